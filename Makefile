@@ -1,0 +1,33 @@
+# One word per task. `make demo` and `make test` set up what they need by themselves.
+PYTHON ?= python3
+VENV ?= .venv
+BIN := $(VENV)/bin
+STAMP := $(VENV)/.installed
+
+.PHONY: demo test lint format bench clean
+
+$(STAMP): pyproject.toml
+	$(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --upgrade pip
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[dev,cluster,classifier]'
+	touch $@
+
+demo: $(STAMP)
+	@mkdir -p out/demo
+	@$(BIN)/xosc-lateral template write cut-in -o out/demo
+	@$(BIN)/xosc-lateral convert out/demo/cut-in.xosc -o out/demo/cut-in_lifelike.xosc --seed 1 --report out/demo/cut-in_report.html
+
+lint: $(STAMP)
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+
+test: lint
+	$(BIN)/python -m pytest -n 2
+
+format: $(STAMP)
+	$(BIN)/ruff check --fix .
+	$(BIN)/ruff format .
+
+clean:
+	rm -rf $(VENV) out build dist

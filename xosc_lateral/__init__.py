@@ -1,0 +1,3 @@
+"""Lifelike lateral movement for OpenSCENARIO traffic."""
+
+__version__ = "0.1.0"

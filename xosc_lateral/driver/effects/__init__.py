@@ -1,0 +1,1 @@
+"""Effects that a profile can hold, one per file."""

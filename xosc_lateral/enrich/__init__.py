@@ -1,0 +1,1 @@
+"""Where motion and driver meet: offsets sampled for every road-following segment of a played scenario."""

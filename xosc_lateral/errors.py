@@ -1,0 +1,53 @@
+"""Everything that this package raises on purpose. Imports nothing, so that every layer can raise it.
+
+Exit codes of the command line follow from this tree: an `XoscLateralError` or an `OSError` means that the input is at
+fault (exit 1, one line); anything else is our bug and keeps its traceback.
+"""
+
+from __future__ import annotations
+
+
+class XoscLateralError(Exception):
+    """Base of all errors that a user can cause. `str()` of it is one line, fit for stderr."""
+
+
+class FormatError(XoscLateralError, ValueError):
+    """A file can't be understood.
+
+    Parameters
+    ----------
+    what : str
+        What is wrong, with the value and, if known, what to do.
+    path : str or path-like, optional
+        The file.
+    line : int, optional
+        Line in the file, from 1.
+    element : str, optional
+        The XML element or table column, as in ``Event 'brake'``.
+    """
+
+    def __init__(self, what: str, *, path: object = None, line: int | None = None, element: str | None = None) -> None:
+        self.what, self.path, self.line, self.element = what, path, line, element
+        super().__init__(" ".join(locate(what, path=path, line=line, element=element).split()))
+
+
+class UnsupportedElementError(FormatError):
+    """An element that is understood but can't be played: named, never skipped."""
+
+
+class PlaybackError(FormatError):
+    """The scenario is valid XML, yet it can't be played (an entity without a place, a lane that is not there)."""
+
+
+class DriverProfileError(XoscLateralError, ValueError):
+    """A driver profile contradicts itself, or a profile of that name is unknown."""
+
+
+class NotEnoughDataError(XoscLateralError, ValueError):
+    """Too little measured data: the message carries what was found and what was needed."""
+
+
+def locate(what: str, *, path: object = None, line: int | None = None, element: str | None = None) -> str:
+    """``path:line: element: what``, leaving out what is unknown."""
+    place = "" if path is None else f"{path}:" if line is None else f"{path}:{line}:"
+    return " ".join(part for part in (place, "" if element is None else f"{element}:", what) if part)

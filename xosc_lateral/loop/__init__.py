@@ -1,0 +1,1 @@
+"""Scores, residual, tracing, closing the loop."""

@@ -1,0 +1,145 @@
+"""Nominal motion: what the maneuvers alone give, before offsets. The player makes it; segments, writer and report read it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import IntFlag
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from xosc_lateral.scenario import Entity
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int32]
+
+
+class Activity(IntFlag):
+    """What an entity does in a row (a bit set, stored as uint8)."""
+
+    ACTIVE = 1
+    """The entity exists (not before AddEntity, not after DeleteEntity)."""
+    LATERAL = 2
+    """A lateral action (lane change, lane offset, lateral distance) runs."""
+    TRAJECTORY = 4
+    """A FollowTrajectory or AcquirePosition-like action moves it."""
+    TELEPORTED = 8
+    """It was placed anew in the step that ends with this row: motion is not continuous from the row before."""
+    OFF_ROAD = 16
+    """Its reference point is on no road."""
+    ROAD_END = 32
+    """It stands at the end of its road."""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class EntityMotion:
+    """One entity's rows, one per step, from time 0 to the end.
+
+    Parameters
+    ----------
+    entity : Entity
+        Name, category, bounding box, performance.
+    time : array, shape (n,)
+        [s] from scenario start, uniform.
+    x, y, z, heading, pitch, roll : array, shape (n,)
+        Pose of the reference point (rear axle). [m], [rad]
+    speed : array, shape (n,)
+        Signed scalar speed. [m/s]
+    road : array of int32, shape (n,)
+        Index into `RoadNetwork.road_ids`; -1 where the entity is on no road.
+    lane : array of int32, shape (n,)
+        OpenDRIVE lane id; 0 where on no road.
+    s : array, shape (n,)
+        Along the road's reference line. [m]
+    offset : array, shape (n,)
+        From the centre of `lane`, positive to the LEFT of the lane's direction of travel. [m]
+    heading_relative : array, shape (n,)
+        Heading relative to the lane's direction of travel. [rad]
+    activity : array of uint8, shape (n,)
+        `Activity` bits.
+    """
+
+    entity: Entity
+    time: FloatArray
+    x: FloatArray
+    y: FloatArray
+    z: FloatArray
+    heading: FloatArray
+    pitch: FloatArray
+    roll: FloatArray
+    speed: FloatArray
+    road: IntArray
+    lane: IntArray
+    s: FloatArray
+    offset: FloatArray
+    heading_relative: FloatArray
+    activity: NDArray[np.uint8]
+
+    @property
+    def name(self) -> str:
+        """The entity's name in the scenario."""
+        return self.entity.name
+
+
+@dataclass(frozen=True, slots=True)
+class PlayedAction:
+    """An action that the player started (and perhaps ended).
+
+    Parameters
+    ----------
+    action : object
+        The action of `xosc_lateral.scenario`, with its place in the file.
+    actor : str or None
+        Entity acting; None for global and user-defined actions.
+    path : tuple of str
+        Names from story to action; ``("Init",)`` for init actions.
+    start : float
+        Time of the frame in which it started. [s]
+    end : float or None
+        Time at which it ended; None: still running at the end of the run. [s]
+    """
+
+    action: Any
+    actor: str | None
+    path: tuple[str, ...]
+    start: float
+    end: float | None
+
+
+@dataclass(frozen=True, slots=True)
+class Note:
+    """Something that was not played, or not as written: never silent."""
+
+    what: str
+    path: str
+    line: int | None
+    element: str | None = None
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class NominalMotion:
+    """A played scenario.
+
+    Parameters
+    ----------
+    step : float
+        [s]
+    entities : tuple of EntityMotion
+        In the scenario's order.
+    actions : tuple of PlayedAction
+        Every action started, in order of start.
+    end_time : float
+        [s]
+    ended_by : str
+        ``"stop trigger"`` or ``"time limit"`` or what else ended the run.
+    notes : tuple of Note
+        What could not be played as written.
+    """
+
+    step: float
+    entities: tuple[EntityMotion, ...]
+    actions: tuple[PlayedAction, ...]
+    end_time: float
+    ended_by: str
+    notes: tuple[Note, ...]

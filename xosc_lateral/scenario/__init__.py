@@ -1,0 +1,1 @@
+"""The storyboard as data: frozen elements under the standard's names, parameters, expressions."""

@@ -1,0 +1,82 @@
+"""The one thing that the driver model and the scenario player share: a stretch of road-following driving."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from types import MappingProxyType
+
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+
+# Contexts that a scenario can supply by itself (DESIGN, section 4): name -> (unit, what is neutral).
+# `None` as the neutral value: "there is none", written as NaN in the arrays (no vehicle ahead, say).
+CONTEXT_UNITS: Mapping[str, str] = MappingProxyType(
+    {
+        "speed": "m/s",
+        "acceleration": "m/s2",
+        "curvature": "1/m",
+        "lane_width": "m",
+        "lane_index": "-",
+        "lane_count": "-",
+        "crossfall": "%",
+        "grade": "%",
+        "lead_distance": "m",
+        "lead_is_truck": "-",
+        "left_distance": "m",
+        "right_distance": "m",
+        "left_is_truck": "-",
+        "right_is_truck": "-",
+        "oncoming_distance": "m",
+        "time_of_day": "h",
+        "rain": "mm/h",
+        "wind_speed": "m/s",
+        "wind_direction": "deg",
+        "friction": "-",
+        "illuminance": "lx",
+    }
+)
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Segment:
+    """A stretch of one vehicle's motion with no lateral action running, on a uniform time grid.
+
+    Parameters
+    ----------
+    time : array, shape (n,)
+        Uniformly increasing. [s]
+    lane_width : array, shape (n,)
+        Width of the lane followed. [m]
+    speed : array, shape (n,)
+        [m/s]
+    context : mapping of str to array, shape (n,)
+        What the driver may react to, under DESIGN's names or any other; NaN where there is nothing (no leader).
+        A name that is absent is neutral.
+    """
+
+    time: FloatArray
+    lane_width: FloatArray
+    speed: FloatArray
+    context: Mapping[str, FloatArray] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        """Copy and freeze the arrays; refuse unequal lengths."""
+        n = len(self.time)
+        for name in ("time", "lane_width", "speed"):
+            object.__setattr__(self, name, _frozen(getattr(self, name), name, n))
+        context = {name: _frozen(values, name, n) for name, values in self.context.items()}
+        object.__setattr__(self, "context", MappingProxyType(context))
+
+    def __len__(self) -> int:
+        return len(self.time)
+
+
+def _frozen(values: FloatArray, name: str, n: int) -> FloatArray:
+    array = np.array(values, dtype=np.float64)
+    if array.shape != (n,):
+        raise ValueError(f"{name}: shape {array.shape}, expected ({n},)")
+    array.flags.writeable = False
+    return array

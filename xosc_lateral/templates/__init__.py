@@ -1,0 +1,1 @@
+"""Maneuver-based motorway scenarios to start from."""
