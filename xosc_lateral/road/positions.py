@@ -1,0 +1,121 @@
+"""What the road network answers with: poses, lane positions, lane links. Plain named tuples, of floats or of arrays."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int32]
+
+
+class Pose(NamedTuple):
+    """One pose. [m], [rad]; heading counter-clockwise from x, pitch positive nose down, roll positive right side down."""
+
+    x: float
+    y: float
+    z: float
+    heading: float
+    pitch: float
+    roll: float
+
+
+class Poses(NamedTuple):
+    """Poses as arrays of one shape; fields as in `Pose`."""
+
+    x: FloatArray
+    y: FloatArray
+    z: FloatArray
+    heading: FloatArray
+    pitch: FloatArray
+    roll: FloatArray
+
+
+class LanePosition(NamedTuple):
+    """A place on the road.
+
+    `road` is an index into `RoadNetwork.road_ids`, `offset` [m] counts from the lane centre, positive to the LEFT of
+    travel, `t` [m] from the reference line, positive to its left, and `distance` [m] from the lane's nearest edge
+    (0 inside the lane).
+    """
+
+    road: int
+    lane: int
+    s: float
+    offset: float
+    t: float
+    distance: float
+
+
+class LanePositions(NamedTuple):
+    """Places on the road as arrays of one shape; fields as in `LanePosition`; road -1 and lane 0 where there is none."""
+
+    road: IntArray
+    lane: IntArray
+    s: FloatArray
+    offset: FloatArray
+    t: FloatArray
+    distance: FloatArray
+
+
+class LaneState(NamedTuple):
+    """A lane at one `s`: t of its centre [m], d(centre t)/ds [-], width [m]."""
+
+    centre_t: float
+    slope: float
+    width: float
+
+
+class LaneInfo(NamedTuple):
+    """One lane of a cross-section: OpenDRIVE id, type, centre t [m], width [m], +1 driven along s or -1 against it."""
+
+    id: int
+    type: str
+    centre_t: float
+    width: float
+    direction: int
+
+
+class LaneLink(NamedTuple):
+    """Where a lane leads: entered at `s` (0 or the road's length) and then followed along (+1) or against (-1) s."""
+
+    road: int
+    lane: int
+    s: float
+    direction: int
+
+
+class Advance(NamedTuple):
+    """Where a move along the lanes ended.
+
+    `direction` is that of the movement along s on the new road; `remaining` [m] is what could not be moved because the
+    lane ends there (0 otherwise).
+    """
+
+    road: int
+    lane: int
+    s: float
+    direction: int
+    remaining: float
+
+
+class RouteStep(NamedTuple):
+    """One road of a route, driven from `s_start` to `s_end` (s_end < s_start: against s)."""
+
+    road: int
+    direction: int
+    s_start: float
+    s_end: float
+
+
+class RoadMark(NamedTuple):
+    """Marking at a lane's outer edge over [s_start, s_end) [m]; type and colour in the words of OpenDRIVE."""
+
+    lane: int
+    s_start: float
+    s_end: float
+    type: str
+    color: str
+    width: float
