@@ -1,0 +1,142 @@
+"""Report pages: escaped, self-contained, the same bytes each time."""
+
+from __future__ import annotations
+
+import re
+from html.parser import HTMLParser
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from xosc_lateral.report.figures import BLUE, LARGEST_SVG, figure_markup, figure_style, new_figure
+from xosc_lateral.report.page import NOTHING, KeyFigure, Page, format_number
+
+VOID = {"meta", "img", "br", "link", "input"}
+
+
+class Balance(HTMLParser):
+    """Collects ids, and fails on a closing tag that does not match."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.open: list[str] = []
+        self.ids: list[str] = []
+        self.feed(text)
+        self.close()
+
+    def handle_starttag(self, tag, attrs):
+        self.ids += [value for name, value in attrs if name == "id"]
+        if tag not in VOID:
+            self.open.append(tag)
+
+    def handle_startendtag(self, tag, attrs):
+        self.ids += [value for name, value in attrs if name == "id"]
+
+    def handle_endtag(self, tag):
+        assert self.open.pop() == tag
+
+
+@figure_style()
+def waves(n_points: int = 200, rasterized: bool = False):
+    figure, axes = new_figure(1, 1, height=2.0)
+    time = np.linspace(0.0, 10.0, n_points)
+    axes[0, 0].plot(time, np.random.default_rng(1).normal(size=n_points), rasterized=rasterized)
+    axes[0, 0].set_xlabel("time [s]")
+    return figure
+
+
+def full_page() -> Page:
+    page = Page("Cut-in").lead("Two cars.", [KeyFigure(0.2134, "spread [m]", "measured 0.2 m", "good")])
+    page.section("Paths").figure(waves(), "Paths", alt="two paths").section("Paths").figure(
+        waves(), "Again", alt="same"
+    )
+    page.table([{"entity": "Ego", "spread [m]": 0.2}], "Per entity", tones={0: "bad"}).items(["one"]).warning("hot")
+    return page.note("cold").provenance({"seed": 7, "inputs": ["a.xosc", "b.xodr"]})
+
+
+def test_the_same_calls_give_the_same_bytes():
+    assert full_page().html() == full_page().html()
+
+
+def test_tags_balance_and_ids_are_unique_though_a_figure_appears_twice():
+    seen = Balance(full_page().html())
+    assert seen.open == []
+    assert len(seen.ids) == len(set(seen.ids)) > 10
+
+
+def test_every_reference_inside_the_page_has_its_target_and_none_leads_outside():
+    html = full_page().html()
+    ids = set(Balance(html).ids)
+    targets = set(re.findall(r'href="#([^"]+)"|url\(#([^)]+)\)', html))
+    assert {first or second for first, second in targets} <= ids
+    outside = re.findall(r'(?:src|href)="(?!#|data:)[^"]*"|@import|url\((?!#|data:)', html)
+    assert outside == []
+    assert "<script" not in html
+
+
+@pytest.mark.parametrize(
+    "place", ["title", "lead", "label", "section", "text", "item", "note", "cell", "column", "caption", "alt", "fact"]
+)
+def test_text_from_outside_is_escaped_everywhere(place):
+    evil = '<img src=x onerror="a()">&'
+
+    def said(where: str) -> str:
+        return evil if where == place else "plain"
+
+    page = Page(said("title")).lead(said("lead"), [KeyFigure(said("label"), said("label"), said("label"))])
+    page.section(said("section"), said("text")).items([said("item")]).note(said("note"))
+    page.table([{said("column"): said("cell")}], said("caption")).figure(waves(), said("caption"), alt=said("alt"))
+    html = page.provenance({said("fact"): said("fact")}).html()
+    assert "onerror" in html
+    assert "<img src=x" not in html
+    assert 'onerror="' not in html
+
+
+def test_code_between_backticks_is_the_only_markup():
+    html = Page("p").text("run `make <x>` **now**").html()
+    assert "<code>make &lt;x&gt;</code> **now**" in html
+
+
+def test_numbers_are_short_and_what_is_missing_is_a_dash():
+    written = [
+        format_number(value)
+        for value in (0.2134, 1234.5, 3.0, 0.0, -0.00012345, 1.234e-9, float("nan"), 2.5e7, float("inf"))
+    ]
+    assert written == ["0.213", "1234", "3", "0", "-0.000123", "1.23e-09", NOTHING, "2.50e+07", "∞"]
+
+
+def test_a_data_frame_and_a_list_of_rows_give_the_same_table():
+    rows = [{"entity": "Ego", "p": 1e-12, "ok": True}, {"entity": "Van", "p": 0.5, "ok": False}]
+    from_rows = Page("p").table(rows, formats={"p": ".1e"}).html()
+    assert from_rows == Page("p").table(pd.DataFrame(rows), formats={"p": ".1e"}).html()
+    assert '<td class="number">1.0e-12</td><td>yes</td>' in from_rows
+
+
+def test_an_empty_table_says_so():
+    assert "Findings: none." in Page("p").table([], "Findings").html()
+    assert "Findings: none." in Page("p").table(pd.DataFrame({"a": []}), "Findings").html()
+
+
+def test_figures_take_their_colours_from_the_page():
+    markup = figure_markup(waves(), "waves", key="f1")
+    assert BLUE not in markup
+    assert "var(--series-1)" in markup
+    assert ">time [s]</text>" in markup
+
+
+def test_a_figure_too_large_for_svg_becomes_a_picture():
+    with figure_style():
+        figure, axes = new_figure(height=2.0)
+        axes[0, 0].plot(np.random.default_rng(1).normal(size=30_000), "o")  # markers are not simplified, as lines are
+    markup = figure_markup(figure, "noise", key="f1")
+    assert markup.startswith('<img alt="noise" src="data:image/png;base64,')
+    assert len(markup) < LARGEST_SVG
+
+
+def test_figure_style_leaves_the_callers_settings_alone():
+    import matplotlib as mpl
+
+    before = dict(mpl.rcParams)
+    figure_markup(waves(rasterized=True), "waves", key="f1")
+    assert dict(mpl.rcParams) == before

@@ -1,0 +1,171 @@
+"""How figures look in every report: palette and matplotlib style, and figures into SVG with the same bytes each time.
+
+Colours here are for the light theme. `figure_markup` replaces them by CSS variables of `page.css`, so that a figure
+follows the reader's light or dark theme; any other colour stays as it is.
+"""
+
+from __future__ import annotations
+
+import base64
+import io
+import re
+from collections.abc import Iterator
+from contextlib import contextmanager
+from html import escape
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+# Okabe and Ito, "Color universal design" (2008): told apart with any common colour blindness.
+BLUE, VERMILLION, GREEN, PURPLE, ORANGE, SKY = "#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9"
+PALETTE = (BLUE, VERMILLION, GREEN, PURPLE, ORANGE, SKY)
+INK, MUTED, GRID, SHADE, PAPER = "#1b2126", "#6a737b", "#dde1e4", "#eef1f3", "#ffffff"
+
+# The same thing has the same colour in every report.
+MEASURED, SAMPLED = BLUE, VERMILLION
+BEFORE, AFTER = MUTED, BLUE
+NOMINAL, ENRICHED = MUTED, BLUE
+
+CSS_VARIABLES = {
+    INK: "--ink",
+    MUTED: "--muted",
+    GRID: "--grid",
+    SHADE: "--shade",
+    PAPER: "--paper",
+    **{color: f"--series-{number}" for number, color in enumerate(PALETTE, start=1)},
+}
+
+FULL_WIDTH = 9.2
+"""Width of a figure that fills the text column. [inch]"""
+
+LARGEST_SVG = 1_500_000
+"""A figure beyond this is embedded as a picture: browsers get slow on larger SVG. [byte]"""
+
+_RASTER_DPI = 160
+_STYLE: dict[Any, Any] = {
+    "figure.facecolor": "none",
+    "figure.constrained_layout.use": True,
+    "savefig.facecolor": "none",
+    "font.family": "sans-serif",
+    "font.size": 10.0,
+    "text.color": INK,
+    "axes.facecolor": "none",
+    "axes.edgecolor": MUTED,
+    "axes.labelcolor": INK,
+    "axes.labelsize": 10.0,
+    "axes.titlecolor": INK,
+    "axes.titlesize": 10.5,
+    "axes.titleweight": "bold",
+    "axes.titlelocation": "left",
+    "axes.linewidth": 0.8,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.grid": True,
+    "axes.axisbelow": True,
+    "axes.formatter.useoffset": False,
+    "grid.color": GRID,
+    "grid.linewidth": 0.8,
+    "xtick.color": MUTED,
+    "ytick.color": MUTED,
+    "xtick.labelcolor": INK,
+    "ytick.labelcolor": INK,
+    "xtick.labelsize": 9.0,
+    "ytick.labelsize": 9.0,
+    "lines.linewidth": 1.5,
+    "legend.facecolor": PAPER,
+    "legend.edgecolor": "none",
+    "legend.framealpha": 0.8,
+    "legend.fontsize": 9.0,
+    "path.simplify_threshold": 0.2,
+    "svg.fonttype": "none",  # text stays text: searchable, read aloud, a tenth of the size
+}
+
+
+@contextmanager
+def figure_style() -> Iterator[None]:
+    """Matplotlib's settings while a figure is drawn: ``with figure_style():``, or the decorator ``@figure_style()``."""
+    import matplotlib as mpl
+    from cycler import cycler
+
+    with mpl.rc_context({**_STYLE, "axes.prop_cycle": cycler(color=PALETTE)}):
+        yield
+
+
+def new_figure(
+    rows: int = 1, columns: int = 1, *, height: float = 3.0, width: float = FULL_WIDTH, **options: Any
+) -> tuple[Figure, Any]:
+    """Figure and array of axes, shape (rows, columns), in the reports' style; no pyplot, so nothing stays in memory.
+
+    Parameters
+    ----------
+    rows, columns : int
+        Grid of axes.
+    height, width : float
+        Size of the whole figure. [inch]
+    options
+        Passed to `matplotlib.figure.Figure.subplots`, such as ``sharex=True``.
+    """
+    from matplotlib.figure import Figure
+
+    with figure_style():
+        figure = Figure(figsize=(width, height))
+        axes = figure.subplots(rows, columns, squeeze=False, **options)
+    return figure, axes
+
+
+def figure_markup(figure: Figure, alt: str, *, key: str) -> str:
+    """Figure as an inline ``<svg>`` (or a PNG in an ``<img>`` where the SVG would be larger than `LARGEST_SVG`).
+
+    Parameters
+    ----------
+    figure : Figure
+        Drawn under `figure_style`.
+    alt : str
+        What the figure shows, for those who can't see it.
+    key : str
+        Unique in the page; element ids start with it.
+    """
+    svg = _svg(figure, key)
+    return _inline(svg, alt, key) if len(svg) <= LARGEST_SVG else _picture(figure, alt)
+
+
+def _svg(figure: Figure, key: str) -> str:
+    import matplotlib as mpl
+
+    buffer = io.StringIO()
+    # Ids in the SVG are salted hashes and its metadata hold the date: both are fixed, for the same bytes each time.
+    with mpl.rc_context({**_STYLE, "svg.hashsalt": key}):
+        figure.savefig(buffer, format="svg", metadata={"Date": None, "Creator": None}, dpi=_RASTER_DPI)
+    return buffer.getvalue()
+
+
+def _inline(svg: str, alt: str, key: str) -> str:
+    svg = svg[svg.index("<svg") :]
+    svg = re.sub(r"<metadata>.*?</metadata>\s*", "", svg, flags=re.DOTALL)
+    svg = re.sub(r'(\bid="|href="#|url\(#)', rf"\g<1>{key}-", svg)
+    svg = re.sub(r'\b(d|points)="([^"]*)"', lambda m: f'{m[1]}="{_rounded(m[2])}"', svg)
+    svg = re.sub(r"#[0-9a-f]{6}\b", lambda m: f"var({CSS_VARIABLES[m[0]]})" if m[0] in CSS_VARIABLES else m[0], svg)
+    svg = re.sub(r"font: ([^;]*?)(\d+(?:\.\d+)?)px [^;\"]*", r"font: \1\2px var(--sans)", svg)
+    head = re.search(r'viewBox="[^"]*"', svg)
+    assert head is not None, "matplotlib writes a viewBox"
+    body = svg[svg.index(">") + 1 :].strip()
+    return (
+        f'<svg {head[0]} xmlns:xlink="http://www.w3.org/1999/xlink" role="img" aria-label="{escape(alt)}">'
+        f"<title>{escape(alt)}</title>{body}"
+    )
+
+
+def _rounded(path: str) -> str:
+    """Coordinates to a hundredth of a point, well below what a screen can show."""
+    return re.sub(r"-?\d+\.\d{3,}", lambda m: f"{float(m[0]):.2f}".rstrip("0").rstrip("."), " ".join(path.split()))
+
+
+def _picture(figure: Figure, alt: str) -> str:
+    import matplotlib as mpl
+
+    buffer = io.BytesIO()
+    with mpl.rc_context(_STYLE):
+        figure.savefig(buffer, format="png", dpi=_RASTER_DPI, facecolor=PAPER, metadata={"Software": None})
+    data = base64.b64encode(buffer.getvalue()).decode("ascii")
+    return f'<img alt="{escape(alt)}" src="data:image/png;base64,{data}">'
