@@ -1,0 +1,74 @@
+"""Lane change, lane offset, lateral distance."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from xosc_lateral.scenario.dynamics import DynamicConstraints, TransitionDynamics
+from xosc_lateral.scenario.enums import CoordinateSystem, DynamicsShape, LateralDisplacement
+from xosc_lateral.scenario.place import Place
+
+
+@dataclass(frozen=True, slots=True)
+class AbsoluteTargetLane:
+    """By lane id."""
+
+    lane_id: int
+
+
+@dataclass(frozen=True, slots=True)
+class RelativeTargetLane:
+    """`value` lanes from an entity's lane."""
+
+    entity_ref: str
+    value: int
+
+
+@dataclass(frozen=True, slots=True)
+class LaneChangeAction:
+    """Change to a lane; `target_lane_offset` along +t. [m]"""
+
+    target: AbsoluteTargetLane | RelativeTargetLane
+    dynamics: TransitionDynamics
+    place: Place
+    target_lane_offset: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class AbsoluteTargetLaneOffset:
+    """Along +t from the lane's centre. [m]"""
+
+    value: float
+
+
+@dataclass(frozen=True, slots=True)
+class RelativeTargetLaneOffset:
+    """Along +t from an entity's position. [m]"""
+
+    entity_ref: str
+    value: float
+
+
+@dataclass(frozen=True, slots=True)
+class LaneOffsetAction:
+    """Move inside the lane; `max_lateral_acc` None: as fast as can be (DESIGN: the player's default). [m/s2]"""
+
+    target: AbsoluteTargetLaneOffset | RelativeTargetLaneOffset
+    shape: DynamicsShape
+    continuous: bool
+    place: Place
+    max_lateral_acc: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class LateralDistanceAction:
+    """Keep a lateral distance [m] to an entity; `distance` None: the present one."""
+
+    entity_ref: str
+    continuous: bool
+    freespace: bool
+    place: Place
+    distance: float | None = None
+    displacement: LateralDisplacement = LateralDisplacement.ANY
+    coordinate_system: CoordinateSystem | None = None
+    constraints: DynamicConstraints | None = None

@@ -1,0 +1,222 @@
+"""Conditions on the state of triggering entities. `value` is in the quantity's SI unit."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from xosc_lateral.scenario.enums import (
+    AngleType,
+    CoordinateSystem,
+    DirectionalDimension,
+    EntityCategory,
+    RelativeDistanceType,
+    RoutingAlgorithm,
+    Rule,
+)
+from xosc_lateral.scenario.place import Place, Unsupported
+from xosc_lateral.scenario.position import Position
+
+
+@dataclass(frozen=True, slots=True)
+class EndOfRoadCondition:
+    """At the end of its road for this long. [s]"""
+
+    duration: float
+    place: Place
+
+
+@dataclass(frozen=True, slots=True)
+class CollisionCondition:
+    """Touches that entity, or any of that category."""
+
+    place: Place
+    entity_ref: str | None = None
+    by_type: EntityCategory | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class OffroadCondition:
+    """Off the road for this long. [s]"""
+
+    duration: float
+    place: Place
+
+
+@dataclass(frozen=True, slots=True)
+class TimeHeadwayCondition:
+    """Distance to an entity over own speed. [s] `along_route` (1.0) None: not said."""
+
+    entity_ref: str
+    value: float
+    rule: Rule
+    freespace: bool
+    place: Place
+    coordinate_system: CoordinateSystem | None = None
+    distance_type: RelativeDistanceType | None = None
+    along_route: bool | None = None
+    routing_algorithm: RoutingAlgorithm | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class TimeToCollisionCondition:
+    """Distance to an entity or position over closing speed. [s]"""
+
+    target: str | Position
+    value: float
+    rule: Rule
+    freespace: bool
+    place: Place
+    coordinate_system: CoordinateSystem | None = None
+    distance_type: RelativeDistanceType | None = None
+    along_route: bool | None = None
+    routing_algorithm: RoutingAlgorithm | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class AccelerationCondition:
+    """[m/s2]; `direction` None: the magnitude."""
+
+    value: float
+    rule: Rule
+    place: Place
+    direction: DirectionalDimension | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class StandStillCondition:
+    """Stands for this long. [s]"""
+
+    duration: float
+    place: Place
+
+
+@dataclass(frozen=True, slots=True)
+class SpeedCondition:
+    """[m/s]; `direction` None: the scalar speed."""
+
+    value: float
+    rule: Rule
+    place: Place
+    direction: DirectionalDimension | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class RelativeSpeedCondition:
+    """Own speed minus that of an entity. [m/s]"""
+
+    entity_ref: str
+    value: float
+    rule: Rule
+    place: Place
+    direction: DirectionalDimension | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class TraveledDistanceCondition:
+    """Since the scenario's start. [m]"""
+
+    value: float
+    place: Place
+
+
+@dataclass(frozen=True, slots=True)
+class ReachPositionCondition:
+    """Within `tolerance` of a position. [m]"""
+
+    position: Position
+    tolerance: float
+    place: Place
+
+
+@dataclass(frozen=True, slots=True)
+class DistanceCondition:
+    """Distance to a position. [m]"""
+
+    position: Position
+    value: float
+    rule: Rule
+    freespace: bool
+    place: Place
+    coordinate_system: CoordinateSystem | None = None
+    distance_type: RelativeDistanceType | None = None
+    along_route: bool | None = None
+    routing_algorithm: RoutingAlgorithm | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class RelativeDistanceCondition:
+    """Distance to an entity. [m]"""
+
+    entity_ref: str
+    value: float
+    rule: Rule
+    freespace: bool
+    distance_type: RelativeDistanceType
+    place: Place
+    coordinate_system: CoordinateSystem | None = None
+    routing_algorithm: RoutingAlgorithm | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class RelativeLaneRange:
+    """Lanes `from_lane` to `to_lane`, relative to the own one; None: open."""
+
+    from_lane: int | None
+    to_lane: int | None
+
+
+@dataclass(frozen=True, slots=True)
+class RelativeClearanceCondition:
+    """Nobody (of `entity_refs`, or at all when empty) in these lanes within these distances. [m]"""
+
+    opposite_lanes: bool
+    freespace: bool
+    place: Place
+    distance_forward: float = 0.0
+    distance_backward: float = 0.0
+    lane_ranges: tuple[RelativeLaneRange, ...] = ()
+    entity_refs: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class AngleCondition:
+    """Own angle within a tolerance. [rad]"""
+
+    angle_type: AngleType
+    angle: float
+    tolerance: float
+    place: Place
+    coordinate_system: CoordinateSystem | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class RelativeAngleCondition:
+    """Angle relative to an entity's within a tolerance. [rad]"""
+
+    entity_ref: str
+    angle_type: AngleType
+    angle: float
+    tolerance: float
+    place: Place
+    coordinate_system: CoordinateSystem | None = None
+
+
+EntityCondition = (
+    EndOfRoadCondition
+    | CollisionCondition
+    | OffroadCondition
+    | TimeHeadwayCondition
+    | TimeToCollisionCondition
+    | AccelerationCondition
+    | StandStillCondition
+    | SpeedCondition
+    | RelativeSpeedCondition
+    | TraveledDistanceCondition
+    | ReachPositionCondition
+    | DistanceCondition
+    | RelativeDistanceCondition
+    | RelativeClearanceCondition
+    | AngleCondition
+    | RelativeAngleCondition
+    | Unsupported
+)

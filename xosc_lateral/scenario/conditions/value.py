@@ -1,0 +1,98 @@
+"""Conditions on time, parameters, variables, signals and the storyboard itself."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from datetime import datetime
+
+from xosc_lateral.scenario.enums import Rule, StoryboardElementState, StoryboardElementType
+from xosc_lateral.scenario.place import Place, Unsupported
+
+
+@dataclass(frozen=True, slots=True)
+class ParameterCondition:
+    """`value` is text: numbers are compared as numbers where both are."""
+
+    parameter_ref: str
+    value: str
+    rule: Rule
+    place: Place
+
+
+@dataclass(frozen=True, slots=True)
+class VariableCondition:
+    """`value` is text: numbers are compared as numbers where both are."""
+
+    variable_ref: str
+    value: str
+    rule: Rule
+    place: Place
+
+
+@dataclass(frozen=True, slots=True)
+class SimulationTimeCondition:
+    """[s]"""
+
+    value: float
+    rule: Rule
+    place: Place
+
+
+@dataclass(frozen=True, slots=True)
+class TimeOfDayCondition:
+    """Against the environment's clock."""
+
+    date_time: datetime
+    rule: Rule
+    place: Place
+
+
+@dataclass(frozen=True, slots=True)
+class StoryboardElementStateCondition:
+    """State or transition of a storyboard element; `element_ref` is the trailing part of ``story::act::...::name``."""
+
+    element_type: StoryboardElementType
+    element_ref: str
+    state: StoryboardElementState
+    place: Place
+
+
+@dataclass(frozen=True, slots=True)
+class TrafficSignalCondition:
+    """A signal shows a state."""
+
+    name: str
+    state: str
+    place: Place
+
+
+@dataclass(frozen=True, slots=True)
+class TrafficSignalControllerCondition:
+    """A signal controller is in a phase."""
+
+    controller_ref: str
+    phase: str
+    place: Place
+
+
+@dataclass(frozen=True, slots=True)
+class UserDefinedValueCondition:
+    """A value from outside: never known while playing."""
+
+    name: str
+    value: str
+    rule: Rule
+    place: Place
+
+
+ValueCondition = (
+    ParameterCondition
+    | VariableCondition
+    | SimulationTimeCondition
+    | TimeOfDayCondition
+    | StoryboardElementStateCondition
+    | TrafficSignalCondition
+    | TrafficSignalControllerCondition
+    | UserDefinedValueCondition
+    | Unsupported
+)

@@ -1,0 +1,28 @@
+"""How values change: transition dynamics and dynamic constraints."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from xosc_lateral.scenario.enums import DynamicsDimension, DynamicsShape, FollowingMode
+
+
+@dataclass(frozen=True, slots=True)
+class TransitionDynamics:
+    """Shape, dimension and value of a transition; `value` in s, m, or 1/s of the quantity (peak rate)."""
+
+    shape: DynamicsShape
+    dimension: DynamicsDimension
+    value: float
+    following_mode: FollowingMode = FollowingMode.POSITION
+
+
+@dataclass(frozen=True, slots=True)
+class DynamicConstraints:
+    """Limits of one action; None where the file has none (the performance holds then). [m/s], [m/s2], [m/s3]"""
+
+    max_acceleration: float | None = None
+    max_deceleration: float | None = None
+    max_speed: float | None = None
+    max_acceleration_rate: float | None = None
+    max_deceleration_rate: float | None = None

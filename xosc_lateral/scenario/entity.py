@@ -1,0 +1,129 @@
+"""Scenario objects: vehicles, pedestrians, things, and the controllers assigned to them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from xosc_lateral.scenario.enums import EntityCategory, VehicleCategory
+from xosc_lateral.scenario.place import Place
+
+
+@dataclass(frozen=True, slots=True)
+class BoundingBox:
+    """Box around the entity; its centre in the entity's frame (x ahead of the reference point, y left, z up). [m]"""
+
+    center_x: float
+    center_y: float
+    center_z: float
+    length: float
+    width: float
+    height: float
+
+
+@dataclass(frozen=True, slots=True)
+class Performance:
+    """Limits of a vehicle; infinite where the file has none. [m/s], [m/s2], [m/s3]"""
+
+    max_speed: float = float("inf")
+    max_acceleration: float = float("inf")
+    max_deceleration: float = float("inf")
+    max_acceleration_rate: float = float("inf")
+    max_deceleration_rate: float = float("inf")
+
+
+@dataclass(frozen=True, slots=True)
+class Axle:
+    """An axle; `position_x` ahead of the reference point. [m], [rad]"""
+
+    max_steering: float
+    position_x: float
+    position_z: float
+    track_width: float
+    wheel_diameter: float
+
+
+@dataclass(frozen=True, slots=True)
+class Axles:
+    """Front (a trailer may have none), rear and further axles."""
+
+    front: Axle | None
+    rear: Axle | None
+    additional: tuple[Axle, ...] = ()
+
+    @property
+    def wheelbase(self) -> float | None:
+        """Distance from the rear to the front axle. [m]"""
+        return None if self.front is None or self.rear is None else self.front.position_x - self.rear.position_x
+
+
+@dataclass(frozen=True, slots=True)
+class Controller:
+    """A controller by name. It is named and reported; playback uses the default driver instead."""
+
+    name: str
+    place: Place
+    properties: Mapping[str, str] = field(default_factory=dict)
+    object_name: str | None = None
+    """Name of the ObjectController (1.3), which ActivateControllerAction may refer to."""
+
+
+@dataclass(frozen=True, slots=True)
+class Entity:
+    """One scenario object.
+
+    Parameters
+    ----------
+    name : str
+        Name of the ScenarioObject.
+    category : EntityCategory
+        Vehicle, pedestrian, miscellaneous or external.
+    place : Place
+        Of the ScenarioObject.
+    bounding_box : BoundingBox
+        Field default where the file has none: a car of 5 m x 2 m.
+    vehicle_category : VehicleCategory or None
+        Vehicles only.
+    performance : Performance
+        Vehicles only; else without limits.
+    axles : Axles or None
+        Vehicles only.
+    controllers : tuple of Controller
+        Assigned at the start.
+    object_name : str
+        Name of the Vehicle, Pedestrian or MiscObject (often its catalog entry).
+    kind : str
+        The file's own category code (``car``, ``wheelchair``, ``pole`` ...); empty for external objects.
+    trailer : str or None
+        Name of the entity that it pulls from the start.
+    hitch_x, coupler_x : float or None
+        Of the trailer coupling, ahead of the reference point. [m]
+    mass : float or None
+        [kg]
+    model3d : str or None
+        3D model file, as written.
+    properties : mapping of str to str
+        Vendor properties.
+    """
+
+    name: str
+    category: EntityCategory
+    place: Place
+    bounding_box: BoundingBox
+    vehicle_category: VehicleCategory | None = None
+    performance: Performance = field(default_factory=Performance)
+    axles: Axles | None = None
+    controllers: tuple[Controller, ...] = ()
+    object_name: str = ""
+    kind: str = ""
+    trailer: str | None = None
+    hitch_x: float | None = None
+    coupler_x: float | None = None
+    mass: float | None = None
+    model3d: str | None = None
+    properties: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def is_vehicle(self) -> bool:
+        """Vehicles are what lateral movement is added to; all else plays along."""
+        return self.category is EntityCategory.VEHICLE

@@ -1,0 +1,110 @@
+"""A scenario as read: everything that playing and writing need."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from xosc_lateral.scenario.entity import Entity
+from xosc_lateral.scenario.enums import ParameterType
+from xosc_lateral.scenario.place import Place, Unsupported
+from xosc_lateral.scenario.storyboard import Storyboard
+
+
+@dataclass(frozen=True, slots=True)
+class FileHeader:
+    """Version, author, description; `date` as written."""
+
+    major: int
+    minor: int
+    author: str
+    description: str
+    date: str
+
+    @property
+    def version(self) -> tuple[int, int]:
+        """(1, 0) to (1, 3)."""
+        return self.major, self.minor
+
+
+@dataclass(frozen=True, slots=True)
+class Parameter:
+    """A declared parameter or variable with its value after overrides and expressions, as text."""
+
+    name: str
+    type: ParameterType
+    value: str
+    place: Place
+
+
+@dataclass(frozen=True, slots=True)
+class TrafficSignalPhase:
+    """States of signals during one phase; `duration` [s]"""
+
+    name: str
+    duration: float
+    states: tuple[tuple[str, str], ...]
+
+
+@dataclass(frozen=True, slots=True)
+class TrafficSignalController:
+    """Phases one after another, for ever; `delay` [s] to the `reference` controller."""
+
+    name: str
+    delay: float
+    reference: str | None
+    phases: tuple[TrafficSignalPhase, ...]
+    place: Place
+
+
+@dataclass(frozen=True, slots=True)
+class Scenario:
+    """One concrete scenario.
+
+    Parameters
+    ----------
+    path : Path
+        The file, as given.
+    header : FileHeader
+    parameters, variables : mapping of name to Parameter
+        Global ones; a player starts from these values.
+    catalog_locations : mapping of str to Path
+        Catalog element name (``VehicleCatalog``) to its folder or file.
+    road_file : Path or None
+        RoadNetwork/LogicFile, resolved against the scenario's folder; None: no road.
+    scene_graph_file : str or None
+        As written.
+    traffic_signal_controllers : tuple
+    entities : tuple of Entity
+        In file order; a trailer described inside its tractor follows it as an entity of its own.
+    storyboard : Storyboard
+    remarks : tuple of Unsupported
+        What was read over because motion does not depend on it, or is replaced (a controller whose catalog is missing).
+    input_files : tuple of Path
+        Every file that went in, the scenario first (for hashes).
+    source : bytes
+        The scenario file's bytes: the writer parses them again.
+    """
+
+    path: Path
+    header: FileHeader
+    parameters: Mapping[str, Parameter]
+    variables: Mapping[str, Parameter]
+    catalog_locations: Mapping[str, Path]
+    road_file: Path | None
+    scene_graph_file: str | None
+    traffic_signal_controllers: tuple[TrafficSignalController, ...]
+    entities: tuple[Entity, ...]
+    storyboard: Storyboard
+    road_place: Place | None = None
+    remarks: tuple[Unsupported, ...] = ()
+    input_files: tuple[Path, ...] = ()
+    source: bytes = field(default=b"", repr=False)
+
+    def entity(self, name: str) -> Entity:
+        """The entity of that name; `KeyError` if there is none (the reader has checked every reference)."""
+        for entity in self.entities:
+            if entity.name == name:
+                return entity
+        raise KeyError(name)

@@ -1,0 +1,126 @@
+"""The storyboard tree under the standard's names."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from xosc_lateral.scenario.actions import ActionContent
+from xosc_lateral.scenario.enums import Priority
+from xosc_lateral.scenario.place import Place
+from xosc_lateral.scenario.trigger import Trigger
+
+
+@dataclass(frozen=True, slots=True)
+class Action:
+    """One action, of init (then without a name) or of an event.
+
+    Parameters
+    ----------
+    name : str
+        Empty in init.
+    content : one of `ActionContent`
+        What it does.
+    place : Place
+        Of the Action, PrivateAction, GlobalAction or UserDefinedAction element.
+    is_private : bool
+        Acts once for each actor; else once.
+    scope : mapping of str to str
+        Parameters of story, maneuver or catalog that the element may refer to, with their values: whoever moves the
+        element to another place has to fill them in.
+    """
+
+    name: str
+    content: ActionContent
+    place: Place
+    is_private: bool
+    scope: Mapping[str, str] = field(default_factory=dict, repr=False, compare=False)
+
+
+@dataclass(frozen=True, slots=True)
+class Event:
+    """`start_trigger` None: starts at once. Counts from 1."""
+
+    name: str
+    priority: Priority
+    actions: tuple[Action, ...]
+    start_trigger: Trigger | None
+    place: Place
+    maximum_execution_count: int = 1
+
+
+@dataclass(frozen=True, slots=True)
+class Maneuver:
+    """Events side by side."""
+
+    name: str
+    events: tuple[Event, ...]
+    place: Place
+
+
+@dataclass(frozen=True, slots=True)
+class Actors:
+    """Who acts; entity selections are already replaced by their members."""
+
+    entity_refs: tuple[str, ...]
+    select_triggering_entities: bool
+    place: Place
+
+
+@dataclass(frozen=True, slots=True)
+class ManeuverGroup:
+    """Actors and their maneuvers (those from catalogs included, in file order)."""
+
+    name: str
+    actors: Actors
+    maneuvers: tuple[Maneuver, ...]
+    place: Place
+    maximum_execution_count: int = 1
+
+
+@dataclass(frozen=True, slots=True)
+class Act:
+    """`start_trigger` None: starts at once."""
+
+    name: str
+    maneuver_groups: tuple[ManeuverGroup, ...]
+    start_trigger: Trigger | None
+    stop_trigger: Trigger | None
+    place: Place
+
+
+@dataclass(frozen=True, slots=True)
+class Story:
+    """Acts side by side."""
+
+    name: str
+    acts: tuple[Act, ...]
+    place: Place
+
+
+@dataclass(frozen=True, slots=True)
+class Private:
+    """Init actions of one entity, in file order."""
+
+    entity_ref: str
+    actions: tuple[Action, ...]
+    place: Place
+
+
+@dataclass(frozen=True, slots=True)
+class Init:
+    """In the order in which they start."""
+
+    global_actions: tuple[Action, ...]
+    user_defined_actions: tuple[Action, ...]
+    privates: tuple[Private, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Storyboard:
+    """`stop_trigger` None: never stops by itself."""
+
+    init: Init
+    stories: tuple[Story, ...]
+    stop_trigger: Trigger | None
+    place: Place
