@@ -55,12 +55,17 @@ class Segment:
     context : mapping of str to array, shape (n,)
         What the driver may react to, under DESIGN's names or any other; NaN where there is nothing (no leader).
         A name that is absent is neutral.
+    before, after : int
+        Rows at the start and at the end of the arrays that lie outside the stretch: context only, no offsets are
+        sampled there. Effects that look ahead or respond slowly need what comes after and what went before.
     """
 
     time: FloatArray
     lane_width: FloatArray
     speed: FloatArray
     context: Mapping[str, FloatArray] = field(default_factory=dict)
+    before: int = 0
+    after: int = 0
 
     def __post_init__(self) -> None:
         """Copy and freeze the arrays; refuse unequal lengths."""
@@ -69,9 +74,16 @@ class Segment:
             object.__setattr__(self, name, _frozen(getattr(self, name), name, n))
         context = {name: _frozen(values, name, n) for name, values in self.context.items()}
         object.__setattr__(self, "context", MappingProxyType(context))
+        if self.before < 0 or self.after < 0 or self.before + self.after > n:
+            raise ValueError(f"{self.before} rows before and {self.after} after a stretch in {n} rows")
 
     def __len__(self) -> int:
         return len(self.time)
+
+    @property
+    def inside(self) -> slice:
+        """Rows of the stretch itself."""
+        return slice(self.before, len(self.time) - self.after)
 
 
 def _frozen(values: FloatArray, name: str, n: int) -> FloatArray:

@@ -1,0 +1,117 @@
+"""Which stretches of an entity's motion are road-following, and why the rest is none."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from xosc_lateral.motion.nominal import Activity, EntityMotion
+from xosc_lateral.road import RoadNetwork
+
+MINIMUM_SPEED = 40.0 / 3.6
+"""Below this the model says nothing [m/s] (Neis & Beyerer cut their data at 40 km/h)."""
+
+_AGAINST_LANE = np.pi / 4
+"""Heading relative to the lane beyond which the vehicle does not follow it. [rad]"""
+
+_SPEED_SLACK = 1e-6
+"""40 km/h written as 11.1111 in a scenario is meant as 40 km/h. [m/s, relative]"""
+
+
+class StretchKind(Enum):
+    """What a stretch is; every value but the first is a reason why no offsets are sampled there."""
+
+    ROAD_FOLLOWING = "road-following"
+    ABSENT = "not in the scenario at that time"
+    NOT_A_VEHICLE = "not a vehicle"
+    TRAILER = "trailer"
+    OFF_ROAD = "off the road"
+    TRAJECTORY = "follows a trajectory"
+    LATERAL_ACTION = "lateral action"
+    NOT_DRIVING_LANE = "not in a driving lane"
+    AGAINST_LANE = "not heading along its lane"
+    SLOW = "below 40 km/h"
+    ROAD_END = "at the end of the road"
+
+
+_KINDS = tuple(StretchKind)
+
+
+@dataclass(frozen=True, slots=True)
+class Stretch:
+    """Rows ``first`` to ``last`` (both included) of one entity, of one kind throughout.
+
+    Parameters
+    ----------
+    kind : StretchKind
+    first, last : int
+        Rows of the entity's motion.
+    start, end : float
+        Time of those rows. [s]
+    """
+
+    kind: StretchKind
+    first: int
+    last: int
+    start: float
+    end: float
+
+    @property
+    def is_road_following(self) -> bool:
+        """Whether offsets are sampled here."""
+        return self.kind is StretchKind.ROAD_FOLLOWING
+
+
+def cut_stretches(motion: EntityMotion, network: RoadNetwork, *, is_trailer: bool = False) -> tuple[Stretch, ...]:
+    """Cut an entity's whole motion into stretches; teleports always cut.
+
+    Parameters
+    ----------
+    motion : EntityMotion
+    network : RoadNetwork
+        The one that it was played on.
+    is_trailer : bool
+        The entity is pulled by another: it has no driver.
+
+    Returns
+    -------
+    tuple of Stretch
+        In order of time, without gaps: each row belongs to exactly one.
+    """
+    kinds = row_kinds(motion, network, is_trailer=is_trailer)
+    placed_anew = (motion.activity & Activity.TELEPORTED) != 0
+    cut = np.flatnonzero((np.diff(kinds) != 0) | placed_anew[1:]) + 1
+    firsts = np.concatenate(([0], cut))
+    lasts = np.concatenate((cut - 1, [len(kinds) - 1]))
+    return tuple(
+        Stretch(_KINDS[kinds[a]], int(a), int(b), float(motion.time[a]), float(motion.time[b]))
+        for a, b in zip(firsts, lasts, strict=True)
+    )
+
+
+def row_kinds(motion: EntityMotion, network: RoadNetwork, *, is_trailer: bool = False) -> NDArray[np.int64]:
+    """Kind of every row, as its index in `StretchKind`; the first reason that applies, in the enum's order."""
+    entity, activity = motion.entity, motion.activity
+    n = len(motion.time)
+    on_road = (motion.road >= 0) & ((activity & Activity.OFF_ROAD) == 0)
+    in_driving_lane = np.zeros(n, dtype=bool)
+    in_driving_lane[on_road] = network.lane_index(motion.road[on_road], motion.lane[on_road], motion.s[on_road])[0] >= 0
+    reasons = {
+        StretchKind.ABSENT: (activity & Activity.ACTIVE) == 0,
+        StretchKind.NOT_A_VEHICLE: np.full(n, not entity.is_vehicle),
+        StretchKind.TRAILER: np.full(n, is_trailer),
+        StretchKind.OFF_ROAD: ~on_road,
+        StretchKind.TRAJECTORY: (activity & Activity.TRAJECTORY) != 0,
+        StretchKind.LATERAL_ACTION: (activity & Activity.LATERAL) != 0,
+        StretchKind.NOT_DRIVING_LANE: on_road & ~in_driving_lane,
+        StretchKind.AGAINST_LANE: np.abs(motion.heading_relative) > _AGAINST_LANE,
+        StretchKind.SLOW: motion.speed < MINIMUM_SPEED * (1.0 - _SPEED_SLACK),
+        StretchKind.ROAD_END: (activity & Activity.ROAD_END) != 0,
+    }
+    kinds = np.zeros(n, dtype=np.int64)
+    for kind, applies in reversed(reasons.items()):
+        kinds[applies] = _KINDS.index(kind)
+    return kinds

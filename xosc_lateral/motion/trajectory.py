@@ -1,0 +1,116 @@
+"""From nominal motion and a lateral deviation to the path that is written."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from xosc_lateral.motion.nominal import Activity, EntityMotion
+from xosc_lateral.road import RoadNetwork
+
+FloatArray = NDArray[np.float64]
+
+_STANDSTILL = 1e-3
+"""Displacement per step under which a direction of motion can't be read from it. [m]"""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Trajectory:
+    """A path in the world over time, on the rows of the nominal motion.
+
+    Parameters
+    ----------
+    time : array, shape (n,)
+        [s]
+    x, y, z : array, shape (n,)
+        [m]
+    heading, pitch, roll : array, shape (n,)
+        [rad]
+    speed : array, shape (n,)
+        Along the path, negative when driving backwards. [m/s]
+    """
+
+    time: FloatArray
+    x: FloatArray
+    y: FloatArray
+    z: FloatArray
+    heading: FloatArray
+    pitch: FloatArray
+    roll: FloatArray
+    speed: FloatArray
+
+
+def distance_driven(motion: EntityMotion) -> FloatArray:
+    """Distance driven on the nominal path up to each row, shape (n,); being placed anew is no driving. [m]"""
+    ahead = np.hypot(np.diff(motion.x), np.diff(motion.y))
+    placed_anew = (motion.activity[1:] & Activity.TELEPORTED) != 0
+    return np.concatenate(([0.0], np.cumsum(np.where(placed_anew, 0.0, ahead))))
+
+
+def displace(motion: EntityMotion, network: RoadNetwork, deviation: FloatArray) -> Trajectory:
+    """Shift a motion sideways in lane coordinates; headings and speeds follow from the shifted path.
+
+    Parameters
+    ----------
+    motion : EntityMotion
+    network : RoadNetwork
+    deviation : array, shape (n,)
+        Added to the nominal offset, positive to the left of the vehicle's travel; ignored where it is on no road. [m]
+    """
+    x, y, z = motion.x.copy(), motion.y.copy(), motion.z.copy()
+    heading, pitch, roll = motion.heading.copy(), motion.pitch.copy(), motion.roll.copy()
+    moved = (motion.road >= 0) & (deviation != 0.0)
+    if moved.any():
+        # a vehicle that meets its lane's traffic head-on has its left on the lane's right
+        along_lane = np.where(np.cos(motion.heading_relative[moved]) >= 0.0, 1.0, -1.0)
+        road, lane, s = motion.road[moved], motion.lane[moved], motion.s[moved]
+        nominal = motion.offset[moved]
+        before = network.lane_to_world(road, lane, s, nominal)
+        after = network.lane_to_world(road, lane, s, nominal + along_lane * deviation[moved])
+        # the nominal pose is kept to the bit and only the difference added, so that a zero deviation changes nothing
+        x[moved] += after.x - before.x
+        y[moved] += after.y - before.y
+        z[moved] += after.z - before.z
+        heading += _direction_change(motion, x, y)
+    return Trajectory(motion.time, x, y, z, heading, pitch, roll, _speed(motion, x, y))
+
+
+def _pieces(motion: EntityMotion) -> list[slice]:
+    """Runs of rows between which the entity was not placed anew."""
+    cut = np.flatnonzero((motion.activity & Activity.TELEPORTED) != 0)
+    borders = np.unique(np.concatenate(([0], cut, [len(motion.time)])))
+    return [slice(int(a), int(b)) for a, b in pairwise(borders)]
+
+
+def _direction_change(motion: EntityMotion, x: FloatArray, y: FloatArray) -> FloatArray:
+    """Direction of the shifted path against the nominal one's, held where the vehicle stands. [rad]"""
+    change = np.zeros(len(x))
+    for piece in _pieces(motion):
+        if piece.stop - piece.start < 2:
+            continue
+        nominal = np.gradient(motion.x[piece]) + 1j * np.gradient(motion.y[piece])
+        shifted = np.gradient(x[piece]) + 1j * np.gradient(y[piece])
+        moving = np.minimum(np.abs(nominal), np.abs(shifted)) > _STANDSTILL
+        if not moving.any():
+            continue
+        turn = np.angle(shifted * np.conj(nominal))
+        last = np.maximum.accumulate(np.where(moving, np.arange(len(moving)), -1))
+        last[last < 0] = int(np.argmax(moving))
+        change[piece] = turn[last]
+    return change
+
+
+def _speed(motion: EntityMotion, x: FloatArray, y: FloatArray) -> FloatArray:
+    """Nominal speed times the ratio of path lengths, which stays right at a speed step. [m/s]"""
+    speed = motion.speed.copy()
+    for piece in _pieces(motion):
+        if piece.stop - piece.start < 2:
+            continue
+        nominal = np.hypot(np.gradient(motion.x[piece]), np.gradient(motion.y[piece]))
+        shifted = np.hypot(np.gradient(x[piece]), np.gradient(y[piece]))
+        moving = nominal > _STANDSTILL
+        speed[piece] = np.where(moving, speed[piece] * shifted / np.where(moving, nominal, 1.0), speed[piece])
+    return speed

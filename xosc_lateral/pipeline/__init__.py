@@ -1,0 +1,1 @@
+"""From files to files: one scenario, or a whole database of them."""
