@@ -1,0 +1,332 @@
+"""DLR Highway Traffic (A39, Germany) into the standard drive table.
+
+The data set (DLR Institute of Transportation Systems, "DLR Highway Traffic dataset", Zenodo, concept record 14012005)
+holds 20 Hz tracks in UTM coordinates and no lane geometry. The first file of version 1.1.0, five minutes with 445
+vehicles on 6.4 km, lies as a zip inside the PyPI wheel of `tasi`.
+
+What a reader of the table has to know:
+
+- `offset` is counted from the middle of the *traffic* of that lane at that place, not from the middle between painted
+  markings, which nobody measured. The mean offset of a lane is therefore about zero by construction.
+- The lane width is the distance between the traffic's centres of the two lanes of that direction.
+- The provider smoothed the tracks: nothing is left above about 0.3 Hz.
+- Between two cameras the provider interpolated. Bridges up to `max_gap` are kept (0.3 Hz content hardly changes in
+  that time), longer ones are cut.
+"""
+
+from __future__ import annotations
+
+import io
+import zipfile
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from xosc_lateral.errors import FormatError
+from xosc_lateral.formats.importers.lanes_from_tracks import LaneCentre, fit_lane_centre
+from xosc_lateral.formats.importers.neighbours import find_neighbours
+from xosc_lateral.formats.importers.road_from_tracks import fit_reference_line
+from xosc_lateral.formats.importers.table import Imported, Provenance, hash_file
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+
+LANES = 2  # through lanes per direction of the A39 there; ramps and their merging lanes are left out
+STEP = 0.05  # [s]
+COLUMNS = (
+    "timestamp", "id", "center_easting", "center_northing", "velocity_easting", "velocity_northing",
+    "velocity_magnitude", "acceleration_signed", "classifications_motorbike", "classifications_car",
+    "classifications_van", "classifications_truck", "interpolated",
+)  # fmt: skip
+LICENCE = (
+    "tracks: DLR Highway Traffic dataset, Deutsches Zentrum für Luft- und Raumfahrt (see the licence of the Zenodo "
+    "record); the wheel of tasi that carries them: Apache-2.0. Fitted parameters may be passed on with this notice."
+)
+
+
+@dataclass(frozen=True)
+class DlrSettings:
+    """How tracks are cut.
+
+    Parameters
+    ----------
+    max_gap : float
+        Longest bridge between two cameras that is kept. [s]
+    calm_rate : float
+        A lane change reaches back and forth to where the lateral speed falls below this. [m/s]
+    longest_change : float
+        But not farther than this from the crossing. [s]
+    margin : float
+        Cut in addition before and after each lane change. [s]
+    shortest : float
+        Stretches below this are dropped. [s]
+    """
+
+    max_gap: float = 1.0
+    calm_rate: float = 0.1
+    longest_change: float = 8.0
+    margin: float = 1.0
+    shortest: float = 5.0
+
+
+def import_dlr_ht(source: Path, settings: DlrSettings = DlrSettings(), *, keep_cut: bool = False) -> Imported:
+    """Read the trajectory CSV, the data set's zip or the wheel of `tasi` that holds it.
+
+    Returns
+    -------
+    Imported
+        Table with columns drive, time, offset, lane_width, speed, context, vehicle_class, and (with `keep_cut`) `state`
+        naming why a row would have been cut.
+    """
+    tracks = read_tracks(source)
+    xy = tracks[["center_easting", "center_northing"]].to_numpy()
+    vehicle = tracks["vehicle"].to_numpy()
+    forward = _travels_north(tracks)
+    reference, s_road, d_road = fit_reference_line(xy, forward)
+    # From here on every carriageway has its own s and d: s grows with travel, d is positive to the left of it.
+    s = np.where(forward, s_road, reference.length - s_road)
+    d = np.where(forward, d_road, -d_road)
+
+    gap = _long_gaps(tracks["interpolated"].to_numpy(), vehicle, settings.max_gap)
+    placed = _Placed.empty(len(tracks))
+    lanes: dict[str, list[LaneCentre]] = {}
+    for name, mine in (("northbound", forward), ("southbound", ~forward)):
+        rows = np.flatnonzero(mine)
+        part, lanes[name] = _place_in_lanes(s[rows], d[rows], vehicle[rows], gap[rows], settings)
+        placed.put(rows, part)
+    table = _context(tracks, placed, s, forward)
+    table["curvature"] = reference.curvature(s_road) * np.where(forward, 1.0, -1.0)
+    table["state"] = _states(placed, gap, vehicle, settings)
+    record = Provenance(
+        format="dlr-ht",
+        source=source.name,
+        sha256=hash_file(source),
+        version=_version(source),
+        licence=LICENCE,
+        settings=asdict(settings),
+        rows={str(k): int(v) for k, v in table["state"].value_counts().sort_index().items()},
+        vehicles=int(vehicle[-1]) + 1,
+        hours=round(float((table["state"] == "kept").sum()) * STEP / 3600.0, 3),
+        lanes=[_describe(name, k, lane) for name, both in lanes.items() for k, lane in enumerate(both)],
+    )
+    if not keep_cut:
+        table = table[table["state"] == "kept"].drop(columns="state")
+    return Imported(table.reset_index(drop=True), record)
+
+
+def read_tracks(source: Path) -> pd.DataFrame:
+    """All rows of the data set, sorted by vehicle and time, with `time` [s] from its first instant and `vehicle` 0..n-1."""
+    import pandas as pd
+
+    frame = pd.concat([_read_csv(stream, source) for stream in _trajectory_files(source)], ignore_index=True)
+    stamps = pd.to_datetime(frame["timestamp"], utc=True)
+    frame["time"] = (stamps - stamps.min()).dt.total_seconds()
+    frame = frame.drop_duplicates(["id", "time"]).sort_values(["id", "time"], ignore_index=True)
+    frame["vehicle"] = np.unique(frame["id"].to_numpy(), return_inverse=True)[1]
+    return frame
+
+
+def _trajectory_files(source: Path) -> list[io.BufferedIOBase]:
+    """The trajectory CSV files in a CSV, a zip, or a zip in a wheel."""
+    if not zipfile.is_zipfile(source):
+        return [source.open("rb")]
+    archive = zipfile.ZipFile(source)
+    inner = [name for name in archive.namelist() if "DLR-Highway-Traffic" in name and name.endswith(".zip")]
+    if inner:
+        archive = zipfile.ZipFile(io.BytesIO(archive.read(sorted(inner)[-1])))
+    names = sorted(name for name in archive.namelist() if "/trajectories" in name and name.endswith(".csv"))
+    if not names:
+        raise FormatError("holds no DLR Highway Traffic trajectories (trajectories_*.csv)", path=source)
+    return [io.BytesIO(archive.read(name)) for name in names]
+
+
+def _read_csv(stream: io.BufferedIOBase, source: Path) -> pd.DataFrame:
+    import pandas as pd
+
+    with stream:
+        head = stream.readline().decode("utf-8", "replace").strip().split(",")
+        missing = [name for name in COLUMNS if name not in head]
+        if missing:
+            raise FormatError(f"no column {', '.join(missing)}; is this a DLR HT trajectory file?", path=source, line=1)
+        stream.seek(0)
+        frame = pd.read_csv(stream, usecols=list(COLUMNS), engine="pyarrow")
+    numbers = frame.drop(columns=["timestamp"]).to_numpy(dtype=np.float64)
+    if not np.isfinite(numbers).all():
+        row, column = np.argwhere(~np.isfinite(numbers))[0]
+        raise FormatError(
+            "missing value", path=source, line=int(row) + 2, element=frame.columns.drop("timestamp")[column]
+        )
+    return frame
+
+
+def _travels_north(tracks: pd.DataFrame) -> NDArray[np.bool_]:
+    mean = tracks.groupby("vehicle")["velocity_northing"].transform("mean")
+    return np.asarray(mean.to_numpy() > 0.0)
+
+
+def _long_gaps(interpolated: NDArray[np.bool_], vehicle: IntArray, max_gap: float) -> NDArray[np.bool_]:
+    """Rows in bridges longer than `max_gap`."""
+    new = np.r_[True, (interpolated[1:] != interpolated[:-1]) | (vehicle[1:] != vehicle[:-1])]
+    run = np.cumsum(new) - 1
+    length = np.bincount(run) * STEP
+    return np.asarray(interpolated & (length[run] > max_gap))
+
+
+@dataclass(frozen=True, eq=False)
+class _Placed:
+    """Each row's place across the road."""
+
+    lane: IntArray
+    offset: FloatArray
+    width: FloatArray
+    changing: NDArray[np.bool_]
+
+    @classmethod
+    def empty(cls, n: int) -> _Placed:
+        return cls(np.full(n, -1), np.full(n, np.nan), np.full(n, np.nan), np.zeros(n, dtype=np.bool_))
+
+    def put(self, rows: IntArray, part: _Placed) -> None:
+        self.lane[rows], self.offset[rows] = part.lane, part.offset
+        self.width[rows], self.changing[rows] = part.width, part.changing
+
+
+def _place_in_lanes(
+    s: FloatArray, d: FloatArray, vehicle: IntArray, gap: NDArray[np.bool_], settings: DlrSettings
+) -> tuple[_Placed, list[LaneCentre]]:
+    """Lane centres of one carriageway, and every row's lane and offset. Rounds, since each needs the other."""
+    levels = _levels(d)
+    centre = np.repeat(levels[:, None], len(s), axis=1)
+    width = float(np.diff(levels).mean())
+    lanes: list[LaneCentre] = []
+    for _ in range(3):
+        lane = _nearest_lane(d, centre, width)
+        changing = _lane_changes(d - centre.mean(axis=0), lane, vehicle, settings)
+        lanes = []
+        for index in range(LANES):
+            rows = np.flatnonzero((lane == index) & ~changing & ~gap)
+            stretch = np.cumsum(np.r_[True, (np.diff(rows) != 1) | (np.diff(vehicle[rows]) != 0)])
+            second = _each(stretch, round(1.0 / STEP))
+            lanes.append(fit_lane_centre(s[rows][second], d[rows][second], stretch[second]))
+        centre = np.array([one.at(s) for one in lanes])
+        width = float(np.nanmedian(np.diff(centre, axis=0)))
+    lane = _nearest_lane(d, centre, width)
+    changing = _lane_changes(d - centre.mean(axis=0), lane, vehicle, settings)
+    mine = np.clip(lane, 0, None)
+    offset = np.where(lane >= 0, d - centre[mine, np.arange(len(s))], np.nan)
+    return _Placed(lane, offset, np.full(len(s), width), changing), lanes
+
+
+def _levels(d: FloatArray) -> FloatArray:
+    """Mean lateral position of the lanes, right to left: the innermost `LANES` clusters (two-means)."""
+    low, high = np.quantile(d, [0.2, 0.95])
+    levels = np.linspace(low, high, LANES)
+    for _ in range(50):
+        nearest = np.abs(d[:, None] - levels).argmin(axis=1)
+        close = np.abs(d - levels[nearest]) < 2.0
+        levels = np.array([d[close & (nearest == k)].mean() for k in range(LANES)])
+    return levels
+
+
+def _nearest_lane(d: FloatArray, centre: FloatArray, width: float) -> IntArray:
+    """Index from the right; -1 where the vehicle is more than half a lane width from every centre."""
+    away = np.abs(d - centre)
+    away = np.where(np.isfinite(away), away, np.inf)
+    nearest = away.argmin(axis=0)
+    # Between two lanes the midpoint decides; towards the outside half a width does.
+    return np.where(away.min(axis=0) <= width * 0.55, nearest, -1)
+
+
+def _lane_changes(x: FloatArray, lane: IntArray, vehicle: IntArray, settings: DlrSettings) -> NDArray[np.bool_]:
+    """Rows from where a vehicle sets off towards another lane to where it has settled there."""
+    changing = np.zeros(len(x), dtype=np.bool_)
+    reach, margin, half = round(settings.longest_change / STEP), round(settings.margin / STEP), 5
+    same = vehicle[1:] == vehicle[:-1]
+    rate = np.zeros(len(x))
+    rate[half:-half] = (x[2 * half :] - x[: -2 * half]) / (2 * half * STEP)
+    rate = np.where(np.isfinite(rate), rate, 0.0)
+    first = np.searchsorted(vehicle, vehicle, side="left")
+    last = np.searchsorted(vehicle, vehicle, side="right") - 1
+    for k in np.flatnonzero(same & (lane[1:] != lane[:-1])):
+        lowest, highest = max(first[k], k - reach), min(last[k], k + reach)
+        towards = np.sign(rate[k]) or 1.0
+        before = np.flatnonzero(towards * rate[lowest : k + 1] < settings.calm_rate)
+        after = np.flatnonzero(towards * rate[k : highest + 1] < settings.calm_rate)
+        begin = lowest + before[-1] if len(before) else lowest
+        end = k + after[0] if len(after) else highest
+        changing[max(first[k], begin - margin) : min(last[k], end + margin) + 1] = True
+    return changing
+
+
+def _each(stretch: IntArray, every: int) -> NDArray[np.bool_]:
+    """True for every n-th row of each stretch, from its first."""
+    start = np.flatnonzero(np.r_[True, stretch[1:] != stretch[:-1]])
+    position = np.arange(len(stretch)) - np.repeat(start, np.diff(np.r_[start, len(stretch)]))
+    return np.asarray(position % every == 0)
+
+
+def _context(tracks: pd.DataFrame, placed: _Placed, s: FloatArray, forward: NDArray[np.bool_]) -> pd.DataFrame:
+    """The drive table's columns, for every row of the tracks."""
+    import pandas as pd
+
+    kind = _vehicle_class(tracks)
+    frame = np.round(tracks["time"].to_numpy() / STEP).astype(np.int64) * 2 + forward
+    near = find_neighbours(frame, placed.lane, s, kind == "truck")
+    return pd.DataFrame(
+        {
+            "drive": "ht-" + tracks["id"].astype(str),
+            "time": np.round(tracks["time"].to_numpy(), 3),
+            "offset": placed.offset,
+            "lane_width": placed.width,
+            "speed": tracks["velocity_magnitude"].to_numpy(),
+            "acceleration": tracks["acceleration_signed"].to_numpy(),
+            "lane_index": placed.lane,
+            "lane_count": LANES,
+            **asdict(near),
+            "vehicle_class": kind,
+        }
+    )
+
+
+def _vehicle_class(tracks: pd.DataFrame) -> NDArray[np.str_]:
+    """The provider's likeliest class of each vehicle."""
+    names = np.array(["car", "van", "truck", "motorbike"])
+    scores = tracks[[f"classifications_{name}" for name in names]].to_numpy()
+    return np.asarray(names[scores.argmax(axis=1)])
+
+
+def _states(placed: _Placed, gap: NDArray[np.bool_], vehicle: IntArray, settings: DlrSettings) -> NDArray[np.str_]:
+    """Why a row is kept or cut."""
+    state = np.select([placed.lane < 0, placed.changing, gap], ["no lane", "lane change", "gap"], default="kept")
+    kept = state == "kept"
+    new = np.r_[True, (kept[1:] != kept[:-1]) | (vehicle[1:] != vehicle[:-1]) | (placed.lane[1:] != placed.lane[:-1])]
+    run = np.cumsum(new) - 1
+    length = np.bincount(run) * STEP
+    return np.where(kept & (length[run] < settings.shortest), "short", state)
+
+
+def _describe(carriageway: str, index: int, lane: LaneCentre) -> dict[str, object]:
+    error = lane.standard_error(np.arange(lane.start, lane.end, 10.0))
+    return {
+        "carriageway": carriageway,
+        "lane_index": index,
+        "length_m": round(lane.end - lane.start, 1),
+        "stretches": lane.stretches,
+        "centre_standard_error_m": {"median": round(float(np.median(error)), 4), "max": round(float(error.max()), 4)},
+    }
+
+
+def _version(source: Path) -> str:
+    """Version of the data set, as the name of the folder or zip gives it."""
+    import re
+
+    names = [str(source)]
+    if zipfile.is_zipfile(source):
+        names += zipfile.ZipFile(source).namelist()
+    found = [match for name in names if (match := re.search(r"Highway-Traffic-dataset_v(\d+)-(\d+)-(\d+)", name))]
+    return ".".join(found[0].groups()) if found else "unknown"
