@@ -1,0 +1,135 @@
+"""What the ten metrics don't see: spectrum, autocorrelation, time near a marking, excursions."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+
+BANDS = np.geomspace(0.01, 1.0, 21)
+"""Edges of the frequency bands, ten a decade. [Hz]"""
+
+SEGMENTS = (512, 256, 128, 64)
+"""Window lengths at 5 Hz, 102 s to 13 s: each band takes the shortest one that holds two of its periods."""
+
+PERIODS = 2.0
+"""Periods of a band's centre that a window must hold. [-]"""
+
+NEAR_MARKING = 1.2
+"""A reference point this close to a marking counts as near: half a car (0.9 m) and 0.3 m of air. [m]"""
+
+
+@dataclass(frozen=True, eq=False)
+class Spectrum:
+    """One-sided power density of the offset in logarithmic bands; bands that no run is long enough for are left out.
+
+    Parameters
+    ----------
+    frequency : array, shape (n,)
+        Geometric centres. [Hz]
+    density : array, shape (n,)
+        [m²/Hz]
+    windows : array of int, shape (n,)
+        How many windows each band rests on.
+    """
+
+    frequency: FloatArray
+    density: FloatArray
+    windows: NDArray[np.int64]
+
+
+def spectrum(runs: Sequence[FloatArray], step: float) -> Spectrum:
+    """Power density by Welch's method (Hann windows, half overlapping, mean removed), pooled over runs.
+
+    Parameters
+    ----------
+    runs : sequence of array, shape (n_i,)
+        Offsets of uninterrupted driving at an even step. [m]
+    step : float
+        [s]
+    """
+    by_length = {length: _periodogram(runs, length, step) for length in SEGMENTS}
+    centres, densities, windows = [], [], []
+    for low, high in pairwise(BANDS):
+        centre = float(np.sqrt(low * high))
+        for length in reversed(SEGMENTS):
+            frequency, density, count = by_length[length]
+            inside = (frequency >= low) & (frequency < high)
+            if count and length * step * centre >= PERIODS and inside.any():
+                centres.append(centre)
+                densities.append(float(density[inside].mean()))
+                windows.append(count)
+                break
+    return Spectrum(np.array(centres), np.array(densities), np.array(windows, dtype=np.int64))
+
+
+def _periodogram(runs: Sequence[FloatArray], length: int, step: float) -> tuple[FloatArray, FloatArray, int]:
+    frequency = np.asarray(np.fft.rfftfreq(length, step), dtype=np.float64)
+    window = np.hanning(length + 1)[:-1]
+    parts = [
+        np.lib.stride_tricks.sliding_window_view(run, length)[:: length // 2] for run in runs if len(run) >= length
+    ]
+    if not parts:
+        return frequency, np.zeros(len(frequency)), 0
+    rows = np.concatenate(parts)
+    rows = (rows - rows.mean(axis=1, keepdims=True)) * window
+    power = (np.abs(np.fft.rfft(rows, axis=1)) ** 2).mean(axis=0)
+    density: FloatArray = 2.0 * step * power / (window**2).sum()
+    return frequency, density, len(rows)
+
+
+def autocorrelation(runs: Sequence[FloatArray], lags: Sequence[int]) -> FloatArray:
+    """Correlation of the offset with itself some steps later, about the mean of all runs.
+
+    Differences between drivers count: they don't decay.
+
+    Returns
+    -------
+    array, shape (len(lags),)
+        Lags that no run reaches get 0.
+    """
+    everything = np.concatenate(list(runs))
+    mean, variance = everything.mean(), everything.var()
+    result = np.zeros(len(lags))
+    for k, lag in enumerate(lags):
+        products = [(run[lag:] - mean) @ (run[: len(run) - lag] - mean) for run in runs if len(run) > lag]
+        count = sum(len(run) - lag for run in runs if len(run) > lag)
+        if count and variance > 0.0:
+            result[k] = sum(products) / count / variance
+    return result
+
+
+@dataclass(frozen=True)
+class Margins:
+    """How a driver uses the lane's margins.
+
+    Parameters
+    ----------
+    share_near : float
+        Share of time with the reference point within `NEAR_MARKING` of a marking. [-]
+    excursions_per_hour : float
+        How often that zone is entered. [1/h]
+    largest : float
+        Largest |offset|. [m]
+    """
+
+    share_near: float
+    excursions_per_hour: float
+    largest: float
+
+
+def margins(offsets: Sequence[FloatArray], lane_widths: Sequence[FloatArray], step: float) -> Margins:
+    """Time near a marking and rate of excursions over several runs (offset and lane width [m] at an even step [s])."""
+    near = [np.abs(x) > 0.5 * w - NEAR_MARKING for x, w in zip(offsets, lane_widths, strict=True)]
+    rows = sum(len(one) for one in near)
+    entries = sum(int((one[1:] & ~one[:-1]).sum()) for one in near)
+    return Margins(
+        share_near=sum(int(one.sum()) for one in near) / rows,
+        excursions_per_hour=entries / (rows * step / 3600.0),
+        largest=max(float(np.abs(x).max()) for x in offsets),
+    )
