@@ -1,0 +1,242 @@
+"""Sample offsets for every road-following segment of a played scenario and shift the paths by them."""
+
+from __future__ import annotations
+
+import zlib
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from xosc_lateral.driver.profile import DriverProfile
+from xosc_lateral.driver.sampling import OffsetSampler
+from xosc_lateral.enrich.result import Enriched, EntityResult, LaneDeparture, SampledSegment
+from xosc_lateral.motion.context import entity_context
+from xosc_lateral.motion.deviation import SETTLING_TIME, SampledStretch, deviation_through
+from xosc_lateral.motion.gaps import BoxPath, Gap, smallest_gaps
+from xosc_lateral.motion.nominal import Activity, EntityMotion, NominalMotion
+from xosc_lateral.motion.segments import Stretch, cut_stretches
+from xosc_lateral.motion.trajectory import Trajectory, displace, distance_driven
+from xosc_lateral.road import RoadNetwork
+from xosc_lateral.segment import Segment
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+
+SAMPLE_STEP = 0.2
+"""Step of the driver model. [s]"""
+
+PAST, FUTURE = 30.0, 10.0
+"""Context before and after a segment that its effects may look at [s]: several response times, and any look-ahead."""
+
+GAP_STEP = 0.1
+"""Rows that gaps are looked for on. [s]"""
+
+Drivers = Mapping[str, DriverProfile | str]
+"""Per entity the profile that drives it, or the reason why it gets none."""
+
+
+def enrich(
+    motion: NominalMotion,
+    network: RoadNetwork,
+    drivers: Drivers,
+    *,
+    seed: int,
+    variant: int = 0,
+    entropy: Sequence[int] = (),
+    context: Mapping[str, tuple[FloatArray, FloatArray]] | None = None,
+    trailers: Mapping[str, str] | None = None,
+    attempts: int = 1,
+) -> Enriched:
+    """Enrich a played scenario.
+
+    Parameters
+    ----------
+    motion : NominalMotion
+    network : RoadNetwork
+        The one that it was played on.
+    drivers : mapping of entity name to DriverProfile or str
+        A profile, or the reason why the entity is not enriched; an entity that is absent is not enriched.
+    seed, variant : int
+        Together with `entropy` and the entity's name they seed each entity's own random numbers, so that adding an
+        entity changes no other's offsets.
+    entropy : sequence of int
+        Further seed words: the input's hash.
+    context : mapping of str to (time, values), optional
+        Context that the scenario doesn't state, or that replaces what it states; the same for all entities. [s]
+    trailers : mapping of str to str, optional
+        Entity that is pulled -> entity that pulls it: it follows in the tractor's track.
+    attempts : int
+        Sample anew up to so many times while vehicles touch or leave their lane that nominally don't; the best is kept.
+    """
+    trailers = trailers or {}
+    stretches = {
+        entity.name: cut_stretches(entity, network, is_trailer=entity.name in trailers) for entity in motion.entities
+    }
+    gaps_before = _gaps(motion, [_nominal(entity) for entity in motion.entities])
+    best: Enriched | None = None
+    for attempt in range(max(1, attempts)):
+        entities = tuple(
+            _enrich_entity(
+                motion,
+                network,
+                index,
+                stretches[entity.name],
+                drivers.get(entity.name, "not chosen"),
+                np.random.SeedSequence([seed, variant, attempt, zlib.crc32(entity.name.encode()), *entropy]),
+                context or {},
+            )
+            for index, entity in enumerate(motion.entities)
+        )
+        entities = _with_trailers(entities, network, trailers)
+        gaps_after = _gaps(motion, [entity.trajectory for entity in entities])
+        departures = tuple(found for entity in entities for found in _departures(entity, network))
+        result = Enriched(motion, network, entities, gaps_before, gaps_after, departures, seed, variant, attempt)
+        if best is None or _trouble(result) < _trouble(best):
+            best = result
+        if not _trouble(result):
+            break
+    assert best is not None
+    return best
+
+
+def _trouble(enriched: Enriched) -> int:
+    return len(enriched.new_contacts) + len(enriched.departures)
+
+
+def _enrich_entity(
+    motion: NominalMotion,
+    network: RoadNetwork,
+    index: int,
+    stretches: tuple[Stretch, ...],
+    driver: DriverProfile | str,
+    seed: np.random.SeedSequence,
+    foreign_context: Mapping[str, tuple[FloatArray, FloatArray]],
+) -> EntityResult:
+    entity = motion.entities[index]
+    if isinstance(driver, str):
+        return _untouched(entity, stretches, driver)
+    sampler = OffsetSampler(driver, seed)
+    distance = distance_driven(entity)
+    every = max(1, round(SAMPLE_STEP / motion.step))
+    segments: list[SampledSegment] = []
+    sampled: list[SampledStretch] = []
+    neutral: set[str] = set()
+    for stretch in stretches:
+        knots = np.arange(stretch.first, stretch.last + 1, every)
+        if not stretch.is_road_following or len(knots) < 2:
+            continue
+        segment = _segment(motion, network, index, knots, every, foreign_context)
+        neutral |= _unknown(driver, segment)
+        offset = sampler.sample(segment)
+        segments.append(SampledSegment(stretch, entity.time[knots], offset))
+        settling = (SETTLING_TIME * entity.speed[knots[0]], SETTLING_TIME * entity.speed[knots[-1]])
+        sampled.append(SampledStretch(distance[knots], offset, settling))
+    if not segments:
+        return _untouched(entity, stretches, "no road-following segment")
+    deviation = deviation_through(sampled)(distance)
+    trajectory = displace(entity, network, deviation)
+    return EntityResult(entity, stretches, driver, "", tuple(segments), deviation, trajectory, tuple(sorted(neutral)))
+
+
+def _with_trailers(
+    entities: tuple[EntityResult, ...], network: RoadNetwork, trailers: Mapping[str, str]
+) -> tuple[EntityResult, ...]:
+    """Trailers in their tractor's track: its deviation, where its coupling was one trailer length ago."""
+    results = {entity.name: entity for entity in entities}
+    for name in results:  # in file order, in which a tractor comes before what it pulls, also in a chain
+        tractor = results.get(trailers.get(name, ""))
+        if tractor is None or not tractor.deviation.any():
+            continue
+        trailer = results[name]
+        behind = float(np.hypot(trailer.motion.x[0] - tractor.motion.x[0], trailer.motion.y[0] - tractor.motion.y[0]))
+        distance = distance_driven(tractor.motion)
+        deviation = np.interp(distance - behind, distance, tractor.deviation)
+        trajectory = displace(trailer.motion, network, deviation)
+        results[name] = replace(trailer, deviation=deviation, trajectory=trajectory, why="follows its tractor")
+    return tuple(results.values())
+
+
+def _untouched(entity: EntityMotion, stretches: tuple[Stretch, ...], why: str) -> EntityResult:
+    return EntityResult(entity, stretches, None, why, (), np.zeros(len(entity.time)), _nominal(entity))
+
+
+def _nominal(entity: EntityMotion) -> Trajectory:
+    return Trajectory(
+        entity.time, entity.x, entity.y, entity.z, entity.heading, entity.pitch, entity.roll, entity.speed
+    )
+
+
+def _segment(
+    motion: NominalMotion,
+    network: RoadNetwork,
+    index: int,
+    knots: IntArray,
+    every: int,
+    foreign_context: Mapping[str, tuple[FloatArray, FloatArray]],
+) -> Segment:
+    """The segment on its knots, with context before and after as far as the entity's motion is one piece."""
+    entity = motion.entities[index]
+    broken = ((entity.activity & Activity.TELEPORTED) != 0) | ((entity.activity & Activity.ACTIVE) == 0)
+    breaks = np.flatnonzero(broken)
+    first = int(breaks[breaks <= knots[0]].max(initial=0))
+    last = int(breaks[breaks > knots[-1]].min(initial=len(entity.time))) - 1
+    before = min((knots[0] - first) // every, round(PAST / SAMPLE_STEP))
+    after = min((last - knots[-1]) // every, round(FUTURE / SAMPLE_STEP))
+    grid = np.arange(knots[0] - before * every, knots[-1] + after * every + 1, every)
+    context = entity_context(motion, network, index, grid)
+    for name, (time, values) in foreign_context.items():
+        context[name] = np.interp(entity.time[grid], time, values)
+    return Segment(
+        time=entity.time[grid],
+        lane_width=_filled(context["lane_width"], slice(before, len(grid) - after)),
+        speed=context["speed"],
+        context=context,
+        before=before,
+        after=after,
+    )
+
+
+def _filled(values: FloatArray, inside: slice) -> FloatArray:
+    """Lane widths with the nearest one inside the stretch where the margins hold none (off the road)."""
+    filled = values.copy()
+    filled[: inside.start][np.isnan(filled[: inside.start])] = values[inside.start]
+    filled[inside.stop :][np.isnan(filled[inside.stop :])] = values[inside.stop - 1]
+    return filled
+
+
+def _unknown(driver: DriverProfile, segment: Segment) -> set[str]:
+    return {column for effect in driver.effects for column in effect.columns if column not in segment.context}
+
+
+def _departures(entity: EntityResult, network: RoadNetwork) -> list[LaneDeparture]:
+    """Where the enriched reference point is outside the nominal lane although the nominal one is inside: worst row."""
+    found = []
+    motion = entity.motion
+    for segment in entity.segments:
+        rows = slice(segment.stretch.first, segment.stretch.last + 1)
+        half = 0.5 * network.lane_width(motion.road[rows], motion.lane[rows], motion.s[rows])
+        beyond = np.abs(motion.offset[rows] + entity.deviation[rows]) - half
+        left = (beyond > 0.0) & (np.abs(motion.offset[rows]) <= half)
+        if left.any():
+            worst = int(np.argmax(np.where(left, beyond, -np.inf)))
+            found.append(LaneDeparture(entity.name, float(motion.time[rows][worst]), float(beyond[worst])))
+    return found
+
+
+def _gaps(motion: NominalMotion, trajectories: Sequence[Trajectory]) -> tuple[Gap, ...]:
+    every = max(1, round(GAP_STEP / motion.step))
+    paths = []
+    for entity, path in zip(motion.entities, trajectories, strict=True):
+        if not entity.entity.is_vehicle:
+            continue
+        box = entity.entity.bounding_box
+        absent = ((entity.activity & Activity.ACTIVE) == 0)[::every]
+        x = np.where(absent, np.nan, path.x[::every])
+        paths.append(
+            BoxPath(entity.name, x, path.y[::every], path.heading[::every], box.length, box.width, box.center_x)
+        )
+    if not paths:
+        return ()
+    return smallest_gaps(motion.entities[0].time[::every], paths)

@@ -1,0 +1,173 @@
+"""What enriching a scenario gives, as data: the writer, the report and the manifest read it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from xosc_lateral.driver.profile import DriverProfile
+from xosc_lateral.motion.gaps import Gap
+from xosc_lateral.motion.nominal import EntityMotion, NominalMotion
+from xosc_lateral.motion.segments import Stretch
+from xosc_lateral.motion.trajectory import Trajectory
+from xosc_lateral.road import RoadNetwork
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class SampledSegment:
+    """Offsets sampled on one road-following segment.
+
+    Parameters
+    ----------
+    stretch : Stretch
+        The segment.
+    time : array, shape (n,)
+        Every 0.2 s from the segment's start. [s]
+    offset : array, shape (n,)
+        Added to the nominal offset, positive left. [m]
+    """
+
+    stretch: Stretch
+    time: FloatArray
+    offset: FloatArray
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class EntityResult:
+    """One entity, nominal and enriched.
+
+    Parameters
+    ----------
+    motion : EntityMotion
+        Nominal.
+    stretches : tuple of Stretch
+        All of its motion, road-following or not.
+    profile : DriverProfile or None
+        None: not enriched, `why` says the reason.
+    why : str
+        Why it was not enriched; empty if it was.
+    segments : tuple of SampledSegment
+    deviation : array, shape (rows,)
+        Of the enriched path from the nominal one, positive left. [m]
+    trajectory : Trajectory
+        The enriched path (the nominal one if not enriched).
+    neutral : tuple of str
+        Context columns that the profile's effects ask for and that were not known: taken as neutral.
+    """
+
+    motion: EntityMotion
+    stretches: tuple[Stretch, ...]
+    profile: DriverProfile | None
+    why: str
+    segments: tuple[SampledSegment, ...]
+    deviation: FloatArray
+    trajectory: Trajectory
+    neutral: tuple[str, ...] = ()
+
+    @property
+    def name(self) -> str:
+        """The entity's name."""
+        return self.motion.name
+
+    @property
+    def is_enriched(self) -> bool:
+        """Whether offsets were sampled for it."""
+        return bool(self.segments)
+
+    @property
+    def segment_seconds(self) -> float:
+        """Time in road-following segments that got offsets. [s]"""
+        return sum(segment.stretch.end - segment.stretch.start for segment in self.segments)
+
+    @property
+    def offset_spread(self) -> float:
+        """Standard deviation of the sampled offsets; 0 if there are none. [m]"""
+        return float(np.std(np.concatenate([segment.offset for segment in self.segments]))) if self.segments else 0.0
+
+    def lateral_acceleration(self) -> FloatArray:
+        """Second time derivative of the deviation, shape (rows,): what enriching added. [m/s2]"""
+        return _derivative(_derivative(self.deviation, self.motion.time), self.motion.time)
+
+    def lateral_jerk(self) -> FloatArray:
+        """Third time derivative of the deviation, shape (rows,). [m/s3]"""
+        return _derivative(self.lateral_acceleration(), self.motion.time)
+
+
+def _derivative(values: FloatArray, time: FloatArray) -> FloatArray:
+    return np.gradient(values, time[1] - time[0]) if len(time) > 2 else np.zeros_like(values)
+
+
+@dataclass(frozen=True, slots=True)
+class LaneDeparture:
+    """An enriched vehicle whose reference point leaves the lane that its nominal motion keeps."""
+
+    name: str
+    time: float
+    beyond: float
+    """How far beyond the marking. [m]"""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Enriched:
+    """A played scenario with lifelike lateral movement.
+
+    Parameters
+    ----------
+    motion : NominalMotion
+    network : RoadNetwork
+    entities : tuple of EntityResult
+        In the scenario's order, all of them.
+    gaps_before, gaps_after : tuple of Gap
+        Smallest gaps of the pairs that come near each other, nominal and enriched.
+    departures : tuple of LaneDeparture
+    seed, variant, attempt : int
+        What the samples were drawn with; `attempt` counts resamplings on request.
+    """
+
+    motion: NominalMotion
+    network: RoadNetwork
+    entities: tuple[EntityResult, ...]
+    gaps_before: tuple[Gap, ...]
+    gaps_after: tuple[Gap, ...]
+    departures: tuple[LaneDeparture, ...]
+    seed: int
+    variant: int
+    attempt: int
+
+    def entity(self, name: str) -> EntityResult:
+        """The entity of that name; `KeyError` if there is none."""
+        for entity in self.entities:
+            if entity.name == name:
+                return entity
+        raise KeyError(name)
+
+    @property
+    def new_contacts(self) -> tuple[Gap, ...]:
+        """Pairs that touch now and did not before."""
+        before: Mapping[tuple[str, str], Gap] = {gap.names: gap for gap in self.gaps_before}
+        return tuple(
+            gap for gap in self.gaps_after if gap.touches and not (gap.names in before and before[gap.names].touches)
+        )
+
+    def warnings(self) -> tuple[str, ...]:
+        """What a user has to know, a line each."""
+        lines = [
+            f"{a} and {b} touch at {gap.time:.1f} s (nominally they don't)"
+            for gap in self.new_contacts
+            for a, b in [gap.names]
+        ]
+        lines += [
+            f"{departure.name} leaves its lane at {departure.time:.1f} s by {departure.beyond:.2f} m"
+            for departure in self.departures
+        ]
+        lines += [
+            f"{entity.name}: {', '.join(entity.neutral)} not known in the scenario, taken as neutral"
+            for entity in self.entities
+            if entity.neutral
+        ]
+        return tuple(lines)
