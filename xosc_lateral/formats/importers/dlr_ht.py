@@ -39,11 +39,12 @@ IntArray = NDArray[np.int64]
 
 LANES = 2  # through lanes per direction of the A39 there; ramps and their merging lanes are left out
 STEP = 0.05  # [s]
+CLASSES = ("car", "van", "truck", "motorbike")
 COLUMNS = (
-    "timestamp", "id", "center_easting", "center_northing", "velocity_easting", "velocity_northing",
-    "velocity_magnitude", "acceleration_signed", "classifications_motorbike", "classifications_car",
-    "classifications_van", "classifications_truck", "interpolated",
-)  # fmt: skip
+    *("timestamp", "id", "center_easting", "center_northing", "velocity_northing", "velocity_magnitude"),
+    *("acceleration_signed", "dimension_length", "dimension_height", "interpolated"),
+    *(f"classifications_{name}" for name in CLASSES),
+)
 LICENCE = (
     "tracks: DLR Highway Traffic dataset, Deutsches Zentrum für Luft- und Raumfahrt (see the licence of the Zenodo "
     "record); the wheel of tasi that carries them: Apache-2.0. Fitted parameters may be passed on with this notice."
@@ -93,12 +94,13 @@ def import_dlr_ht(source: Path, settings: DlrSettings = DlrSettings(), *, keep_c
     s = np.where(forward, s_road, reference.length - s_road)
     d = np.where(forward, d_road, -d_road)
 
+    height = tracks["dimension_height"].to_numpy()
     gap = _long_gaps(tracks["interpolated"].to_numpy(), vehicle, settings.max_gap)
     placed = _Placed.empty(len(tracks))
     lanes: dict[str, list[LaneCentre]] = {}
     for name, mine in (("northbound", forward), ("southbound", ~forward)):
         rows = np.flatnonzero(mine)
-        part, lanes[name] = _place_in_lanes(s[rows], d[rows], vehicle[rows], gap[rows], settings)
+        part, lanes[name] = _place_in_lanes(s[rows], d[rows], height[rows], vehicle[rows], gap[rows], settings)
         placed.put(rows, part)
     table = _context(tracks, placed, s, forward)
     table["curvature"] = reference.curvature(s_road) * np.where(forward, 1.0, -1.0)
@@ -121,7 +123,7 @@ def import_dlr_ht(source: Path, settings: DlrSettings = DlrSettings(), *, keep_c
 
 
 def read_tracks(source: Path) -> pd.DataFrame:
-    """All rows of the data set, sorted by vehicle and time, with `time` [s] from its first instant and `vehicle` 0..n-1."""
+    """All rows, sorted by vehicle and time, with `time` [s] from the first instant and `vehicle` counted from 0."""
     import pandas as pd
 
     frame = pd.concat([_read_csv(stream, source) for stream in _trajectory_files(source)], ignore_index=True)
@@ -197,7 +199,12 @@ class _Placed:
 
 
 def _place_in_lanes(
-    s: FloatArray, d: FloatArray, vehicle: IntArray, gap: NDArray[np.bool_], settings: DlrSettings
+    s: FloatArray,
+    d: FloatArray,
+    height: FloatArray,
+    vehicle: IntArray,
+    gap: NDArray[np.bool_],
+    settings: DlrSettings,
 ) -> tuple[_Placed, list[LaneCentre]]:
     """Lane centres of one carriageway, and every row's lane and offset. Rounds, since each needs the other."""
     levels = _levels(d)
@@ -212,14 +219,20 @@ def _place_in_lanes(
             rows = np.flatnonzero((lane == index) & ~changing & ~gap)
             stretch = np.cumsum(np.r_[True, (np.diff(rows) != 1) | (np.diff(vehicle[rows]) != 0)])
             second = _each(stretch, round(1.0 / STEP))
-            lanes.append(fit_lane_centre(s[rows][second], d[rows][second], stretch[second]))
-        centre = np.array([one.at(s) for one in lanes])
-        width = float(np.nanmedian(np.diff(centre, axis=0)))
+            lanes.append(fit_lane_centre(s[rows][second], d[rows][second], height[rows][second], stretch[second]))
+        centre = np.array([one.at(s, height) for one in lanes])
+        width = _lane_width(lanes)
     lane = _nearest_lane(d, centre, width)
     changing = _lane_changes(d - centre.mean(axis=0), lane, vehicle, settings)
     mine = np.clip(lane, 0, None)
     offset = np.where(lane >= 0, d - centre[mine, np.arange(len(s))], np.nan)
     return _Placed(lane, offset, np.full(len(s), width), changing), lanes
+
+
+def _lane_width(lanes: list[LaneCentre]) -> float:
+    """Median distance of neighbouring lane centres, where both are known."""
+    s = np.arange(max(lane.start for lane in lanes), min(lane.end for lane in lanes), 10.0)
+    return float(np.median(np.diff([lane.at(s, np.full(len(s), lane.height)) for lane in lanes], axis=0)))
 
 
 def _levels(d: FloatArray) -> FloatArray:
@@ -276,7 +289,7 @@ def _context(tracks: pd.DataFrame, placed: _Placed, s: FloatArray, forward: NDAr
 
     kind = _vehicle_class(tracks)
     frame = np.round(tracks["time"].to_numpy() / STEP).astype(np.int64) * 2 + forward
-    near = find_neighbours(frame, placed.lane, s, kind == "truck")
+    near = find_neighbours(frame, placed.lane, s, tracks["dimension_length"].to_numpy(), kind == "truck")
     return pd.DataFrame(
         {
             "drive": "ht-" + tracks["id"].astype(str),
@@ -295,9 +308,8 @@ def _context(tracks: pd.DataFrame, placed: _Placed, s: FloatArray, forward: NDAr
 
 def _vehicle_class(tracks: pd.DataFrame) -> NDArray[np.str_]:
     """The provider's likeliest class of each vehicle."""
-    names = np.array(["car", "van", "truck", "motorbike"])
-    scores = tracks[[f"classifications_{name}" for name in names]].to_numpy()
-    return np.asarray(names[scores.argmax(axis=1)])
+    scores = tracks[[f"classifications_{name}" for name in CLASSES]].to_numpy()
+    return np.asarray(np.array(CLASSES)[scores.argmax(axis=1)])
 
 
 def _states(placed: _Placed, gap: NDArray[np.bool_], vehicle: IntArray, settings: DlrSettings) -> NDArray[np.str_]:

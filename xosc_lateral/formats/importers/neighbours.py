@@ -10,15 +10,16 @@ from numpy.typing import NDArray
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
-SIGHT = 300.0  # [m]; who is farther away is none
+REACH = 200.0  # [m]; who is farther away is none, as in `motion.context`
+LONGEST = 30.0  # [m]; no vehicle is longer (German road traffic regulations: 25.25 m)
 
 
 @dataclass(frozen=True, eq=False)
 class Neighbours:
-    """Context of every row, under the names of the drive table; NaN where there is none within `SIGHT`.
+    """Context of every row, under the names of the drive table; NaN where there is none within `REACH`.
 
-    Distances are between vehicle centres along the road [m], never negative; `*_is_truck` is 1 or 0, and 0 where there
-    is nobody.
+    Distances are free space, bumper to bumper along the road, 0 while side by side [m]; `*_is_truck` is 1 or 0, and 0
+    where there is nobody.
     """
 
     lead_distance: FloatArray
@@ -29,7 +30,9 @@ class Neighbours:
     right_is_truck: FloatArray
 
 
-def find_neighbours(frame: IntArray, lane: IntArray, s: FloatArray, is_truck: NDArray[np.bool_]) -> Neighbours:
+def find_neighbours(
+    frame: IntArray, lane: IntArray, s: FloatArray, length: FloatArray, is_truck: NDArray[np.bool_]
+) -> Neighbours:
     """Leader in the same lane and nearest vehicle in the lanes beside.
 
     Parameters
@@ -39,14 +42,16 @@ def find_neighbours(frame: IntArray, lane: IntArray, s: FloatArray, is_truck: ND
     lane : array of int, shape (n,)
         0 = rightmost driving lane, counting up to the left; negative: in no lane.
     s : array, shape (n,)
-        Along the road, growing in the direction of travel. [m]
+        Vehicle centres along the road, growing in the direction of travel. [m]
+    length : array, shape (n,)
+        Of the vehicles. [m]
     is_truck : array of bool, shape (n,)
     """
     known = lane >= 0
     group = np.where(known, frame * 64 + lane, -1)
     order = np.lexsort((s, group))
     # One sorted axis for all groups: each gets its own, far apart from the next.
-    span = float(np.ptp(s)) + 4.0 * SIGHT if len(s) else 1.0
+    span = float(np.ptp(s)) + 4.0 * (REACH + LONGEST) if len(s) else 1.0
     base = float(s.min()) if len(s) else 0.0
     axis = group[order] * span + (s[order] - base)
 
@@ -57,8 +62,9 @@ def find_neighbours(frame: IntArray, lane: IntArray, s: FloatArray, is_truck: ND
         for candidate in (after,) if ahead_only else (after, after - 1):
             there = (candidate >= 0) & (candidate < len(axis)) & known
             who = order[np.clip(candidate, 0, len(axis) - 1)]
-            gap = np.where(there & (group[who] == target), np.abs(s[who] - s), np.inf)
-            closer = (gap < best) & (gap <= SIGHT)
+            free = np.maximum(np.abs(s[who] - s) - 0.5 * (length[who] + length), 0.0)
+            gap = np.where(there & (group[who] == target), free, np.inf)
+            closer = (gap < best) & (gap <= REACH)
             best, truck = np.where(closer, gap, best), np.where(closer, is_truck[who], truck)
         return np.where(np.isfinite(best), best, np.nan), truck
 

@@ -78,3 +78,14 @@ def hash_file(path: Path) -> str:
     """SHA-256 of a file's bytes."""
     with path.open("rb") as stream:
         return hashlib.file_digest(stream, "sha256").hexdigest()
+
+
+def describe(provenance: Provenance, *, as_json: bool) -> str:
+    """What was imported, for a person or a machine."""
+    if as_json:
+        return provenance.line()
+    rows = ", ".join(f"{count} {state}" for state, count in provenance.rows.items())
+    lines = [f"{provenance.source}: {provenance.vehicles} vehicles, {provenance.hours:g} h kept (rows: {rows})"]
+    for lane in provenance.lanes:
+        lines.append("  " + ", ".join(f"{name} {value}" for name, value in lane.items()))
+    return "\n".join([*lines, f"licence: {provenance.licence}"])
