@@ -1,0 +1,123 @@
+"""Catalogs: an entry by name, in the scope of its own parameters."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from lxml import etree
+
+from xosc_lateral.errors import FormatError
+from xosc_lateral.formats.openscenario.declarations import entry_scope
+from xosc_lateral.formats.openscenario.element import Element, local_name
+from xosc_lateral.formats.openscenario.references import resolve_reference
+from xosc_lateral.formats.xml import read_xml
+from xosc_lateral.scenario.parameters import Scope
+from xosc_lateral.scenario.place import Place, Unsupported
+
+MAX_FILES_SCANNED = 200
+"""Catalog files looked into per folder when no file is named like the catalog."""
+
+
+@dataclass(slots=True)
+class Catalogs:
+    """Folders of catalogs named by a scenario.
+
+    Parameters
+    ----------
+    locations : mapping of str to (str, Place)
+        ``VehicleCatalog`` ... to the folder or file as written, and where.
+    folder : Path
+        The scenario's folder.
+    roots : tuple of Path
+        Folders that references may lead into.
+    remarks : list of Unsupported
+        Gets a line for a catalog that was not where the scenario says.
+    """
+
+    locations: Mapping[str, tuple[str, Place]]
+    folder: Path
+    roots: tuple[Path, ...]
+    remarks: list[Unsupported]
+    used: list[Path] = field(default_factory=list)
+    _files: dict[tuple[str, str], Path] = field(default_factory=dict)
+
+    def entry(self, reference: Element) -> Element:
+        """The element that a CatalogReference names, in the scope of its parameters and the assigned values.
+
+        Raises
+        ------
+        FormatError
+            No such catalog or entry, or a catalog folder outside the allowed ones.
+        """
+        catalog, name = reference.text("catalogName"), reference.text("entryName")
+        path = self._file(catalog, reference)
+        root, _ = read_xml(path)
+        if path not in self.used:
+            self.used.append(path)
+        # Names of entries are plain text: no scope is needed to find them.
+        found = next((Element(xml, path, Scope({})) for xml in _entries(root) if xml.get("name") == name), None)
+        if found is None:
+            known = ", ".join(sorted(str(xml.get("name")) for xml in _entries(root))[:8])
+            reference.fail(f"catalog '{catalog}' has no entry '{name}' (it has {known})")
+        return found.within(entry_scope(found, reference))
+
+    def _file(self, catalog: str, reference: Element) -> Path:
+        kind = reference.tag
+        if (kind, catalog) not in self._files:
+            self._files[kind, catalog] = self._search(catalog, reference)
+        return self._files[kind, catalog]
+
+    def _search(self, catalog: str, reference: Element) -> Path:
+        """By file name in every location, as the reference player does; then by the name inside the file; then near by."""
+        if not catalog or any(separator in catalog for separator in "/\\\0"):
+            reference.fail(f"'{catalog[:60]}' is no catalog name")
+        refused: FormatError | None = None
+        folders: list[Path] = []
+        for written, place in self.locations.values():
+            try:
+                path = resolve_reference(written, self.folder, self.roots, place)
+            except FormatError as error:
+                refused = refused or error
+                continue
+            if path.suffix.lower() == ".xosc":
+                if path.stem == catalog:
+                    return path
+                path = path.parent
+            folders.append(path)
+            candidate = path / f"{catalog}.xosc"
+            if candidate.is_file():
+                return Path(resolve_reference(str(candidate), self.folder, self.roots, place))
+        for folder in dict.fromkeys(folders):
+            for path in sorted(folder.glob("*.xosc"))[:MAX_FILES_SCANNED]:
+                if _calls_itself(path, catalog):
+                    return path
+        if refused is not None:
+            raise refused
+        near = _near_by(self.folder, f"{catalog}.xosc")
+        if near is not None:
+            self.remarks.append(Unsupported("CatalogReference", reference.place(), f"catalog taken from {near}"))
+            return near
+        searched = ", ".join(str(folder) for folder in dict.fromkeys(folders)) or "no folder is named"
+        reference.fail(f"catalog '{catalog}' not found ({searched})")
+
+
+def _entries(root: etree._Element) -> Iterator[etree._Element]:
+    for catalog in root:
+        if isinstance(catalog.tag, str) and local_name(catalog) == "Catalog":
+            yield from (entry for entry in catalog if isinstance(entry.tag, str))
+
+
+def _near_by(folder: Path, name: str) -> Path | None:
+    """The only file of that name at most three levels below the scenario: some field files name stale folders."""
+    found = [path for pattern in ("", "*/", "*/*/", "*/*/*/") for path in folder.glob(pattern + name)]
+    return found[0] if len(found) == 1 else None
+
+
+def _calls_itself(path: Path, name: str) -> bool:
+    try:
+        root, _ = read_xml(path)
+    except FormatError:
+        return False
+    return any(isinstance(xml.tag, str) and local_name(xml) == "Catalog" and xml.get("name") == name for xml in root)

@@ -1,0 +1,324 @@
+"""Triggers and conditions."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from xosc_lateral.formats.openscenario.context import Context
+from xosc_lateral.formats.openscenario.declarations import parameter_name
+from xosc_lateral.formats.openscenario.element import Element
+from xosc_lateral.formats.openscenario.environment import read_date_time
+from xosc_lateral.formats.openscenario.positions import read_position_in
+from xosc_lateral.scenario.conditions import (
+    AccelerationCondition,
+    AngleCondition,
+    CollisionCondition,
+    DistanceCondition,
+    EndOfRoadCondition,
+    EntityCondition,
+    OffroadCondition,
+    ParameterCondition,
+    ReachPositionCondition,
+    RelativeAngleCondition,
+    RelativeClearanceCondition,
+    RelativeDistanceCondition,
+    RelativeLaneRange,
+    RelativeSpeedCondition,
+    SimulationTimeCondition,
+    SpeedCondition,
+    StandStillCondition,
+    StoryboardElementStateCondition,
+    TimeHeadwayCondition,
+    TimeOfDayCondition,
+    TimeToCollisionCondition,
+    TrafficSignalCondition,
+    TrafficSignalControllerCondition,
+    TraveledDistanceCondition,
+    UserDefinedValueCondition,
+    ValueCondition,
+    VariableCondition,
+)
+from xosc_lateral.scenario.enums import (
+    AngleType,
+    ConditionEdge,
+    CoordinateSystem,
+    DirectionalDimension,
+    EntityCategory,
+    RelativeDistanceType,
+    RoutingAlgorithm,
+    Rule,
+    StoryboardElementState,
+    StoryboardElementType,
+    TriggeringEntitiesRule,
+)
+from xosc_lateral.scenario.place import Unsupported
+from xosc_lateral.scenario.trigger import Condition, ConditionGroup, Trigger, TriggeringEntities
+
+# `cartesianDistance` is the name of 1.0; the misspelt one is the standard's.
+DISTANCE_TYPES = {
+    "cartesianDistance": RelativeDistanceType.EUCLIDIAN,
+    "euclideanDistance": RelativeDistanceType.EUCLIDIAN,
+}
+
+
+def read_trigger(element: Element | None, context: Context) -> Trigger | None:
+    """A start or stop trigger; None where the element is missing."""
+    if element is None:
+        return None
+    groups = tuple(
+        ConditionGroup(tuple(_read_condition(condition, context) for condition in group.children("Condition")))
+        for group in element.children("ConditionGroup")
+    )
+    return Trigger(groups, element.place())
+
+
+def _read_condition(element: Element, context: Context) -> Condition:
+    owner = element.required("ByEntityCondition", "ByValueCondition")
+    triggering: TriggeringEntities | None = None
+    content: EntityCondition | ValueCondition
+    if owner.tag == "ByEntityCondition":
+        triggering = _triggering_entities(owner.required("TriggeringEntities"), context)
+        kind = owner.required("EntityCondition").child()
+        readers: dict[str, Callable[[Element, Context], EntityCondition | ValueCondition]] = {**ENTITY_CONDITIONS}
+    else:
+        kind = owner.child()
+        readers = {**VALUE_CONDITIONS}
+    if kind is None:
+        owner.fail("holds no condition")
+    reader = readers.get(kind.tag)
+    content = reader(kind, context) if reader else Unsupported(kind.tag, kind.place())
+    delay = element.number("delay", 0.0)
+    if delay < 0:
+        element.fail(f"delay of {delay} s is negative")
+    edge = element.choice("conditionEdge", ConditionEdge, ConditionEdge.NONE)
+    return Condition(element.text("name", ""), delay, edge, content, triggering, element.place())
+
+
+def _triggering_entities(element: Element, context: Context) -> TriggeringEntities:
+    members = [name for reference in element.children("EntityRef") for name in context.members(reference)]
+    rule = element.choice("triggeringEntitiesRule", TriggeringEntitiesRule, TriggeringEntitiesRule.ANY)
+    return TriggeringEntities(rule, tuple(members))
+
+
+def _rule(e: Element) -> Rule:
+    return e.choice("rule", Rule)
+
+
+def _value(e: Element) -> float:
+    return e.number("value", finite=False)
+
+
+def _system(e: Element) -> CoordinateSystem | None:
+    return e.optional_choice("coordinateSystem", CoordinateSystem)
+
+
+def _distance_type(e: Element) -> RelativeDistanceType | None:
+    return e.optional_choice("relativeDistanceType", RelativeDistanceType, DISTANCE_TYPES)
+
+
+def _routing(e: Element) -> RoutingAlgorithm | None:
+    return e.optional_choice("routingAlgorithm", RoutingAlgorithm)
+
+
+def _direction(e: Element) -> DirectionalDimension | None:
+    return e.optional_choice("direction", DirectionalDimension)
+
+
+def _end_of_road(e: Element, _: Context) -> EntityCondition:
+    return EndOfRoadCondition(e.number("duration"), e.place())
+
+
+def _collision(e: Element, context: Context) -> EntityCondition:
+    reference, by_type = e.child("EntityRef"), e.child("ByType")
+    if reference is None and by_type is None:
+        e.fail("holds neither EntityRef nor ByType")
+    return CollisionCondition(
+        e.place(),
+        None if reference is None else context.entity(reference),
+        None if by_type is None else by_type.choice("type", EntityCategory),
+    )
+
+
+def _offroad(e: Element, _: Context) -> EntityCondition:
+    return OffroadCondition(e.number("duration"), e.place())
+
+
+def _time_headway(e: Element, context: Context) -> EntityCondition:
+    return TimeHeadwayCondition(
+        context.entity(e),
+        _value(e),
+        _rule(e),
+        e.boolean("freespace", False),
+        e.place(),
+        _system(e),
+        _distance_type(e),
+        e.optional_boolean("alongRoute"),
+        _routing(e),
+    )
+
+
+def _time_to_collision(e: Element, context: Context) -> EntityCondition:
+    target = e.required("TimeToCollisionConditionTarget")
+    reference = target.child("EntityRef")
+    return TimeToCollisionCondition(
+        context.entity(reference) if reference is not None else read_position_in(target, context),
+        _value(e),
+        _rule(e),
+        e.boolean("freespace", False),
+        e.place(),
+        _system(e),
+        _distance_type(e),
+        e.optional_boolean("alongRoute"),
+        _routing(e),
+    )
+
+
+def _acceleration(e: Element, _: Context) -> EntityCondition:
+    return AccelerationCondition(_value(e), _rule(e), e.place(), _direction(e))
+
+
+def _stand_still(e: Element, _: Context) -> EntityCondition:
+    return StandStillCondition(e.number("duration"), e.place())
+
+
+def _speed(e: Element, _: Context) -> EntityCondition:
+    return SpeedCondition(_value(e), _rule(e), e.place(), _direction(e))
+
+
+def _relative_speed(e: Element, context: Context) -> EntityCondition:
+    return RelativeSpeedCondition(context.entity(e), _value(e), _rule(e), e.place(), _direction(e))
+
+
+def _traveled_distance(e: Element, _: Context) -> EntityCondition:
+    return TraveledDistanceCondition(_value(e), e.place())
+
+
+def _reach_position(e: Element, context: Context) -> EntityCondition:
+    return ReachPositionCondition(read_position_in(e, context), e.number("tolerance"), e.place())
+
+
+def _distance(e: Element, context: Context) -> EntityCondition:
+    return DistanceCondition(
+        read_position_in(e, context),
+        _value(e),
+        _rule(e),
+        e.boolean("freespace", False),
+        e.place(),
+        _system(e),
+        _distance_type(e),
+        e.optional_boolean("alongRoute"),
+        _routing(e),
+    )
+
+
+def _relative_distance(e: Element, context: Context) -> EntityCondition:
+    return RelativeDistanceCondition(
+        context.entity(e),
+        _value(e),
+        _rule(e),
+        e.boolean("freespace", False),
+        _distance_type(e) or RelativeDistanceType.EUCLIDIAN,
+        e.place(),
+        _system(e),
+        _routing(e),
+    )
+
+
+def _relative_clearance(e: Element, context: Context) -> EntityCondition:
+    return RelativeClearanceCondition(
+        e.boolean("oppositeLanes", False),
+        e.boolean("freeSpace", e.boolean("freespace", False)),
+        e.place(),
+        e.number("distanceForward", 0.0),
+        e.number("distanceBackward", 0.0),
+        tuple(
+            RelativeLaneRange(lanes.optional_integer("from"), lanes.optional_integer("to"))
+            for lanes in e.children("RelativeLaneRange")
+        ),
+        tuple(name for reference in e.children("EntityRef") for name in context.members(reference)),
+    )
+
+
+def _angle(e: Element, _: Context) -> EntityCondition:
+    return AngleCondition(
+        e.choice("angleType", AngleType), e.number("angle"), e.number("angleTolerance"), e.place(), _system(e)
+    )
+
+
+def _relative_angle(e: Element, context: Context) -> EntityCondition:
+    kind = e.choice("angleType", AngleType)
+    return RelativeAngleCondition(
+        context.entity(e), kind, e.number("angle"), e.number("angleTolerance"), e.place(), _system(e)
+    )
+
+
+def _parameter(e: Element, _: Context) -> ValueCondition:
+    name = parameter_name(e.raw("parameterRef") or e.text("parameterRef"))
+    return ParameterCondition(name, e.text("value"), _rule(e), e.place())
+
+
+def _variable(e: Element, _: Context) -> ValueCondition:
+    name = parameter_name(e.raw("variableRef") or e.text("variableRef"))
+    return VariableCondition(name, e.text("value"), _rule(e), e.place())
+
+
+def _simulation_time(e: Element, _: Context) -> ValueCondition:
+    return SimulationTimeCondition(_value(e), _rule(e), e.place())
+
+
+def _time_of_day(e: Element, _: Context) -> ValueCondition:
+    moment = read_date_time(e)
+    if moment is None:
+        e.fail(f"dateTime='{e.text('dateTime')}' is no date and time")
+    return TimeOfDayCondition(moment, _rule(e), e.place())
+
+
+def _element_state(e: Element, _: Context) -> ValueCondition:
+    return StoryboardElementStateCondition(
+        e.choice("storyboardElementType", StoryboardElementType),
+        e.text("storyboardElementRef"),
+        e.choice("state", StoryboardElementState),
+        e.place(),
+    )
+
+
+def _traffic_signal(e: Element, _: Context) -> ValueCondition:
+    return TrafficSignalCondition(e.text("name"), e.text("state"), e.place())
+
+
+def _traffic_signal_controller(e: Element, _: Context) -> ValueCondition:
+    return TrafficSignalControllerCondition(e.text("trafficSignalControllerRef"), e.text("phase"), e.place())
+
+
+def _user_defined(e: Element, _: Context) -> ValueCondition:
+    return UserDefinedValueCondition(e.text("name"), e.text("value"), _rule(e), e.place())
+
+
+ENTITY_CONDITIONS: dict[str, Callable[[Element, Context], EntityCondition]] = {
+    "EndOfRoadCondition": _end_of_road,
+    "CollisionCondition": _collision,
+    "OffroadCondition": _offroad,
+    "TimeHeadwayCondition": _time_headway,
+    "TimeToCollisionCondition": _time_to_collision,
+    "AccelerationCondition": _acceleration,
+    "StandStillCondition": _stand_still,
+    "SpeedCondition": _speed,
+    "RelativeSpeedCondition": _relative_speed,
+    "TraveledDistanceCondition": _traveled_distance,
+    "ReachPositionCondition": _reach_position,
+    "DistanceCondition": _distance,
+    "RelativeDistanceCondition": _relative_distance,
+    "RelativeClearanceCondition": _relative_clearance,
+    "AngleCondition": _angle,
+    "RelativeAngleCondition": _relative_angle,
+}
+VALUE_CONDITIONS: dict[str, Callable[[Element, Context], ValueCondition]] = {
+    "ParameterCondition": _parameter,
+    "VariableCondition": _variable,
+    "SimulationTimeCondition": _simulation_time,
+    "TimeOfDayCondition": _time_of_day,
+    "StoryboardElementStateCondition": _element_state,
+    "TrafficSignalCondition": _traffic_signal,
+    "TrafficSignalControllerCondition": _traffic_signal_controller,
+    "UserDefinedValueCondition": _user_defined,
+}

@@ -1,0 +1,114 @@
+"""Parameter, variable and monitor declarations, assignments, and the constraints on values."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from xosc_lateral.formats.openscenario.element import Element
+from xosc_lateral.scenario.enums import ParameterType, Rule
+from xosc_lateral.scenario.expressions import ExpressionError
+from xosc_lateral.scenario.parameters import Scope, satisfies
+from xosc_lateral.scenario.place import Unsupported
+from xosc_lateral.scenario.scenario import Parameter
+
+TYPE_SYNONYMS = {"integer": ParameterType.INT, "bool": ParameterType.BOOLEAN, "float": ParameterType.DOUBLE}
+
+
+def parameter_name(text: str) -> str:
+    """Name without the ``$`` that references in field files carry."""
+    return text[1:] if text.startswith("$") else text
+
+
+def declared_values(owner: Element) -> dict[str, str]:
+    """Names and values as written; of declarations with the same name the last counts, as in the reference player."""
+    values = {}
+    declarations = owner.child("ParameterDeclarations")
+    for declaration in declarations.children("ParameterDeclaration") if declarations else ():
+        name = parameter_name(declaration.raw("name") or "")
+        if not name:
+            declaration.fail("attribute 'name' is missing")
+        values[name] = declaration.raw("value") or ""
+    return values
+
+
+def local_scope(owner: Element) -> Scope:
+    """Scope inside an element that may declare parameters (Story, Maneuver, inline Vehicle, Route, Trajectory ...)."""
+    values = declared_values(owner)
+    return Scope(values, owner.scope) if values else owner.scope
+
+
+def entry_scope(entry: Element, reference: Element) -> Scope:
+    """Scope inside a catalog entry: its declarations, overridden by what the reference assigns.
+
+    Assigned values are read in the scope of the reference. Names that the entry does not declare are looked up there,
+    too: field catalogs use the scenario's parameters.
+    """
+    assigned = {}
+    assignments = reference.child("ParameterAssignments")
+    for assignment in assignments.children("ParameterAssignment") if assignments else ():
+        assigned[parameter_name(assignment.raw("parameterRef") or "")] = assignment.text("value")
+    # A value assigned is final: a `$` in it is text.
+    final = {name: f"\\{value}" if value.startswith("$") else value for name, value in assigned.items()}
+    return Scope({**declared_values(entry), **final}, reference.scope)
+
+
+def read_declarations(
+    root: Element, overrides: Mapping[str, str], remarks: list[Unsupported]
+) -> tuple[Scope, dict[str, Parameter]]:
+    """Global scope and parameters, with overrides in place.
+
+    Raises
+    ------
+    FormatError
+        An override of a parameter that is not declared or that violates its constraints, or a value that can't be
+        evaluated. A declared value that violates the constraints beside it is only remarked: it plays.
+    """
+    values = declared_values(root)
+    unknown = sorted(set(overrides) - set(values))
+    if unknown:
+        known = ", ".join(sorted(values)[:10]) or "none"
+        root.fail(f"parameter '{unknown[0]}' is not declared (declared: {known})")
+    scope = Scope({**values, **overrides})
+    declarations = root.child("ParameterDeclarations")
+    parameters = {}
+    for declaration in declarations.children("ParameterDeclaration") if declarations else ():
+        parameter = _read_parameter(declaration.within(scope), "parameterType", scope)
+        parameters[parameter.name] = parameter
+        broken = broken_constraint(declaration.within(scope), parameter.value)
+        if broken and parameter.name in overrides:
+            declaration.fail(f"value '{parameter.value}' violates {broken}")
+        if broken:
+            remarks.append(Unsupported("ConstraintGroup", parameter.place, f"'{parameter.value}' violates {broken}"))
+    return scope, parameters
+
+
+def read_variables(root: Element) -> dict[str, Parameter]:
+    """Variable declarations (1.2)."""
+    variables = {}
+    declarations = root.child("VariableDeclarations")
+    for declaration in declarations.children("VariableDeclaration") if declarations else ():
+        name, value = parameter_name(declaration.text("name")), declaration.text("value", "")
+        kind = declaration.choice("variableType", ParameterType, ParameterType.STRING, TYPE_SYNONYMS)
+        variables[name] = Parameter(name, kind, value, declaration.place())
+    return variables
+
+
+def broken_constraint(declaration: Element, value: str) -> str | None:
+    """Words for the constraints that a value violates; None if it satisfies one of the groups, or there is none."""
+    groups = []
+    for group in declaration.children("ConstraintGroup"):
+        constraints = [(item.choice("rule", Rule), item.text("value")) for item in group.children("ValueConstraint")]
+        if all(satisfies(value, rule, limit) for rule, limit in constraints):
+            return None
+        groups.append(" and ".join(f"{rule} {limit}" for rule, limit in constraints))
+    return " or ".join(groups) or None
+
+
+def _read_parameter(declaration: Element, type_attribute: str, scope: Scope) -> Parameter:
+    name = parameter_name(declaration.raw("name") or "")
+    try:
+        value = scope.value(name)
+    except ExpressionError as error:
+        declaration.fail(f"value: {error}")
+    kind = declaration.choice(type_attribute, ParameterType, ParameterType.STRING, TYPE_SYNONYMS)
+    return Parameter(name, kind, value, declaration.place())

@@ -1,0 +1,223 @@
+"""One XML element with its parameters filled in: attributes as typed values, errors with file, line and element."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from enum import StrEnum
+from pathlib import Path
+from typing import NoReturn, TypeVar
+
+from lxml import etree
+
+from xosc_lateral.errors import FormatError
+from xosc_lateral.scenario.expressions import ExpressionError
+from xosc_lateral.scenario.parameters import Scope
+from xosc_lateral.scenario.place import Place
+
+E = TypeVar("E", bound=StrEnum)
+
+_TRUE = {"true", "1", "1.0000000000", "yes"}
+_FALSE = {"false", "0", "0.0000000000", "no"}
+
+
+class Element:
+    """An element of the scenario or of a catalog, in the scope that its attributes are read in.
+
+    Optional attributes: `default` comes back where the attribute is missing or empty. Required ones raise.
+    """
+
+    __slots__ = ("path", "scope", "xml")
+
+    def __init__(self, xml: etree._Element, path: Path, scope: Scope) -> None:
+        self.xml, self.path, self.scope = xml, path, scope
+
+    # --- tree ---------------------------------------------------------------------------------------------------
+
+    @property
+    def tag(self) -> str:
+        """Name without namespace."""
+        return local_name(self.xml)
+
+    def children(self, *tags: str) -> Iterator[Element]:
+        """Child elements, of these tags or all; comments left out."""
+        for child in self.xml:
+            if isinstance(child.tag, str) and (not tags or local_name(child) in tags):
+                yield Element(child, self.path, self.scope)
+
+    def child(self, *tags: str) -> Element | None:
+        """First child of one of these tags."""
+        return next(self.children(*tags), None)
+
+    def required(self, *tags: str) -> Element:
+        """First child of one of these tags; an error without."""
+        found = self.child(*tags)
+        if found is None:
+            self.fail(f"{' or '.join(tags)} is missing")
+        return found
+
+    def within(self, scope: Scope) -> Element:
+        """The same element in another scope."""
+        return Element(self.xml, self.path, scope)
+
+    # --- attributes ---------------------------------------------------------------------------------------------
+
+    def raw(self, name: str) -> str | None:
+        """Attribute as written."""
+        return self.xml.get(name)
+
+    def optional_text(self, name: str) -> str | None:
+        """Attribute with its parameter filled in; None where it is missing."""
+        raw = self.xml.get(name)
+        if raw is None or not raw.startswith(("$", "\\")):
+            return raw
+        try:
+            return self.scope.fill(raw)
+        except ExpressionError as error:
+            self.fail(f"{name}: {error}")
+
+    def text(self, name: str, default: str | None = None) -> str:
+        """Attribute as text."""
+        found = self.optional_text(name)
+        if found is None:
+            found = default
+        if found is None:
+            self.fail(f"attribute '{name}' is missing")
+        return found
+
+    def optional_number(self, name: str, *, finite: bool = True) -> float | None:
+        """Attribute as a number; None where it is missing or empty. NaN is refused, infinity where `finite`."""
+        text = self.optional_text(name)
+        if text is None or not text.strip():
+            return None
+        try:
+            value = float(text)
+        except ValueError:
+            self.fail(f"{name}='{text[:60]}' is no number")
+        if math.isnan(value) or (finite and math.isinf(value)):
+            self.fail(f"{name}='{text}' is not finite")
+        return value
+
+    def number(self, name: str, default: float | None = None, *, finite: bool = True) -> float:
+        """Attribute as a number."""
+        found = self.optional_number(name, finite=finite)
+        if found is None:
+            found = default
+        if found is None:
+            self.fail(f"attribute '{name}' is missing")
+        return found
+
+    def optional_integer(self, name: str) -> int | None:
+        """Attribute as a whole number; ``2.0000000000`` of an expression is one."""
+        value = self.optional_number(name)
+        if value is None:
+            return None
+        if value != round(value) or abs(value) > 2**53:
+            self.fail(f"{name}='{self.text(name)}' is no whole number")
+        return round(value)
+
+    def integer(self, name: str, default: int | None = None) -> int:
+        """Attribute as a whole number."""
+        found = self.optional_integer(name)
+        if found is None:
+            found = default
+        if found is None:
+            self.fail(f"attribute '{name}' is missing")
+        return found
+
+    def optional_boolean(self, name: str) -> bool | None:
+        """Attribute as a truth value, in any case and as 0 and 1; None where it is missing or empty."""
+        text = self.optional_text(name)
+        if text is None or not text.strip():
+            return None
+        word = text.strip().lower()
+        if word in _TRUE:
+            return True
+        if word in _FALSE:
+            return False
+        self.fail(f"{name}='{text[:60]}' is neither true nor false")
+
+    def boolean(self, name: str, default: bool | None = None) -> bool:
+        """Attribute as a truth value."""
+        found = self.optional_boolean(name)
+        if found is None:
+            found = default
+        if found is None:
+            self.fail(f"attribute '{name}' is missing")
+        return found
+
+    def optional_choice(self, name: str, kind: type[E], synonyms: dict[str, E] | None = None) -> E | None:
+        """Attribute as an option code; None where it is missing or empty. The case of letters does not count."""
+        text = self.optional_text(name)
+        if text is None or not text.strip():
+            return None
+        word = text.strip()
+        if synonyms and word in synonyms:
+            return synonyms[word]
+        for member in kind:
+            if member.value.lower() == word.lower():
+                return member
+        self.fail(f"{name}='{text[:60]}' is none of {', '.join(kind)}")
+
+    def choice(self, name: str, kind: type[E], default: E | None = None, synonyms: dict[str, E] | None = None) -> E:
+        """Attribute as an option code."""
+        found = self.optional_choice(name, kind, synonyms)
+        if found is None:
+            found = default
+        if found is None:
+            self.fail(f"attribute '{name}' is missing")
+        return found
+
+    # --- place --------------------------------------------------------------------------------------------------
+
+    def place(self) -> Place:
+        """File, line, element, and the way to find it again."""
+        return Place(str(self.path), line_of(self.xml), self.label(), node_of(self.xml))
+
+    def label(self) -> str:
+        """``Event 'brake'``, or ``SpeedAction of Event 'brake'`` for an element without a name."""
+        own = _name(self.xml)
+        if own:
+            return f"{self.tag} '{own}'"
+        for ancestor in self.xml.iterancestors():
+            name = _name(ancestor)
+            if name:
+                return f"{self.tag} of {local_name(ancestor)} '{name}'"
+        return self.tag
+
+    def fail(self, what: str) -> NoReturn:
+        """Raise a `FormatError` that names this element."""
+        raise FormatError(what, path=self.path, line=line_of(self.xml), element=self.label())
+
+
+def local_name(xml: etree._Element) -> str:
+    """Tag without namespace."""
+    return str(xml.tag).rpartition("}")[2]
+
+
+def line_of(xml: etree._Element) -> int | None:
+    """Line in the file, from 1; None for an element that was made, not read."""
+    line = xml.sourceline
+    return line if isinstance(line, int) else None
+
+
+def node_of(xml: etree._Element) -> tuple[int, ...]:
+    """Child indices from the root down to this element, comments counted."""
+    indices = []
+    parent = xml.getparent()
+    while parent is not None:
+        indices.append(parent.index(xml))
+        xml, parent = parent, parent.getparent()
+    return tuple(reversed(indices))
+
+
+def at_node(root: etree._Element, node: tuple[int, ...]) -> etree._Element:
+    """The element that `node_of` described, in another parse of the same bytes."""
+    for index in node:
+        root = root[index]
+    return root
+
+
+def _name(xml: etree._Element) -> str | None:
+    name = xml.get("name") or xml.get("entityRef")
+    return name[:60] if name else None

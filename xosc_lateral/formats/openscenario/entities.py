@@ -1,0 +1,186 @@
+"""Scenario objects, their controllers, entity selections."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from xosc_lateral.formats.openscenario.context import Context
+from xosc_lateral.formats.openscenario.declarations import local_scope
+from xosc_lateral.formats.openscenario.element import Element
+from xosc_lateral.scenario.entity import Axle, Axles, BoundingBox, Controller, Entity, Performance
+from xosc_lateral.scenario.enums import EntityCategory, VehicleCategory
+
+DEFAULT_BOX = BoundingBox(1.5, 0.0, 0.9, 5.0, 2.0, 1.8)
+"""Where a file gives none: the middle of the field's passenger cars."""
+
+CATEGORIES = {
+    "Vehicle": EntityCategory.VEHICLE,
+    "Pedestrian": EntityCategory.PEDESTRIAN,
+    "MiscObject": EntityCategory.MISC,
+    "ExternalObjectReference": EntityCategory.EXTERNAL,
+}
+_KIND_ATTRIBUTE = {"Vehicle": "vehicleCategory", "Pedestrian": "pedestrianCategory", "MiscObject": "miscObjectCategory"}
+
+
+def read_entities(root: Element, context: Context) -> tuple[Entity, ...]:
+    """All entities in file order, each trailer described inside its tractor after it; names go into the context."""
+    owner = root.required("Entities")
+    entities: list[Entity] = []
+    for item in owner.children("ScenarioObject"):
+        entities.extend(_read_object(item, context))
+    for entity in entities:
+        if entity.name in context.entities:
+            owner.fail(f"two entities are called '{entity.name}'")
+        context.entities.add(entity.name)
+    context.selections = _read_selections(owner, entities, context)
+    return tuple(_check_trailer(entity, context) for entity in entities)
+
+
+def _check_trailer(entity: Entity, context: Context) -> Entity:
+    return entity if entity.trailer is None or entity.trailer in context.entities else replace(entity, trailer=None)
+
+
+def _read_selections(owner: Element, entities: list[Entity], context: Context) -> dict[str, tuple[str, ...]]:
+    selections: dict[str, tuple[str, ...]] = {}
+    for selection in owner.children("EntitySelection"):
+        members: list[str] = []
+        for member in selection.required("Members").children():
+            if member.tag == "EntityRef":
+                name = member.text("entityRef")
+                members.extend(selections[name] if name in selections else (context.entity(member),))
+            elif member.tag == "ByType":
+                wanted = member.choice("objectType", EntityCategory)
+                members.extend(entity.name for entity in entities if entity.category is wanted)
+        selections[selection.text("name")] = tuple(dict.fromkeys(members))
+    return selections
+
+
+def _read_object(item: Element, context: Context) -> list[Entity]:
+    name = item.text("name")
+    if not name:
+        item.fail("attribute 'name' is empty")
+    content = item.child(*CATEGORIES, "CatalogReference")
+    if content is None:
+        item.fail("holds neither Vehicle, Pedestrian, MiscObject nor CatalogReference")
+    if content.tag == "CatalogReference":
+        content = context.catalogs.entry(content)
+    else:
+        content = content.within(local_scope(content))
+    category = CATEGORIES.get(content.tag)
+    if category is None:
+        item.fail(f"catalog entry '{content.raw('name')}' is a {content.tag}, which can't be a scenario object")
+    trailer, inner = _read_trailer(content, context)
+    box = content.child("BoundingBox")
+    entity = Entity(
+        name=name,
+        category=category,
+        place=item.place(),
+        bounding_box=DEFAULT_BOX if box is None else _bounding_box(box),
+        vehicle_category=_vehicle_category(content) if category is EntityCategory.VEHICLE else None,
+        performance=_performance(content.child("Performance")),
+        axles=_axles(content.child("Axles")),
+        controllers=_controllers(item, context),
+        object_name=content.text("name", ""),
+        kind=content.text(_KIND_ATTRIBUTE.get(content.tag, "name"), "") if content.tag in _KIND_ATTRIBUTE else "",
+        trailer=trailer,
+        hitch_x=_coupling(content, "TrailerHitch"),
+        coupler_x=_coupling(content, "TrailerCoupler"),
+        mass=content.optional_number("mass"),
+        model3d=content.optional_text("model3d") or content.optional_text("model"),
+        properties=read_properties(content),
+    )
+    return [entity, *inner]
+
+
+def _vehicle_category(vehicle: Element) -> VehicleCategory:
+    return vehicle.choice("vehicleCategory", VehicleCategory, VehicleCategory.CAR)
+
+
+def _read_trailer(vehicle: Element, context: Context) -> tuple[str | None, list[Entity]]:
+    """Name of the trailer hitched from the start, and the trailer itself when it is described right here."""
+    owner = vehicle.child("Trailer")
+    if owner is None:
+        return None, []
+    reference = owner.child("TrailerRef")
+    if reference is not None:
+        return reference.text("entityRef", "") or None, []
+    inner = owner.child("Trailer")
+    if inner is None:
+        return None, []
+    context.enter(inner)
+    entities = _read_object(inner, context)
+    context.leave()
+    return entities[0].name, entities
+
+
+def _coupling(vehicle: Element, tag: str) -> float | None:
+    element = vehicle.child(tag)
+    return None if element is None else element.number("dx")
+
+
+def _bounding_box(box: Element) -> BoundingBox:
+    center, size = box.required("Center"), box.required("Dimensions")
+    length, width, height = size.number("length"), size.number("width"), size.number("height")
+    if min(length, width, height) < 0:
+        size.fail(f"negative dimension ({length} m x {width} m x {height} m)")
+    return BoundingBox(center.number("x"), center.number("y"), center.number("z", 0.0), length, width, height)
+
+
+def _performance(element: Element | None) -> Performance:
+    if element is None:
+        return Performance()
+    inf = float("inf")
+    names = ("maxSpeed", "maxAcceleration", "maxDeceleration", "maxAccelerationRate", "maxDecelerationRate")
+    return Performance(*(element.number(name, inf, finite=False) for name in names))
+
+
+def _axles(element: Element | None) -> Axles | None:
+    if element is None:
+        return None
+    front, rear = element.child("FrontAxle"), element.child("RearAxle")
+    return Axles(
+        None if front is None else _axle(front),
+        None if rear is None else _axle(rear),
+        tuple(_axle(axle) for axle in element.children("AdditionalAxle")),
+    )
+
+
+def _axle(axle: Element) -> Axle:
+    names = ("maxSteering", "positionX", "positionZ", "trackWidth", "wheelDiameter")
+    return Axle(*(axle.number(name, 0.0) for name in names))
+
+
+def _controllers(item: Element, context: Context) -> tuple[Controller, ...]:
+    """Controllers of ObjectController elements (several from 1.3 on)."""
+    found = []
+    for owner in item.children("ObjectController"):
+        controller = read_controller(owner, context)
+        if controller is not None:
+            found.append(replace(controller, object_name=owner.optional_text("name")))
+    return tuple(found)
+
+
+def read_controller(owner: Element, context: Context) -> Controller | None:
+    """Controller inline, from a catalog, or in an ObjectController (1.3 actions). Motion does not depend on it."""
+    nested = owner.child("ObjectController")
+    if nested is not None:
+        return read_controller(nested, context)
+    inline = owner.child("Controller")
+    if inline is not None:
+        scoped = inline.within(local_scope(inline))
+        return Controller(scoped.text("name", ""), inline.place(), read_properties(scoped))
+    reference = owner.child("CatalogReference")
+    if reference is None:
+        return None
+    entry = context.optional_entry(reference)
+    if entry is None:
+        return Controller(reference.text("entryName"), reference.place())
+    return Controller(entry.text("name", ""), reference.place(), read_properties(entry))
+
+
+def read_properties(owner: Element) -> dict[str, str]:
+    """Name and value pairs of a ``Properties`` child."""
+    properties = owner.child("Properties")
+    if properties is None:
+        return {}
+    return {item.text("name", ""): item.text("value", "") for item in properties.children("Property")}

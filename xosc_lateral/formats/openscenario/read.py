@@ -1,0 +1,178 @@
+"""Read an OpenSCENARIO file, leniently: what field files leave out or misspell is taken as meant where it is clear."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from pathlib import Path, PureWindowsPath
+
+from lxml import etree
+
+from xosc_lateral.errors import FormatError
+from xosc_lateral.formats.openscenario.catalogs import Catalogs
+from xosc_lateral.formats.openscenario.context import Context
+from xosc_lateral.formats.openscenario.declarations import read_declarations, read_variables
+from xosc_lateral.formats.openscenario.element import Element, local_name
+from xosc_lateral.formats.openscenario.entities import read_entities
+from xosc_lateral.formats.openscenario.references import allowed_roots, resolve_reference
+from xosc_lateral.formats.openscenario.storyboard import read_storyboard
+from xosc_lateral.formats.xml import read_xml
+from xosc_lateral.scenario import (
+    FileHeader,
+    Scenario,
+    TrafficSignalController,
+    TrafficSignalPhase,
+    Unsupported,
+)
+from xosc_lateral.scenario.parameters import Scope
+from xosc_lateral.scenario.place import Place
+
+NEWEST = (1, 3)
+
+
+def read_scenario(
+    path: Path | str,
+    parameters: Mapping[str, str] | None = None,
+    *,
+    allowed: Iterable[Path] = (),
+) -> Scenario:
+    """Read a scenario with all that it takes from catalogs.
+
+    Parameters
+    ----------
+    path : path
+        The ``.xosc`` file.
+    parameters : mapping of str to str, optional
+        Values that override those of the file's parameter declarations.
+    allowed : iterable of path
+        Folders, besides the scenario's own and the two above it, that roads and catalogs may lie in.
+
+    Returns
+    -------
+    Scenario
+
+    Raises
+    ------
+    FormatError
+        File, line, element and what is wrong: no XML, no scenario, a missing or malformed value, an unknown entity,
+        catalog or parameter, a reference that leads outside, a missing road file.
+    """
+    path = Path(path)
+    document, source = read_xml(path)
+    root = open_scenario(document, path)
+    if root.child("ParameterValueDistribution") is not None:
+        root.fail("is a parameter value distribution, not a scenario: read the scenarios that it stands for")
+    if root.child("Storyboard") is None and root.child("Catalog") is not None:
+        root.fail("is a catalog, not a scenario")
+    remarks: list[Unsupported] = []
+    header = read_header(root)
+    if header.version > NEWEST:
+        remarks.append(Unsupported("FileHeader", root.place(), f"version 1.{header.minor} is read as 1.{NEWEST[1]}"))
+    scope, values = read_declarations(root, dict(parameters or {}), remarks)
+    root = root.within(scope)
+    roots = allowed_roots(path, allowed)
+    locations = _catalog_locations(root)
+    catalogs = Catalogs(locations, path.parent, roots, remarks)
+    context = Context(header.version, catalogs, remarks)
+    road_file, road_place, scene_graph, signals = _road_network(root, path.parent, roots, remarks)
+    entities = read_entities(root, context)
+    storyboard = read_storyboard(root, context)
+    return Scenario(
+        path=path,
+        header=header,
+        parameters=values,
+        variables=read_variables(root),
+        catalog_locations={kind: path.parent / written for kind, (written, _) in locations.items()},
+        road_file=road_file,
+        road_place=road_place,
+        scene_graph_file=scene_graph,
+        traffic_signal_controllers=signals,
+        entities=entities,
+        storyboard=storyboard,
+        remarks=tuple(remarks),
+        input_files=(path, *catalogs.used),
+        source=source,
+    )
+
+
+def open_scenario(document: etree._Element, path: Path) -> Element:
+    """Root element of any OpenSCENARIO file."""
+    root = Element(document, path, Scope({}))
+    if local_name(document).lower() != "openscenario":
+        root.fail(f"the root element is '{local_name(document)[:40]}', not OpenSCENARIO")
+    return root
+
+
+def read_header(root: Element) -> FileHeader:
+    """File header; versions before 1.0 and after 1 are refused."""
+    header = root.child("FileHeader")
+    if header is None:
+        root.fail("FileHeader is missing")
+    major, minor = header.integer("revMajor", 1), header.integer("revMinor", 0)
+    if major != 1:
+        header.fail(f"OpenSCENARIO {major}.{minor} is not read; versions 1.0 to 1.3 are")
+    return FileHeader(major, minor, header.text("author", ""), header.text("description", ""), header.text("date", ""))
+
+
+def _catalog_locations(root: Element) -> dict[str, tuple[str, Place]]:
+    owner = root.child("CatalogLocations")
+    locations = {}
+    for location in owner.children() if owner else ():
+        directory = location.child("Directory")
+        if directory is not None and directory.text("path", ""):
+            locations[location.tag] = (directory.text("path"), directory.place())
+    return locations
+
+
+def _road_network(
+    root: Element, folder: Path, roots: tuple[Path, ...], remarks: list[Unsupported]
+) -> tuple[Path | None, Place | None, str | None, tuple[TrafficSignalController, ...]]:
+    network = root.child("RoadNetwork")
+    if network is None:
+        return None, None, None, ()
+    logic = network.child("LogicFile", "Logics")
+    road: Path | None = None
+    if logic is not None and logic.text("filepath", "").strip():
+        road = _road_file(logic, folder, roots, remarks)
+    graph = network.child("SceneGraphFile")
+    signals = network.child("TrafficSignals")
+    controllers = () if signals is None else tuple(map(_signal_controller, signals.children("TrafficSignalController")))
+    return road, logic.place() if logic else None, graph.text("filepath", "") if graph else None, controllers
+
+
+def _road_file(logic: Element, folder: Path, roots: tuple[Path, ...], remarks: list[Unsupported]) -> Path:
+    """The road where the scenario says, or else, like the reference player, a file of that name near the scenario."""
+    written = logic.text("filepath")
+    try:
+        road = resolve_reference(written, folder, roots, logic.place())
+        if road.is_file():
+            return road
+        missing = FormatError(
+            f"road file '{written}' does not exist (looked for {road})",
+            path=logic.path,
+            line=logic.place().line,
+            element=logic.label(),
+        )
+    except FormatError as error:
+        missing = error
+    name = PureWindowsPath(written.strip()).name
+    for near in (folder / name, folder / "xodr" / name, folder.parent / "xodr" / name):
+        if name and near.is_file():
+            remarks.append(Unsupported("LogicFile", logic.place(), f"'{written}' is taken from {near}"))
+            return near
+    raise missing
+
+
+def _signal_controller(element: Element) -> TrafficSignalController:
+    phases = []
+    for phase in element.children("Phase"):
+        states = tuple(
+            (state.text("trafficSignalId"), state.text("state")) for state in phase.children("TrafficSignalState")
+        )
+        phases.append(TrafficSignalPhase(phase.text("name", ""), phase.number("duration"), states))
+    return TrafficSignalController(
+        element.text("name"),
+        element.number("delay", 0.0),
+        element.optional_text("reference"),
+        tuple(phases),
+        element.place(),
+    )
