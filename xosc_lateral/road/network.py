@@ -10,11 +10,17 @@ floats and are made for stepping one vehicle at a time: a few microseconds each,
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Sequence
-from dataclasses import dataclass
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
 
 from numpy.typing import ArrayLike
 
+from xosc_lateral.errors import PlaybackError
+from xosc_lateral.road.index import SurfaceIndex
+from xosc_lateral.road.lanes import DRIVING
+from xosc_lateral.road.marks import road_marks
+from xosc_lateral.road.places import cross_section, find_lane, lane_at, lane_pose, surface_pose
 from xosc_lateral.road.positions import (
     Advance,
     FloatArray,
@@ -29,26 +35,9 @@ from xosc_lateral.road.positions import (
     RoadMark,
     RouteStep,
 )
-
-# Lane types that vehicles follow (and that world positions snap to).
-DRIVING: frozenset[str] = frozenset(
-    {
-        "driving",
-        "entry",
-        "exit",
-        "onRamp",
-        "offRamp",
-        "connectingRamp",
-        "slipLane",
-        "bidirectional",
-        "bus",
-        "taxi",
-        "HOV",
-    }
-)
-
-Chooser = Callable[[Sequence[LaneLink]], LaneLink]
-
+from xosc_lateral.road.road import Junction, Road
+from xosc_lateral.road.tables import NetworkTables
+from xosc_lateral.road.topology import Chooser, Topology
 
 @dataclass(frozen=True, eq=False)
 class RoadNetwork:
@@ -57,38 +46,70 @@ class RoadNetwork:
     Attributes
     ----------
     roads : tuple of Road
-    road_ids : tuple of str
-        ``road/@id`` in file order.
+    junctions : tuple of Junction
     path : str
         The file.
     notes : tuple of str
         What was repaired, ignored or degenerate on reading: never silent.
+    geo_reference : str or None
+        Projection of x, y (PROJ string).
+    road_ids : tuple of str
+        ``road/@id`` in file order.
     """
+
+    roads: tuple[Road, ...]
+    junctions: tuple[Junction, ...] = ()
+    path: str = ""
+    notes: tuple[str, ...] = ()
+    geo_reference: str | None = None
+    road_ids: tuple[str, ...] = field(init=False)
+    _indices: dict[str, int] = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        """Index the roads by id."""
+        object.__setattr__(self, "road_ids", tuple(road.id for road in self.roads))
+        object.__setattr__(self, "_indices", {road.id: i for i, road in enumerate(self.roads)})
+
+    @cached_property
+    def _tables(self) -> NetworkTables:
+        return NetworkTables(self.roads, self.path)
+
+    @cached_property
+    def _index(self) -> SurfaceIndex:
+        return SurfaceIndex(self._tables)
+
+    @cached_property
+    def _topology(self) -> Topology:
+        return Topology(self.roads, self.junctions)
 
     # ---- names and signs ---------------------------------------------------------------------------------------------
     def index_of(self, road_id: str) -> int:
         """Index of a road by its OpenDRIVE id; raises `PlaybackError` naming the id."""
-        raise NotImplementedError
+        try:
+            return self._indices[road_id]
+        except KeyError:
+            there = ", ".join(self.road_ids[:8]) + (", ..." if len(self.road_ids) > 8 else "")
+            raise PlaybackError(f"there is no road '{road_id}' (roads: {there})", path=self.path) from None
 
     def travel_direction(self, road: int, lane: int) -> int:
         """+1: the lane is driven along s, -1: against s. Lane id and ``road/@rule`` (RHT, LHT) decide."""
-        raise NotImplementedError
+        return self.roads[road].directions.get(lane, 1)
 
     def travel_directions(self, road: ArrayLike, lane: ArrayLike) -> IntArray:
         """`travel_direction` for arrays."""
-        raise NotImplementedError
+        return self._tables.travel_directions(road, lane)
 
     def offset_to_t(self, road: ArrayLike, lane: ArrayLike, s: ArrayLike, offset: ArrayLike) -> FloatArray:
         """Offset to the left of travel -> t from the reference line. [m]"""
-        raise NotImplementedError
+        return self._tables.offset_to_t(road, lane, s, offset)
 
     def t_to_offset(self, road: ArrayLike, lane: ArrayLike, s: ArrayLike, t: ArrayLike) -> FloatArray:
         """Inverse of `offset_to_t`."""
-        raise NotImplementedError
+        return self._tables.t_to_offset(road, lane, s, t)
 
     def offset_from_offset_t(self, road: int, lane: int, offset_t: float) -> float:
         """OpenSCENARIO's LanePosition offset (along +t) -> offset (left of travel); its own inverse."""
-        raise NotImplementedError
+        return self.travel_direction(road, lane) * offset_t
 
     # ---- batch: road and lane to world -------------------------------------------------------------------------------
     def lane_to_world(self, road: ArrayLike, lane: ArrayLike, s: ArrayLike, offset: ArrayLike = 0.0) -> Poses:
@@ -96,11 +117,11 @@ class RoadNetwork:
 
         `s` outside the road is clamped to its ends. Raises `PlaybackError` for a lane that is not there, naming it.
         """
-        raise NotImplementedError
+        return self._tables.lane_to_world(road, lane, s, offset)
 
     def road_to_world(self, road: ArrayLike, s: ArrayLike, t: ArrayLike = 0.0) -> Poses:
         """World poses; heading along the reference line (+s)."""
-        raise NotImplementedError
+        return self._tables.road_to_world(road, s, t)
 
     # ---- batch: world to lane ----------------------------------------------------------------------------------------
     def world_to_lane(
@@ -118,7 +139,7 @@ class RoadNetwork:
         `z` tells roads on top of each other apart; `heading` prefers lanes driven that way; `near` limits the search to
         those roads. Everything is found, however far off: look at `distance`.
         """
-        raise NotImplementedError
+        return self._index.world_to_lane(x, y, z, heading, near=near, lane_types=lane_types)
 
     def path_to_lane(
         self,
@@ -130,84 +151,87 @@ class RoadNetwork:
         lane_types: Collection[str] | None = DRIVING,
     ) -> LanePositions:
         """Like `world_to_lane`, on known roads and from a guess of `s` per point (a written path, say): cheap."""
-        raise NotImplementedError
+        return self._index.path_to_lane(x, y, road, s, lane_types=lane_types)
 
     # ---- batch: what a lane is like ----------------------------------------------------------------------------------
     def lane_centre_t(self, road: ArrayLike, lane: ArrayLike, s: ArrayLike) -> FloatArray:
         """T of the lane centre. [m]"""
-        raise NotImplementedError
+        return self._tables.lane_profile(road, lane, s).centre
 
     def lane_width(self, road: ArrayLike, lane: ArrayLike, s: ArrayLike) -> FloatArray:
         """Width of the lane. [m]"""
-        raise NotImplementedError
+        return self._tables.lane_profile(road, lane, s).width
 
     def lane_edges_t(self, road: ArrayLike, lane: ArrayLike, s: ArrayLike) -> tuple[FloatArray, FloatArray]:
         """T of the lane's edges to the left and to the right of TRAVEL. [m]"""
-        raise NotImplementedError
+        return self._tables.lane_edges(road, lane, s)
 
     def curvature(self, road: ArrayLike, s: ArrayLike) -> FloatArray:
         """Curvature of the reference line along +s, positive in left turns. [1/m]"""
-        raise NotImplementedError
+        return self._tables.curvature(road, s)
 
     def lane_curvature(self, road: ArrayLike, lane: ArrayLike, s: ArrayLike, offset: ArrayLike = 0.0) -> FloatArray:
         """Curvature of the driven path parallel to the reference line, positive turning left in TRAVEL. [1/m]"""
-        raise NotImplementedError
+        return self._tables.lane_curvature(road, lane, s, offset)
 
     def lane_index(self, road: ArrayLike, lane: ArrayLike, s: ArrayLike) -> tuple[IntArray, IntArray]:
         """Index among the driving lanes of its direction (0 = rightmost in travel direction), and their count.
 
         Index -1 for a lane that is no driving lane.
         """
-        raise NotImplementedError
+        return self._tables.lane_index(road, lane, s)
 
     def crossfall(self, road: ArrayLike, lane: ArrayLike, s: ArrayLike) -> FloatArray:
         """Cross slope seen in travel direction, positive when the road falls to the RIGHT. [%]"""
-        raise NotImplementedError
+        return self._tables.lean(road, lane, s)[0]
 
     def grade(self, road: ArrayLike, lane: ArrayLike, s: ArrayLike) -> FloatArray:
         """Slope along travel, positive uphill. [%]"""
-        raise NotImplementedError
+        return self._tables.lean(road, lane, s)[1]
 
     def speed_limit(self, road: ArrayLike, lane: ArrayLike, s: ArrayLike) -> FloatArray:
         """Speed limit of the lane, else of the road; inf where none is given. [m/s]"""
-        raise NotImplementedError
+        return self._tables.speed_limit(road, lane, s)
 
     # ---- one place at a time, fast -----------------------------------------------------------------------------------
     def pose_at(self, road: int, lane: int, s: float, offset: float = 0.0) -> Pose:
         """`lane_to_world` of one place."""
-        raise NotImplementedError
+        return lane_pose(self.roads[road], lane, s, offset)
 
     def road_pose_at(self, road: int, s: float, t: float = 0.0) -> Pose:
         """`road_to_world` of one place."""
-        raise NotImplementedError
+        return surface_pose(self.roads[road], s, t)
 
     def curvature_at(self, road: int, s: float) -> float:
         """`curvature` of one place. [1/m]"""
-        raise NotImplementedError
+        return self.roads[road].curvature_at(s)
 
     def lane_state_at(self, road: int, lane: int, s: float) -> LaneState:
         """Centre t, its slope along s, and width of a lane; raises `PlaybackError` for a lane that is not there."""
-        raise NotImplementedError
+        road_ = self.roads[road]
+        found = road_.section_at(s).by_id.get(lane)
+        return (found or find_lane(road_, lane, s)).state_at(s)
 
     def lanes_at(self, road: int, s: float) -> tuple[LaneInfo, ...]:
         """All lanes of the cross-section but the centre lane 0, from left to right looking along s."""
-        raise NotImplementedError
+        return cross_section(self.roads[road], s)
 
     def has_lane_at(self, road: int, lane: int, s: float) -> bool:
         """Whether the lane exists there."""
-        raise NotImplementedError
+        return lane in self.roads[road].section_at(s).by_id
 
     def lane_type_at(self, road: int, lane: int, s: float) -> str:
         """The lane's type in the words of OpenDRIVE; raises `PlaybackError` for a lane that is not there."""
-        raise NotImplementedError
+        return find_lane(self.roads[road], lane, s).type
 
     def lane_at(self, road: int, s: float, t: float, *, lane_types: Collection[str] | None = DRIVING) -> LanePosition:
         """The lane of these types that holds `t`, else the nearest one; lane 0 if the road has none of them there."""
-        raise NotImplementedError
+        return lane_at(self.roads[road], road, s, t, lane_types)
 
     def section_at(self, road: int, s: float) -> tuple[float, float]:
         """Start and end s of the lane section. [m]"""
-        raise NotImplementedError
+        section = self.roads[road].section_at(s)
+        return section.start, section.end
 
     def world_to_lane_at(
         self,
@@ -220,7 +244,7 @@ class RoadNetwork:
         lane_types: Collection[str] | None = DRIVING,
     ) -> LanePosition:
         """`world_to_lane` of one point; `near` = (road, s) where it was a moment ago makes it cheap."""
-        raise NotImplementedError
+        return self._index.world_to_lane_at(x, y, z, heading, near=near, lane_types=lane_types)
 
     # ---- where lanes lead --------------------------------------------------------------------------------------------
     def next_lanes(self, road: int, lane: int, direction: int) -> tuple[LaneLink, ...]:
@@ -228,7 +252,7 @@ class RoadNetwork:
 
         `lane` is its id in the road's last (first) section. Several at a junction, none where the lane ends.
         """
-        raise NotImplementedError
+        return self._topology.next_lanes(road, lane, direction)
 
     def advance(
         self,
@@ -245,11 +269,11 @@ class RoadNetwork:
         `direction` of positive distance: +1 along s, -1 against; default the lane's travel direction. `choose` picks
         one of several links; default the straightest. Ends at the lane's end, saying what remains.
         """
-        raise NotImplementedError
+        return self._topology.advance(road, lane, s, distance, choose=choose, direction=direction)
 
     def straightest(self, options: Sequence[LaneLink]) -> LaneLink:
         """The link whose road turns least from entry to exit; of equals the first."""
-        raise NotImplementedError
+        return self._topology.straightest(options)
 
     def path_distance(
         self,
@@ -264,7 +288,7 @@ class RoadNetwork:
         Positive when the path leaves `start` in `direction` (+1 along s, -1 against s), negative when it leaves the other
         way. None: no path within `limit` metres.
         """
-        raise NotImplementedError
+        return self._topology.path_distance(start, end, direction=direction, limit=limit)
 
     def route(
         self, start: tuple[int, int, float], end: tuple[int, int, float], *, via: Sequence[tuple[int, int, float]] = ()
@@ -273,16 +297,16 @@ class RoadNetwork:
 
         None: there is none.
         """
-        raise NotImplementedError
+        return self._topology.route(start, end, via=via)
 
     # ---- to be seen --------------------------------------------------------------------------------------------------
     def road_marks(self, road: int) -> tuple[RoadMark, ...]:
         """Markings at the outer edges of all lanes, lane 0 included, of one road."""
-        raise NotImplementedError
+        return road_marks(self.roads[road])
 
     def mark_line(self, road: int, mark: RoadMark, *, step: float = 2.0) -> tuple[FloatArray, FloatArray]:
         """Polyline x, y of a marking, for plots. [m]"""
-        raise NotImplementedError
+        return self._tables.mark_line(road, mark, step)
 
 
 __all__ = ["DRIVING", "Chooser", "RoadNetwork"]

@@ -1,0 +1,98 @@
+"""The XML of one OpenDRIVE file, with numbers checked and every complaint located."""
+
+from __future__ import annotations
+
+from collections import Counter
+from copy import deepcopy
+from dataclasses import dataclass, field
+from math import isfinite
+from os import PathLike, fspath
+from pathlib import Path
+
+from lxml import etree
+
+from xosc_lateral.errors import FormatError
+from xosc_lateral.formats.xml import read_xml
+from xosc_lateral.road.piecewise import Cubic
+
+XmlElement = etree._Element
+
+
+@dataclass(slots=True)
+class Source:
+    """One file being read: its path, and what was noted on the way."""
+
+    path: str
+    _notes: Counter[str] = field(default_factory=Counter)
+    _first_line: dict[str, int] = field(default_factory=dict)
+
+    def note(self, what: str, element: XmlElement) -> None:
+        """Remember something that was repaired or ignored; the same note twice is counted, not repeated."""
+        self._notes[what] += 1
+        self._first_line.setdefault(what, int(element.sourceline or 0))
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """One line per kind of note, with the line of its first occurrence."""
+        return tuple(
+            f"{self.path}:{self._first_line[what]}: {what}" + (f" (and {count - 1} more)" if count > 1 else "")
+            for what, count in self._notes.items()
+        )
+
+    def error(self, what: str, element: XmlElement) -> FormatError:
+        """An error at an element."""
+        return FormatError(what, path=self.path, line=element.sourceline, element=describe(element))
+
+    def number(self, element: XmlElement, name: str, default: float | None = None) -> float:
+        """A finite number; `default` where the attribute is absent (None: it must be there)."""
+        text = element.get(name)
+        if text is None:
+            if default is None:
+                raise self.error(f"attribute '{name}' is missing", element)
+            return default
+        try:
+            value = float(text)
+        except ValueError:
+            raise self.error(f"{name}={text!r} is no number", element) from None
+        if not isfinite(value):
+            raise self.error(f"{name}={text!r} is not finite", element)
+        return value
+
+    def cubic(self, element: XmlElement) -> Cubic:
+        """Attributes a, b, c, d; absent ones are 0."""
+        return (
+            self.number(element, "a", 0.0),
+            self.number(element, "b", 0.0),
+            self.number(element, "c", 0.0),
+            self.number(element, "d", 0.0),
+        )
+
+    def integer(self, element: XmlElement, name: str) -> int:
+        """A whole number."""
+        value = self.number(element, name)
+        if value != int(value):
+            raise self.error(f"{name}={element.get(name)!r} is no whole number", element)
+        return int(value)
+
+
+def open_document(path: str | PathLike[str]) -> tuple[XmlElement, Source]:
+    """Parse a file (no entities, no network, see `read_xml`); namespaces are dropped."""
+    source = Source(fspath(path))
+    root, _ = read_xml(Path(source.path))
+    if root.tag.startswith("{"):
+        root = deepcopy(root)  # the tree is shared between callers
+        for element in root.iter(etree.Element):
+            element.tag = element.tag.rpartition("}")[2]
+    if root.tag != "OpenDRIVE":
+        raise FormatError(
+            f"root element is '{root.tag}', expected 'OpenDRIVE'", path=source.path, line=root.sourceline
+        )
+    return root, source
+
+
+def describe(element: XmlElement) -> str:
+    """Where an element is, as in ``road '3' geometry``."""
+    road = next((above for above in element.iterancestors() if above.tag in ("road", "junction")), None)
+    own = next((element.get(key) for key in ("id", "s", "sOffset") if element.get(key) is not None), None)
+    name = element.tag if own is None else f"{element.tag} '{own}'"
+    return name if road is None else f"{road.tag} '{road.get('id')}' {name}"

@@ -1,0 +1,167 @@
+"""One OpenDRIVE file into a `RoadNetwork`."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from os import PathLike
+
+from xosc_lateral.formats.opendrive.document import Source, XmlElement, open_document
+from xosc_lateral.formats.opendrive.lane_sections import read_sections, speed_limit
+from xosc_lateral.formats.opendrive.plan_view import Record, finish_elements, read_plan_view
+from xosc_lateral.road.geometry import ReferenceElement
+from xosc_lateral.road.network import RoadNetwork
+from xosc_lateral.road.piecewise import Piecewise
+from xosc_lateral.road.road import Connection, Junction, Road, RoadLink
+from xosc_lateral.road.surface import Shape, Surface
+
+LENGTH_TOLERANCE = 0.01
+"""road/@length and the end of its geometry may differ by this without a note. [m]"""
+
+
+def read_opendrive(path: str | PathLike[str]) -> RoadNetwork:
+    """Read one ``.xodr``.
+
+    Parameters
+    ----------
+    path : path-like
+        The file.
+
+    Returns
+    -------
+    RoadNetwork
+        Its `notes` name what was repaired, ignored or degenerate.
+
+    Raises
+    ------
+    FormatError
+        If it is no OpenDRIVE, or can't be understood: file, line, element and value.
+    OSError
+        If it can't be opened.
+    """
+    root, source = open_document(path)
+    elements = list(root.iterfind("road"))
+    if not elements:
+        raise source.error("no road", root)
+    _check_ids(elements, source)
+    plans = [read_plan_view(element, source) for element in elements]
+    lines = finish_elements(plans)
+    roads = tuple(_read_road(e, plan, line, source) for e, plan, line in zip(elements, plans, lines, strict=True))
+    junctions = tuple(_read_junction(element, source) for element in root.iterfind("junction"))
+    reference = root.findtext("header/geoReference")
+    return RoadNetwork(
+        roads=roads,
+        junctions=junctions,
+        path=source.path,
+        notes=source.notes,
+        geo_reference=reference.strip() if reference and reference.strip() else None,
+    )
+
+
+def _check_ids(elements: Sequence[XmlElement], source: Source) -> None:
+    seen: set[str] = set()
+    for element in elements:
+        road = element.get("id")
+        if road is None:
+            raise source.error("attribute 'id' is missing", element)
+        if road in seen:
+            raise source.error(f"second road with id={road!r}", element)
+        seen.add(road)
+
+
+def _read_road(
+    element: XmlElement, plan: Sequence[Record], line: tuple[ReferenceElement, ...], source: Source
+) -> Road:
+    length = _length(element, plan, source)
+    rule = element.get("rule", "RHT").upper()
+    if rule not in ("RHT", "LHT"):
+        raise source.error(f"rule={element.get('rule')!r} is neither RHT nor LHT", element)
+    sections, directions = read_sections(element, length, rule, source)
+    junction = element.get("junction", "-1")
+    return Road(
+        id=element.get("id", ""),
+        name=element.get("name", ""),
+        length=length,
+        rule=rule,
+        junction=None if junction in ("-1", "") else junction,
+        starts=tuple(s for s, _, _ in plan),
+        elements=line,
+        sections=sections,
+        surface=_read_surface(element, source),
+        speeds=_read_speeds(element, source),
+        directions=directions,
+        predecessor=_read_link(element, "predecessor"),
+        successor=_read_link(element, "successor"),
+    )
+
+
+def _length(element: XmlElement, plan: Sequence[Record], source: Source) -> float:
+    """road/@length, or the end of the geometry where the attribute is absent or reaches further."""
+    end = plan[-1][0] + plan[-1][1]
+    length = source.number(element, "length", end)
+    if length <= 0.0:
+        raise source.error(f"length={length:g} m is not positive", element)
+    if abs(length - end) > LENGTH_TOLERANCE:
+        used = min(length, end)
+        source.note(f"length={length:g} m, but the geometry ends at {end:g} m: {used:g} m used", element)
+    return min(length, end) if length - end > LENGTH_TOLERANCE else length
+
+
+def _read_surface(element: XmlElement, source: Source) -> Surface:
+    crossfalls = element.findall("lateralProfile/crossfall")
+    fall = [(source.number(e, "s"), source.cubic(e), e.get("side", "both")) for e in crossfalls]
+    return Surface(
+        elevation=_profile(element, "elevationProfile/elevation", source),
+        superelevation=_profile(element, "lateralProfile/superelevation", source),
+        crossfall=(
+            Piecewise.from_records([(s, c) for s, c, side in fall if side != "right"], begin=0.0),
+            Piecewise.from_records([(s, c) for s, c, side in fall if side != "left"], begin=0.0),
+        )
+        if fall
+        else None,
+        shape=_read_shape(element, source),
+    )
+
+
+def _profile(element: XmlElement, tag: str, source: Source) -> Piecewise:
+    records = [(source.number(e, "s"), source.cubic(e)) for e in element.iterfind(tag)]
+    return Piecewise.from_records(records, begin=0.0)
+
+
+def _read_shape(element: XmlElement, source: Source) -> Shape | None:
+    stations: dict[float, list[tuple[float, tuple[float, float, float, float]]]] = {}
+    for e in element.iterfind("lateralProfile/shape"):
+        stations.setdefault(source.number(e, "s"), []).append((source.number(e, "t"), source.cubic(e)))
+    if not stations:
+        return None
+    ordered = sorted(stations)
+    profiles = (Piecewise.from_records(stations[s], begin=min(t for t, _ in stations[s])) for s in ordered)
+    return Shape(tuple(ordered), tuple(profiles))
+
+
+def _read_speeds(element: XmlElement, source: Source) -> tuple[tuple[float, float], ...]:
+    speeds = []
+    for kind in element.iterfind("type"):
+        speed = kind.find("speed")
+        speeds.append((source.number(kind, "s", 0.0), float("inf") if speed is None else speed_limit(speed, source)))
+    return tuple(sorted(speeds))
+
+
+def _read_link(element: XmlElement, tag: str) -> RoadLink | None:
+    link = element.find(f"link/{tag}")
+    if link is None or link.get("elementId") is None:
+        return None
+    contact = link.get("contactPoint", "")
+    return RoadLink(link.get("elementType", "road"), link.get("elementId", ""), contact)
+
+
+def _read_junction(element: XmlElement, source: Source) -> Junction:
+    connections = []
+    for e in element.iterfind("connection"):
+        connecting = e.get("connectingRoad") or e.get("linkedRoad")
+        incoming = e.get("incomingRoad")
+        if connecting is None or incoming is None:
+            source.note("junction connection without incoming or connecting road left out", e)
+            continue
+        lanes = tuple((source.integer(k, "from"), source.integer(k, "to")) for k in e.iterfind("laneLink"))
+        connections.append(Connection(incoming, connecting, e.get("contactPoint", "start"), lanes))
+    return Junction(element.get("id", ""), element.get("name", ""), tuple(connections))

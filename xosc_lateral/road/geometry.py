@@ -1,0 +1,253 @@
+"""The elements of a reference line, one place at a time in plain floats: line, arc, spiral, parametric cubic.
+
+Every element answers `at(ds)` -> (x, y, heading) and `curvature_at(ds)`, with ds [m] from its start; beyond its ends it
+is continued. Arrays of places are evaluated in `reference_line` from the same pieces.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import atan2, ceil, cos, hypot, sin
+from typing import Protocol
+
+TURN_PER_PIECE = 0.5
+"""A clothoid is expanded in power series over pieces that turn at most by this. [rad]"""
+
+SERIES_TERMS = 11
+"""With half a piece turning by 0.25 rad, the first term left out is below 0.25^11 / 11! = 6e-15 of the length."""
+
+MAX_TURN = 2000.0
+"""An element that turns more than this is refused by the reader. [rad]"""
+
+
+class Element(Protocol):
+    """One element of a reference line."""
+
+    def at(self, ds: float) -> tuple[float, float, float]:
+        """x, y, heading at ds."""
+
+    def curvature_at(self, ds: float) -> float:
+        """Curvature at ds, positive to the left. [1/m]"""
+
+
+@dataclass(frozen=True, slots=True)
+class ClothoidPiece:
+    """A stretch of clothoid (line and arc included) about its middle.
+
+    Attributes
+    ----------
+    start, middle, end : float
+        ds in its element. [m]
+    heading, curvature, sharpness : float
+        At the middle: [rad], [1/m]; change of curvature [1/m^2].
+    x_series, y_series : tuple of float
+        x and y as power series in ds - middle, lowest power first.
+    """
+
+    start: float
+    middle: float
+    end: float
+    heading: float
+    curvature: float
+    sharpness: float
+    x_series: tuple[float, ...]
+    y_series: tuple[float, ...]
+
+
+def clothoid_pieces(
+    x: float, y: float, heading: float, length: float, curvature: float, sharpness: float
+) -> tuple[ClothoidPiece, ...]:
+    """Cut a clothoid into pieces that turn little enough for a short power series.
+
+    The tangent exp(i (k u + c u^2 / 2)) obeys f' = i (k + c u) f, hence the recurrence of its coefficients in
+    `tangent_series`; integrating it term by term gives the position. Unlike Fresnel integrals this has no special case
+    where the curvature does not change, and needs no division by its change.
+    """
+    turn = max(abs(curvature), abs(curvature + sharpness * length)) * length
+    n = max(1, ceil(turn / TURN_PER_PIECE))
+    step = length / n
+    pieces = []
+    at = complex(x, y)
+    for i in range(n):
+        middle = (i + 0.5) * step
+        k = curvature + sharpness * middle
+        theta = heading + middle * (curvature + 0.5 * sharpness * middle)
+        position = [0j, *(a / (j + 1) for j, a in enumerate(tangent_series(k, sharpness, SERIES_TERMS)))]
+        rotation = complex(cos(theta), sin(theta))
+        series = [rotation * a for a in position]
+        series[0] = at - _horner(series, -0.5 * step)
+        at = _horner(series, 0.5 * step)
+        pieces.append(
+            ClothoidPiece(
+                *(i * step, middle, (i + 1) * step, theta, k, sharpness),
+                tuple(a.real for a in series),
+                tuple(a.imag for a in series),
+            )
+        )
+    return tuple(pieces)
+
+
+def tangent_series(k: float, c: float, terms: int) -> list[complex]:
+    """Taylor coefficients of exp(i (k u + c u^2 / 2)) in u: (n + 1) a[n + 1] = i (k a[n] + c a[n - 1])."""
+    series = [1.0 + 0j]
+    before = 0j
+    for n in range(terms - 1):
+        series.append(1j * (k * series[n] + c * before) / (n + 1))
+        before = series[n]
+    return series
+
+
+def _horner(series: list[complex], u: float) -> complex:
+    value = 0j
+    for coefficient in reversed(series):
+        value = value * u + coefficient
+    return value
+
+
+@dataclass(frozen=True, slots=True)
+class Line:
+    """A straight line."""
+
+    x: float
+    y: float
+    heading: float
+    length: float
+    cos_heading: float
+    sin_heading: float
+
+    @classmethod
+    def of(cls, x: float, y: float, heading: float, length: float) -> Line:
+        """A line from (x, y)."""
+        return cls(x, y, heading, length, cos(heading), sin(heading))
+
+    def at(self, ds: float) -> tuple[float, float, float]:
+        """x, y, heading at ds."""
+        return self.x + ds * self.cos_heading, self.y + ds * self.sin_heading, self.heading
+
+    def curvature_at(self, ds: float) -> float:
+        """Zero."""
+        return 0.0
+
+    def pieces(self) -> tuple[ClothoidPiece, ...]:
+        """The line as clothoid pieces."""
+        return clothoid_pieces(self.x, self.y, self.heading, self.length, 0.0, 0.0)
+
+
+@dataclass(frozen=True, slots=True)
+class Arc:
+    """A circular arc."""
+
+    x: float
+    y: float
+    heading: float
+    length: float
+    curvature: float
+
+    def at(self, ds: float) -> tuple[float, float, float]:
+        """x, y, heading at ds, along the chord: exact for any curvature, also one near zero."""
+        half = 0.5 * self.curvature * ds
+        # sin(h) / h loses nothing above 1e-8 and is 1 to the last bit below
+        chord = ds * sin(half) / half if abs(half) > 1e-8 else ds
+        direction = self.heading + half
+        return self.x + chord * cos(direction), self.y + chord * sin(direction), direction + half
+
+    def curvature_at(self, ds: float) -> float:
+        """Constant."""
+        return self.curvature
+
+    def pieces(self) -> tuple[ClothoidPiece, ...]:
+        """The arc as clothoid pieces."""
+        return clothoid_pieces(self.x, self.y, self.heading, self.length, self.curvature, 0.0)
+
+
+@dataclass(frozen=True, slots=True)
+class Spiral:
+    """A clothoid: curvature changes linearly along it."""
+
+    heading: float
+    curvature: float
+    sharpness: float
+    pieces_per_metre: float
+    parts: tuple[ClothoidPiece, ...]
+
+    @classmethod
+    def of(cls, x: float, y: float, heading: float, length: float, start: float, end: float) -> Spiral:
+        """A clothoid from curvature `start` to `end`."""
+        sharpness = (end - start) / length
+        parts = clothoid_pieces(x, y, heading, length, start, sharpness)
+        return cls(heading, start, sharpness, len(parts) / length, parts)
+
+    def at(self, ds: float) -> tuple[float, float, float]:
+        """x, y, heading at ds."""
+        i = int(ds * self.pieces_per_metre)
+        part = self.parts[0 if i < 0 else i if i < len(self.parts) else -1]
+        u = ds - part.middle
+        x0, x1, x2, x3, x4, x5, x6, x7, x8, x9, x10, x11 = part.x_series
+        y0, y1, y2, y3, y4, y5, y6, y7, y8, y9, y10, y11 = part.y_series
+        x = x6 + u * (x7 + u * (x8 + u * (x9 + u * (x10 + u * x11))))
+        y = y6 + u * (y7 + u * (y8 + u * (y9 + u * (y10 + u * y11))))
+        return (
+            x0 + u * (x1 + u * (x2 + u * (x3 + u * (x4 + u * (x5 + u * x))))),
+            y0 + u * (y1 + u * (y2 + u * (y3 + u * (y4 + u * (y5 + u * y))))),
+            self.heading + ds * (self.curvature + 0.5 * self.sharpness * ds),
+        )
+
+    def curvature_at(self, ds: float) -> float:
+        """Linear in ds."""
+        return self.curvature + self.sharpness * ds
+
+    def pieces(self) -> tuple[ClothoidPiece, ...]:
+        """The clothoid's pieces."""
+        return self.parts
+
+
+@dataclass(frozen=True, slots=True)
+class ParamCubic:
+    """A parametric cubic (paramPoly3, and poly3 as its special case) run through by arc length.
+
+    Attributes
+    ----------
+    x, y : tuple of 4 floats
+        World coordinates as cubics of the parameter p.
+    step : float
+        Length of the pieces of p(ds). [m]
+    parameter : tuple of 4-tuples
+        p as a cubic of ds about each piece's start (see `arc_length`).
+    """
+
+    x: tuple[float, ...]
+    y: tuple[float, ...]
+    length: float
+    step: float
+    parameter: tuple[tuple[float, ...], ...]
+
+    def _parameter_at(self, ds: float) -> float:
+        i = int(ds / self.step)
+        i = 0 if i < 0 else min(i, len(self.parameter) - 1)
+        a, b, c, d = self.parameter[i]
+        ds -= i * self.step
+        return a + ds * (b + ds * (c + ds * d))
+
+    def at(self, ds: float) -> tuple[float, float, float]:
+        """x, y, heading at ds."""
+        p = self._parameter_at(ds)
+        x0, x1, x2, x3 = self.x
+        y0, y1, y2, y3 = self.y
+        return (
+            x0 + p * (x1 + p * (x2 + p * x3)),
+            y0 + p * (y1 + p * (y2 + p * y3)),
+            atan2(y1 + p * (2.0 * y2 + 3.0 * p * y3), x1 + p * (2.0 * x2 + 3.0 * p * x3)),
+        )
+
+    def curvature_at(self, ds: float) -> float:
+        """Curvature of the curve itself, whatever its parameter."""
+        p = self._parameter_at(ds)
+        _, x1, x2, x3 = self.x
+        _, y1, y2, y3 = self.y
+        dx, dy = x1 + p * (2.0 * x2 + 3.0 * p * x3), y1 + p * (2.0 * y2 + 3.0 * p * y3)
+        ddx, ddy = 2.0 * x2 + 6.0 * p * x3, 2.0 * y2 + 6.0 * p * y3
+        speed = hypot(dx, dy)
+        return (dx * ddy - dy * ddx) / (speed * speed * speed) if speed > 0.0 else 0.0
+
+
+ReferenceElement = Line | Arc | Spiral | ParamCubic

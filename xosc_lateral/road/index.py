@@ -1,0 +1,3 @@
+"""World to lane."""
+class SurfaceIndex:
+    def __init__(self, tables): pass

@@ -1,0 +1,172 @@
+"""Lanes and lane sections, and how widths, borders and the lane offset make their edges."""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+from xosc_lateral.road.piecewise import ZERO, Cubic, Piecewise
+from xosc_lateral.road.positions import LaneState, RoadMark
+
+DRIVING: frozenset[str] = frozenset(
+    "driving entry exit onRamp offRamp connectingRamp slipLane bidirectional HOV bus taxi mwyEntry mwyExit".split()
+)
+"""Lane types that vehicles follow, and that world positions snap to."""
+
+NARROW = 0.1
+"""A lane narrower than this at some s does not count as one there (it opens or closes). [m]"""
+
+
+@dataclass(frozen=True, slots=True)
+class LaneRecord:
+    """A lane as written in the file; starts are s of the road, not of the section. [m], [m/s]"""
+
+    id: int
+    type: str
+    level: bool
+    widths: tuple[tuple[float, Cubic], ...]
+    borders: tuple[tuple[float, Cubic], ...]
+    heights: tuple[tuple[float, float, float], ...]
+    speeds: tuple[tuple[float, float], ...]
+    marks: tuple[RoadMark, ...]
+    predecessors: tuple[int, ...]
+    successors: tuple[int, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Lane:
+    """A lane of one section, evaluated.
+
+    Attributes
+    ----------
+    id : int
+        Positive to the left of the reference line, negative to the right.
+    direction : int
+        Travel along (+1) or against (-1) s.
+    starts : tuple of float
+        s where new cubics begin. [m]
+    centre, width : tuple of Cubic
+        t of the lane centre and width, about each start. [m]
+    heights : tuple of (s, inner, outer)
+        Height over the road surface at its edges. [m]
+    speeds : tuple of (s, limit)
+        [m/s], inf: none.
+    """
+
+    id: int
+    type: str
+    direction: int
+    level: bool
+    starts: tuple[float, ...]
+    centre: tuple[Cubic, ...]
+    width: tuple[Cubic, ...]
+    heights: tuple[tuple[float, float, float], ...]
+    speeds: tuple[tuple[float, float], ...]
+    marks: tuple[RoadMark, ...]
+    predecessors: tuple[int, ...]
+    successors: tuple[int, ...]
+
+    def state_at(self, s: float) -> LaneState:
+        """Centre t, its slope and the width at s."""
+        i = bisect_right(self.starts, s) - 1
+        if i < 0:
+            i = 0
+        s -= self.starts[i]
+        a, b, c, d = self.centre[i]
+        e, f, g, h = self.width[i]
+        return LaneState(
+            a + s * (b + s * (c + s * d)),
+            b + s * (2.0 * c + 3.0 * s * d),
+            e + s * (f + s * (g + s * h)),
+        )
+
+    def height_at(self, s: float, across: float) -> float:
+        """Height over the road surface, `across` the lane from its inner (0) to its outer edge (1). [m]"""
+        i = max(bisect_right(self.heights, s, key=lambda record: record[0]) - 1, 0)
+        _, inner, outer = self.heights[i]
+        return inner + across * (outer - inner)
+
+
+@dataclass(frozen=True, slots=True)
+class LaneSection:
+    """The cross-section of a road over [start, end).
+
+    Attributes
+    ----------
+    lanes : tuple of Lane
+        From left to right looking along s, without the centre lane 0.
+    centre : Lane
+        Lane 0: no width, its t is the lane offset.
+    by_id : mapping
+        All of them by id.
+    centre_marks : tuple of RoadMark
+        Markings of lane 0.
+    """
+
+    start: float
+    end: float
+    lanes: tuple[Lane, ...]
+    centre: Lane
+    by_id: Mapping[int, Lane] = field(init=False)
+
+    def __post_init__(self) -> None:
+        """Index the lanes by id."""
+        object.__setattr__(self, "by_id", {lane.id: lane for lane in (*self.lanes, self.centre)})
+
+
+def build_section(
+    records: Sequence[LaneRecord],
+    start: float,
+    end: float,
+    *,
+    lane_offset: Piecewise,
+    directions: Mapping[int, int],
+    centre_marks: tuple[RoadMark, ...] = (),
+) -> LaneSection:
+    """Evaluate the lanes of one section, outwards from the centre lane on either side."""
+    centre = lane_offset.restricted(start, end)
+    lanes: list[Lane] = []
+    for side in (1, -1):
+        inner = centre
+        for record in sorted((r for r in records if r.id * side > 0), key=lambda r: abs(r.id)):
+            outer = _outer_edge(record, inner, centre, start, end, side)
+            width = outer.plus(inner, -1.0)
+            if side < 0:
+                width = Piecewise(width.starts, tuple((-a, -b, -c, -d) for a, b, c, d in width.cubics))
+            middle = inner.plus(width, 0.5 * side)
+            lanes.append(_lane(record, directions[record.id], middle, width))
+            inner = outer
+    nothing = Piecewise(centre.starts, (ZERO,) * len(centre.starts))
+    lane_zero = LaneRecord(0, "none", True, (), (), (), (), centre_marks, (), ())
+    return LaneSection(start, end, tuple(sorted(lanes, key=lambda lane: -lane.id)), _lane(lane_zero, 1, centre, nothing))
+
+
+def _outer_edge(
+    record: LaneRecord, inner: Piecewise, centre: Piecewise, start: float, end: float, side: int
+) -> Piecewise:
+    """The edge away from the centre lane; widths count outwards, borders (in t) from the centre lane. Widths win."""
+    records, origin, factor = (record.widths, inner, float(side)) if record.widths else (record.borders, centre, 1.0)
+    if not records:
+        return inner
+    # Before its first record a width is taken as the record's first value: no lane begins with a jump.
+    first = min(records, key=lambda item: item[0])[1]
+    profile = Piecewise.from_records(records, begin=start, before=(first[0], 0.0, 0.0, 0.0))
+    return origin.plus(profile.restricted(start, end), factor)
+
+
+def _lane(record: LaneRecord, direction: int, centre: Piecewise, width: Piecewise) -> Lane:
+    return Lane(
+        id=record.id,
+        type=record.type,
+        direction=direction,
+        level=record.level,
+        starts=centre.starts,
+        centre=centre.cubics,
+        width=width.cubics if width.starts == centre.starts else tuple(width.cubic_at(s) for s in centre.starts),
+        heights=record.heights,
+        speeds=record.speeds,
+        marks=record.marks,
+        predecessors=record.predecessors,
+        successors=record.successors,
+    )

@@ -1,0 +1,88 @@
+"""Piecewise cubic functions of s, one at a time in plain floats: lane edges, elevation, superelevation."""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+Cubic = tuple[float, float, float, float]
+"""a, b, c, d of a + b ds + c ds^2 + d ds^3."""
+
+ZERO: Cubic = (0.0, 0.0, 0.0, 0.0)
+
+
+def shift(cubic: Cubic, ds: float) -> Cubic:
+    """The same cubic about a point `ds` further on (Taylor)."""
+    if ds == 0.0:
+        return cubic
+    a, b, c, d = cubic
+    return (a + ds * (b + ds * (c + ds * d)), b + ds * (2.0 * c + ds * 3.0 * d), c + 3.0 * d * ds, d)
+
+
+@dataclass(frozen=True, slots=True)
+class Piecewise:
+    """A function of s that is one cubic from each start to the next, about that start.
+
+    Parameters
+    ----------
+    starts : tuple of float
+        Increasing s; the first piece also holds before its start, the last one to infinity. [m]
+    cubics : tuple of Cubic
+        One per start.
+    """
+
+    starts: tuple[float, ...]
+    cubics: tuple[Cubic, ...]
+
+    @classmethod
+    def from_records(cls, records: Iterable[tuple[float, Cubic]], *, begin: float, before: Cubic = ZERO) -> Piecewise:
+        """From (s, cubic) records in any order; of two at the same s the later counts; `before` holds from `begin` on."""
+        ordered: dict[float, Cubic] = {}
+        for s, cubic in sorted(records, key=lambda record: record[0]):
+            ordered[s] = cubic
+        if not ordered or min(ordered) > begin:
+            ordered = {begin: before, **ordered}
+        return cls(tuple(ordered), tuple(ordered.values()))
+
+    @property
+    def is_zero(self) -> bool:
+        """Whether the function vanishes everywhere."""
+        return not any(any(cubic) for cubic in self.cubics)
+
+    def at(self, s: float) -> float:
+        """Value at s."""
+        i = bisect_right(self.starts, s) - 1
+        if i < 0:
+            i = 0
+        a, b, c, d = self.cubics[i]
+        s -= self.starts[i]
+        return a + s * (b + s * (c + s * d))
+
+    def with_slope_at(self, s: float) -> tuple[float, float]:
+        """Value and derivative at s."""
+        i = bisect_right(self.starts, s) - 1
+        if i < 0:
+            i = 0
+        a, b, c, d = self.cubics[i]
+        s -= self.starts[i]
+        return a + s * (b + s * (c + s * d)), b + s * (2.0 * c + 3.0 * s * d)
+
+    def cubic_at(self, s: float) -> Cubic:
+        """The cubic that holds at s, about s."""
+        i = max(bisect_right(self.starts, s) - 1, 0)
+        return shift(self.cubics[i], s - self.starts[i])
+
+    def restricted(self, begin: float, end: float) -> Piecewise:
+        """The same function with pieces for [begin, end) only."""
+        starts = (begin, *(s for s in self.starts if begin < s < end))
+        return Piecewise(starts, tuple(self.cubic_at(s) for s in starts))
+
+    def plus(self, other: Piecewise, factor: float = 1.0) -> Piecewise:
+        """``self + factor * other``, with the breakpoints of both."""
+        starts = tuple(sorted({*self.starts, *other.starts}))
+        cubics = []
+        for s in starts:
+            (a, b, c, d), (e, f, g, h) = self.cubic_at(s), other.cubic_at(s)
+            cubics.append((a + factor * e, b + factor * f, c + factor * g, d + factor * h))
+        return Piecewise(starts, tuple(cubics))

@@ -1,0 +1,113 @@
+"""One place on one road at a time, in plain floats: what the player asks at every step."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from math import atan, ceil, cos, inf, pi, sin
+
+from xosc_lateral.errors import PlaybackError
+from xosc_lateral.road.lanes import Lane
+from xosc_lateral.road.positions import LaneInfo, LanePosition, Pose
+from xosc_lateral.road.road import Road
+
+TWO_PI = 2.0 * pi
+
+
+def normal_angle(angle: float) -> float:
+    """The angle in (-pi, pi]."""
+    if -pi < angle <= pi:
+        return angle
+    return angle - TWO_PI * ceil((angle - pi) / TWO_PI)
+
+
+def find_lane(road: Road, lane: int, s: float) -> Lane:
+    """A lane at s; raises `PlaybackError` naming the road, the lane and the lanes that are there."""
+    section = road.section_at(s)
+    found = section.by_id.get(lane)
+    if found is None:
+        there = ", ".join(str(other.id) for other in section.lanes) or "none"
+        raise PlaybackError(f"road '{road.id}' has no lane {lane} at s={s:.3f} m (lanes there: {there})")
+    return found
+
+
+def lane_pose(road: Road, lane: int, s: float, offset: float) -> Pose:
+    """Pose of driving along a lane; `offset` positive to the left of travel."""
+    s = 0.0 if s < 0.0 else s if s < road.length else road.length
+    found = road.section_at(s).by_id.get(lane) or find_lane(road, lane, s)
+    centre, slope, width = found.state_at(s)
+    direction = found.direction
+    return surface_pose(road, s, centre + direction * offset, slope, direction, found, centre, width)
+
+
+def surface_pose(
+    road: Road,
+    s: float,
+    t: float,
+    slope: float = 0.0,
+    direction: int = 1,
+    lane: Lane | None = None,
+    centre: float = 0.0,
+    width: float = 0.0,
+) -> Pose:
+    """Pose at (s, t), heading along (+1) or against (-1) s, turned by the slope of what is followed."""
+    x, y, heading = road.reference_at(s)
+    z = pitch = roll = 0.0
+    from_line = t
+    if not road.is_flat:
+        z, along, roll, shrink = road.surface.at(s, t)
+        from_line = t * shrink
+        if lane is not None and lane.heights:
+            z += lane.height_at(s, across_lane(lane, t, centre, width))
+        pitch = -direction * atan(along)
+        roll *= direction
+    x -= from_line * sin(heading)
+    y += from_line * cos(heading)
+    if slope != 0.0:
+        heading += atan(slope)
+    if direction < 0:
+        heading += pi
+    return Pose(x, y, z, normal_angle(heading), pitch, roll)
+
+
+def across_lane(lane: Lane, t: float, centre: float, width: float) -> float:
+    """How far across a lane t lies, from its inner (0) to its outer edge (1)."""
+    if width <= 0.0:
+        return 0.0
+    outwards = (t - centre) / width if lane.id > 0 else (centre - t) / width
+    return min(max(0.5 + outwards, 0.0), 1.0)
+
+
+def cross_section(road: Road, s: float) -> tuple[LaneInfo, ...]:
+    """All lanes but lane 0, from left to right looking along s."""
+    infos = []
+    for lane in road.section_at(s).lanes:
+        centre, _, width = lane.state_at(s)
+        infos.append(LaneInfo(lane.id, lane.type, centre, width, lane.direction))
+    return tuple(infos)
+
+
+def lane_at(road: Road, index: int, s: float, t: float, lane_types: Collection[str] | None) -> LanePosition:
+    """The lane of these types that holds t, else the nearest; lanes of no width only where there is nothing else."""
+    best: tuple[float, float, float] | None = None
+    found: tuple[Lane, float] | None = None
+    for lane in road.section_at(s).lanes:
+        if lane_types is not None and lane.type not in lane_types:
+            continue
+        centre, _, width = lane.state_at(s)
+        away = abs(t - centre)
+        score = (max(away - 0.5 * width, 0.0) + (1e3 if width <= 1e-6 else 0.0), away, width)
+        if best is None or score < best:
+            best, found = score, (lane, centre)
+    if best is None or found is None:
+        return LanePosition(index, 0, s, t, t, inf)
+    lane, centre = found
+    return LanePosition(index, lane.id, s, lane.direction * (t - centre), t, max(best[1] - 0.5 * best[2], 0.0))
+
+
+def limit_at(speeds: tuple[tuple[float, float], ...], s: float) -> float:
+    """The speed limit of (s, limit) records at s; inf where there is none. [m/s]"""
+    limit = inf
+    for start, value in speeds:
+        if start <= s:
+            limit = value
+    return limit

@@ -1,0 +1,121 @@
+"""One road: reference line, lane sections, surface, links; everything that is known about one place on it."""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from xosc_lateral.road.geometry import ReferenceElement
+from xosc_lateral.road.lanes import LaneSection
+from xosc_lateral.road.surface import Surface
+
+
+@dataclass(frozen=True, slots=True)
+class RoadLink:
+    """What a road is linked to at one of its ends.
+
+    Attributes
+    ----------
+    element_type : str
+        ``"road"`` or ``"junction"``.
+    element_id : str
+        Its id.
+    contact : str
+        Where the other road is touched: ``"start"``, ``"end"``, or empty when the file does not say (junctions).
+    """
+
+    element_type: str
+    element_id: str
+    contact: str
+
+
+@dataclass(frozen=True, slots=True)
+class Connection:
+    """A way through a junction: from an incoming road onto a connecting one.
+
+    `lanes` holds (from, to) lane ids; empty: the file gives none.
+    """
+
+    incoming_road: str
+    connecting_road: str
+    contact: str
+    lanes: tuple[tuple[int, int], ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Junction:
+    """A junction and its connections."""
+
+    id: str
+    name: str
+    connections: tuple[Connection, ...]
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Road:
+    """One road.
+
+    Attributes
+    ----------
+    id, name : str
+        As in the file.
+    length : float
+        [m]
+    rule : str
+        ``"RHT"`` or ``"LHT"``: on which side one drives.
+    junction : str or None
+        Id of the junction that it is a connecting road of.
+    starts : tuple of float
+        s where each element of the reference line starts. [m]
+    elements : tuple of ReferenceElement
+    sections : tuple of LaneSection
+        Gapless over [0, length].
+    surface : Surface
+    speeds : tuple of (s, limit)
+        From ``road/type/speed``; inf: none. [m/s]
+    directions : mapping of int to int
+        Travel direction along s by lane id.
+    predecessor, successor : RoadLink or None
+    """
+
+    id: str
+    name: str
+    length: float
+    rule: str
+    junction: str | None
+    starts: tuple[float, ...]
+    elements: tuple[ReferenceElement, ...]
+    sections: tuple[LaneSection, ...]
+    surface: Surface
+    speeds: tuple[tuple[float, float], ...]
+    directions: Mapping[int, int]
+    predecessor: RoadLink | None
+    successor: RoadLink | None
+    section_starts: tuple[float, ...] = field(init=False)
+    is_flat: bool = field(init=False)
+
+    def __post_init__(self) -> None:
+        """Keep what every look-up needs."""
+        object.__setattr__(self, "section_starts", tuple(section.start for section in self.sections))
+        heights = any(lane.heights for section in self.sections for lane in section.lanes)
+        object.__setattr__(self, "is_flat", self.surface.is_flat and not heights)
+
+    def section_at(self, s: float) -> LaneSection:
+        """The lane section at s; beyond the ends the first or last one."""
+        i = bisect_right(self.section_starts, s) - 1
+        return self.sections[i if i > 0 else 0]
+
+    def reference_at(self, s: float) -> tuple[float, float, float]:
+        """x, y, heading of the reference line."""
+        i = bisect_right(self.starts, s) - 1
+        if i < 0:
+            i = 0
+        return self.elements[i].at(s - self.starts[i])
+
+    def curvature_at(self, s: float) -> float:
+        """Curvature of the reference line. [1/m]"""
+        i = bisect_right(self.starts, s) - 1
+        if i < 0:
+            i = 0
+        return self.elements[i].curvature_at(s - self.starts[i])

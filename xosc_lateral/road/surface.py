@@ -1,0 +1,108 @@
+"""The road surface: height over (s, t), and how it leans."""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from dataclasses import dataclass
+from math import cos, sin
+
+from xosc_lateral.road.piecewise import Cubic, Piecewise
+
+
+@dataclass(frozen=True, slots=True)
+class Shape:
+    """Lateral profile over t at a few stations (``lateralProfile/shape``), linear in s between them.
+
+    Attributes
+    ----------
+    stations : tuple of float
+        Increasing s. [m]
+    profiles : tuple of Piecewise
+        Height over t at each station. [m]
+    """
+
+    stations: tuple[float, ...]
+    profiles: tuple[Piecewise, ...]
+
+    def at(self, s: float, t: float) -> tuple[float, float, float]:
+        """Height, its slope along s, its slope along t."""
+        i = bisect_right(self.stations, s) - 1
+        if i < 0 or i == len(self.stations) - 1:
+            height, across = self.profiles[max(i, 0)].with_slope_at(t)
+            return height, 0.0, across
+        length = self.stations[i + 1] - self.stations[i]
+        weight = (s - self.stations[i]) / length
+        (before, before_slope), (after, after_slope) = (self.profiles[j].with_slope_at(t) for j in (i, i + 1))
+        return (
+            before + weight * (after - before),
+            (after - before) / length,
+            before_slope + weight * (after_slope - before_slope),
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class Surface:
+    """Elevation and lean of one road.
+
+    Attributes
+    ----------
+    elevation : Piecewise
+        z of the reference line over s. [m]
+    superelevation : Piecewise
+        Roll about the reference line, positive when the road falls to the right looking along s. [rad]
+    crossfall : tuple of 2 Piecewise
+        OpenDRIVE 1.4: angle of the surface left and right of the reference line, positive falling outwards. [rad]
+    shape : Shape or None
+        Height over t on top of all that.
+    """
+
+    elevation: Piecewise
+    superelevation: Piecewise
+    crossfall: tuple[Piecewise, Piecewise] | None = None
+    shape: Shape | None = None
+
+    @property
+    def is_flat(self) -> bool:
+        """Whether z is 0 all over the road."""
+        return self.elevation.is_zero and self.is_level
+
+    @property
+    def is_level(self) -> bool:
+        """Whether the road leans nowhere."""
+        return self.superelevation.is_zero and self.crossfall is None and self.shape is None
+
+    def at(self, s: float, t: float) -> tuple[float, float, float, float]:
+        """Height, its slope along s, angle about s, and the factor by which t shrinks seen from above.
+
+        `t` is measured in the leaning surface (OpenDRIVE 8.3), so that x, y lie t * cos(superelevation) off.
+        """
+        height, along = self.elevation.with_slope_at(s)
+        angle, twist = self.superelevation.with_slope_at(s)
+        shrink = 1.0
+        if angle != 0.0 or twist != 0.0:
+            shrink = cos(angle)
+            height += t * sin(angle)
+            along += t * shrink * twist
+        if self.crossfall is not None or self.shape is not None:
+            lift, lift_along, lean = self.profile_at(s, t)
+            height, along, angle = height + lift, along + lift_along, angle + lean
+        return height, along, angle, shrink
+
+    def profile_at(self, s: float, t: float) -> tuple[float, float, float]:
+        """What crossfall and shape add: height, its slope along s, its slope along t."""
+        height = along = lean = 0.0
+        if self.crossfall is not None:
+            fall, fall_slope = self.crossfall[0 if t >= 0.0 else 1].with_slope_at(s)
+            height -= abs(t) * fall
+            along -= abs(t) * fall_slope
+            lean -= fall if t >= 0.0 else -fall
+        if self.shape is not None:
+            lift, lift_along, lift_across = self.shape.at(s, t)
+            height, along, lean = height + lift, along + lift_along, lean + lift_across
+        return height, along, lean
+
+
+def no_records(begin: float = 0.0) -> Piecewise:
+    """A profile that is zero everywhere."""
+    zero: Cubic = (0.0, 0.0, 0.0, 0.0)
+    return Piecewise((begin,), (zero,))
