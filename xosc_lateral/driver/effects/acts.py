@@ -1,0 +1,36 @@
+"""What an effect acts on, and how its strength becomes terms of the movement."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from xosc_lateral.driver.effects.base import EffectTerms
+
+FloatArray = NDArray[np.float64]
+
+FACTOR_LIMIT = 5.0
+"""A factor on spread, pace or fine noise stays within 1/5..5: beyond the fitted range of its column a
+log-linear effect would run away. [-]"""
+
+
+class Acts(StrEnum):
+    """Part of the movement that an effect changes. The strength is [m] for location, a natural logarithm for the rest."""
+
+    LOCATION = "location"
+    SPREAD = "spread"
+    RATE = "rate"
+    FINE = "fine"
+
+
+def terms_of(acts: Acts, strength: FloatArray) -> EffectTerms:
+    """Terms of an effect of the given strength, shape (n,): added for location, the exponential of it for factors."""
+    if acts is Acts.LOCATION:
+        return EffectTerms(location=strength)
+    limit = np.log(FACTOR_LIMIT)
+    factor = np.exp(np.clip(strength, -limit, limit))
+    if acts is Acts.SPREAD:
+        return EffectTerms(spread=factor)
+    return EffectTerms(rate=factor) if acts is Acts.RATE else EffectTerms(fine=factor)

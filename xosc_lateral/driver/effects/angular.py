@@ -1,0 +1,46 @@
+"""Strength by a direction: an angle has no beginning and no end."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from xosc_lateral.driver.effects.column import ColumnEffect
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Angular(ColumnEffect):
+    """Sine and cosine of an angle, a coefficient each.
+
+    Parameters
+    ----------
+    column : str
+        Where it is NaN ("there is none"), nothing changes.
+    period : float
+        Full circle in the column's unit: 360 deg or 2 pi rad.
+    """
+
+    kind: ClassVar[str] = "angular"
+    column: str
+    period: float = 360.0
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """The one column."""
+        return (self.column,)
+
+    @property
+    def shape(self) -> str:
+        """Word for the report."""
+        return "angular"
+
+    def quantity(self, context: Mapping[str, FloatArray]) -> FloatArray:
+        """Sine and cosine, shape (n, 2)."""
+        angle = 2.0 * np.pi / self.period * context[self.column]
+        return np.stack([np.sin(angle), np.cos(angle)], axis=1)

@@ -1,0 +1,45 @@
+"""Growing spread: fatigue, say."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from xosc_lateral.driver.effects.base import EffectTerms
+from xosc_lateral.driver.effects.hidden import HiddenEffect
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True)
+class GrowingSpread(HiddenEffect):
+    """Spread and fine noise change steadily with time on the road; outside the fitted time the outermost value holds.
+
+    Parameters
+    ----------
+    factor : float
+        Spread at `to_s` over spread at `from_s`, > 0. [-]
+    factor_error : float
+        Standard error. [-]
+    fine_factor : float
+        The same for the fine noise. [-]
+    from_s, to_s : float
+        Time that it was fitted on, in the drive's clock. [s]
+    """
+
+    kind: ClassVar[str] = "growing-spread"
+    positive: ClassVar[tuple[str, ...]] = ("factor", "fine_factor")
+    factor: float
+    factor_error: float = 0.0
+    fine_factor: float = 1.0
+    from_s: float = 0.0
+    to_s: float = 3600.0
+
+    def terms(self, time: FloatArray, context: Mapping[str, FloatArray], rng: np.random.Generator) -> EffectTerms:
+        """1 in the middle of the fitted time; nothing is random."""
+        share = np.clip((time - self.from_s) / max(self.to_s - self.from_s, 1e-9), 0.0, 1.0) - 0.5
+        return EffectTerms(spread=self.factor**share, fine=self.fine_factor**share)

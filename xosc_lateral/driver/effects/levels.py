@@ -1,0 +1,46 @@
+"""A value of its own for each level of a column of whole numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from xosc_lateral.driver.effects.column import ColumnEffect
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Levels(ColumnEffect):
+    """One coefficient for each named level; every other level is the base.
+
+    Parameters
+    ----------
+    column : str
+        Column of whole numbers.
+    levels : tuple of float
+        Those that differ from the rest.
+    """
+
+    kind: ClassVar[str] = "levels"
+    column: str
+    levels: tuple[float, ...]
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """The one column."""
+        return (self.column,)
+
+    @property
+    def shape(self) -> str:
+        """Word for the report."""
+        return f"levels ({', '.join(f'{level:g}' for level in self.levels)})"
+
+    def quantity(self, context: Mapping[str, FloatArray]) -> FloatArray:
+        """1 where the column is at the level, shape (n, number of levels)."""
+        values = np.rint(context[self.column])
+        return np.stack([(values == level).astype(np.float64) for level in self.levels], axis=1)

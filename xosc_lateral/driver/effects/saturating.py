@@ -1,0 +1,53 @@
+"""In proportion near the middle, levelling off at both ends."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from xosc_lateral.driver.effects.column import ColumnEffect
+from xosc_lateral.errors import DriverProfileError
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Saturating(ColumnEffect):
+    """tanh((column - middle) / scale).
+
+    Parameters
+    ----------
+    column : str
+        Where it is NaN ("there is none"), nothing changes.
+    middle, scale : float
+        In the column's unit; scale > 0.
+    """
+
+    kind: ClassVar[str] = "saturating"
+    column: str
+    middle: float
+    scale: float
+
+    def __post_init__(self) -> None:
+        """Refuse a scale that is not positive."""
+        super().__post_init__()
+        if not self.scale > 0:
+            raise DriverProfileError(f"effect saturating of {self.column}: scale {self.scale} must be above 0")
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """The one column."""
+        return (self.column,)
+
+    @property
+    def shape(self) -> str:
+        """Word for the report."""
+        return f"saturating (beyond {self.middle:.4g} +- {self.scale:.3g})"
+
+    def quantity(self, context: Mapping[str, FloatArray]) -> FloatArray:
+        """Between -1 and 1, shape (n, 1)."""
+        return np.asarray(np.tanh((context[self.column] - self.middle) / self.scale))[:, None]

@@ -1,0 +1,43 @@
+"""A step: from one moment on, everything is measured (or driven) elsewhere, as after a recalibrated camera."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from xosc_lateral.driver.effects.base import EffectTerms
+from xosc_lateral.driver.effects.hidden import HiddenEffect
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Step(HiddenEffect):
+    """The mean offset jumps once.
+
+    Parameters
+    ----------
+    size : float
+        Positive: to the left. [m]
+    size_error : float
+        Standard error. [m]
+    at_s : float
+        When, in the drive's clock. [s]
+    share_before : float
+        Share of the fitted drive before the jump: the mean over the drive stays unchanged. [-]
+    """
+
+    kind: ClassVar[str] = "step"
+    size: float
+    size_error: float = 0.0
+    at_s: float = 0.0
+    share_before: float = 0.5
+
+    def terms(self, time: FloatArray, context: Mapping[str, FloatArray], rng: np.random.Generator) -> EffectTerms:
+        """Below the mean before, above after; nothing is random."""
+        after = (time >= self.at_s).astype(np.float64)
+        return EffectTerms(location=self.size * (after - (1.0 - self.share_before)))

@@ -1,0 +1,52 @@
+"""Nothing up to a limit, then a jump (step) or a slope (hinge)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from xosc_lateral.driver.effects.column import ColumnEffect
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Threshold(ColumnEffect):
+    """Acts beyond a limit only.
+
+    Parameters
+    ----------
+    column : str
+        Where it is NaN ("there is none"), it counts as on the side that does not act.
+    at : float
+        The limit, in the column's unit.
+    above : bool
+        Whether it acts above the limit, or below.
+    jump : bool
+        True: as a whole at once; False: in proportion to the distance from the limit.
+    """
+
+    kind: ClassVar[str] = "threshold"
+    column: str
+    at: float
+    above: bool = True
+    jump: bool = True
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """The one column."""
+        return (self.column,)
+
+    @property
+    def shape(self) -> str:
+        """Word for the report."""
+        return f"threshold ({'step' if self.jump else 'hinge'} {'above' if self.above else 'below'} {self.at:.4g})"
+
+    def quantity(self, context: Mapping[str, FloatArray]) -> FloatArray:
+        """0 on the quiet side, 1 or the distance from the limit on the other; shape (n, 1)."""
+        beyond = np.nan_to_num((context[self.column] - self.at) * (1.0 if self.above else -1.0), nan=0.0)
+        return np.where(beyond > 0, 1.0 if self.jump else beyond, 0.0)[:, None]
