@@ -70,7 +70,7 @@ class Catalogs:
         return self._files[kind, catalog]
 
     def _search(self, catalog: str, reference: Element) -> Path:
-        """By file name in every location, as the reference player does; then by the name inside the file; then near by."""
+        """By file name in every location, as the reference player does; then by the name inside; then near by."""
         if not catalog or any(separator in catalog for separator in "/\\\0"):
             reference.fail(f"'{catalog[:60]}' is no catalog name")
         refused: FormatError | None = None

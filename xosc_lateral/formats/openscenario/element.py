@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator
 from enum import StrEnum
 from pathlib import Path
-from typing import NoReturn, TypeVar
+from typing import NoReturn, TypeVar, cast
 
 from lxml import etree
 
@@ -197,8 +197,7 @@ def local_name(xml: etree._Element) -> str:
 
 def line_of(xml: etree._Element) -> int | None:
     """Line in the file, from 1; None for an element that was made, not read."""
-    line = xml.sourceline
-    return line if isinstance(line, int) else None
+    return cast("int | None", xml.sourceline)  # the stubs have an ellipsis there
 
 
 def node_of(xml: etree._Element) -> tuple[int, ...]:

@@ -1,0 +1,304 @@
+"""Read ParameterValueDistribution files: the concrete scenarios that a logical one stands for."""
+
+from __future__ import annotations
+
+import math
+import zlib
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, field
+from decimal import Decimal, InvalidOperation
+from pathlib import Path
+
+import numpy as np
+
+from xosc_lateral.errors import FormatError
+from xosc_lateral.formats.openscenario.declarations import broken_constraint, declared_values, parameter_name
+from xosc_lateral.formats.openscenario.element import Element
+from xosc_lateral.formats.openscenario.read import open_scenario, read_header
+from xosc_lateral.formats.openscenario.references import allowed_roots, resolve_reference
+from xosc_lateral.formats.xml import read_xml
+from xosc_lateral.scenario.distribution import (
+    Deterministic,
+    DistributionError,
+    Draw,
+    Histogram,
+    LogNormal,
+    Normal,
+    ParameterSet,
+    Poisson,
+    SteppedRange,
+    Stochastic,
+    Uniform,
+    ValueSets,
+    Weighted,
+)
+from xosc_lateral.scenario.expressions import ExpressionError
+from xosc_lateral.scenario.parameters import Scope
+from xosc_lateral.scenario.place import Place
+
+MAX_REDRAWS = 1000
+"""Stochastic sets in a row that violate the scenario's constraints until reading gives up."""
+MAX_RANGE = 1_000_000
+"""Values in one stepped range."""
+
+
+@dataclass(slots=True)
+class LogicalScenario:
+    """A scenario file and the values that its parameters take.
+
+    Parameters
+    ----------
+    path : Path
+        The distribution file.
+    scenario_file : Path
+        The scenario that it varies.
+    distribution : Deterministic or Stochastic
+    place : Place
+        Of the distribution.
+    discarded : int
+        Parameter sets left out so far because they violate the scenario's constraint groups.
+    """
+
+    path: Path
+    scenario_file: Path
+    distribution: Deterministic | Stochastic
+    place: Place
+    _scenario: Element = field(repr=False)
+    discarded: int = 0
+
+    def parameter_sets(self, seed: int = 0) -> Iterator[ParameterSet]:
+        """Parameter sets that satisfy the scenario's constraint groups, in order, made when asked for.
+
+        Combinations of a deterministic distribution that violate them are left out; stochastic ones are drawn again.
+
+        Parameters
+        ----------
+        seed : int
+            For a stochastic distribution without a ``randomSeed`` of its own.
+
+        Raises
+        ------
+        FormatError
+            A parameter that the scenario does not declare, or constraints that nothing satisfies.
+        """
+        self.discarded = 0
+        if isinstance(self.distribution, Deterministic):
+            for values in self.distribution:
+                if self._accepts(values):
+                    yield values
+            return
+        rng = np.random.default_rng(seed if self.distribution.seed is None else self.distribution.seed)
+        for _ in range(self.distribution.number_of_test_runs):
+            yield self._draw(self.distribution, rng)
+
+    def _draw(self, distribution: Stochastic, rng: np.random.Generator) -> ParameterSet:
+        for _ in range(MAX_REDRAWS):
+            try:
+                values = distribution.sample(rng)
+            except DistributionError as error:
+                raise self._error(str(error)) from error
+            if self._accepts(values):
+                return values
+        raise self._error(f"{MAX_REDRAWS} draws in a row violate the constraints of {self.scenario_file}")
+
+    def _accepts(self, values: ParameterSet) -> bool:
+        declared = declared_values(self._scenario)
+        for name in values:
+            if name not in declared:
+                raise self._error(f"parameter '{name}' is not declared in {self.scenario_file}")
+        scope = Scope({**declared, **values})
+        declarations = self._scenario.child("ParameterDeclarations")
+        for declaration in declarations.children("ParameterDeclaration") if declarations else ():
+            name = parameter_name(declaration.raw("name") or "")
+            try:
+                broken = broken_constraint(declaration.within(scope), scope.value(name))
+            except ExpressionError as error:
+                declaration.fail(f"value: {error}")
+            if broken:
+                self.discarded += 1
+                return False
+        return True
+
+    def _error(self, what: str) -> FormatError:
+        return FormatError(what, path=self.place.path, line=self.place.line, element=self.place.element)
+
+
+def is_distribution(path: Path | str) -> bool:
+    """Whether a file is a parameter value distribution."""
+    document, _ = read_xml(Path(path))
+    return open_scenario(document, Path(path)).child("ParameterValueDistribution") is not None
+
+
+def read_distribution(path: Path | str, *, allowed: Iterable[Path] = ()) -> LogicalScenario:
+    """Read a ParameterValueDistribution file (1.1 and later).
+
+    Parameters
+    ----------
+    path : path
+        The ``.xosc`` file.
+    allowed : iterable of path
+        Folders, besides the file's own and the two above it, that the scenario may lie in.
+
+    Raises
+    ------
+    FormatError
+        With file, line and element; user-defined distributions among others.
+    """
+    path = Path(path)
+    document, _ = read_xml(path)
+    root = open_scenario(document, path)
+    read_header(root)
+    owner = root.required("ParameterValueDistribution")
+    reference = owner.required("ScenarioFile")
+    scenario = resolve_reference(
+        reference.text("filepath"), path.parent, allowed_roots(path, allowed), reference.place()
+    )
+    if not scenario.is_file():
+        reference.fail(f"scenario file '{reference.text('filepath')}' does not exist (looked for {scenario})")
+    content = owner.required("Deterministic", "Stochastic")
+    distribution = _deterministic(content) if content.tag == "Deterministic" else _stochastic(content)
+    inner, _ = read_xml(scenario)
+    return LogicalScenario(path, scenario, distribution, content.place(), open_scenario(inner, scenario))
+
+
+def _deterministic(owner: Element) -> Deterministic:
+    parts: list[ValueSets | SteppedRange] = []
+    for item in owner.children():
+        if item.tag == "DeterministicMultiParameterDistribution":
+            parts.append(_value_sets(item.required("ValueSetDistribution")))
+        elif item.tag == "DeterministicSingleParameterDistribution":
+            parts.append(_single(item))
+        else:
+            item.fail("is no deterministic distribution")
+    return Deterministic(tuple(parts))
+
+
+def _value_sets(owner: Element) -> ValueSets:
+    sets = tuple(
+        {parameter_name(a.text("parameterRef")): a.text("value") for a in item.children("ParameterAssignment")}
+        for item in owner.children("ParameterValueSet")
+    )
+    return ValueSets(sets, owner.place())
+
+
+def _single(item: Element) -> ValueSets | SteppedRange:
+    name = parameter_name(item.text("parameterName"))
+    content = item.required("DistributionSet", "DistributionRange", "UserDefinedDistribution")
+    if content.tag == "DistributionSet":
+        return ValueSets(tuple({name: value.text("value")} for value in content.children("Element")), item.place())
+    if content.tag == "UserDefinedDistribution":
+        content.fail("user-defined distributions can't be drawn from")
+    limits = content.required("Range")
+    step, lower, upper = _decimal(content, "stepWidth"), _decimal(limits, "lowerLimit"), _decimal(limits, "upperLimit")
+    if step <= 0:
+        content.fail(f"stepWidth of {step} is not positive")
+    if upper < lower:
+        limits.fail(f"upperLimit {upper} is below lowerLimit {lower}")
+    if (upper - lower) / step > MAX_RANGE:
+        content.fail(f"more than {MAX_RANGE} values")
+    return SteppedRange(name, lower, upper, step, item.place())
+
+
+def _decimal(element: Element, name: str) -> Decimal:
+    element.number(name)  # refuses what is no finite number, with its place
+    try:
+        return Decimal(element.text(name).strip())
+    except InvalidOperation:
+        element.fail(f"{name}='{element.text(name)[:60]}' is no number")
+
+
+def _stochastic(owner: Element) -> Stochastic:
+    runs = owner.integer("numberOfTestRuns")
+    if runs < 0:
+        owner.fail(f"numberOfTestRuns of {runs} is negative")
+    draws = []
+    for item in owner.children("StochasticDistribution"):
+        content = item.required(*_DRAWS)
+        draws.append((parameter_name(item.text("parameterName")), _DRAWS[content.tag](content)))
+    return Stochastic(tuple(draws), runs, _seed(owner))
+
+
+def _seed(owner: Element) -> int | None:
+    """The file's seed is a double: whole ones as they are, others by their text."""
+    value = owner.optional_number("randomSeed")
+    if value is None:
+        return None
+    return int(value) if value == int(value) and value >= 0 else zlib.crc32(repr(value).encode())
+
+
+def _limits(owner: Element) -> tuple[float, float]:
+    element = owner.child("Range")
+    if element is None:
+        return -math.inf, math.inf
+    lower, upper = element.number("lowerLimit", finite=False), element.number("upperLimit", finite=False)
+    if upper < lower:
+        element.fail(f"upperLimit {upper} is below lowerLimit {lower}")
+    return lower, upper
+
+
+def _finite_limits(owner: Element) -> tuple[float, float]:
+    limits = _limits(owner)
+    if not all(map(math.isfinite, limits)):
+        owner.fail("needs a finite Range")
+    return limits
+
+
+def _weights(items: list[Element], owner: Element) -> tuple[float, ...]:
+    weights = tuple(item.number("weight") for item in items)
+    if not weights or min(weights) < 0 or sum(weights) <= 0:
+        owner.fail("needs weights that are not negative and not all zero")
+    return weights
+
+
+def _weighted(e: Element) -> Draw:
+    items = list(e.children("Element"))
+    return Weighted(tuple(item.text("value") for item in items), _weights(items, e))
+
+
+def _histogram(e: Element) -> Draw:
+    bins = list(e.children("Bin", "HistogramBin"))
+    return Histogram(tuple(_finite_limits(item) for item in bins), _weights(bins, e))
+
+
+def _uniform(e: Element) -> Draw:
+    return Uniform(*_finite_limits(e))
+
+
+def _normal(e: Element) -> Draw:
+    return Normal(e.number("expectedValue"), _variance(e), _limits(e))
+
+
+def _log_normal(e: Element) -> Draw:
+    mean = e.number("expectedValue")
+    if mean <= 0:
+        e.fail(f"expectedValue of {mean} is not positive")
+    return LogNormal(mean, _variance(e), _limits(e))
+
+
+def _variance(e: Element) -> float:
+    variance = e.number("variance")
+    if variance < 0:
+        e.fail(f"variance of {variance} is negative")
+    return variance
+
+
+def _poisson(e: Element) -> Draw:
+    mean = e.number("expectedValue")
+    if not 0 <= mean <= 1e9:
+        e.fail(f"expectedValue of {mean} is not within [0, 1e9]")
+    return Poisson(mean, _limits(e))
+
+
+def _user_defined(e: Element) -> Draw:
+    e.fail("user-defined distributions can't be drawn from")
+
+
+_DRAWS: dict[str, Callable[[Element], Draw]] = {
+    "ProbabilityDistributionSet": _weighted,
+    "Histogram": _histogram,
+    "UniformDistribution": _uniform,
+    "NormalDistribution": _normal,
+    "LogNormalDistribution": _log_normal,
+    "PoissonDistribution": _poisson,
+    "UserDefinedDistribution": _user_defined,
+}
