@@ -26,10 +26,11 @@ def register(app: typer.Typer) -> None:
         as_json: AsJson = False,
     ) -> None:
         """DLR Highway Traffic: the wheel of tasi 0.15.4, the data set's zip, or its trajectory CSV."""
-        from xosc_lateral.formats.importers.dlr_ht import DlrSettings, import_dlr_ht
+        from xosc_lateral.formats.importers.cuts import CutSettings
+        from xosc_lateral.formats.importers.dlr_ht import import_dlr_ht
         from xosc_lateral.formats.importers.table import describe, write_imported
 
-        imported = import_dlr_ht(source, DlrSettings(max_gap=max_gap), keep_cut=keep_cut)
+        imported = import_dlr_ht(source, CutSettings(max_gap=max_gap), keep_cut=keep_cut)
         write_imported(imported, output)
         typer.echo(describe(imported.provenance, as_json=as_json), err=not as_json)
 

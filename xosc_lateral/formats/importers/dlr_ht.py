@@ -26,10 +26,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.errors import FormatError
+from xosc_lateral.formats.importers.cuts import DEFAULT_CUTS, CutSettings, lane_changes, long_gaps, name_states
 from xosc_lateral.formats.importers.lanes_from_tracks import LaneCentre, fit_lane_centre
 from xosc_lateral.formats.importers.neighbours import find_neighbours
 from xosc_lateral.formats.importers.road_from_tracks import fit_reference_line
-from xosc_lateral.formats.importers.table import Imported, Provenance, hash_file
+from xosc_lateral.formats.importers.table import Imported, drop_cut, make_provenance
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -51,32 +52,7 @@ LICENCE = (
 )
 
 
-@dataclass(frozen=True)
-class DlrSettings:
-    """How tracks are cut.
-
-    Parameters
-    ----------
-    max_gap : float
-        Longest bridge between two cameras that is kept. [s]
-    calm_rate : float
-        A lane change reaches back and forth to where the lateral speed falls below this. [m/s]
-    longest_change : float
-        But not farther than this from the crossing. [s]
-    margin : float
-        Cut in addition before and after each lane change. [s]
-    shortest : float
-        Stretches below this are dropped. [s]
-    """
-
-    max_gap: float = 1.0
-    calm_rate: float = 0.1
-    longest_change: float = 8.0
-    margin: float = 1.0
-    shortest: float = 5.0
-
-
-def import_dlr_ht(source: Path, settings: DlrSettings = DlrSettings(), *, keep_cut: bool = False) -> Imported:
+def import_dlr_ht(source: Path, settings: CutSettings = DEFAULT_CUTS, *, keep_cut: bool = False) -> Imported:
     """Read the trajectory CSV, the data set's zip or the wheel of `tasi` that holds it.
 
     Returns
@@ -95,7 +71,7 @@ def import_dlr_ht(source: Path, settings: DlrSettings = DlrSettings(), *, keep_c
     d = np.where(forward, d_road, -d_road)
 
     height = tracks["dimension_height"].to_numpy()
-    gap = _long_gaps(tracks["interpolated"].to_numpy(), vehicle, settings.max_gap)
+    gap = long_gaps(tracks["interpolated"].to_numpy(), vehicle, STEP, settings.max_gap)
     placed = _Placed.empty(len(tracks))
     lanes: dict[str, list[LaneCentre]] = {}
     for name, mine in (("northbound", forward), ("southbound", ~forward)):
@@ -104,22 +80,20 @@ def import_dlr_ht(source: Path, settings: DlrSettings = DlrSettings(), *, keep_c
         placed.put(rows, part)
     table = _context(tracks, placed, s, forward)
     table["curvature"] = reference.curvature(s_road) * np.where(forward, 1.0, -1.0)
-    table["state"] = _states(placed, gap, vehicle, settings)
-    record = Provenance(
+    reasons = {"no lane": placed.lane < 0, "lane change": placed.changing, "gap": gap}
+    frame = np.round(tracks["time"].to_numpy() / STEP).astype(np.int64)
+    table["state"] = name_states(reasons, placed.lane, vehicle, frame, STEP, settings.shortest)
+    record = make_provenance(
+        table,
         format="dlr-ht",
-        source=source.name,
-        sha256=hash_file(source),
+        sources=[source],
         version=_version(source),
         licence=LICENCE,
         settings=asdict(settings),
-        rows={str(k): int(v) for k, v in table["state"].value_counts().sort_index().items()},
-        vehicles=int(vehicle[-1]) + 1,
-        hours=round(float((table["state"] == "kept").sum()) * STEP / 3600.0, 3),
+        step=STEP,
         lanes=[_describe(name, k, lane) for name, both in lanes.items() for k, lane in enumerate(both)],
     )
-    if not keep_cut:
-        table = table[table["state"] == "kept"].drop(columns="state")
-    return Imported(table.reset_index(drop=True), record)
+    return Imported(drop_cut(table, keep_cut), record)
 
 
 def read_tracks(source: Path) -> pd.DataFrame:
@@ -172,14 +146,6 @@ def _travels_north(tracks: pd.DataFrame) -> NDArray[np.bool_]:
     return np.asarray(mean.to_numpy() > 0.0)
 
 
-def _long_gaps(interpolated: NDArray[np.bool_], vehicle: IntArray, max_gap: float) -> NDArray[np.bool_]:
-    """Rows in bridges longer than `max_gap`."""
-    new = np.r_[True, (interpolated[1:] != interpolated[:-1]) | (vehicle[1:] != vehicle[:-1])]
-    run = np.cumsum(new) - 1
-    length = np.bincount(run) * STEP
-    return np.asarray(interpolated & (length[run] > max_gap))
-
-
 @dataclass(frozen=True, eq=False)
 class _Placed:
     """Each row's place across the road."""
@@ -204,7 +170,7 @@ def _place_in_lanes(
     height: FloatArray,
     vehicle: IntArray,
     gap: NDArray[np.bool_],
-    settings: DlrSettings,
+    settings: CutSettings,
 ) -> tuple[_Placed, list[LaneCentre]]:
     """Lane centres of one carriageway, and every row's lane and offset. Rounds, since each needs the other."""
     levels = _levels(d)
@@ -213,7 +179,7 @@ def _place_in_lanes(
     lanes: list[LaneCentre] = []
     for _ in range(3):
         lane = _nearest_lane(d, centre, width)
-        changing = _lane_changes(d - centre.mean(axis=0), lane, vehicle, settings)
+        changing = lane_changes(d - centre.mean(axis=0), lane, vehicle, STEP, settings)
         lanes = []
         for index in range(LANES):
             rows = np.flatnonzero((lane == index) & ~changing & ~gap)
@@ -223,7 +189,7 @@ def _place_in_lanes(
         centre = np.array([one.at(s, height) for one in lanes])
         width = _lane_width(lanes)
     lane = _nearest_lane(d, centre, width)
-    changing = _lane_changes(d - centre.mean(axis=0), lane, vehicle, settings)
+    changing = lane_changes(d - centre.mean(axis=0), lane, vehicle, STEP, settings)
     mine = np.clip(lane, 0, None)
     offset = np.where(lane >= 0, d - centre[mine, np.arange(len(s))], np.nan)
     return _Placed(lane, offset, np.full(len(s), width), changing), lanes
@@ -253,27 +219,6 @@ def _nearest_lane(d: FloatArray, centre: FloatArray, width: float) -> IntArray:
     nearest = away.argmin(axis=0)
     # Between two lanes the midpoint decides; towards the outside half a width does.
     return np.where(away.min(axis=0) <= width * 0.55, nearest, -1)
-
-
-def _lane_changes(x: FloatArray, lane: IntArray, vehicle: IntArray, settings: DlrSettings) -> NDArray[np.bool_]:
-    """Rows from where a vehicle sets off towards another lane to where it has settled there."""
-    changing = np.zeros(len(x), dtype=np.bool_)
-    reach, margin, half = round(settings.longest_change / STEP), round(settings.margin / STEP), 5
-    same = vehicle[1:] == vehicle[:-1]
-    rate = np.zeros(len(x))
-    rate[half:-half] = (x[2 * half :] - x[: -2 * half]) / (2 * half * STEP)
-    rate = np.where(np.isfinite(rate), rate, 0.0)
-    first = np.searchsorted(vehicle, vehicle, side="left")
-    last = np.searchsorted(vehicle, vehicle, side="right") - 1
-    for k in np.flatnonzero(same & (lane[1:] != lane[:-1])):
-        lowest, highest = max(first[k], k - reach), min(last[k], k + reach)
-        towards = np.sign(rate[k]) or 1.0
-        before = np.flatnonzero(towards * rate[lowest : k + 1] < settings.calm_rate)
-        after = np.flatnonzero(towards * rate[k : highest + 1] < settings.calm_rate)
-        begin = lowest + before[-1] if len(before) else lowest
-        end = k + after[0] if len(after) else highest
-        changing[max(first[k], begin - margin) : min(last[k], end + margin) + 1] = True
-    return changing
 
 
 def _each(stretch: IntArray, every: int) -> NDArray[np.bool_]:
@@ -310,16 +255,6 @@ def _vehicle_class(tracks: pd.DataFrame) -> NDArray[np.str_]:
     """The provider's likeliest class of each vehicle."""
     scores = tracks[[f"classifications_{name}" for name in CLASSES]].to_numpy()
     return np.asarray(np.array(CLASSES)[scores.argmax(axis=1)])
-
-
-def _states(placed: _Placed, gap: NDArray[np.bool_], vehicle: IntArray, settings: DlrSettings) -> NDArray[np.str_]:
-    """Why a row is kept or cut."""
-    state = np.select([placed.lane < 0, placed.changing, gap], ["no lane", "lane change", "gap"], default="kept")
-    kept = state == "kept"
-    new = np.r_[True, (kept[1:] != kept[:-1]) | (vehicle[1:] != vehicle[:-1]) | (placed.lane[1:] != placed.lane[:-1])]
-    run = np.cumsum(new) - 1
-    length = np.bincount(run) * STEP
-    return np.where(kept & (length[run] < settings.shortest), "short", state)
 
 
 def _describe(carriageway: str, index: int, lane: LaneCentre) -> dict[str, object]:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 from xosc_lateral import __version__
 from xosc_lateral.errors import FormatError
+from xosc_lateral.formats.importers.cuts import KEPT
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -47,6 +48,39 @@ class Imported:
     provenance: Provenance
 
 
+def make_provenance(
+    table: pd.DataFrame,
+    *,
+    format: str,  # noqa: A002 (the record's own word)
+    sources: Sequence[Path],
+    version: str,
+    licence: str,
+    settings: Mapping[str, object],
+    step: float,
+    lanes: Sequence[Mapping[str, object]] = (),
+) -> Provenance:
+    """Record of an import, from the table with its column `state` and rows `step` seconds apart."""
+    return Provenance(
+        format=format,
+        source=", ".join(source.name for source in sources),
+        sha256=hash_files(sources),
+        version=version,
+        licence=licence,
+        settings=settings,
+        rows={str(state): int(count) for state, count in table["state"].value_counts().sort_index().items()},
+        vehicles=int(table["drive"].nunique()),
+        hours=round(float((table["state"] == KEPT).sum()) * step / 3600.0, 3),
+        lanes=lanes,
+    )
+
+
+def drop_cut(table: pd.DataFrame, keep_cut: bool) -> pd.DataFrame:
+    """Without the rows that are cut and without `state`, unless they are wanted."""
+    if keep_cut:
+        return table.reset_index(drop=True)
+    return table[table["state"] == KEPT].drop(columns="state").reset_index(drop=True)
+
+
 def write_imported(imported: Imported, path: Path) -> None:
     """Write Parquet (provenance in its metadata) or CSV (provenance in a file beside it), whole or not at all."""
     temporary = path.with_name(f".{path.name}.partial")
@@ -74,10 +108,15 @@ def _write_parquet(imported: Imported, path: Path) -> None:
     pq.write_table(table.replace_schema_metadata(metadata), path, compression="zstd")
 
 
-def hash_file(path: Path) -> str:
-    """SHA-256 of a file's bytes."""
-    with path.open("rb") as stream:
-        return hashlib.file_digest(stream, "sha256").hexdigest()
+def hash_files(paths: Sequence[Path]) -> str:
+    """SHA-256 of one file's bytes; of several, that of their hashes one after the other."""
+    digests = []
+    for path in paths:
+        with path.open("rb") as stream:
+            digests.append(hashlib.file_digest(stream, "sha256"))
+    if len(digests) == 1:
+        return digests[0].hexdigest()
+    return hashlib.sha256(b"".join(digest.digest() for digest in digests)).hexdigest()
 
 
 def describe(provenance: Provenance, *, as_json: bool) -> str:
@@ -85,7 +124,6 @@ def describe(provenance: Provenance, *, as_json: bool) -> str:
     if as_json:
         return provenance.line()
     rows = ", ".join(f"{count} {state}" for state, count in provenance.rows.items())
-    lines = [f"{provenance.source}: {provenance.vehicles} vehicles, {provenance.hours:g} h kept (rows: {rows})"]
-    for lane in provenance.lanes:
-        lines.append("  " + ", ".join(f"{name} {value}" for name, value in lane.items()))
-    return "\n".join([*lines, f"licence: {provenance.licence}"])
+    head = f"{provenance.source}: {provenance.vehicles} vehicles, {provenance.hours:g} h kept (rows: {rows})"
+    lanes = ["  " + ", ".join(f"{name} {value}" for name, value in lane.items()) for lane in provenance.lanes]
+    return "\n".join([head, *lanes, f"licence: {provenance.licence}"])

@@ -1,0 +1,67 @@
+"""Bus logs through asammdf; the log is written by asammdf itself."""
+
+from __future__ import annotations
+
+import sys
+import warnings
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from xosc_lateral.cli import main
+from xosc_lateral.errors import FormatError
+from xosc_lateral.formats.importers.mf4 import import_mf4
+
+
+@pytest.fixture
+def log(tmp_path: Path) -> Path:
+    """50 Hz distances to the markings in cm, 10 Hz speed in km/h, with a camera dropout of 3 s."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # asammdf's own imports
+        asammdf = pytest.importorskip("asammdf", reason="extra `mdf` is not installed")
+    fast, slow = np.arange(0, 60, 0.02), np.arange(0, 60, 0.1)
+    fast = fast[(fast < 30) | (fast > 33)]
+    sway = 0.3 * np.sin(2 * np.pi * fast / 10)
+    with asammdf.MDF(version="4.10") as mdf:
+        mdf.append(
+            [
+                asammdf.Signal(100 * (1.8 - sway), fast, name="LnLeft"),
+                asammdf.Signal(100 * (1.8 + sway), fast, name="LnRight"),
+            ]
+        )
+        mdf.append([asammdf.Signal(np.full(len(slow), 108.0), slow, name="VehSpd")])
+        mdf.save(tmp_path / "drive7.mf4", overwrite=True)
+    return tmp_path / "drive7.mf4"
+
+
+MAP = ["distance_left=LnLeft:cm", "distance_right=LnRight:cm", "speed=VehSpd:km/h"]
+
+
+@pytest.mark.filterwarnings("default")
+def test_channels_come_back_in_standard_units(log):
+    table = import_mf4(log, MAP, step=0.04).table
+    assert table["speed"].to_numpy() == pytest.approx(30.0)
+    assert (table["distance_left"] + table["distance_right"]).to_numpy() == pytest.approx(3.6)
+    offset = 0.5 * (table["distance_right"] - table["distance_left"])
+    assert offset.to_numpy() == pytest.approx(0.3 * np.sin(2 * np.pi * table["time"].to_numpy() / 10), abs=1e-3)
+    assert not table["time"].between(30.1, 32.9).any(), "a dropout is a gap, not a straight line"
+    assert set(table["drive"]) == {"drive7"}
+
+
+@pytest.mark.filterwarnings("default")
+def test_a_channel_that_is_not_there_is_named(log):
+    with pytest.raises(FormatError, match=r"drive7\.mf4: speed: no channel V"):
+        import_mf4(log, [*MAP[:2], "speed=V"])
+
+
+def test_without_a_channel_map_the_verb_asks_for_one(tmp_path, capsys):
+    (tmp_path / "a.mf4").write_bytes(b"")
+    assert main(["import", "mf4", str(tmp_path / "a.mf4"), "-o", str(tmp_path / "t.csv")]) == 1
+    assert "channel map needs --map offset=CHANNEL" in capsys.readouterr().err
+
+
+def test_without_asammdf_the_extra_is_named(tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "asammdf", None)
+    with pytest.raises(FormatError, match=r"xosc-lateral\[mdf\]"):
+        import_mf4(tmp_path / "a.mf4", MAP)

@@ -1,0 +1,103 @@
+"""Which rows of a recording are road-following: lane changes, gaps and crumbs are told apart."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+BoolArray = NDArray[np.bool_]
+
+RATE_WINDOW = 0.5  # [s]; the lateral speed is a central difference over this
+KEPT = "kept"
+
+
+@dataclass(frozen=True)
+class CutSettings:
+    """How tracks are cut.
+
+    Parameters
+    ----------
+    max_gap : float
+        Longest stretch of rows that the provider made up (between two cameras) that is kept. [s]
+    calm_rate : float
+        A lane change reaches back and forth to where the lateral speed falls below this. [m/s]
+    longest_change : float
+        But not farther than this from the crossing. [s]
+    margin : float
+        Cut in addition before and after each lane change. [s]
+    shortest : float
+        Stretches below this are dropped. [s]
+    """
+
+    max_gap: float = 1.0
+    calm_rate: float = 0.1
+    longest_change: float = 8.0
+    margin: float = 1.0
+    shortest: float = 5.0
+
+
+DEFAULT_CUTS = CutSettings()
+
+
+def lane_changes(x: FloatArray, lane: IntArray, vehicle: IntArray, step: float, settings: CutSettings) -> BoolArray:
+    """Rows from where a vehicle sets off towards another lane to where it has settled there.
+
+    Parameters
+    ----------
+    x : array, shape (n,)
+        Lateral position, continuous through lane changes; NaN where unknown. [m]
+    lane, vehicle : array of int, shape (n,)
+        Rows sorted by vehicle and time.
+    step : float
+        Between two rows of a vehicle. [s]
+    """
+    changing = np.zeros(len(x), dtype=np.bool_)
+    reach, margin = round(settings.longest_change / step), round(settings.margin / step)
+    same = vehicle[1:] == vehicle[:-1]
+    rate = _lateral_speed(x, step)
+    first = np.searchsorted(vehicle, vehicle, side="left")
+    last = np.searchsorted(vehicle, vehicle, side="right") - 1
+    for k in np.flatnonzero(same & (lane[1:] != lane[:-1])):
+        lowest, highest = max(first[k], k - reach), min(last[k], k + reach)
+        towards = np.sign(rate[k]) or 1.0
+        before = np.flatnonzero(towards * rate[lowest : k + 1] < settings.calm_rate)
+        after = np.flatnonzero(towards * rate[k : highest + 1] < settings.calm_rate)
+        begin = lowest + before[-1] if len(before) else lowest
+        end = k + after[0] if len(after) else highest
+        changing[max(first[k], begin - margin) : min(last[k], end + margin) + 1] = True
+    return changing
+
+
+def long_gaps(made_up: BoolArray, vehicle: IntArray, step: float, max_gap: float) -> BoolArray:
+    """Rows in made-up stretches longer than `max_gap` [s]."""
+    run = _runs((made_up[1:] != made_up[:-1]) | (vehicle[1:] != vehicle[:-1]))
+    length = np.bincount(run) * step
+    return np.asarray(made_up & (length[run] > max_gap + 1e-9))
+
+
+def name_states(
+    reasons: dict[str, BoolArray], lane: IntArray, vehicle: IntArray, frame: IntArray, step: float, shortest: float
+) -> NDArray[np.str_]:
+    """Per row `KEPT`, or the first reason that cuts it, or "short" for what is left in crumbs."""
+    state = np.select(list(reasons.values()), list(reasons), default=KEPT)
+    kept = state == KEPT
+    new = (kept[1:] != kept[:-1]) | (vehicle[1:] != vehicle[:-1]) | (lane[1:] != lane[:-1]) | (np.diff(frame) != 1)
+    run = _runs(new)
+    length = np.bincount(run) * step
+    return np.where(kept & (length[run] < shortest), "short", state)
+
+
+def _lateral_speed(x: FloatArray, step: float) -> FloatArray:
+    half = max(1, round(0.5 * RATE_WINDOW / step))
+    rate = np.zeros(len(x))
+    if len(x) > 2 * half:
+        rate[half:-half] = (x[2 * half :] - x[: -2 * half]) / (2 * half * step)
+    return np.where(np.isfinite(rate), rate, 0.0)
+
+
+def _runs(new: BoolArray) -> IntArray:
+    return np.concatenate([[0], np.cumsum(new)]).astype(np.int64)
