@@ -18,7 +18,7 @@ from xosc_lateral.motion.gaps import BoxPath, Gap, smallest_gaps
 from xosc_lateral.motion.nominal import Activity, EntityMotion, NominalMotion
 from xosc_lateral.motion.segments import Stretch, cut_stretches
 from xosc_lateral.motion.trajectory import Trajectory, displace, distance_driven
-from xosc_lateral.road import RoadNetwork
+from xosc_lateral.road.network import RoadNetwork
 from xosc_lateral.segment import Segment
 
 FloatArray = NDArray[np.float64]

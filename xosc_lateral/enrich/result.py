@@ -13,7 +13,7 @@ from xosc_lateral.motion.gaps import Gap
 from xosc_lateral.motion.nominal import EntityMotion, NominalMotion
 from xosc_lateral.motion.segments import Stretch
 from xosc_lateral.motion.trajectory import Trajectory
-from xosc_lateral.road import RoadNetwork
+from xosc_lateral.road.network import RoadNetwork
 
 FloatArray = NDArray[np.float64]
 

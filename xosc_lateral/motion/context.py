@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.motion.nominal import Activity, EntityMotion, NominalMotion
-from xosc_lateral.road import RoadNetwork
+from xosc_lateral.road.network import RoadNetwork
 from xosc_lateral.scenario import BoundingBox
 from xosc_lateral.scenario.actions import EnvironmentAction
 from xosc_lateral.scenario.enums import VehicleCategory

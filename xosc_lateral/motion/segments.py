@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.motion.nominal import Activity, EntityMotion
-from xosc_lateral.road import RoadNetwork
+from xosc_lateral.road.network import RoadNetwork
 
 MINIMUM_SPEED = 40.0 / 3.6
 """Below this the model says nothing [m/s] (Neis & Beyerer cut their data at 40 km/h)."""

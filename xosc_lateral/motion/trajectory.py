@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.motion.nominal import Activity, EntityMotion
-from xosc_lateral.road import RoadNetwork
+from xosc_lateral.road.network import RoadNetwork
 
 FloatArray = NDArray[np.float64]
 
@@ -112,5 +112,5 @@ def _speed(motion: EntityMotion, x: FloatArray, y: FloatArray) -> FloatArray:
         nominal = np.hypot(np.gradient(motion.x[piece]), np.gradient(motion.y[piece]))
         shifted = np.hypot(np.gradient(x[piece]), np.gradient(y[piece]))
         moving = nominal > _STANDSTILL
-        speed[piece] = np.where(moving, speed[piece] * shifted / np.where(moving, nominal, 1.0), speed[piece])
+        speed[piece] = np.where(moving, speed[piece] * (shifted / np.where(moving, nominal, 1.0)), speed[piece])
     return speed

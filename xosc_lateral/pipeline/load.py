@@ -12,7 +12,7 @@ from xosc_lateral.formats.opendrive import read_opendrive
 from xosc_lateral.formats.openscenario import read_scenario
 from xosc_lateral.motion.nominal import NominalMotion
 from xosc_lateral.motion.playback import play
-from xosc_lateral.road import RoadNetwork
+from xosc_lateral.road.network import RoadNetwork
 from xosc_lateral.scenario import Scenario
 
 STEP = 0.02

@@ -1,0 +1,113 @@
+"""Context of a driver in a scenario, against distances and curvatures worked out by hand."""
+
+from __future__ import annotations
+
+from datetime import datetime
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tests.motion.made_motion import LANE_WIDTH, RADIUS, drive, entity, together, two_roads
+from xosc_lateral.motion.context import entity_context
+from xosc_lateral.motion.nominal import PlayedAction
+from xosc_lateral.scenario import Place
+from xosc_lateral.scenario.actions import EnvironmentAction
+from xosc_lateral.scenario.enums import VehicleCategory
+from xosc_lateral.scenario.environment import Environment, TimeOfDay, Weather
+
+GRID = np.arange(0, 501, 10)
+TRUCK = VehicleCategory.TRUCK
+
+
+@pytest.mark.parametrize(("lane", "sign"), [(-2, 1.0), (2, -1.0)])
+def test_curvature_is_that_of_the_lane_and_positive_to_the_left_of_travel(
+    tmp_path: Path, lane: int, sign: float
+) -> None:
+    network = two_roads(tmp_path)
+    start = 550.0 if lane < 0 else 100.0
+    context = entity_context(together(drive(network, entity(), lane=lane, start=start)), network, 0, GRID)
+    t = np.sign(lane) * 1.5 * LANE_WIDTH
+    np.testing.assert_allclose(context["curvature"], sign / (RADIUS - t), rtol=1e-9)
+
+
+def test_lane_index_counts_from_the_right_of_travel_in_both_directions(tmp_path: Path) -> None:
+    network = two_roads(tmp_path)
+    for lane, expected in ((-3, 0), (-1, 2), (3, 0), (1, 2)):
+        context = entity_context(together(drive(network, entity(), lane=lane)), network, 0, GRID)
+        assert set(context["lane_index"]) == {expected}
+        assert set(context["lane_count"]) == {3}
+        np.testing.assert_allclose(context["lane_width"], LANE_WIDTH)
+
+
+@pytest.mark.parametrize("lane", [-2, 2])
+def test_lead_distance_is_bumper_to_bumper_also_across_a_road_border(tmp_path: Path, lane: int) -> None:
+    network = two_roads(tmp_path)
+    own = drive(network, entity("own"), lane=lane, start=380.0)
+    lead = drive(network, entity("lead", TRUCK, 15.0), lane=lane, start=440.0)
+    context = entity_context(together(own, lead), network, 0, GRID)
+    np.testing.assert_allclose(context["lead_distance"], 60.0 - 0.5 * (5.0 + 15.0), atol=1e-6)
+    assert set(context["lead_is_truck"]) == {1.0}
+    behind = entity_context(together(own, lead), network, 1, GRID)
+    assert np.isnan(behind["lead_distance"]).all()
+
+
+@pytest.mark.parametrize(("lane", "neighbour"), [(-2, -1), (2, 1)])
+def test_neighbours_are_found_on_their_side_and_flagged_while_alongside(
+    tmp_path: Path, lane: int, neighbour: int
+) -> None:
+    network = two_roads(tmp_path)
+    own = drive(network, entity("own"), lane=lane, start=100.0, speed=30.0)
+    left = drive(network, entity("left"), lane=neighbour, start=40.0, speed=40.0)
+    right = drive(network, entity("right", TRUCK), lane=2 * lane - neighbour, start=130.0)
+    context = entity_context(together(own, left, right), network, 0, GRID)
+    time = own.time[GRID]
+    np.testing.assert_allclose(context["left_distance"], np.maximum(np.abs(-60 + 10 * time) - 5.0, 0.0), atol=1e-6)
+    np.testing.assert_allclose(context["right_distance"], 25.0, atol=1e-6)
+    assert set(context["right_is_truck"]) == {1.0}
+    assert not context["truck_right"].any()
+    np.testing.assert_array_equal(context["car_left"], (np.abs(-60 + 10 * time) <= 15.0 + 1e-9).astype(float))
+    assert np.isnan(context["lead_distance"]).all()
+
+
+def test_oncoming_traffic_is_seen_ahead_only(tmp_path: Path) -> None:
+    network = two_roads(tmp_path)
+    own = drive(network, entity("own"), lane=-1, start=100.0)
+    other = drive(network, entity("other"), lane=1, start=800.0)
+    context = entity_context(together(own, other), network, 0, GRID)
+    between = 200.0 - 60.0 * own.time[GRID] - 2 * 1.4 - 5.0
+    ahead = 200.0 - 60.0 * own.time[GRID] > 0
+    np.testing.assert_allclose(context["oncoming_distance"][ahead], np.maximum(between[ahead], 0.0), atol=1e-6)
+    assert np.isnan(context["oncoming_distance"][~ahead]).all()
+
+
+def test_weather_holds_from_the_time_of_its_action_and_wind_is_relative_to_travel(tmp_path: Path) -> None:
+    network = two_roads(tmp_path)
+    place = Place("made", 1, "Environment")
+    weather = Weather(
+        wind_speed=12.0,
+        wind_direction=np.pi / 2,
+        precipitation_type="rain",
+        precipitation_intensity=4.0,
+        illuminance=900.0,
+    )
+    clock = TimeOfDay(datetime(2026, 1, 1, 6, 30), animation=True)
+    environment = Environment("storm", place, time_of_day=clock, weather=weather, friction_scale_factor=0.7)
+    action = PlayedAction(EnvironmentAction(environment, place), None, ("Init",), 4.0, 4.0)
+    motion = together(drive(network, entity(), lane=-2, start=0.0), actions=(action,))
+    context = entity_context(motion, network, 0, GRID)
+    since = motion.entities[0].time[GRID] >= 4.0
+    assert np.isnan(context["wind_speed"][~since]).all()
+    assert set(context["wind_speed"][since]) == {12.0}
+    np.testing.assert_allclose(context["wind_direction"][since], 90.0)  # to the left of travel along x
+    assert set(context["rain"][since]) == {4.0}
+    np.testing.assert_allclose(context["time_of_day"][since][0], 6.5, atol=1e-4)
+    against = entity_context(
+        together(drive(network, entity(), lane=2, start=650.0), actions=(action,)), network, 0, GRID
+    )
+    np.testing.assert_allclose(against["wind_direction"][since], 270.0)
+
+
+def test_a_scenario_without_weather_supplies_none(tmp_path: Path) -> None:
+    network = two_roads(tmp_path)
+    assert "rain" not in entity_context(together(drive(network, entity())), network, 0, GRID)
