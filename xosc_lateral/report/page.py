@@ -52,7 +52,7 @@ class Page:
         Heading and window title.
     """
 
-    def __init__(self, title: str) -> None:  # noqa: D107 (the class says it)
+    def __init__(self, title: str) -> None:
         self._title = title
         self._lead: list[str] = []
         self._contents: list[tuple[str, str]] = []

@@ -1,0 +1,144 @@
+"""Settings of a template: typed, with unit, default and valid range."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+
+from xosc_lateral.errors import XoscLateralError
+
+
+@dataclass(frozen=True, slots=True)
+class Number:
+    """A number within a range.
+
+    Parameters
+    ----------
+    name : str
+    default, low, high : float
+        The range includes its borders. [unit]
+    unit : str
+        ``-`` for none.
+    what : str
+        One line for the user.
+    whole : bool
+        Whole numbers only.
+    """
+
+    name: str
+    default: float
+    low: float
+    high: float
+    unit: str
+    what: str
+    whole: bool = False
+
+    def read(self, text: str) -> float:
+        """Value of ``--set NAME=text``; `XoscLateralError` when it is no number or out of range."""
+        try:
+            value = float(text)
+        except ValueError:
+            raise XoscLateralError(f"{self.name}: {text!r} is no number ({self.allowed})") from None
+        if not (math.isfinite(value) and self.low <= value <= self.high):
+            raise XoscLateralError(f"{self.name}: {text} is out of range ({self.allowed})")
+        if self.whole and value != round(value):
+            raise XoscLateralError(f"{self.name}: {text} is no whole number ({self.allowed})")
+        return value
+
+    @property
+    def allowed(self) -> str:
+        """Valid range in words."""
+        unit = "" if self.unit == "-" else f" {self.unit}"
+        return f"{self.low:g} to {self.high:g}{unit}"
+
+    @property
+    def shown_default(self) -> str:
+        """Default as text."""
+        return f"{self.default:g}"
+
+
+@dataclass(frozen=True, slots=True)
+class Choice:
+    """One of a few words.
+
+    Parameters
+    ----------
+    name : str
+    default : str
+    options : tuple of str
+    what : str
+        One line for the user.
+    """
+
+    name: str
+    default: str
+    options: tuple[str, ...]
+    what: str
+    unit: str = "-"
+
+    def read(self, text: str) -> str:
+        """Value of ``--set NAME=text``; `XoscLateralError` when it is none of the options."""
+        if text not in self.options:
+            raise XoscLateralError(f"{self.name}: {text!r} is none of {self.allowed}")
+        return text
+
+    @property
+    def allowed(self) -> str:
+        """Options in words."""
+        return ", ".join(self.options)
+
+    @property
+    def shown_default(self) -> str:
+        """Default as text."""
+        return self.default
+
+
+Parameter = Number | Choice
+
+
+class Settings:
+    """Values of a template's parameters: the defaults, and what the user set.
+
+    Parameters
+    ----------
+    parameters : iterable of Parameter
+    chosen : mapping of str to str
+        What the user set, as text.
+
+    Raises
+    ------
+    XoscLateralError
+        For an unknown name or a value out of range.
+    """
+
+    __slots__ = ("_values",)
+
+    def __init__(self, parameters: Iterable[Parameter], chosen: Mapping[str, str]) -> None:
+        by_name = {parameter.name: parameter for parameter in parameters}
+        for name in chosen:
+            if name not in by_name:
+                raise XoscLateralError(f"unknown setting {name!r}; there are {', '.join(sorted(by_name))}")
+        self._values: dict[str, float | str] = {
+            name: parameter.read(chosen[name]) if name in chosen else parameter.default
+            for name, parameter in by_name.items()
+        }
+
+    def number(self, name: str) -> float:
+        """Value of a `Number`."""
+        value = self._values[name]
+        assert isinstance(value, float | int), f"{name} is no number"
+        return float(value)
+
+    def text(self, name: str) -> str:
+        """Value of a `Choice`."""
+        value = self._values[name]
+        assert isinstance(value, str), f"{name} is no choice"
+        return value
+
+    def need_more(self, name: str, other: str) -> None:
+        """Refuse settings under which nothing would happen: `name` has to be larger than `other`."""
+        if self.number(name) <= self.number(other):
+            raise XoscLateralError(
+                f"{name}: {self.number(name):g} has to be more than {other} ({self.number(other):g})"
+            )
