@@ -310,7 +310,8 @@ def _why_nothing(drives: Sequence[Drive], rules: CutRules) -> str:
     changes = sum(float(lane_change_rows(drive, rules).sum()) for drive in drives) / rows
     return (
         f"no run of {rules.min_run:g} s is left in {driven:.1f} s of driving: {100 * slow:.0f} % of the rows are "
-        f"below {3.6 * rules.min_speed:.0f} km/h, {100 * changes:.0f} % within {rules.lane_change_margin:g} s of a lane change"
+        f"below {3.6 * rules.min_speed:.0f} km/h, {100 * changes:.0f} % within "
+        f"{rules.lane_change_margin:g} s of a lane change"
     )
 
 
