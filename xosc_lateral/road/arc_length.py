@@ -84,7 +84,7 @@ def _refined(
 
 
 def _slopes(value: FloatArray, u: FloatArray, v: FloatArray, scale: FloatArray, length: FloatArray) -> FloatArray:
-    """dp/ds at the nodes, held to three times the neighbouring secants so that p(ds) never runs back (Fritsch-Carlson)."""
+    """dp/ds at the nodes, at most three times the neighbouring secants: p(ds) never runs back (Fritsch-Carlson)."""
     slope = 1.0 / (np.maximum(_speed(u, v, value), 1e-9) * scale[:, None])
     secant = np.diff(value, axis=1) / (length / PIECES)[:, None]
     slope[:, :-1] = np.minimum(slope[:, :-1], 3.0 * secant)

@@ -1,3 +1,388 @@
-"""World to lane."""
+"""World to lane: which roads are near a point, and which of their lanes it is in."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from xosc_lateral.errors import PlaybackError
+from xosc_lateral.road.places import lane_at
+from xosc_lateral.road.positions import FloatArray, IntArray, LanePosition, LanePositions
+from xosc_lateral.road.projection import Feet, project, project_at
+from xosc_lateral.road.tables import NetworkTables
+
+SPACING = 8.0
+"""Distance of the samples laid over the lanes. [m]"""
+
+REACH = 0.5 * float(np.hypot(SPACING, SPACING)) + 1.0
+"""No place on a lane is further from its nearest sample (1 m for what curves bulge between samples). [m]"""
+
+CELL = 2.0 * SPACING
+"""Size of the grid's cells; a point looks for samples in its own cell and the eight around it. [m]"""
+
+WRONG_WAY = 2.0
+"""A lane driven the opposite way counts as this much further off when the heading is known. [m]"""
+
+SAME_LEVEL = 1.0
+"""Height differences below this tell nothing when z is known. [m]"""
+
+BRUTE_FORCE = 4_000_000
+"""Up to so many pairs of points and samples, plain distances beat building a tree."""
+
+
+class Candidates(NamedTuple):
+    """Roads that a point may lie on: index of the point, road, guess of s."""
+
+    point: NDArray[np.int64]
+    road: IntArray
+    s: FloatArray
+
+
+class Samples:
+    """Samples of all lanes of some types, in a grid.
+
+    Parameters
+    ----------
+    tables : NetworkTables
+    lane_types : collection of str or None
+        None: all but lane 0.
+    """
+
+    def __init__(self, tables: NetworkTables, lane_types: Collection[str] | None) -> None:
+        """Lay samples over the lanes, and list for each cell those in it and around it."""
+        parts = [part for i in range(len(tables.roads)) for part in _road_samples(tables, i, lane_types)]
+        if not parts:
+            raise PlaybackError(f"no road has a lane of these types: {', '.join(sorted(lane_types or ('any',)))}")
+        self.road = np.concatenate([np.full(len(s), road, dtype=np.int32) for road, s, _, _ in parts])
+        self.s, self.x, self.y = (np.concatenate([part[k] for part in parts]) for k in (1, 2, 3))
+        # The stretches of a road that pass a cell apart from each other (a loop, a hairpin) are separate candidates.
+        self.stretch = np.concatenate(
+            [np.full(len(part[1]), k, dtype=np.int64) for k, part in enumerate(parts)]
+        ) * 1_000_000 + (self.s // (4.0 * CELL)).astype(np.int64)
+        self._x0, self._y0 = float(self.x.min()) - CELL, float(self.y.min()) - CELL
+        column, line = self._cell(self.x, self.y)
+        self._lines = int(line.max()) + 2
+        keys, samples = [], []
+        for across in (-1, 0, 1):
+            for along in (-1, 0, 1):
+                keys.append((column + across) * self._lines + line + along)
+                samples.append(np.arange(len(self.x)))
+        key, sample = np.concatenate(keys), np.concatenate(samples)
+        order = np.lexsort((self.stretch[sample], key))
+        self._sample = sample[order]
+        self._cells, first = np.unique(key[order], return_index=True)
+        self._first = np.append(first, len(order))
+
+    def _cell(self, x: FloatArray, y: FloatArray) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        return ((x - self._x0) // CELL).astype(np.int64), ((y - self._y0) // CELL).astype(np.int64)
+
+    def near(self, x: FloatArray, y: FloatArray) -> Candidates:
+        """Every stretch of road that may be the nearest one, once per point; at least one for every point."""
+        limit = 1e9  # keeps the cell numbers of absurdly distant points within integers
+        column, line = self._cell(np.clip(x, -limit, limit), np.clip(y, -limit, limit))
+        inside = (line >= 0) & (line < self._lines)
+        key = np.where(inside, column * self._lines + line, -1)
+        cell = np.minimum(np.searchsorted(self._cells, key), len(self._cells) - 1)
+        found = self._cells[cell] == key
+        hits = self._in_cells(np.flatnonzero(found), cell[found], x, y)
+        if found.all():
+            return hits
+        far = self._nearest(np.flatnonzero(~found), x, y)
+        return _joined(hits, far)
+
+    def _in_cells(
+        self, points: NDArray[np.int64], cells: NDArray[np.int64], x: FloatArray, y: FloatArray
+    ) -> Candidates:
+        first = self._first[cells]
+        count = self._first[cells + 1] - first
+        start = np.cumsum(count) - count
+        sample = self._sample[np.arange(int(count.sum())) + np.repeat(first - start, count)]
+        return self._closest_per_stretch(np.repeat(points, count), sample, x, y)
+
+    def _nearest(self, points: NDArray[np.int64], x: FloatArray, y: FloatArray) -> Candidates:
+        """Far from any lane: the nearest 16 samples by brute force for a few points, by a tree for many."""
+        k = min(16, len(self.x))
+        if len(points) * len(self.x) <= BRUTE_FORCE:
+            squared = (x[points, None] - self.x) ** 2 + (y[points, None] - self.y) ** 2
+            sample = np.argpartition(squared, k - 1, axis=1)[:, :k]
+        else:
+            from scipy.spatial import cKDTree
+
+            tree = cKDTree(np.stack([self.x, self.y], axis=1))
+            sample = tree.query(np.stack([x[points], y[points]], axis=1), k=k)[1].reshape(len(points), k)
+        order = np.argsort(self.stretch[sample], axis=1)
+        sample = np.take_along_axis(sample, order, axis=1)
+        return self._closest_per_stretch(np.repeat(points, k), sample.ravel(), x, y)
+
+    def _closest_per_stretch(
+        self, point: NDArray[np.int64], sample: NDArray[np.int64], x: FloatArray, y: FloatArray
+    ) -> Candidates:
+        """Of (point, sample) pairs sorted by point and stretch: the closest of each stretch, unless out of reach."""
+        if not len(point):
+            return Candidates(point, self.road[:0], self.s[:0])
+        distance = np.hypot(x[point] - self.x[sample], y[point] - self.y[sample])
+        stretch = self.stretch[sample]
+        new_point = np.append(True, point[1:] != point[:-1])
+        new = new_point | np.append(True, stretch[1:] != stretch[:-1])
+        begin = np.flatnonzero(new)
+        group = np.cumsum(new) - 1
+        smallest = np.minimum.reduceat(distance, begin)
+        at_minimum = np.flatnonzero(distance == smallest[group])
+        chosen = at_minimum[np.append(True, np.diff(group[at_minimum]) > 0)]
+        nearest = np.minimum.reduceat(distance, np.flatnonzero(new_point))
+        point_number = np.cumsum(new_point) - 1
+        keep = chosen[distance[chosen] <= nearest[point_number[chosen]] + REACH]
+        return Candidates(point[keep], self.road[sample[keep]], self.s[sample[keep]])
+
+
+def _joined(*parts: Candidates) -> Candidates:
+    return Candidates(
+        np.concatenate([part.point for part in parts]),
+        np.concatenate([part.road for part in parts]),
+        np.concatenate([part.s for part in parts]),
+    )
+
+
+def _road_samples(
+    tables: NetworkTables, index: int, lane_types: Collection[str] | None
+) -> list[tuple[int, FloatArray, FloatArray, FloatArray]]:
+    """Samples of one road, section by section: (road, s, x, y)."""
+    parts = []
+    for section in tables.roads[index].sections:
+        lanes = [lane for lane in section.lanes if lane_types is None or lane.type in lane_types]
+        if not lanes or section.end <= section.start:
+            continue
+        n = int(np.ceil((section.end - section.start) / SPACING)) + 1
+        s = np.linspace(section.start, section.end, n)
+        inside = np.minimum(s, np.nextafter(section.end, -np.inf))
+        left = tables.lane_profile(index, lanes[0].id, inside)
+        right = tables.lane_profile(index, lanes[-1].id, inside)
+        top, bottom = left.centre + 0.5 * left.width, right.centre - 0.5 * right.width
+        m = int(np.ceil(max(float((top - bottom).max()), 0.0) / SPACING)) + 1
+        t = bottom + (top - bottom) * (np.linspace(0.0, 1.0, m)[:, None] if m > 1 else 0.5)
+        t = np.broadcast_to(t, (m, n))
+        poses = tables.road_to_world(index, np.broadcast_to(s, (m, n)), t)
+        parts.append((index, np.tile(s, m), poses.x.ravel(), poses.y.ravel()))
+    return parts
+
+
 class SurfaceIndex:
-    def __init__(self, tables): pass
+    """World to lane over a whole network."""
+
+    def __init__(self, tables: NetworkTables) -> None:
+        """Samples are laid when they are first asked for, once per choice of lane types."""
+        self._tables = tables
+        self._samples: dict[frozenset[str] | None, Samples] = {}
+        self._wanted: dict[frozenset[str] | None, NDArray[np.bool_]] = {}
+
+    def world_to_lane(
+        self,
+        x: ArrayLike,
+        y: ArrayLike,
+        z: ArrayLike | None,
+        heading: ArrayLike | None,
+        *,
+        near: Sequence[int] | None,
+        lane_types: Collection[str] | None,
+    ) -> LanePositions:
+        """Nearest lanes (see `RoadNetwork.world_to_lane`)."""
+        given = [x, y, *(a for a in (z, heading) if a is not None)]
+        arrays = np.broadcast_arrays(*(np.asarray(a, dtype=np.float64) for a in given))
+        flat = [a.ravel() for a in arrays]
+        _refuse_nan(flat)
+        height = flat[2] if z is not None else None
+        direction = flat[-1] if heading is not None else None
+        types = None if lane_types is None else frozenset(lane_types)
+        best = _Best(len(flat[0]))
+        for begin in range(0, len(flat[0]), 16384):
+            part = slice(begin, begin + 16384)
+            found = self._candidates(flat[0][part], flat[1][part], near, types)
+            point = found.point + begin
+            self._score(
+                best, point, found.road, found.s, flat[0][point], flat[1][point],
+                None if height is None else height[point], None if direction is None else direction[point], types,
+            )  # fmt: skip
+        return best.positions(arrays[0].shape)
+
+    def _candidates(
+        self, x: FloatArray, y: FloatArray, near: Sequence[int] | None, types: frozenset[str] | None
+    ) -> Candidates:
+        if types not in self._samples:
+            self._samples[types] = Samples(self._tables, types)
+        samples = self._samples[types]
+        found = samples.near(x, y)
+        if near is None:
+            return found
+        kept = np.isin(found.road, np.asarray(near, dtype=np.int32))
+        found = Candidates(found.point[kept], found.road[kept], found.s[kept])
+        missing = np.setdiff1d(np.arange(len(x)), found.point)
+        extra = [self._on_road(samples, missing, x, y, int(road)) for road in near] if len(missing) else []
+        return _joined(found, *extra)
+
+    @staticmethod
+    def _on_road(samples: Samples, points: NDArray[np.int64], x: FloatArray, y: FloatArray, road: int) -> Candidates:
+        """The nearest sample of one road to each point."""
+        own = np.flatnonzero(samples.road == road)
+        if not len(own):
+            return Candidates(points[:0], samples.road[:0], samples.s[:0])
+        nearest = np.empty(len(points), dtype=np.int64)
+        rows = max(1, BRUTE_FORCE // len(own))
+        for begin in range(0, len(points), rows):
+            part = points[begin : begin + rows]
+            squared = (x[part, None] - samples.x[own]) ** 2 + (y[part, None] - samples.y[own]) ** 2
+            nearest[begin : begin + rows] = own[np.argmin(squared, axis=1)]
+        return Candidates(points, samples.road[nearest], samples.s[nearest])
+
+    def path_to_lane(
+        self, x: ArrayLike, y: ArrayLike, road: ArrayLike, s: ArrayLike, *, lane_types: Collection[str] | None
+    ) -> LanePositions:
+        """Nearest lanes on known roads (see `RoadNetwork.path_to_lane`)."""
+        arrays = np.broadcast_arrays(*(np.asarray(a, dtype=np.float64) for a in (x, y, s)), np.asarray(road, np.int32))
+        flat = [a.ravel() for a in arrays]
+        _refuse_nan(flat[:3])
+        types = None if lane_types is None else frozenset(lane_types)
+        best = _Best(len(flat[0]))
+        roads = flat[3].astype(np.int32)
+        known = np.flatnonzero(roads >= 0)
+        self._score(best, known, roads[known], flat[2][known], flat[0][known], flat[1][known], None, None, types)
+        # Driven off the road that it was on, onto the next one: look again, without prejudice.
+        lost = np.flatnonzero(~(best.distance <= 0.0))
+        if len(lost):
+            found = self._candidates(flat[0][lost], flat[1][lost], None, types)
+            point = lost[found.point]
+            self._score(best, point, found.road, found.s, flat[0][point], flat[1][point], None, None, types)
+        return best.positions(arrays[0].shape)
+
+    def world_to_lane_at(
+        self,
+        x: float,
+        y: float,
+        z: float | None,
+        heading: float | None,
+        *,
+        near: tuple[int, float] | None,
+        lane_types: Collection[str] | None,
+    ) -> LanePosition:
+        """Nearest lane of one point (see `RoadNetwork.world_to_lane_at`)."""
+        if near is not None and near[0] >= 0:
+            road = self._tables.roads[near[0]]
+            s, t, ahead = project_at(road, x, y, near[1])
+            here = lane_at(road, near[0], s, t, lane_types)
+            if ahead == 0.0 and here.distance <= 0.0 and here.lane != 0:
+                return here
+        best = self.world_to_lane(x, y, z, heading, near=None, lane_types=lane_types)
+        return LanePosition(
+            int(best.road), int(best.lane), float(best.s), float(best.offset), float(best.t), float(best.distance)
+        )
+
+    # ---- choosing ----------------------------------------------------------------------------------------------------
+    def _score(
+        self,
+        best: _Best,
+        point: NDArray[np.int64],
+        road: IntArray,
+        guess: FloatArray,
+        x: FloatArray,
+        y: FloatArray,
+        z: FloatArray | None,
+        heading: FloatArray | None,
+        types: frozenset[str] | None,
+    ) -> None:
+        """Project each point onto its candidate road, find the lane there, keep what beats the best so far."""
+        feet = project(self._tables, road, x, y, guess)
+        row, centre, width = self._lanes(road, feet, types)
+        away = np.abs(feet.t - centre)
+        outside = np.hypot(np.maximum(away - 0.5 * width, 0.0), feet.ahead)
+        outside[row < 0] = np.inf
+        direction = self._tables.directions[row]
+        score = outside
+        if z is not None:
+            score = score + np.maximum(np.abs(z - self._tables.height(road, feet.s, feet.t)) - SAME_LEVEL, 0.0)
+        if heading is not None:
+            lane_heading = feet.heading + np.where(direction < 0, np.pi, 0.0)
+            score = score + 0.5 * WRONG_WAY * (1.0 - np.cos(heading - lane_heading))
+        best.offer(
+            point, score, away, road, np.where(row < 0, 0, self._tables.ids[row]), feet.s,
+            direction * (feet.t - centre), feet.t, outside,
+        )  # fmt: skip
+
+    def _lanes(
+        self, road: IntArray, feet: Feet, types: frozenset[str] | None
+    ) -> tuple[IntArray, FloatArray, FloatArray]:
+        """Row, centre and width of the lane of these types that holds t, else of the nearest; row -1: there is none."""
+        tables = self._tables
+        if types not in self._wanted:
+            self._wanted[types] = np.array(
+                [lane.id != 0 and (types is None or lane.type in types) for lane in tables.lanes]
+            )
+        wanted = self._wanted[types]
+        section = np.broadcast_to(np.asarray(tables.section_of(road, feet.s)), feet.s.shape)
+        spans = np.array(tables.section_rows, dtype=np.int32)
+        first, count = spans[section, 0], spans[section, 1]
+        row = np.full(len(feet.s), -1, dtype=np.int32)
+        centre, width = np.zeros(len(feet.s)), np.zeros(len(feet.s))
+        lowest, closest = np.full(len(feet.s), np.inf), np.full(len(feet.s), np.inf)
+        for rank in range(int(count.max(initial=0))):
+            here = np.flatnonzero(rank < count)
+            here = here[wanted[first[here] + rank]]
+            profile = tables.profile_of(first[here] + rank, feet.s[here])
+            away = np.abs(feet.t[here] - profile.centre)
+            # lanes of no width only where there is nothing else, as in `places.lane_at`
+            score = np.maximum(away - 0.5 * profile.width, 0.0) + np.where(profile.width <= 1e-6, 1e3, 0.0)
+            better = (score < lowest[here]) | ((score == lowest[here]) & (away < closest[here]))
+            to = here[better]
+            row[to] = first[to] + rank
+            centre[to], width[to] = profile.centre[better], profile.width[better]
+            lowest[to], closest[to] = score[better], away[better]
+        return row, centre, width
+
+
+class _Best:
+    """The best candidate so far for each of n points."""
+
+    def __init__(self, n: int) -> None:
+        self._score, self._away = np.full(n, np.inf), np.full(n, np.inf)
+        self.road, self.lane = np.full(n, -1, dtype=np.int32), np.zeros(n, dtype=np.int32)
+        self.s, self.offset, self.t = np.zeros(n), np.zeros(n), np.zeros(n)
+        self.distance = np.full(n, np.inf)
+
+    def offer(
+        self,
+        point: NDArray[np.int64],
+        score: FloatArray,
+        away: FloatArray,
+        road: IntArray,
+        lane: IntArray,
+        s: FloatArray,
+        offset: FloatArray,
+        t: FloatArray,
+        distance: FloatArray,
+    ) -> None:
+        """Take what has a smaller score; of equals (lanes on top of each other) the one whose centre is nearer."""
+        score = np.round(score, 9)  # rounding noise must not decide between roads that touch
+        order = np.lexsort((road, np.round(away, 9), score, point))
+        order = order[np.append(True, np.diff(point[order]) > 0)] if len(order) else order
+        target = point[order]
+        better = (score[order] < self._score[target]) | (
+            (score[order] == self._score[target]) & (away[order] < self._away[target])
+        )
+        order, target = order[better], target[better]
+        self._score[target], self._away[target] = score[order], away[order]
+        self.road[target], self.lane[target] = road[order], lane[order]
+        self.s[target], self.offset[target], self.t[target] = s[order], offset[order], t[order]
+        self.distance[target] = distance[order]
+
+    def positions(self, shape: tuple[int, ...]) -> LanePositions:
+        """The result, in the shape of the question."""
+        lane = LanePositions(self.road, self.lane, self.s, self.offset, self.t, self.distance)
+        return LanePositions(lane.road.reshape(shape), lane.lane.reshape(shape), *(a.reshape(shape) for a in lane[2:]))
+
+
+def _refuse_nan(arrays: Sequence[FloatArray]) -> None:
+    for array in arrays:
+        if not np.isfinite(array).all():
+            i = int(np.flatnonzero(~np.isfinite(array))[0])
+            raise ValueError(f"point {i}: {array[i]} is no coordinate")

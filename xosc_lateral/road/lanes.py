@@ -10,7 +10,10 @@ from xosc_lateral.road.piecewise import ZERO, Cubic, Piecewise
 from xosc_lateral.road.positions import LaneState, RoadMark
 
 DRIVING: frozenset[str] = frozenset(
-    "driving entry exit onRamp offRamp connectingRamp slipLane bidirectional HOV bus taxi mwyEntry mwyExit".split()
+    (
+        *("driving", "entry", "exit", "onRamp", "offRamp", "connectingRamp", "slipLane", "bidirectional"),
+        *("HOV", "bus", "taxi", "mwyEntry", "mwyExit"),
+    )
 )
 """Lane types that vehicles follow, and that world positions snap to."""
 
@@ -82,9 +85,16 @@ class Lane:
         )
 
     def height_at(self, s: float, across: float) -> float:
-        """Height over the road surface, `across` the lane from its inner (0) to its outer edge (1). [m]"""
+        """Height over the road surface, `across` the lane from its inner (0) to its outer edge (1). [m]
+
+        Linear in s from one record to the next, as the reference player has it: files draw kerb ramps so.
+        """
         i = max(bisect_right(self.heights, s, key=lambda record: record[0]) - 1, 0)
-        _, inner, outer = self.heights[i]
+        start, inner, outer = self.heights[i]
+        if i + 1 < len(self.heights) and s > start:
+            end, next_inner, next_outer = self.heights[i + 1]
+            weight = (s - start) / (end - start)
+            inner, outer = inner + weight * (next_inner - inner), outer + weight * (next_outer - outer)
         return inner + across * (outer - inner)
 
 
@@ -139,7 +149,9 @@ def build_section(
             inner = outer
     nothing = Piecewise(centre.starts, (ZERO,) * len(centre.starts))
     lane_zero = LaneRecord(0, "none", True, (), (), (), (), centre_marks, (), ())
-    return LaneSection(start, end, tuple(sorted(lanes, key=lambda lane: -lane.id)), _lane(lane_zero, 1, centre, nothing))
+    return LaneSection(
+        start, end, tuple(sorted(lanes, key=lambda lane: -lane.id)), _lane(lane_zero, 1, centre, nothing)
+    )
 
 
 def _outer_edge(

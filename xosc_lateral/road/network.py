@@ -39,6 +39,7 @@ from xosc_lateral.road.road import Junction, Road
 from xosc_lateral.road.tables import NetworkTables
 from xosc_lateral.road.topology import Chooser, Topology
 
+
 @dataclass(frozen=True, eq=False)
 class RoadNetwork:
     """Roads, their lanes and their links, as read from one OpenDRIVE file.
@@ -264,7 +265,7 @@ class RoadNetwork:
         choose: Chooser | None = None,
         direction: int | None = None,
     ) -> Advance:
-        """Move along s by `distance` [m] (negative: backwards), following lane links over sections, roads and junctions.
+        """Move along s by `distance` [m] (negative: backwards) over sections, roads and junctions, by lane links.
 
         `direction` of positive distance: +1 along s, -1 against; default the lane's travel direction. `choose` picks
         one of several links; default the straightest. Ends at the lane's end, saying what remains.
@@ -285,8 +286,8 @@ class RoadNetwork:
     ) -> float | None:
         """Shortest signed distance along the reference lines of linked roads between two (road, s).
 
-        Positive when the path leaves `start` in `direction` (+1 along s, -1 against s), negative when it leaves the other
-        way. None: no path within `limit` metres.
+        Positive when the path leaves `start` in `direction` (+1 along s, -1 against s), negative when it leaves the
+        other way. None: no path within `limit` metres.
         """
         return self._topology.path_distance(start, end, direction=direction, limit=limit)
 

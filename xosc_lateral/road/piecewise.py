@@ -37,10 +37,8 @@ class Piecewise:
 
     @classmethod
     def from_records(cls, records: Iterable[tuple[float, Cubic]], *, begin: float, before: Cubic = ZERO) -> Piecewise:
-        """From (s, cubic) records in any order; of two at the same s the later counts; `before` holds from `begin` on."""
-        ordered: dict[float, Cubic] = {}
-        for s, cubic in sorted(records, key=lambda record: record[0]):
-            ordered[s] = cubic
+        """From (s, cubic) records in any order; the later of two at the same s counts; before the first: `before`."""
+        ordered = dict(sorted(records, key=lambda record: record[0]))
         if not ordered or min(ordered) > begin:
             ordered = {begin: before, **ordered}
         return cls(tuple(ordered), tuple(ordered.values()))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection
-from math import atan, ceil, cos, inf, pi, sin
+from math import asin, atan, atan2, ceil, cos, inf, pi, sin
 
 from xosc_lateral.errors import PlaybackError
 from xosc_lateral.road.lanes import Lane
@@ -53,20 +53,39 @@ def surface_pose(
     x, y, heading = road.reference_at(s)
     z = pitch = roll = 0.0
     from_line = t
+    forward = heading
     if not road.is_flat:
-        z, along, roll, shrink = road.surface.at(s, t)
+        z, pitch, roll, shrink, drift = road.surface.at(s, t)
         from_line = t * shrink
+        if drift != 0.0:
+            forward += atan(drift)
         if lane is not None and lane.heights:
             z += lane.height_at(s, across_lane(lane, t, centre, width))
-        pitch = -direction * atan(along)
-        roll *= direction
     x -= from_line * sin(heading)
     y += from_line * cos(heading)
-    if slope != 0.0:
-        heading += atan(slope)
+    turn = atan(slope) if slope != 0.0 else 0.0
+    if turn != 0.0 and (pitch != 0.0 or roll != 0.0):
+        turn, pitch, roll = turned_in_surface(turn, pitch, roll)
     if direction < 0:
-        heading += pi
-    return Pose(x, y, z, normal_angle(heading), pitch, roll)
+        turn, pitch, roll = turn + pi, -pitch, -roll
+    return Pose(x, y, z, normal_angle(forward + turn), pitch, roll)
+
+
+def turned_in_surface(turn: float, pitch: float, roll: float) -> tuple[float, float, float]:
+    """Heading change, pitch and roll after turning by `turn` within a surface that pitches and rolls.
+
+    The angles of the rotation Ry(pitch) Rx(roll) Rz(turn), seen as Rz Ry Rx again.
+    """
+    cos_turn, sin_turn, cos_pitch, sin_pitch = cos(turn), sin(turn), cos(pitch), sin(pitch)
+    cos_roll, sin_roll = cos(roll), sin(roll)
+    forward_x = cos_pitch * cos_turn + sin_pitch * sin_roll * sin_turn
+    forward_z = cos_pitch * sin_roll * sin_turn - sin_pitch * cos_turn
+    lateral_z = cos_pitch * sin_roll * cos_turn + sin_pitch * sin_turn
+    return (
+        atan2(cos_roll * sin_turn, forward_x),
+        -asin(min(max(forward_z, -1.0), 1.0)),
+        atan2(lateral_z, cos_pitch * cos_roll),
+    )
 
 
 def across_lane(lane: Lane, t: float, centre: float, width: float) -> float:

@@ -12,7 +12,10 @@ IntArray = NDArray[np.int32]
 
 
 class Pose(NamedTuple):
-    """One pose. [m], [rad]; heading counter-clockwise from x, pitch positive nose down, roll positive right side down."""
+    """One pose. [m], [rad]; heading counter-clockwise from x in (-pi, pi], pitch positive nose down, roll right side down.
+
+    Applied in the order heading, pitch, roll (Rz Ry Rx).
+    """
 
     x: float
     y: float
@@ -50,7 +53,7 @@ class LanePosition(NamedTuple):
 
 
 class LanePositions(NamedTuple):
-    """Places on the road as arrays of one shape; fields as in `LanePosition`; road -1 and lane 0 where there is none."""
+    """Places on the road as arrays of one shape; fields as in `LanePosition`; lane 0 where there is none."""
 
     road: IntArray
     lane: IntArray

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from bisect import bisect_right
 from dataclasses import dataclass
-from math import cos, sin
+from math import asin, atan, cos, sin, sqrt
 
 from xosc_lateral.road.piecewise import Cubic, Piecewise
 
@@ -71,22 +71,36 @@ class Surface:
         """Whether the road leans nowhere."""
         return self.superelevation.is_zero and self.crossfall is None and self.shape is None
 
-    def at(self, s: float, t: float) -> tuple[float, float, float, float]:
-        """Height, its slope along s, angle about s, and the factor by which t shrinks seen from above.
+    def at(self, s: float, t: float) -> tuple[float, float, float, float, float]:
+        """Height, pitch, roll, the factor by which t shrinks seen from above, and how far +s at this t turns aside.
 
-        `t` is measured in the leaning surface (OpenDRIVE 8.3), so that x, y lie t * cos(superelevation) off.
+        `t` is measured in the leaning surface (OpenDRIVE 8.3), so that x, y lie t * cos(superelevation) off. Where the
+        lean changes along s, the line of constant t climbs and drifts: its tangent is (1, drift, climb).
         """
-        height, along = self.elevation.with_slope_at(s)
+        height, grade = self.elevation.with_slope_at(s)
         angle, twist = self.superelevation.with_slope_at(s)
-        shrink = 1.0
+        climb, drift, shrink = grade, 0.0, 1.0
         if angle != 0.0 or twist != 0.0:
-            shrink = cos(angle)
-            height += t * sin(angle)
-            along += t * shrink * twist
+            shrink, rise = cos(angle), sin(angle)
+            height += t * rise
+            climb += t * shrink * twist
+            drift = -t * rise * twist
         if self.crossfall is not None or self.shape is not None:
             lift, lift_along, lean = self.profile_at(s, t)
-            height, along, angle = height + lift, along + lift_along, angle + lean
-        return height, along, angle, shrink
+            height, climb, angle = height + lift, climb + lift_along, angle + atan(lean)
+        pitch = -atan(climb / sqrt(1.0 + drift * drift)) if drift else -atan(climb)
+        roll = angle
+        if climb != grade and angle:
+            # the lateral axis stays (0, cos, sin) of the lean while the forward axis pitches by more than the grade
+            roll = asin(min(max(sin(angle) * cos(atan(grade)) / cos(pitch), -1.0), 1.0))
+        return height, pitch, roll, shrink, drift
+
+    def slopes_at(self, s: float, t: float) -> tuple[float, float]:
+        """Climb along +s and angle about s (positive falling to the right)."""
+        _, grade = self.elevation.with_slope_at(s)
+        angle, twist = self.superelevation.with_slope_at(s)
+        _, lift_along, lean = self.profile_at(s, t)
+        return grade + t * cos(angle) * twist + lift_along, angle + atan(lean)
 
     def profile_at(self, s: float, t: float) -> tuple[float, float, float]:
         """What crossfall and shape add: height, its slope along s, its slope along t."""

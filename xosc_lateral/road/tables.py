@@ -84,7 +84,8 @@ class NetworkTables:
         self._superelevation = Cubics([road.surface.superelevation for road in roads])
         self._is_shaped = np.array([bool(r.surface.crossfall or r.surface.shape) for r in roads])
         self._heights = _HeightTable(self.lanes)
-        self._flat = bool(self._elevation.is_zero and self._superelevation.is_zero and not self._is_shaped.any())
+        self._level = bool(self._superelevation.is_zero and not self._is_shaped.any())
+        self._flat = bool(self._elevation.is_zero and self._level)
 
     # ---- lanes -------------------------------------------------------------------------------------------------------
     def section_of(self, road: IndexLike, s: FloatArray) -> IndexLike:
@@ -210,18 +211,22 @@ class NetworkTables:
         return Poses(*self._batch(evaluate, 6, road, s, offset=t))
 
     def _clamped(self, road: IndexLike, s: FloatArray) -> FloatArray:
-        return np.minimum(np.maximum(s, 0.0), self.lengths[road])
+        return np.asarray(np.minimum(np.maximum(s, 0.0), self.lengths[road]))
 
-    def _pose(self, road: IndexLike, s: FloatArray, t: FloatArray, profile: LaneProfile | None) -> tuple[FloatArray, ...]:
+    def _pose(
+        self, road: IndexLike, s: FloatArray, t: FloatArray, profile: LaneProfile | None
+    ) -> tuple[FloatArray, ...]:
         frame = self.lines.at(road, s)
-        z, along, angle, shrink = self.surface(road, s, t)
-        heading = frame.heading
+        z, pitch, roll, shrink, drift = self._surface(road, s, t)
+        heading = frame.heading if drift is None else frame.heading + np.arctan(drift)
         sideways = t if shrink is None else t * shrink
         x, y = frame.x - sideways * frame.sin, frame.y + sideways * frame.cos
-        pitch, roll = -np.arctan(along) if along.any() else along, angle
         if profile is not None:
             if profile.slope.any():
-                heading = heading + np.arctan(profile.slope)
+                turn = np.arctan(profile.slope)
+                if pitch.any() or roll.any():
+                    turn, pitch, roll = _turned_in_surface(turn, pitch, roll)
+                heading = heading + turn
             backwards = profile.direction < 0
             if np.any(backwards):
                 heading = heading + np.pi * backwards
@@ -232,28 +237,39 @@ class NetworkTables:
         heading = heading - (2.0 * np.pi) * np.rint(heading / (2.0 * np.pi))
         return x, y, z, heading, pitch, roll
 
-    def surface(
+    def _surface(
         self, road: IndexLike, s: FloatArray, t: FloatArray
-    ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray | None]:
-        """Height, slope along s, angle about s, and how t shrinks seen from above (None: not at all)."""
+    ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray | None, FloatArray | None]:
+        """What `Surface.at` answers; no shrinking and no drift where nothing leans."""
         nothing = np.zeros(len(s))
         if self._flat:
-            return nothing, nothing, nothing, None
-        height, along = self._elevation.at(road, s)
-        angle, shrink = nothing, None
-        if not self._superelevation.is_zero:
-            angle, twist = self._superelevation.at(road, s)
-            shrink = np.cos(angle)
-            height = height + t * np.sin(angle)
-            along = along + t * shrink * twist
-        if np.any(self._is_shaped[road]):
-            lift, lift_along, lean = self._shaped(road, s, t)
-            height, along, angle = height + lift, along + lift_along, angle + lean
-        return height, along, angle, shrink
+            return nothing, nothing, nothing, None, None
+        height, grade = self._elevation.at(road, s)
+        if self._level:
+            return height, -np.arctan(grade), nothing, None, None
+        angle, twist = self._superelevation.at(road, s)
+        shrink, rise = np.cos(angle), np.sin(angle)
+        height, climb, drift = height + t * rise, grade + t * shrink * twist, -t * rise * twist
+        lift, lift_along, lean = self._shaped(road, s, t)
+        height, climb, angle = height + lift, climb + lift_along, angle + np.arctan(lean)
+        pitch = -np.arctan(climb / np.sqrt(1.0 + drift * drift))
+        leaning = np.clip(np.sin(angle) * np.cos(np.arctan(grade)) / np.cos(pitch), -1.0, 1.0)
+        roll = np.where(climb == grade, angle, np.arcsin(leaning))
+        return height, pitch, roll, shrink, drift
+
+    def shrink(self, road: IndexLike, s: FloatArray) -> FloatArray:
+        """How t shrinks seen from above: cos(superelevation)."""
+        return np.ones(len(s)) if self._superelevation.is_zero else np.cos(self._superelevation.at(road, s)[0])
+
+    def height(self, road: IndexLike, s: FloatArray, t: FloatArray) -> FloatArray:
+        """Height of the road surface, without kerbs. [m]"""
+        return self._surface(road, s, t)[0]
 
     def _shaped(self, road: IndexLike, s: FloatArray, t: FloatArray) -> FloatArray:
         """Crossfall and shape are rare: place by place."""
         result = np.zeros((3, len(s)))
+        if not np.any(self._is_shaped[road]):
+            return result
         roads = np.broadcast_to(road, s.shape)
         for i in np.flatnonzero(self._is_shaped[roads]):
             result[:, i] = self.roads[int(roads[i])].surface.profile_at(float(s[i]), float(t[i]))
@@ -299,11 +315,19 @@ class NetworkTables:
         def evaluate(road: IndexLike, s: FloatArray, lane: IndexLike) -> tuple[FloatArray, ...]:
             s = self._clamped(road, s)
             profile = self.profile_of(self.row_of(road, lane, s), s)
-            _, along, angle, _ = self.surface(road, s, profile.centre)
-            return 100.0 * profile.direction * np.tan(angle), 100.0 * profile.direction * along
+            angle, climb = self._slopes(road, s, profile.centre)
+            percent = 100.0 * profile.direction
+            return np.asarray(percent * np.tan(angle)), percent * climb
 
         crossfall, grade = self._batch(evaluate, 2, road, s, lane=lane)
         return crossfall, grade
+
+    def _slopes(self, road: IndexLike, s: FloatArray, t: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Angle about s and climb along s at (s, t)."""
+        _, grade = self._elevation.at(road, s)
+        angle, twist = self._superelevation.at(road, s)
+        _, lift_along, lean = self._shaped(road, s, t)
+        return angle + np.arctan(lean), grade + t * np.cos(angle) * twist + lift_along
 
     def speed_limit(self, road: ArrayLike, lane: ArrayLike, s: ArrayLike) -> FloatArray:
         """Of the lane, else of the road; inf: none."""
@@ -354,7 +378,9 @@ class NetworkTables:
         for begin in range(0, size, CHUNK):
             part = slice(begin, begin + CHUNK)
             cut = [a if isinstance(a, int) else a[part] for a in indices]
-            results = evaluate(road_ if isinstance(road_, int) else road_[part], flat[0][part], *cut, *(a[part] for a in flat[1:]))
+            results = evaluate(
+                road_ if isinstance(road_, int) else road_[part], flat[0][part], *cut, *(a[part] for a in flat[1:])
+            )
             for target, result in zip(whole, results, strict=True):
                 target[part] = result
         return tuple(a.reshape(shape) for a in whole)
@@ -368,20 +394,48 @@ def _one_or_many(index: ArrayLike, shape: tuple[int, ...]) -> IndexLike:
     return np.asarray(np.broadcast_to(array, shape).ravel(), dtype=np.int32)
 
 
+def _turned_in_surface(
+    turn: FloatArray, pitch: FloatArray, roll: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """`places.turned_in_surface` for arrays."""
+    cos_turn, sin_turn, cos_pitch, sin_pitch = np.cos(turn), np.sin(turn), np.cos(pitch), np.sin(pitch)
+    cos_roll, sin_roll = np.cos(roll), np.sin(roll)
+    forward_x = cos_pitch * cos_turn + sin_pitch * sin_roll * sin_turn
+    forward_z = cos_pitch * sin_roll * sin_turn - sin_pitch * cos_turn
+    lateral_z = cos_pitch * sin_roll * cos_turn + sin_pitch * sin_turn
+    return (
+        np.arctan2(cos_roll * sin_turn, forward_x),
+        -np.arcsin(np.clip(forward_z, -1.0, 1.0)),
+        np.arctan2(lateral_z, cos_pitch * cos_roll),
+    )
+
+
 class _HeightTable:
-    """Heights of lanes over the road surface (kerbs): constant from one record to the next."""
+    """Heights of lanes over the road surface (kerbs), linear from one record to the next."""
 
     def __init__(self, lanes: Sequence[Lane]) -> None:
         records = [lane.heights or ((0.0, 0.0, 0.0),) for lane in lanes]
         self.any = any(lane.heights for lane in lanes)
         self._lookup = Lookup([[s for s, _, _ in own] for own in records])
-        self._inner = np.array([inner for own in records for _, inner, _ in own])
-        self._outer = np.array([outer for own in records for _, _, outer in own])
+        self._table = np.array([piece for own in records for piece in _linear_pieces(own)]).T.copy()
 
     def at(self, profile: LaneProfile, s: FloatArray, t: FloatArray, ids: IntArray) -> FloatArray:
         """Height at t, linear across the lane."""
         piece = self._lookup.find(profile.row, s)
-        inner, outer = self._inner[piece], self._outer[piece]
-        wide = np.maximum(profile.width, 1e-9)
-        across = 0.5 + np.sign(ids[profile.row]) * (t - profile.centre) / wide
-        return np.asarray(inner + np.clip(across, 0.0, 1.0) * (outer - inner))
+        ds = np.maximum(s - self._lookup.starts[piece], 0.0)
+        inner, inner_slope, outer, outer_slope = (values[piece] for values in self._table)
+        low, high = inner + ds * inner_slope, outer + ds * outer_slope
+        # a lane of no width has no inside: its inner edge counts
+        narrow = profile.width <= 0.0
+        outwards = np.sign(ids[profile.row]) * (t - profile.centre) / np.where(narrow, 1.0, profile.width)
+        across = np.where(narrow, 0.0, np.clip(0.5 + outwards, 0.0, 1.0))
+        return np.asarray(low + across * (high - low))
+
+
+def _linear_pieces(records: Sequence[tuple[float, float, float]]) -> list[tuple[float, float, float, float]]:
+    """Inner height and its slope, outer height and its slope, from each record to the next."""
+    pieces = []
+    for (s, inner, outer), (end, inner_end, outer_end) in zip(records, [*records[1:], records[-1]], strict=True):
+        length = end - s if end > s else np.inf
+        pieces.append((inner, (inner_end - inner) / length, outer, (outer_end - outer) / length))
+    return pieces

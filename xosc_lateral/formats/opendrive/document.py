@@ -29,7 +29,7 @@ class Source:
     def note(self, what: str, element: XmlElement) -> None:
         """Remember something that was repaired or ignored; the same note twice is counted, not repeated."""
         self._notes[what] += 1
-        self._first_line.setdefault(what, int(element.sourceline or 0))
+        self._first_line.setdefault(what, line_of(element) or 0)
 
     @property
     def notes(self) -> tuple[str, ...]:
@@ -41,7 +41,7 @@ class Source:
 
     def error(self, what: str, element: XmlElement) -> FormatError:
         """An error at an element."""
-        return FormatError(what, path=self.path, line=element.sourceline, element=describe(element))
+        return FormatError(what, path=self.path, line=line_of(element), element=describe(element))
 
     def number(self, element: XmlElement, name: str, default: float | None = None) -> float:
         """A finite number; `default` where the attribute is absent (None: it must be there)."""
@@ -84,10 +84,14 @@ def open_document(path: str | PathLike[str]) -> tuple[XmlElement, Source]:
         for element in root.iter(etree.Element):
             element.tag = element.tag.rpartition("}")[2]
     if root.tag != "OpenDRIVE":
-        raise FormatError(
-            f"root element is '{root.tag}', expected 'OpenDRIVE'", path=source.path, line=root.sourceline
-        )
+        raise FormatError(f"root element is '{root.tag}', expected 'OpenDRIVE'", path=source.path, line=line_of(root))
     return root, source
+
+
+def line_of(element: XmlElement) -> int | None:
+    """Line in the file, from 1."""
+    line: object = element.sourceline  # its stub leaves the type open
+    return line if isinstance(line, int) else None
 
 
 def describe(element: XmlElement) -> str:

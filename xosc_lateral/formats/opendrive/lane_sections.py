@@ -108,7 +108,11 @@ def _read_lane(element: XmlElement, start: float, source: Source) -> LaneRecord:
         widths=widths,
         borders=borders,
         heights=tuple(heights),
-        speeds=tuple(sorted((start + source.number(e, "sOffset", 0.0), speed_limit(e, source)) for e in element.iterfind("speed"))),
+        speeds=tuple(
+            sorted(
+                (start + source.number(e, "sOffset", 0.0), speed_limit(e, source)) for e in element.iterfind("speed")
+            )
+        ),
         marks=_read_marks(element, lane, start, source),
         predecessors=links["predecessor"],
         successors=links["successor"],
@@ -141,7 +145,7 @@ def speed_limit(element: XmlElement, source: Source) -> float:
 
 
 def _directions(road: XmlElement, written: Sequence[_Written], rule: str, source: Source) -> dict[int, int]:
-    """Right-hand traffic drives right lanes along s and left lanes against it; left-hand traffic the other way round."""
+    """Right-hand traffic drives right lanes along s and left lanes against it; left-hand traffic vice versa."""
     along = -1 if rule == "RHT" else 1
     directions = {
         lane.id: along if lane.id > 0 else -along for w in written for lane in (*(w.left or ()), *(w.right or ()))
@@ -171,7 +175,11 @@ def _merge_sides(written: Sequence[_Written]) -> list[tuple[float, tuple[LaneRec
                 part[side] = lanes
         parts.append(part)
     return [
-        (section.start, tuple(_clip(lane, start, end) for lane in (*part["left"], *part["right"])), section.centre_marks)
+        (
+            section.start,
+            tuple(_clip(lane, start, end) for lane in (*part["left"], *part["right"])),
+            section.centre_marks,
+        )
         for section, part, start, end in zip(written, parts, *_spans(written), strict=True)
     ]
 

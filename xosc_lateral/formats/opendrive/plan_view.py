@@ -82,7 +82,9 @@ def _coefficients(shape: XmlElement, axis: str, source: Source) -> Cubic:
 def _check_turn(curvature: float, length: float, shape: XmlElement, source: Source) -> None:
     turn = abs(curvature) * length
     if turn > MAX_TURN:
-        raise source.error(f"curvature {curvature:g} 1/m over {length:g} m turns by {turn:g} rad; limit {MAX_TURN:g}", shape)
+        raise source.error(
+            f"curvature {curvature:g} 1/m over {length:g} m turns by {turn:g} rad; limit {MAX_TURN:g}", shape
+        )
 
 
 def finish_elements(records: Iterable[Sequence[Record]]) -> list[tuple[ReferenceElement, ...]]:

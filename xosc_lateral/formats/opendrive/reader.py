@@ -68,9 +68,7 @@ def _check_ids(elements: Sequence[XmlElement], source: Source) -> None:
         seen.add(road)
 
 
-def _read_road(
-    element: XmlElement, plan: Sequence[Record], line: tuple[ReferenceElement, ...], source: Source
-) -> Road:
+def _read_road(element: XmlElement, plan: Sequence[Record], line: tuple[ReferenceElement, ...], source: Source) -> Road:
     length = _length(element, plan, source)
     rule = element.get("rule", "RHT").upper()
     if rule not in ("RHT", "LHT"):
