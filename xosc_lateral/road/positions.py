@@ -12,7 +12,7 @@ IntArray = NDArray[np.int32]
 
 
 class Pose(NamedTuple):
-    """One pose. [m], [rad]; heading counter-clockwise from x in (-pi, pi], pitch positive nose down, roll right side down.
+    """One pose: heading counter-clockwise from x, in [-pi, pi], pitch positive nose down, roll right side down. [m], [rad]
 
     Applied in the order heading, pitch, roll (Rz Ry Rx).
     """

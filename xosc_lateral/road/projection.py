@@ -22,7 +22,7 @@ DONE = 1e-11
 
 
 class Feet(NamedTuple):
-    """Feet of perpendiculars: s, t (in the leaning surface), how far the point lies ahead of the foot (0: none), heading.
+    """Feet of perpendiculars: s, t in the leaning surface, how far the point lies ahead of the foot, heading.
 
     `ahead` differs from 0 beyond the ends of a road and in the outside of kinks. [m], [rad]
     """

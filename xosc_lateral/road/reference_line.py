@@ -19,7 +19,7 @@ from xosc_lateral.road.road import Road
 
 
 class Frame(NamedTuple):
-    """The reference line at some places: position, tangent, heading; curvature and speed |d(x, y)/ds| where asked for."""
+    """Reference lines at some places: position, tangent, heading; where asked for, curvature and speed |d(x, y)/ds|."""
 
     x: FloatArray
     y: FloatArray

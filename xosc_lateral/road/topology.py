@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from heapq import heappop, heappush
+from itertools import pairwise
 from math import inf
 
 from xosc_lateral.road.lanes import DRIVING, Lane, LaneSection
@@ -65,7 +66,7 @@ class Topology:
                     yield self._enter(other, target, contact)
 
     def _connected_ids(self, connection: Connection, lane: Lane, other: Road, contact: str) -> list[int]:
-        """Lanes of the connecting road; where a connection has no laneLink, those that name the lane as their own link."""
+        """Lanes of the connecting road; without any laneLink, those that name the lane as their own link."""
         if connection.lanes:
             return [to for source, to in connection.lanes if source == lane.id]
         lanes = _end_section(other, contact).lanes
@@ -217,7 +218,7 @@ class Topology:
         steps: list[RouteStep] = []
         stops = [start, *via, end]
         way = self._roads[start[0]].directions.get(start[1], 1)
-        for leg_start, leg_end in zip(stops[:-1], stops[1:], strict=True):
+        for leg_start, leg_end in pairwise(stops):
             leg = self._leg(leg_start, leg_end, way)
             if leg is None:
                 return None
