@@ -1,1 +1,32 @@
 """Road geometry: (road, lane, s, offset) <-> (x, y, z, heading). Numbers only, no files."""
+
+from xosc_lateral.road.lanes import DRIVING
+from xosc_lateral.road.network import Chooser, RoadNetwork
+from xosc_lateral.road.positions import (
+    Advance,
+    LaneInfo,
+    LaneLink,
+    LanePosition,
+    LanePositions,
+    LaneState,
+    Pose,
+    Poses,
+    RoadMark,
+    RouteStep,
+)
+
+__all__ = [
+    "DRIVING",
+    "Advance",
+    "Chooser",
+    "LaneInfo",
+    "LaneLink",
+    "LanePosition",
+    "LanePositions",
+    "LaneState",
+    "Pose",
+    "Poses",
+    "RoadMark",
+    "RoadNetwork",
+    "RouteStep",
+]

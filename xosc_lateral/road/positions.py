@@ -12,9 +12,9 @@ IntArray = NDArray[np.int32]
 
 
 class Pose(NamedTuple):
-    """One pose: heading counter-clockwise from x, in [-pi, pi], pitch positive nose down, roll right side down. [m], [rad]
+    """One pose: heading in [-pi, pi], counter-clockwise from x, pitch positive nose down, roll right side down.
 
-    Applied in the order heading, pitch, roll (Rz Ry Rx).
+    [m], [rad]; the rotation is Rz(heading) Ry(pitch) Rx(roll).
     """
 
     x: float

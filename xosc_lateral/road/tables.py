@@ -372,6 +372,7 @@ class NetworkTables:
         shape = np.broadcast_shapes(np.shape(road), *(a.shape for a in (*extra, *numbers)))
         flat = [np.broadcast_to(a, shape).ravel() for a in numbers]
         road_ = _one_or_many(road, shape)
+        self._refuse_nonsense(road_, flat)
         indices = [_one_or_many(a, shape) for a in extra]
         size = len(flat[0])
         whole = [np.empty(size) for _ in range(outputs)]
@@ -384,6 +385,17 @@ class NetworkTables:
             for target, result in zip(whole, results, strict=True):
                 target[part] = result
         return tuple(a.reshape(shape) for a in whole)
+
+    def _refuse_nonsense(self, road: IndexLike, numbers: Sequence[FloatArray]) -> None:
+        """Road -1 (off the road) would quietly be the last one, and NaN would travel on."""
+        wrong = np.flatnonzero((np.asarray(road) < 0) | (np.asarray(road) >= len(self.roads)))
+        if len(wrong):
+            raise ValueError(
+                f"road index {np.ravel(road)[wrong[0]]}: there are {len(self.roads)} roads, counted from 0"
+            )
+        for values in numbers:
+            if not np.isfinite(values).all():
+                raise ValueError(f"s, t and offset must be finite, found {values[~np.isfinite(values)][0]}")
 
 
 def _one_or_many(index: ArrayLike, shape: tuple[int, ...]) -> IndexLike:
