@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from enum import StrEnum
 from typing import Any
 
 import numpy as np
@@ -12,20 +11,12 @@ from numpy.typing import NDArray
 
 from xosc_lateral import __version__
 from xosc_lateral.driver.core import CoreModel
+from xosc_lateral.driver.kinds import ModelKind
 from xosc_lateral.driver.profile import DriverProfile, Provenance
 from xosc_lateral.driver.series import PAPER_RULES, CutRules, Drive, Run, all_runs
 from xosc_lateral.driver.two_level import fit_two_level
 
 FloatArray = NDArray[np.float64]
-
-
-class ModelKind(StrEnum):
-    """Core models that can be fitted."""
-
-    TWO_LEVEL = "two-level"
-    """The paper's, to the letter."""
-    BEST = "best"
-    """Ours."""
 
 
 def fit_profile(

@@ -90,7 +90,9 @@ class OffsetSampler:
         inside = segment.inside
         found = [self._hidden.terms(segment.time[inside], self.profile.model.step)]
         if self._columned:
-            context = {"speed": segment.speed, "lane_width": segment.lane_width, **segment.context}
+            context = {"lane_width": segment.lane_width, **segment.context}
+            if np.isfinite(segment.speed).any():
+                context.setdefault("speed", segment.speed)
             unused = np.random.default_rng(0)
             found += [_cut(effect.terms(segment.time, context, unused), inside) for effect in self._columned]
         return combine(found)

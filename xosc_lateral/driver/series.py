@@ -189,6 +189,11 @@ def all_runs(drives: Sequence[Drive], rules: CutRules = PAPER_RULES) -> list[Run
     return runs
 
 
+def whole_run(drive: Drive, step: float = STEP) -> Run:
+    """The drive from its first row to its last at an even step, nothing cut out, gaps bridged: for its context."""
+    return _run(drive, 0, slice(0, len(drive)), step)
+
+
 def lane_change_rows(drive: Drive, rules: CutRules = PAPER_RULES) -> BoolArray:
     """Rows within the margin of a lane change: `lane_index` changes, or the offset jumps by about a lane width.
 

@@ -336,7 +336,8 @@ def _check_units(
         worst = float(np.max(np.abs(offset[known])))
         raise FormatError(
             f"drive {name}: offsets of up to {worst:.4g} m in a lane of {median_width:.3g} m, "
-            f"{100 * outside.mean():.0f} % of the rows beyond a whole lane width; name the unit with --map, as in offset=COLUMN:cm",
+            f"{100 * outside.mean():.0f} % of the rows beyond a whole lane width; name the unit with --map, "
+            "as in offset=COLUMN:cm",
             path=path,
         )
     speed = columns.get("speed")

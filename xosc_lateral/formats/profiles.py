@@ -79,6 +79,19 @@ def profile_hash(profile: DriverProfile) -> str:
     return hashlib.sha256(profile_bytes(profile)).hexdigest()
 
 
+def describe_profile(profile: DriverProfile, *, as_json: bool = False) -> str:
+    """What was fitted, in a line, or as one line of JSON."""
+    known = profile.provenance
+    if as_json:
+        facts: dict[str, Any] = {"name": profile.name, "model": profile.model.kind, "sha256": profile_hash(profile)}
+        facts |= {"hours": known.hours, "drives": known.drives, "runs": known.runs, "lane_width": profile.lane_width}
+        return json.dumps(facts)
+    return (
+        f"{profile.name}: {profile.model.kind} model from {known.hours:.2f} h in {known.runs} runs of {known.drives} "
+        f"drives, {len(profile.effects)} effects"
+    )
+
+
 def find_profile(name_or_path: str | Path, folders: Iterable[str | Path] = ()) -> Path:
     """Path of a profile; see `read_profile`."""
     text = str(name_or_path)

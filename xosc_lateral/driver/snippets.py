@@ -1,0 +1,143 @@
+"""Snippets of measured runs, and sampled ones beside them; free runs under the context of measured drives."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from xosc_lateral.driver.profile import DriverProfile
+from xosc_lateral.driver.sampling import sample_offsets
+from xosc_lateral.driver.seeds import child
+from xosc_lateral.driver.series import PAPER_RULES, STEP, CutRules, Drive, Run, all_runs, whole_run
+from xosc_lateral.errors import NotEnoughDataError
+from xosc_lateral.segment import Segment
+
+FloatArray = NDArray[np.float64]
+
+PAST, FUTURE = 30.0, 10.0
+"""Context before and after a snippet that effects may look at. [s]"""
+
+MEAN_SPEED = 30.0
+"""Of a free run whose speed nobody named: about 108 km/h. [m/s]"""
+
+MAX_DURATION = 1e7
+"""Of a free run [s]: 2 GB of offsets, anything longer is a slip."""
+
+
+@dataclass(frozen=True, slots=True)
+class Snippet:
+    """A stretch of a run: `rows` of `run`, the `index`-th of its drive."""
+
+    run: Run
+    index: int
+    rows: slice
+
+    @property
+    def time(self) -> FloatArray:
+        """[s]"""
+        return self.run.time[self.rows]
+
+    @property
+    def offset(self) -> FloatArray:
+        """As measured, positive left. [m]"""
+        return self.run.offset[self.rows]
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Sampled:
+    """Sampled offsets of one snippet or drive."""
+
+    drive: str
+    snippet: int
+    time: FloatArray
+    offset: FloatArray
+    offset_real: FloatArray | None
+
+
+def cut_snippets(runs: Sequence[Run], seconds: float, step: float = STEP) -> list[Snippet]:
+    """Successive snippets without overlap; each has ``seconds / step + 1`` rows and lies in one run.
+
+    Raises
+    ------
+    NotEnoughDataError
+        When no run is as long.
+    """
+    length = round(seconds / step) + 1
+    if length < 2:
+        raise ValueError(f"a snippet of {seconds} s holds no two steps of {step} s")
+    snippets: list[Snippet] = []
+    count: dict[str, int] = {}
+    for run in runs:
+        for first in range(0, len(run) - length + 1, length):
+            index = count.get(run.drive, 0)
+            snippets.append(Snippet(run, index, slice(first, first + length)))
+            count[run.drive] = index + 1
+    if not snippets:
+        longest = max((len(run) for run in runs), default=0) * step
+        raise NotEnoughDataError(f"the longest run lasts {longest:.1f} s, a snippet needs {seconds:g} s")
+    return snippets
+
+
+def segment_of(run: Run, rows: slice | None = None) -> Segment:
+    """A run, or rows of it with the context around them, as the segment that is sampled on."""
+    first, last = (0, len(run)) if rows is None else (rows.start, rows.stop)
+    begin = max(0, first - round(PAST / STEP))
+    end = min(len(run), last + round(FUTURE / STEP))
+    cut = slice(begin, end)
+    speed = np.full(end - begin, np.nan) if run.speed is None else run.speed[cut]
+    return Segment(
+        time=run.time[cut],
+        lane_width=run.lane_width[cut],
+        speed=speed,
+        context={name: values[cut] for name, values in run.context.items()},
+        before=first - begin,
+        after=end - last,
+    )
+
+
+def sample_like(
+    profile: DriverProfile, drives: Sequence[Drive], seconds: float, seed: int, rules: CutRules = PAPER_RULES
+) -> Iterator[Sampled]:
+    """For each snippet of the measured drives a sampled one of the same length, start, lane width and context."""
+    numbers = {drive.name: number for number, drive in enumerate(drives)}
+    root = np.random.SeedSequence(seed)
+    for snippet in cut_snippets(all_runs(drives, rules), seconds):
+        own = child(root, numbers[snippet.run.drive], snippet.index)
+        segment = segment_of(snippet.run, snippet.rows)
+        offset = sample_offsets(profile, segment, own, start=float(snippet.offset[0]))
+        yield Sampled(snippet.run.drive, snippet.index, snippet.time, offset, snippet.offset)
+
+
+def sample_context(profile: DriverProfile, drives: Sequence[Drive], seed: int) -> Iterator[Sampled]:
+    """One free run per measured drive, under its context from its first row to its last, lane changes included."""
+    root = np.random.SeedSequence(seed)
+    for number, drive in enumerate(drives):
+        run = whole_run(drive)
+        yield Sampled(drive.name, 0, run.time, sample_offsets(profile, segment_of(run), child(root, number)), None)
+
+
+def sample_free(
+    profile: DriverProfile, duration: float, seed: int, *, speed: float = MEAN_SPEED, lane_width: float | None = None
+) -> Iterator[Sampled]:
+    """One free run in even traffic: constant speed, no other context.
+
+    Parameters
+    ----------
+    duration : float
+        [s]
+    speed : float
+        [m/s]
+    lane_width : float, optional
+        The profile's own where not given. [m]
+    """
+    if not 0 < duration < MAX_DURATION:
+        raise ValueError(f"a free run of {duration} s, expected more than 0 and less than {MAX_DURATION:g} s")
+    n = round(duration / profile.model.step) + 1
+    time: FloatArray = profile.model.step * np.arange(n, dtype=np.float64)
+    width = profile.lane_width if lane_width is None else lane_width
+    segment = Segment(time=time, lane_width=np.full(n, width), speed=np.full(n, speed))
+    offset = sample_offsets(profile, segment, child(np.random.SeedSequence(seed), 0))
+    yield Sampled(profile.name, 0, time, offset, None)
