@@ -56,10 +56,22 @@ def test_a_lane_change_is_cut_from_setting_off_to_settling():
     time = np.arange(0, 30, step)
     x = 3.75 / (1 + np.exp(-(time - 15) / 0.8))  # a smooth change of about 6 s around 15 s
     lane = (x > 3.75 / 2).astype(np.int64)
-    cut = lane_changes(x, lane, np.zeros(len(time), dtype=np.int64), step, CutSettings(margin=1.0))
+    vehicle = np.zeros(len(time), dtype=np.int64)
+    cut = lane_changes(x, x - 3.75 * lane, lane, vehicle, step, CutSettings(margin=1.0))
     rate = np.gradient(x, step)
     assert cut[rate > 0.1].all()
     assert not cut[np.abs(time - 15) > 6].any()
+
+
+def test_a_lane_change_whose_crossing_was_not_seen_is_cut_too():
+    step = 0.05
+    time = np.arange(0, 40, step)
+    x = 3.75 / (1 + np.exp(-(time - 40) / 1.2))  # the track ends as the marking is reached
+    zeros = np.zeros(len(time), dtype=np.int64)
+    cut = lane_changes(x, x, zeros, zeros, step, CutSettings())
+    assert cut[np.gradient(x, step) > 0.1].all() and not cut[time < 30].any()
+    swaying = 0.3 * np.sin(2 * np.pi * time / 12)
+    assert not lane_changes(swaying, swaying, zeros, zeros, step, CutSettings()).any()
 
 
 def test_only_long_bridges_count_as_gaps():

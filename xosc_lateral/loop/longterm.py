@@ -14,11 +14,14 @@ FloatArray = NDArray[np.float64]
 BANDS = np.geomspace(0.01, 1.0, 21)
 """Edges of the frequency bands, ten a decade. [Hz]"""
 
-SEGMENTS = (512, 256, 128, 64)
-"""Window lengths at 5 Hz, 102 s to 13 s: each band takes the shortest one that holds two of its periods."""
+SEGMENTS = (1024, 512, 256, 128, 64)
+"""Window lengths at 5 Hz, 102 s to 13 s: each band takes the shortest one that holds `PERIODS`."""
 
-PERIODS = 2.0
+PERIODS = 1.0
 """Periods of a band's centre that a window must hold. [-]"""
+
+PADDING = 8
+"""Windows are padded with zeros to so many times their length: every band then holds a frequency. [-]"""
 
 NEAR_MARKING = 1.2
 """A reference point this close to a marking counts as near: half a car (0.9 m) and 0.3 m of air. [m]"""
@@ -69,7 +72,7 @@ def spectrum(runs: Sequence[FloatArray], step: float) -> Spectrum:
 
 
 def _periodogram(runs: Sequence[FloatArray], length: int, step: float) -> tuple[FloatArray, FloatArray, int]:
-    frequency = np.asarray(np.fft.rfftfreq(length, step), dtype=np.float64)
+    frequency = np.asarray(np.fft.rfftfreq(PADDING * length, step), dtype=np.float64)
     window = np.hanning(length + 1)[:-1]
     parts = [
         np.lib.stride_tricks.sliding_window_view(run, length)[:: length // 2] for run in runs if len(run) >= length
@@ -78,7 +81,7 @@ def _periodogram(runs: Sequence[FloatArray], length: int, step: float) -> tuple[
         return frequency, np.zeros(len(frequency)), 0
     rows = np.concatenate(parts)
     rows = (rows - rows.mean(axis=1, keepdims=True)) * window
-    power = (np.abs(np.fft.rfft(rows, axis=1)) ** 2).mean(axis=0)
+    power = (np.abs(np.fft.rfft(rows, n=PADDING * length, axis=1)) ** 2).mean(axis=0)
     density: FloatArray = 2.0 * step * power / (window**2).sum()
     return frequency, density, len(rows)
 

@@ -31,6 +31,9 @@ class CutSettings:
         Cut in addition before and after each lane change. [s]
     shortest : float
         Stretches below this are dropped. [s]
+    open_offset, open_rate : float
+        A track that begins or ends farther from the lane centre than this, or faster sideways, is taken to do so in
+        a lane change whose rest was not seen. [m], [m/s]
     """
 
     max_gap: float = 1.0
@@ -38,18 +41,24 @@ class CutSettings:
     longest_change: float = 8.0
     margin: float = 1.0
     shortest: float = 5.0
+    open_offset: float = 0.7
+    open_rate: float = 0.3
 
 
 DEFAULT_CUTS = CutSettings()
 
 
-def lane_changes(x: FloatArray, lane: IntArray, vehicle: IntArray, step: float, settings: CutSettings) -> BoolArray:
+def lane_changes(
+    x: FloatArray, offset: FloatArray, lane: IntArray, vehicle: IntArray, step: float, settings: CutSettings
+) -> BoolArray:
     """Rows from where a vehicle sets off towards another lane to where it has settled there.
 
     Parameters
     ----------
     x : array, shape (n,)
         Lateral position, continuous through lane changes; NaN where unknown. [m]
+    offset : array, shape (n,)
+        From the centre of its lane; NaN where unknown. [m]
     lane, vehicle : array of int, shape (n,)
         Rows sorted by vehicle and time.
     step : float
@@ -57,11 +66,11 @@ def lane_changes(x: FloatArray, lane: IntArray, vehicle: IntArray, step: float, 
     """
     changing = np.zeros(len(x), dtype=np.bool_)
     reach, margin = round(settings.longest_change / step), round(settings.margin / step)
-    same = vehicle[1:] == vehicle[:-1]
-    rate = _lateral_speed(x, step)
     first = np.searchsorted(vehicle, vehicle, side="left")
     last = np.searchsorted(vehicle, vehicle, side="right") - 1
-    for k in np.flatnonzero(same & (lane[1:] != lane[:-1])):
+    rate = _lateral_speed(x, first, last, step)
+    switches = np.flatnonzero((vehicle[1:] == vehicle[:-1]) & (lane[1:] != lane[:-1]))
+    for k in np.concatenate([switches, _open_ends(offset, rate, vehicle, settings)]):
         lowest, highest = max(first[k], k - reach), min(last[k], k + reach)
         towards = np.sign(rate[k]) or 1.0
         before = np.flatnonzero(towards * rate[lowest : k + 1] < settings.calm_rate)
@@ -70,6 +79,14 @@ def lane_changes(x: FloatArray, lane: IntArray, vehicle: IntArray, step: float, 
         end = k + after[0] if len(after) else highest
         changing[max(first[k], begin - margin) : min(last[k], end + margin) + 1] = True
     return changing
+
+
+def _open_ends(offset: FloatArray, rate: FloatArray, vehicle: IntArray, settings: CutSettings) -> IntArray:
+    """First and last rows of tracks that are cut off amid a lane change."""
+    new = np.flatnonzero(vehicle[1:] != vehicle[:-1])
+    ends = np.concatenate([[0], new, new + 1, [len(vehicle) - 1]]).astype(np.int64)
+    far, fast = np.abs(offset[ends]) > settings.open_offset, np.abs(rate[ends]) > settings.open_rate
+    return np.asarray(ends[(far & (np.abs(rate[ends]) > settings.calm_rate)) | fast])
 
 
 def long_gaps(made_up: BoolArray, vehicle: IntArray, step: float, max_gap: float) -> BoolArray:
@@ -91,11 +108,12 @@ def name_states(
     return np.where(kept & (length[run] < shortest), "short", state)
 
 
-def _lateral_speed(x: FloatArray, step: float) -> FloatArray:
+def _lateral_speed(x: FloatArray, first: IntArray, last: IntArray, step: float) -> FloatArray:
+    """Difference over `RATE_WINDOW`, one-sided at a track's ends; 0 where unknown. [m/s]"""
     half = max(1, round(0.5 * RATE_WINDOW / step))
-    rate = np.zeros(len(x))
-    if len(x) > 2 * half:
-        rate[half:-half] = (x[2 * half :] - x[: -2 * half]) / (2 * half * step)
+    rows = np.arange(len(x))
+    ahead, behind = np.minimum(rows + half, last), np.maximum(rows - half, first)
+    rate = (x[ahead] - x[behind]) / (np.maximum(ahead - behind, 1) * step)
     return np.where(np.isfinite(rate), rate, 0.0)
 
 

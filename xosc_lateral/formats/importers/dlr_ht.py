@@ -175,11 +175,10 @@ def _place_in_lanes(
     """Lane centres of one carriageway, and every row's lane and offset. Rounds, since each needs the other."""
     levels = _levels(d)
     centre = np.repeat(levels[:, None], len(s), axis=1)
-    width = float(np.diff(levels).mean())
+    bend, width = np.full(len(d), levels.mean()), float(np.diff(levels).mean())
     lanes: list[LaneCentre] = []
     for _ in range(3):
-        lane = _nearest_lane(d, centre, width)
-        changing = lane_changes(d - centre.mean(axis=0), lane, vehicle, STEP, settings)
+        lane, offset, changing = _place(d, centre, bend, width, vehicle, settings)
         lanes = []
         for index in range(LANES):
             rows = np.flatnonzero((lane == index) & ~changing & ~gap)
@@ -187,12 +186,20 @@ def _place_in_lanes(
             second = _each(stretch, round(1.0 / STEP))
             lanes.append(fit_lane_centre(s[rows][second], d[rows][second], height[rows][second], stretch[second]))
         centre = np.array([one.at(s, height) for one in lanes])
+        # Past a lane's known part its last value stands in, so that no lane change is lost sight of there.
+        bend = np.mean([one.at(np.clip(s, one.start, one.end), height) for one in lanes], axis=0)
         width = _lane_width(lanes)
-    lane = _nearest_lane(d, centre, width)
-    changing = lane_changes(d - centre.mean(axis=0), lane, vehicle, STEP, settings)
-    mine = np.clip(lane, 0, None)
-    offset = np.where(lane >= 0, d - centre[mine, np.arange(len(s))], np.nan)
+    lane, offset, changing = _place(d, centre, bend, width, vehicle, settings)
     return _Placed(lane, offset, np.full(len(s), width), changing), lanes
+
+
+def _place(
+    d: FloatArray, centre: FloatArray, bend: FloatArray, width: float, vehicle: IntArray, settings: CutSettings
+) -> tuple[IntArray, FloatArray, NDArray[np.bool_]]:
+    """Lane, offset (NaN in no lane) and whether a lane change is on."""
+    lane = _nearest_lane(d, centre, width)
+    offset = np.where(lane >= 0, d - centre[np.clip(lane, 0, None), np.arange(len(d))], np.nan)
+    return lane, offset, lane_changes(d - bend, offset, lane, vehicle, STEP, settings)
 
 
 def _lane_width(lanes: list[LaneCentre]) -> float:

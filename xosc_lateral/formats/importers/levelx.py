@@ -152,7 +152,7 @@ def _from_highd(
     near = find_neighbours(frame * 2 + rightwards, lane_number, x, tracks["width"].to_numpy(), np.isin(kind, TRUCKS))
     reasons = {
         "no lane": lane_number < 0,
-        "lane change": lane_changes(left, lane_number, vehicle, step, settings),
+        "lane change": lane_changes(left, offset, lane_number, vehicle, step, settings),
     }
     return pd.DataFrame(
         {
@@ -194,7 +194,7 @@ def _from_exid(
     reasons = {
         "no vehicle": ~np.isin(kind, VEHICLES),
         "no lane": ~known,
-        "lane change": lane_changes(lateral, lane, vehicle, step, settings),
+        "lane change": lane_changes(lateral, offset, lane, vehicle, step, settings),
     }
     return pd.DataFrame(
         {
