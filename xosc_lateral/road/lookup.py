@@ -15,7 +15,7 @@ class Lookup:
     """Pieces of several owners, each owner's sorted by start.
 
     All starts lie on one axis, owner behind owner, so that one `searchsorted` finds any mixture of owners; the result
-    is then put right by one piece where rounding on that long axis moved it over a start.
+    is then put right where rounding on that long axis moved it over a start.
 
     Parameters
     ----------
@@ -53,6 +53,8 @@ class Lookup:
         piece = np.searchsorted(self._keys, key, side="right").astype(np.int32) - 1
         first_, last_ = self.first[owner], self._last[owner]
         piece = np.minimum(np.maximum(piece, first_), last_)
-        piece -= (s < self.starts[piece]) & (piece > first_)
-        following = np.minimum(piece + 1, last_)
-        return np.asarray(np.where(s >= self.starts[following], following, piece), dtype=np.int32)
+        while (down := (s < self.starts[piece]) & (piece > first_)).any():
+            piece -= down
+        while (up := (s >= self.starts[np.minimum(piece + 1, last_)]) & (piece < last_)).any():
+            piece += up
+        return np.asarray(piece, dtype=np.int32)

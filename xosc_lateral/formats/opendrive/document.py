@@ -17,6 +17,9 @@ from xosc_lateral.road.piecewise import Cubic
 
 XmlElement = etree._Element
 
+LARGEST = 1e12
+"""No number of a road is larger; beyond, squares and cubes would overflow sooner or later."""
+
 
 @dataclass(slots=True)
 class Source:
@@ -56,6 +59,8 @@ class Source:
             raise self.error(f"{name}={text!r} is no number", element) from None
         if not isfinite(value):
             raise self.error(f"{name}={text!r} is not finite", element)
+        if abs(value) > LARGEST:
+            raise self.error(f"{name}={text!r} is larger than {LARGEST:g}", element)
         return value
 
     def cubic(self, element: XmlElement) -> Cubic:
