@@ -11,7 +11,7 @@ import pytest
 from tests.motion.made_motion import LANE_WIDTH, RADIUS, drive, entity, together, two_roads
 from xosc_lateral.motion.context import entity_context
 from xosc_lateral.motion.nominal import PlayedAction
-from xosc_lateral.scenario import Place
+from xosc_lateral.scenario import Action, Place
 from xosc_lateral.scenario.actions import EnvironmentAction
 from xosc_lateral.scenario.enums import VehicleCategory
 from xosc_lateral.scenario.environment import Environment, TimeOfDay, Weather
@@ -93,7 +93,8 @@ def test_weather_holds_from_the_time_of_its_action_and_wind_is_relative_to_trave
     )
     clock = TimeOfDay(datetime(2026, 1, 1, 6, 30), animation=True)
     environment = Environment("storm", place, time_of_day=clock, weather=weather, friction_scale_factor=0.7)
-    action = PlayedAction(EnvironmentAction(environment, place), None, ("Init",), 4.0, 4.0)
+    content = Action("weather", EnvironmentAction(environment, place), place, is_private=False)
+    action = PlayedAction(content, None, ("Init",), 4.0, 4.0)
     motion = together(drive(network, entity(), lane=-2, start=0.0), actions=(action,))
     context = entity_context(motion, network, 0, GRID)
     since = motion.entities[0].time[GRID] >= 4.0

@@ -1,9 +1,52 @@
-"""`xosc-lateral convert`."""
+"""`xosc-lateral convert`: the main job."""
 
 from __future__ import annotations
 
+from pathlib import Path
+from typing import Annotated
+
 import typer
+
+from xosc_lateral.cli.words import pairs
 
 
 def register(app: typer.Typer) -> None:
     """Add the verb to the command line."""
+    app.command("convert")(convert)
+
+
+def convert(
+    scenario: Annotated[Path, typer.Argument(help="Maneuver-based scenario (.xosc).", show_default=False)],
+    output: Annotated[Path | None, typer.Option("-o", "--output", help="Default: NAME_lifelike.xosc.")] = None,
+    profile: Annotated[str, typer.Option(help="Name or path; auto: by the vehicle's class.")] = "auto",
+    seed: Annotated[int, typer.Option(help="Same inputs and seed, same bytes.", min=0)] = 0,
+    entity: Annotated[list[str] | None, typer.Option(metavar="NAME=PROFILE", help="Profile of one entity.")] = None,
+    only: Annotated[list[str] | None, typer.Option(metavar="NAME", help="Enrich this entity alone.")] = None,
+    variants: Annotated[int, typer.Option(help="Write so many, each with other offsets.", min=1)] = 1,
+    report: Annotated[Path | None, typer.Option(help="HTML page about what was changed.")] = None,
+    context: Annotated[Path | None, typer.Option(help="Table of context over time (time, wind_speed, ...).")] = None,
+    parameter: Annotated[list[str] | None, typer.Option("--set", metavar="NAME=VALUE")] = None,
+    library: Annotated[list[Path] | None, typer.Option(help="Folder with further profiles.")] = None,
+    resample: Annotated[int, typer.Option(help="Attempts while cars touch or leave their lane.", min=1)] = 1,
+    time_limit: Annotated[float, typer.Option(help="End of a scenario without one [s].", min=0.1)] = 60.0,
+    as_json: Annotated[bool, typer.Option("--json", help="For machines.")] = False,
+) -> None:
+    """Give every car in a scenario the lateral movement of a real driver."""
+    from xosc_lateral.pipeline.convert import convert_variants
+    from xosc_lateral.pipeline.settings import ConvertSettings
+    from xosc_lateral.report.conversion import as_text, to_json, write_report
+
+    settings = ConvertSettings(
+        profile=profile,
+        entity_profiles=pairs(entity, "--entity"),
+        only=frozenset(only) if only else None,
+        seed=seed,
+        context=context,
+        parameters=pairs(parameter, "--set"),
+        attempts=resample,
+        libraries=tuple(library or ()),
+        time_limit=time_limit,
+    )
+    for conversion in convert_variants(scenario, output, settings, variants=variants):
+        where = write_report(conversion, report, variants=variants) if report else None
+        typer.echo(to_json(conversion, where) if as_json else as_text(conversion, where))

@@ -232,10 +232,11 @@ def _weather(motion: NominalMotion, entity: EntityMotion, grid: IntArray) -> dic
     time = entity.time[grid]
     context: dict[str, FloatArray] = {}
     for played in motion.actions:
-        if not isinstance(played.action, EnvironmentAction):
+        content = played.action.content
+        if not isinstance(content, EnvironmentAction):
             continue
         since = time >= played.start - 1e-9
-        for name, values in _stated(played.action.environment, time, played.start, entity.heading[grid]).items():
+        for name, values in _stated(content.environment, time, played.start, entity.heading[grid]).items():
             context.setdefault(name, np.full(len(grid), np.nan))[since] = values[since]
     return context
 

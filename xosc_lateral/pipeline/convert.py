@@ -2,12 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+import hashlib
+import os
+from collections.abc import Iterator, Mapping
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 
+from xosc_lateral import __version__
+from xosc_lateral.enrich.enrich import enrich
 from xosc_lateral.enrich.result import Enriched
-from xosc_lateral.pipeline.settings import ConvertSettings
+from xosc_lateral.formats.context_table import read_context
+from xosc_lateral.formats.hashes import file_hash
+from xosc_lateral.formats.openscenario.write import WrittenScenario, write_trajectory_scenario
+from xosc_lateral.formats.profiles import profile_hash
+from xosc_lateral.pipeline.drivers import choose_drivers
+from xosc_lateral.pipeline.load import Played, play_scenario
+from xosc_lateral.pipeline.settings import ConvertSettings, Mode
+from xosc_lateral.scenario import Scenario
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,6 +72,16 @@ class Conversion:
 def convert_scenario(source: Path, output: Path, settings: ConvertSettings, *, variant: int = 0) -> Conversion:
     """Convert one scenario and write it.
 
+    Parameters
+    ----------
+    source : Path
+        Maneuver-based scenario.
+    output : Path
+        Where the converted one goes; its folder has to exist.
+    settings : ConvertSettings
+    variant : int
+        Number of the variant: another one, other offsets.
+
     Raises
     ------
     XoscLateralError
@@ -68,4 +89,94 @@ def convert_scenario(source: Path, output: Path, settings: ConvertSettings, *, v
     OSError
         When the output can't be written; nothing is left half-written.
     """
-    raise NotImplementedError
+    played = play_scenario(source, parameters=settings.parameters, step=settings.step, time_limit=settings.time_limit)
+    drivers = choose_drivers(played.scenario, settings)
+    enriched = enrich(
+        played.motion,
+        played.network,
+        drivers,
+        seed=settings.seed,
+        variant=variant,
+        entropy=_entropy(played.scenario),
+        context=read_context(settings.context) if settings.context is not None else None,
+        trailers=played.trailers,
+        attempts=settings.attempts,
+    )
+    provenance = _provenance(played, enriched, settings, variant)
+    written = _write(played, enriched, output, provenance, settings.mode)
+    warnings = enriched.warnings() + tuple(
+        f"{removed.place.element}: left out ({removed.reason})" for removed in written.removed
+    )
+    return Conversion(source, output, written.sha256, enriched, provenance, warnings)
+
+
+def _entropy(scenario: Scenario) -> tuple[int, ...]:
+    """Seed words from what is played, not from where it lies: the scenario's bytes and its parameter values."""
+    digest = hashlib.sha256(scenario.source)
+    for name, parameter in sorted(scenario.parameters.items()):
+        digest.update(f"\0{name}={parameter.value}".encode())
+    return tuple(int.from_bytes(digest.digest()[k : k + 4], "little") for k in range(0, 16, 4))
+
+
+def _provenance(played: Played, enriched: Enriched, settings: ConvertSettings, variant: int) -> Provenance:
+    scenario = played.scenario
+    files = [*scenario.input_files, *([scenario.road_file] if scenario.road_file else [])]
+    if settings.context is not None:
+        files.append(settings.context)
+    return Provenance(
+        package_version=__version__,
+        inputs={_relative(path, scenario.path): file_hash(path) for path in files},
+        profiles={
+            entity.name: (entity.profile.name, profile_hash(entity.profile))
+            for entity in enriched.entities
+            if entity.profile is not None
+        },
+        seed=settings.seed,
+        variant=variant,
+        parameters=dict(sorted(settings.parameters.items())),
+    )
+
+
+def _relative(path: Path, scenario: Path) -> str:
+    """Path as seen from the scenario: the same on every machine."""
+    return Path(os.path.relpath(path.resolve(), scenario.resolve().parent)).as_posix()
+
+
+def _write(played: Played, enriched: Enriched, output: Path, provenance: Provenance, mode: Mode) -> WrittenScenario:
+    profiles = sorted({name for name, _ in provenance.profiles.values()})
+    summary = f"seed {provenance.seed}, variant {provenance.variant}, {', '.join(profiles) or 'no profile'}"
+    trajectories = {entity.name: entity.trajectory for entity in enriched.entities}
+    return write_trajectory_scenario(
+        played.scenario,
+        played.motion,
+        trajectories,
+        output,
+        provenance=asdict(provenance),
+        summary=summary,
+    )
+
+
+def convert_variants(
+    source: Path, output: Path | None, settings: ConvertSettings, *, variants: int = 1
+) -> Iterator[Conversion]:
+    """Convert one scenario into as many variants as wanted, one after another.
+
+    Parameters
+    ----------
+    source : Path
+    output : Path or None
+        None: ``NAME_lifelike.xosc`` beside the source. Several variants get their number before the suffix.
+    settings : ConvertSettings
+    variants : int
+    """
+    target = output if output is not None else source.with_name(f"{source.stem}_lifelike{source.suffix or '.xosc'}")
+    for variant in range(variants):
+        yield convert_scenario(source, numbered(target, variant, variants), settings, variant=variant)
+
+
+def numbered(path: Path, variant: int, variants: int) -> Path:
+    """Path of one variant: as it is when there is one alone, else with its number from 1 before the suffix."""
+    if variants == 1:
+        return path
+    digits = max(2, len(str(variants)))
+    return path.with_name(f"{path.stem}_{variant + 1:0{digits}d}{path.suffix}")

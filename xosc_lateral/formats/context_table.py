@@ -1,0 +1,46 @@
+"""Context over time from a table, for what a scenario does not state (`convert --context`)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from xosc_lateral.errors import FormatError
+from xosc_lateral.formats.drives import read_table
+
+FloatArray = NDArray[np.float64]
+
+
+def read_context(path: Path) -> Mapping[str, tuple[FloatArray, FloatArray]]:
+    """Read a table with a `time` column [s from scenario start] and any numeric context columns.
+
+    Returns
+    -------
+    mapping of str to (time, values), shape (n,) each
+        NaN values are left out row by row: between what is stated, values are interpolated.
+
+    Raises
+    ------
+    FormatError
+        No `time` column, time that does not increase, or no context column.
+    """
+    table = read_table(path)
+    if "time" not in table:
+        raise FormatError("no column 'time'", path=path)
+    time = table["time"].to_numpy(dtype=np.float64)
+    if len(time) == 0 or not np.isfinite(time).all() or (np.diff(time) <= 0).any():
+        raise FormatError("times have to increase from row to row", path=path, element="column 'time'")
+    context = {}
+    for name in table.columns:
+        if name == "time" or table[name].dtype.kind not in "fiub":
+            continue
+        values = table[name].to_numpy(dtype=np.float64)
+        known = np.isfinite(values)
+        if known.any():
+            context[str(name)] = (time[known], values[known])
+    if not context:
+        raise FormatError("no numeric column besides 'time'", path=path)
+    return context

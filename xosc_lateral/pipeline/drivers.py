@@ -1,0 +1,79 @@
+"""Which profile drives which entity."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from pathlib import Path
+
+from xosc_lateral.driver.profile import DriverProfile
+from xosc_lateral.enrich.enrich import Drivers
+from xosc_lateral.errors import FormatError
+from xosc_lateral.formats.profiles import find_profile, read_profile
+from xosc_lateral.pipeline.settings import AUTO, ConvertSettings
+from xosc_lateral.scenario import Entity, Scenario
+from xosc_lateral.scenario.enums import VehicleCategory
+
+SHIPPED_BY_CLASS = {
+    VehicleCategory.TRUCK: "motorway-truck",
+    VehicleCategory.SEMITRAILER: "motorway-truck",
+    VehicleCategory.BUS: "motorway-truck",
+    VehicleCategory.CAR: "motorway-car",
+    VehicleCategory.VAN: "motorway-car",
+    VehicleCategory.MOTORBIKE: "motorway-car",
+}
+"""What "auto" chooses. Motorcycles ride like cars for want of measured ones; the report names the profile."""
+
+NO_DRIVER = {
+    VehicleCategory.TRAILER: "a trailer has no driver",
+    VehicleCategory.TRAIN: "a train has no lane to wander in",
+    VehicleCategory.TRAM: "a tram has no lane to wander in",
+    VehicleCategory.BICYCLE: "there is no profile for bicycles; name one with --entity",
+}
+"""Vehicles that "auto" leaves alone, and why."""
+
+
+def choose_drivers(scenario: Scenario, settings: ConvertSettings) -> Drivers:
+    """Per entity its profile, or why it gets none.
+
+    Raises
+    ------
+    FormatError
+        If the settings name an entity that the scenario doesn't have.
+    DriverProfileError
+        If a profile is not known.
+    """
+    known = {entity.name for entity in scenario.entities}
+    for option, names in (("--entity", settings.entity_profiles), ("--only", settings.only or ())):
+        for name in names:
+            if name not in known:
+                raise FormatError(
+                    f"{option} {name!r}: no such entity; there are {', '.join(sorted(known)) or 'none'}",
+                    path=scenario.path,
+                )
+    return {entity.name: _driver(entity, settings) for entity in scenario.entities}
+
+
+def _driver(entity: Entity, settings: ConvertSettings) -> DriverProfile | str:
+    if not entity.is_vehicle:
+        return f"a {entity.category.value}, no vehicle"
+    if settings.only is not None and entity.name not in settings.only:
+        return "not chosen (--only)"
+    named = settings.entity_profiles.get(entity.name, settings.profile)
+    if named == AUTO:
+        category = entity.vehicle_category or VehicleCategory.CAR
+        if category in NO_DRIVER:
+            return NO_DRIVER[category]
+        named = SHIPPED_BY_CLASS[category]
+    return load_profile(named, settings.libraries)
+
+
+def load_profile(name_or_path: str, libraries: tuple[Path, ...]) -> DriverProfile:
+    """Read a profile, once per process for as long as its file stays the same."""
+    path = find_profile(name_or_path, libraries)
+    state = path.stat()
+    return _load_profile(path, state.st_mtime_ns, state.st_size)
+
+
+@lru_cache(maxsize=128)
+def _load_profile(path: Path, _modified: int, _size: int) -> DriverProfile:
+    return read_profile(path)
