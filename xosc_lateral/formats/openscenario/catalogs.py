@@ -11,7 +11,7 @@ from lxml import etree
 from xosc_lateral.errors import FormatError
 from xosc_lateral.formats.openscenario.declarations import entry_scope
 from xosc_lateral.formats.openscenario.element import Element, local_name
-from xosc_lateral.formats.openscenario.references import resolve_reference
+from xosc_lateral.formats.openscenario.references import Boundary
 from xosc_lateral.formats.xml import read_xml
 from xosc_lateral.scenario.parameters import Scope
 from xosc_lateral.scenario.place import Place, Unsupported
@@ -28,17 +28,14 @@ class Catalogs:
     ----------
     locations : mapping of str to (str, Place)
         ``VehicleCatalog`` ... to the folder or file as written, and where.
-    folder : Path
-        The scenario's folder.
-    roots : tuple of Path
-        Folders that references may lead into.
+    boundary : Boundary
+        Where references may lead.
     remarks : list of Unsupported
         Gets a line for a catalog that was not where the scenario says.
     """
 
     locations: Mapping[str, tuple[str, Place]]
-    folder: Path
-    roots: tuple[Path, ...]
+    boundary: Boundary
     remarks: list[Unsupported]
     used: list[Path] = field(default_factory=list)
     _files: dict[tuple[str, str], Path] = field(default_factory=dict)
@@ -76,26 +73,24 @@ class Catalogs:
         refused: FormatError | None = None
         folders: list[Path] = []
         for written, place in self.locations.values():
-            try:
-                path = resolve_reference(written, self.folder, self.roots, place)
-            except FormatError as error:
-                refused = refused or error
-                continue
+            path = self.boundary.path(written, place)
             if path.suffix.lower() == ".xosc":
-                if path.stem == catalog:
-                    return path
-                path = path.parent
-            folders.append(path)
-            candidate = path / f"{catalog}.xosc"
-            if candidate.is_file():
-                return Path(resolve_reference(str(candidate), self.folder, self.roots, place))
+                folder, candidate = path.parent, path if path.stem == catalog else None
+            else:
+                folder, candidate = path, path / f"{catalog}.xosc"
+            if candidate is not None and candidate.is_file() and self.boundary.holds(candidate):
+                return candidate
+            if self.boundary.holds(folder):
+                folders.append(folder)
+            else:
+                refused = refused or self.boundary.refusal(written, place)
         for folder in dict.fromkeys(folders):
             for path in sorted(folder.glob("*.xosc"))[:MAX_FILES_SCANNED]:
-                if _calls_itself(path, catalog):
+                if self.boundary.holds(path) and _calls_itself(path, catalog):
                     return path
         if refused is not None:
             raise refused
-        near = _near_by(self.folder, f"{catalog}.xosc")
+        near = _near_by(self.boundary.folder, f"{catalog}.xosc")
         if near is not None:
             self.remarks.append(Unsupported("CatalogReference", reference.place(), f"catalog taken from {near}"))
             return near

@@ -15,7 +15,7 @@ from xosc_lateral.errors import FormatError
 from xosc_lateral.formats.openscenario.declarations import broken_constraint, declared_values, parameter_name
 from xosc_lateral.formats.openscenario.element import Element
 from xosc_lateral.formats.openscenario.read import open_scenario, read_header
-from xosc_lateral.formats.openscenario.references import allowed_roots, resolve_reference
+from xosc_lateral.formats.openscenario.references import Boundary, allowed_roots
 from xosc_lateral.formats.xml import read_xml
 from xosc_lateral.scenario.distribution import (
     Deterministic,
@@ -150,9 +150,8 @@ def read_distribution(path: Path | str, *, allowed: Iterable[Path] = ()) -> Logi
     read_header(root)
     owner = root.required("ParameterValueDistribution")
     reference = owner.required("ScenarioFile")
-    scenario = resolve_reference(
-        reference.text("filepath"), path.parent, allowed_roots(path, allowed), reference.place()
-    )
+    boundary = Boundary(path.parent, allowed_roots(path, allowed))
+    scenario = boundary.inside(reference.text("filepath"), reference.place())
     if not scenario.is_file():
         reference.fail(f"scenario file '{reference.text('filepath')}' does not exist (looked for {scenario})")
     content = owner.required("Deterministic", "Stochastic")

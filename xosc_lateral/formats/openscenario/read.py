@@ -13,7 +13,8 @@ from xosc_lateral.formats.openscenario.context import Context
 from xosc_lateral.formats.openscenario.declarations import read_declarations, read_variables
 from xosc_lateral.formats.openscenario.element import Element, local_name
 from xosc_lateral.formats.openscenario.entities import read_entities
-from xosc_lateral.formats.openscenario.references import allowed_roots, resolve_reference
+from xosc_lateral.formats.openscenario.provenance import trusted_hashes
+from xosc_lateral.formats.openscenario.references import Boundary, allowed_roots
 from xosc_lateral.formats.openscenario.storyboard import read_storyboard
 from xosc_lateral.formats.xml import read_xml
 from xosc_lateral.scenario import (
@@ -69,11 +70,11 @@ def read_scenario(
         remarks.append(Unsupported("FileHeader", root.place(), f"version 1.{header.minor} is read as 1.{NEWEST[1]}"))
     scope, values = read_declarations(root, dict(parameters or {}), remarks)
     root = root.within(scope)
-    roots = allowed_roots(path, allowed)
+    boundary = Boundary(path.parent, allowed_roots(path, allowed), trusted_hashes(document))
     locations = _catalog_locations(root)
-    catalogs = Catalogs(locations, path.parent, roots, remarks)
+    catalogs = Catalogs(locations, boundary, remarks)
     context = Context(header.version, catalogs, remarks)
-    road_file, road_place, scene_graph, signals = _road_network(root, path.parent, roots, remarks)
+    road_file, road_place, scene_graph, signals = _road_network(root, boundary, remarks)
     entities = read_entities(root, context)
     storyboard = read_storyboard(root, context)
     return Scenario(
@@ -124,7 +125,7 @@ def _catalog_locations(root: Element) -> dict[str, tuple[str, Place]]:
 
 
 def _road_network(
-    root: Element, folder: Path, roots: tuple[Path, ...], remarks: list[Unsupported]
+    root: Element, boundary: Boundary, remarks: list[Unsupported]
 ) -> tuple[Path | None, Place | None, str | None, tuple[TrafficSignalController, ...]]:
     network = root.child("RoadNetwork")
     if network is None:
@@ -132,18 +133,18 @@ def _road_network(
     logic = network.child("LogicFile", "Logics")
     road: Path | None = None
     if logic is not None and logic.text("filepath", "").strip():
-        road = _road_file(logic, folder, roots, remarks)
+        road = _road_file(logic, boundary, remarks)
     graph = network.child("SceneGraphFile")
     signals = network.child("TrafficSignals")
     controllers = () if signals is None else tuple(map(_signal_controller, signals.children("TrafficSignalController")))
     return road, logic.place() if logic else None, graph.text("filepath", "") if graph else None, controllers
 
 
-def _road_file(logic: Element, folder: Path, roots: tuple[Path, ...], remarks: list[Unsupported]) -> Path:
+def _road_file(logic: Element, boundary: Boundary, remarks: list[Unsupported]) -> Path:
     """The road where the scenario says, or else, like the reference player, a file of that name near the scenario."""
     written = logic.text("filepath")
     try:
-        road = resolve_reference(written, folder, roots, logic.place())
+        road = boundary.inside(written, logic.place())
         if road.is_file():
             return road
         missing = FormatError(
@@ -154,9 +155,10 @@ def _road_file(logic: Element, folder: Path, roots: tuple[Path, ...], remarks: l
         )
     except FormatError as error:
         missing = error
+    folder = boundary.folder
     name = PureWindowsPath(written.strip()).name
     for near in (folder / name, folder / "xodr" / name, folder.parent / "xodr" / name):
-        if name and near.is_file():
+        if name and near.is_file() and boundary.holds(near):
             remarks.append(Unsupported("LogicFile", logic.place(), f"'{written}' is taken from {near}"))
             return near
     raise missing

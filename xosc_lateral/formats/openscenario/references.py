@@ -5,16 +5,22 @@ distribution) has to stay inside the folders that the user gave: the scenario's 
 (field layouts are ``xosc/``, ``xodr/`` and ``xosc/Catalogs`` side by side, sometimes one level deeper), and folders
 allowed explicitly. The file system's root and its direct children are never reached by going up twice. Symbolic links
 are followed before the check. Absolute paths are fine inside these folders, and refused outside.
+
+A scenario that we wrote into another folder names its road and catalogs where they are. It states their hashes, and
+a file with a stated hash may lie anywhere: whoever knows a file's hash learns nothing from our reading it.
 """
 
 from __future__ import annotations
 
+import hashlib
 import os
 import re
 from collections.abc import Iterable
+from dataclasses import dataclass
 from pathlib import Path
 
 from xosc_lateral.errors import FormatError
+from xosc_lateral.formats.xml import read_xml
 from xosc_lateral.scenario.place import Place
 
 LEVELS_UP = 2
@@ -41,27 +47,63 @@ def _highest(folder: Path) -> Path:
     return root
 
 
-def resolve_reference(reference: str, folder: Path, roots: Iterable[Path], place: Place) -> Path:
-    """Path of a file or folder that a scenario names, relative to the scenario's folder.
+@dataclass(frozen=True, slots=True)
+class Boundary:
+    """Where references of one scenario may lead.
 
-    Raises
-    ------
-    FormatError
-        The reference is empty, no path at all, or leads outside of `roots`.
+    Parameters
+    ----------
+    folder : Path
+        The scenario's: relative references start here.
+    roots : tuple of Path
+        Real paths of the folders that they have to stay in.
+    trusted : frozenset of str
+        SHA-256 of files that may lie elsewhere.
     """
-    text = reference.strip()
-    if not text or "\0" in text:
-        raise FormatError("empty file reference", path=place.path, line=place.line, element=place.element)
-    outside = bool(_WINDOWS_DRIVE.match(text)) and os.name != "nt"
-    path = Path(os.path.normpath(folder / text.replace("\\", "/")))
-    if not outside:
+
+    folder: Path
+    roots: tuple[Path, ...]
+    trusted: frozenset[str] = frozenset()
+
+    def path(self, reference: str, place: Place) -> Path:
+        """Path of a file or folder, wherever it is.
+
+        Raises
+        ------
+        FormatError
+            The reference is empty or no path at all.
+        """
+        text = reference.strip()
+        if not text or "\0" in text:
+            raise FormatError("empty file reference", path=place.path, line=place.line, element=place.element)
+        return Path(os.path.normpath(self.folder / text.replace("\\", "/")))
+
+    def holds(self, path: Path) -> bool:
+        """Whether a file or folder lies inside, or is a file that may lie anywhere."""
         real = Path(os.path.realpath(path))
-        outside = not any(real == root or root in real.parents for root in roots)
-    if outside:
-        raise FormatError(
-            f"'{text}' lies outside the scenario's folders; allow its folder explicitly or use a relative path inside",
+        if any(real == root or root in real.parents for root in self.roots):
+            return True
+        return bool(self.trusted) and real.is_file() and hashlib.sha256(read_xml(real)[1]).hexdigest() in self.trusted
+
+    def refusal(self, reference: str, place: Place) -> FormatError:
+        """The error for a reference that leads outside."""
+        return FormatError(
+            f"'{reference.strip()[:200]}' lies outside the scenario's folders; allow its folder explicitly",
             path=place.path,
             line=place.line,
             element=place.element,
         )
-    return path
+
+    def inside(self, reference: str, place: Place) -> Path:
+        """Path of a file or folder that has to lie inside.
+
+        Raises
+        ------
+        FormatError
+            It leads outside, is empty, or no path at all.
+        """
+        path = self.path(reference, place)
+        windows = bool(_WINDOWS_DRIVE.match(reference.strip())) and os.name != "nt"
+        if windows or not self.holds(path):
+            raise self.refusal(reference, place)
+        return path

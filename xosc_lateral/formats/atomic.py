@@ -1,0 +1,58 @@
+"""Writing a file so that it is there completely, or not at all."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import tempfile
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+
+def write_atomically(path: Path | str, data: bytes | str) -> Path:
+    """Write bytes or UTF-8 text to a temporary file beside the target, then move it there.
+
+    Raises
+    ------
+    OSError
+        Disk full, no permission, no such folder: the target is as it was, and no temporary file stays behind.
+    """
+    content = data.encode() if isinstance(data, str) else data
+
+    def write(temporary: Path) -> None:
+        with temporary.open("wb") as file:
+            file.write(content)
+            file.flush()
+            os.fsync(file.fileno())
+
+    return replace_atomically(path, write)
+
+
+def replace_atomically(path: Path | str, write: Callable[[Path], object]) -> Path:
+    """Let `write` fill a temporary file beside the target, then move it there: for writers that want a path."""
+    path = Path(path)
+    with _temporary_beside(path) as temporary:
+        write(temporary)
+        temporary.replace(path)
+    return path
+
+
+@contextmanager
+def _temporary_beside(path: Path) -> Iterator[Path]:
+    # The suffix stays: some writers (Parquet, CSV.gz) choose the format by it.
+    descriptor, name = tempfile.mkstemp(prefix=f".{path.stem[:40]}.", suffix=f".tmp{path.suffix}", dir=path.parent)
+    os.close(descriptor)
+    temporary = Path(name)
+    try:
+        temporary.chmod(0o666 & ~_umask())  # mkstemp makes it private; outputs are for everybody
+        yield temporary
+    finally:
+        with contextlib.suppress(FileNotFoundError):
+            temporary.unlink()
+
+
+def _umask() -> int:
+    mask = os.umask(0)
+    os.umask(mask)
+    return mask

@@ -1,0 +1,175 @@
+"""Cut an entity's path where it stands, is placed anew or is gone, and choose the vertices that are written.
+
+The reference player merges polyline vertices closer than 0.1 m, and with them their times: written at 10 Hz, a car that
+stops for 5 s ends up 0.67 m off. So a path is cut at every stop; where it is driven slowly, vertices are spaced by
+distance instead of time. Between two vertices the player drives at constant speed: 0.1 s of acceleration a is then off
+by a * 0.1^2 / 8 (1 cm at 8 m/s2), and the last 0.1 m before a stop by a quarter of that distance. Where that is not
+enough, at a sudden change of speed, a vertex is added.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
+
+VERTEX_STEP = 0.1
+"""Time between vertices where distance allows it. [s]"""
+VERTEX_SPACING = 0.105
+"""Least distance between vertices: the player's 0.1 m and a margin for rounding. [m]"""
+LEAST_SPACING = VERTEX_SPACING - 1e-6
+"""What counts as that far, rounding aside. [m]"""
+TOLERANCE = 0.01
+"""Where straight motion between two vertices is further off than this, a vertex is added. [m]"""
+REFINEMENTS = 4
+"""How often vertices are added: each time one per gap."""
+STANDSTILL_SPEED = 0.005
+"""Slower counts as standing. [m/s]"""
+STANDSTILL_TIME = 0.3
+"""A shorter stop is driven through, unless the move begins or ends with it. [s]"""
+
+
+@dataclass(frozen=True, slots=True)
+class Move:
+    """A stretch of rows without a stop.
+
+    Parameters
+    ----------
+    first, last : int
+        Rows, both included. Equal: the entity is only placed there.
+    placed : bool
+        It begins by being placed there (teleport, or added), in the step that ends with row `first`.
+    stops : bool
+        The entity stands when it is over.
+    """
+
+    first: int
+    last: int
+    placed: bool
+    stops: bool
+
+
+def cut_moves(time: FloatArray, x: FloatArray, y: FloatArray, active: BoolArray, teleported: BoolArray) -> list[Move]:
+    """Moves of one entity in order.
+
+    Parameters
+    ----------
+    time, x, y : array, shape (n,)
+        [s], [m]
+    active, teleported : array of bool, shape (n,)
+        The entity exists; it was placed anew in the step that ends with this row.
+    """
+    moves: list[Move] = []
+    for first, last in _runs(active):
+        cuts = [first, *(row for row in range(first + 1, last + 1) if teleported[row]), last + 1]
+        for begin, end in pairwise(cuts):
+            placed = begin > 0
+            moves.extend(_cut_at_stops(time, x, y, begin, end - 1, placed))
+    return moves
+
+
+def vertex_times(time: FloatArray, x: FloatArray, y: FloatArray) -> FloatArray:
+    """Times of the vertices of one move, ends included; fewer than 2 when it is shorter than the vertex spacing. [s]
+
+    Every `VERTEX_STEP`, but never closer than `VERTEX_SPACING`. Counted from the start, and near the end from the end,
+    so that the last stretch before a stop is not longer than it has to be.
+    """
+    way = np.concatenate(([0.0], np.cumsum(np.hypot(np.diff(x), np.diff(y)))))
+    if way[-1] < LEAST_SPACING:
+        return time[:1]
+    # Strictly increasing distance, so that it can be turned into time where the entity creeps.
+    way = way + np.arange(len(way)) * 1e-12
+    tail = _tail(time, way)
+    head = _head(time, way, tail[0])
+    while len(head) > 1 and _way_at(tail[0], time, way) - _way_at(head[-1], time, way) < LEAST_SPACING:
+        head.pop()
+    times = np.array([*head, *tail])
+    if _way_at(times[1], time, way) - _way_at(times[0], time, way) < LEAST_SPACING:
+        times = np.delete(times, 1)
+    for _ in range(REFINEMENTS):
+        refined = _refined(times, time, x, y, way)
+        if len(refined) == len(times):
+            break
+        times = refined
+    return times
+
+
+def _refined(times: FloatArray, time: FloatArray, x: FloatArray, y: FloatArray, way: FloatArray) -> FloatArray:
+    """With a vertex in every gap that needs one: on the worst row, if that is far enough from its neighbours."""
+    written_x = np.interp(time, times, np.interp(times, time, x))
+    written_y = np.interp(time, times, np.interp(times, time, y))
+    error = np.hypot(x - written_x, y - written_y)
+    gap = np.clip(np.searchsorted(times, time, side="right") - 1, 0, len(times) - 2)
+    at = np.interp(times, time, way)
+    room = np.minimum(way - at[gap], at[gap + 1] - way) >= LEAST_SPACING
+    error[~room] = 0.0
+    candidates = np.flatnonzero(error > TOLERANCE)
+    if len(candidates) == 0:
+        return times
+    order = candidates[np.lexsort((-error[candidates], gap[candidates]))]
+    _, worst = np.unique(gap[order], return_index=True)
+    return np.sort(np.concatenate((times, time[order[worst]])))
+
+
+def _runs(mask: BoolArray) -> list[tuple[int, int]]:
+    """First and last index of every run of True."""
+    edges = np.flatnonzero(np.diff(np.concatenate(([False], mask, [False])).astype(np.int8)))
+    return [(int(begin), int(end) - 1) for begin, end in zip(edges[::2], edges[1::2], strict=True)]
+
+
+def _cut_at_stops(time: FloatArray, x: FloatArray, y: FloatArray, first: int, last: int, placed: bool) -> list[Move]:
+    """Moves between the stops inside rows first..last, which hold no jump."""
+    rows = slice(first, last + 1)
+    step = np.diff(time[rows])
+    still = np.hypot(np.diff(x[rows]), np.diff(y[rows])) < STANDSTILL_SPEED * step
+    stops = [
+        (first + begin, first + end + 1)
+        for begin, end in _runs(still)
+        if begin == 0 or first + end + 1 == last or time[first + end + 1] - time[first + begin] >= STANDSTILL_TIME
+    ]
+    moves = []
+    begin = first
+    for stop_begin, stop_end in stops:
+        if stop_begin > begin or (begin == first and placed):
+            moves.append(Move(begin, stop_begin, placed and begin == first, stops=True))
+        begin = stop_end
+    if begin < last or (begin == first and placed):
+        moves.append(Move(begin, last, placed and begin == first, stops=False))
+    return moves
+
+
+def _head(time: FloatArray, way: FloatArray, until: float) -> list[float]:
+    times = [float(time[0])]
+    while True:
+        nearest = _time_at(_way_at(times[-1], time, way) + VERTEX_SPACING, time, way)
+        following = max(times[-1] + VERTEX_STEP, nearest)
+        if following >= until - 1e-9:
+            return times
+        times.append(following)
+
+
+def _tail(time: FloatArray, way: FloatArray) -> list[float]:
+    """Vertices from where time spacing stops being possible to the end, in order of time."""
+    times = [float(time[-1])]
+    while True:
+        target = _way_at(times[-1], time, way) - VERTEX_SPACING
+        if target <= VERTEX_SPACING:
+            break
+        previous = _time_at(target, time, way)
+        if times[-1] - previous <= VERTEX_STEP:
+            break
+        times.append(previous)
+    return times[::-1]
+
+
+def _way_at(moment: float, time: FloatArray, way: FloatArray) -> float:
+    return float(np.interp(moment, time, way))
+
+
+def _time_at(distance: float, time: FloatArray, way: FloatArray) -> float:
+    return float(np.interp(distance, way, time)) if distance <= way[-1] else float("inf")
