@@ -118,6 +118,13 @@ def test_an_empty_table_says_so():
     assert "Findings: none." in Page("p").table(pd.DataFrame({"a": []}), "Findings").html()
 
 
+def test_lists_and_mappings_in_the_footer_are_written_out():
+    html = Page("p").provenance({"inputs": ["a", "b"], "parameters": {"speed": 30.0, "n": None}, "nothing": []}).html()
+    assert "<dd>a, b</dd>" in html
+    assert f"<dd>speed: 30, n: {NOTHING}</dd>" in html
+    assert f"<dt>nothing</dt><dd>{NOTHING}</dd>" in html
+
+
 def test_figures_take_their_colours_from_the_page():
     markup = figure_markup(waves(), "waves", key="f1")
     assert BLUE not in markup

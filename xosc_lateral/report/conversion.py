@@ -67,14 +67,6 @@ def facts(conversion: Conversion) -> dict[str, Any]:
 def write_report(conversion: Conversion, path: Path, *, variants: int = 1) -> Path:
     """Write the HTML page; of several variants each gets its own."""
     from xosc_lateral.pipeline.convert import numbered
-    from xosc_lateral.report.scenario import scenario_page
+    from xosc_lateral.report.scenario import conversion_page
 
-    target = numbered(path, conversion.provenance.variant, variants)
-    page = scenario_page(
-        conversion.enriched,
-        source=str(conversion.source),
-        output=str(conversion.output),
-        provenance=asdict(conversion.provenance),
-        warnings=conversion.warnings,
-    )
-    return write_atomically(target, page)
+    return write_atomically(numbered(path, conversion.provenance.variant, variants), conversion_page(conversion))

@@ -193,6 +193,8 @@ def _value(value: object, spec: str = "") -> str:
         return "yes" if value else "no"
     if isinstance(value, numbers.Real):
         return NOTHING if math.isnan(value) else format(value, spec) if spec else format_number(float(value))
+    if isinstance(value, Mapping):
+        value = [f"{name}: {_value(part)}" for name, part in value.items()]
     if isinstance(value, Sequence) and not isinstance(value, str):
         return ", ".join(map(_value, value)) or NOTHING
     return str(value)
