@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from xosc_lateral.errors import locate
 from xosc_lateral.scenario import Entity
 
 FloatArray = NDArray[np.float64]
@@ -115,6 +116,10 @@ class Note:
     path: str
     line: int | None
     element: str | None = None
+
+    def __str__(self) -> str:
+        """One line: file, line, element, what."""
+        return " ".join(locate(self.what, path=self.path, line=self.line, element=self.element).split())
 
 
 @dataclass(frozen=True, eq=False, slots=True)

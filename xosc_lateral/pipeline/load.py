@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 
-from xosc_lateral.errors import FormatError
 from xosc_lateral.formats.opendrive import read_opendrive
 from xosc_lateral.formats.openscenario import read_scenario
 from xosc_lateral.motion.nominal import NominalMotion
@@ -60,7 +59,7 @@ def play_scenario(
         With file, line and element.
     """
     scenario = read_scenario(path, parameters or {})
-    network = _no_road(scenario) if scenario.road_file is None else road_network(scenario.road_file)
+    network = RoadNetwork(()) if scenario.road_file is None else road_network(scenario.road_file)
     return Played(scenario, network, play(scenario, network, step=step, time_limit=time_limit))
 
 
@@ -73,12 +72,3 @@ def road_network(path: Path) -> RoadNetwork:
 @lru_cache(maxsize=32)
 def _road_network(path: Path, _modified: int, _size: int) -> RoadNetwork:
     return read_opendrive(path)
-
-
-def _no_road(scenario: Scenario) -> RoadNetwork:
-    raise FormatError(
-        "no road: RoadNetwork/LogicFile is missing, and without lanes there is nothing to play on",
-        path=scenario.path,
-        line=None if scenario.road_place is None else scenario.road_place.line,
-        element="RoadNetwork",
-    )

@@ -1,0 +1,1 @@
+"""Actions while playing, one per file. A new one is a file here and a line in the tuple of `registry`."""

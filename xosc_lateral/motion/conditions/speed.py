@@ -1,0 +1,23 @@
+"""SpeedCondition: own speed, or its component along an axis of the entity."""
+
+from __future__ import annotations
+
+from xosc_lateral.motion.conditions.base import EntityCheck
+from xosc_lateral.motion.conditions.direction import component
+from xosc_lateral.motion.run import Run
+from xosc_lateral.motion.state import EntityState
+from xosc_lateral.motion.values import holds
+from xosc_lateral.scenario.conditions import SpeedCondition
+
+
+def prepare(content: SpeedCondition, run: Run) -> EntityCheck:
+    """Without a direction, the signed scalar speed. [m/s]"""
+    direction = content.direction
+    if direction is None:
+        return lambda state: holds(state.speed, content.rule, content.value)
+    run.derives_motion = True
+
+    def check(state: EntityState) -> bool:
+        return holds(component(state.body_frame(state.velocity), direction), content.rule, content.value)
+
+    return check

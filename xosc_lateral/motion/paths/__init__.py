@@ -1,0 +1,1 @@
+"""Trajectories as curves to be followed, one shape per file; `registry` knows them all."""

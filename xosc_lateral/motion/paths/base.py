@@ -1,0 +1,55 @@
+"""A curve to be followed, by length or by time."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple, Protocol
+
+
+class PathPoint(NamedTuple):
+    """A place on a path: [m], [rad]; `tangent` is the direction of the path itself; NaN: as the road there."""
+
+    x: float
+    y: float
+    z: float
+    heading: float
+    pitch: float
+    roll: float
+    tangent: float
+
+
+class Path(Protocol):
+    """A shape that was laid out in the world."""
+
+    @property
+    def length(self) -> float:
+        """[m]"""
+
+    @property
+    def has_headings(self) -> bool:
+        """Whether the file gives headings: else they follow from the path."""
+
+    @property
+    def start_time(self) -> float:
+        """Of the path's own clock; NaN without times. [s]"""
+
+    @property
+    def end_time(self) -> float:
+        """Of the path's own clock; NaN without times. [s]"""
+
+    def at(self, s: float) -> PathPoint:
+        """The point at a length, clamped to the ends. [m]"""
+
+    def s_at(self, time: float) -> float:
+        """Length reached at a time of the path's own clock. [m]"""
+
+    def speed_at(self, s: float) -> float:
+        """Speed that the times of the path ask for. [m/s]"""
+
+
+@dataclass(slots=True)
+class PathProgress:
+    """How far an entity has come on its path. [m]"""
+
+    path: Path
+    s: float

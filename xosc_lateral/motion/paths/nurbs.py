@@ -1,0 +1,141 @@
+"""NURBS curves, sampled each metre of their control polygon (as in the reference player) into a polyline."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import atan2, hypot, nan
+
+from xosc_lateral.motion.angles import wrap
+from xosc_lateral.motion.paths.base import PathPoint
+from xosc_lateral.motion.paths.polyline import Corner, PolylinePath
+from xosc_lateral.motion.transition import EPSILON
+
+SAMPLE = 1.0
+"""Length of the control polygon per sample. [m]"""
+
+_TANGENT_STEP = 0.001
+"""Step in the curve's parameter that its direction is taken over. [-]"""
+
+
+@dataclass(frozen=True, slots=True)
+class Control:
+    """A control point: [m], [-], [s]; NaN in `time`: none."""
+
+    x: float
+    y: float
+    weight: float = 1.0
+    time: float = nan
+
+
+class NurbsPath:
+    """A NURBS curve of order `order` (degree + 1).
+
+    Parameters
+    ----------
+    controls : sequence of Control
+        At least `order`.
+    knots : sequence of float
+        As many as control points and order together.
+    order : int
+    """
+
+    has_headings = False
+
+    def __init__(self, controls: Sequence[Control], knots: Sequence[float], order: int) -> None:
+        self.controls = tuple(controls)
+        self.knots = tuple(knots)
+        self.order = order
+        self._parameters: list[float] = []
+        self._line = self._sample()
+        self.length = self._line.length
+        self.start_time = self.controls[0].time
+        self.end_time = self.controls[-1].time
+
+    def at(self, s: float) -> PathPoint:
+        """The point of the curve itself at the parameter that belongs to a length."""
+        i, u = self._line._piece(s)
+        following = min(i + 1, len(self._parameters) - 1)
+        parameter = self._parameters[i] + u * (self._parameters[following] - self._parameters[i])
+        x, y, _ = self.point(parameter)
+        sampled = self._line.at(s)
+        return PathPoint(x, y, nan, sampled.heading, nan, nan, sampled.heading)
+
+    def s_at(self, time: float) -> float:
+        """Length at a time, evenly between samples."""
+        corners, lengths = self._line.corners, self._line.lengths
+        if not time > corners[0].time:
+            return 0.0
+        for i in range(len(corners) - 1):
+            a, b = corners[i].time, corners[i + 1].time
+            if a <= time < b:
+                return lengths[i] + (time - a) / (b - a) * (lengths[i + 1] - lengths[i])
+        return self.length
+
+    def speed_at(self, s: float) -> float:
+        """Speed of the sampled piece. [m/s]"""
+        i = min(self._line._piece(s)[0], len(self._line.corners) - 2)
+        dt = self._line.corners[i + 1].time - self._line.corners[i].time
+        return (self._line.lengths[i + 1] - self._line.lengths[i]) / dt if dt > EPSILON else 0.0
+
+    def point(self, parameter: float) -> tuple[float, float, list[float]]:
+        """x, y and the share of each control point at a parameter."""
+        t = min(max(parameter, self.knots[0]), self.knots[-1] - EPSILON)
+        shares = [basis(t, i, self.order, self.knots) for i in range(len(self.controls))]
+        total = sum(share * control.weight for share, control in zip(shares, self.controls, strict=True))
+        x = sum(share * c.weight * c.x for share, c in zip(shares, self.controls, strict=True)) / total
+        y = sum(share * c.weight * c.y for share, c in zip(shares, self.controls, strict=True)) / total
+        return x, y, shares
+
+    # ---- in detail ---------------------------------------------------------------------------------------------------
+    def _sample(self) -> PolylinePath:
+        polygon = sum(hypot(b.x - a.x, b.y - a.y) for a, b in zip(self.controls, self.controls[1:], strict=False))
+        steps = int(1 + polygon / SAMPLE)
+        step = self.knots[-1] / steps
+        self._parameters = [i * step for i in range(steps + 1)]
+        samples = [self.point(t) for t in self._parameters]
+        times = self._times([shares for _, _, shares in samples])
+        corners = [
+            Corner(x, y, heading=self._heading(i, x, y, step, steps), time=time)
+            for i, ((x, y, _), time) in enumerate(zip(samples, times, strict=True))
+        ]
+        return PolylinePath(corners, follow=True)
+
+    def _heading(self, i: int, x: float, y: float, step: float, steps: int) -> float:
+        delta = min(_TANGENT_STEP, step)
+        forward = i < steps
+        u, v, _ = self.point(self._parameters[i] + (delta if forward else -delta))
+        dx, dy = (u - x, v - y) if forward else (x - u, y - v)
+        if hypot(dx, dy) < EPSILON:
+            u, v, _ = self.point(self._parameters[i] + (step if forward else -step))
+            dx, dy = (u - x, v - y) if forward else (x - u, y - v)
+        return wrap(atan2(dy, dx))
+
+    def _times(self, shares: Sequence[Sequence[float]]) -> list[float]:
+        """Times of the samples: those of the control points where each weighs most, evenly in between."""
+        count = len(self.controls)
+        weights = [[row[i] for row in shares] for i in range(count)]
+        peak_parameters = [self._parameters[weight.index(max(weight))] for weight in weights]
+        times, k = [], 0
+        for parameter in self._parameters:
+            while k < count - 2 and parameter >= peak_parameters[k + 1]:
+                k += 1
+            span = peak_parameters[k + 1] - peak_parameters[k]
+            share = (parameter - peak_parameters[k]) / span if span > 0.0 else 1.0
+            a, b = self.controls[k].time, self.controls[k + 1].time
+            times.append(a + share * (b - a))
+        return times
+
+
+def basis(t: float, i: int, order: int, knots: Sequence[float]) -> float:
+    """B-spline basis function by the recursion of Cox and de Boor."""
+    if order == 1:
+        return 1.0 if knots[i] <= t < knots[i + 1] else 0.0
+    value = 0.0
+    left = knots[i + order - 1] - knots[i]
+    right = knots[i + order] - knots[i + 1]
+    if left > 0.0:
+        value += (t - knots[i]) / left * basis(t, i, order - 1, knots)
+    if right > 0.0:
+        value += (knots[i + order] - t) / right * basis(t, i + 1, order - 1, knots)
+    return value

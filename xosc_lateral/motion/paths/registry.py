@@ -1,0 +1,152 @@
+"""All trajectory shapes that can be played: what the file says -> a path laid out in the world."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from math import nan
+from typing import Any
+
+from xosc_lateral.errors import PlaybackError, UnsupportedElementError
+from xosc_lateral.motion.paths.base import Path
+from xosc_lateral.motion.paths.clothoid import ClothoidPath, ClothoidPiece
+from xosc_lateral.motion.paths.nurbs import Control, NurbsPath
+from xosc_lateral.motion.paths.polyline import Corner, PolylinePath, merge_close
+from xosc_lateral.motion.positions.orientation import is_absolute
+from xosc_lateral.motion.run import Run
+from xosc_lateral.motion.state import EntityState
+from xosc_lateral.road.positions import Pose
+from xosc_lateral.scenario import Place, Unsupported
+from xosc_lateral.scenario.position import Position, WorldPosition
+from xosc_lateral.scenario.trajectory import Clothoid, ClothoidSpline, Nurbs, Polyline, Trajectory
+
+VERTEX_RADIUS = 0.1
+"""Vertices of a polyline nearer than this count as one. [m]"""
+
+
+@dataclass(frozen=True, slots=True)
+class Layout:
+    """What laying out a path may depend on, besides the world: who follows it, how, and how fast it comes. [m/s]"""
+
+    run: Run
+    place: Place
+    follower: EntityState | None
+    follow: bool
+    speed: float
+
+
+def _polyline(shape: Polyline, layout: Layout) -> Path:
+    if not shape.vertices:
+        raise _error("the polyline has no vertices", layout.place)
+    corners = []
+    for vertex in shape.vertices:
+        pose = _pose(vertex.position, layout.run)
+        absolute = _gives_heading(vertex.position, layout.run)
+        on_road = not _gives_height(vertex.position)
+        z, pitch, roll = (nan, nan, nan) if on_road else (pose.z, pose.pitch, pose.roll)
+        time = nan if vertex.time is None else vertex.time
+        corners.append(Corner(pose.x, pose.y, z, pose.heading if absolute else nan, pitch, roll, time))
+    if any(corner.z != corner.z for corner in corners):
+        corners = [Corner(c.x, c.y, nan, c.heading, nan, nan, c.time) for c in corners]
+    merged = merge_close(corners, VERTEX_RADIUS)
+    if len(merged) < len(corners):
+        left_out = len(corners) - len(merged)
+        layout.run.note(
+            f"{left_out} vertices nearer than {VERTEX_RADIUS:g} m to the one before are left out", layout.place
+        )
+    return PolylinePath(merged, follow=layout.follow, initial_speed=layout.speed)
+
+
+def _clothoid(shape: Clothoid, layout: Layout) -> Path:
+    pose = _pose(shape.position, layout.run)
+    end = shape.curvature + shape.curvature_prime * shape.length
+    start_time = nan if shape.start_time is None else shape.start_time
+    piece = ClothoidPiece(pose.x, pose.y, pose.heading, shape.curvature, end, shape.length, start_time)
+    return ClothoidPath([piece], nan if shape.stop_time is None else shape.stop_time)
+
+
+def _clothoid_spline(shape: ClothoidSpline, layout: Layout) -> Path:
+    if not shape.segments:
+        raise _error("the clothoid spline has no segments", layout.place)
+    pieces: list[ClothoidPiece] = []
+    for segment in shape.segments:
+        if segment.position_start is not None:
+            pose = _pose(segment.position_start, layout.run)
+            x, y, heading = pose.x, pose.y, pose.heading
+        elif pieces:
+            x, y, heading = pieces[-1].at(pieces[-1].length)
+        elif layout.follower is not None:
+            x, y, heading = layout.follower.pose.x, layout.follower.pose.y, layout.follower.pose.heading
+        else:
+            raise _error("the clothoid spline has no start", layout.place)
+        time = nan if segment.time_start is None else segment.time_start
+        heading += segment.h_offset
+        pieces.append(
+            ClothoidPiece(x, y, heading, segment.curvature_start, segment.curvature_end, segment.length, time)
+        )
+    return ClothoidPath(pieces, nan if shape.time_end is None else shape.time_end)
+
+
+def _nurbs(shape: Nurbs, layout: Layout) -> Path:
+    count = len(shape.control_points)
+    if count < max(shape.order, 2) or len(shape.knots) != count + shape.order:
+        raise _error(
+            f"a NURBS curve of order {shape.order} with {count} control points and {len(shape.knots)} knots: "
+            "needs at least as many control points as its order, and knots = control points + order",
+            layout.place,
+        )
+    controls = []
+    for point in shape.control_points:
+        pose = _pose(point.position, layout.run)
+        controls.append(Control(pose.x, pose.y, point.weight, nan if point.time is None else point.time))
+    return NurbsPath(controls, shape.knots, shape.order)
+
+
+SHAPES: tuple[tuple[type, Callable[[Any, Layout], Path]], ...] = (
+    (Clothoid, _clothoid),
+    (ClothoidSpline, _clothoid_spline),
+    (Nurbs, _nurbs),
+    (Polyline, _polyline),
+)
+
+_SHAPES = dict(SHAPES)
+
+
+def path_of(
+    trajectory: Trajectory,
+    run: Run,
+    *,
+    follower: EntityState | None = None,
+    follow: bool = False,
+    speed: float = 0.0,
+) -> Path:
+    """A trajectory laid out in the world as it is now."""
+    shape = trajectory.shape
+    if isinstance(shape, Unsupported):
+        place = shape.place
+        raise UnsupportedElementError(
+            shape.reason or f"a {shape.kind} can't be followed", path=place.path, line=place.line, element=place.element
+        )
+    return _SHAPES[type(shape)](shape, Layout(run, trajectory.place, follower, follow, speed))
+
+
+def _pose(position: Position, run: Run) -> Pose:
+    from xosc_lateral.motion.positions.resolve import resolve
+
+    scout = EntityState(run.entities[0].entity, run.network)
+    scout.put(resolve(position, run))
+    return scout.pose
+
+
+def _gives_heading(position: Position, run: Run) -> bool:
+    if isinstance(position, WorldPosition):
+        return position.h is not None
+    return is_absolute(getattr(position, "orientation", None), run)
+
+
+def _gives_height(position: Position) -> bool:
+    return isinstance(position, WorldPosition) and position.z is not None
+
+
+def _error(what: str, place: Place) -> PlaybackError:
+    return PlaybackError(what, path=place.path, line=place.line, element=place.element)

@@ -1,0 +1,24 @@
+"""Orientations: absolute, or relative to a road or an entity."""
+
+from __future__ import annotations
+
+from xosc_lateral.motion.run import Run
+from xosc_lateral.scenario.enums import ReferenceContext
+from xosc_lateral.scenario.position import Orientation
+
+_RELATIVE_SINCE = (1, 3)
+"""Version from which an orientation without a type is relative; before, it was absolute."""
+
+
+def is_absolute(orientation: Orientation | None, run: Run) -> bool:
+    """Whether it is meant in the world; no orientation at all is relative (along the road, like the entity)."""
+    if orientation is None:
+        return False
+    if orientation.type is None:
+        return run.scenario.header.version < _RELATIVE_SINCE
+    return orientation.type is ReferenceContext.ABSOLUTE
+
+
+def heading_of(orientation: Orientation | None) -> float:
+    """Its heading; 0 where none is given. [rad]"""
+    return 0.0 if orientation is None or orientation.h is None else orientation.h

@@ -1,0 +1,190 @@
+"""Rows of a run: written down cheaply in every frame, worked out into poses all at once in the end."""
+
+from __future__ import annotations
+
+from array import array
+from math import pi
+
+import numpy as np
+from numpy.typing import NDArray
+
+from xosc_lateral.motion.nominal import Activity, EntityMotion, FloatArray, IntArray
+from xosc_lateral.motion.state import NOWHERE, EntityState
+from xosc_lateral.road import RoadNetwork
+
+_UNKNOWN = -2
+"""Road of a row whose world pose is known, but whose road coordinates nobody has asked for yet."""
+
+
+class Rows:
+    """Rows of one entity."""
+
+    def __init__(self, state: EntityState) -> None:
+        self.state = state
+        self._road = array("i")
+        self._lane = array("i")
+        self._s = array("d")
+        self._offset_t = array("d")
+        self._relative_heading = array("d")
+        self._speed = array("d")
+        self._activity = array("B")
+        self._free_rows = array("q")
+        self._free = array("d")
+
+    def write(self) -> None:
+        """Write down where the entity is now."""
+        state = self.state
+        free = state._free_pose
+        if free is not None:
+            self._free_rows.append(len(self._road))
+            self._free.extend(free)
+        self._road.append(state.road if state._located else _UNKNOWN)
+        self._lane.append(state.lane)
+        self._s.append(state.s)
+        self._offset_t.append(state.offset_t)
+        self._relative_heading.append(state.relative_heading)
+        self._speed.append(state.speed)
+        self._activity.append(state.activity | Activity.ROAD_END if state.at_road_end else state.activity)
+
+    def overwrite(self) -> None:
+        """Replace the last row by where the entity is now."""
+        if self._free_rows and self._free_rows[-1] == len(self._road) - 1:
+            self._free_rows.pop()
+            del self._free[-6:]
+        for column in (
+            self._road,
+            self._lane,
+            self._s,
+            self._offset_t,
+            self._relative_heading,
+            self._speed,
+            self._activity,
+        ):
+            column.pop()
+        self.write()
+
+    def motion(self, network: RoadNetwork, time: FloatArray) -> EntityMotion:
+        """All rows, with world poses and directions of travel."""
+        road: IntArray = np.frombuffer(self._road, dtype=np.int32).copy()
+        lane: IntArray = np.frombuffer(self._lane, dtype=np.int32).copy()
+        s, offset_t, along, speed = (
+            np.frombuffer(column, dtype=np.float64).copy()
+            for column in (self._s, self._offset_t, self._relative_heading, self._speed)
+        )
+        activity = np.frombuffer(self._activity, dtype=np.uint8).copy()
+        free_rows = np.frombuffer(self._free_rows, dtype=np.int64)
+        free = np.frombuffer(self._free, dtype=np.float64).reshape(-1, 6)
+
+        direction = np.ones(len(road))
+        offset = offset_t.copy()
+        looked_up = free_rows[road[free_rows] == _UNKNOWN]
+        known = road >= 0
+        if known.any():
+            direction[known] = network.travel_directions(road[known], lane[known])
+        offset *= direction
+        if len(looked_up):
+            _look_up(network, looked_up, free[road[free_rows] == _UNKNOWN], road, lane, s, offset, direction)
+        on_road = road >= 0
+        pose = np.zeros((len(road), 6))
+        if on_road.any():
+            pose[on_road] = np.column_stack(
+                network.lane_to_world(road[on_road], lane[on_road], s[on_road], offset[on_road])
+            )
+        to_lane = along - np.where(direction > 0, 0.0, pi)
+        _turn(pose, to_lane, on_road)
+        _lay_over(pose, free_rows, free)
+        to_lane[looked_up] = pose[looked_up, 3] - _lane_heading(network, road, lane, s, offset, looked_up)
+        beside = _beside_road(network, road, lane, s, offset, pose, on_road)
+        activity[beside & (activity & np.uint8(Activity.ACTIVE) > 0)] |= np.uint8(Activity.OFF_ROAD)
+        road[~on_road], lane[~on_road], s[~on_road], offset[~on_road] = NOWHERE, 0, 0.0, 0.0
+        return EntityMotion(
+            entity=self.state.entity,
+            time=time,
+            x=pose[:, 0].copy(),
+            y=pose[:, 1].copy(),
+            z=pose[:, 2].copy(),
+            heading=pose[:, 3] % (2.0 * pi),
+            pitch=pose[:, 4].copy(),
+            roll=pose[:, 5].copy(),
+            speed=speed,
+            road=road,
+            lane=lane,
+            s=s,
+            offset=offset,
+            heading_relative=(to_lane + pi) % (2.0 * pi) - pi,
+            activity=activity,
+        )
+
+
+def _look_up(
+    network: RoadNetwork,
+    rows: NDArray[np.int64],
+    free: FloatArray,
+    road: IntArray,
+    lane: IntArray,
+    s: FloatArray,
+    offset: FloatArray,
+    direction: FloatArray,
+) -> None:
+    """Road coordinates of rows that only have a world pose."""
+    if not network.road_ids:
+        road[rows] = NOWHERE
+        return
+    z = free[:, 2]
+    found = network.world_to_lane(free[:, 0], free[:, 1], None if np.isnan(z).any() else z)
+    road[rows], lane[rows], s[rows], offset[rows] = found.road, found.lane, found.s, found.offset
+    direction[rows] = network.travel_directions(found.road, found.lane)
+
+
+def _turn(pose: FloatArray, angle: FloatArray, rows: NDArray[np.bool_]) -> None:
+    """Turn poses about the normal of the surface that they stand on."""
+    c, s = np.cos(angle[rows]), np.sin(angle[rows])
+    pitch, roll = pose[rows, 4], pose[rows, 5]
+    pose[rows, 3] += angle[rows]
+    pose[rows, 4] = pitch * c - roll * s
+    pose[rows, 5] = roll * c + pitch * s
+
+
+def _lay_over(pose: FloatArray, rows: NDArray[np.int64], free: FloatArray) -> None:
+    """World poses where they were given; what was left to the road stays."""
+    if len(rows):
+        pose[rows] = np.where(np.isnan(free), pose[rows], free)
+
+
+def _lane_heading(
+    network: RoadNetwork,
+    road: IntArray,
+    lane: IntArray,
+    s: FloatArray,
+    offset: FloatArray,
+    rows: NDArray[np.int64],
+) -> FloatArray:
+    if not len(rows) or not network.road_ids:
+        return np.zeros(len(rows))
+    return network.lane_to_world(road[rows], lane[rows], s[rows], offset[rows]).heading
+
+
+def _beside_road(
+    network: RoadNetwork,
+    road: IntArray,
+    lane: IntArray,
+    s: FloatArray,
+    offset: FloatArray,
+    pose: FloatArray,
+    on_road: NDArray[np.bool_],
+) -> NDArray[np.bool_]:
+    """Rows whose reference point is on no lane of any kind."""
+    beside = ~on_road
+    if not on_road.any():
+        return beside
+    suspects = np.flatnonzero(on_road)
+    half = 0.5 * network.lane_width(road[suspects], lane[suspects], s[suspects])
+    suspects = suspects[np.abs(offset[suspects]) > half + _TOUCH]
+    if len(suspects):
+        found = network.world_to_lane(pose[suspects, 0], pose[suspects, 1], lane_types=None)
+        beside[suspects] = ~(found.distance <= _TOUCH)
+    return beside
+
+
+_TOUCH = 1e-3
+"""So near to a lane, a point counts as on it. [m]"""
