@@ -1,0 +1,44 @@
+"""A converter that costs nothing, so that the engine is tested apart from it; what a file says, it does."""
+
+from __future__ import annotations
+
+import errno
+import hashlib
+import os
+import signal
+import time
+from dataclasses import replace
+
+from xosc_lateral.errors import FormatError
+from xosc_lateral.formats.hashes import file_hash
+from xosc_lateral.formats.output import write_whole
+from xosc_lateral.pipeline.jobs import Job
+from xosc_lateral.pipeline.manifest import ManifestRow
+
+
+def convert(job: Job) -> ManifestRow:
+    """Write a text that depends on everything that may decide on an output, and on nothing else."""
+    text = job.source.read_text()
+    if "slow" in text:
+        time.sleep(0.05)
+    if "bad" in text:
+        raise FormatError("nothing to play", path=job.source, line=1)
+    if "bug" in text:
+        raise ZeroDivisionError("by nought")
+    if "crash" in text:
+        os.kill(os.getpid(), signal.SIGKILL)
+    if "full" in text:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(job.output))
+    road = job.source.parent / "road.xodr"
+    content = f"{text}{road.read_text()}{job.settings.seed} {job.variant} {dict(job.settings.parameters)}"
+    write_whole(job.output, content)
+    inputs = {"road.xodr": file_hash(road), job.scenario: file_hash(job.source)}
+    output_hash = hashlib.sha256(content.encode()).hexdigest()
+    return replace(job.row(), output_hash=output_hash, inputs=inputs, road="road.xodr", road_hash=inputs["road.xodr"])
+
+
+def convert_and_log(job: Job) -> ManifestRow:
+    """The same; leaves the process id of each conversion behind."""
+    with (job.base / "log.txt").open("a") as log:
+        log.write(f"{os.getpid()} {job.name}\n")
+    return convert(job)

@@ -1,0 +1,213 @@
+"""Convert many scenarios: parallel, resumable, one bad scenario costing one row."""
+
+from __future__ import annotations
+
+import errno
+import os
+import re
+import time
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from dataclasses import dataclass
+from enum import StrEnum
+from functools import partial
+from pathlib import Path
+
+from xosc_lateral import __version__
+from xosc_lateral.errors import XoscLateralError
+from xosc_lateral.formats.hashes import file_hash
+from xosc_lateral.pipeline.jobs import Batch, Job
+from xosc_lateral.pipeline.journal import Journal
+from xosc_lateral.pipeline.lock import folder_lock
+from xosc_lateral.pipeline.manifest import ManifestRow
+from xosc_lateral.pipeline.workers import WorkerDiedError, open_pool, run_tasks
+
+Converter = Callable[[Job], ManifestRow]
+"""Makes a job's output and describes it; raises an `XoscLateralError` when the input is at fault."""
+
+STATE = ".xosc-lateral"
+"""Folder inside the output folder, there only while a batch is unfinished: journal and lock."""
+
+_HALF_WRITTEN = re.compile(r"\..+\.[0-9a-f]{8}\.tmp")
+"""Names that `write_whole` gives to files while they are being written."""
+
+_STOPPING = frozenset({errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EACCES, errno.EPERM, errno.EMFILE, errno.ENFILE})
+"""Errors of the system that the next scenario would meet as well."""
+
+
+class State(StrEnum):
+    """What became of a job."""
+
+    WRITTEN = "written"
+    UP_TO_DATE = "up to date"
+    FAILED = "failed"
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """What became of a job.
+
+    Parameters
+    ----------
+    state : State
+    row : ManifestRow
+        As in the manifest.
+    seconds : float
+        The conversion took. [s]
+    """
+
+    state: State
+    row: ManifestRow
+    seconds: float
+
+
+class BatchStoppedError(XoscLateralError):
+    """The run can't go on (disk full, no permission). What is finished is kept; run it again to go on."""
+
+
+def convert_many(
+    batch: Batch,
+    *,
+    workers: int = 1,
+    cluster: str | None = None,
+    again: bool = False,
+    converter: Converter | None = None,
+) -> Iterator[Outcome]:
+    """Convert a batch and yield what became of each job as it comes: first what is up to date, then in any order.
+
+    The outputs, and the manifest written at the end, do not depend on the number of workers, on the order, or on how
+    often the run was interrupted. To stop early, close the iterator: what is finished is kept.
+
+    Parameters
+    ----------
+    batch : Batch
+        From `plan_batch`.
+    workers : int
+        Processes on this machine; -1: one per core.
+    cluster : str, optional
+        Address of a dask.distributed scheduler: its workers are used instead.
+    again : bool
+        Convert also what is up to date.
+    converter : callable, optional
+        In place of `convert_job`; has to be picklable.
+
+    Raises
+    ------
+    FolderInUseError
+        Another run writes into the folder.
+    BatchStoppedError, OSError
+        The folder can't be written, the disk is full. Everything finished so far is kept.
+    ClusterError
+        The cluster can't be reached, or is gone.
+
+    Examples
+    --------
+    >>> batch = plan_batch(["scenarios/"], "enriched/", variants=3)
+    >>> failed = [outcome.row for outcome in convert_many(batch, workers=-1) if outcome.row.error]
+    """
+    if converter is None:
+        from xosc_lateral.pipeline.convert_job import convert_job
+
+        converter = convert_job
+    state = batch.folder / STATE
+    with folder_lock(state / "lock"):
+        _sweep(batch.folder)
+        with Journal(batch.folder, state / "journal.jsonl") as journal:
+            todo = []
+            for job in batch.jobs:
+                row = None if again else _current_row(job, journal)
+                if row is None:
+                    todo.append(job)
+                else:
+                    yield Outcome(State.UP_TO_DATE, row, 0.0)
+            if todo:
+                with open_pool(min(workers, len(todo)), cluster) as pool:
+                    for job, answer in run_tasks(pool, partial(_run, converter), todo):
+                        yield _noted(job, answer, journal)
+            _forget_missing(batch, journal)
+            journal.finish()
+    with suppress(OSError):  # the next run has begun already
+        state.rmdir()
+
+
+@dataclass(frozen=True, slots=True)
+class _Answer:
+    """What comes back from a worker."""
+
+    row: ManifestRow
+    seconds: float
+    stop: str = ""
+
+
+def _run(converter: Converter, job: Job) -> _Answer:
+    """One job, in a worker. Whatever goes wrong with this one scenario ends up in its row."""
+    start = time.perf_counter()
+    try:
+        row = job.row(job.error) if job.error else _checked(converter, job)
+    except OSError as error:
+        if error.errno in _STOPPING:
+            return _Answer(job.row(str(error)), 0.0, f"{job.output}: {error.strerror or error}")
+        row = job.row(_one_line(error))
+    except XoscLateralError as error:
+        row = job.row(_one_line(error))
+    except Exception as error:  # a bug of ours must not cost the other ten thousand; the row says that it is one
+        row = job.row(f"{job.source}: internal error: {type(error).__name__}: {_one_line(error)}{_origin(error)}")
+    return _Answer(row, time.perf_counter() - start)
+
+
+def _checked(converter: Converter, job: Job) -> ManifestRow:
+    if job.package_version != __version__:
+        raise XoscLateralError(f"the worker has version {__version__}, the run was planned by {job.package_version}")
+    return converter(job)
+
+
+def _noted(job: Job, answer: _Answer | WorkerDiedError, journal: Journal) -> Outcome:
+    if isinstance(answer, WorkerDiedError):
+        answer = _Answer(job.row(f"{job.source}: {answer}"), 0.0)
+    if answer.stop:
+        raise BatchStoppedError(f"{answer.stop}; what is finished is kept, run it again to go on")
+    if answer.row.error and job.name in journal:
+        job.output.unlink(missing_ok=True)  # of a former run, when the scenario could still be converted
+    journal.add(answer.row, answer.seconds)
+    return Outcome(State.FAILED if answer.row.error else State.WRITTEN, answer.row, answer.seconds)
+
+
+def _current_row(job: Job, journal: Journal) -> ManifestRow | None:
+    """The journal's row if its output is still what a conversion would write."""
+    if job.error or job.name not in journal:
+        return None
+    row = journal.row(job.name)
+    if row.error or row.settings != job.fingerprint or row.scenario != job.scenario:
+        return None
+    expected = {job.output: row.output_hash}
+    expected |= {Path(os.path.normpath(job.base / name)): value for name, value in row.inputs.items()}
+    try:
+        return row if all(file_hash(path) == value for path, value in expected.items()) else None
+    except OSError:
+        return None
+
+
+def _forget_missing(batch: Batch, journal: Journal) -> None:
+    """Rows of former runs stay as long as their output does; those of this run stay."""
+    planned = {job.name for job in batch.jobs}
+    for output in journal:
+        if output not in planned and not (batch.folder / output).is_file():
+            journal.forget(output)
+
+
+def _sweep(folder: Path) -> None:
+    """Remove what a killed run was just writing."""
+    for path in folder.rglob(".*.tmp"):
+        if _HALF_WRITTEN.fullmatch(path.name):
+            path.unlink(missing_ok=True)
+
+
+def _one_line(error: BaseException) -> str:
+    return " ".join(str(error).split())
+
+
+def _origin(error: BaseException) -> str:
+    trace = error.__traceback__
+    while trace is not None and trace.tb_next is not None:
+        trace = trace.tb_next
+    return "" if trace is None else f" ({Path(trace.tb_frame.f_code.co_filename).name}:{trace.tb_lineno})"

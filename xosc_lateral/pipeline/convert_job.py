@@ -1,0 +1,76 @@
+"""One job of a batch on the real converter, and what it gave as a row of the manifest."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from xosc_lateral.enrich.result import Enriched
+from xosc_lateral.motion.gaps import Gap
+from xosc_lateral.pipeline.convert import Conversion, convert_scenario
+from xosc_lateral.pipeline.jobs import Job
+from xosc_lateral.pipeline.manifest import ManifestRow
+
+ROAD_SUFFIX = ".xodr"
+
+
+def convert_job(job: Job) -> ManifestRow:
+    """Convert and describe.
+
+    Raises
+    ------
+    XoscLateralError
+        When the input is at fault.
+    OSError
+        When the output can't be written.
+    """
+    return describe(job, convert_scenario(job.source, job.output, job.settings, variant=job.variant))
+
+
+def describe(job: Job, conversion: Conversion) -> ManifestRow:
+    """A conversion as a row: numbers and hashes, nothing that keeps its arrays alive."""
+    enriched, provenance = conversion.enriched, conversion.provenance
+    inputs = _below(job.base, job.source.parent, provenance.inputs)
+    road = next((name for name in inputs if name.lower().endswith(ROAD_SUFFIX)), "")
+    return replace(
+        job.row(),
+        output_hash=conversion.output_hash,
+        road=road,
+        road_hash=inputs.get(road, ""),
+        inputs=inputs,
+        profiles={entity: name for entity, (name, _) in sorted(provenance.profiles.items())},
+        profile_hashes=dict(sorted(provenance.profiles.values())),
+        entities=len(enriched.entities),
+        enriched=tuple(entity.name for entity in enriched.entities if entity.is_enriched),
+        segment_seconds=_rounded(sum(entity.segment_seconds for entity in enriched.entities)),
+        offset_spread=_rounded(_spread(enriched)),
+        gap_before=_smallest(enriched.gaps_before),
+        gap_after=_smallest(enriched.gaps_after),
+        warnings=conversion.warnings,
+    )
+
+
+def _below(base: Path, folder: Path, inputs: Mapping[str, str]) -> dict[str, str]:
+    """Names from the scenario's folder -> names from the batch's."""
+    return {
+        Path(os.path.relpath(os.path.normpath(folder / name), base)).as_posix(): value
+        for name, value in sorted(inputs.items())
+    }
+
+
+def _spread(enriched: Enriched) -> float:
+    offsets = [segment.offset for entity in enriched.entities for segment in entity.segments]
+    return float(np.std(np.concatenate(offsets))) if offsets else 0.0
+
+
+def _smallest(gaps: tuple[Gap, ...]) -> float | None:
+    return _rounded(min(gap.distance for gap in gaps)) if gaps else None
+
+
+def _rounded(value: float) -> float:
+    """To a micrometre or microsecond: what a manifest is read for, and no noise of another machine's last bit."""
+    return round(value, 6)

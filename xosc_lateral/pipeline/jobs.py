@@ -1,0 +1,286 @@
+"""A batch as a list of jobs: every output with its place in the tree, its settings and a fingerprint of them."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+from xosc_lateral import __version__
+from xosc_lateral.errors import FormatError, XoscLateralError
+from xosc_lateral.formats.hashes import file_hash
+from xosc_lateral.formats.openscenario.distribution import read_distribution
+from xosc_lateral.formats.profiles import SHIPPED, SUFFIX, find_profile
+from xosc_lateral.pipeline.manifest import ManifestRow
+from xosc_lateral.pipeline.request import DocumentKind, Request, document_kind, find_requests
+from xosc_lateral.pipeline.settings import AUTO, ConvertSettings
+
+
+@dataclass(frozen=True, slots=True)
+class Job:
+    """One output to make; plain values, so that it can be sent to another process.
+
+    Parameters
+    ----------
+    name : str
+        Path of the output below the output folder, with forward slashes: names its row in the manifest.
+    scenario : str
+        Path of the input below `base`, with forward slashes.
+    source, output : Path
+        Absolute.
+    base : Path
+        Folder that the output tree mirrors. Absolute.
+    settings : ConvertSettings
+    variant : int
+    fingerprint : str
+        SHA-256 over everything but the input files that decides on the output's bytes.
+    error : str
+        Why it can't even be tried (a distribution that can't be read); empty normally.
+    package_version : str
+        Of the process that planned it: a worker with another one refuses.
+    """
+
+    name: str
+    scenario: str
+    source: Path
+    output: Path
+    base: Path
+    settings: ConvertSettings
+    variant: int
+    fingerprint: str
+    error: str = ""
+    package_version: str = __version__
+
+    def row(self, error: str = "") -> ManifestRow:
+        """Its row as far as it is known before the conversion."""
+        try:
+            scenario_hash = file_hash(self.source)
+        except OSError:
+            scenario_hash = ""
+        return ManifestRow(
+            output=self.name,
+            scenario=self.scenario,
+            scenario_hash=scenario_hash,
+            variant=self.variant,
+            seed=self.settings.seed,
+            profile=self.settings.profile,
+            parameters=dict(sorted(self.settings.parameters.items())),
+            settings=self.fingerprint,
+            package_version=self.package_version,
+            error=error,
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class Batch:
+    """What `convert_many` does.
+
+    Parameters
+    ----------
+    folder : Path
+        Output tree. Absolute.
+    base : Path
+        Folder that it mirrors. Absolute.
+    jobs : tuple of Job
+        By name.
+    left_out : tuple of Path
+        Files found in folders that hold no scenario: catalogs.
+    """
+
+    folder: Path
+    base: Path
+    jobs: tuple[Job, ...]
+    left_out: tuple[Path, ...] = ()
+
+    def __len__(self) -> int:
+        return len(self.jobs)
+
+
+def plan_batch(
+    inputs: Sequence[str | Path | Request],
+    folder: str | Path,
+    settings: ConvertSettings | None = None,
+    *,
+    variants: int = 1,
+) -> Batch:
+    """Plan a batch; nothing is converted or written yet.
+
+    Parameters
+    ----------
+    inputs : sequence of str, Path or Request
+        Files, folders, globs, tables (see `find_requests`), or requests with settings of their own.
+    folder : str or Path
+        Output tree. It mirrors the inputs below their common folder: ``db/a/x.xosc`` of the input ``db`` becomes
+        ``folder/a/x.xosc``, its variants ``folder/a/x_v000.xosc`` and so on, the scenarios that a parameter value
+        distribution stands for ``folder/a/x_p00000.xosc`` and so on; a scenario named
+        again with other settings becomes ``folder/a/x_r001.xosc``.
+    settings : ConvertSettings, optional
+        For every input that has none of its own.
+    variants : int
+        Outputs per scenario.
+
+    Returns
+    -------
+    Batch
+
+    Raises
+    ------
+    FormatError
+        An input that isn't there, two inputs with the same output, an output on top of an input.
+    DriverProfileError
+        A profile that is unknown.
+    """
+    settings = settings or ConvertSettings()
+    for name in {settings.profile, *settings.entity_profiles.values()} - {AUTO}:
+        file_hash(find_profile(name, settings.libraries))  # wrong for all is said once, wrong in a table's row there
+    target = _normal(Path(folder))
+    requests = [_absolute(request) for request in _all_requests(inputs, settings, variants, target)]
+    base = _common_folder(requests)
+    fingerprints = _Fingerprints()
+    jobs: dict[str, Job] = {}
+    left_out: list[Path] = []
+    asked: dict[Path, dict[tuple[str, int], None]] = {}
+    for request in requests:
+        kind = document_kind(request.scenario)
+        if kind is DocumentKind.CATALOG and not request.listed:
+            left_out.append(request.scenario)
+            continue
+        before = asked.setdefault(request.scenario, {})
+        key = (fingerprints.of(request.settings, 0), request.variants)
+        if key in before:
+            continue  # named twice, by a folder and by itself, say
+        repeat = f"_r{len(before):03d}" if before else ""
+        before[key] = None
+        for job in _jobs(request, kind, base, target, fingerprints, repeat):
+            earlier = jobs.setdefault(job.name, job)
+            if earlier is not job:
+                what = f"would be written twice: from {earlier.scenario} and from {job.scenario}"
+                raise FormatError(what, path=job.output)
+    _refuse_overwriting(jobs.values())
+    return Batch(target, base, tuple(jobs[name] for name in sorted(jobs)), tuple(left_out))
+
+
+def _all_requests(
+    inputs: Sequence[str | Path | Request], settings: ConvertSettings, variants: int, target: Path
+) -> Iterator[Request]:
+    for given in inputs:
+        if isinstance(given, Request):
+            yield given
+        else:
+            yield from find_requests([given], settings, variants=variants, leave_out=target)
+
+
+def _absolute(request: Request) -> Request:
+    scenario = _normal(request.scenario)
+    base = scenario.parent if request.base is None else _normal(request.base)
+    return replace(request, scenario=scenario, base=base if base in scenario.parents else scenario.parent)
+
+
+def _normal(path: Path) -> Path:
+    """Absolute, without dots; symbolic links stay, for the tree mirrors names."""
+    return Path(os.path.normpath(path.absolute()))
+
+
+def _common_folder(requests: Sequence[Request]) -> Path:
+    bases = {str(request.base) for request in requests}
+    if not bases:
+        return Path.cwd()
+    try:
+        return Path(os.path.commonpath(bases))
+    except ValueError as error:  # two drives of a Windows machine
+        raise FormatError(f"inputs have no folder in common: {', '.join(sorted(bases)[:3])}") from error
+
+
+def _jobs(
+    request: Request, kind: DocumentKind, base: Path, target: Path, fingerprints: _Fingerprints, repeat: str
+) -> Iterator[Job]:
+    relative = request.scenario.relative_to(base)
+    for source, suffix, settings, error in _concrete(request, kind):
+        for variant in range(request.variants):
+            variant_suffix = "" if request.variants == 1 else f"_v{variant:03d}"
+            output = relative.with_name(f"{relative.stem}{repeat}{suffix}{variant_suffix}{relative.suffix}")
+            yield Job(
+                name=output.as_posix(),
+                scenario=Path(os.path.relpath(source, base)).as_posix(),
+                source=source,
+                output=target / output,
+                base=base,
+                settings=settings,
+                variant=variant,
+                fingerprint=fingerprints.of(settings, variant),
+                error=error,
+            )
+
+
+def _concrete(request: Request, kind: DocumentKind) -> Iterator[tuple[Path, str, ConvertSettings, str]]:
+    """The scenarios that a file stands for: itself, or those of its distribution."""
+    if kind is not DocumentKind.DISTRIBUTION:
+        yield request.scenario, "", request.settings, ""
+        return
+    try:
+        logical = read_distribution(request.scenario)
+        sets = list(logical.parameter_sets(request.settings.seed))
+    except (XoscLateralError, OSError) as error:
+        yield request.scenario, "", request.settings, " ".join(str(error).split())
+        return
+    for index, values in enumerate(sets):
+        parameters = {**values, **request.settings.parameters}
+        yield logical.scenario_file, f"_p{index:05d}", replace(request.settings, parameters=parameters), ""
+
+
+def _refuse_overwriting(jobs: Iterable[Job]) -> None:
+    jobs = list(jobs)
+    sources = {os.path.realpath(job.source) for job in jobs}
+    for job in jobs:
+        if os.path.realpath(job.output) in sources:
+            raise FormatError("is an input: choose another output folder", path=job.output)
+
+
+@dataclass(slots=True)
+class _Fingerprints:
+    """Hashes of settings; files that settings name count by their bytes, not by their place."""
+
+    _profiles: dict[tuple[str, tuple[Path, ...]], str] = field(default_factory=dict)
+
+    def of(self, settings: ConvertSettings, variant: int) -> str:
+        values = {
+            "package_version": __version__,
+            "variant": variant,
+            "profile": self._profile(settings.profile, settings.libraries),
+            "entity_profiles": {
+                entity: self._profile(name, settings.libraries)
+                for entity, name in sorted(settings.entity_profiles.items())
+            },
+            "only": None if settings.only is None else sorted(settings.only),
+            "seed": settings.seed,
+            "context": None if settings.context is None else _hash_or_missing(settings.context),
+            "parameters": dict(sorted(settings.parameters.items())),
+            "attempts": settings.attempts,
+            "mode": str(settings.mode),
+            "step": settings.step,
+            "time_limit": settings.time_limit,
+        }
+        return hashlib.sha256(json.dumps(values, sort_keys=True).encode()).hexdigest()
+
+    def _profile(self, name: str, libraries: tuple[Path, ...]) -> str:
+        key = (name, libraries)
+        if key not in self._profiles:
+            self._profiles[key] = _profile_state(name, libraries)
+        return self._profiles[key]
+
+
+def _profile_state(name: str, libraries: tuple[Path, ...]) -> str:
+    """What a profile's name means now: its file's hash; "auto": those of all shipped ones."""
+    if name == AUTO:
+        return " ".join(f"{path.stem}={file_hash(path)}" for path in sorted(SHIPPED.glob(f"*{SUFFIX}")))
+    try:
+        return _hash_or_missing(find_profile(name, libraries))
+    except XoscLateralError:
+        return "missing"  # the conversion says so
+
+
+def _hash_or_missing(path: Path) -> str:
+    return file_hash(path) if path.is_file() else "missing"

@@ -1,0 +1,119 @@
+"""What a run has done so far, on disk at every moment: rows appended one by one, read again after a kill."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from contextlib import suppress
+from pathlib import Path
+from types import TracebackType
+from typing import Self
+
+from xosc_lateral.pipeline.manifest import (
+    MANIFEST,
+    TIMINGS,
+    ManifestRow,
+    read_manifest,
+    read_timings,
+    write_manifest,
+    write_timings,
+)
+
+
+class Journal:
+    """Rows of an output folder, the newest of each output.
+
+    A file of JSON lines; a line that a kill cut short is dropped. Rows stay on disk: in memory is only where each
+    one begins, so that ten thousand of them cost a megabyte.
+
+    Parameters
+    ----------
+    folder : Path
+        Output folder; rows of its manifest count until the journal has newer ones.
+    path : Path
+        The journal.
+    """
+
+    def __init__(self, folder: Path, path: Path) -> None:
+        self._folder, self._path = folder, path
+        self._begin: dict[str, int] = {}
+        self._seconds: dict[str, float] = {}
+        self._end = self._intact_end()
+        self._file = path.open("r+b" if path.exists() else "w+b")
+        self._file.truncate(self._end)
+        self._adopt_manifest()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        with suppress(OSError):  # every row has been flushed; what a full disk refused was never promised
+            self._file.close()
+
+    def __contains__(self, output: str) -> bool:
+        return output in self._begin
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(tuple(self._begin))
+
+    def row(self, output: str) -> ManifestRow:
+        """The newest row of an output; `KeyError` if there is none."""
+        self._file.seek(self._begin[output])
+        return ManifestRow.from_dict(json.loads(self._file.readline())["row"])
+
+    def add(self, row: ManifestRow, seconds: float) -> None:
+        """Append a row. From the return on it survives the death of this process.
+
+        Raises
+        ------
+        OSError
+            When the disk is full; rows added before are still there.
+        """
+        line = json.dumps({"row": row.to_dict(), "seconds": seconds}, ensure_ascii=False).encode() + b"\n"
+        self._file.seek(self._end)
+        self._file.write(line)
+        self._file.flush()
+        self._begin[row.output] = self._end
+        self._seconds[row.output] = seconds
+        self._end += len(line)
+
+    def forget(self, output: str) -> None:
+        """Leave an output out of the manifest."""
+        del self._begin[output]
+
+    def finish(self) -> None:
+        """Write manifest and timings, sorted by output; then the journal is no longer needed and goes.
+
+        A kill in between leaves a journal that says the same as the manifest.
+        """
+        outputs = sorted(self._begin)
+        write_timings(((output, self._seconds[output]) for output in outputs), self._folder / TIMINGS)
+        write_manifest((self.row(output) for output in outputs), self._folder / MANIFEST)
+        self._file.close()
+        self._path.unlink()
+
+    def _intact_end(self) -> int:
+        """Index the lines there are; returns where the last whole one ends. [byte]"""
+        end = 0
+        if not self._path.exists():
+            return end
+        with self._path.open("rb") as file:
+            for line in file:
+                try:
+                    values = json.loads(line)
+                    output, seconds = str(values["row"]["output"]), float(values["seconds"])
+                except (ValueError, KeyError, TypeError):
+                    break
+                if not line.endswith(b"\n"):
+                    break
+                self._begin[output], self._seconds[output] = end, seconds
+                end += len(line)
+        return end
+
+    def _adopt_manifest(self) -> None:
+        seconds = read_timings(self._folder / TIMINGS)
+        for row in read_manifest(self._folder / MANIFEST):
+            if row.output not in self._begin:
+                self.add(row, seconds.get(row.output, 0.0))

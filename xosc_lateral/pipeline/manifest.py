@@ -1,0 +1,203 @@
+"""`manifest.parquet`: one row per output, with all that went into it and what came out.
+
+The manifest holds nothing that changes from run to run: same inputs, settings and seed, same bytes, whether the run
+was disturbed or not and on however many workers. What each conversion took is in `timings.parquet` beside it,
+therefore the only file of an output tree that is never twice the same.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field, fields
+from io import BytesIO
+from itertools import islice
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from xosc_lateral.errors import FormatError
+from xosc_lateral.formats.output import write_whole
+
+if TYPE_CHECKING:
+    import pyarrow as pa
+
+MANIFEST, TIMINGS = "manifest.parquet", "timings.parquet"
+
+ROW_GROUP = 1000
+"""Rows held in memory while writing."""
+
+
+@dataclass(frozen=True, slots=True)
+class ManifestRow:
+    """One output, or why there is none.
+
+    Parameters
+    ----------
+    output : str
+        Path of the output below the output folder, with forward slashes; names the row.
+    scenario, scenario_hash : str, str
+        Path of the input below the inputs' common folder, and SHA-256 of the file.
+    variant, seed : int, int
+    profile : str
+        As asked for (a name, a path, "auto").
+    parameters : mapping of str to str
+        Scenario parameters that were replaced.
+    settings : str
+        SHA-256 over package version, settings, variant, profile files and context table.
+    package_version : str
+    output_hash : str
+        SHA-256 of the output.
+    road, road_hash : str, str
+        As for the scenario; empty if it has none.
+    inputs : mapping of str to str
+        Every file that was read -> SHA-256.
+    profiles : mapping of str to str
+        Enriched entity -> name of its profile.
+    profile_hashes : mapping of str to str
+        Profile name -> SHA-256.
+    entities : int
+        In the scenario.
+    enriched : tuple of str
+        Names of the entities that got offsets.
+    segment_seconds : float
+        Road-following time of all enriched entities together. [s]
+    offset_spread : float
+        Standard deviation of all sampled offsets. [m]
+    gap_before, gap_after : float or None
+        Smallest gap between any two vehicles, nominal and enriched; None: no two come near each other. [m]
+    warnings : tuple of str
+    error : str
+        One line; empty if there is an output.
+    """
+
+    output: str
+    scenario: str
+    scenario_hash: str
+    variant: int
+    seed: int
+    profile: str
+    parameters: Mapping[str, str]
+    settings: str
+    package_version: str
+    output_hash: str = ""
+    road: str = ""
+    road_hash: str = ""
+    inputs: Mapping[str, str] = field(default_factory=dict)
+    profiles: Mapping[str, str] = field(default_factory=dict)
+    profile_hashes: Mapping[str, str] = field(default_factory=dict)
+    entities: int = 0
+    enriched: tuple[str, ...] = ()
+    segment_seconds: float = 0.0
+    offset_spread: float = 0.0
+    gap_before: float | None = None
+    gap_after: float | None = None
+    warnings: tuple[str, ...] = ()
+    error: str = ""
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain JSON values."""
+        values = {item.name: getattr(self, item.name) for item in fields(self)}
+        return {
+            name: dict(value) if isinstance(value, Mapping) else list(value) if isinstance(value, tuple) else value
+            for name, value in values.items()
+        }
+
+    @classmethod
+    def from_dict(cls, values: Mapping[str, Any]) -> ManifestRow:
+        """Read what `to_dict` gave; names that are unknown are left out.
+
+        Raises
+        ------
+        TypeError
+            When a value is missing.
+        """
+        names = {item.name for item in fields(cls)}
+        known: dict[str, Any] = {name: value for name, value in values.items() if name in names}
+        known |= {name: tuple(known[name]) for name in ("enriched", "warnings") if name in known}
+        return cls(**known)
+
+
+_MAPPINGS = ("parameters", "inputs", "profiles", "profile_hashes")  # JSON text in the file: every reader takes it
+
+
+def manifest_schema() -> pa.Schema:
+    """Columns of `manifest.parquet`."""
+    import pyarrow as pa
+
+    types = {"variant": pa.int64(), "seed": pa.int64(), "entities": pa.int64()}
+    types |= dict.fromkeys(("segment_seconds", "offset_spread", "gap_before", "gap_after"), pa.float64())
+    types |= dict.fromkeys(("enriched", "warnings"), pa.list_(pa.string()))
+    return pa.schema([(item.name, types.get(item.name, pa.string())) for item in fields(ManifestRow)])
+
+
+def write_manifest(rows: Iterable[ManifestRow], path: Path) -> None:
+    """Write rows in the order given, `ROW_GROUP` at a time; a file that would not change is left alone.
+
+    Raises
+    ------
+    OSError
+        The old manifest is still there.
+    """
+    schema = manifest_schema()
+    _write_table(path, schema, (_packed(row) for row in rows))
+
+
+def read_manifest(path: Path) -> Iterator[ManifestRow]:
+    """Rows of a manifest; none if there is no file.
+
+    Raises
+    ------
+    FormatError
+        When it is no manifest.
+    """
+    for values in _read_table(path):
+        try:
+            unpacked = {name: json.loads(value) if name in _MAPPINGS else value for name, value in values.items()}
+            yield ManifestRow.from_dict(unpacked)
+        except (TypeError, ValueError) as error:
+            raise FormatError(f"not a manifest of this package: {error}", path=path) from error
+
+
+def write_timings(seconds: Iterable[tuple[str, float]], path: Path) -> None:
+    """Write what each output took: columns `output`, `seconds`."""
+    import pyarrow as pa
+
+    schema = pa.schema([("output", pa.string()), ("seconds", pa.float64())])
+    _write_table(path, schema, ({"output": output, "seconds": took} for output, took in seconds))
+
+
+def read_timings(path: Path) -> dict[str, float]:
+    """Seconds per output; empty if there is no file."""
+    return {str(values["output"]): float(values["seconds"]) for values in _read_table(path)}
+
+
+def _packed(row: ManifestRow) -> dict[str, Any]:
+    values = row.to_dict()
+    return values | {name: json.dumps(values[name], sort_keys=True, ensure_ascii=False) for name in _MAPPINGS}
+
+
+def _write_table(path: Path, schema: pa.Schema, rows: Iterator[dict[str, Any]]) -> None:
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    buffer = BytesIO()
+    with pq.ParquetWriter(buffer, schema, compression="zstd") as writer:
+        while group := list(islice(rows, ROW_GROUP)):
+            writer.write_table(pa.Table.from_pylist(group, schema=schema))
+    data = buffer.getvalue()
+    if not path.exists() or path.read_bytes() != data:
+        write_whole(path, data)
+
+
+def _read_table(path: Path) -> Iterator[dict[str, Any]]:
+    if not path.exists():
+        return
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    try:
+        with pq.ParquetFile(path) as file:
+            for batch in file.iter_batches(ROW_GROUP):
+                yield from batch.to_pylist()
+    except (pa.ArrowInvalid, KeyError) as error:
+        raise FormatError(f"can't be read as Parquet: {error}", path=path) from error

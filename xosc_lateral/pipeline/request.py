@@ -1,0 +1,250 @@
+"""What a batch is asked for: files, folders, globs and tables, as one list of scenarios with their settings."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from enum import Enum
+from pathlib import Path
+from typing import IO, TYPE_CHECKING, Any
+
+from lxml import etree
+
+from xosc_lateral.errors import FormatError
+from xosc_lateral.formats.openscenario.element import local_name
+from xosc_lateral.pipeline.manifest import MANIFEST
+from xosc_lateral.pipeline.settings import ConvertSettings
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+SCENARIO_SUFFIX = ".xosc"
+TABLE_SUFFIXES = (".csv", ".csv.gz", ".parquet")
+TABLE_COLUMNS = ("scenario", "profile", "seed", "variants", "parameters", "only")
+"""Columns of a table of scenarios; further ones are ``profile:ENTITY`` and ``parameter:NAME``."""
+
+_GLOB_CHARACTERS = frozenset("*?[")
+
+
+class DocumentKind(Enum):
+    """What an OpenSCENARIO file holds."""
+
+    SCENARIO = "scenario"
+    CATALOG = "catalog"
+    DISTRIBUTION = "parameter value distribution"
+
+
+_KINDS = {"Catalog": DocumentKind.CATALOG, "ParameterValueDistribution": DocumentKind.DISTRIBUTION}
+_SCENARIO_PARTS = frozenset({"CatalogLocations", "RoadNetwork", "Entities", "Storyboard"})
+
+
+@dataclass(frozen=True, slots=True)
+class Request:
+    """One scenario to convert.
+
+    Parameters
+    ----------
+    scenario : Path
+        A scenario, or a parameter value distribution that stands for several.
+    settings : ConvertSettings
+    variants : int
+        Outputs per scenario, each with offsets of its own.
+    base : Path or None
+        Folder whose layout below the output tree mirrors; None: the scenario's own.
+    listed : bool
+        Named one by one. What was merely found in a folder is left out if it is a catalog.
+    """
+
+    scenario: Path
+    settings: ConvertSettings = field(default_factory=ConvertSettings)
+    variants: int = 1
+    base: Path | None = None
+    listed: bool = True
+
+
+def find_requests(
+    inputs: Sequence[str | Path], settings: ConvertSettings, *, variants: int = 1, leave_out: Path | None = None
+) -> Iterator[Request]:
+    """Scenarios that files, folders, globs and tables name.
+
+    Parameters
+    ----------
+    inputs : sequence of str or Path
+        A ``.xosc`` file, a folder (searched to the bottom), a glob (``db/**/cut*.xosc``) or a table
+        (CSV, Parquet; see `read_request_table`).
+    settings : ConvertSettings
+        For all of them; a table's columns go before it.
+    variants : int
+    leave_out : Path, optional
+        Folder that is not searched: the output's.
+
+    Raises
+    ------
+    FormatError
+        An input that is not there, a glob that matches nothing, a table that can't be read.
+    """
+    for given in inputs:
+        path = Path(given)
+        if path.is_dir():
+            for found in _search(path, leave_out):
+                yield Request(found, settings, variants, path, listed=False)
+        elif path.is_file() and path.name.lower().endswith(TABLE_SUFFIXES):
+            yield from read_request_table(path, settings, variants=variants)
+        elif path.is_file():
+            yield Request(path, settings, variants)
+        elif _GLOB_CHARACTERS & set(str(given)):
+            yield from _matches(str(given), settings, variants, leave_out)
+        else:
+            raise FormatError("no such file or folder", path=given)
+
+
+def read_request_table(path: Path, settings: ConvertSettings, *, variants: int = 1) -> Iterator[Request]:
+    """Scenarios of a table, one a row.
+
+    Columns: ``scenario`` (path, from the table's folder), and if wanted ``profile``, ``profile:ENTITY``, ``seed``,
+    ``variants``, ``only`` (entities, separated by semicolons), ``parameter:NAME`` and ``parameters`` (JSON object). An
+    empty cell leaves what `settings` says. Other columns are for the user: tags, owners.
+
+    Raises
+    ------
+    FormatError
+        With the line of the table (the header is line 1).
+    """
+    table = _read_text_table(path)
+    if "scenario" not in table.columns:
+        known = ", ".join(map(str, table.columns[:12]))
+        raise FormatError(f"no column 'scenario'; there are {known}", path=path, line=1)
+    folder = path.parent
+    for number, row in enumerate(table.to_dict("records"), start=2):
+        cells = {str(name): text for name, value in row.items() if (text := str(value).strip())}
+        try:
+            scenario = cells.pop("scenario", "")
+            if not scenario:
+                raise ValueError("no scenario")
+            rows_variants = _whole_number(cells, "variants", variants, smallest=1)
+            row_settings = _row_settings(cells, settings, folder)
+        except ValueError as error:
+            raise FormatError(str(error), path=path, line=number) from error
+        yield Request(folder / scenario, row_settings, rows_variants, folder)
+
+
+def document_kind(path: Path) -> DocumentKind:
+    """What a file holds, from its first elements; what can't be read counts as a scenario (its reader says why)."""
+    try:
+        with path.open("rb") as file:
+            return _kind_from(file)
+    except (etree.XMLSyntaxError, OSError):
+        return DocumentKind.SCENARIO
+
+
+def _kind_from(file: IO[bytes]) -> DocumentKind:
+    events = etree.iterparse(
+        file, events=("start",), resolve_entities=False, no_network=True, load_dtd=False, remove_comments=True
+    )
+    for _, element in events:
+        parent = element.getparent()
+        if parent is not None and parent.getparent() is None and isinstance(element.tag, str):
+            name = local_name(element)
+            if name in _KINDS or name in _SCENARIO_PARTS:
+                return _KINDS.get(name, DocumentKind.SCENARIO)
+    return DocumentKind.SCENARIO
+
+
+def _search(folder: Path, leave_out: Path | None) -> Iterator[Path]:
+    """Scenario files below a folder, sorted; hidden folders, output trees of former batches and `leave_out` aside."""
+    avoided = None if leave_out is None else leave_out.resolve()
+    for name, folders, files in os.walk(folder):
+        here = Path(name)
+        folders[:] = sorted(
+            inner
+            for inner in folders
+            if not inner.startswith(".")
+            and (here / inner).resolve() != avoided
+            and not (here / inner / MANIFEST).exists()
+        )
+        for file in sorted(files):
+            if file.lower().endswith(SCENARIO_SUFFIX) and not file.startswith("."):
+                yield here / file
+
+
+def _matches(pattern: str, settings: ConvertSettings, variants: int, leave_out: Path | None) -> Iterator[Request]:
+    parts = Path(pattern).parts
+    wild = next(index for index, part in enumerate(parts) if _GLOB_CHARACTERS & set(part))
+    base = Path(*parts[:wild]) if wild else Path()
+    found = sorted(base.glob(str(Path(*parts[wild:]))))
+    if not found:
+        raise FormatError("nothing matches", path=pattern)
+    avoided = None if leave_out is None else leave_out.resolve()
+    for path in found:
+        if path.is_file() and (avoided is None or avoided not in path.resolve().parents):
+            yield Request(path, settings, variants, base, listed=False)
+
+
+def _read_text_table(path: Path) -> pd.DataFrame:
+    """All cells as text, missing ones empty."""
+    import pandas as pd
+
+    try:
+        if path.name.lower().endswith(".parquet"):
+            table = pd.read_parquet(path)
+            return pd.DataFrame({str(name): [_as_text(value) for value in table[name]] for name in table.columns})
+        return pd.read_csv(path, dtype=str, keep_default_na=False, encoding="utf-8-sig", sep=None, engine="python")
+    except (ValueError, pd.errors.ParserError, UnicodeDecodeError) as error:
+        raise FormatError(f"can't be read as a table: {error}", path=path) from error
+
+
+def _as_text(value: object) -> str:
+    if value is None or value != value or type(value).__name__ in ("NAType", "NaTType"):
+        return ""
+    if isinstance(value, float) and value.is_integer():
+        return str(int(value))  # a column of whole numbers with a missing one comes as floats
+    return json.dumps(value) if isinstance(value, dict | list) else str(value)
+
+
+def _row_settings(cells: Mapping[str, str], settings: ConvertSettings, folder: Path) -> ConvertSettings:
+    profiles, parameters = dict(settings.entity_profiles), dict(settings.parameters)
+    parameters.update(_json_object(cells.get("parameters", "{}")))
+    for name, text in cells.items():
+        kind, colon, rest = name.partition(":")
+        if colon and kind == "profile":
+            profiles[rest] = _profile(text, folder)
+        elif colon and kind == "parameter":
+            parameters[rest] = text
+    only = cells.get("only")
+    return replace(
+        settings,
+        profile=_profile(cells["profile"], folder) if "profile" in cells else settings.profile,
+        entity_profiles=profiles,
+        parameters=parameters,
+        seed=_whole_number(cells, "seed", settings.seed, smallest=0),
+        only=settings.only if only is None else frozenset(name.strip() for name in only.split(";") if name.strip()),
+    )
+
+
+def _profile(text: str, folder: Path) -> str:
+    """A profile's name as it is; a path from the table's folder."""
+    return str(folder / text) if text.endswith(".json") or "/" in text or "\\" in text else text
+
+
+def _whole_number(cells: Mapping[str, str], name: str, otherwise: int, *, smallest: int) -> int:
+    if name not in cells:
+        return otherwise
+    try:
+        number = int(cells[name])
+    except ValueError as error:
+        raise ValueError(f"{name} {cells[name]!r} is no whole number") from error
+    if number < smallest:
+        raise ValueError(f"{name} {number}, at least {smallest}")
+    return number
+
+
+def _json_object(text: str) -> dict[str, str]:
+    try:
+        values: Any = json.loads(text)
+    except ValueError as error:
+        raise ValueError(f"parameters {text!r} is no JSON object: {error}") from error
+    if not isinstance(values, dict):
+        raise ValueError(f"parameters {text!r} is no JSON object")
+    return {str(name): value if isinstance(value, str) else json.dumps(value) for name, value in values.items()}

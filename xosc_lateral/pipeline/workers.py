@@ -1,0 +1,307 @@
+"""Where jobs run: in this process, on this machine's cores (joblib's executor), on a dask.distributed cluster.
+
+All three are `concurrent.futures` executors, so the loop that feeds them is the same. joblib's `Parallel` is not in
+between because it ends, and on dask waits for ever, when one task takes its worker down; here that costs one row.
+"""
+
+from __future__ import annotations
+
+import os
+import threading
+import time
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, CancelledError, Executor, Future, wait
+from contextlib import AbstractContextManager
+from types import TracebackType
+from typing import Any, Protocol, Self, TypeVar
+
+from xosc_lateral.errors import XoscLateralError
+
+Task = TypeVar("Task")
+Answer = TypeVar("Answer")
+
+AHEAD = 2
+"""Tasks handed out per worker: one at work, one to begin with at once."""
+
+TRIES_ALONE = 2
+"""Tries of a task that may have killed its worker; more than one, for a worker may be killed from outside as well."""
+
+CONNECT_TIMEOUT = 10.0
+"""A scheduler that has not answered after this is not there. [s]"""
+
+PARENT_CHECK = 0.5
+"""How often a worker looks whether its run is still there. [s]"""
+
+
+class ClusterError(XoscLateralError):
+    """The cluster can't be reached, or is gone."""
+
+
+class WorkerDiedError(XoscLateralError):
+    """A task took down its worker, time and again."""
+
+
+class Pool(AbstractContextManager["Pool"], Protocol):
+    """Workers; use as a context."""
+
+    def capacity(self) -> int:
+        """How many tasks may be handed out at once."""
+        ...
+
+    def submit(self, work: Callable[[Task], Answer], task: Task) -> Future[Answer]:
+        """Hand out a task."""
+        ...
+
+    def recover(self) -> None:
+        """Get fit again after a worker died; raises `ClusterError` if that can't be."""
+        ...
+
+    def lost(self, error: BaseException) -> bool:
+        """Whether a future's error means that its worker died, rather than that the task raised it."""
+        ...
+
+
+def run_tasks(
+    pool: Pool, work: Callable[[Task], Answer], tasks: Iterable[Task]
+) -> Iterator[tuple[Task, Answer | WorkerDiedError]]:
+    """Answers as they come, in any order.
+
+    When a worker dies, whatever had been handed out is tried again, one by one: what kills its worker then as well is
+    the culprit and is answered by a `WorkerDiedError`; the rest is fine.
+
+    Raises
+    ------
+    ClusterError
+        When the cluster is gone.
+    Exception
+        What `work` raises.
+    """
+    waiting = iter(tasks)
+    running: dict[Future[Answer], Task] = {}
+    suspects: list[Task] = []
+    while True:
+        if not suspects:
+            suspects += _feed(pool, work, waiting, running)
+        if not running:
+            if not suspects:
+                return
+            pool.recover()
+            while suspects:
+                task = suspects.pop(0)
+                yield task, _alone(pool, work, task)
+            continue
+        for future in wait(running, return_when=FIRST_COMPLETED).done:
+            task = running.pop(future)
+            try:
+                answer = future.result()
+            except (Exception, CancelledError) as error:
+                if not pool.lost(error):
+                    raise
+                suspects.append(task)
+            else:
+                yield task, answer
+
+
+def _feed(
+    pool: Pool, work: Callable[[Task], Answer], waiting: Iterator[Task], running: dict[Future[Answer], Task]
+) -> list[Task]:
+    """Hand out as many as may be; returns the task during whose submission the pool turned out to be broken."""
+    while len(running) < pool.capacity():
+        try:
+            task = next(waiting)
+        except StopIteration:
+            break
+        try:
+            running[pool.submit(work, task)] = task
+        except BrokenExecutor:
+            return [task]
+    return []
+
+
+def _alone(pool: Pool, work: Callable[[Task], Answer], task: Task) -> Answer | WorkerDiedError:
+    for _ in range(TRIES_ALONE):
+        try:
+            return pool.submit(work, task).result()
+        except (Exception, CancelledError) as error:
+            if not pool.lost(error):
+                raise
+            pool.recover()
+    deaths = TRIES_ALONE + 1
+    return WorkerDiedError(f"its worker process died {deaths} times (killed, out of memory, or a crash in a library)")
+
+
+class ThisProcess:
+    """No workers: a task runs when it is handed out."""
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        return None
+
+    def capacity(self) -> int:
+        """One."""
+        return 1
+
+    def submit(self, work: Callable[[Task], Answer], task: Task) -> Future[Answer]:
+        """Run it."""
+        future: Future[Answer] = Future()
+        future.set_result(work(task))
+        return future
+
+    def recover(self) -> None:
+        """Nothing to do: if a task takes this process down, that was it."""
+
+    def lost(self, error: BaseException) -> bool:
+        """Never."""
+        return False
+
+
+class LocalProcesses:
+    """Worker processes of joblib's executor (loky).
+
+    Parameters
+    ----------
+    count : int
+        How many.
+    """
+
+    def __init__(self, count: int) -> None:
+        self._count = count
+        self._executor = self._start()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._executor.shutdown(wait=True, kill_workers=error is not None)
+
+    def capacity(self) -> int:
+        """A few per worker."""
+        return AHEAD * self._count
+
+    def submit(self, work: Callable[[Task], Answer], task: Task) -> Future[Answer]:
+        """Hand out a task."""
+        future: Future[Answer] = self._executor.submit(work, task)
+        return future
+
+    def recover(self) -> None:
+        """Start anew."""
+        self._executor.shutdown(wait=True, kill_workers=True)
+        self._executor = self._start()
+
+    def lost(self, error: BaseException) -> bool:
+        """Whether the pool broke."""
+        return isinstance(error, BrokenExecutor)
+
+    def _start(self) -> Any:
+        from joblib.externals.loky import ProcessPoolExecutor
+
+        # One thread each for numpy's and numba's libraries: as many workers as cores are busy already.
+        threads = dict.fromkeys(
+            ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"), "1"
+        )
+        return ProcessPoolExecutor(
+            max_workers=self._count, env=threads, initializer=_end_with_parent, initargs=(os.getpid(),)
+        )
+
+
+def _end_with_parent(parent: int) -> None:
+    """End this worker soon after the run that it works for, even if that was killed and could not say so."""
+
+    def watch() -> None:
+        while os.getppid() == parent:
+            time.sleep(PARENT_CHECK)
+        os._exit(1)
+
+    threading.Thread(target=watch, daemon=True, name="watch parent").start()
+
+
+class Cluster:
+    """Workers of a running dask.distributed cluster.
+
+    They have to see the same files under the same paths, and have the same version of this package. The scheduler
+    itself gives a dead worker's tasks to another.
+
+    Parameters
+    ----------
+    address : str
+        Of the scheduler, as in ``tcp://10.0.0.1:8786``.
+
+    Raises
+    ------
+    ClusterError
+        The extra ``cluster`` is not installed, or nobody answers.
+    """
+
+    def __init__(self, address: str) -> None:
+        try:
+            import distributed
+        except ImportError as error:
+            raise ClusterError("dask.distributed is not installed: pip install 'xosc-lateral[cluster]'") from error
+        try:
+            library: Any = distributed
+            self._client: Any = library.Client(address, set_as_default=False, timeout=CONNECT_TIMEOUT)
+        except (OSError, ValueError, TimeoutError) as error:
+            raise ClusterError(f"no dask scheduler answers at {address}: {error}") from error
+        self._address = address
+        # pure=False: the key of a task must not come from its arguments, a repeated task has to run again
+        self._executor: Executor = self._client.get_executor(pure=False)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._executor.shutdown(wait=error is None)
+        self._client.close()
+
+    def capacity(self) -> int:
+        """A few per thread of the workers that there are now; workers may come and go."""
+        return AHEAD * max(1, sum(map(int, self._client.nthreads().values())))
+
+    def submit(self, work: Callable[[Task], Answer], task: Task) -> Future[Answer]:
+        """Hand out a task."""
+        self._check()
+        return self._executor.submit(work, task)
+
+    def recover(self) -> None:
+        """The scheduler sees to it, if it is still there."""
+        self._check()
+
+    def lost(self, error: BaseException) -> bool:
+        """Whether the scheduler has given the task up, or is gone."""
+        from distributed import KilledWorker
+
+        self._check()
+        return isinstance(error, KilledWorker | CancelledError)
+
+    def _check(self) -> None:
+        if self._client.status != "running":
+            raise ClusterError(f"the dask scheduler at {self._address} is gone; what is finished is kept, run it again")
+
+
+def open_pool(workers: int, cluster: str | None) -> Pool:
+    """Pool for so many processes on this machine (-1: one per core), or for a cluster.
+
+    Raises
+    ------
+    ClusterError
+        The cluster can't be reached.
+    ValueError
+        No workers at all.
+    """
+    if cluster is not None:
+        return Cluster(cluster)
+    if workers == -1:
+        import joblib
+
+        workers = joblib.cpu_count()
+    if workers < 1:
+        raise ValueError(f"{workers} workers; at least 1, or -1 for one per core")
+    return ThisProcess() if workers == 1 else LocalProcesses(workers)
