@@ -55,8 +55,8 @@ def _read_selections(owner: Element, entities: list[Entity], context: Context) -
     return selections
 
 
-def _read_object(item: Element, context: Context) -> list[Entity]:
-    name = item.text("name")
+def _read_object(item: Element, context: Context, name: str | None = None) -> list[Entity]:
+    name = item.text("name") if name is None else name
     if not name:
         item.fail("attribute 'name' is empty")
     content = item.child(*CATEGORIES, "CatalogReference")
@@ -69,7 +69,7 @@ def _read_object(item: Element, context: Context) -> list[Entity]:
     category = CATEGORIES.get(content.tag)
     if category is None:
         item.fail(f"catalog entry '{content.raw('name')}' is a {content.tag}, which can't be a scenario object")
-    trailer, inner = _read_trailer(content, context)
+    trailer, inner = _read_trailer(content, name, context)
     box = content.child("BoundingBox")
     entity = Entity(
         name=name,
@@ -96,8 +96,12 @@ def _vehicle_category(vehicle: Element) -> VehicleCategory:
     return vehicle.choice("vehicleCategory", VehicleCategory, VehicleCategory.CAR)
 
 
-def _read_trailer(vehicle: Element, context: Context) -> tuple[str | None, list[Entity]]:
-    """Name of the trailer hitched from the start, and the trailer itself when it is described right here."""
+def _read_trailer(vehicle: Element, tractor: str, context: Context) -> tuple[str | None, list[Entity]]:
+    """Name of the trailer hitched from the start, and the trailer itself when it is described right here.
+
+    Catalog entries with a trailer are used several times over, so a trailer can't keep the name that it has there: it is
+    called like its tractor with a ``+``, as in the reference player.
+    """
     owner = vehicle.child("Trailer")
     if owner is None:
         return None, []
@@ -108,7 +112,7 @@ def _read_trailer(vehicle: Element, context: Context) -> tuple[str | None, list[
     if inner is None:
         return None, []
     context.enter(inner)
-    entities = _read_object(inner, context)
+    entities = _read_object(inner, context, f"{tractor}+")
     context.leave()
     return entities[0].name, entities
 
