@@ -14,7 +14,7 @@ PARAMETERS = (
     Number("start_gap", 40.0, 15.0, 120.0, "m", "How far it starts behind the ego vehicle."),
     Number("headway", 0.7, 0.3, 3.0, "s", "Time headway ahead of the ego vehicle at which it starts to cut in."),
     Number("lane_change_time", 4.0, 2.0, 10.0, "s", "Duration of its lane change."),
-    Number("slow_speed", 28.0, 12.0, 45.0, "m/s", "Speed that it slows down to afterwards."),
+    Number("slow_speed", 29.0, 12.0, 45.0, "m/s", "Speed that it slows down to afterwards."),
     Number("deceleration", 2.0, 0.5, 8.0, "m/s2", "How hard it brakes."),
     Number("duration", 45.0, 20.0, 300.0, "s", "End of the scenario."),
 )

@@ -29,6 +29,8 @@ PARAMETERS = (
 )
 
 _REACTION = 0.9  # between two vehicles of a platoon [s]
+_BRAKE_TIME, _SLOW_TIME = 12.0, 5.0  # when the platoon slows down, and for how long [s]
+_BRAKING, _RECOVERING = 1.5, 0.8  # how hard [m/s2]
 
 
 def plot(settings: Settings) -> Plot:
@@ -50,9 +52,11 @@ def plot(settings: Settings) -> Plot:
         """`ahead` is counted in time headways from the ego vehicle."""
         return Actor(name, vehicle, lane, ego_s + ahead * gap * (slow, middle, fast)[lane], f"${names[lane]}")
 
-    brake = speed_action(round(middle - settings.number("slow_down"), 3), rate=1.5)
+    slow_down = settings.number("slow_down")
+    brake = speed_action(round(middle - slow_down, 3), rate=_BRAKING)
+    recover = speed_action("$middle_lane_speed", rate=_RECOVERING)
     catch_up = speed_action("$middle_lane_speed", rate=1.0)
-    recover = speed_action("$middle_lane_speed", rate=0.8)
+    recovered = _BRAKE_TIME + slow_down / _BRAKING + _SLOW_TIME + slow_down / _RECOVERING + 3.0 * _REACTION
     return Plot(
         what="Ten vehicles on three lanes: lane changes, and a platoon that slows down and recovers",
         motorway=motorway,
@@ -69,11 +73,11 @@ def plot(settings: Settings) -> Plot:
             place("FastThird", Vehicle.VAN, 2, -2.6),
         ),
         steps=(
-            Step("MiddleFirst", "FirstBrakes", brake, at_time(12.0)),
+            Step("MiddleFirst", "FirstBrakes", brake, at_time(_BRAKE_TIME)),
             Step("MiddleAhead", "SecondBrakes", brake, after("FirstBrakes", _REACTION, state="startTransition")),
             Step("Ego", "EgoBrakes", brake, after("SecondBrakes", _REACTION, state="startTransition")),
             Step("MiddleBehind", "LastBrakes", brake, after("EgoBrakes", _REACTION, state="startTransition")),
-            Step("MiddleFirst", "FirstRecovers", recover, after("FirstBrakes", 5.0)),
+            Step("MiddleFirst", "FirstRecovers", recover, after("FirstBrakes", _SLOW_TIME)),
             Step("MiddleAhead", "SecondRecovers", recover, after("FirstRecovers", _REACTION, state="startTransition")),
             Step("Ego", "EgoRecovers", recover, after("SecondRecovers", _REACTION, state="startTransition")),
             Step("MiddleBehind", "LastRecovers", recover, after("EgoRecovers", _REACTION, state="startTransition")),
@@ -87,7 +91,7 @@ def plot(settings: Settings) -> Plot:
                 "SlowThird",
                 "SlowPullsOut",
                 lane_change(motorway.lane(1), "$lane_change_time"),
-                headway("SlowThird", "MiddleBehind", "greaterThan", 1.5, not_before=16.0),
+                headway("SlowThird", "MiddleBehind", "greaterThan", 1.5, not_before=recovered),
             ),
             Step("SlowThird", "SlowSpeedsUp", catch_up, after("SlowPullsOut", 0.5, state="startTransition")),
         ),

@@ -20,7 +20,7 @@ PARAMETERS = (
 )
 
 _SPACING = 14.0  # between the reference points of two vehicles in the jam [m]
-_TAIL = 4.0  # from a vehicle's reference point to its rear, or to the next one's front, rounded up [m]
+_EGO, _QUEUE = Vehicle.CAR, (Vehicle.TRUCK, Vehicle.CAR, Vehicle.VAN)
 
 
 def plot(settings: Settings) -> Plot:
@@ -30,7 +30,8 @@ def plot(settings: Settings) -> Plot:
     follow = 2.0 * speed
     ego = 30.0 + follow
     jam = ego + settings.number("jam_distance")
-    braking = (speed - jam_speed) ** 2 / (2.0 * deceleration) + settings.number("jam_gap") + 2.0 * _TAIL
+    stopped = settings.number("jam_gap") + _EGO.front + _QUEUE[0].rear
+    braking = (speed - jam_speed) ** 2 / (2.0 * deceleration) + stopped
     reach = jam + jam_speed * duration + 4.0 * _SPACING + 150.0
     bends = (Straight(250.0), Bend(1500.0, 200.0, 120.0))
     motorway = Motorway(
@@ -40,9 +41,10 @@ def plot(settings: Settings) -> Plot:
         left_hand=is_left_hand(settings),
     )
     brake = speed_action(jam_speed, rate="$deceleration")
-    queue = (Vehicle.TRUCK, Vehicle.CAR, Vehicle.VAN)
     in_jam = tuple(
-        Actor(f"Jam{lane}{number}", queue[(number + lane) % 3], lane, jam + _SPACING * (number + 0.4 * lane), jam_speed)
+        Actor(
+            f"Jam{lane}{number}", _QUEUE[(number + lane) % 3], lane, jam + _SPACING * (number + 0.4 * lane), jam_speed
+        )
         for lane in (0, 1)
         for number in range(3)
     )
@@ -50,7 +52,7 @@ def plot(settings: Settings) -> Plot:
         what="The ego vehicle comes up to the end of a jam and brakes down behind it",
         motorway=motorway,
         actors=(
-            Actor("Ego", Vehicle.CAR, 0, ego, "$speed"),
+            Actor("Ego", _EGO, 0, ego, "$speed"),
             Actor("Follower", Vehicle.CAR, 0, ego - follow, "$speed"),
             *in_jam,
         ),

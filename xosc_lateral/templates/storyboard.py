@@ -25,6 +25,16 @@ class Vehicle(Enum):
     VAN = ("vehicle.mercedes.sprinter", "van", 5.9, 2.0, 2.6, 1.7, 3.7, 50.0, 3.0, 3200.0)
     TRUCK = ("vehicle.carlamotors.european_hgv", "truck", 7.9, 2.5, 3.5, 2.6, 5.2, 28.0, 1.5, 18000.0)
 
+    @property
+    def front(self) -> float:
+        """From the reference point to the front. [m]"""
+        return float(self.value[5] + 0.5 * self.value[2])
+
+    @property
+    def rear(self) -> float:
+        """From the reference point back to the rear. [m]"""
+        return float(0.5 * self.value[2] - self.value[5])
+
     def definition(self, *, is_ego: bool) -> Any:
         """Inline `Vehicle` element; the reference point is the middle of the rear axle."""
         from scenariogeneration import xosc
