@@ -1,6 +1,20 @@
 """Writing scenarios: trajectories in place of maneuvers, or lane offsets on top of them."""
 
 from xosc_lateral.formats.openscenario.provenance import provenance_of, refuse_converted
-from xosc_lateral.formats.openscenario.write.trajectory_scenario import WrittenScenario, write_trajectory_scenario
+from xosc_lateral.formats.openscenario.write.lane_offset_scenario import (
+    OffsetChain,
+    offset_chain,
+    write_lane_offset_scenario,
+)
+from xosc_lateral.formats.openscenario.write.result import WrittenScenario
+from xosc_lateral.formats.openscenario.write.trajectory_scenario import write_trajectory_scenario
 
-__all__ = ["WrittenScenario", "provenance_of", "refuse_converted", "write_trajectory_scenario"]
+__all__ = [
+    "OffsetChain",
+    "WrittenScenario",
+    "offset_chain",
+    "provenance_of",
+    "refuse_converted",
+    "write_lane_offset_scenario",
+    "write_trajectory_scenario",
+]

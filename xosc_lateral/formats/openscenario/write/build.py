@@ -79,6 +79,19 @@ def time_trigger(owner: etree._Element, tag: str, moment: float, version: Versio
     return trigger
 
 
+def state_condition(group: etree._Element, kind: str, reference: str, state: str, delay: float) -> None:
+    """Add a condition on the state of a storyboard element."""
+    name = f"{state} after {decimal(delay, 3)}"
+    condition = sub(group, "Condition", name=name, delay=decimal(delay, 6), conditionEdge="none")
+    sub(
+        sub(condition, "ByValueCondition"),
+        "StoryboardElementStateCondition",
+        storyboardElementType=kind,
+        storyboardElementRef=reference,
+        state=state,
+    )
+
+
 def speed_step(owner: etree._Element, speed: float) -> None:
     """Speed at once, as the content of a private action."""
     action = sub(sub(owner, "LongitudinalAction"), "SpeedAction")

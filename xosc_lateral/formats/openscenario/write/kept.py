@@ -10,6 +10,7 @@ from lxml import etree
 
 from xosc_lateral.formats.openscenario.element import at_node, local_name
 from xosc_lateral.formats.openscenario.write import build
+from xosc_lateral.formats.openscenario.write.parameters import final
 from xosc_lateral.formats.xml import read_xml
 from xosc_lateral.motion.nominal import PlayedAction
 from xosc_lateral.scenario import Action, Scenario
@@ -128,13 +129,15 @@ def _copied(action: Action, scenario: Scenario, root: etree._Element, scope: Sco
     element.tail = None
     if not action.scope:
         return element
-    # Values are final: a `$` in them is text.
-    final = {name: f"\\{value}" if value.startswith("$") else value for name, value in action.scope.items()}
-    local = Scope(final, scope)
+    local = Scope({name: final(value) for name, value in action.scope.items()}, scope)
     for item in element.iter("{*}*"):  # no comments
         for attribute, value in item.attrib.items():
             text = str(value)
-            if text.startswith("$") and attribute not in ("parameterRef", "variableRef") and _mentions(text, final):
+            if (
+                text.startswith("$")
+                and attribute not in ("parameterRef", "variableRef")
+                and _mentions(text, action.scope)
+            ):
                 try:
                     item.set(attribute, local.fill(text))
                 except ExpressionError:

@@ -85,12 +85,14 @@ def vertex_times(time: FloatArray, x: FloatArray, y: FloatArray) -> FloatArray:
     # Strictly increasing distance, so that it can be turned into time where the entity creeps.
     way = way + np.arange(len(way)) * 1e-12
     tail = _tail(time, way)
-    head = _head(time, way, tail[0])
-    while len(head) > 1 and _way_at(tail[0], time, way) - _way_at(head[-1], time, way) < LEAST_SPACING:
-        head.pop()
-    times = np.array([*head, *tail])
-    if _way_at(times[1], time, way) - _way_at(times[0], time, way) < LEAST_SPACING:
-        times = np.delete(times, 1)
+    if _way_at(tail[0], time, way) < 2.0 * VERTEX_SPACING and len(tail) > 1:
+        # Slow from end to end: evenly, so that no gap is left over.
+        times = np.interp(np.linspace(0.0, way[-1], int(way[-1] / VERTEX_SPACING) + 1), way, time)
+    else:
+        head = _head(time, way, tail[0])
+        while len(head) > 1 and _way_at(tail[0], time, way) - _way_at(head[-1], time, way) < LEAST_SPACING:
+            head.pop()
+        times = np.array([*head, *tail])
     for _ in range(REFINEMENTS):
         refined = _refined(times, time, x, y, way)
         if len(refined) == len(times):

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -26,7 +25,9 @@ from xosc_lateral.formats.openscenario.write.kept import (
     is_replaced,
 )
 from xosc_lateral.formats.openscenario.write.moves import Move, cut_moves, vertex_times
+from xosc_lateral.formats.openscenario.write.parameters import global_scope, override_parameters
 from xosc_lateral.formats.openscenario.write.relocate import relocate
+from xosc_lateral.formats.openscenario.write.result import WrittenScenario
 from xosc_lateral.formats.xml import parse_xml
 from xosc_lateral.motion.nominal import Activity, EntityMotion, NominalMotion, PlayedAction
 from xosc_lateral.motion.trajectory import Trajectory
@@ -42,27 +43,6 @@ FloatArray = NDArray[np.float64]
 STORY = "xosc-lateral"
 STOP_TRIGGER = "stop trigger"
 """`NominalMotion.ended_by` of a run that the scenario itself ended."""
-
-
-@dataclass(frozen=True, slots=True)
-class WrittenScenario:
-    """What was written.
-
-    Parameters
-    ----------
-    path : Path
-    sha256 : str
-        Of the file's bytes.
-    converted : tuple of str
-        Entities that follow trajectories now.
-    removed : tuple of Unsupported
-        Controllers and actions that are no longer in the file although they are no motion, with reasons.
-    """
-
-    path: Path
-    sha256: str
-    converted: tuple[str, ...]
-    removed: tuple[Unsupported, ...]
 
 
 def write_trajectory_scenario(
@@ -104,7 +84,7 @@ def write_trajectory_scenario(
     root = parse_xml(scenario.source, scenario.path)
     untouched = parse_xml(scenario.source, scenario.path)
     refuse_converted(root, scenario.path)
-    scope = Scope({name: _final(parameter.value) for name, parameter in scenario.parameters.items()})
+    scope = global_scope(scenario)
     pulled = _trailers(scenario, motion)
     moving = {
         entity.name: _Moving(entity, trajectories[entity.name], motion)
@@ -117,7 +97,7 @@ def write_trajectory_scenario(
     rewrite_init(root, scenario, starts)
     _replace_stories(root, scenario, motion, moving, untouched, scope)
     _replace_stop_trigger(root, scenario, motion)
-    _override_parameters(root, scenario)
+    override_parameters(root, scenario)
     relocate(root, scenario, output, scope)
     mark(root, provenance, summary)
     data = build.document(root)
@@ -326,23 +306,8 @@ def _dropped(scenario: Scenario, motion: NominalMotion, moving: Mapping[str, _Mo
     return list(found.values())
 
 
-def _override_parameters(root: etree._Element, scenario: Scenario) -> None:
-    """Write the values that parameters were played with, where they are not the file's own."""
-    owner = next((element for element in root if local_name(element) == "ParameterDeclarations"), None)
-    declarations = [] if owner is None else [element for element in owner if isinstance(element.tag, str)]
-    own = Scope({(element.get("name") or "").lstrip("$"): element.get("value") or "" for element in declarations})
-    for element in declarations:
-        parameter = scenario.parameters.get((element.get("name") or "").lstrip("$"))
-        if parameter is not None and own.value(parameter.name) != parameter.value:
-            element.set("value", parameter.value)
-
-
 def _child(parent: etree._Element, tag: str) -> etree._Element:
     return next(element for element in parent if isinstance(element.tag, str) and local_name(element) == tag)
-
-
-def _final(value: str) -> str:
-    return f"\\{value}" if value.startswith("$") else value
 
 
 def _wrapped(angle: FloatArray) -> FloatArray:

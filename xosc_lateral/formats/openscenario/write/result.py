@@ -1,0 +1,29 @@
+"""What a writer hands back."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from xosc_lateral.scenario.place import Unsupported
+
+
+@dataclass(frozen=True, slots=True)
+class WrittenScenario:
+    """What was written.
+
+    Parameters
+    ----------
+    path : Path
+    sha256 : str
+        Of the file's bytes.
+    converted : tuple of str
+        Entities that move otherwise than in the input.
+    removed : tuple of Unsupported
+        Controllers and actions that are no longer in the file although they are no motion, with reasons.
+    """
+
+    path: Path
+    sha256: str
+    converted: tuple[str, ...]
+    removed: tuple[Unsupported, ...]
