@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from math import cos, hypot, pi, sin, sqrt
 from pathlib import Path
 
@@ -56,7 +57,7 @@ def test_a_clothoid_agrees_with_fresnel_integrals_and_with_quadrature(k0, k1, le
     s = share * length
     x, y, heading = Spiral.of(0.0, 0.0, 0.0, length, k0, k1).at(s)
     k = k0 + share * (k1 - k0)
-    # scipy's Fresnel integrals are true to 1e-15 of a scale of 280 m, and two of them are subtracted far from the origin
+    # scipy's Fresnel integrals are true to 1e-15 of a scale of 280 m, and two of them are subtracted
     expected = clothoid_end(k0, k, s)
     assert hypot(x - expected.real, y - expected.imag) < 1e-10
     node, weight = np.polynomial.legendre.leggauss(200)
@@ -90,7 +91,7 @@ def test_the_power_series_obeys_the_differential_equation():
 
 def test_pieces_join_and_turn_little():
     pieces = clothoid_pieces(0.0, 0.0, 0.0, 100.0, 0.3, -0.003)
-    for before, after in zip(pieces[:-1], pieces[1:], strict=True):
+    for before, after in pairwise(pieces):
         ends = []
         for piece, s in ((before, before.end), (after, after.start)):
             u = s - piece.middle

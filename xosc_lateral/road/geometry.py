@@ -7,14 +7,17 @@ is continued. Arrays of places are evaluated in `reference_line` from the same p
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import atan2, ceil, cos, hypot, sin
+from math import atan2, ceil, cos, hypot, sin, sqrt
 from typing import Protocol
 
 TURN_PER_PIECE = 0.5
 """A clothoid is expanded in power series over pieces that turn at most by this. [rad]"""
 
-SERIES_TERMS = 11
-"""With half a piece turning by 0.25 rad, the first term left out is below 0.25^11 / 11! = 6e-15 of the length."""
+BEND_PER_PIECE = 0.02
+"""... and the change of curvature turns each half of a piece by at most this. [rad]"""
+
+SERIES_TERMS = 13
+"""The first tangent terms left out, (0.25)^13 / 13! and 0.25 (0.02)^6 / 6!, are below 3e-14."""
 
 MAX_TURN = 2000.0
 """An element that turns more than this is refused by the reader. [rad]"""
@@ -64,7 +67,7 @@ def clothoid_pieces(
     where the curvature does not change, and needs no division by its change.
     """
     turn = max(abs(curvature), abs(curvature + sharpness * length)) * length
-    n = max(1, ceil(turn / TURN_PER_PIECE))
+    n = max(1, ceil(turn / TURN_PER_PIECE), ceil(length * sqrt(abs(sharpness) / (8.0 * BEND_PER_PIECE))))
     step = length / n
     pieces = []
     at = complex(x, y)
@@ -182,10 +185,10 @@ class Spiral:
         i = int(ds * self.pieces_per_metre)
         part = self.parts[0 if i < 0 else i if i < len(self.parts) else -1]
         u = ds - part.middle
-        x0, x1, x2, x3, x4, x5, x6, x7, x8, x9, x10, x11 = part.x_series
-        y0, y1, y2, y3, y4, y5, y6, y7, y8, y9, y10, y11 = part.y_series
-        x = x6 + u * (x7 + u * (x8 + u * (x9 + u * (x10 + u * x11))))
-        y = y6 + u * (y7 + u * (y8 + u * (y9 + u * (y10 + u * y11))))
+        x0, x1, x2, x3, x4, x5, x6, x7, x8, x9, x10, x11, x12, x13 = part.x_series
+        y0, y1, y2, y3, y4, y5, y6, y7, y8, y9, y10, y11, y12, y13 = part.y_series
+        x = x6 + u * (x7 + u * (x8 + u * (x9 + u * (x10 + u * (x11 + u * (x12 + u * x13))))))
+        y = y6 + u * (y7 + u * (y8 + u * (y9 + u * (y10 + u * (y11 + u * (y12 + u * y13))))))
         return (
             x0 + u * (x1 + u * (x2 + u * (x3 + u * (x4 + u * (x5 + u * x))))),
             y0 + u * (y1 + u * (y2 + u * (y3 + u * (y4 + u * (y5 + u * y))))),

@@ -29,6 +29,9 @@ WRONG_WAY = 2.0
 SAME_LEVEL = 1.0
 """Height differences below this tell nothing when z is known. [m]"""
 
+TOUCHING = 1e-6
+"""A point no further off than this is on the lane that it was expected on. [m]"""
+
 BRUTE_FORCE = 4_000_000
 """Up to so many pairs of points and samples, plain distances beat building a tree."""
 
@@ -249,7 +252,7 @@ class SurfaceIndex:
         known = np.flatnonzero(roads >= 0)
         self._score(best, known, roads[known], flat[2][known], flat[0][known], flat[1][known], None, None, types)
         # Driven off the road that it was on, onto the next one: look again, without prejudice.
-        lost = np.flatnonzero(~(best.distance <= 0.0))
+        lost = np.flatnonzero(best.distance > TOUCHING)
         if len(lost):
             found = self._candidates(flat[0][lost], flat[1][lost], None, types)
             point = lost[found.point]
@@ -271,7 +274,7 @@ class SurfaceIndex:
             road = self._tables.roads[near[0]]
             s, t, ahead = project_at(road, x, y, near[1])
             here = lane_at(road, near[0], s, t, lane_types)
-            if ahead == 0.0 and here.distance <= 0.0 and here.lane != 0:
+            if abs(ahead) <= TOUCHING and here.distance <= TOUCHING and here.lane != 0:
                 return here
         best = self.world_to_lane(x, y, z, heading, near=None, lane_types=lane_types)
         return LanePosition(

@@ -32,7 +32,7 @@ def read_sections(
     written = _read_all(road, length, source)
     directions = _directions(road, written, rule, source)
     sections = []
-    for i, (start, lanes, marks) in enumerate(_merge_sides(written)):
+    for i, (start, lanes, marks) in enumerate(_merge_sides(written, length)):
         end = written[i + 1].start if i + 1 < len(written) else length
         sections.append(
             build_section(
@@ -157,7 +157,9 @@ def _directions(road: XmlElement, written: Sequence[_Written], rule: str, source
     return directions
 
 
-def _merge_sides(written: Sequence[_Written]) -> list[tuple[float, tuple[LaneRecord, ...], tuple[RoadMark, ...]]]:
+def _merge_sides(
+    written: Sequence[_Written], length: float
+) -> list[tuple[float, tuple[LaneRecord, ...], tuple[RoadMark, ...]]]:
     """Sections that hold both sides: a side that a section leaves out goes on as it was.
 
     The lane of a side that goes on is its own successor at the cut, and hands its real links to its last part.
@@ -180,13 +182,13 @@ def _merge_sides(written: Sequence[_Written]) -> list[tuple[float, tuple[LaneRec
             tuple(_clip(lane, start, end) for lane in (*part["left"], *part["right"])),
             section.centre_marks,
         )
-        for section, part, start, end in zip(written, parts, *_spans(written), strict=True)
+        for section, part, start, end in zip(written, parts, *_spans(written, length), strict=True)
     ]
 
 
-def _spans(written: Sequence[_Written]) -> tuple[list[float], list[float]]:
+def _spans(written: Sequence[_Written], length: float) -> tuple[list[float], list[float]]:
     starts = [section.start for section in written]
-    return starts, [*starts[1:], float("inf")]
+    return starts, [*starts[1:], length]
 
 
 def _clip(lane: LaneRecord, start: float, end: float) -> LaneRecord:
