@@ -18,7 +18,8 @@ def drive(state: EntityState, distance: float) -> None:
     """Move an entity along its lane as far as it goes, lateral offset and relative heading kept.
 
     The way along the reference line follows from the curvature at the START of the step (explicit Euler, as the
-    reference player does it). Without a road there is no lane to follow: the entity stops.
+    reference player does it). Without a road there is no lane to follow: the entity stops; at the end of the road it does
+    so one frame after the first in which it has not moved.
 
     Parameters
     ----------
@@ -30,14 +31,12 @@ def drive(state: EntityState, distance: float) -> None:
     if state.road == NOWHERE:
         state.set_speed(0.0)
         return
-    standing_at_end = state.at_road_end
+    was_stuck = state.stuck
     way = 1 if state.is_forward else -1
     s = state.s
     travel(state, way, along_reference(state.network, state.road, state.lane, s, state.offset_t, distance))
-    if standing_at_end and state.at_road_end and state.s == s:
-        state.set_speed(0.0)
-    else:
-        state.speed_taken = True
+    state.stuck = state.at_road_end and state.s == s
+    state.set_speed(0.0 if was_stuck and state.stuck else state.speed)
 
 
 def along_reference(network: RoadNetwork, road: int, lane: int, s: float, offset_t: float, distance: float) -> float:

@@ -16,7 +16,7 @@ import numpy as np
 from xosc_lateral.errors import PlaybackError
 from xosc_lateral.motion.drive import drive
 from xosc_lateral.motion.nominal import Activity, NominalMotion
-from xosc_lateral.motion.recorder import Rows
+from xosc_lateral.motion.recorder import NO_LANE, Rows
 from xosc_lateral.motion.run import Run
 from xosc_lateral.motion.state import NOWHERE, EntityState
 from xosc_lateral.motion.storyboard import State
@@ -225,10 +225,10 @@ def _since(since: float | None, holds: bool, now: float) -> float | None:
 
 
 def _is_off_road(state: EntityState) -> bool:
-    """Beside all lanes of its road."""
+    """Beside all lanes of its road; lanes of type `none` are no part of it."""
     state.locate()
     if state.road == NOWHERE:
         return False
     lanes = state.network.lanes_at(state.road, state.s)
     t = state.t
-    return not any(abs(t - lane.centre_t) <= 0.5 * lane.width for lane in lanes)
+    return not any(abs(t - lane.centre_t) <= 0.5 * lane.width for lane in lanes if lane.type != NO_LANE)

@@ -12,6 +12,9 @@ from xosc_lateral.motion.nominal import Activity, EntityMotion, FloatArray, IntA
 from xosc_lateral.motion.state import NOWHERE, EntityState
 from xosc_lateral.road import RoadNetwork
 
+NO_LANE = "none"
+"""Lane type of what is beside the road, though the road describes it."""
+
 _UNKNOWN = -2
 """Road of a row whose world pose is known, but whose road coordinates nobody has asked for yet."""
 
@@ -181,7 +184,8 @@ def _beside_road(
     half = 0.5 * network.lane_width(road[suspects], lane[suspects], s[suspects])
     suspects = suspects[np.abs(offset[suspects]) > half + _TOUCH]
     if len(suspects):
-        found = network.world_to_lane(pose[suspects, 0], pose[suspects, 1], lane_types=None)
+        types = {lane.type for r in network.roads for section in r.sections for lane in section.lanes} - {NO_LANE}
+        found = network.world_to_lane(pose[suspects, 0], pose[suspects, 1], lane_types=types)
         beside[suspects] = ~(found.distance <= _TOUCH)
     return beside
 

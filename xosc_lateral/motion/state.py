@@ -84,6 +84,7 @@ class EntityState:
         "speed",
         "speed_taken",
         "standing_since",
+        "stuck",
         "teleported",
         "tow",
         "trailer",
@@ -104,6 +105,8 @@ class EntityState:
         self.section = (0.0, -1.0)
         """Range of s in which the lane id holds; empty: unknown. [m]"""
         self.at_road_end = False
+        self.stuck = False
+        """The default driver could not move it in the frame before: the road had ended."""
         self._free_pose: Pose | None = Pose(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
         self._located = True
         self._pose: Pose | None = None

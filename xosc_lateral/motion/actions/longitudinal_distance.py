@@ -27,14 +27,12 @@ class RunningLongitudinalDistance(RunningAction):
     def prepare(self) -> None:
         """Find the entity to keep the distance to."""
         self._other = self.run.entity(self.content.entity_ref, self.content.place)
-        self._time = 0.0
         self._acceleration = 0.0
         self._ahead = True
         self._kept: float | None = None
 
     def start(self) -> None:
         """Decide on which side of the other entity to stay."""
-        self._time = self.run.time
         self._acceleration = 0.0
         displacement = self.content.displacement
         if displacement in (None, LongitudinalDisplacement.ANY):
@@ -48,7 +46,6 @@ class RunningLongitudinalDistance(RunningAction):
     def step(self, time: float, step: float) -> None:
         """Accelerate towards the wanted distance."""
         state, other = self.state, self._other
-        elapsed, self._time = time - self._time, time
         distance = self._distance()
         if distance is None:
             self.note(f"no way from '{state.name}' to '{other.name}': the distance is not kept")
@@ -62,8 +59,8 @@ class RunningLongitudinalDistance(RunningAction):
             drive(state, rest)
             state.set_speed(other.speed)
             return
-        self._acceleration = self._pull(rest, elapsed)
-        speed = state.speed + self._acceleration * elapsed
+        self._acceleration = self._pull(rest, step)
+        speed = state.speed + self._acceleration * step
         state.set_speed(min(max(speed, -limits.speed), limits.speed))
 
     # ---- in detail ---------------------------------------------------------------------------------------------------
@@ -90,7 +87,7 @@ class RunningLongitudinalDistance(RunningAction):
             amount = abs(self._other.speed) * (self.content.time_gap or 0.0)
         return amount if self._ahead else -amount
 
-    def _pull(self, rest: float, elapsed: float) -> float:
+    def _pull(self, rest: float, step: float) -> float:
         limits = limits_of(self.content.constraints, self.state.entity.performance)
         tension = limits.acceleration if rest < 0.0 else limits.deceleration
         stiffness = STIFFNESS * min(tension, 1e10)
@@ -98,12 +95,12 @@ class RunningLongitudinalDistance(RunningAction):
         wanted = min(max(wanted, -limits.deceleration), limits.acceleration)
         before = self._acceleration
         if wanted < 0.0 and wanted < before:
-            return max(before - _grown(limits.deceleration_rate, elapsed), wanted)
+            return max(before - _grown(limits.deceleration_rate, step), wanted)
         if wanted >= 0.0 and wanted > before:
-            return min(before + _grown(limits.acceleration_rate, elapsed), wanted)
+            return min(before + _grown(limits.acceleration_rate, step), wanted)
         return wanted
 
 
-def _grown(rate: float, elapsed: float) -> float:
+def _grown(rate: float, step: float) -> float:
     """How far an acceleration may change; nothing in no time, even without a limit."""
-    return 0.0 if elapsed <= 0.0 else rate * elapsed
+    return 0.0 if step <= 0.0 else rate * step

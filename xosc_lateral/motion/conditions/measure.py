@@ -24,10 +24,8 @@ class Measured(Protocol):
 
 
 def measure_of(content: Measured) -> tuple[CoordinateSystem, RelativeDistanceType]:
-    """Defaults of the standard (entity frame, euclidian); `alongRoute` of version 1.0 means along the road."""
-    if content.along_route and content.coordinate_system is None and content.distance_type is None:
-        return CoordinateSystem.ROAD, RelativeDistanceType.LONGITUDINAL
-    return (
-        content.coordinate_system or CoordinateSystem.ENTITY,
-        content.distance_type or RelativeDistanceType.EUCLIDIAN,
-    )
+    """Defaults of the standard: entity frame, euclidian. `alongRoute` of version 1.0 names the road, but not which
+    component of the distance; a euclidian one is the same in every frame (so the reference player has it, too).
+    """
+    system = content.coordinate_system or (CoordinateSystem.ROAD if content.along_route else CoordinateSystem.ENTITY)
+    return system, content.distance_type or RelativeDistanceType.EUCLIDIAN
