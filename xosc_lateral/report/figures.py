@@ -114,6 +114,36 @@ def new_figure(
     return figure, axes
 
 
+def new_panels(
+    rows: int, columns: int = 1, *, panel_height: float = 0.75, width: float = FULL_WIDTH, **options: Any
+) -> tuple[Figure, Any]:
+    """Like `new_figure` for many panels with titles above one another: laid out by hand, four times as fast.
+
+    Parameters
+    ----------
+    panel_height : float
+        Of one panel without its title. [inch]
+    """
+    from matplotlib.figure import Figure
+
+    left, right, below, above, between, beside = 0.75, 0.12, 0.5, 0.3, 0.36, 0.55  # [inch]
+    height = above + rows * panel_height + (rows - 1) * between + below
+    panel_width = (width - left - right - (columns - 1) * beside) / columns
+    with figure_style():
+        figure = Figure(figsize=(width, height))
+        figure.set_layout_engine("none")
+        grid = {
+            "left": left / width,
+            "right": 1.0 - right / width,
+            "bottom": below / height,
+            "top": 1.0 - above / height,
+            "hspace": between / panel_height,
+            "wspace": beside / panel_width,
+        }
+        axes = figure.subplots(rows, columns, squeeze=False, gridspec_kw=grid, **options)
+    return figure, axes
+
+
 def figure_markup(figure: Figure, alt: str, *, key: str) -> str:
     """Figure as an inline ``<svg>`` (or a PNG in an ``<img>`` where the SVG would be larger than `LARGEST_SVG`).
 

@@ -12,14 +12,14 @@ from xosc_lateral.enrich.result import Enriched, EntityResult
 from xosc_lateral.motion.gaps import Gap
 from xosc_lateral.motion.nominal import Note
 from xosc_lateral.report import scenario_figures as figures
-from xosc_lateral.report.page import KeyFigure, Page, Tone, format_number
+from xosc_lateral.report.page import KeyFigure, Page, Tone
 from xosc_lateral.report.path_dynamics import COMFORTABLE
 
 if TYPE_CHECKING:
     from xosc_lateral.pipeline.convert import Conversion
 
-MOST_PANELS = 12
-"""Entities with panels of their own; those with the largest offsets come first."""
+MOST_PANELS, MOST_DYNAMICS = 12, 6
+"""Entities with panels of their own, for offsets and for dynamics; those with the largest offsets come first."""
 
 MOST_PAIRS = 20
 """Pairs of vehicles that the gap figure shows, the closest first."""
@@ -112,7 +112,7 @@ def _key_figures(enriched: Enriched) -> list[KeyFigure]:
         after = min(enriched.gaps_after, key=lambda gap: gap.distance)
         before = min((gap.distance for gap in enriched.gaps_before), default=float("nan"))
         tone: Tone = "bad" if enriched.new_contacts else ""
-        note = f"{' and '.join(after.names)}; nominally {format_number(before)} m"
+        note = f"{' and '.join(after.names)}; the smallest one was {before:.2f} m"
         figures_.append(KeyFigure(f"{after.distance:.2f} m", "smallest gap between two vehicles", note, tone))
     return figures_
 
@@ -141,10 +141,11 @@ def _offsets(page: Page, enriched: Enriched) -> None:
     page.section("Offsets", "What was added to the nominal place in the lane, positive to the left of travel.")
     done = [entity for entity in enriched.entities if entity.is_enriched]
     if done:
-        shown = _largest(done)
+        shown = _largest(done, MOST_PANELS)
         page.figure(
             figures.offsets_over_time(enriched, shown),
-            f"Shaded: road-following segments, where offsets are sampled; in between they lead over.{_left_out(done)}",
+            "Shaded: road-following segments, where offsets are sampled; in between they lead over. Left is up."
+            + _left_out(done, MOST_PANELS),
             alt="Offset over time of each enriched entity",
         )
         page.table(
@@ -184,10 +185,10 @@ def _motion(page: Page, enriched: Enriched) -> None:
     if not done:
         return
     page.figure(
-        figures.dynamics_over_time(_largest(done)),
+        figures.dynamics_over_time(_largest(done, MOST_DYNAMICS)),
         f"Blue: enriched; dashed: nominal, which holds what curves and lane changes ask. The band reaches "
         f"{COMFORTABLE} m/s² to both sides of nominal: real drivers seldom leave it while they keep their "
-        f"lane.{_left_out(done)}",
+        f"lane.{_left_out(done, MOST_DYNAMICS)}",
         alt="Lateral acceleration and jerk over time, nominal and enriched",
     )
 
@@ -211,7 +212,10 @@ def _gaps(page: Page, enriched: Enriched) -> None:
         number: "bad" for number, pair in enumerate(pairs) if any(gap and gap.names in touching for gap in pair)
     }
     page.table(
-        [_gap_row(a, b) for a, b in pairs], "Pairs of vehicles; marked: they touch and nominally don't", tones=tones
+        [_gap_row(*pair) for pair in pairs],
+        "Pairs of vehicles; marked: they touch and nominally don't",
+        formats=dict.fromkeys(("nominal [m]", "enriched [m]", "change [m]"), ".2f") | dict.fromkeys(GAP_TIMES, ".1f"),
+        tones=tones,
     )
 
 
@@ -259,12 +263,12 @@ def _not_played(page: Page, notes: Sequence[Note]) -> None:
     page.table(rows, "Left out or changed while playing")
 
 
-def _largest(entities: Sequence[EntityResult]) -> list[EntityResult]:
-    """At most `MOST_PANELS` of them, those with the largest offsets, in their own order."""
-    ranked = sorted(entities, key=lambda entity: -float(np.abs(entity.deviation).max()))[:MOST_PANELS]
+def _largest(entities: Sequence[EntityResult], most: int) -> list[EntityResult]:
+    """At most so many of them, those with the largest offsets, in their own order."""
+    ranked = sorted(entities, key=lambda entity: -float(np.abs(entity.deviation).max()))[:most]
     return [entity for entity in entities if entity in ranked]
 
 
-def _left_out(entities: Sequence[EntityResult]) -> str:
-    more = len(entities) - MOST_PANELS
+def _left_out(entities: Sequence[EntityResult], most: int) -> str:
+    more = len(entities) - most
     return f" {more} more with smaller offsets are left out." if more > 0 else ""

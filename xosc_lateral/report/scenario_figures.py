@@ -23,6 +23,7 @@ from xosc_lateral.report.figures import (
     SHADE,
     figure_style,
     new_figure,
+    new_panels,
 )
 from xosc_lateral.report.path_dynamics import COMFORTABLE, lateral_dynamics
 from xosc_lateral.report.road_drawing import View, draw_from_above, draw_stretched, view_along
@@ -86,7 +87,7 @@ def paths_from_above(enriched: Enriched) -> Figure | None:
 
 def _turned(view: View) -> str:
     degrees = round(float(np.degrees(view.angle)))
-    return f"; east is turned clockwise by {degrees}°" if degrees else ""
+    return f"; world x points {abs(degrees)}° {'down' if degrees > 0 else 'up'} from here" if degrees else ""
 
 
 def _draw_paths(ax: Any, enriched: Enriched, view: View) -> float:
@@ -134,10 +135,10 @@ def paths_stretched(enriched: Enriched, *, most_roads: int = 3) -> Figure | None
             for number, entity in enumerate(enriched.entities)
             if (place := _draw_on_road(ax, enriched, entity, number, road)) is not None
         ]
-        _label_starts(ax, places)
         low, high = _shown_t(enriched, road)
         ax.set_ylim(low, high)
         ax.set_xlim(first - MARGIN, last + MARGIN)
+        _label_starts(ax, places)
         ax.grid(visible=False)
         ax.set_title(f"Road {enriched.network.road_ids[road]}")
         ax.set_ylabel("t [m]")
@@ -170,8 +171,24 @@ def _draw_on_road(
 
 
 def _label_starts(ax: Any, places: Sequence[tuple[float, float, str, str]]) -> None:
-    for s, t, name, color in places:
-        ax.annotate(name, (s, t), (4, 5), textcoords="offset points", fontsize=8, color=color, zorder=6)
+    """Names beside the starts, each a line higher or lower where it would cover another one."""
+    scale_s, scale_t = _points_per_unit(ax)
+    taken: list[tuple[float, float, float]] = []
+    for s, t, name, color in sorted(places):
+        left, width = s * scale_s, 5.0 * len(name) + 6.0
+        for lift in (5, -12, 15, -22, 25, -32):
+            base = t * scale_t + lift
+            if all(left > right or left + width < begin or abs(base - other) > 9.0 for begin, right, other in taken):
+                break
+        taken.append((left, left + width, base))
+        ax.annotate(name, (s, t), (4, lift), textcoords="offset points", fontsize=8, color=color, zorder=6)
+
+
+def _points_per_unit(ax: Any) -> tuple[float, float]:
+    """How many points a metre takes along and across, roughly: margins are not laid out yet."""
+    width, height = (72.0 * part for part in ax.figure.get_size_inches())
+    n_rows = ax.get_subplotspec().get_gridspec().nrows
+    return 0.9 * width / float(np.ptp(ax.get_xlim())), 0.75 * height / n_rows / float(np.ptp(ax.get_ylim()))
 
 
 def _shown_t(enriched: Enriched, road: int) -> tuple[float, float]:
@@ -190,7 +207,7 @@ def _shown_t(enriched: Enriched, road: int) -> tuple[float, float]:
 @figure_style()
 def offsets_over_time(enriched: Enriched, entities: Sequence[EntityResult]) -> Figure:
     """What was added to each entity's nominal offset, road-following segments shaded."""
-    figure, axes = new_figure(len(entities), 1, height=0.6 + 1.15 * len(entities), sharex=True, sharey=True)
+    figure, axes = new_panels(len(entities), sharex=True, sharey=True)
     for ax, entity in zip(axes[:, 0], entities, strict=True):
         rows = _rows(entity.motion)
         for stretch in entity.stretches:
@@ -202,7 +219,7 @@ def offsets_over_time(enriched: Enriched, entities: Sequence[EntityResult]) -> F
         ax.set_title(entity.name)
     reach = max(0.5, 1.1 * max(float(np.abs(entity.deviation).max()) for entity in entities))
     axes[0, 0].set_ylim(-reach, reach)
-    figure.supylabel("offset [m], left is up", fontsize=10)
+    axes[len(entities) // 2, 0].set_ylabel("offset [m]")
     axes[-1, 0].set_xlabel("time [s]")
     return figure
 
@@ -230,7 +247,7 @@ def speeds_over_time(enriched: Enriched) -> Figure:
 @figure_style()
 def dynamics_over_time(entities: Sequence[EntityResult]) -> Figure:
     """Lateral acceleration and jerk of nominal and enriched path; the band is 0.5 m/s2 to both sides of nominal."""
-    figure, axes = new_figure(len(entities), 2, height=0.7 + 1.35 * len(entities), sharex=True, sharey="col")
+    figure, axes = new_panels(len(entities), 2, panel_height=1.0, sharex=True, sharey="col")
     for row, entity in zip(axes, entities, strict=True):
         nominal = lateral_dynamics(entity.motion, _nominal_path(entity))
         made = lateral_dynamics(entity.motion, entity.trajectory)
