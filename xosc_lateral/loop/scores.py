@@ -161,14 +161,14 @@ def score_profile(profile: DriverProfile, runs: Sequence[Run], *, seed: int, cla
     step = profile.model.step
     short = _enough(snippets_of(runs, SNIPPET, step))
     long = snippets_of(runs, LONG_SNIPPET, step)
-    sampled = sample_snippets(profile, runs, short, seed)
+    sampled = sample_snippets(profile, short, seed)
     free = sample_runs(profile, runs, seed + 1)
     widths = [run.lane_width for run in runs]
     offsets = [run.offset for run in runs]
     lags = [round(lag / step) for lag in LAGS]
     long_scores = None
     if len(long) >= MIN_SNIPPETS and len(np.unique(long.group)) >= 2:
-        long_sampled = sample_snippets(profile, runs, long, seed + 2)
+        long_sampled = sample_snippets(profile, long, seed + 2)
         long_scores = score_snippets(long.offset, long_sampled, long.group, seed=seed, seconds=LONG_SNIPPET)
     return ProfileScores(
         profile=profile.name,
@@ -177,7 +177,7 @@ def score_profile(profile: DriverProfile, runs: Sequence[Run], *, seed: int, cla
         hours=sum(map(len, runs)) * step / 3600.0,
         snippets=score_snippets(short.offset, sampled, short.group, seed=seed, seconds=SNIPPET),
         long_snippets=long_scores,
-        evaluations=evaluate_parts(profile, runs, short, sampled, seed=seed + 3),
+        evaluations=evaluate_parts(profile, short, sampled, seed=seed + 3),
         spectrum_real=spectrum(offsets, step),
         spectrum_sampled=spectrum(free, step),
         lags=np.array(LAGS),
@@ -216,10 +216,10 @@ def score_snippets(
 
 
 def evaluate_parts(
-    profile: DriverProfile, runs: Sequence[Run], snippets: Snippets, sampled: FloatArray, *, seed: int
+    profile: DriverProfile, snippets: Snippets, sampled: FloatArray, *, seed: int
 ) -> tuple[PartEvaluation, ...]:
     """Run the paper's four evaluations; (4) takes `sampled`, effects included."""
-    coarse_real, fine_real = _real_parts(runs, snippets)
+    coarse_real, fine_real = _real_parts(snippets)
     coarse, fine = sample_parts(profile, snippets, seed)
     shifted = np.roll(fine_real, round(FINE_SHIFT / profile.model.step), axis=1)
     width = snippets.lane_width
@@ -238,13 +238,12 @@ def evaluate_parts(
     return tuple(results)
 
 
-def _real_parts(runs: Sequence[Run], snippets: Snippets) -> tuple[FloatArray, FloatArray]:
+def _real_parts(snippets: Snippets) -> tuple[FloatArray, FloatArray]:
     """The paper's split of the measured snippets, made on whole runs so that only a run's ends are ends."""
-    split = {int(k): split_levels(runs[k].rel_offset, PAPER_SETTINGS) for k in np.unique(snippets.run)}
-    length = snippets.offset.shape[1]
-    places = list(zip(snippets.run.tolist(), snippets.first.tolist(), strict=True))
-    coarse = np.array([split[k][0][a : a + length] for k, a in places])
-    fine = np.array([split[k][1][a : a + length] for k, a in places])
+    runs = {id(one.run): one.run for one in snippets.items}
+    split = {key: split_levels(run.rel_offset, PAPER_SETTINGS) for key, run in runs.items()}
+    coarse = np.array([split[id(one.run)][0][one.rows] for one in snippets.items])
+    fine = np.array([split[id(one.run)][1][one.rows] for one in snippets.items])
     return coarse, fine
 
 

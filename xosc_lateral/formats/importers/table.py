@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gzip
 import hashlib
 import json
 from collections.abc import Mapping, Sequence
@@ -11,7 +12,10 @@ from typing import TYPE_CHECKING
 
 from xosc_lateral import __version__
 from xosc_lateral.errors import FormatError
+from xosc_lateral.formats.atomic import replace_atomically
+from xosc_lateral.formats.hashes import file_hash
 from xosc_lateral.formats.importers.cuts import KEPT
+from xosc_lateral.formats.output import write_whole
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -83,20 +87,14 @@ def drop_cut(table: pd.DataFrame, keep_cut: bool) -> pd.DataFrame:
 
 def write_imported(imported: Imported, path: Path) -> None:
     """Write Parquet (provenance in its metadata) or CSV (provenance in a file beside it), whole or not at all."""
-    temporary = path.with_name(f".{path.name}.partial")
-    try:
-        if path.suffix == ".parquet":
-            _write_parquet(imported, temporary)
-        elif path.name.endswith((".csv", ".csv.gz")):
-            packing = {"method": "gzip", "mtime": 0} if path.suffix == ".gz" else None
-            imported.table.to_csv(temporary, index=False, compression=packing)
-            beside = path.with_name(path.name + ".provenance.json")
-            beside.write_text(imported.provenance.line() + "\n", encoding="utf-8")
-        else:
-            raise FormatError("a drive table is written as .parquet, .csv or .csv.gz", path=path)
-        temporary.replace(path)
-    finally:
-        temporary.unlink(missing_ok=True)
+    if path.suffix == ".parquet":
+        replace_atomically(path, lambda temporary: _write_parquet(imported, temporary))
+    elif path.name.endswith((".csv", ".csv.gz")):
+        text = imported.table.to_csv(index=False, lineterminator="\n").encode()
+        write_whole(path, gzip.compress(text, mtime=0) if path.suffix == ".gz" else text)
+        write_whole(path.with_name(path.name + ".provenance.json"), imported.provenance.line() + "\n")
+    else:
+        raise FormatError("a drive table is written as .parquet, .csv or .csv.gz", path=path)
 
 
 def _write_parquet(imported: Imported, path: Path) -> None:
@@ -110,13 +108,9 @@ def _write_parquet(imported: Imported, path: Path) -> None:
 
 def hash_files(paths: Sequence[Path]) -> str:
     """SHA-256 of one file's bytes; of several, that of their hashes one after the other."""
-    digests = []
-    for path in paths:
-        with path.open("rb") as stream:
-            digests.append(hashlib.file_digest(stream, "sha256"))
-    if len(digests) == 1:
-        return digests[0].hexdigest()
-    return hashlib.sha256(b"".join(digest.digest() for digest in digests)).hexdigest()
+    if len(paths) == 1:
+        return file_hash(paths[0])
+    return hashlib.sha256("".join(map(file_hash, paths)).encode()).hexdigest()
 
 
 def describe(provenance: Provenance, *, as_json: bool) -> str:
