@@ -99,8 +99,8 @@ def _vehicle_category(vehicle: Element) -> VehicleCategory:
 def _read_trailer(vehicle: Element, tractor: str, context: Context) -> tuple[str | None, list[Entity]]:
     """Name of the trailer hitched from the start, and the trailer itself when it is described right here.
 
-    Catalog entries with a trailer are used several times over, so a trailer can't keep the name that it has there: it is
-    called like its tractor with a ``+``, as in the reference player.
+    Catalog entries with a trailer are used several times over, so a trailer can't keep the name that it has there: it
+    is called like its tractor with a ``+``, as in the reference player.
     """
     owner = vehicle.child("Trailer")
     if owner is None:

@@ -1,9 +1,9 @@
 """Write a scenario that keeps its maneuvers and gets the offsets as lane offset actions on top.
 
 For scenarios that have to stay reactive: triggers look at what happens, an ego under test may drive itself. Each
-stretch of road-following gets an act of its own. It starts when the lateral action before it has ended (or at its time),
-and is stopped by any lateral action of the same entity that has not run yet: a lane change overrules it, whenever it
-comes. Times inside an act count from the act's start where a lateral action starts it.
+stretch of road-following gets an act of its own. It starts when the lateral action before it has ended (or at its
+time), and is stopped by any lateral action of the same entity that has not run yet: a lane change overrules it, whenever
+it comes. Times inside an act count from the act's start where a lateral action starts it.
 """
 
 from __future__ import annotations

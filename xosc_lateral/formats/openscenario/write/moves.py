@@ -94,28 +94,46 @@ def vertex_times(time: FloatArray, x: FloatArray, y: FloatArray) -> FloatArray:
             head.pop()
         times = np.array([*head, *tail])
     for _ in range(REFINEMENTS):
-        refined = _refined(times, time, x, y, way)
-        if len(refined) == len(times):
+        error = _error(times, time, x, y)
+        refined = _refined(times, time, way, error)
+        if _error(refined, time, x, y).max() >= error.max():
             break
         times = refined
     return times
 
 
-def _refined(times: FloatArray, time: FloatArray, x: FloatArray, y: FloatArray, way: FloatArray) -> FloatArray:
-    """With a vertex in every gap that needs one: on the worst row, if that is far enough from its neighbours."""
+def _error(times: FloatArray, time: FloatArray, x: FloatArray, y: FloatArray) -> FloatArray:
+    """How far straight motion between the vertices is from each row. [m]"""
     written_x = np.interp(time, times, np.interp(times, time, x))
     written_y = np.interp(time, times, np.interp(times, time, y))
-    error = np.hypot(x - written_x, y - written_y)
-    gap = np.clip(np.searchsorted(times, time, side="right") - 1, 0, len(times) - 2)
-    at = np.interp(times, time, way)
-    room = np.minimum(way - at[gap], at[gap + 1] - way) >= LEAST_SPACING
-    error[~room] = 0.0
+    return np.hypot(x - written_x, y - written_y)
+
+
+def _refined(times: FloatArray, time: FloatArray, way: FloatArray, error: FloatArray) -> FloatArray:
+    """With a vertex in every gap that needs one, on its worst row; vertices too close to that give way to it."""
+    error = error.copy()
+    # The ends stay: a vertex needs room to them.
+    error[(way < LEAST_SPACING) | (way[-1] - way < LEAST_SPACING)] = 0.0
     candidates = np.flatnonzero(error > TOLERANCE)
     if len(candidates) == 0:
         return times
+    gap = np.searchsorted(times, time, side="right")
     order = candidates[np.lexsort((-error[candidates], gap[candidates]))]
     _, worst = np.unique(gap[order], return_index=True)
-    return np.sort(np.concatenate((times, time[order[worst]])))
+    added = _spaced(order[worst], way)
+    nearest = np.abs(np.interp(times, time, way)[:, None] - way[added][None, :]).min(axis=1)
+    keep = nearest >= LEAST_SPACING
+    keep[[0, -1]] = True
+    return np.sort(np.concatenate((times[keep], time[added])))
+
+
+def _spaced(rows: NDArray[np.intp], way: FloatArray) -> NDArray[np.intp]:
+    """Those rows that are far enough from the one kept before."""
+    kept = [rows[0]]
+    for row in rows[1:]:
+        if way[row] - way[kept[-1]] >= LEAST_SPACING:
+            kept.append(row)
+    return np.array(kept)
 
 
 def _runs(mask: BoolArray) -> list[tuple[int, int]]:
