@@ -2,8 +2,8 @@
 
 For scenarios that have to stay reactive: triggers look at what happens, an ego under test may drive itself. Each
 stretch of road-following gets an act of its own. It starts when the lateral action before it has ended (or at its
-time), and is stopped by any lateral action of the same entity that has not run yet: a lane change overrules it, whenever
-it comes. Times inside an act count from the act's start where a lateral action starts it.
+time), and is stopped by any lateral action of the same entity that has not run yet: a lane change overrules it,
+whenever it comes. Times inside an act count from the act's start where a lateral action starts it.
 """
 
 from __future__ import annotations

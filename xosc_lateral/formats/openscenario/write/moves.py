@@ -26,8 +26,10 @@ LEAST_SPACING = VERTEX_SPACING - 1e-6
 """What counts as that far, rounding aside. [m]"""
 TOLERANCE = 0.01
 """Where straight motion between two vertices is further off than this, a vertex is added. [m]"""
+LARGE_ERROR = 0.04
+"""Where it is still further off than this, a vertex takes the place of its neighbours. [m]"""
 REFINEMENTS = 4
-"""How often vertices are added: each time one per gap."""
+"""How often vertices are added, and then replaced: each time one per gap."""
 STANDSTILL_SPEED = 0.005
 """Slower counts as standing. [m/s]"""
 STANDSTILL_TIME = 0.3
@@ -93,12 +95,11 @@ def vertex_times(time: FloatArray, x: FloatArray, y: FloatArray) -> FloatArray:
         while len(head) > 1 and _way_at(tail[0], time, way) - _way_at(head[-1], time, way) < LEAST_SPACING:
             head.pop()
         times = np.array([*head, *tail])
-    for _ in range(REFINEMENTS):
+    for attempt in range(2 * REFINEMENTS):
         error = _error(times, time, x, y)
-        refined = _refined(times, time, way, error)
-        if _error(refined, time, x, y).max() >= error.max():
-            break
-        times = refined
+        refined = _refined(times, time, way, error, replace=attempt >= REFINEMENTS)
+        if _error(refined, time, x, y).max() < error.max():
+            times = refined
     return times
 
 
@@ -109,20 +110,25 @@ def _error(times: FloatArray, time: FloatArray, x: FloatArray, y: FloatArray) ->
     return np.hypot(x - written_x, y - written_y)
 
 
-def _refined(times: FloatArray, time: FloatArray, way: FloatArray, error: FloatArray) -> FloatArray:
-    """With a vertex in every gap that needs one, on its worst row; vertices too close to that give way to it."""
-    error = error.copy()
-    # The ends stay: a vertex needs room to them.
-    error[(way < LEAST_SPACING) | (way[-1] - way < LEAST_SPACING)] = 0.0
-    candidates = np.flatnonzero(error > TOLERANCE)
+def _refined(times: FloatArray, time: FloatArray, way: FloatArray, error: FloatArray, *, replace: bool) -> FloatArray:
+    """With a vertex in every gap that needs one, on its worst row.
+
+    `replace`: only where the error is large, but then vertices too close to that row give way to it, but for the ends.
+    """
+    at = np.interp(times, time, way)
+    gap = np.searchsorted(times, time, side="right")
+    if replace:
+        room = np.minimum(way, way[-1] - way)
+    else:
+        before = np.clip(gap - 1, 0, len(times) - 2)
+        room = np.minimum(way - at[before], at[before + 1] - way)
+    candidates = np.flatnonzero((error > (LARGE_ERROR if replace else TOLERANCE)) & (room >= LEAST_SPACING))
     if len(candidates) == 0:
         return times
-    gap = np.searchsorted(times, time, side="right")
     order = candidates[np.lexsort((-error[candidates], gap[candidates]))]
     _, worst = np.unique(gap[order], return_index=True)
     added = _spaced(order[worst], way)
-    nearest = np.abs(np.interp(times, time, way)[:, None] - way[added][None, :]).min(axis=1)
-    keep = nearest >= LEAST_SPACING
+    keep = np.abs(at[:, None] - way[added][None, :]).min(axis=1) >= LEAST_SPACING
     keep[[0, -1]] = True
     return np.sort(np.concatenate((times[keep], time[added])))
 
