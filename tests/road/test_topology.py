@@ -88,7 +88,16 @@ def test_lane_ids_follow_the_links_from_section_to_section():
     assert network.advance(0, -1, 150.0, 100.0).lane == -1  # the one-sided section leaves this side alone
     assert network.advance(0, 1, 350.0, 300.0)[1:3] == (1, 50.0)
     ended = network.advance(0, -2, 250.0, 100.0)
-    assert (ended.lane, ended.s, ended.remaining) == (-2, 300.0, 50.0)
+    assert (ended.lane, ended.remaining) == (-2, 50.0)
+    assert ended.s == pytest.approx(300.0)
+    assert network.has_lane_at(0, ended.lane, ended.s)
+
+
+def test_whoever_reaches_a_section_exactly_is_in_it_both_ways():
+    network = hand_written("sections")
+    assert network.advance(0, -1, 50.0, 50.0)[1:3] == (-2, 100.0)
+    assert network.advance(0, -2, 150.0, -50.0)[1:3] == (-2, 100.0)
+    assert network.advance(0, -2, 100.0, -1.0)[1:3] == (-1, 99.0)
 
 
 def test_the_distance_along_roads_is_signed_by_the_way_that_is_shorter():

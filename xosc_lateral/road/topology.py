@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from heapq import heappop, heappush
 from itertools import pairwise
-from math import inf
+from math import inf, nextafter
 
 from xosc_lateral.road.lanes import DRIVING, Lane, LaneSection
 from xosc_lateral.road.places import find_lane, normal_angle
@@ -108,22 +108,25 @@ class Topology:
         way = self._roads[road].directions.get(lane, 1) if direction is None else direction
         if distance < 0.0:
             way, distance = -way, -distance
+        here = self._roads[road]
+        section = here.section_at(s)
         links_passed = 0
         while True:
-            here = self._roads[road]
-            section = here.section_at(s if way > 0 else _just_before(s))
             room = section.end - s if way > 0 else s - section.start
-            if distance <= room:
+            last = section.end >= here.length if way > 0 else section.start <= 0.0
+            # a section does not hold its own end: whoever reaches it exactly is in the next one
+            if distance < room or (distance == room and (last or way < 0)):
                 return Advance(road, lane, s + way * distance, way, 0.0)
             distance -= max(room, 0.0)
-            s = section.end if way > 0 else section.start
-            on_road = s < here.length if way > 0 else s > 0.0
-            if on_road:
-                follower = follow_section(here, section, lane, way)
+            if not last:
+                beyond = here.section_at(section.end if way > 0 else _just_before(section.start))
+                follower = follow_section(here, section, beyond, lane, way)
                 if follower is None:
-                    return Advance(road, lane, s, way, distance)
-                lane = follower
+                    return Advance(road, lane, _just_before(section.end) if way > 0 else section.start, way, distance)
+                s = section.end if way > 0 else section.start
+                lane, section = follower, beyond
                 continue
+            s = section.end if way > 0 else section.start
             options = self.next_lanes(road, lane, way)
             links_passed += 1
             # A ring of roads without length would never end.
@@ -131,6 +134,8 @@ class Topology:
                 return Advance(road, lane, s, way, distance)
             link = options[0] if len(options) == 1 else (choose or self.straightest)(options)
             road, lane, s, way = link
+            here = self._roads[road]
+            section = here.sections[0 if way > 0 else -1]
 
     def straightest(self, options: Sequence[LaneLink]) -> LaneLink:
         """The link whose road turns least; of equals the first."""
@@ -274,14 +279,13 @@ class Topology:
         return tuple(steps)
 
 
-def follow_section(road: Road, section: LaneSection, lane: int, way: int) -> int | None:
+def follow_section(road: Road, section: LaneSection, beyond: LaneSection, lane: int, way: int) -> int | None:
     """The lane that goes on in the next section of the same road.
 
     Where a file gives no link, the lane of the same id goes on if it touches; OpenDRIVE asks for links only where lanes
     are connected, but many files leave them out between sections.
     """
     at = section.end if way > 0 else section.start
-    beyond = road.section_at(at if way > 0 else _just_before(at))
     here = section.by_id.get(lane) or find_lane(road, lane, at)
     for target in here.successors if way > 0 else here.predecessors:
         if target in beyond.by_id:
@@ -298,5 +302,5 @@ def _end_section(road: Road, contact: str) -> LaneSection:
 
 
 def _just_before(s: float) -> float:
-    """A place in the section that ends at s."""
-    return s - max(1e-9, 1e-12 * abs(s))
+    """The last place of the section that ends at s."""
+    return nextafter(s, -inf)

@@ -63,6 +63,14 @@ class Source:
             raise self.error(f"{name}={text!r} is larger than {LARGEST:g}", element)
         return value
 
+    def appearance(self, element: XmlElement, name: str, default: float) -> float:
+        """A number that only matters to the eye: what can't be read is noted and replaced by the default."""
+        try:
+            return self.number(element, name, default)
+        except FormatError as error:
+            self.note(f"{error.what}: {default:g} used", element)
+            return default
+
     def cubic(self, element: XmlElement) -> Cubic:
         """Attributes a, b, c, d; absent ones are 0."""
         return (

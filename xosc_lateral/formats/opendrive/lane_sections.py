@@ -10,6 +10,9 @@ from xosc_lateral.road.lanes import LaneRecord, LaneSection, build_section
 from xosc_lateral.road.piecewise import Piecewise
 from xosc_lateral.road.positions import RoadMark
 
+WIDEST = 1000.0
+"""No lane is wider, or further off its reference line. [m]"""
+
 SPEED_UNITS = {"m/s": 1.0, "km/h": 1.0 / 3.6, "mph": 0.44704}
 
 
@@ -39,7 +42,7 @@ def read_sections(
                 lanes, start, end, lane_offset=lane_offset, directions=directions, centre_marks=_until(marks, end)
             )
         )
-    _note_thin_lanes(road, sections, source)
+    _check_lanes(road, sections, source)
     return tuple(sections), directions
 
 
@@ -124,7 +127,7 @@ def _read_marks(element: XmlElement, lane: int, start: float, source: Source) ->
     found = sorted((start + source.number(e, "sOffset", 0.0), i, e) for i, e in enumerate(element.iterfind("roadMark")))
     ends = [*(s for s, _, _ in found[1:]), float("inf")][: len(found)]
     return tuple(
-        RoadMark(lane, s, end, e.get("type", "none"), e.get("color", "standard"), source.number(e, "width", 0.12))
+        RoadMark(lane, s, end, e.get("type", "none"), e.get("color", "standard"), source.appearance(e, "width", 0.12))
         for (s, _, e), end in zip(found, ends, strict=True)
         if end > s
     )
@@ -196,9 +199,17 @@ def _clip(lane: LaneRecord, start: float, end: float) -> LaneRecord:
     return replace(lane, marks=marks)
 
 
-def _note_thin_lanes(road: XmlElement, sections: Sequence[LaneSection], source: Source) -> None:
+def _check_lanes(road: XmlElement, sections: Sequence[LaneSection], source: Source) -> None:
     for section in sections:
         for lane in section.lanes:
+            for s in (*lane.starts, section.end):
+                centre, _, width = lane.state_at(s)
+                if max(abs(centre), abs(width)) > WIDEST:
+                    raise source.error(
+                        f"lane {lane.id} at s={s:g} m: {width:g} m wide, {centre:g} m off the reference line; "
+                        f"limit {WIDEST:g} m",
+                        road,
+                    )
             if not any(any(cubic) for cubic in lane.width):
                 source.note(f"road '{road.get('id')}': lane {lane.id} is 0 m wide all along a section", road)
             elif min(lane.state_at(s).width for s in (*lane.starts, section.end)) < -1e-6:

@@ -17,6 +17,12 @@ from xosc_lateral.road.surface import Shape, Surface
 LENGTH_TOLERANCE = 0.01
 """road/@length and the end of its geometry may differ by this without a note. [m]"""
 
+FARTHEST = 1e8
+"""Largest coordinate; UTM stays below 1e7. [m]"""
+
+LONGEST = 1e6
+"""Longest road. The longest one in the field has 50 km. [m]"""
+
 
 def read_opendrive(path: str | PathLike[str]) -> RoadNetwork:
     """Read one ``.xodr``.
@@ -73,6 +79,7 @@ def _read_road(element: XmlElement, plan: Sequence[Record], line: tuple[Referenc
     rule = element.get("rule", "RHT").upper()
     if rule not in ("RHT", "LHT"):
         raise source.error(f"rule={element.get('rule')!r} is neither RHT nor LHT", element)
+    _check_places(element, plan, line, source)
     sections, directions = read_sections(element, length, rule, source)
     junction = element.get("junction", "-1")
     return Road(
@@ -92,12 +99,26 @@ def _read_road(element: XmlElement, plan: Sequence[Record], line: tuple[Referenc
     )
 
 
+def _check_places(
+    element: XmlElement, plan: Sequence[Record], line: tuple[ReferenceElement, ...], source: Source
+) -> None:
+    for (s, length, _), part in zip(plan, line, strict=True):
+        for ds in (0.0, 0.5 * length, length):
+            x, y, _ = part.at(ds)
+            if not max(abs(x), abs(y)) <= FARTHEST:
+                raise source.error(
+                    f"at s={s + ds:g} m the road lies at x={x:g}, y={y:g}; limit {FARTHEST:g} m", element
+                )
+
+
 def _length(element: XmlElement, plan: Sequence[Record], source: Source) -> float:
     """road/@length, or the end of the geometry where the attribute is absent or reaches further."""
     end = plan[-1][0] + plan[-1][1]
     length = source.number(element, "length", end)
     if length <= 0.0:
         raise source.error(f"length={length:g} m is not positive", element)
+    if length > LONGEST:
+        raise source.error(f"length={length:g} m; limit {LONGEST:g} m", element)
     if abs(length - end) > LENGTH_TOLERANCE:
         used = min(length, end)
         source.note(f"length={length:g} m, but the geometry ends at {end:g} m: {used:g} m used", element)
