@@ -28,8 +28,8 @@ Converter = Callable[[Job], ManifestRow]
 STATE = ".xosc-lateral"
 """Folder inside the output folder, there only while a batch is unfinished: journal and lock."""
 
-_HALF_WRITTEN = re.compile(r"\..+\.[0-9a-f]{8}\.tmp")
-"""Names that `write_whole` gives to files while they are being written."""
+_HALF_WRITTEN = re.compile(r"\..+\.[0-9a-z_]{8}\.tmp(\.\w+)?")
+"""Names that files have while they are being written (`formats.output`, `formats.atomic`)."""
 
 _STOPPING = frozenset({errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EACCES, errno.EPERM, errno.EMFILE, errno.ENFILE})
 """Errors of the system that the next scenario would meet as well."""
@@ -197,7 +197,7 @@ def _forget_missing(batch: Batch, journal: Journal) -> None:
 
 def _sweep(folder: Path) -> None:
     """Remove what a killed run was just writing."""
-    for path in folder.rglob(".*.tmp"):
+    for path in folder.rglob(".*.tmp*"):
         if _HALF_WRITTEN.fullmatch(path.name):
             path.unlink(missing_ok=True)
 

@@ -28,6 +28,7 @@ def convert_job(job: Job) -> ManifestRow:
     OSError
         When the output can't be written.
     """
+    job.output.parent.mkdir(parents=True, exist_ok=True)
     return describe(job, convert_scenario(job.source, job.output, job.settings, variant=job.variant))
 
 

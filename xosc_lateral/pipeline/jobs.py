@@ -6,7 +6,7 @@ import hashlib
 import json
 import os
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 
 from xosc_lateral import __version__
@@ -14,6 +14,7 @@ from xosc_lateral.errors import FormatError, XoscLateralError
 from xosc_lateral.formats.hashes import file_hash
 from xosc_lateral.formats.openscenario.distribution import read_distribution
 from xosc_lateral.formats.profiles import SHIPPED, SUFFIX, find_profile
+from xosc_lateral.pipeline.convert import numbered
 from xosc_lateral.pipeline.manifest import ManifestRow
 from xosc_lateral.pipeline.request import DocumentKind, Request, document_kind, find_requests
 from xosc_lateral.pipeline.settings import AUTO, ConvertSettings
@@ -114,7 +115,7 @@ def plan_batch(
         Files, folders, globs, tables (see `find_requests`), or requests with settings of their own.
     folder : str or Path
         Output tree. It mirrors the inputs below their common folder: ``db/a/x.xosc`` of the input ``db`` becomes
-        ``folder/a/x.xosc``, its variants ``folder/a/x_v000.xosc`` and so on, the scenarios that a parameter value
+        ``folder/a/x.xosc``, its variants ``folder/a/x_01.xosc`` and so on, the scenarios that a parameter value
         distribution stands for ``folder/a/x_p00000.xosc`` and so on; a scenario named
         again with other settings becomes ``folder/a/x_r001.xosc``.
     settings : ConvertSettings, optional
@@ -200,8 +201,8 @@ def _jobs(
     relative = request.scenario.relative_to(base)
     for source, suffix, settings, error in _concrete(request, kind):
         for variant in range(request.variants):
-            variant_suffix = "" if request.variants == 1 else f"_v{variant:03d}"
-            output = relative.with_name(f"{relative.stem}{repeat}{suffix}{variant_suffix}{relative.suffix}")
+            named = relative.with_name(f"{relative.stem}{repeat}{suffix}{relative.suffix}")
+            output = numbered(named, variant, request.variants)
             yield Job(
                 name=output.as_posix(),
                 scenario=Path(os.path.relpath(source, base)).as_posix(),
@@ -246,23 +247,16 @@ class _Fingerprints:
     _profiles: dict[tuple[str, tuple[Path, ...]], str] = field(default_factory=dict)
 
     def of(self, settings: ConvertSettings, variant: int) -> str:
-        values = {
-            "package_version": __version__,
-            "variant": variant,
-            "profile": self._profile(settings.profile, settings.libraries),
-            "entity_profiles": {
-                entity: self._profile(name, settings.libraries)
-                for entity, name in sorted(settings.entity_profiles.items())
-            },
-            "only": None if settings.only is None else sorted(settings.only),
-            "seed": settings.seed,
-            "context": None if settings.context is None else _hash_or_missing(settings.context),
-            "parameters": dict(sorted(settings.parameters.items())),
-            "attempts": settings.attempts,
-            "mode": str(settings.mode),
-            "step": settings.step,
-            "time_limit": settings.time_limit,
+        values = {item.name: getattr(settings, item.name) for item in fields(settings)}
+        del values["libraries"]  # only where profiles are looked for
+        values["profile"] = self._profile(settings.profile, settings.libraries)
+        values["entity_profiles"] = {
+            entity: self._profile(name, settings.libraries) for entity, name in settings.entity_profiles.items()
         }
+        values["context"] = None if settings.context is None else _hash_or_missing(settings.context)
+        values["only"] = None if settings.only is None else sorted(settings.only)
+        values["parameters"] = dict(settings.parameters)
+        values |= {"package_version": __version__, "variant": variant}
         return hashlib.sha256(json.dumps(values, sort_keys=True).encode()).hexdigest()
 
     def _profile(self, name: str, libraries: tuple[Path, ...]) -> str:
