@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from enum import IntFlag
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from xosc_lateral.motion.run import Run
@@ -36,7 +36,7 @@ class RunningAction:
     run : Run
     """
 
-    domains: ClassVar[Domain] = Domain.NONE
+    domains: Domain = Domain.NONE
 
     def __init__(self, source: Action, actor: EntityState | None, run: Run) -> None:
         self.source = source

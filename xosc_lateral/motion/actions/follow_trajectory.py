@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import copysign, cos, pi, sin
+from math import copysign, cos, hypot, pi, sin
 
 from xosc_lateral.motion.actions.base import Domain, RunningAction
 from xosc_lateral.motion.angles import HALF_PI, difference, wrap
@@ -14,6 +14,9 @@ from xosc_lateral.motion.transition import EPSILON
 from xosc_lateral.scenario.actions import FollowTrajectoryAction
 from xosc_lateral.scenario.enums import FollowingMode, ReferenceContext
 
+JUMP = 0.05
+"""When the path begins further away than this, the entity's motion is not continuous. [m]"""
+
 
 class RunningFollowTrajectory(RunningAction):
     """The entity jumps onto the path when the action starts (there is no approach).
@@ -22,11 +25,11 @@ class RunningFollowTrajectory(RunningAction):
     the offset that it has there.
     """
 
-    domains = Domain.BOTH
     content: FollowTrajectoryAction
 
     def prepare(self) -> None:
-        """Nothing yet: the path may depend on where entities are when it starts."""
+        """Without times the speed is left to others; the path may depend on where entities are when it starts."""
+        self.domains = Domain.LATERAL if self.content.timing is None else Domain.BOTH
         self._path: Path | None = None
         self._s = 0.0
         self._time = 0.0
@@ -36,6 +39,7 @@ class RunningFollowTrajectory(RunningAction):
         """Lay the path out and jump onto it."""
         state, content = self.state, self.content
         follow = content.following_mode is FollowingMode.FOLLOW
+        before = state.pose
         path = path_of(content.trajectory, self.run, follower=state, follow=follow, speed=state.speed)
         self._path = path
         if content.timing is not None and not path.start_time == path.start_time:
@@ -53,8 +57,9 @@ class RunningFollowTrajectory(RunningAction):
         state.path = PathProgress(path, self._s)
         if self._is_timed:
             state.set_speed((-1.0 if self._backwards else 1.0) * path.speed_at(self._s))
-        state.take_control(Activity.TRAJECTORY | Activity.TELEPORTED)
-        state.teleported = True
+        state.take_control(Activity.TRAJECTORY)
+        if hypot(point.x - before.x, point.y - before.y) > JUMP:
+            state.activity |= Activity.TELEPORTED
 
     def step(self, time: float, step: float) -> None:
         """Move along."""

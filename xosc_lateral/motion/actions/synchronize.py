@@ -7,6 +7,7 @@ from math import copysign, cos, hypot, inf, sin, sqrt
 
 from xosc_lateral.motion.actions.base import Domain, RunningAction
 from xosc_lateral.motion.distances import FAR, Spot, road_gap
+from xosc_lateral.motion.paths.base import Path, PathProgress, nearest_s
 from xosc_lateral.motion.positions.resolve import spot_at
 from xosc_lateral.motion.state import EntityState
 from xosc_lateral.motion.transition import EPSILON
@@ -49,6 +50,7 @@ class RunningSynchronize(RunningAction):
         self._master = self.run.entity(self.content.master_entity_ref, self.content.place)
         self._own_spot: Spot | None = None
         self._master_spot: Spot | None = None
+        self._on_paths: dict[Spot, tuple[Path, float]] = {}
         self._mode = Mode.NONE
         self._rushes = False
         self._last = (FAR, FAR)
@@ -95,13 +97,21 @@ class RunningSynchronize(RunningAction):
     def _distance(self, entity: EntityState, spot: Spot, position: Position) -> float:
         """Left on the trajectory, else along the road, else straight. [m]"""
         if entity.path is not None:
-            if isinstance(position, TrajectoryPosition):
-                return abs(position.s - entity.path.s)
-            return abs(entity.path.path.length - entity.path.s)
+            return abs(self._target_s(entity.path, spot, position) - entity.path.s)
         gap = road_gap(self.run.network, entity, spot)
         if gap is not None:
             return abs(gap.ds)
         return hypot(spot.x - entity.pose.x, spot.y - entity.pose.y)
+
+    def _target_s(self, progress: PathProgress, spot: Spot, position: Position) -> float:
+        """Where on a path the place is; looked for once for each path. [m]"""
+        if isinstance(position, TrajectoryPosition):
+            return position.s
+        known = self._on_paths.get(spot)
+        if known is None or known[0] is not progress.path:
+            known = (progress.path, nearest_s(progress.path, spot.x, spot.y))
+            self._on_paths[spot] = known
+        return known[1]
 
     def _final_speed(self) -> float | None:
         final = self.content.final_speed

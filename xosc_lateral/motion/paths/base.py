@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import hypot
 from typing import NamedTuple, Protocol
 
 
@@ -45,6 +46,31 @@ class Path(Protocol):
 
     def speed_at(self, s: float) -> float:
         """Speed that the times of the path ask for. [m/s]"""
+
+
+def nearest_s(path: Path, x: float, y: float) -> float:
+    """Length at which a path comes nearest to a point: sampled each metre, then narrowed down. [m]"""
+    count = min(max(int(path.length), 1), _MOST_SAMPLES)
+    spacing = path.length / count
+
+    def away(s: float) -> float:
+        point = path.at(s)
+        return hypot(point.x - x, point.y - y)
+
+    middle = min((i * spacing for i in range(count + 1)), key=away)
+    low, high = max(middle - spacing, 0.0), min(middle + spacing, path.length)
+    while high - low > _CLOSE:
+        third = (high - low) / 3.0
+        if away(low + third) < away(high - third):
+            high -= third
+        else:
+            low += third
+    return 0.5 * (low + high)
+
+
+_MOST_SAMPLES = 5000
+_CLOSE = 1e-6
+"""Where narrowing down ends. [m]"""
 
 
 @dataclass(slots=True)

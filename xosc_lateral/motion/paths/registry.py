@@ -12,7 +12,6 @@ from xosc_lateral.motion.paths.base import Path
 from xosc_lateral.motion.paths.clothoid import ClothoidPath, ClothoidPiece
 from xosc_lateral.motion.paths.nurbs import Control, NurbsPath
 from xosc_lateral.motion.paths.polyline import Corner, PolylinePath, merge_close
-from xosc_lateral.motion.positions.orientation import is_absolute
 from xosc_lateral.motion.run import Run
 from xosc_lateral.motion.state import EntityState
 from xosc_lateral.road.positions import Pose
@@ -41,11 +40,11 @@ def _polyline(shape: Polyline, layout: Layout) -> Path:
     corners = []
     for vertex in shape.vertices:
         pose = _pose(vertex.position, layout.run)
-        absolute = _gives_heading(vertex.position, layout.run)
+        headed = _gives_heading(vertex.position)
         on_road = not _gives_height(vertex.position)
         z, pitch, roll = (nan, nan, nan) if on_road else (pose.z, pose.pitch, pose.roll)
         time = nan if vertex.time is None else vertex.time
-        corners.append(Corner(pose.x, pose.y, z, pose.heading if absolute else nan, pitch, roll, time))
+        corners.append(Corner(pose.x, pose.y, z, pose.heading if headed else nan, pitch, roll, time))
     if any(corner.z != corner.z for corner in corners):
         corners = [Corner(c.x, c.y, nan, c.heading, nan, nan, c.time) for c in corners]
     merged = merge_close(corners, VERTEX_RADIUS)
@@ -138,10 +137,12 @@ def _pose(position: Position, run: Run) -> Pose:
     return scout.pose
 
 
-def _gives_heading(position: Position, run: Run) -> bool:
+def _gives_heading(position: Position) -> bool:
+    """Absolute or relative to road or entity: a heading that is written counts; else the path's own does."""
     if isinstance(position, WorldPosition):
         return position.h is not None
-    return is_absolute(getattr(position, "orientation", None), run)
+    orientation = getattr(position, "orientation", None)
+    return orientation is not None and orientation.h is not None
 
 
 def _gives_height(position: Position) -> bool:

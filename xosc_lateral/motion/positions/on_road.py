@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from math import pi
 
 from xosc_lateral.errors import PlaybackError
-from xosc_lateral.motion.positions.orientation import heading_of, is_absolute
+from xosc_lateral.motion.positions.orientation import heading_of, is_absolute, tilted
 from xosc_lateral.motion.run import Run
-from xosc_lateral.motion.state import Placement
+from xosc_lateral.motion.state import EntityState, Placement
 from xosc_lateral.scenario import Place
 from xosc_lateral.scenario.position import Orientation
 
@@ -41,7 +42,8 @@ def lane_placement(
         there = ", ".join(str(info.id) for info in network.lanes_at(road, s))
         raise _error(f"road '{network.road_ids[road]}' has no lane {lane} at s = {s:g} m (lanes: {there})", place)
     against = along_lane and network.travel_direction(road, lane) < 0
-    return Placement(road, lane, s, offset_t, _relative(run, road, lane, s, orientation, against=against))
+    relative = _relative(run, road, lane, s, orientation, against=against)
+    return _tilt(Placement(road, lane, s, offset_t, relative), orientation, run)
 
 
 def road_placement(run: Run, road: int, s: float, t: float, orientation: Orientation | None, place: Place) -> Placement:
@@ -53,7 +55,18 @@ def road_placement(run: Run, road: int, s: float, t: float, orientation: Orienta
     s = min(max(s, 0.0), length)
     found = network.lane_at(road, s, t)
     offset_t = t - network.lane_state_at(road, found.lane, s).centre_t
-    return Placement(road, found.lane, s, offset_t, _relative(run, road, found.lane, s, orientation, against=False))
+    relative = _relative(run, road, found.lane, s, orientation, against=False)
+    return _tilt(Placement(road, found.lane, s, offset_t, relative), orientation, run)
+
+
+def _tilt(place: Placement, orientation: Orientation | None, run: Run) -> Placement:
+    """Pitch and roll that are given hold until the entity drives on."""
+    if orientation is None or not (orientation.p or orientation.r):
+        return place
+    scout = EntityState(run.entities[0].entity, run.network)
+    scout.put(place)
+    pitch, roll = tilted(orientation, scout.pose.pitch, scout.pose.roll, run)
+    return replace(place, pose=scout.pose._replace(pitch=pitch, roll=roll))
 
 
 def _relative(run: Run, road: int, lane: int, s: float, orientation: Orientation | None, *, against: bool) -> float:

@@ -19,6 +19,12 @@ def is_absolute(orientation: Orientation | None, run: Run) -> bool:
     return orientation.type is ReferenceContext.ABSOLUTE
 
 
+def tilted(orientation: Orientation | None, pitch: float, roll: float, run: Run) -> tuple[float, float]:
+    """Pitch and roll: those of the reference plus what is given, or what is given alone where it is absolute. [rad]"""
+    p, r = (0.0, 0.0) if orientation is None else (orientation.p or 0.0, orientation.r or 0.0)
+    return (p, r) if is_absolute(orientation, run) else (pitch + p, roll + r)
+
+
 def heading_of(orientation: Orientation | None) -> float:
     """Its heading; 0 where none is given. [rad]"""
     return 0.0 if orientation is None or orientation.h is None else orientation.h

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from math import cos, sin
 
-from xosc_lateral.motion.positions.orientation import heading_of, is_absolute
+from xosc_lateral.motion.positions.orientation import heading_of, is_absolute, tilted
 from xosc_lateral.motion.run import Run
 from xosc_lateral.motion.state import Placement, free, locate
 from xosc_lateral.scenario.position import RelativeObjectPosition
@@ -21,7 +21,7 @@ def resolve(position: RelativeObjectPosition, run: Run) -> Placement:
     flat_ahead = ahead * cos(pose.pitch) + (left * sin(pose.roll) + up * cos(pose.roll)) * sin(pose.pitch)
     flat_left = left * cos(pose.roll) - up * sin(pose.roll)
     rise = (left * sin(pose.roll) + up * cos(pose.roll)) * cos(pose.pitch) - ahead * sin(pose.pitch)
-    return locate(
-        run.network,
-        free(pose.x + flat_ahead * c - flat_left * s, pose.y + flat_ahead * s + flat_left * c, heading, pose.z + rise),
-    )
+    x = pose.x + flat_ahead * c - flat_left * s
+    y = pose.y + flat_ahead * s + flat_left * c
+    pitch, roll = tilted(position.orientation, pose.pitch, pose.roll, run)
+    return locate(run.network, free(x, y, heading, pose.z + rise, pitch, roll))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from xosc_lateral.motion.positions.orientation import heading_of, is_absolute
+from xosc_lateral.motion.positions.orientation import heading_of, is_absolute, tilted
 from xosc_lateral.motion.run import Run
 from xosc_lateral.motion.state import Placement, free, locate
 from xosc_lateral.scenario.position import RelativeWorldPosition
@@ -14,4 +14,6 @@ def resolve(position: RelativeWorldPosition, run: Run) -> Placement:
     heading = heading_of(position.orientation)
     if not is_absolute(position.orientation, run):
         heading += pose.heading
-    return locate(run.network, free(pose.x + position.dx, pose.y + position.dy, heading, pose.z + position.dz))
+    pitch, roll = tilted(position.orientation, pose.pitch, pose.roll, run)
+    x, y, z = pose.x + position.dx, pose.y + position.dy, pose.z + position.dz
+    return locate(run.network, free(x, y, heading, z, pitch, roll))
