@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 from itertools import pairwise
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -16,6 +17,7 @@ from xosc_lateral.formats.opendrive import read_opendrive
 from xosc_lateral.templates import TEMPLATES, Template, find_template, read_settings
 from xosc_lateral.templates.parameter import Number
 
+XSD = Path(__file__).resolve().parents[1] / "data" / "xsd"
 NAMES = [template.name for template in TEMPLATES]
 
 
@@ -41,6 +43,15 @@ def starts(root: etree._Element) -> dict[str, tuple[int, float]]:
 @pytest.mark.parametrize("template", TEMPLATES, ids=NAMES)
 def test_the_same_settings_give_the_same_bytes(template):
     assert template.files({"rain": "2"}) == template.files({"rain": "2"}) != template.files()
+
+
+@pytest.mark.parametrize("version", ["1.2", "1.3"])
+def test_every_template_is_valid_against_the_schema_of_its_version(version):
+    schema = etree.XMLSchema(etree.parse(XSD / f"OpenSCENARIO-{version}.0.xsd"))
+    for template in TEMPLATES:
+        root = scenario(template, {"version": version, "rain": "3", "time_of_day": "23"})
+        assert root.find("FileHeader").get("revMinor") == version[-1]
+        assert schema.validate(root), f"{template.name}: {schema.error_log}"
 
 
 @pytest.mark.parametrize("side", ["right", "left"])
