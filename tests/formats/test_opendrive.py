@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+import copy
+import math
+import random
 from pathlib import Path
 
+import numpy as np
 import pytest
+from lxml import etree
 
 from xosc_lateral.errors import FormatError
 from xosc_lateral.formats.opendrive import read_opendrive
@@ -114,3 +119,45 @@ def test_every_public_road_is_read(shared):
         assert network.roads
         for note in network.notes:
             assert "0 m wide" in note, note
+
+
+def _damage(root: etree._Element, rng: random.Random) -> None:
+    """Do to a file what hands, tools and disks do: change or drop an attribute, drop or repeat an element."""
+    element = rng.choice(list(root.iter(etree.Element)))
+    parent = element.getparent()
+    what = rng.choice(["change", "change", "drop attribute", "drop", "repeat"])
+    if what == "change" and element.attrib:
+        element.set(
+            rng.choice(list(element.attrib)), rng.choice(["", "nan", "-1", "0", "1e9", "abc", "1e-300", "start"])
+        )
+    elif what == "drop attribute" and element.attrib:
+        del element.attrib[rng.choice(list(element.attrib))]
+    elif what == "drop" and parent is not None:
+        parent.remove(element)
+    elif what == "repeat" and parent is not None:
+        parent.append(copy.deepcopy(element))
+
+
+@pytest.mark.parametrize("path", VALID, ids=lambda path: path.stem)
+def test_a_damaged_file_is_refused_in_one_line_or_gives_finite_places(path, tmp_path):
+    rng = random.Random(path.stem)
+    damaged = tmp_path / "damaged.xodr"
+    refused = 0
+    for _ in range(25):
+        tree = etree.parse(str(path))
+        for _ in range(rng.choice([1, 1, 3])):
+            _damage(tree.getroot(), rng)
+        tree.write(str(damaged))
+        try:
+            network = read_opendrive(damaged)
+        except FormatError as error:
+            refused += 1
+            assert "\n" not in str(error)
+            continue
+        for index, road in enumerate(network.roads):
+            for section in road.sections:
+                for lane in section.lanes:
+                    poses = network.lane_to_world(index, lane.id, [section.start, math.nextafter(section.end, 0.0)])
+                    assert np.isfinite(np.array(poses)).all()
+                    assert network.advance(index, lane.id, section.start, 500.0).remaining <= 500.0
+    assert 0 < refused < 25
