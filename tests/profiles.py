@@ -1,0 +1,27 @@
+"""Profiles for tests, fitted from simulated drives: never typed by hand."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+
+from tests.simulators.driver_simulator import simulate_drive
+from xosc_lateral.driver.fitting import fit_profile
+from xosc_lateral.driver.profile import DriverProfile
+from xosc_lateral.driver.series import Drive
+
+
+def as_drive(table: object, name: str = "simulated") -> Drive:
+    """A simulated table as a `Drive`, without going through a file."""
+    columns = {str(key): np.asarray(table[key], dtype=float) for key in table}  # type: ignore[attr-defined,index]
+    left, right = columns.pop("distance_left"), columns.pop("distance_right")
+    context = {key: values for key, values in columns.items() if key != "time"}
+    return Drive(name, columns["time"], 0.5 * (right - left), left + right, context, frozenset({"lane_index"}))
+
+
+@lru_cache(maxsize=4)
+def simulated_profile(model: str = "two-level", seed: int = 11) -> DriverProfile:
+    """A driver without effects, from 40 min of simulated driving."""
+    drive = simulate_drive(2400.0, seed)
+    return fit_profile([as_drive(drive.table)], name=f"simulated-{seed}", model=model)
