@@ -323,8 +323,7 @@ class SurfaceIndex:
             )
         wanted = self._wanted[types]
         section = np.broadcast_to(np.asarray(tables.section_of(road, feet.s)), feet.s.shape)
-        spans = np.array(tables.section_rows, dtype=np.int32)
-        first, count = spans[section, 0], spans[section, 1]
+        first, count = tables.section_first[section], tables.section_count[section]
         row = np.full(len(feet.s), -1, dtype=np.int32)
         centre, width = np.zeros(len(feet.s)), np.zeros(len(feet.s))
         lowest, closest = np.full(len(feet.s), np.inf), np.full(len(feet.s), np.inf)

@@ -52,6 +52,7 @@ class NetworkTables:
     """Roads, lane sections, lanes and surfaces of a network as flat arrays.
 
     Lane rows: all lanes of all sections, lane 0 included, in one list; `row_of` turns (section, lane id) into a row.
+    The lanes of a section but lane 0 are the `section_count` rows from `section_first` on, from left to right.
     """
 
     def __init__(self, roads: Sequence[Road], path: str) -> None:
@@ -68,9 +69,10 @@ class NetworkTables:
         self._slots = max(ids) - self._lowest + 1
         self._row_of = np.full(len(sections) * self._slots, -1, dtype=np.int32)
         row = 0
-        self.section_rows: list[tuple[int, int]] = []
+        self.section_first = np.empty(len(sections), dtype=np.int32)
+        self.section_count = np.array([len(section.lanes) for section in sections], dtype=np.int32)
         for i, section in enumerate(sections):
-            self.section_rows.append((row, len(section.lanes)))
+            self.section_first[i] = row
             for lane in (*section.lanes, section.centre):
                 self._row_of[i * self._slots + lane.id - self._lowest] = row
                 row += 1
@@ -176,7 +178,7 @@ class NetworkTables:
         return index.astype(np.int32), count.astype(np.int32)
 
     def _section_index(self, section: int, own: IntArray, s: FloatArray) -> tuple[FloatArray, FloatArray]:
-        first, n = self.section_rows[section]
+        first, n = int(self.section_first[section]), int(self.section_count[section])
         direction = self.directions[own]
         index, count, is_driving = np.zeros(len(s)), np.zeros(len(s)), np.zeros(len(s), dtype=bool)
         for row in range(first, first + n):
