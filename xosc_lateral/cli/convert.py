@@ -16,8 +16,15 @@ def register(app: typer.Typer) -> None:
 
 
 def convert(
-    scenario: Annotated[Path, typer.Argument(help="Maneuver-based scenario (.xosc).", show_default=False)],
-    output: Annotated[Path | None, typer.Option("-o", "--output", help="Default: NAME_lifelike.xosc.")] = None,
+    scenario: Annotated[
+        list[str],
+        typer.Argument(
+            help="Maneuver-based scenario (.xosc); folder, glob, table or several: batch.", show_default=False
+        ),
+    ],
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", help="Default: NAME_lifelike.xosc. Of a batch: folder.")
+    ] = None,
     profile: Annotated[str, typer.Option(help="Name or path; auto: by the vehicle's class.")] = "auto",
     seed: Annotated[int, typer.Option(help="Same inputs and seed, same bytes.", min=0)] = 0,
     entity: Annotated[list[str] | None, typer.Option(metavar="NAME=PROFILE", help="Profile of one entity.")] = None,
@@ -29,9 +36,14 @@ def convert(
     library: Annotated[list[Path] | None, typer.Option(help="Folder with further profiles.")] = None,
     resample: Annotated[int, typer.Option(help="Attempts while cars touch or leave their lane.", min=1)] = 1,
     time_limit: Annotated[float, typer.Option(help="End of a scenario without one [s].", min=0.1)] = 60.0,
+    jobs: Annotated[int, typer.Option(help="Batch: processes; -1: one per core.")] = 1,
+    cluster: Annotated[str | None, typer.Option(metavar="ADDRESS", help="Batch: dask scheduler to work on.")] = None,
+    quiet: Annotated[bool, typer.Option("--quiet", help="Batch: failures alone.")] = False,
+    log_json: Annotated[bool, typer.Option("--log-json", help="Batch: progress as JSON lines.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="For machines.")] = False,
 ) -> None:
     """Give every car in a scenario the lateral movement of a real driver."""
+    from xosc_lateral.cli.batches import convert_batch, is_batch
     from xosc_lateral.pipeline.convert import convert_variants
     from xosc_lateral.pipeline.settings import ConvertSettings
     from xosc_lateral.report.conversion import as_text, to_json, write_report
@@ -47,6 +59,14 @@ def convert(
         libraries=tuple(library or ()),
         time_limit=time_limit,
     )
-    for conversion in convert_variants(scenario, output, settings, variants=variants):
+    if is_batch(scenario):
+        if report is not None:
+            raise typer.BadParameter("a page is made of one scenario, not of a batch", param_hint="--report")
+        display = "json" if log_json else "quiet" if quiet else "auto"
+        convert_batch(
+            scenario, output, settings, variants=variants, jobs=jobs, cluster=cluster, display=display, as_json=as_json
+        )
+        return
+    for conversion in convert_variants(Path(scenario[0]), output, settings, variants=variants):
         where = write_report(conversion, report, variants=variants) if report else None
         typer.echo(to_json(conversion, where) if as_json else as_text(conversion, where))

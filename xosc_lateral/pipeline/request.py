@@ -130,6 +130,15 @@ def read_request_table(path: Path, settings: ConvertSettings, *, variants: int =
         yield Request(folder / scenario, row_settings, rows_variants, folder)
 
 
+def is_single(given: str | Path) -> bool:
+    """Whether an input is one scenario, or nothing that is there: neither folder, glob, table nor distribution."""
+    path = Path(given)
+    if path.is_file():
+        is_table = path.name.lower().endswith(TABLE_SUFFIXES)
+        return not is_table and document_kind(path) is not DocumentKind.DISTRIBUTION
+    return not path.is_dir() and not _GLOB_CHARACTERS & set(str(given))
+
+
 def document_kind(path: Path) -> DocumentKind:
     """What a file holds, from its first elements; what can't be read counts as a scenario (its reader says why)."""
     try:
