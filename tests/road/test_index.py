@@ -10,7 +10,7 @@ import pytest
 from tests.road.places import VALID, hand_written, random_places
 from xosc_lateral.errors import PlaybackError
 from xosc_lateral.formats.opendrive import read_opendrive
-from xosc_lateral.road.index import BRUTE_FORCE
+from xosc_lateral.road.samples import BRUTE_FORCE
 
 # Elements of these files are far apart on purpose: jumps have no inverse.
 TORN = {"clothoids", "arcs"}

@@ -19,7 +19,9 @@ from numpy.typing import ArrayLike
 from xosc_lateral.errors import PlaybackError
 from xosc_lateral.road.index import SurfaceIndex
 from xosc_lateral.road.lanes import DRIVING
+from xosc_lateral.road.links import Links
 from xosc_lateral.road.marks import road_marks
+from xosc_lateral.road.moving import Chooser, advance, straightest
 from xosc_lateral.road.places import cross_section, find_lane, lane_at, lane_pose, surface_pose
 from xosc_lateral.road.positions import (
     Advance,
@@ -36,8 +38,8 @@ from xosc_lateral.road.positions import (
     RouteStep,
 )
 from xosc_lateral.road.road import Junction, Road
+from xosc_lateral.road.routes import path_distance, route
 from xosc_lateral.road.tables import NetworkTables
-from xosc_lateral.road.topology import Chooser, Topology
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,8 +82,8 @@ class RoadNetwork:
         return SurfaceIndex(self._tables)
 
     @cached_property
-    def _topology(self) -> Topology:
-        return Topology(self.roads, self.junctions)
+    def _links(self) -> Links:
+        return Links(self.roads, self.junctions)
 
     # ---- names and signs ---------------------------------------------------------------------------------------------
     def index_of(self, road_id: str) -> int:
@@ -253,7 +255,7 @@ class RoadNetwork:
 
         `lane` is its id in the road's last (first) section. Several at a junction, none where the lane ends.
         """
-        return self._topology.next_lanes(road, lane, direction)
+        return self._links.next_lanes(road, lane, direction)
 
     def advance(
         self,
@@ -270,11 +272,11 @@ class RoadNetwork:
         `direction` of positive distance: +1 along s, -1 against; default the lane's travel direction. `choose` picks
         one of several links; default the straightest. Ends at the lane's end, saying what remains.
         """
-        return self._topology.advance(road, lane, s, distance, choose=choose, direction=direction)
+        return advance(self._links, road, lane, s, distance, choose=choose, direction=direction)
 
     def straightest(self, options: Sequence[LaneLink]) -> LaneLink:
         """The link whose road turns least from entry to exit; of equals the first."""
-        return self._topology.straightest(options)
+        return straightest(self.roads, options)
 
     def path_distance(
         self,
@@ -289,7 +291,7 @@ class RoadNetwork:
         Positive when the path leaves `start` in `direction` (+1 along s, -1 against s), negative when it leaves the
         other way. None: no path within `limit` metres.
         """
-        return self._topology.path_distance(start, end, direction=direction, limit=limit)
+        return path_distance(self._links, start, end, direction=direction, limit=limit)
 
     def route(
         self, start: tuple[int, int, float], end: tuple[int, int, float], *, via: Sequence[tuple[int, int, float]] = ()
@@ -298,7 +300,7 @@ class RoadNetwork:
 
         None: there is none.
         """
-        return self._topology.route(start, end, via=via)
+        return route(self._links, start, end, via=via)
 
     # ---- to be seen --------------------------------------------------------------------------------------------------
     def road_marks(self, road: int) -> tuple[RoadMark, ...]:

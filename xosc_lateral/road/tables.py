@@ -11,9 +11,9 @@ from numpy.typing import ArrayLike
 from xosc_lateral.errors import PlaybackError
 from xosc_lateral.road.lanes import DRIVING, NARROW, Lane
 from xosc_lateral.road.lookup import IndexLike, Lookup
-from xosc_lateral.road.piecewise import Piecewise
 from xosc_lateral.road.places import limit_at
 from xosc_lateral.road.positions import FloatArray, IntArray, Poses, RoadMark
+from xosc_lateral.road.profiles import Cubics, HeightTable
 from xosc_lateral.road.reference_line import Frame, ReferenceLines
 from xosc_lateral.road.road import Road
 
@@ -29,23 +29,6 @@ class LaneProfile(NamedTuple):
     slope: FloatArray
     width: FloatArray
     direction: IntArray
-
-
-class Cubics:
-    """Piecewise cubics of several owners."""
-
-    def __init__(self, functions: Sequence[Piecewise]) -> None:
-        """Gather the pieces."""
-        self._lookup = Lookup([function.starts for function in functions])
-        self._table = np.array([cubic for function in functions for cubic in function.cubics]).T.copy()
-        self.is_zero = not self._table.any()
-
-    def at(self, owner: IndexLike, s: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Values and derivatives."""
-        piece = self._lookup.find(owner, s)
-        ds = s - self._lookup.starts[piece]
-        a, b, c, d = (values[piece] for values in self._table)
-        return a + ds * (b + ds * (c + ds * d)), b + ds * (2.0 * c + (3.0 * ds) * d)
 
 
 class NetworkTables:
@@ -85,7 +68,7 @@ class NetworkTables:
         self._elevation = Cubics([road.surface.elevation for road in roads])
         self._superelevation = Cubics([road.surface.superelevation for road in roads])
         self._is_shaped = np.array([bool(r.surface.crossfall or r.surface.shape) for r in roads])
-        self._heights = _HeightTable(self.lanes)
+        self._heights = HeightTable(self.lanes)
         self._level = bool(self._superelevation.is_zero and not self._is_shaped.any())
         self._flat = bool(self._elevation.is_zero and self._level)
 
@@ -234,7 +217,7 @@ class NetworkTables:
                 heading = heading + np.pi * backwards
                 pitch, roll = pitch * profile.direction, roll * profile.direction
             if self._heights.any:
-                z = z + self._heights.at(profile, s, t, self.ids)
+                z = z + self._heights.at(profile.row, s, t - profile.centre, profile.width, self.ids[profile.row])
         # into [-pi, pi]
         heading = heading - (2.0 * np.pi) * np.rint(heading / (2.0 * np.pi))
         return x, y, z, heading, pitch, roll
@@ -422,34 +405,3 @@ def _turned_in_surface(
         -np.arcsin(np.clip(forward_z, -1.0, 1.0)),
         np.arctan2(lateral_z, cos_pitch * cos_roll),
     )
-
-
-class _HeightTable:
-    """Heights of lanes over the road surface (kerbs), linear from one record to the next."""
-
-    def __init__(self, lanes: Sequence[Lane]) -> None:
-        records = [lane.heights or ((0.0, 0.0, 0.0),) for lane in lanes]
-        self.any = any(lane.heights for lane in lanes)
-        self._lookup = Lookup([[s for s, _, _ in own] for own in records])
-        self._table = np.array([piece for own in records for piece in _linear_pieces(own)]).T.copy()
-
-    def at(self, profile: LaneProfile, s: FloatArray, t: FloatArray, ids: IntArray) -> FloatArray:
-        """Height at t, linear across the lane."""
-        piece = self._lookup.find(profile.row, s)
-        ds = np.maximum(s - self._lookup.starts[piece], 0.0)
-        inner, inner_slope, outer, outer_slope = (values[piece] for values in self._table)
-        low, high = inner + ds * inner_slope, outer + ds * outer_slope
-        # a lane of no width has no inside: its inner edge counts
-        narrow = profile.width <= 0.0
-        outwards = np.sign(ids[profile.row]) * (t - profile.centre) / np.where(narrow, 1.0, profile.width)
-        across = np.where(narrow, 0.0, np.clip(0.5 + outwards, 0.0, 1.0))
-        return np.asarray(low + across * (high - low))
-
-
-def _linear_pieces(records: Sequence[tuple[float, float, float]]) -> list[tuple[float, float, float, float]]:
-    """Inner height and its slope, outer height and its slope, from each record to the next."""
-    pieces = []
-    for (s, inner, outer), (end, inner_end, outer_end) in zip(records, [*records[1:], records[-1]], strict=True):
-        length = end - s if end > s else np.inf
-        pieces.append((inner, (inner_end - inner) / length, outer, (outer_end - outer) / length))
-    return pieces

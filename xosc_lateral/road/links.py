@@ -1,0 +1,121 @@
+"""Where lanes and roads lead: road links, lane links, junctions."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+from xosc_lateral.road.lanes import Lane, LaneSection
+from xosc_lateral.road.positions import LaneLink
+from xosc_lateral.road.road import Connection, Junction, Road, RoadLink
+
+End = tuple[int, int]
+"""A road as entered: its index, and +1 (at its start, to go along s) or -1 (at its end)."""
+
+
+class Links:
+    """Links between lanes and roads; look-ups are kept, since a player asks the same ones again and again."""
+
+    def __init__(self, roads: Sequence[Road], junctions: Sequence[Junction]) -> None:
+        """Index roads and junctions by id."""
+        self.roads = roads
+        self._index = {road.id: i for i, road in enumerate(roads)}
+        self._junctions = {junction.id: junction for junction in junctions}
+        self._links: dict[tuple[int, int, int], tuple[LaneLink, ...]] = {}
+        self._ends: dict[End, tuple[End, ...]] = {}
+
+    def next_lanes(self, road: int, lane: int, direction: int) -> tuple[LaneLink, ...]:
+        """Lanes that follow when leaving the road at its end (+1) or start (-1)."""
+        key = (road, lane, direction)
+        if key not in self._links:
+            self._links[key] = tuple(dict.fromkeys(self._find_links(*key)))
+        return self._links[key]
+
+    def _find_links(self, road: int, lane: int, direction: int) -> Iterator[LaneLink]:
+        here = self.roads[road]
+        link = here.successor if direction > 0 else here.predecessor
+        found = here.sections[-1 if direction > 0 else 0].by_id.get(lane)
+        if link is None or found is None or lane == 0:
+            return
+        if link.element_type == "junction":
+            yield from self._through_junction(here, found, link)
+            return
+        other = self._index.get(link.element_id)
+        if other is None:
+            return
+        contact = link.contact or self._contact_of(road, direction, other)
+        for target in self._linked_ids(found, direction, self.roads[other], contact, here):
+            yield self._enter(other, target, contact)
+
+    def _through_junction(self, here: Road, lane: Lane, link: RoadLink) -> Iterator[LaneLink]:
+        junction = self._junctions.get(link.element_id)
+        for connection in junction.connections if junction else ():
+            other = self._index.get(connection.connecting_road)
+            if connection.incoming_road != here.id or other is None:
+                continue
+            contact = connection.contact or "start"
+            for target in self._connected_ids(connection, lane, self.roads[other], contact):
+                if target in _end_section(self.roads[other], contact).by_id:
+                    yield self._enter(other, target, contact)
+
+    def _connected_ids(self, connection: Connection, lane: Lane, other: Road, contact: str) -> list[int]:
+        """Lanes of the connecting road; without any laneLink, those that name the lane as their own link."""
+        if connection.lanes:
+            return [to for source, to in connection.lanes if source == lane.id]
+        lanes = _end_section(other, contact).lanes
+        return [o.id for o in lanes if lane.id in (o.predecessors if contact == "start" else o.successors)]
+
+    def _linked_ids(self, lane: Lane, direction: int, other: Road, contact: str, here: Road) -> list[int]:
+        """Lanes of the linked road: as the lane says, else as the other side says."""
+        there = _end_section(other, contact)
+        ids = lane.successors if direction > 0 else lane.predecessors
+        if ids:
+            return [i for i in ids if i in there.by_id and i != 0]
+        return [o.id for o in there.lanes if lane.id in (o.predecessors if contact == "start" else o.successors)]
+
+    def _contact_of(self, road: int, direction: int, other: int) -> str:
+        """Contact point that a file leaves out: the end of the other road that is nearer."""
+        here, there = self.roads[road], self.roads[other]
+        x, y, _ = here.reference_at(here.length if direction > 0 else 0.0)
+        gaps = []
+        for s in (0.0, there.length):
+            u, v, _ = there.reference_at(s)
+            gaps.append((u - x) ** 2 + (v - y) ** 2)
+        return "start" if gaps[0] <= gaps[1] else "end"
+
+    def _enter(self, road: int, lane: int, contact: str) -> LaneLink:
+        return LaneLink(road, lane, *((0.0, 1) if contact == "start" else (self.roads[road].length, -1)))
+
+    def next_roads(self, road: int, direction: int) -> tuple[End, ...]:
+        """Roads that can be entered when leaving this one at its end (+1) or start (-1), driven there either way."""
+        key = (road, direction)
+        if key not in self._ends:
+            self._ends[key] = tuple(dict.fromkeys(self._find_roads(road, direction)))
+        return self._ends[key]
+
+    def _find_roads(self, road: int, direction: int) -> Iterator[End]:
+        here = self.roads[road]
+        link = here.successor if direction > 0 else here.predecessor
+        if link is None:
+            return
+        if link.element_type != "junction":
+            other = self._index.get(link.element_id)
+            if other is not None:
+                yield other, 1 if (link.contact or self._contact_of(road, direction, other)) == "start" else -1
+            return
+        junction = self._junctions.get(link.element_id)
+        for connection in junction.connections if junction else ():
+            other = self._index.get(connection.connecting_road)
+            if connection.incoming_road == here.id and other is not None:
+                yield other, 1 if connection.contact != "end" else -1
+        # Files list a connection from the road that drives into it only; on the way back it is found by its own links.
+        for other, there in enumerate(self.roads):
+            if there.junction != link.element_id:
+                continue
+            for back, entry in ((there.predecessor, 1), (there.successor, -1)):
+                touches = "end" if direction > 0 else "start"
+                if back and back.element_id == here.id and back.element_type == "road" and back.contact == touches:
+                    yield other, entry
+
+
+def _end_section(road: Road, contact: str) -> LaneSection:
+    return road.sections[0 if contact == "start" else -1]

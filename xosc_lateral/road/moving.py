@@ -1,0 +1,97 @@
+"""Moving along lanes over sections, roads and junctions."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from math import inf, nextafter
+
+from xosc_lateral.road.lanes import LaneSection
+from xosc_lateral.road.links import Links
+from xosc_lateral.road.places import find_lane, normal_angle
+from xosc_lateral.road.positions import Advance, LaneLink
+from xosc_lateral.road.road import Road
+
+Chooser = Callable[[Sequence[LaneLink]], LaneLink]
+"""Picks one of several ways on; gets at least one."""
+
+
+def advance(
+    links: Links,
+    road: int,
+    lane: int,
+    s: float,
+    distance: float,
+    *,
+    choose: Chooser | None = None,
+    direction: int | None = None,
+) -> Advance:
+    """Move along s, following lane links (see `RoadNetwork.advance`)."""
+    way = links.roads[road].directions.get(lane, 1) if direction is None else direction
+    if distance < 0.0:
+        way, distance = -way, -distance
+    here = links.roads[road]
+    section = here.section_at(s)
+    links_passed = 0
+    while True:
+        room = section.end - s if way > 0 else s - section.start
+        last = section.end >= here.length if way > 0 else section.start <= 0.0
+        # a section does not hold its own end: whoever reaches it exactly is in the next one
+        if distance < room or (distance == room and (last or way < 0)):
+            return Advance(road, lane, s + way * distance, way, 0.0)
+        distance -= max(room, 0.0)
+        if not last:
+            beyond = here.section_at(section.end if way > 0 else _just_before(section.start))
+            follower = follow_section(here, section, beyond, lane, way)
+            if follower is None:
+                return Advance(road, lane, _just_before(section.end) if way > 0 else section.start, way, distance)
+            s = section.end if way > 0 else section.start
+            lane, section = follower, beyond
+            continue
+        s = section.end if way > 0 else section.start
+        options = links.next_lanes(road, lane, way)
+        links_passed += 1
+        # A ring of roads without length would never end.
+        if not options or links_passed > 100_000:
+            return Advance(road, lane, s, way, distance)
+        link = _chosen(links, options, choose)
+        road, lane, s, way = link
+        here = links.roads[road]
+        section = here.sections[0 if way > 0 else -1]
+
+
+def straightest(roads: Sequence[Road], options: Sequence[LaneLink]) -> LaneLink:
+    """The link whose road turns least; of equals the first."""
+    return min(options, key=lambda link: abs(_turn(roads[link.road])))
+
+
+def _turn(road: Road) -> float:
+    return normal_angle(road.reference_at(road.length)[2] - road.reference_at(0.0)[2])
+
+
+def _chosen(links: Links, options: Sequence[LaneLink], choose: Chooser | None) -> LaneLink:
+    if len(options) == 1:
+        return options[0]
+    return choose(options) if choose else straightest(links.roads, options)
+
+
+def follow_section(road: Road, section: LaneSection, beyond: LaneSection, lane: int, way: int) -> int | None:
+    """The lane that goes on in the next section of the same road.
+
+    Where a file gives no link, the lane of the same id goes on if it touches; OpenDRIVE asks for links only where lanes
+    are connected, but many files leave them out between sections.
+    """
+    at = section.end if way > 0 else section.start
+    here = section.by_id.get(lane) or find_lane(road, lane, at)
+    for target in here.successors if way > 0 else here.predecessors:
+        if target in beyond.by_id:
+            return target
+    same = beyond.by_id.get(lane)
+    if same is None:
+        return None
+    (centre, _, width), (other, _, other_width) = here.state_at(at), same.state_at(at)
+    return lane if abs(centre - other) < 0.5 * max(width, other_width) else None
+
+
+def _just_before(s: float) -> float:
+    """The last place of the section that ends at s."""
+    return nextafter(s, -inf)
