@@ -10,6 +10,9 @@ from xosc_lateral.road.lanes import LaneRecord, LaneSection, build_section
 from xosc_lateral.road.piecewise import Piecewise
 from xosc_lateral.road.positions import RoadMark
 
+MOST_LANES = 1000
+"""No lane id is further from 0: tables of lanes grow with it."""
+
 WIDEST = 1000.0
 """No lane is wider, or further off its reference line. [m]"""
 
@@ -94,6 +97,8 @@ def _read_lane(element: XmlElement, start: float, source: Source) -> LaneRecord:
         for tag in ("width", "border")
     )
     lane = source.integer(element, "id")
+    if abs(lane) > MOST_LANES:
+        raise source.error(f"lane id {lane}; limit {MOST_LANES}", element)
     if not widths and not borders:
         source.note(f"lane {lane} has neither width nor border: taken as 0 m wide", element)
     heights = sorted(
