@@ -4,7 +4,7 @@ VENV ?= .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 
-.PHONY: demo test lint format bench clean
+.PHONY: demo test lint format bench profiles clean
 
 $(STAMP): pyproject.toml
 	$(PYTHON) -m venv $(VENV)
@@ -28,6 +28,14 @@ test: lint
 format: $(STAMP)
 	$(BIN)/ruff check --fix .
 	$(BIN)/ruff format .
+
+# The shipped driver profiles, rebuilt from the public recording (50 MB from PyPI): byte for byte what is in the tree.
+WHEEL := out/data/tasi-0.15.4-py3-none-any.whl
+profiles: $(STAMP) $(WHEEL)
+	$(BIN)/python -m xosc_lateral.formats.library $(WHEEL) -o xosc_lateral/resources/driver_profiles --cards docs/profiles.md
+
+$(WHEEL): | $(STAMP)
+	$(BIN)/python -m pip download --quiet --disable-pip-version-check --no-deps --dest $(@D) tasi==0.15.4
 
 clean:
 	rm -rf $(VENV) out build dist

@@ -47,8 +47,9 @@ COLUMNS = (
     *(f"classifications_{name}" for name in CLASSES),
 )
 LICENCE = (
-    "tracks: DLR Highway Traffic dataset, Deutsches Zentrum für Luft- und Raumfahrt (see the licence of the Zenodo "
-    "record); the wheel of tasi that carries them: Apache-2.0. Fitted parameters may be passed on with this notice."
+    "DLR Highway Traffic dataset (Deutsches Zentrum für Luft- und Raumfahrt, doi:10.5281/zenodo.14012005): published "
+    "there under CC BY-NC-SA 4.0; its first file lies in the wheel of tasi, licensed Apache-2.0. No tracks are passed "
+    "on with a profile, only fitted parameters."
 )
 
 
@@ -80,6 +81,8 @@ def import_dlr_ht(source: Path, settings: CutSettings = DEFAULT_CUTS, *, keep_cu
         placed.put(rows, part)
     table = _context(tracks, placed, s, forward)
     table["curvature"] = reference.curvature(s_road) * np.where(forward, 1.0, -1.0)
+    # 0.1 mm, 0.1 per km: below any measurement, above what linear algebra does differently from machine to machine.
+    table = table.round({"curvature": 7, **dict.fromkeys(table.columns.drop(["curvature", "drive", "time"]), 4)})
     reasons = {"no lane": placed.lane < 0, "lane change": placed.changing, "gap": gap}
     frame = np.round(tracks["time"].to_numpy() / STEP).astype(np.int64)
     table["state"] = name_states(reasons, placed.lane, vehicle, frame, STEP, settings.shortest)

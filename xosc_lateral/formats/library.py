@@ -1,0 +1,246 @@
+"""The shipped profile library, built from the public recording.
+
+    python -m xosc_lateral.formats.library tasi-0.15.4-py3-none-any.whl -o FOLDER [--cards docs/profiles.md]
+
+The same wheel gives the same bytes. Every profile is scored before it is written: for groups of drivers a fit to half
+of the vehicles is scored on the other half; for single vehicles a fit to the first part of the drive is held against
+the last part of its own drive and those of the others. What is written is fitted to everything.
+"""
+
+from __future__ import annotations
+
+import argparse
+import tempfile
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from xosc_lateral.driver.fitting import fit_runs
+from xosc_lateral.driver.profile import DriverProfile, Provenance
+from xosc_lateral.driver.series import STEP, Run, all_runs
+from xosc_lateral.errors import NotEnoughDataError
+from xosc_lateral.formats.drives import read_drives
+from xosc_lateral.formats.hashes import file_hash
+from xosc_lateral.formats.importers.dlr_ht import LICENCE, import_dlr_ht
+from xosc_lateral.formats.importers.table import write_imported
+from xosc_lateral.formats.output import write_whole
+from xosc_lateral.formats.profiles import write_profile
+from xosc_lateral.loop.compare import told_from_each_other
+from xosc_lateral.loop.metrics import snippet_metrics
+from xosc_lateral.loop.scores import SNIPPET, score_profile, scores_to_dict
+from xosc_lateral.loop.snippets import snippets_of
+
+FloatArray = NDArray[np.float64]
+
+SOURCE = "DLR Highway Traffic v1.1.0 (A39 near Braunschweig, 7 October 2024, 5 min, 6.4 km), DLR"
+SEED = 20241007  # the day of the recording
+SINGLE_VEHICLES = 6
+LONG_DRIVE = 140.0  # [s]; of road-following, for a profile of one vehicle
+FITTED_SHARE = 0.6  # of a single vehicle's drive; the rest is held out
+
+
+@dataclass(frozen=True)
+class Group:
+    """Which runs a profile of many drivers is fitted to.
+
+    Parameters
+    ----------
+    name, notes : str
+    classes : tuple of str
+        Vehicle classes; empty: all.
+    lane : int or None
+        0 = right lane; None: all.
+    """
+
+    name: str
+    notes: str
+    classes: tuple[str, ...] = ()
+    lane: int | None = None
+
+    def holds(self, run: Run, kind: Mapping[str, str]) -> bool:
+        """Whether a run belongs to it."""
+        lane = int(run.context["lane_index"][0])
+        return (not self.classes or kind[run.drive] in self.classes) and self.lane in (None, lane)
+
+
+GROUPS = (
+    Group("motorway", "All vehicles on a two-lane German motorway in the morning: the population."),
+    Group("motorway-car", "Cars and vans, both lanes.", classes=("car", "van", "motorbike")),
+    Group("motorway-truck", "Trucks, nearly all in the right lane.", classes=("truck",)),
+    Group("motorway-right-lane", "Whoever drives in the right lane.", lane=0),
+    Group("motorway-left-lane", "Whoever drives in the left lane.", lane=1),
+)
+
+
+def build_library(source: Path, *, model: str = "best") -> list[DriverProfile]:
+    """All shipped profiles, from the wheel of `tasi` (or the data set's zip or CSV).
+
+    Raises
+    ------
+    FormatError, NotEnoughDataError
+        If the source is no such recording or too little is left of it.
+    """
+    imported = import_dlr_ht(source)
+    kind = dict(zip(imported.table["drive"], imported.table["vehicle_class"], strict=True))
+    with tempfile.TemporaryDirectory() as folder:
+        table = Path(folder) / "dlr-ht.parquet"
+        write_imported(imported, table)
+        runs = all_runs(read_drives(table))
+    known = Provenance(source=SOURCE, licence=LICENCE, inputs={source.name: file_hash(source)})
+    groups = [
+        _group_profile(group, [run for run in runs if group.holds(run, kind)], replace(known, notes=group.notes), model)
+        for group in GROUPS
+    ]
+    return groups + _single_profiles(runs, kind, known, model)
+
+
+def _group_profile(group: Group, runs: Sequence[Run], known: Provenance, model: str) -> DriverProfile:
+    """Score on held-out vehicles, then fit to all."""
+    vehicles = np.unique([run.drive for run in runs])
+    chosen = set(np.random.default_rng(SEED).permutation(vehicles)[: len(vehicles) // 2].tolist())
+    half = fit_runs([run for run in runs if run.drive in chosen], name=group.name, model=model)
+    scores = scores_to_dict(
+        score_profile(half, [run for run in runs if run.drive not in chosen], seed=SEED, classify=False)
+    )
+    evaluation = {
+        "held_out": "half of the vehicles, not fitted",
+        "seed": SEED,
+        "snippets": scores["snippets"],
+        "long_snippets": scores["long_snippets"],
+        "spectrum_error_db": scores["spectrum"]["error_db"],
+        "margins": scores["margins"],
+    }
+    return fit_runs(runs, name=group.name, model=model, provenance=replace(known, evaluation=evaluation))
+
+
+# ---- single vehicles -------------------------------------------------------------------------------------------------
+def _single_profiles(
+    runs: Sequence[Run], kind: Mapping[str, str], known: Provenance, model: str
+) -> list[DriverProfile]:
+    """Vehicles with long drives whose movement differs most from one another."""
+    by_vehicle: dict[str, list[Run]] = {}
+    for run in runs:
+        by_vehicle.setdefault(run.drive, []).append(run)
+    long = {name: mine for name, mine in by_vehicle.items() if sum(map(len, mine)) * STEP >= LONG_DRIVE}
+    chosen = most_different({name: snippets_of(mine, SNIPPET, STEP).offset for name, mine in long.items()})
+    parts = {name: _split_in_time(long[name]) for name in chosen}
+    early = [fit_runs(parts[name][0], name=name, model=model) for name in chosen]
+    distance = told_from_each_other(early, [_sliding_snippets(parts[name][1]) for name in chosen], SEED)
+    profiles = []
+    for k, name in enumerate(chosen):
+        others = np.delete(distance[k], k)
+        nearer = int((distance[k, k] < others).sum())
+        evaluation: dict[str, Any] = {
+            "held_out": f"last {100 * (1 - FITTED_SHARE):.0f} % of the drive, not fitted",
+            "own_distance": round(float(distance[k, k]), 4),
+            "distances_to_others": [round(float(value), 4) for value in others],
+            "told_apart": f"nearer to its own held-out part than to those of {nearer} of {len(others)} others",
+        }
+        label = f"motorway-vehicle-{k + 1}"
+        notes = f"One {kind[name]}, {_habit(long[name])}."
+        provenance = replace(
+            known, notes=notes, evaluation=evaluation, fit={"vehicle": name, "vehicle_class": kind[name]}
+        )
+        profiles.append(fit_runs(long[name], name=label, model=model, provenance=provenance))
+    return profiles
+
+
+def most_different(snippets: Mapping[str, FloatArray], count: int = SINGLE_VEHICLES) -> list[str]:
+    """Names of drivers that differ visibly: each next one is farthest from all chosen before it.
+
+    Drivers are compared by the mean of their ten metrics, in units of its spread between drivers.
+
+    Parameters
+    ----------
+    snippets : mapping of str to array, shape (n, m)
+        Driver -> snippets. [m]
+
+    Raises
+    ------
+    NotEnoughDataError
+        If there are fewer drivers than asked for.
+    """
+    names = sorted(snippets)
+    if len(names) < count:
+        raise NotEnoughDataError(f"{len(names)} vehicles with {LONG_DRIVE:g} s of road-following; {count} are needed")
+    means = np.array([snippet_metrics(snippets[name]).mean(axis=0) for name in names])
+    points = (means - means.mean(axis=0)) / means.std(axis=0)
+    chosen = [int(np.argmin((points**2).sum(axis=1)))]  # the most ordinary one first
+    while len(chosen) < count:
+        nearest = np.min([((points - points[k]) ** 2).sum(axis=1) for k in chosen], axis=0)
+        chosen.append(int(np.argmax(nearest)))
+    return [names[k] for k in chosen]
+
+
+def _split_in_time(runs: Sequence[Run]) -> tuple[list[Run], list[Run]]:
+    """Runs before and after the moment by which `FITTED_SHARE` of the driving is done."""
+    left = round(FITTED_SHARE * sum(map(len, runs)))
+    before, after = [], []
+    for run in runs:
+        cut = min(max(left, 0), len(run))
+        left -= len(run)
+        before += [_part(run, slice(0, cut))] if cut > 1 else []
+        after += [_part(run, slice(cut, len(run)))] if len(run) - cut > 1 else []
+    return before, after
+
+
+def _part(run: Run, rows: slice) -> Run:
+    context = {name: values[rows] for name, values in run.context.items()}
+    return Run(run.drive, run.index, run.time[rows], run.offset[rows], run.lane_width[rows], context, run.levels)
+
+
+def _sliding_snippets(runs: Sequence[Run]) -> FloatArray:
+    """Snippets of 10 s every second: a short drive has few that don't overlap."""
+    length = round(SNIPPET / STEP) + 1
+    windows = [
+        np.lib.stride_tricks.sliding_window_view(run.offset, length)[:: round(1 / STEP)]
+        for run in runs
+        if len(run) >= length
+    ]
+    if not windows:
+        raise NotEnoughDataError(f"no {SNIPPET:g} s without a cut in the last part of {runs[0].drive if runs else '?'}")
+    return np.concatenate(windows)
+
+
+def _habit(runs: Sequence[Run]) -> str:
+    """What strikes the eye, in words."""
+    offset = np.concatenate([run.offset for run in runs])
+    mean, spread = float(offset.mean()), float(np.mean([run.offset.std() for run in runs]))
+    side = "left" if mean > 0 else "right"
+    place = "to the lane centre" if abs(mean) < 0.08 else f"{abs(mean):.2f} m to the {side} of the lane centre"
+    calm = "steady" if spread < 0.13 else "restless" if spread > 0.22 else "ordinary"
+    return f"keeps {place}, {calm} (std {spread:.2f} m)"
+
+
+# ---- command ---------------------------------------------------------------------------------------------------------
+CARDS_HEAD = """# The profile library
+
+`xosc-lateral profiles list` names them, `profiles show NAME` prints a card, `profiles compare A B` sets two side
+by side. What follows is written by `make profiles`, which rebuilds the profiles from the public wheel, byte for
+byte. How the data was read, and what may be shipped: [real_data.md](real_data.md).
+"""
+
+
+def main(argv: Sequence[str] | None = None) -> None:
+    """Build the library and write it, with its cards."""
+    ask = argparse.ArgumentParser(description="Build the shipped driver profiles from the public recording.")
+    ask.add_argument("source", type=Path)
+    ask.add_argument("-o", "--output", type=Path, required=True, metavar="FOLDER")
+    ask.add_argument("--cards", type=Path, metavar="PAGE.md")
+    ask.add_argument("--model", default="best")
+    said = ask.parse_args(argv)
+    profiles = build_library(said.source, model=said.model)
+    for profile in profiles:
+        write_profile(profile, said.output / f"{profile.name}.json")
+    if said.cards is not None:
+        from xosc_lateral.report.cards import card_markdown
+
+        write_whole(said.cards, "\n".join([CARDS_HEAD, *map(card_markdown, profiles)]))
+
+
+if __name__ == "__main__":
+    main()
