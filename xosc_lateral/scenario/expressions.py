@@ -86,21 +86,25 @@ def evaluate(expression: str, resolve: Callable[[str], str]) -> str:
     """
     if len(expression) > MAX_LENGTH:
         raise ExpressionError(f"expression of {len(expression)} characters, at most {MAX_LENGTH} are allowed")
-    tokens = _tokens(expression)
     try:
+        tokens = _tokens(expression)
         if _joins_words(tokens):
             return _joined(expression, resolve)
         return as_text(_Parser(tokens, resolve).parse())
     except RecursionError as error:
-        raise ExpressionError(f"'${{{expression[:40]}}}': nested too deeply") from error
+        raise ExpressionError(f"{_quoted(expression)}: nested too deeply") from error
     except (ZeroDivisionError, OverflowError) as error:
-        raise ExpressionError(f"'${{{expression}}}': {error}") from error
+        raise ExpressionError(f"{_quoted(expression)}: {error}") from error
     except ExpressionError as error:
-        raise ExpressionError(f"'${{{expression}}}': {error}") from error
-    except ValueError as error:  # math domain error
+        raise ExpressionError(f"{_quoted(expression)}: {error}") from error
+    except ValueError as error:
         if type(error) is not ValueError:
-            raise
-        raise ExpressionError(f"'${{{expression}}}': {error}") from error
+            raise  # an error of `resolve`
+        raise ExpressionError(f"{_quoted(expression)}: {error}") from error  # math domain error
+
+
+def _quoted(expression: str) -> str:
+    return f"'${{{expression}}}'" if len(expression) <= 80 else f"'${{{expression[:80]}...'"
 
 
 def as_text(value: Value) -> str:

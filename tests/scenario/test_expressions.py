@@ -1,0 +1,118 @@
+from __future__ import annotations
+
+import math
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from xosc_lateral.scenario.expressions import MAX_LENGTH, ExpressionError, evaluate
+
+VALUES = {"a": "3", "b": "-2.5", "yes": "true", "name": "Ego", "v": "108.0"}
+
+
+def value(expression: str) -> str:
+    return evaluate(expression, VALUES.__getitem__)
+
+
+@pytest.mark.parametrize(
+    ("expression", "expected"),
+    [
+        ("1 + 2 * 3", 7.0),
+        ("(1 + 2) * 3", 9.0),
+        ("2 - 3 - 4", -5.0),
+        ("2 / 4 / 2", 0.25),
+        ("7 % 4", 3.0),
+        ("-7 % 4", -3.0),
+        ("--2", 2.0),
+        ("-$b", 2.5),
+        ("$a-$b", 5.5),
+        ("$v / 3.6", 30.0),
+        ("1.5e2 + .5", 150.5),
+        ("round(2.4)", 2.0),
+        ("floor(-0.5)", -1.0),
+        ("ceil(0.2)", 1.0),
+        ("sqrt($a * $a)", 3.0),
+        ("pow(2, 10)", 1024.0),
+        ("sign(-3)", -1.0),
+        ("abs($b)", 2.5),
+        ("max($a, 5)", 5.0),
+        ("min($a, 5)", 3.0),
+        ("sin(pi / 2)", 1.0),
+        ("atan(1) * 4", math.pi),
+    ],
+)
+def test_arithmetic_follows_the_standard(expression: str, expected: float) -> None:
+    assert float(value(expression)) == pytest.approx(expected, abs=1e-10)
+
+
+@pytest.mark.parametrize(
+    ("expression", "expected"),
+    [
+        ("1 < 2", "true"),
+        ("2 <= 2 and not 3 > 4", "true"),
+        ("true and false or true", "true"),
+        ("not true or true", "true"),
+        ("not (true or true)", "false"),
+        ("1 == 1 && 1 != 2", "true"),
+        ("!$yes || false", "false"),
+    ],
+)
+def test_logic_follows_the_standard(expression: str, expected: str) -> None:
+    assert value(expression) == expected
+
+
+def test_numbers_come_out_with_ten_decimals() -> None:
+    assert value("1 / 3") == "0.3333333333"
+    assert value("2") == "2.0000000000"
+
+
+def test_words_are_joined() -> None:
+    assert value("$name + _ + $a") == "Ego_3"
+    assert value("$name + brake event") == "Egobrake event"
+
+
+@pytest.mark.parametrize(
+    "expression",
+    ["", "   ", "1 +", "* 2", "1 2", "(1", "1)", "sqrt()", "pow(2)", "max(1, 2, 3)", "sqrt(-1)", "1 / 0", "7 % 0",
+     "pow(10, 400)", "1 + true and 2 +", "$name * 2", "not $name", "__import__(os)", "a.b()", "1 ; 2", "#", "asin(2)"],
+)  # fmt: skip
+def test_what_is_no_expression_is_an_expression_error(expression: str) -> None:
+    with pytest.raises(ExpressionError):
+        value(expression)
+
+
+def test_depth_and_length_are_bounded() -> None:
+    with pytest.raises(ExpressionError, match="nested"):
+        value("(" * 1000 + "1" + ")" * 1000)
+    with pytest.raises(ExpressionError, match="nested"):
+        value("-" * 1000 + "1")
+    with pytest.raises(ExpressionError, match="characters"):
+        value("1+" * MAX_LENGTH + "1")
+
+
+@settings(max_examples=300, deadline=None, derandomize=True)
+@given(st.text(alphabet="0123456789+-*/%(),.<>=!&| andortue$abpiqsx", max_size=40))
+def test_any_text_gives_a_value_or_an_expression_error(expression: str) -> None:
+    def resolve(name: str) -> str:
+        try:
+            return VALUES[name]
+        except KeyError:
+            raise ExpressionError(f"'{name}' is unknown") from None
+
+    try:
+        assert isinstance(evaluate(expression, resolve), str)
+    except ExpressionError as error:
+        assert str(error)
+
+
+@settings(max_examples=200, deadline=None, derandomize=True)
+@given(
+    st.recursive(
+        st.integers(-9, 9).map(lambda n: f"({n})"),
+        lambda inner: st.tuples(inner, st.sampled_from("+-*"), inner).map(lambda t: f"({t[0]} {t[1]} {t[2]})"),
+        max_leaves=12,
+    )
+)
+def test_integer_arithmetic_agrees_with_python(expression: str) -> None:
+    assert float(value(expression)) == pytest.approx(eval(expression, {}), abs=1e-9)
