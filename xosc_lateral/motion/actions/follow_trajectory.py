@@ -114,7 +114,7 @@ class RunningFollowTrajectory(RunningAction):
 
     def _is_at_end(self, path: Path, way: float, step: float) -> bool:
         if self._is_timed:
-            return self._clock >= path.end_time
+            return self._clock >= path.end_time - EPSILON
         if self.content.trajectory.closed or step <= 0.0 or self.state.speed == 0.0:
             return False
         return self._s > path.length - EPSILON if way > 0.0 else self._s < EPSILON

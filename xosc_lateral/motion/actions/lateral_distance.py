@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
-from math import inf, pi, sqrt
+from math import asin, copysign, inf, pi, sqrt
 
-from xosc_lateral.motion import boxes
 from xosc_lateral.motion.actions.base import Domain, RunningAction
-from xosc_lateral.motion.actions.constraints import limits_of
+from xosc_lateral.motion.actions.constraints import Limits
 from xosc_lateral.motion.distances import ahead_and_left, road_gap, spot_of
+from xosc_lateral.motion.drive import along_reference, travel
 from xosc_lateral.motion.nominal import Activity
 from xosc_lateral.motion.state import NOWHERE
+from xosc_lateral.motion.transition import EPSILON
 from xosc_lateral.scenario.actions import LateralDistanceAction
+from xosc_lateral.scenario.dynamics import DynamicConstraints
 from xosc_lateral.scenario.enums import CoordinateSystem, LateralDisplacement
 
-CLOSE_ENOUGH = 0.1
+CLOSE_ENOUGH = 0.01
 """A distance that is not kept continuously counts as reached. [m]"""
 
 STIFFNESS = 0.4
@@ -21,7 +23,11 @@ STIFFNESS = 0.4
 
 
 class RunningLateralDistance(RunningAction):
-    """At once without dynamic constraints, else a critically damped spring within them; the default driver moves ahead."""
+    """Sideways at the speed allowed, or by a critically damped spring where an acceleration is given.
+
+    With free space, the distance is that between boxes that stand side by side. The way of one frame on the entity's own
+    track is `speed * step`: what goes sideways is missing ahead. Nothing moves in the first frame.
+    """
 
     domains = Domain.LATERAL
     content: LateralDistanceAction
@@ -32,21 +38,27 @@ class RunningLateralDistance(RunningAction):
         self._left = True
         self._wanted = 0.0
         self._speed = 0.0
+        self._is_first = True
 
     def start(self) -> None:
-        """Decide on which side of the other entity to stay."""
+        """Decide on which side of the other entity to be."""
         self._speed = 0.0
-        distance = self._distance()
+        self._is_first = True
+        beside = self._beside()
         displacement = self.content.displacement
         if displacement is LateralDisplacement.ANY:
-            self._left = distance <= 0.0
+            self._left = beside >= 0.0
         else:
             self._left = displacement is LateralDisplacement.LEFT
-        wanted = abs(distance) if self.content.distance is None else abs(self.content.distance)
-        self._wanted = -wanted if self._left else wanted
+        wanted = abs(beside)
+        if self.content.distance is not None:
+            wanted = abs(self.content.distance)
+            if self.content.freespace:
+                wanted += 0.5 * (self.state.entity.bounding_box.width + self._other.entity.bounding_box.width)
+        self._wanted = wanted if self._left else -wanted
 
     def step(self, time: float, step: float) -> None:
-        """Move sideways."""
+        """Move ahead and sideways."""
         state = self.state
         state.locate()
         if state.road == NOWHERE:
@@ -54,41 +66,62 @@ class RunningLateralDistance(RunningAction):
             self.end()
             return
         state.activity |= Activity.LATERAL
-        rest = self._distance() - self._wanted
+        if self._is_first:
+            self._is_first = False
+            return
+        rest = self._wanted - self._beside()
+        self._move(self._sideways(rest, step), step)
         if not self.content.continuous and abs(rest) < CLOSE_ENOUGH:
+            state.turn(0.0 if state.is_forward else pi)
             self.end()
-        self._move(self._sideways(rest, step))
 
     # ---- in detail ---------------------------------------------------------------------------------------------------
-    def _distance(self) -> float:
-        """From the actor to the other, positive when the other is to the left. [m]"""
+    def _beside(self) -> float:
+        """Of the other, positive to the left of it. [m]"""
         state, other = self.state, self._other
-        if self.content.freespace:
-            return boxes.gaps(state, boxes.corners(other))[1]
         if self.content.coordinate_system in (CoordinateSystem.ROAD, CoordinateSystem.LANE):
-            gap = road_gap(self.run.network, state, spot_of(other))
+            gap = road_gap(self.run.network, other, spot_of(state))
             if gap is not None:
-                return gap.dt if state.is_forward else -gap.dt
-        return -ahead_and_left(other, state.pose.x, state.pose.y)[1]
+                return gap.dt if other.is_forward else -gap.dt
+        return ahead_and_left(other, state.pose.x, state.pose.y)[1]
 
     def _sideways(self, rest: float, step: float) -> float:
         """Movement of the frame to the left. [m]"""
-        constraints = self.content.constraints
-        limits = limits_of(constraints, self.state.entity.performance)
-        if constraints is None or constraints.max_acceleration is None or limits.acceleration == inf:
-            return rest
+        limits = self._limits()
+        if limits.acceleration == inf:
+            most = inf if limits.speed == inf else limits.speed * step
+            return min(max(rest, -most), most)
         stiffness = STIFFNESS * limits.acceleration
         pull = rest * stiffness - self._speed * 2.0 * sqrt(stiffness)
         pull = min(max(pull, -limits.deceleration), limits.acceleration)
         self._speed = min(max(self._speed + pull * step, -limits.speed), limits.speed)
         return self._speed * step
 
-    def _move(self, sideways: float) -> None:
+    def _limits(self) -> Limits:
+        """As given, not capped by what the entity can do ahead; without an acceleration there is no spring."""
+        given = self.content.constraints or DynamicConstraints()
+        speed = inf if given.max_speed is None else given.max_speed
+        if given.max_acceleration is None:
+            return Limits(speed, inf, inf, inf, inf)
+        acceleration = given.max_acceleration
+        deceleration = acceleration if given.max_deceleration is None else given.max_deceleration
+        return Limits(speed, acceleration, deceleration, inf, inf)
+
+    def _move(self, sideways: float, step: float) -> None:
         state, network = self.state, self.run.network
         state.follow_lane()
-        t = state.t + (sideways if state.is_forward else -sideways)
+        state.take_control(Activity.LATERAL)
+        state.speed_taken = True
+        way = abs(state.speed) * step
+        across = min(max(sideways, -way), way) if way > EPSILON else 0.0
+        ahead = copysign(sqrt(way * way - across * across), state.speed)
+        forward = state.is_forward
+        t = state.t + (sideways if forward else -sideways)
         found = network.lane_at(state.road, state.s, t)
         lane = found.lane or state.lane
         state.move_to(state.road, lane, state.s, t - network.lane_state_at(state.road, lane, state.s).centre_t)
         state.section = (0.0, -1.0)
-        state.turn(0.0 if state.is_forward else pi)
+        on_line = along_reference(network, state.road, state.lane, state.s, state.offset_t, ahead)
+        travel(state, 1 if forward else -1, on_line)
+        turn = copysign(asin(across / way), across * state.speed) if way > EPSILON and across else 0.0
+        state.turn((0.0 if state.is_forward else pi) + turn)

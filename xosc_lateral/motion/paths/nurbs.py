@@ -94,7 +94,9 @@ class NurbsPath:
         step = self.knots[-1] / steps
         self._parameters = [i * step for i in range(steps + 1)]
         samples = [self.point(t) for t in self._parameters]
-        times = self._times([shares for _, _, shares in samples])
+        delta = min(_TANGENT_STEP, step)
+        beside = [self.point(t + delta if i < steps else t - delta) for i, t in enumerate(self._parameters)]
+        times = self._times([shares for _, _, shares in beside])
         corners = [
             Corner(x, y, heading=self._heading(i, x, y, step, steps), time=time)
             for i, ((x, y, _), time) in enumerate(zip(samples, times, strict=True))
