@@ -174,14 +174,19 @@ def _deterministic(owner: Element) -> Deterministic:
 
 def _value_sets(owner: Element) -> ValueSets:
     sets = tuple(
-        {parameter_name(a.text("parameterRef")): a.text("value") for a in item.children("ParameterAssignment")}
+        {_name_of(a, "parameterRef"): a.text("value") for a in item.children("ParameterAssignment")}
         for item in owner.children("ParameterValueSet")
     )
     return ValueSets(sets, owner.place())
 
 
+def _name_of(element: Element, attribute: str) -> str:
+    """Name of a parameter: never a reference, even where a file writes it with a ``$``."""
+    return parameter_name(element.raw(attribute) or element.text(attribute))
+
+
 def _single(item: Element) -> ValueSets | SteppedRange:
-    name = parameter_name(item.text("parameterName"))
+    name = _name_of(item, "parameterName")
     content = item.required("DistributionSet", "DistributionRange", "UserDefinedDistribution")
     if content.tag == "DistributionSet":
         return ValueSets(tuple({name: value.text("value")} for value in content.children("Element")), item.place())
@@ -213,7 +218,7 @@ def _stochastic(owner: Element) -> Stochastic:
     draws = []
     for item in owner.children("StochasticDistribution"):
         content = item.required(*_DRAWS)
-        draws.append((parameter_name(item.text("parameterName")), _DRAWS[content.tag](content)))
+        draws.append((_name_of(item, "parameterName"), _DRAWS[content.tag](content)))
     return Stochastic(tuple(draws), runs, _seed(owner))
 
 

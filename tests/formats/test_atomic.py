@@ -1,0 +1,51 @@
+from __future__ import annotations
+
+import stat
+from pathlib import Path
+
+import pytest
+
+from xosc_lateral.formats.atomic import replace_atomically, write_atomically
+
+
+def test_text_and_bytes_arrive(tmp_path: Path) -> None:
+    assert write_atomically(tmp_path / "a.txt", "grüße").read_bytes() == "grüße".encode()
+    assert write_atomically(tmp_path / "a.txt", b"\x00").read_bytes() == b"\x00"
+    assert [path.name for path in tmp_path.iterdir()] == ["a.txt"]
+
+
+def test_a_failing_writer_leaves_the_old_file_and_nothing_else(tmp_path: Path) -> None:
+    target = write_atomically(tmp_path / "a.txt", "old")
+
+    def fail(path: Path) -> None:
+        path.write_text("half")
+        raise OSError("disk full")
+
+    with pytest.raises(OSError, match="disk full"):
+        replace_atomically(target, fail)
+    assert target.read_text() == "old"
+    assert [path.name for path in tmp_path.iterdir()] == ["a.txt"]
+
+
+def test_the_temporary_file_has_the_targets_suffix_and_folder(tmp_path: Path) -> None:
+    seen: list[Path] = []
+
+    def write(path: Path) -> None:
+        seen.append(path)
+        path.write_bytes(b"x")
+
+    replace_atomically(tmp_path / "table.csv.gz", write)
+    assert seen[0].parent == tmp_path
+    assert seen[0].suffix == ".gz"
+
+
+def test_outputs_are_readable_for_others(tmp_path: Path) -> None:
+    plain = tmp_path / "plain"
+    plain.touch()
+    written = write_atomically(tmp_path / "a", "x")
+    assert stat.S_IMODE(written.stat().st_mode) == stat.S_IMODE(plain.stat().st_mode)
+
+
+def test_a_missing_folder_is_an_os_error(tmp_path: Path) -> None:
+    with pytest.raises(OSError, match="No such file"):
+        write_atomically(tmp_path / "no" / "a", "x")
