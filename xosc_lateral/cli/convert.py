@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from xosc_lateral.cli.words import pairs
+from xosc_lateral.pipeline.settings import ConvertSettings, Mode
 
 
 def register(app: typer.Typer) -> None:
@@ -34,6 +35,10 @@ def convert(
     context: Annotated[Path | None, typer.Option(help="Table of context over time (time, wind_speed, ...).")] = None,
     parameter: Annotated[list[str] | None, typer.Option("--set", metavar="NAME=VALUE")] = None,
     library: Annotated[list[Path] | None, typer.Option(help="Folder with further profiles.")] = None,
+    mode: Annotated[
+        Mode, typer.Option(help="trajectory: maneuvers are played out; lane-offset: maneuvers stay reactive.")
+    ] = Mode.TRAJECTORY,
+    allow: Annotated[list[Path] | None, typer.Option(help="Folder that roads and catalogs may lie in.")] = None,
     resample: Annotated[int, typer.Option(help="Attempts while cars touch or leave their lane.", min=1)] = 1,
     time_limit: Annotated[float, typer.Option(help="End of a scenario without one [s].", min=0.1)] = 60.0,
     jobs: Annotated[int, typer.Option(help="Batch: processes; -1: one per core.")] = 1,
@@ -45,7 +50,6 @@ def convert(
     """Give every car in a scenario the lateral movement of a real driver."""
     from xosc_lateral.cli.batches import convert_batch, is_batch
     from xosc_lateral.pipeline.convert import convert_variants
-    from xosc_lateral.pipeline.settings import ConvertSettings
     from xosc_lateral.report.conversion import as_text, to_json, write_report
 
     settings = ConvertSettings(
@@ -56,7 +60,9 @@ def convert(
         context=context,
         parameters=pairs(parameter, "--set"),
         attempts=resample,
+        mode=mode,
         libraries=tuple(library or ()),
+        allowed=tuple(allow or ()),
         time_limit=time_limit,
     )
     if is_batch(scenario):

@@ -13,7 +13,12 @@ from xosc_lateral.enrich.enrich import enrich
 from xosc_lateral.enrich.result import Enriched
 from xosc_lateral.formats.context_table import read_context
 from xosc_lateral.formats.hashes import file_hash
-from xosc_lateral.formats.openscenario.write import WrittenScenario, write_trajectory_scenario
+from xosc_lateral.formats.openscenario.write import (
+    WrittenScenario,
+    offset_chain,
+    write_lane_offset_scenario,
+    write_trajectory_scenario,
+)
 from xosc_lateral.formats.profiles import profile_hash
 from xosc_lateral.pipeline.drivers import choose_drivers
 from xosc_lateral.pipeline.load import Played, play_scenario
@@ -89,7 +94,13 @@ def convert_scenario(source: Path, output: Path, settings: ConvertSettings, *, v
     OSError
         When the output can't be written; nothing is left half-written.
     """
-    played = play_scenario(source, parameters=settings.parameters, step=settings.step, time_limit=settings.time_limit)
+    played = play_scenario(
+        source,
+        parameters=settings.parameters,
+        step=settings.step,
+        time_limit=settings.time_limit,
+        allowed=settings.allowed,
+    )
     drivers = choose_drivers(played.scenario, settings)
     enriched = enrich(
         played.motion,
@@ -145,14 +156,19 @@ def _relative(path: Path, scenario: Path) -> str:
 def _write(played: Played, enriched: Enriched, output: Path, provenance: Provenance, mode: Mode) -> WrittenScenario:
     profiles = sorted({name for name, _ in provenance.profiles.values()})
     summary = f"seed {provenance.seed}, variant {provenance.variant}, {', '.join(profiles) or 'no profile'}"
+    facts = asdict(provenance)
+    if mode is Mode.LANE_OFFSET:
+        chains = [
+            offset_chain(entity.motion, played.network, entity.deviation, segment.stretch.first, segment.stretch.last)
+            for entity in enriched.entities
+            for segment in entity.segments
+        ]
+        return write_lane_offset_scenario(
+            played.scenario, played.motion, chains, output, provenance=facts, summary=summary
+        )
     trajectories = {entity.name: entity.trajectory for entity in enriched.entities}
     return write_trajectory_scenario(
-        played.scenario,
-        played.motion,
-        trajectories,
-        output,
-        provenance=asdict(provenance),
-        summary=summary,
+        played.scenario, played.motion, trajectories, output, provenance=facts, summary=summary
     )
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -11,14 +11,9 @@ from xosc_lateral.formats.opendrive import read_opendrive
 from xosc_lateral.formats.openscenario import read_scenario
 from xosc_lateral.motion.nominal import NominalMotion
 from xosc_lateral.motion.playback import play
+from xosc_lateral.pipeline.settings import STEP, TIME_LIMIT
 from xosc_lateral.road.network import RoadNetwork
 from xosc_lateral.scenario import Scenario
-
-STEP = 0.02
-"""Of playback, as in the reference logs. [s]"""
-
-TIME_LIMIT = 60.0
-"""A scenario that does not end by itself is ended after this. [s]"""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -41,6 +36,7 @@ def play_scenario(
     parameters: Mapping[str, str] | None = None,
     step: float = STEP,
     time_limit: float = TIME_LIMIT,
+    allowed: Iterable[Path] = (),
 ) -> Played:
     """Read and play.
 
@@ -52,13 +48,15 @@ def play_scenario(
         Values that replace those declared.
     step, time_limit : float
         [s]
+    allowed : iterable of Path
+        Folders, besides those around the scenario, that its road and catalogs may lie in.
 
     Raises
     ------
     FormatError, PlaybackError
         With file, line and element.
     """
-    scenario = read_scenario(path, parameters or {})
+    scenario = read_scenario(path, parameters or {}, allowed=allowed)
     network = RoadNetwork(()) if scenario.road_file is None else road_network(scenario.road_file)
     return Played(scenario, network, play(scenario, network, step=step, time_limit=time_limit))
 

@@ -7,7 +7,11 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 from pathlib import Path
 
-from xosc_lateral.pipeline.load import STEP, TIME_LIMIT
+STEP = 0.02
+"""Of playback, as in the reference logs. [s]"""
+
+TIME_LIMIT = 60.0
+"""A scenario that does not end by itself is ended after this. [s]"""
 
 AUTO = "auto"
 """Profile name that picks one of the shipped profiles by the vehicle's class."""
@@ -42,6 +46,8 @@ class ConvertSettings:
     mode : Mode
     libraries : tuple of Path
         Folders with further profiles.
+    allowed : tuple of Path
+        Folders, besides those around the scenario, that its road and catalogs may lie in.
     step, time_limit : float
         Of playback. [s]
     """
@@ -55,5 +61,6 @@ class ConvertSettings:
     attempts: int = 1
     mode: Mode = Mode.TRAJECTORY
     libraries: tuple[Path, ...] = ()
+    allowed: tuple[Path, ...] = ()
     step: float = STEP
     time_limit: float = TIME_LIMIT
