@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Sequence
 from importlib import import_module
-from typing import Annotated
+from typing import Annotated, Any, cast
 
 import typer
 
@@ -55,8 +55,9 @@ def main(argv: Sequence[str] | None = None) -> int:
         # Typer's usage errors come from a click that is vendored in some of its releases: told by their duck shape.
         if not hasattr(error, "exit_code") or not hasattr(error, "format_message"):
             raise
-        error.show()
-        code = error.exit_code
+        usage = cast(Any, error)
+        usage.show()
+        code = usage.exit_code
     if argv is None:
         sys.exit(code)
     return int(code or 0)
