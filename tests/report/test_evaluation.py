@@ -1,0 +1,127 @@
+"""evaluate and profiles, from the command line to the page."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from xosc_lateral.cli import main
+from xosc_lateral.formats.library import GROUPS, most_different
+from xosc_lateral.formats.profiles import list_profiles, read_profile
+from xosc_lateral.loop.compare import free_runs
+from xosc_lateral.report.evaluation import _density
+
+
+@pytest.fixture(scope="module")
+def table(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Twelve drives of two minutes at 10 Hz."""
+    from scipy.signal import lfilter
+
+    rng = np.random.default_rng(0)
+    n = 1200
+    x = lfilter([1.0], np.poly([0.98, 0.9]), rng.normal(size=(12, n + 500)), axis=1)[:, 500:]
+    x *= 0.25 / x.std()
+    path = tmp_path_factory.mktemp("drives") / "drives.parquet"
+    drive = np.repeat([f"d{k}" for k in range(12)], n)
+    pd.DataFrame(
+        {"drive": drive, "time": np.tile(0.1 * np.arange(n), 12), "offset": x.ravel(), "lane_width": 3.6, "speed": 30.0}
+    ).to_parquet(path)
+    return path
+
+
+@pytest.fixture(scope="module")
+def profile(table: Path) -> Path:
+    path = table.with_name("mine.json")
+    assert main(["fit", str(table), "-o", str(path), "--model", "two-level", "--source", "made up"]) == 0
+    return path
+
+
+def test_evaluate_prints_one_json_object_with_everything(table, profile, capsys):
+    assert main(["evaluate", "-p", str(profile), str(table), "--json", "--no-classify"]) == 0
+    values = json.loads(capsys.readouterr().out)
+    assert values["snippets"]["count"] > 100
+    assert len(values["evaluations"]) == 4
+    assert values["spectrum"]["frequency_hz"][0] < 0.03
+    assert set(values["provenance"]["inputs"]) == {"drives.parquet"}
+    assert len(values["provenance"]["profile_sha256"]) == 64
+
+
+def test_evaluate_tells_a_person_the_same(table, profile, capsys):
+    assert main(["evaluate", "-p", str(profile), str(table), "--no-classify"]) == 0
+    text = capsys.readouterr().out
+    assert "snippets of 10 s" in text and "near a marking, measured" in text and "classifier AUC: not computed" in text
+
+
+def test_report_is_one_page_with_violins_and_the_same_bytes_each_time(table, profile, tmp_path):
+    pages = []
+    for name in ("a.html", "b.html"):
+        words = ["evaluate", "-p", str(profile), str(table), "--no-classify", "--report", str(tmp_path / name)]
+        assert main(words) == 0
+        pages.append((tmp_path / name).read_text(encoding="utf-8"))
+    assert pages[0] == pages[1]
+    assert pages[0].count("<svg") == 6, "four evaluations, spectrum, memory"
+    assert "real" in pages[0] and "artificial" in pages[0] and "drives.parquet" in pages[0]
+    assert "src=" not in pages[0] and 'href="http' not in pages[0], "opens offline"
+
+
+def test_density_integrates_to_the_sample():
+    values = np.random.default_rng(1).normal(0, 0.2, 2000)
+    grid = np.linspace(-0.6, 0.6, 120)
+    density = _density(values, grid)
+    density /= density.sum() * (grid[1] - grid[0])
+    expected = np.exp(-0.5 * (grid / 0.2) ** 2) / (0.2 * np.sqrt(2 * np.pi))
+    assert np.abs(density - expected).max() < 0.15 * expected.max()
+
+
+# ---- library ---------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("path", list_profiles(), ids=lambda path: path.stem)
+def test_shipped_profile_names_its_source_and_stays_in_the_lane(path):
+    profile = read_profile(path)
+    known = profile.provenance
+    assert profile.name == path.stem
+    assert known.source and known.licence and known.notes and known.hours > 0.03 and known.package_version
+    assert all(len(digest) == 64 for digest in known.inputs.values()) and known.inputs
+    assert known.evaluation["held_out"]
+    runs = free_runs(profile, 1, drivers=5, duration=300.0)
+    assert np.abs(runs).max() < 0.5 * profile.lane_width
+    assert 0.03 < runs.std() < 0.5
+
+
+def test_population_classes_lanes_and_single_vehicles_are_shipped():
+    names = {path.stem for path in list_profiles()}
+    assert {group.name for group in GROUPS} <= names
+    assert sum(name.startswith("motorway-vehicle-") for name in names) >= 5
+
+
+def test_most_different_picks_the_odd_ones():
+    rng = np.random.default_rng(2)
+    snippets = {f"plain{k}": rng.normal(0, 0.1, (12, 51)) for k in range(8)}
+    snippets["left"] = snippets["plain0"] + 0.6
+    snippets["restless"] = 5.0 * snippets["plain1"]
+    assert {"left", "restless"} <= set(most_different(snippets, 3))
+
+
+def test_profiles_list_show_and_compare_see_own_folders(profile, capsys):
+    folder = ["--library", str(profile.parent)]
+    assert main(["profiles", "list", *folder, "--json"]) == 0
+    listed = {one["name"]: one for one in json.loads(capsys.readouterr().out)}
+    assert listed["mine"]["source"] == "made up" and "motorway-car" in listed
+    assert main(["profiles", "show", "mine", *folder]) == 0
+    card = capsys.readouterr().out
+    assert "made up" in card and "two-level" in card and "of the lane centre on average" in card
+    assert main(["profiles", "show", "mine", *folder, "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["habits"]["spread"] == pytest.approx(0.25, abs=0.06)
+    assert main(["profiles", "compare", "mine", "motorway-car", *folder, "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["mean"] > 0
+
+
+def test_an_unknown_profile_is_answered_with_the_known_ones(capsys):
+    assert main(["profiles", "show", "nobody"]) == 1
+    message = capsys.readouterr().err
+    assert "no profile 'nobody'" in message and "motorway-car" in message
