@@ -32,7 +32,12 @@ STEERING_RATIO = 15.0  # steering wheel angle over road wheel angle [-]
 CHARACTERISTIC_SPEED = 35.0  # understeer: the yaw gain falls beyond it [m/s]
 YAW_LAG = 0.14  # yaw rate behind the steering angle [s]
 STARTLE = 0.9  # a foreseen error that is noticed from the corner of the eye [m]
+LINE_UP = 1.6  # time in which a heading error dies out while nothing else is corrected [s]
+EASE = 2.4  # a change of mind about the place in the lane takes so long [s]
+HARDEST = 1.5  # lateral acceleration of a lane change [m/s2]
 NEUROMUSCULAR_LAG = 0.13  # wheel behind the hand's command, twice in a row [s]
+FOLLOWING_LAG = 2 * NEUROMUSCULAR_LAG + YAW_LAG - 3 * STEP
+"""How far ahead the hand follows the road: curves alone move nobody. A lag taken in steps is one step shorter. [s]"""
 
 
 LEVELS = ("lane_index", "truck_right", "car_left")
@@ -74,9 +79,9 @@ class Driver:
 
     bias: float = 0.0
     """Offset held for the middle of the lane. [m]"""
-    tolerance: float = 0.12
+    tolerance: float = 0.24
     """Foreseen error that is let pass. [m]"""
-    preview: float = 1.9
+    preview: float = 2.3
     """How far ahead the error is foreseen. [s]"""
     delay: float = 0.15
     """From seeing to moving the hand. [s]"""
@@ -86,15 +91,15 @@ class Driver:
     """Time between two corrections, about. [s]"""
     motor_noise: float = 0.25
     """Standard deviation of a correction over its size. [-]"""
-    tremor: float = 0.0016
+    tremor: float = 0.001
     """Wandering of the hand within a second: standard deviation of the yaw rate that it would give. [rad/s]"""
-    blur: float = 0.10
+    blur: float = 0.05
     """Error of the eye about the place in a second. [m]"""
-    mood: float = 0.10
+    mood: float = 0.11
     """Wandering of what feels like the middle. [m]"""
-    mood_time: float = 25.0
+    mood_time: float = 55.0
     """Correlation time of it. [s]"""
-    gusts: float = 0.09
+    gusts: float = 0.095
     """Sideways velocity that road and air give the car. [m/s]"""
 
 
@@ -130,7 +135,7 @@ def draw_driver(rng: np.random.Generator, spread: float = 0.25) -> Driver:
     traits = {
         f.name: getattr(ordinary, f.name) * math.exp(spread * rng.normal()) for f in fields(Driver) if f.name != "bias"
     }
-    traits["preview"] = min(max(traits["preview"], 1.6), 2.6)  # less, and the car can't be held; more, and nobody looks
+    traits["preview"] = min(max(traits["preview"], 1.8), 3.0)  # less, and the car can't be held; more, and nobody looks
     traits["gain"] = min(traits["gain"], 1.1)
     return Driver(bias=0.08 * rng.normal(), **traits)
 
@@ -206,11 +211,24 @@ def _steer(
     n = len(aim)
     noise = rng.normal(size=(7, n))
     traits = np.array([getattr(driver, f.name) for f in fields(Driver) if f.name != "bias"])
-    return _loop(aim, curvature, speed, intent.tolerance, intent.gain, intent.noise, intent.attention, noise, traits)
+    aim = _eased(aim)
+    rate = np.gradient(aim, STEP)
+    sideways = np.gradient(rate, STEP)
+    path = curvature + np.clip(sideways, -HARDEST, HARDEST) / speed**2  # the way that the human means to drive
+    care = (intent.tolerance, intent.gain, intent.noise, intent.attention)
+    return _loop(aim, rate, path, curvature, speed, *care, noise, traits)
+
+
+def _eased(values: np.ndarray) -> np.ndarray:
+    """Smoothed over `EASE`, without delay: a human sees a truck or a bend before it is there."""
+    window = np.hanning(2 * round(0.5 * EASE / STEP) + 1)
+    half = len(window) // 2
+    padded = np.concatenate([np.full(half, values[0]), values, np.full(half, values[-1])])
+    return np.asarray(np.convolve(padded, window / window.sum(), mode="valid"))
 
 
 @numba.njit(cache=True)
-def _loop(aim, curvature, speed, tolerance, gain, care, attention, noise, traits):  # type: ignore[no-untyped-def]
+def _loop(aim, aim_rate, path, curvature, speed, tolerance, gain, care, attention, noise, traits):  # type: ignore[no-untyped-def]
     """Car and human, step by step: place [m] in the frame of lane 0's centre, wheel angle [rad], yaw rate [rad/s]."""
     base_tolerance, preview, delay, base_gain, refractory, motor, tremor, blur, mood, mood_time, gusts = traits
     n = len(aim)
@@ -219,7 +237,7 @@ def _loop(aim, curvature, speed, tolerance, gain, care, attention, noise, traits
     # all of these are yaw rates: the command is what the human adds to following the road
     command, first, wheel, shake = 0.0, rate, rate, 0.0
     error_of_eye, drift, gust = 0.0, 0.0, 0.0
-    back, ahead, onset = int(delay / STEP), int(preview / STEP), int(0.25 / STEP)
+    back, ahead, onset = round(delay / STEP), round(preview / STEP), round(FOLLOWING_LAG / STEP)
     wait, limit, count = 0.0, base_tolerance, 0
     for i in range(n):
         v, past = speed[i], max(0, i - back)
@@ -239,9 +257,10 @@ def _loop(aim, curvature, speed, tolerance, gain, care, attention, noise, traits
             wait = refractory * math.exp(0.3 * noise[6, i])
             count += 1
         elif wait <= 0.0:
-            command *= math.exp(-STEP / 0.6)  # nothing to correct: the wheel goes back to the road's curvature
+            # nothing to correct: the hand lets the car line up with its way, wherever in the lane that is
+            command += STEP / 0.6 * (gain[i] * (aim_rate[i] - slope) / (v * LINE_UP) - command)
         shake += -STEP / 0.7 * shake + tremor * care[i] * math.sqrt(2.0 * STEP / 0.7) * noise[3, i]
-        wanted = command + shake + curvature[min(n - 1, i + onset)] * v
+        wanted = command + shake + path[min(n - 1, i + onset)] * v
         first += STEP / NEUROMUSCULAR_LAG * (wanted - first)
         wheel += STEP / NEUROMUSCULAR_LAG * (first - wheel)
         rate += STEP / YAW_LAG * (wheel - rate)

@@ -67,7 +67,7 @@ def test_an_undisturbed_driver_moves_as_drivers_do():
     assert 0.2 < np.median(spreads) < 0.3
     changes = [np.count_nonzero(np.diff(drive.table["lane_index"])) for drive in drives]
     assert min(changes) >= 3 and max(changes) <= 20
-    assert all(1.0 < drive.truth.corrections / (20 * MINUTE) < 5.0 for drive in drives)
+    assert all(0.3 < drive.truth.corrections / (20 * MINUTE) < 3.0 for drive in drives)
 
 
 def test_it_resembles_drives_of_another_simulator_in_spread_and_spectrum(shared):
@@ -111,6 +111,16 @@ def test_a_shift_of_the_target_moves_the_car_by_as_much(plant):
     assert np.mean(slopes) == pytest.approx(1.0, abs=0.3)
 
 
+def test_an_ordinary_driver_neither_cuts_curves_nor_is_carried_out_of_them():
+    """Mean slope of the offset on the shift that a curve cutter of 0.25 m would show; scatters by 0.26 per drive."""
+    slopes = []
+    for seed in range(10):
+        cutter, ordinary = (simulate_drive(50 * MINUTE, seed, effects=e).truth for e in ([CurveCutting(0.25)], []))
+        shift = cutter.target[~cutter.lane_change] - cutter.target[~cutter.lane_change].mean()
+        slopes.append(shift @ ordinary.offset[~ordinary.lane_change] / (shift @ shift))
+    assert np.mean(slopes) == pytest.approx(0.0, abs=3.0 * 0.26 / np.sqrt(10))
+
+
 def test_curves_are_cut_ahead_of_the_curve():
     table_truth = [simulate_drive(30 * MINUTE, seed, effects=[CurveCutting(0.5, look_ahead=2.5)]) for seed in range(3)]
     leads = np.arange(-6.0, 6.1, 0.5)
@@ -123,7 +133,7 @@ def test_curves_are_cut_ahead_of_the_curve():
     assert 1.0 <= leads[fits.argmax()] <= 4.0
 
 
-@pytest.mark.parametrize("plant", [SpreadBy("speed", 2.0), RestoringBy("speed", 0.4)], ids=["spread", "restoring"])
+@pytest.mark.parametrize("plant", [SpreadBy("speed", 2.0), RestoringBy("speed", 0.25)], ids=["spread", "restoring"])
 def test_spread_and_restoring_effects_change_the_spread_where_the_column_is_high(plant):
     def ratio(drive: Drive) -> float:
         low, high = np.quantile(drive.table["speed"], [0.25, 0.75])
@@ -131,8 +141,8 @@ def test_spread_and_restoring_effects_change_the_spread_where_the_column_is_high
             drive, (drive.table["speed"] < low).to_numpy()
         )
 
-    with_effect = [ratio(simulate_drive(30 * MINUTE, seed, effects=[plant])) for seed in range(3)]
-    without = [ratio(simulate_drive(30 * MINUTE, seed)) for seed in range(3)]
+    with_effect = [ratio(simulate_drive(40 * MINUTE, seed, effects=[plant])) for seed in range(5)]
+    without = [ratio(simulate_drive(40 * MINUTE, seed)) for seed in range(5)]
     assert np.mean(with_effect) > 1.2 * np.mean(without)
 
 
