@@ -212,9 +212,9 @@ def markdown(rows: dict[str, Row], splits: int) -> str:
     return "\n".join([*lines, "", f"Mean over {splits} random halves of the drives; AUC on the first."])
 
 
-def write_between_markers(path: Path, text: str) -> None:
+def write_between_markers(path: Path, text: str, marker: str = MARKER) -> None:
     """Put the table into a document, between its two markers."""
-    begin, end = f"<!-- {MARKER}: begin -->", f"<!-- {MARKER}: end -->"
+    begin, end = f"<!-- {marker}: begin -->", f"<!-- {marker}: end -->"
     pattern = re.compile(re.escape(begin) + ".*?" + re.escape(end), re.DOTALL)
     document = path.read_text(encoding="utf-8")
     if not pattern.search(document):

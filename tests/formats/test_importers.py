@@ -121,6 +121,14 @@ def test_lane_centre_is_recovered_within_its_standard_error():
     assert np.corrcoef(parallax, np.sin(2 * np.pi * at / 400))[0, 1] > 0.8
 
 
+def test_vehicles_of_one_height_are_enough():
+    rng = np.random.default_rng(6)
+    s = np.tile(np.arange(0, 1000, 30.0), 40)
+    stretch = np.repeat(np.arange(40), len(s) // 40)
+    lane = fit_lane_centre(s, 0.1 + rng.normal(0, 0.1, len(s)), np.full(len(s), 1.5), stretch)
+    assert lane.at(np.array([500.0]), np.array([1.5])) == pytest.approx(0.1, abs=0.05)
+
+
 def test_a_lane_without_traffic_is_refused_with_the_count():
     s = np.arange(0, 1000, 30.0)
     with pytest.raises(NotEnoughDataError, match=r"at most 1 drives share 100 m .* 10 are needed"):
