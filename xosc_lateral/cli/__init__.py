@@ -18,6 +18,7 @@ app = typer.Typer(
     no_args_is_help=True,
     pretty_exceptions_enable=False,
     add_completion=False,
+    rich_markup_mode=None,  # units in help texts are in brackets, which rich would take for markup
 )
 
 # One module per verb, named like it; each has `register(app)`. They import nothing heavy at the top.
