@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from xosc_lateral.driver.effects.base import EffectTerms
 from xosc_lateral.driver.effects.hidden import HiddenEffect
+from xosc_lateral.driver.effects.running import RunningTerms
 
 FloatArray = NDArray[np.float64]
 
@@ -44,3 +45,31 @@ class Drift(HiddenEffect):
         noise = rng.normal(size=len(time)) * self.size * np.sqrt(1.0 - keep**2)
         noise[:1] /= np.sqrt(1.0 - keep**2)
         return EffectTerms(location=np.asarray(lfilter([1.0], [1.0, -keep], noise)))
+
+    def running(self, rng: np.random.Generator) -> RunningTerms:
+        """See `HiddenEffect.running`."""
+        return _RunningDrift(self, rng)
+
+
+class _RunningDrift:
+    def __init__(self, effect: Drift, rng: np.random.Generator) -> None:
+        self._effect, self._rng = effect, rng
+        self._wander = 0.0
+        self._keep: float | None = None
+
+    def take(self, time: FloatArray) -> EffectTerms:
+        if self._keep is None:
+            keep = float(np.exp(-(time[1] - time[0]) / self._effect.correlation_s))
+            noise = self._noise(len(time), keep)
+            noise[0] /= np.sqrt(1.0 - keep**2)
+        else:
+            keep = self._keep
+            noise = self._noise(len(time), keep)
+        self._keep = keep
+        location = np.empty(len(time))
+        for row, kick in enumerate(noise.tolist()):
+            self._wander = location[row] = kick + keep * self._wander
+        return EffectTerms(location=location)
+
+    def _noise(self, n: int, keep: float) -> FloatArray:
+        return np.asarray(self._rng.normal(size=n) * self._effect.size * np.sqrt(1.0 - keep**2))

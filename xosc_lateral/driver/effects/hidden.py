@@ -2,17 +2,23 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, fields
 from typing import Any, ClassVar, Self
 
 import numpy as np
+from numpy.typing import NDArray
 
+from xosc_lateral.driver.effects.base import EffectTerms
+from xosc_lateral.driver.effects.running import RunningTerms
 from xosc_lateral.errors import DriverProfileError
+
+FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True)
-class HiddenEffect:
+class HiddenEffect(ABC):
     """An effect of time or of chance alone; its fields are finite numbers.
 
     Raises
@@ -37,6 +43,14 @@ class HiddenEffect:
         """None: hidden."""
         return ()
 
+    @abstractmethod
+    def terms(self, time: FloatArray, context: Mapping[str, FloatArray], rng: np.random.Generator) -> EffectTerms:
+        """Evaluate on a uniform time grid; see `Effect.terms`."""
+
+    def running(self, rng: np.random.Generator) -> RunningTerms:
+        """Begin a drive of unknown length. This one is for effects that depend on nothing but the time."""
+        return _ByTime(self, rng)
+
     def to_dict(self) -> dict[str, Any]:
         """Plain JSON values."""
         return {"kind": self.kind, **asdict(self)}
@@ -48,3 +62,13 @@ class HiddenEffect:
             return cls(**{name: value for name, value in data.items() if name != "kind"})
         except (TypeError, ValueError) as error:
             raise DriverProfileError(f"effect {cls.kind}: {error}") from error
+
+
+class _ByTime:
+    """Terms of an effect that is a plain function of time."""
+
+    def __init__(self, effect: HiddenEffect, rng: np.random.Generator) -> None:
+        self._effect, self._rng = effect, rng
+
+    def take(self, time: FloatArray) -> EffectTerms:
+        return self._effect.terms(time, {}, self._rng)

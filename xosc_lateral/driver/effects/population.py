@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from xosc_lateral.driver.effects.base import EffectTerms
 from xosc_lateral.driver.effects.hidden import HiddenEffect
+from xosc_lateral.driver.effects.running import RunningTerms
 
 FloatArray = NDArray[np.float64]
 
@@ -39,6 +40,26 @@ class Population(HiddenEffect):
 
     def terms(self, time: FloatArray, context: Mapping[str, FloatArray], rng: np.random.Generator) -> EffectTerms:
         """One driver for the whole run."""
-        ones = np.ones(len(time))
+        return self.terms_of(self.driver(rng), len(time))
+
+    def driver(self, rng: np.random.Generator) -> tuple[float, float, float]:
+        """Draw one: shift [m], factor on the spread, factor on the fine noise."""
         shift, spread, fine = rng.normal(size=3) * (self.shift, self.log_spread, self.log_fine)
-        return EffectTerms(location=shift * ones, spread=np.exp(spread) * ones, fine=np.exp(fine) * ones)
+        return float(shift), float(np.exp(spread)), float(np.exp(fine))
+
+    def terms_of(self, driver: tuple[float, float, float], n: int) -> EffectTerms:
+        """The driver's terms for n rows."""
+        shift, spread, fine = driver
+        return EffectTerms(location=np.full(n, shift), spread=np.full(n, spread), fine=np.full(n, fine))
+
+    def running(self, rng: np.random.Generator) -> RunningTerms:
+        """See `HiddenEffect.running`."""
+        return _RunningDriver(self, rng)
+
+
+class _RunningDriver:
+    def __init__(self, effect: Population, rng: np.random.Generator) -> None:
+        self._effect, self._driver = effect, effect.driver(rng)
+
+    def take(self, time: FloatArray) -> EffectTerms:
+        return self._effect.terms_of(self._driver, len(time))
