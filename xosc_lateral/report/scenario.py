@@ -21,6 +21,9 @@ if TYPE_CHECKING:
 MOST_PANELS, MOST_DYNAMICS = 12, 6
 """Entities with panels of their own, for offsets and for dynamics; those with the largest offsets come first."""
 
+SELDOM = 0.01
+"""Share of the time beyond which lateral acceleration is rougher than people's. [-]"""
+
 MOST_PAIRS = 20
 """Pairs of vehicles that the gap figure shows, the closest first."""
 
@@ -96,6 +99,7 @@ def _key_figures(enriched: Enriched) -> list[KeyFigure]:
         return []
     offsets = np.concatenate([segment.offset for entity in done for segment in entity.segments])
     added = np.concatenate([np.abs(entity.lateral_acceleration()) for entity in done])
+    rough = float(np.mean(added > COMFORTABLE))
     figures_ = [
         KeyFigure(f"{sum(entity.segment_seconds for entity in done):.0f} s", "road-following, all entities together"),
         KeyFigure(
@@ -104,16 +108,18 @@ def _key_figures(enriched: Enriched) -> list[KeyFigure]:
         KeyFigure(
             f"{added.max():.2f} m/s²",
             "largest lateral acceleration added",
-            f"real drivers stay under about {COMFORTABLE} m/s² in their lane",
-            "" if added.max() <= COMFORTABLE else "bad",
+            f"over {COMFORTABLE} m/s² in {100.0 * rough:.1f} % of the time; real drivers seldom are, in their lane",
+            "bad" if rough > SELDOM else "",
         ),
     ]
     if enriched.gaps_after:
         after = min(enriched.gaps_after, key=lambda gap: gap.distance)
-        before = min((gap.distance for gap in enriched.gaps_before), default=float("nan"))
+        before = min(enriched.gaps_before, key=lambda gap: gap.distance, default=None)
+        nominal = "" if before is None else f"; nominally {before.distance:.2f} m"
+        if before is not None and before.names != after.names:
+            nominal += f", of {' and '.join(before.names)}"
         tone: Tone = "bad" if enriched.new_contacts else ""
-        note = f"{' and '.join(after.names)}; the smallest one was {before:.2f} m"
-        figures_.append(KeyFigure(f"{after.distance:.2f} m", "smallest gap between two vehicles", note, tone))
+        figures_.append(KeyFigure(f"{after.distance:.2f} m", "smallest gap", " and ".join(after.names) + nominal, tone))
     return figures_
 
 
