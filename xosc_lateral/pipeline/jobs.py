@@ -222,7 +222,7 @@ def _concrete(request: Request, kind: DocumentKind) -> Iterator[tuple[Path, str,
         yield request.scenario, "", request.settings, ""
         return
     try:
-        logical = read_distribution(request.scenario)
+        logical = read_distribution(request.scenario, allowed=request.settings.allowed)
         sets = list(logical.parameter_sets(request.settings.seed))
     except (XoscLateralError, OSError) as error:
         yield request.scenario, "", request.settings, " ".join(str(error).split())
@@ -248,7 +248,7 @@ class _Fingerprints:
 
     def of(self, settings: ConvertSettings, variant: int) -> str:
         values = {item.name: getattr(settings, item.name) for item in fields(settings)}
-        del values["libraries"]  # only where profiles are looked for
+        del values["libraries"], values["allowed"]  # where files are looked for, not what is in them
         values["profile"] = self._profile(settings.profile, settings.libraries)
         values["entity_profiles"] = {
             entity: self._profile(name, settings.libraries) for entity, name in settings.entity_profiles.items()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import lru_cache
 from pathlib import Path
 
@@ -58,7 +58,33 @@ def play_scenario(
     """
     scenario = read_scenario(path, parameters or {}, allowed=allowed)
     network = RoadNetwork(()) if scenario.road_file is None else road_network(scenario.road_file)
-    return Played(scenario, network, play(scenario, network, step=step, time_limit=time_limit))
+    values = tuple(sorted((parameters or {}).items()))
+    return _played(_Playable(_file_states(scenario), values, step, time_limit, scenario, network))
+
+
+@dataclass(frozen=True, slots=True)
+class _Playable:
+    """What decides on how a scenario plays, as a key; the scenario itself goes along."""
+
+    files: tuple[tuple[Path, int, int], ...]
+    parameters: tuple[tuple[str, str], ...]
+    step: float
+    time_limit: float
+    scenario: Scenario = field(compare=False)
+    network: RoadNetwork = field(compare=False)
+
+
+def _file_states(scenario: Scenario) -> tuple[tuple[Path, int, int], ...]:
+    """Every file that went in, with time of change and size; links resolved, for one name may come to mean another."""
+    files = [*scenario.input_files, *([scenario.road_file] if scenario.road_file else [])]
+    states = ((path.resolve(), path.stat()) for path in (scenario.path, *files))
+    return tuple((path, state.st_mtime_ns, state.st_size) for path, state in states)
+
+
+@lru_cache(maxsize=2)  # variants of one scenario come one after another, and playing is most of their work
+def _played(playable: _Playable) -> Played:
+    motion = play(playable.scenario, playable.network, step=playable.step, time_limit=playable.time_limit)
+    return Played(playable.scenario, playable.network, motion)
 
 
 def road_network(path: Path) -> RoadNetwork:
