@@ -26,6 +26,7 @@ from tests.formats.made_scenario import (
 )
 from xosc_lateral.errors import FormatError
 from xosc_lateral.formats.openscenario import read_scenario
+from xosc_lateral.formats.openscenario.references import LEVELS_UP
 from xosc_lateral.scenario.actions import (
     AbsoluteTargetSpeed,
     FollowTrajectoryAction,
@@ -41,6 +42,8 @@ from xosc_lateral.scenario.place import Unsupported
 from xosc_lateral.scenario.position import LanePosition
 from xosc_lateral.scenario.trajectory import Polyline
 
+DEEP = "/".join("abcdefgh"[: LEVELS_UP + 1])
+UP = "../" * (LEVELS_UP + 1)
 CATALOG = """<?xml version="1.0"?>
 <OpenSCENARIO><FileHeader revMajor="1" revMinor="2" date="" author="" description=""/>
 <Catalog name="Cars">{entries}</Catalog></OpenSCENARIO>
@@ -275,7 +278,7 @@ def test_siblings_of_the_folder_and_of_its_parent_are_allowed(tmp_path: Path) ->
 
 
 def test_a_folder_further_up_has_to_be_allowed(tmp_path: Path) -> None:
-    path = write_scenario(tmp_path / "a" / "b" / "c", scenario_text(road="../../../roads/far.xodr"))
+    path = write_scenario(tmp_path / DEEP, scenario_text(road=f"{UP}roads/far.xodr"))
     roads = tmp_path / "roads"
     roads.mkdir()
     (roads / "far.xodr").write_bytes((path.parent / "road.xodr").read_bytes())
@@ -285,7 +288,7 @@ def test_a_folder_further_up_has_to_be_allowed(tmp_path: Path) -> None:
 
 
 def test_a_link_out_of_the_folders_is_refused(tmp_path: Path) -> None:
-    folder = tmp_path / "a" / "b" / "c"
+    folder = tmp_path / DEEP
     path = write_scenario(folder, scenario_text(road="linked/far.xodr"))
     roads = tmp_path / "roads"
     roads.mkdir()
@@ -305,8 +308,8 @@ def test_only_a_stated_hash_lets_our_own_output_name_files_elsewhere(tmp_path: P
     roads = tmp_path / "roads"
     roads.mkdir()
     road = roads / "far.xodr"
-    text = scenario_text(road="../../../roads/far.xodr")
-    path = write_scenario(tmp_path / "a" / "b" / "c", text)
+    text = scenario_text(road=f"{UP}roads/far.xodr")
+    path = write_scenario(tmp_path / DEEP, text)
     road.write_bytes((path.parent / "road.xodr").read_bytes())
     digest = hashlib.sha256(road.read_bytes()).hexdigest()
     marked = f'<!-- xosc-lateral provenance: {{"inputs": {{"far.xodr": "{digest}"}}}} --><FileHeader'

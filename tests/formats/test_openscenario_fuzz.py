@@ -58,12 +58,8 @@ DISTRIBUTION = (
     "</ParameterValueDistribution></OpenSCENARIO>"
 )
 
-WORDS = (
-    """NaN INF -INF 1e999 -1 0 99999999999999999999 1.5 true $ $Speed $x ${ ${} ${1/0} ${$Speed} \\$x :: \x7f""".split(
-        " "
-    )
-)
-WORDS += ["", " ", "${" + "(" * 99 + "}", "../../../../etc/passwd"]
+WORDS = ["", " ", "NaN", "INF", "-INF", "1e999", "-1", "0", "99999999999999999999", "1.5", "true", "::", "\x7f"]
+WORDS += ["$", "$Speed", "$x", "${", "${}", "${1/0}", "${$Speed}", "\\$x", "${" + "(" * 99 + "}", "../../../etc/passwd"]
 ODD_VALUES = st.one_of(st.sampled_from(WORDS), st.text(st.characters(exclude_categories=["Cs", "Cc"]), max_size=12))
 
 

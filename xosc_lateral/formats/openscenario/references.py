@@ -1,10 +1,10 @@
 """Which files a scenario may name.
 
 A scenario comes from somewhere else; what it names is read by us. So a reference (road, catalog, scenario of a
-distribution) has to stay inside the folders that the user gave: the scenario's own folder, its parent and grandparent
-(field layouts are ``xosc/``, ``xodr/`` and ``xosc/Catalogs`` side by side, sometimes one level deeper), and folders
-allowed explicitly. The file system's root and its direct children are never reached by going up twice. Symbolic links
-are followed before the check. Absolute paths are fine inside these folders, and refused outside.
+distribution) has to stay inside the folders that the user gave: the scenario's own folder, those up to three levels
+above it (field layouts are ``xosc/``, ``xodr/`` and ``xosc/Catalogs`` side by side, sometimes deeper), and folders
+allowed explicitly. The file system's root is never among them, and its direct children only for a scenario one level
+below. Symbolic links are followed before the check. Absolute paths are fine inside these folders, and refused outside.
 
 A scenario that we wrote into another folder names its road and catalogs where they are. It states their hashes, and
 a file with a stated hash may lie anywhere: whoever knows a file's hash learns nothing from our reading it.
@@ -23,7 +23,7 @@ from xosc_lateral.errors import FormatError
 from xosc_lateral.formats.xml import read_xml
 from xosc_lateral.scenario.place import Place
 
-LEVELS_UP = 2
+LEVELS_UP = 3
 """How many folders above the scenario's own may still hold what it names."""
 
 _WINDOWS_DRIVE = re.compile(r"[A-Za-z]:[\\/]")

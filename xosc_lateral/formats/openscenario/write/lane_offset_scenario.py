@@ -64,11 +64,14 @@ class OffsetChain:
         Increasing. [s]
     offset_t : array, shape (n,)
         From the lane centre along +t, as ``AbsoluteTargetLaneOffset`` has it, the nominal offset included. [m]
+    start_t : float
+        Where the entity is when the chain begins, along +t: the first ramp leads from there. [m]
     """
 
     entity: str
     time: FloatArray
     offset_t: FloatArray
+    start_t: float = 0.0
 
 
 def offset_chain(
@@ -79,7 +82,8 @@ def offset_chain(
     along_lane = np.where(np.cos(motion.heading_relative[rows]) >= 0.0, 1.0, -1.0)
     offset = motion.offset[rows] + along_lane * deviation[rows]
     direction = network.travel_directions(motion.road[rows], motion.lane[rows])
-    return OffsetChain(motion.name, motion.time[rows], direction * offset)
+    start_t = float(direction[0] * motion.offset[first])
+    return OffsetChain(motion.name, motion.time[rows], direction * offset, start_t)
 
 
 def write_lane_offset_scenario(
@@ -215,14 +219,13 @@ def _add_act(
     cause = _cause(before, begin)
     act = build.sub(story, "Act", name=name)
     maneuver = build.maneuver(act, name, chain.entity)
-    ramp_start, last = begin, float(chain.offset_t[0])
+    ramp_start, last = begin, chain.start_t
     for number, (end, offset) in enumerate(zip(times.tolist(), offsets.tolist(), strict=True), start=1):
         if number > 1 and abs(offset - last) < LEAST_CHANGE and end < times[-1]:
             ramp_start = end
             continue
         event = build.event(maneuver, f"{name} {number}", Priority.OVERRIDE, version)
-        change = offset - last if number > 1 else max(abs(offset), LEAST_CHANGE)
-        _add_action(event, f"{name} {number}", offset, change, end - ramp_start, settles=number == 1)
+        _add_action(event, f"{name} {number}", offset, offset - last, end - ramp_start, settles=number == 1)
         if cause is None:
             build.time_trigger(event, "StartTrigger", ramp_start, version)
         else:
