@@ -89,11 +89,11 @@ _MOST_GAPS = 8
 
 
 def _choose(state: EntityState, options: Sequence[LaneLink]) -> LaneLink:
-    """At a junction: along the route, else straight on."""
+    """At a junction: along the route; where that says nothing, the first way on, as in the reference player; without a
+    route straight on.
+    """
     if state.route is not None:
-        chosen = state.route.choose(state.road, options)
-        if chosen is not None:
-            return chosen
+        return state.route.choose(state.road, options) or options[0]
     return state.network.straightest(options)
 
 

@@ -25,7 +25,7 @@ from xosc_lateral.motion.transition import EPSILON
 from xosc_lateral.motion.tree import grow, init_actions
 from xosc_lateral.road import RoadNetwork
 from xosc_lateral.scenario import Scenario
-from xosc_lateral.scenario.actions import AddEntityAction, TeleportAction
+from xosc_lateral.scenario.actions import FollowTrajectoryAction, TeleportAction
 
 STANDING = 1e-3
 """Below this speed an entity stands. [m/s]"""
@@ -138,7 +138,8 @@ class _Player:
         for state in run.entities:
             standing = -STANDING < state.speed < STANDING
             state.standing_since = _since(state.standing_since, standing, run.time)
-            state.road_end_since = _since(state.road_end_since, state.at_road_end, run.time)
+            at_end = state.at_road_end or (state.route is not None and state.route.is_passed(state.road, state.s))
+            state.road_end_since = _since(state.road_end_since, at_end, run.time)
             if run.derives_off_road:
                 state.off_road_since = _since(state.off_road_since, _is_off_road(state), run.time)
 
@@ -152,23 +153,22 @@ class _Player:
                 align_trailers(state)
 
     def _leave_out_later_entities(self) -> None:
-        """An entity that an action adds, and that has no place before, is not there yet."""
-        storyboard = self.run.scenario.storyboard
+        """Entities without init actions are not there until an action adds them (trailers are, with their tractor)."""
+        init = self.run.scenario.storyboard.init
+        present = {private.entity_ref for private in init.privates}
         placed = {
             private.entity_ref
-            for private in storyboard.init.privates
-            if any(isinstance(action.content, TeleportAction) for action in private.actions)
+            for private in init.privates
+            if any(isinstance(action.content, TeleportAction | FollowTrajectoryAction) for action in private.actions)
         }
-        added = set()
-        for element in (*self.init, *self.root.walk()):
-            source = getattr(getattr(element, "action", None), "source", None)
-            if source is not None and isinstance(source.content, AddEntityAction):
-                added.add(source.content.entity_ref)
         for state in self.run.entities:
-            if state.name in placed or state.tow is not None:
+            if state.tow is not None or state.name in placed:
                 continue
-            if state.name in added:
+            if state.name not in present:
                 state.active = False
+                self.run.note(
+                    f"'{state.name}' has no init actions: it is not there until it is added", state.entity.place
+                )
             else:
                 self.run.note(
                     f"'{state.name}' has no initial position: it stands at the world's origin", state.entity.place

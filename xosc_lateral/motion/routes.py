@@ -31,11 +31,16 @@ class RouteGuide:
         for link in options:
             if ahead and link.road == ahead[0]:
                 return link
-        for link in options:
+        for link in reversed(options):
             onward = self.network.next_lanes(link.road, link.lane, link.direction)
             if len(ahead) > 1 and any(following.road == ahead[1] for following in onward):
                 return link
         return None
+
+    def is_passed(self, road: int, s: float) -> bool:
+        """Whether a place on the last road is at the end of the route, or beyond. [m]"""
+        last = self.steps[-1]
+        return road == last.road and (s - last.s_end) * last.direction >= 0.0
 
     def at(self, path_s: float) -> tuple[int, float, int]:
         """Road, s and direction after `path_s` metres of the route; its end beyond it. [m]"""

@@ -8,7 +8,7 @@ from xosc_lateral.motion.actions.base import Domain, RunningAction
 from xosc_lateral.motion.angles import HALF_PI, difference, wrap
 from xosc_lateral.motion.nominal import Activity
 from xosc_lateral.motion.paths.base import Path, PathPoint, PathProgress
-from xosc_lateral.motion.paths.registry import path_of
+from xosc_lateral.motion.paths.registry import duration, path_of
 from xosc_lateral.motion.state import free
 from xosc_lateral.motion.transition import EPSILON
 from xosc_lateral.scenario.actions import FollowTrajectoryAction
@@ -29,7 +29,8 @@ class RunningFollowTrajectory(RunningAction):
 
     def prepare(self) -> None:
         """Without times the speed is left to others; the path may depend on where entities are when it starts."""
-        self.domains = Domain.LATERAL if self.content.timing is None else Domain.BOTH
+        self._is_timed = self.content.timing is not None and duration(self.content.trajectory.shape) > EPSILON
+        self.domains = Domain.BOTH if self._is_timed else Domain.LATERAL
         self._path: Path | None = None
         self._s = 0.0
         self._time = 0.0
@@ -42,11 +43,11 @@ class RunningFollowTrajectory(RunningAction):
         before = state.pose
         path = path_of(content.trajectory, self.run, follower=state, follow=follow, speed=state.speed)
         self._path = path
-        if content.timing is not None and not path.start_time == path.start_time:
+        if content.timing is not None and not self._is_timed:
             self.note(f"trajectory '{content.trajectory.name}' has no times: followed with the entity's own speed")
         self._s = min(max(content.initial_distance_offset, 0.0), path.length)
         point = path.at(self._s)
-        self._time = path.start_time if content.timing is not None else 0.0
+        self._time = path.time_at(self._s) if self._is_timed else 0.0
         along = copysign(1.0, state.speed) if not self._is_timed else 1.0
         if path.has_headings:
             heading = point.heading
@@ -82,11 +83,6 @@ class RunningFollowTrajectory(RunningAction):
         self.state.path = None
 
     # ---- in detail ---------------------------------------------------------------------------------------------------
-    @property
-    def _is_timed(self) -> bool:
-        path = self._path
-        return self.content.timing is not None and path is not None and path.start_time == path.start_time
-
     @property
     def _clock(self) -> float:
         timing = self.content.timing

@@ -35,10 +35,11 @@ class RunningLongitudinalDistance(RunningAction):
         """Decide on which side of the other entity to stay."""
         self._acceleration = 0.0
         displacement = self.content.displacement
-        if displacement in (None, LongitudinalDisplacement.ANY):
+        if displacement is LongitudinalDisplacement.ANY:
             self._ahead = ahead_and_left(self.state, self._other.pose.x, self._other.pose.y)[0] >= 0.0
         else:
-            self._ahead = displacement is LongitudinalDisplacement.TRAILING
+            # None given: behind the other (the reference player's default; version 1.0 knows nothing else).
+            self._ahead = displacement is not LongitudinalDisplacement.LEADING
         self._kept = None
         if self.content.distance is None and self.content.time_gap is None:
             self._kept = self._distance()

@@ -10,7 +10,6 @@ from xosc_lateral.motion.actions.constraints import Limits, limits_of
 from xosc_lateral.motion.actions.jerk_limited import NoSolutionError, follow
 from xosc_lateral.motion.transition import EPSILON
 from xosc_lateral.scenario.actions import SpeedProfileAction
-from xosc_lateral.scenario.dynamics import DynamicConstraints
 from xosc_lateral.scenario.enums import FollowingMode
 
 
@@ -52,7 +51,7 @@ class RunningSpeedProfile(RunningAction):
         """Lay the profile out from the present speed (and acceleration)."""
         state = self.state
         offset = 0.0 if self._reference is None else self._reference.speed
-        limits = limits_of(self.content.constraints or DynamicConstraints(), state.entity.performance)
+        limits = limits_of(self.content.constraints, state.entity.performance)
         self._current = 0
         targets = self._targets(offset, limits)
         self._pieces = [Piece(*target) for target in targets]

@@ -44,6 +44,9 @@ class Path(Protocol):
     def s_at(self, time: float) -> float:
         """Length reached at a time of the path's own clock. [m]"""
 
+    def time_at(self, s: float) -> float:
+        """Time of the path's own clock at a length. [s]"""
+
     def speed_at(self, s: float) -> float:
         """Speed that the times of the path ask for. [m/s]"""
 

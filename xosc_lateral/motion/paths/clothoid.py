@@ -96,6 +96,16 @@ class ClothoidPath:
             before += piece.length
         return self.length
 
+    def time_at(self, s: float) -> float:
+        """Time at a length, evenly on each piece. [s]"""
+        before = 0.0
+        for piece, end in zip(self.pieces, self._piece_ends(), strict=True):
+            if s < before + piece.length or piece is self.pieces[-1]:
+                share = min((s - before) / piece.length, 1.0) if piece.length > 0.0 else 1.0
+                return piece.start_time + share * (end - piece.start_time)
+            before += piece.length
+        raise AssertionError("a clothoid path has pieces")
+
     def speed_at(self, s: float) -> float:
         """Speed of the piece. [m/s]"""
         before = 0.0

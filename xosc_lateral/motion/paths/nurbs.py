@@ -72,6 +72,10 @@ class NurbsPath:
                 return lengths[i] + (time - a) / (b - a) * (lengths[i + 1] - lengths[i])
         return self.length
 
+    def time_at(self, s: float) -> float:
+        """Time at a length, evenly between samples. [s]"""
+        return self._line.time_at(s)
+
     def speed_at(self, s: float) -> float:
         """Speed of the sampled piece. [m/s]"""
         i = min(self._line._piece(s)[0], len(self._line.corners) - 2)
@@ -127,6 +131,12 @@ class NurbsPath:
             a, b = self.controls[k].time, self.controls[k + 1].time
             times.append(a + share * (b - a))
         return times
+
+
+def clamped_knots(count: int, order: int) -> tuple[float, ...]:
+    """Even knots from 0 to 1 that make the curve begin and end in its first and last control point."""
+    inner = max(count + 1 - order, 1)
+    return tuple(min(max((i + 1 - order) / inner, 0.0), 1.0) for i in range(count + order))
 
 
 def basis(t: float, i: int, order: int, knots: Sequence[float]) -> float:

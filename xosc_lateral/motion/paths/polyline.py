@@ -81,8 +81,7 @@ class PolylinePath:
             return PathPoint(a.x, a.y, a.z, self.headings[i], a.pitch, a.roll, self.tangents[i])
         b = self.corners[i + 1]
         along = u * (self.lengths[i + 1] - self.lengths[i])
-        smooth = self.follow and a.heading == a.heading
-        heading = self._blend(i, u) if smooth else self._around_corners(self.headings, i, along)
+        heading = self._blend(i, u) if self.follow else self._around_corners(self.headings, i, along)
         return PathPoint(
             a.x + u * (b.x - a.x),
             a.y + u * (b.y - a.y),
@@ -104,6 +103,12 @@ class PolylinePath:
         if acceleration < 0.0:
             elapsed = min(elapsed, -self._speeds[i] / acceleration)
         return min(self.lengths[i] + elapsed * (self._speeds[i] + 0.5 * acceleration * elapsed), self.lengths[i + 1])
+
+    def time_at(self, s: float) -> float:
+        """Time at a length, evenly on each piece. [s]"""
+        i, u = self._piece(s)
+        following = min(i + 1, len(self.corners) - 1)
+        return self.corners[i].time + u * (self.corners[following].time - self.corners[i].time)
 
     def speed_at(self, s: float) -> float:
         """Speed where a piece begins, or linearly in between (follow mode). [m/s]"""
@@ -134,7 +139,8 @@ class PolylinePath:
             share = (radius + along) / (2.0 * radius)
             return wrap(headings[i - 1] + share * difference(here, headings[i - 1]))
         if along > length - radius:
-            share = (radius + length - along) / (2.0 * radius)
+            is_last = i == len(headings) - 2
+            share = (length - along) / radius if is_last else (radius + length - along) / (2.0 * radius)
             return wrap(here + (1.0 - share) * difference(headings[i + 1], here))
         return here
 

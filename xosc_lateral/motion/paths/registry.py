@@ -10,14 +10,14 @@ from typing import Any
 from xosc_lateral.errors import PlaybackError, UnsupportedElementError
 from xosc_lateral.motion.paths.base import Path
 from xosc_lateral.motion.paths.clothoid import ClothoidPath, ClothoidPiece
-from xosc_lateral.motion.paths.nurbs import Control, NurbsPath
+from xosc_lateral.motion.paths.nurbs import Control, NurbsPath, clamped_knots
 from xosc_lateral.motion.paths.polyline import Corner, PolylinePath, merge_close
 from xosc_lateral.motion.run import Run
 from xosc_lateral.motion.state import EntityState
 from xosc_lateral.road.positions import Pose
 from xosc_lateral.scenario import Place, Unsupported
 from xosc_lateral.scenario.position import Position, WorldPosition
-from xosc_lateral.scenario.trajectory import Clothoid, ClothoidSpline, Nurbs, Polyline, Trajectory
+from xosc_lateral.scenario.trajectory import Clothoid, ClothoidSpline, Nurbs, Polyline, Shape, Trajectory
 
 VERTEX_RADIUS = 0.1
 """Vertices of a polyline nearer than this count as one. [m]"""
@@ -88,7 +88,8 @@ def _clothoid_spline(shape: ClothoidSpline, layout: Layout) -> Path:
 
 def _nurbs(shape: Nurbs, layout: Layout) -> Path:
     count = len(shape.control_points)
-    if count < max(shape.order, 2) or len(shape.knots) != count + shape.order:
+    knots = shape.knots or clamped_knots(count, shape.order)
+    if count < max(shape.order, 2) or len(knots) != count + shape.order:
         raise _error(
             f"a NURBS curve of order {shape.order} with {count} control points and {len(shape.knots)} knots: "
             "needs at least as many control points as its order, and knots = control points + order",
@@ -98,7 +99,7 @@ def _nurbs(shape: Nurbs, layout: Layout) -> Path:
     for point in shape.control_points:
         pose = _pose(point.position, layout.run)
         controls.append(Control(pose.x, pose.y, point.weight, nan if point.time is None else point.time))
-    return NurbsPath(controls, shape.knots, shape.order)
+    return NurbsPath(controls, knots, shape.order)
 
 
 SHAPES: tuple[tuple[type, Callable[[Any, Layout], Path]], ...] = (
@@ -127,6 +128,23 @@ def path_of(
             shape.reason or f"a {shape.kind} can't be followed", path=place.path, line=place.line, element=place.element
         )
     return _SHAPES[type(shape)](shape, Layout(run, trajectory.place, follower, follow, speed))
+
+
+def duration(shape: Shape) -> float:
+    """Time from the first to the last time stamp; 0 where there are none. [s]"""
+    if isinstance(shape, Polyline):
+        ends = (shape.vertices[0].time, shape.vertices[-1].time) if shape.vertices else (None, None)
+    elif isinstance(shape, Clothoid):
+        ends = (shape.start_time, shape.stop_time)
+    elif isinstance(shape, ClothoidSpline):
+        ends = (shape.segments[0].time_start if shape.segments else None, shape.time_end)
+    elif isinstance(shape, Nurbs):
+        points = shape.control_points
+        ends = (points[0].time, points[-1].time) if points else (None, None)
+    else:
+        return 0.0
+    start, end = ends
+    return 0.0 if start is None or end is None else end - start
 
 
 def _pose(position: Position, run: Run) -> Pose:
