@@ -127,9 +127,9 @@ def _single_profiles(
         by_vehicle.setdefault(run.drive, []).append(run)
     long = {name: mine for name, mine in by_vehicle.items() if sum(map(len, mine)) * STEP >= LONG_DRIVE}
     chosen = most_different({name: snippets_of(mine, SNIPPET, STEP).offset for name, mine in long.items()})
-    parts = {name: _split_in_time(long[name]) for name in chosen}
+    parts = {name: split_in_time(long[name]) for name in chosen}
     early = [fit_runs(parts[name][0], name=name, model=model) for name in chosen]
-    distance = told_from_each_other(early, [_sliding_snippets(parts[name][1]) for name in chosen], SEED)
+    distance = told_from_each_other(early, [sliding_snippets(parts[name][1]) for name in chosen], SEED)
     profiles = []
     for k, name in enumerate(chosen):
         others = np.delete(distance[k], k)
@@ -176,7 +176,7 @@ def most_different(snippets: Mapping[str, FloatArray], count: int = SINGLE_VEHIC
     return [names[k] for k in chosen]
 
 
-def _split_in_time(runs: Sequence[Run]) -> tuple[list[Run], list[Run]]:
+def split_in_time(runs: Sequence[Run]) -> tuple[list[Run], list[Run]]:
     """Runs before and after the moment by which `FITTED_SHARE` of the driving is done."""
     left = round(FITTED_SHARE * sum(map(len, runs)))
     before, after = [], []
@@ -193,7 +193,7 @@ def _part(run: Run, rows: slice) -> Run:
     return Run(run.drive, run.index, run.time[rows], run.offset[rows], run.lane_width[rows], context, run.levels)
 
 
-def _sliding_snippets(runs: Sequence[Run]) -> FloatArray:
+def sliding_snippets(runs: Sequence[Run]) -> FloatArray:
     """Snippets of 10 s every second: a short drive has few that don't overlap."""
     length = round(SNIPPET / STEP) + 1
     windows = [
