@@ -1,0 +1,328 @@
+"""Close the loop: residual, cause, effect added, base refitted, error before and after on blocks held out in time."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from xosc_lateral.driver.effects import Acts, ColumnEffect, Drift, Effect, GrowingSpread
+from xosc_lateral.driver.fitting import fit_runs
+from xosc_lateral.driver.kinds import ModelKind
+from xosc_lateral.driver.profile import DriverProfile, Provenance
+from xosc_lateral.driver.series import Drive
+from xosc_lateral.errors import NotEnoughDataError
+from xosc_lateral.loop.findings import Finding, describe_finding, memory_finding
+from xosc_lateral.loop.memory import Memory, test_memory
+from xosc_lateral.loop.movement import Coarse, Fitted, Terms, fit_movement
+from xosc_lateral.loop.residual import Cells, cells_of, error_between, expected, floor_of, own_runs
+from xosc_lateral.loop.scorecard import Scorecard, score_runs
+from xosc_lateral.loop.sizing import Sized, size_effects
+from xosc_lateral.loop.strip import effects_share, stripped_runs
+from xosc_lateral.loop.timeline import COARSE, Timeline, coarse_all, join_drives
+from xosc_lateral.loop.trace import Trace, trace_effects
+
+FloatArray = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
+IntArray = NDArray[np.intp]
+
+FOLDS = 4
+"""Every part of the drives is held out once, and predicted from the other three."""
+
+BLOCK_S = 150.0
+"""Length of the blocks of a drive that are held out; drives shorter than three blocks are held out whole. [s]"""
+
+Progress = Callable[[float, str], None]
+"""Told the share that is done and what is being done."""
+
+
+@dataclass(frozen=True, eq=False)
+class LoopResult:
+    """What the loop found, as data; `xosc_lateral.report.loop` turns it into words.
+
+    Parameters
+    ----------
+    names : tuple of str
+        Drives.
+    base, refined : DriverProfile
+        Before and after.
+    given : bool
+        Whether the base was given; else it was fitted first.
+    findings : tuple of Finding
+    trace : Trace
+        Everything that was looked at.
+    memory : Memory
+        How the base's own runs compare with the drives from band to band.
+    held_out : str
+        What was held out, in words.
+    cells : Cells
+    real, before, after : mapping of str to array
+        Cells of measured and expected offsets on held-out blocks. [m]
+    error_before, error_after, floor : float
+        [m]
+    scores : Scorecard
+        The ten metrics.
+    runs_before, runs_after : array, shape (runs, n)
+        Held-out runs of both profiles. [m]
+    seed : int
+    """
+
+    names: tuple[str, ...]
+    base: DriverProfile
+    refined: DriverProfile
+    given: bool
+    findings: tuple[Finding, ...]
+    trace: Trace
+    memory: Memory
+    held_out: str
+    cells: Cells
+    real: dict[str, FloatArray]
+    before: dict[str, FloatArray]
+    after: dict[str, FloatArray]
+    error_before: float
+    error_after: float
+    floor: float
+    scores: Scorecard
+    runs_before: FloatArray
+    runs_after: FloatArray
+    seed: int
+
+
+def close_loop(
+    drives: Sequence[Drive],
+    base: DriverProfile | None = None,
+    *,
+    seed: int,
+    name: str = "refined",
+    provenance: Provenance | None = None,
+    excluded: Sequence[str] = (),
+    progress: Progress = lambda share, what: None,
+) -> LoopResult:
+    """Find what a profile fails to reproduce, trace it, add it, and score it on held-out blocks.
+
+    Parameters
+    ----------
+    drives : sequence of Drive
+    base : DriverProfile, optional
+        Start from it and from its effects; without, one is fitted first (`best`).
+    seed : int
+        Same drives, base and seed: same result.
+    name : str
+        Of the refined profile.
+    provenance : Provenance, optional
+        What is known about the drives.
+    excluded : sequence of str
+        Columns that are not to be looked at.
+    progress : callable
+
+    Raises
+    ------
+    NotEnoughDataError
+        When less than two minutes of road-following are left after cutting.
+    """
+    root = np.random.SeedSequence(seed)
+    progress(0.0, "reading the drives")
+    timeline = join_drives(drives)
+    coarse = Coarse.of(timeline)
+    kind = ModelKind.BEST if base is None else _kind_of(base)
+    plain = fit_movement(coarse, Terms())
+    everything = np.ones(len(timeline), dtype=np.bool_)
+    given = base is not None
+    if base is None:
+        progress(0.02, "fitting the base profile")
+        base = _fit(timeline, coarse, plain, Sized({}), everything, kind, f"{name}-base", provenance)
+    memory = test_memory(base, timeline, root)
+    trace = trace_effects(
+        coarse,
+        root,
+        initial=initial_terms(base, timeline),
+        excluded=excluded,
+        progress=lambda what: progress(0.1, what),
+    )
+    refined_kind = ModelKind.BEST if memory.found and kind is ModelKind.TWO_LEVEL else kind
+    progress(0.6, "refitting")
+    sized = size_effects(coarse, trace.final)
+    refined = _fit(timeline, coarse, trace.final, sized, everything, refined_kind, name, provenance)
+    progress(0.7, "scoring held-out blocks")
+    blocks = hold_out_blocks(timeline)
+    fixed = base if given else None
+    runs_before, runs_after = _held_out_runs(
+        timeline,
+        coarse,
+        trace,
+        blocks,
+        fixed,
+        kind,
+        refined_kind,
+        root,
+        lambda share, what: progress(0.7 + 0.25 * share, what),
+    )
+    cells = cells_of(timeline, _quantities(coarse, trace, sized))
+    real = cells.describe(timeline.offset, timeline.valid)
+    before, after = expected(cells, runs_before, timeline.valid), expected(cells, runs_after, timeline.valid)
+    rng = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(9,)))
+    findings = [
+        describe_finding(found, index, coarse, trace, sized, (real, before, after))
+        for index, found in enumerate(trace.found)
+    ]
+    if refined_kind is not kind:
+        findings.append(memory_finding(memory, (real, before, after)))
+    progress(1.0, "done")
+    return LoopResult(
+        names=timeline.names,
+        base=base,
+        refined=refined,
+        given=given,
+        findings=tuple(findings),
+        trace=trace,
+        memory=memory,
+        held_out=_in_words(timeline, blocks),
+        cells=cells,
+        real=real,
+        before=before,
+        after=after,
+        error_before=error_between(real, before),
+        error_after=error_between(real, after),
+        floor=floor_of(cells, timeline.offset, blocks, rng),
+        scores=score_runs(timeline, runs_before, runs_after, blocks, rng),
+        runs_before=runs_before,
+        runs_after=runs_after,
+        seed=seed,
+    )
+
+
+def initial_terms(base: DriverProfile, timeline: Timeline) -> Terms:
+    """The base's own effects as far as the table has their columns: they are refitted, not found anew."""
+    there = {"lane_width", *timeline.context}
+    columns = [effect for effect in base.effects if isinstance(effect, ColumnEffect) and set(effect.columns) <= there]
+
+    def acting(acts: Acts) -> tuple[ColumnEffect, ...]:
+        return tuple(effect for effect in columns if effect.acts is acts)
+
+    return Terms(
+        location=acting(Acts.LOCATION),
+        spread=acting(Acts.SPREAD),
+        growth=any(isinstance(effect, GrowingSpread) for effect in base.effects),
+        drift=any(isinstance(effect, Drift) for effect in base.effects),
+    )
+
+
+def hold_out_blocks(timeline: Timeline) -> IntArray:
+    """Number of the block that every row is in, shape (n,); block b belongs to fold b modulo `FOLDS`."""
+    blocks = np.zeros(len(timeline), dtype=np.intp)
+    length = round(BLOCK_S / timeline.step)
+    next_block = 0
+    for span in timeline.spans:
+        n = span.stop - span.start
+        parts = max(1, n // length) if n >= 3 * length else 1
+        own = np.minimum(np.arange(n) * parts // n, parts - 1)
+        blocks[span] = next_block + own
+        next_block += parts
+    return blocks
+
+
+def _held_out_runs(
+    timeline: Timeline,
+    coarse: Coarse,
+    trace: Trace,
+    blocks: IntArray,
+    fixed: DriverProfile | None,
+    kind: ModelKind,
+    refined_kind: ModelKind,
+    root: np.random.SeedSequence,
+    progress: Progress,
+) -> tuple[FloatArray, FloatArray]:
+    """Runs of both profiles over all rows; every row comes from profiles that were fitted without its fold."""
+    composite: list[FloatArray] = [np.zeros(0), np.zeros(0)]
+    folds = min(FOLDS, int(blocks.max()) + 1)
+    for fold in range(folds):
+        progress(fold / folds, f"held-out fold {fold + 1} of {folds}")
+        held = blocks % folds == fold
+        used = ~held if folds > 1 else np.ones(len(held), dtype=np.bool_)
+        profiles = _fold_profiles(timeline, coarse, trace, used, fixed, kind, refined_kind)
+        for side, profile in enumerate(profiles):
+            runs = own_runs(profile, timeline, np.random.SeedSequence(root.entropy, spawn_key=(5, side, fold)))
+            if not len(composite[side]):
+                composite[side] = np.zeros_like(runs)
+            composite[side][:, held] = runs[:, held]
+    return composite[0], composite[1]
+
+
+def _fold_profiles(
+    timeline: Timeline,
+    coarse: Coarse,
+    trace: Trace,
+    used: BoolArray,
+    fixed: DriverProfile | None,
+    kind: ModelKind,
+    refined_kind: ModelKind,
+) -> tuple[DriverProfile, DriverProfile]:
+    part = replace(
+        coarse, valid=coarse.valid & coarse_all(np.pad(used, (0, -len(used) % COARSE), mode="edge"))[: len(coarse)]
+    )
+    before = fixed
+    if before is None:
+        plain = fit_movement(part, Terms())
+        before = _fit(timeline, part, plain, Sized({}), used, kind, "before", None)
+    terms = trace.final.terms
+    fitted = fit_movement(part, terms)
+    sized = size_effects(part, fitted)
+    return before, _fit(timeline, part, fitted, sized, used, refined_kind, "after", None)
+
+
+def _fit(
+    timeline: Timeline,
+    coarse: Coarse,
+    fitted: Fitted,
+    sized: Sized,
+    used: BoolArray,
+    kind: ModelKind,
+    name: str,
+    provenance: Provenance | None,
+) -> DriverProfile:
+    """Base model of what is left without the effects, and the effects."""
+    runs = stripped_runs(timeline, effects_share(coarse, fitted, sized), used)
+    if not runs:
+        raise NotEnoughDataError("closing the loop: no run of 10 s is left to fit the base model on")
+    profile = fit_runs(runs, name=name, model=kind, provenance=provenance)
+    effects: tuple[Effect, ...] = sized.effects
+    return replace(profile, effects=effects)
+
+
+def _quantities(coarse: Coarse, trace: Trace, sized: Sized) -> dict[str, FloatArray]:
+    """What the residual is binned by: every column that may act, and every found effect's own quantity."""
+    quantities = {column.name: coarse.context[column.name] for column in trace.columns}
+    for column in trace.columns:
+        if column.period:
+            angle = 2.0 * np.pi / column.period * quantities.pop(column.name)
+            quantities |= {f"sin({column.name})": np.sin(angle), f"cos({column.name})": np.cos(angle)}
+    for key, group in sized.groups.items():
+        effect = group[0] if group else None
+        if isinstance(effect, ColumnEffect):
+            strength = effect.strength(coarse.timeline.step, coarse.context)
+            if strength is not None:
+                quantities[f"effect: {key}"] = strength
+    if trace.final.terms.step_at is not None:
+        quantities["effect: step"] = (np.arange(len(coarse.timeline)) >= trace.final.terms.step_at * COARSE).astype(
+            float
+        )
+    return quantities
+
+
+def _kind_of(profile: DriverProfile) -> ModelKind:
+    return ModelKind.TWO_LEVEL if profile.model.kind == ModelKind.TWO_LEVEL.value else ModelKind.BEST
+
+
+def _in_words(timeline: Timeline, blocks: IntArray) -> str:
+    number = int(blocks.max()) + 1
+    folds = min(FOLDS, number)
+    if folds == 1:
+        return "nothing: the table is too short to hold a block out"
+    if number == len(timeline.names):
+        return f"{number} drives in {folds} folds: every drive is scored by profiles fitted on the other folds' drives"
+    return (
+        f"{number} blocks of about {BLOCK_S:g} s in {folds} folds: every block is scored by profiles whose base model and effect "
+        "sizes were fitted on the other folds; which effects there are was decided on all blocks, its chance of error is the p-value"
+    )

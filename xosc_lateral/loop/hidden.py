@@ -1,0 +1,261 @@
+"""Looks for what no column explains: growing spread, on/off regimes, a weave, a slow drift, a step."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from xosc_lateral.loop.chance import LEAST, tail_probability
+from xosc_lateral.loop.movement import DRIFT_TERMS, MIN_DRIFT_S, Coarse, Fitted, elapsed, squared_innovations
+from xosc_lateral.loop.noise import Whitener, fit_autoregression
+
+FloatArray = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
+
+MEMORIES = (6.0, 15.0, 40.0)
+"""Lengths of regimes that are looked for. [s]"""
+
+SHORTEST = 5
+"""Loudness that comes and goes faster than this is how people steer, by now and then a correction, and no regime. [s]"""
+
+PERIODS = (4.0, 60.0)
+"""Weaves that are looked for. [s]"""
+
+WIDTHS = (1, 3, 7)
+"""Neighbouring frequencies taken together: a weave keeps its phase for the whole drive, or for a part. [-]"""
+
+SURROUNDINGS = 60
+"""Frequencies to each side that say how high the spectrum is without a weave. [-]"""
+
+STEP_COST = 8.0
+"""A step has a free moment: about 2 ln(number of distinguishable moments). [chi-square]"""
+
+UNREMARKABLE = 6.0
+"""A wander with a lower score is not compared with simulated drives: chance gives it in every few. [chi-square]"""
+
+N_SIMULATED = 300
+"""Drives without drift or step, of the same movement, that the drift look is compared with."""
+
+SLOW_BAND = (60.0, 300.0)
+"""Periods that are slow, but no drift yet. [s]"""
+
+DRIFT_SIZES = (1, 2, 4, 8)
+"""Numbers of half cosines tried for a drift."""
+
+
+@dataclass(frozen=True, slots=True)
+class Growth:
+    """Steady change of the spread."""
+
+    z: float
+    p_value: float
+
+
+@dataclass(frozen=True, slots=True)
+class Clustering:
+    """Loud seconds that come in clusters."""
+
+    z: float
+    memory_s: float
+    p_value: float
+
+
+@dataclass(frozen=True, slots=True)
+class Peak:
+    """A spectral line."""
+
+    frequency: float
+    width: int
+    power: float
+    p_value: float
+
+
+@dataclass(frozen=True, slots=True)
+class Wander:
+    """Slow change of the mean: which of drift and step, and how sure.
+
+    Parameters
+    ----------
+    drift, step : float
+        Score of either. [chi-square]
+    at : int
+        Coarse row of the best step.
+    p_value : float
+        Of the better of the two, against simulated drives.
+    """
+
+    drift: float
+    step: float
+    at: int
+    p_value: float
+
+    @property
+    def is_step(self) -> bool:
+        """Whether one step explains more than a slow wander."""
+        return self.step >= self.drift
+
+
+def find_growth(coarse: Coarse, fitted: Fitted) -> Growth:
+    """Regress the squared innovations on time; clustered seconds count for less (Newey-West over 2 min)."""
+    from scipy.stats import norm
+
+    squares = squared_innovations(fitted.rows, coarse.valid)
+    time = np.where(coarse.valid, elapsed(coarse), 0.0)
+    time = time - np.where(coarse.valid, time[coarse.valid].mean(), 0.0)
+    slope = float(time @ squares) / float(time @ time)
+    left = np.where(coarse.valid, squares - slope * time, 0.0)
+    inflation = 1.0 + 2.0 * sum((1.0 - lag / 121.0) * _correlation(left, coarse.valid, lag) for lag in range(1, 121))
+    z = slope * np.sqrt(float(time @ time)) / np.sqrt(max(inflation, 1.0))
+    return Growth(z, max(2.0 * float(norm.sf(abs(z))), LEAST))
+
+
+def find_clustering(coarse: Coarse, fitted: Fitted, rng: np.random.Generator) -> Clustering:
+    """Autocorrelation of the squared innovations, weighted by exponentials; null: the same seconds in random order."""
+    squares = squared_innovations(fitted.rows, coarse.valid)
+    observed = _clustering_scores(squares, coarse.valid)
+    null = []
+    rows = np.flatnonzero(coarse.valid)
+    shuffled = np.zeros(len(squares))
+    for _ in range(N_SIMULATED):
+        shuffled[rows] = rng.permutation(squares[rows])
+        null.append(_clustering_scores(shuffled, coarse.valid).max())
+    best = int(np.argmax(observed))
+    return Clustering(
+        float(observed[best]),
+        MEMORIES[best],
+        tail_probability(_signed_square(observed[best]), _signed_square(np.array(null))),
+    )
+
+
+def find_peak(coarse: Coarse, fitted: Fitted) -> Peak | None:
+    """Highest spectral line of the whitened residual over its surroundings, per drive that is long enough."""
+    best: Peak | None = None
+    drives = int(coarse.drive.max()) + 1
+    for index in range(drives):
+        rows = coarse.drive == index
+        if coarse.valid[rows].sum() < MIN_DRIFT_S:
+            continue
+        peak = _peak(fitted.rows[rows])
+        if peak is not None and (best is None or peak.p_value < best.p_value):
+            best = peak
+    if best is None:
+        return None
+    return Peak(best.frequency, best.width, best.power, min(1.0, best.p_value * drives))
+
+
+def find_wander(coarse: Coarse, fitted: Fitted, rng: np.random.Generator) -> Wander | None:
+    """Drift and step at once, against simulated drives of the same movement that go through the same procedure."""
+    drift = coarse.drift_terms()
+    if drift.shape[1] == 0 or fitted.terms.drift or fitted.terms.step_at is not None:
+        return None
+    left = np.where(coarse.valid, fitted.movement * fitted.scale, 0.0)
+    basis = np.linalg.qr(np.column_stack([np.ones(len(left)), drift]) * coarse.valid[:, None])[0]
+    scores, at = _wander_scores(coarse, fitted, left, drift, basis)
+    if max(scores) < UNREMARKABLE:
+        return Wander(*scores, at, 1.0)
+    null = []
+    whole = fitted.whitener.process
+    for path in whole.simulate(len(coarse), rng, runs=N_SIMULATED):
+        simulated = np.where(coarse.valid, path * fitted.scale, 0.0)
+        null.append(max(_wander_scores(coarse, fitted, simulated, drift, basis)[0]))
+    return Wander(*scores, at, tail_probability(max(scores), np.asarray(null)))
+
+
+def _wander_scores(
+    coarse: Coarse, fitted: Fitted, left: FloatArray, drift: FloatArray, basis: FloatArray
+) -> tuple[tuple[float, float], int]:
+    from xosc_lateral.loop.scan import as_one_degree
+
+    inside = coarse.valid
+    movement = np.where(inside, (left - basis @ (basis.T @ left)) / fitted.scale, 0.0)
+    process = fit_autoregression(movement, inside, fitted.terms.order)
+    whitener = Whitener(process, inside, coarse.drive, fitted.scale)
+    response, columns = whitener.rows(left), whitener.rows(drift)
+    level = _slow_level(response)
+    best = 0.0
+    per_drive = drift.shape[1] // DRIFT_TERMS
+    for size in DRIFT_SIZES:
+        chosen = np.concatenate(
+            [columns[:, DRIFT_TERMS * k : DRIFT_TERMS * k + size] for k in range(per_drive)], axis=1
+        )
+        moments = chosen.T @ response
+        gained = float(moments @ np.linalg.pinv(chosen.T @ chosen) @ moments)
+        best = max(best, float(as_one_degree(np.array([gained / level]), chosen.shape[1])[0]) - 2.0)
+    step, at = _best_step(coarse, whitener, response)
+    return (best, step / level - STEP_COST), at
+
+
+def _slow_level(rows: FloatArray) -> float:
+    """Power of the rows between 1 and 5 min over their mean, at least 1: what a mere continuation to longer periods gives."""
+    power = np.square(np.abs(np.fft.rfft(rows)))
+    frequency = np.fft.rfftfreq(len(rows))
+    band = (frequency >= 1.0 / SLOW_BAND[1]) & (frequency <= 1.0 / SLOW_BAND[0])
+    return max(1.0, float(power[band].mean() / max(float(power[1:].mean()), 1e-30)))
+
+
+def _best_step(coarse: Coarse, whitener: Whitener, response: FloatArray) -> tuple[float, int]:
+    """Best chi-square of one jump, and where; at least 30 s of driving on either side, single long drives only."""
+    if int(coarse.drive.max()) > 0:
+        return 0.0, 0
+    ones = whitener.white(np.ones(len(response)))
+    gain = float(whitener.process.polynomial.sum())
+    # far from the jump a whitened step is a constant; its edge of a few seconds hardly counts against minutes
+    after = np.cumsum((gain * coarse.valid / whitener.scale * response)[::-1])[::-1]
+    weight = np.cumsum((ones**2)[::-1])[::-1]
+    total = weight[0]
+    variance = weight * (1.0 - weight / total)
+    count = np.cumsum(coarse.valid)
+    possible = (count >= 30) & (count <= count[-1] - 30)
+    chi_square = np.where(possible, after**2 / np.maximum(variance, 1e-9 * total), 0.0)
+    at = int(np.argmax(chi_square))
+    return float(chi_square[at]), at
+
+
+def _peak(rows: FloatArray) -> Peak | None:
+    n = len(rows)
+    power = np.abs(np.fft.rfft(rows)) ** 2 / max(float(rows @ rows), 1e-12)
+    frequency = np.fft.rfftfreq(n)
+    band = (frequency >= 1.0 / PERIODS[1]) & (frequency <= 1.0 / PERIODS[0])
+    best: Peak | None = None
+    for width in WIDTHS:
+        together = np.convolve(power, np.ones(width), mode="same")
+        around = np.convolve(power, np.ones(2 * SURROUNDINGS + 1), mode="same") - np.convolve(
+            power, np.ones(2 * width + 11), "same"
+        )
+        level = around / (2 * SURROUNDINGS + 1 - 2 * width - 11)
+        ratio = np.where(band, together / np.maximum(level, 1e-12), 0.0)
+        at = int(np.argmax(ratio))
+        p_value = _line_probability(float(ratio[at]), width, int(band.sum()))
+        if best is None or p_value < best.p_value:
+            best = Peak(float(frequency[at]), width, float(ratio[at]), p_value)
+    return best
+
+
+def _line_probability(ratio: float, width: int, n_frequencies: int) -> float:
+    from scipy.stats import f
+
+    # sum of `width` exponentials over the mean of about 100 others; every width pays for every frequency
+    single = float(f.sf(ratio / width, 2 * width, 2 * (2 * SURROUNDINGS - 2 * width - 10)))
+    return float(np.clip(single * n_frequencies * len(WIDTHS), LEAST, 1.0))
+
+
+def _clustering_scores(squares: FloatArray, valid: BoolArray) -> FloatArray:
+    n = int(valid.sum())
+    longest = int(3 * max(MEMORIES))
+    size = len(squares) + longest
+    transform = np.fft.rfft(squares, size)
+    lags = np.arange(SHORTEST, longest + 1)
+    covariance = np.fft.irfft(np.abs(transform) ** 2, size)[lags] / np.sqrt(n)
+    weights = np.exp(-lags[None, :] / np.asarray(MEMORIES)[:, None])
+    return np.asarray(weights @ covariance / np.sqrt((weights**2).sum(axis=1)))
+
+
+def _correlation(values: FloatArray, valid: BoolArray, lag: int) -> float:
+    both = float(np.sum(valid[:-lag] & valid[lag:]))
+    return float(values[:-lag] @ values[lag:]) / max(both, 1.0) / max(float(values @ values) / valid.sum(), 1e-12)
+
+
+def _signed_square(values: FloatArray | float) -> FloatArray | float:
+    return np.sign(values) * np.square(values)

@@ -1,0 +1,215 @@
+"""From the scan's grid to the best lag, response time and shape; and which other columns would do as well."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from xosc_lateral.driver.effects import ColumnEffect, Saturating, Threshold
+from xosc_lateral.loop.candidates import COST_SHAPE, Candidate
+from xosc_lateral.loop.looks import Look, fine_rows, pull
+from xosc_lateral.loop.movement import Coarse, Fitted, squared_innovations
+from xosc_lateral.loop.scan import Scan, as_one_degree
+
+FloatArray = NDArray[np.float64]
+
+LAG_RANGE = (-5.0, 5.0)
+"""Lags that are tried. [s]"""
+
+RESPONSES = (0.3, 0.6, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0)
+"""Response times that are tried. [s]"""
+
+WITHIN = 25.0
+"""Candidates whose score is lower than the best by up to this are refined too. [chi-square]"""
+
+CONTENDERS = 6
+"""At most so many."""
+
+SAME = 3.0
+"""Two columns whose scores differ by less than this can't be told apart. [chi-square]"""
+
+
+@dataclass(frozen=True, slots=True)
+class Choice:
+    """The refined winner.
+
+    Parameters
+    ----------
+    candidate : Candidate
+    score : float
+        Chi-square as of one degree of freedom, less cost.
+    rivals : tuple of str
+        Columns of other quantities that explain as much and next to which it adds nothing.
+    """
+
+    candidate: Candidate
+    score: float
+    rivals: tuple[str, ...]
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Target:
+    """What candidates are regressed on in a look: white rows, and how an answer becomes such rows."""
+
+    rows: FloatArray
+    transform: Callable[[FloatArray], FloatArray]
+
+    def gain(self, answer: FloatArray, beside: FloatArray | None = None) -> float:
+        """Chi-square that the answer adds, beside another answer's transformed rows if given."""
+        columns = self.transform(answer)
+        rows = self.rows
+        if beside is not None:
+            basis = np.linalg.qr(beside)[0]
+            columns, rows = columns - basis @ (basis.T @ columns), rows - basis @ (basis.T @ rows)
+        gram = columns.T @ columns
+        gram[np.diag_indices(len(gram))] *= 1.0 + 1e-9
+        if np.trace(gram) <= 1e-12:
+            return 0.0
+        projected = columns.T @ rows
+        return float(projected @ np.linalg.pinv(gram) @ projected)
+
+
+def target_of(look: Look, coarse: Coarse, fitted: Fitted) -> Target:
+    """White rows of a look, free of everything in the model."""
+    ones = np.ones((len(coarse), 1))
+    if look is Look.LOCATION:
+        whitener = fitted.whitener
+        return _target(fitted.rows, whitener.rows, whitener.rows(fitted.location_columns))
+    if look is Look.PACE:
+        recent = pull(coarse, fitted)[:, None]
+        known = [ones, *(coarse.answer(effect) for effect in fitted.terms.pace)]
+        rows = np.where(coarse.valid, fitted.rows, 0.0)
+        return _target(rows, lambda answer: answer * recent, np.concatenate(known, axis=1) * recent)
+    if look is Look.SPREAD:
+        squares, valid = squared_innovations(fitted.rows, coarse.valid), coarse.valid
+    else:
+        fine = fine_rows(coarse, fitted)
+        squares, valid = fine.squares, fine.valid
+    known_columns = np.concatenate([ones, fitted.scale_columns], axis=1) * valid[:, None]
+    return _target(squares, lambda answer: answer * valid[:, None], known_columns)
+
+
+def refine(
+    coarse: Coarse,
+    look: Look,
+    fitted: Fitted,
+    candidates: list[Candidate],
+    result: Scan,
+    usable: NDArray[np.bool_],
+    best: int,
+) -> Choice:
+    """Refine the best candidates of the scan and choose among them."""
+    target = target_of(look, coarse, fitted)
+    contenders = sorted({best, *_contenders(candidates, result, usable)})
+    refined = [_refined(coarse, target, candidates[index], float(result.lag[index])) for index in contenders]
+    refined.sort(key=lambda scored: -scored[1])
+    winner, score = refined[0]
+    rivals = _rivals(coarse, target, winner, score, refined[1:])
+    return Choice(winner, score, rivals)
+
+
+def score_of(coarse: Coarse, target: Target, candidate: Candidate) -> float:
+    """Chi-square as of one degree of freedom, less cost."""
+    answer = coarse.answer(candidate.effect)
+    return float(as_one_degree(np.array([target.gain(answer)]), answer.shape[1])[0]) - candidate.cost
+
+
+def _target(rows: FloatArray, transform: Callable[[FloatArray], FloatArray], known: FloatArray) -> Target:
+    if known.shape[1] == 0:
+        return Target(rows, transform)
+    basis, triangle = np.linalg.qr(known)
+    size = np.abs(np.diag(triangle))
+    basis = basis[:, size > 1e-9 * max(float(size.max()), 1e-12)]
+
+    def free(answer: FloatArray) -> FloatArray:
+        columns = transform(answer)
+        return np.asarray(columns - basis @ (basis.T @ columns))
+
+    return Target(rows - basis @ (basis.T @ rows), free)
+
+
+def _contenders(candidates: list[Candidate], result: Scan, usable: NDArray[np.bool_]) -> list[int]:
+    """Best candidate of each set of columns and each shape, while it is near the best of all."""
+    order = np.argsort(-np.where(usable, result.statistic, -np.inf))
+    best = result.statistic[order[0]]
+    limit = best - max(WITHIN, 0.25 * best)
+    chosen: list[int] = []
+    seen: set[tuple[tuple[str, ...], str]] = set()
+    for index in order:
+        if len(chosen) >= CONTENDERS or not usable[index] or (chosen and result.statistic[index] < limit):
+            break
+        key = (candidates[index].columns, _family(candidates[index].effect))
+        if key not in seen:
+            seen.add(key)
+            chosen.append(int(index))
+    return chosen
+
+
+def _family(effect: ColumnEffect) -> str:
+    if isinstance(effect, Threshold):
+        return f"threshold {effect.jump} {effect.above}"
+    return f"{effect.kind} {getattr(effect, 'factors', '')} {getattr(effect, 'presence', '')}"
+
+
+def _refined(coarse: Coarse, target: Target, candidate: Candidate, lag_s: float) -> tuple[Candidate, float]:
+    effect = replace(candidate.effect, lag_s=lag_s)
+    best, score = effect, score_of(coarse, target, replace(candidate, effect=effect))
+    for variants in (_timings(1.0), _shapes, _timings(0.4), _shapes, _timings(0.2)):
+        improved = True
+        while improved:
+            improved = False
+            for variant in variants(best, coarse):
+                reached = score_of(coarse, target, replace(candidate, effect=variant))
+                if reached > score + 1e-6:
+                    best, score, improved = variant, reached, True
+    return replace(candidate, effect=best), score
+
+
+def _timings(step: float) -> Callable[[ColumnEffect, Coarse], Iterator[ColumnEffect]]:
+    """Neighbours in lag and response time, also along the ridge where one makes up for the other."""
+
+    def variants(effect: ColumnEffect, _: Coarse) -> Iterator[ColumnEffect]:
+        at = int(np.argmin(np.abs(np.asarray(RESPONSES) - effect.response_s)))
+        for change in (0, -1, 1):
+            response = RESPONSES[min(max(at + change, 0), len(RESPONSES) - 1)]
+            ridge = effect.response_s - response
+            for lag in (effect.lag_s, effect.lag_s - step, effect.lag_s + step, effect.lag_s + ridge):
+                lag = round(lag / 0.2) * 0.2
+                if LAG_RANGE[0] <= lag <= LAG_RANGE[1] and (lag, response) != (effect.lag_s, effect.response_s):
+                    yield replace(effect, lag_s=round(lag, 1), response_s=response)
+
+    return variants
+
+
+def _shapes(effect: ColumnEffect, coarse: Coarse) -> Iterator[ColumnEffect]:
+    """Neighbours in the shape's own parameters."""
+    if isinstance(effect, Threshold):
+        seen = coarse.context[effect.column][coarse.timeline.valid]
+        seen = seen[np.isfinite(seen)]
+        share = float(np.mean(seen <= effect.at))
+        for change in (-0.1, -0.03, -0.01, 0.01, 0.03, 0.1):
+            if 0.02 <= share + change <= 0.98:
+                yield replace(effect, at=float(np.quantile(seen, share + change)))
+    elif isinstance(effect, Saturating):
+        for factor in (0.5, 0.7, 1.4, 2.0):
+            if 0.1 <= effect.scale * factor / max(float(np.nanstd(coarse.context[effect.column])), 1e-12) <= 3.0:
+                yield replace(effect, scale=effect.scale * factor)
+
+
+def _rivals(
+    coarse: Coarse, target: Target, winner: Candidate, score: float, others: list[tuple[Candidate, float]]
+) -> tuple[str, ...]:
+    own = coarse.answer(winner.effect)
+    rivals: list[str] = []
+    for other, reached in others:
+        if set(other.columns) & set(winner.columns) or other.cost > winner.cost + COST_SHAPE:
+            continue
+        theirs = coarse.answer(other.effect)
+        beside_them = target.gain(own, beside=target.transform(theirs))
+        beside_us = target.gain(theirs, beside=target.transform(own))
+        if score - reached < SAME and beside_them < SAME and beside_us < SAME:
+            rivals += [column for column in other.columns if column not in rivals]
+    return tuple(rivals)

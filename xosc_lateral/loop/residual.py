@@ -1,0 +1,215 @@
+"""The residual: where measured drives and a profile's own runs under the same context differ, in metres.
+
+Both are described by the same set of cells: the mean offset and the spread of the faster movement in each fifth of every
+context column, the spread in each sixth of the drive, the movement's size in six bands of frequency, and the quantiles of
+the local spread. The error is the root mean square over the cells of measured minus expected, with the expectation taken
+over several runs of the profile. If no cell differs by more than the floor (what measured data differs from itself), then
+no test that looks at means, spreads, spectra or their dependence on context can tell the profile from the driver.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from xosc_lateral.driver.effects.response import respond
+from xosc_lateral.driver.profile import DriverProfile
+from xosc_lateral.driver.sampling import OffsetSampler
+from xosc_lateral.driver.seeds import child
+from xosc_lateral.loop.timeline import PAD, Timeline
+from xosc_lateral.segment import Segment
+
+FloatArray = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
+IntArray = NDArray[np.intp]
+
+N_BINS = 5
+"""Bins of a column, equally filled."""
+
+ANSWER_S = 2.0
+"""Columns are smoothed as a driver answers before they are binned. [s]"""
+
+LOCAL_S = 20.0
+"""Movement slower than this counts as mean, faster as spread. [s]"""
+
+BANDS_S = (1.0, 3.0, 8.0, 20.0, 60.0, 200.0)
+"""Averaging times between which the bands of the movement lie. [s]"""
+
+LOCAL_QUANTILES = (0.1, 0.3, 0.5, 0.7, 0.9)
+
+N_RUNS = 12
+"""Runs of the profile that its expectation is taken over."""
+
+SPARE_ROWS = 75
+"""A bin with fewer rows (15 s) than this is left out. [-]"""
+
+
+@dataclass(frozen=True, eq=False)
+class Cells:
+    """What is compared, once for measured and sampled offsets alike.
+
+    Parameters
+    ----------
+    names : tuple of str
+        Groups: a column's name, "time", ...
+    labels : mapping of str to int array, shape (n,)
+        Bin of every row in each group, -1: none.
+    middles : mapping of str to array
+        Mean of the quantity per bin, for curves.
+    """
+
+    timeline: Timeline
+    labels: Mapping[str, IntArray]
+    middles: Mapping[str, FloatArray]
+
+    def describe(self, offset: FloatArray, used: BoolArray) -> dict[str, FloatArray]:
+        """Cells of one series of offsets on the grid, by group. [m]"""
+        timeline = self.timeline
+        used = used & timeline.valid
+        slow = local_mean(offset, timeline.valid, LOCAL_S, timeline.step)
+        fast = offset - slow
+        found: dict[str, FloatArray] = {}
+        for name, label in self.labels.items():
+            mean, spread = _by_bin(offset, label, used), np.sqrt(_by_bin(fast**2, label, used))
+            if name != "time":
+                found[f"mean by {name}"] = mean
+            found[f"spread by {name}"] = spread
+        found["movement by band"] = _bands(offset, used, timeline)
+        local = np.sqrt(local_mean(fast**2, timeline.valid, LOCAL_S, timeline.step))
+        inside = local[used]
+        found["quantiles of local spread"] = (
+            np.quantile(inside, LOCAL_QUANTILES) if len(inside) else np.full(len(LOCAL_QUANTILES), np.nan)
+        )
+        return found
+
+
+def cells_of(timeline: Timeline, quantities: Mapping[str, FloatArray]) -> Cells:
+    """Bins for every quantity, shape (n,) each on the grid, and for time."""
+    labels, middles = {}, {}
+    for name, values in quantities.items():
+        smooth = respond(_filled(values, timeline.valid), timeline.step, 0.0, ANSWER_S)
+        label, middle = _binned(smooth, timeline.valid)
+        if len(middle) > 1:
+            labels[name], middles[name] = label, middle
+    labels["time"], middles["time"] = _time_bins(timeline)
+    return Cells(timeline, labels, middles)
+
+
+def own_runs(
+    profile: DriverProfile, timeline: Timeline, seed: np.random.SeedSequence, runs: int = N_RUNS
+) -> FloatArray:
+    """Free runs of a profile under the drives' context, shape (runs, n); 0 outside the drives."""
+    result = np.zeros((runs, len(timeline)))
+    context = {"lane_width": timeline.lane_width, **timeline.context}
+    for index, span in enumerate(timeline.spans):
+        rows = slice(span.start, span.stop)
+        n = span.stop - span.start
+        segment = Segment(
+            time=timeline.time[span.start] + timeline.step * np.arange(n),
+            lane_width=timeline.lane_width[rows],
+            speed=context["speed"][rows] if "speed" in context else np.full(n, np.nan),
+            context={name: values[rows] for name, values in context.items()},
+            before=PAD,
+            after=PAD,
+        )
+        for run in range(runs):
+            offset = OffsetSampler(profile, child(seed, run, index)).sample(segment)
+            result[run, span.start + PAD : span.stop - PAD] = offset
+    return result
+
+
+def expected(cells: Cells, runs: FloatArray, used: BoolArray) -> dict[str, FloatArray]:
+    """Mean of the cells over a profile's runs."""
+    several = [cells.describe(run, used) for run in runs]
+    return {name: np.mean([one[name] for one in several], axis=0) for name in several[0]}
+
+
+def error_between(first: Mapping[str, FloatArray], second: Mapping[str, FloatArray]) -> float:
+    """Root mean square of the difference over groups, each group's mean square counting the same. [m]"""
+    squares = []
+    for name in first:
+        difference = first[name] - second[name]
+        difference = difference[np.isfinite(difference)]
+        if len(difference):
+            squares.append(float(np.mean(difference**2)))
+    return float(np.sqrt(np.mean(squares))) if squares else 0.0
+
+
+def floor_of(cells: Cells, offset: FloatArray, blocks: IntArray, rng: np.random.Generator, splits: int = 8) -> float:
+    """What measured data differs from itself: halves of the blocks against each other.
+
+    Two halves of n/2 rows differ by twice the standard error that all n rows have against an exact expectation: halved.
+    """
+    numbers = np.unique(blocks[cells.timeline.valid])
+    found = []
+    for _ in range(splits):
+        chosen = rng.permutation(numbers)[: len(numbers) // 2]
+        half = np.isin(blocks, chosen)
+        found.append(0.5 * error_between(cells.describe(offset, half), cells.describe(offset, ~half)))
+    return float(np.mean(found))
+
+
+def local_mean(values: FloatArray, valid: BoolArray, seconds: float, step: float) -> FloatArray:
+    """Moving average over the valid rows within `seconds`, shape (n,); 0 where there are none."""
+    half = max(1, round(0.5 * seconds / step))
+    sums = np.concatenate([[0.0], np.cumsum(np.where(valid, values, 0.0))])
+    counts = np.concatenate([[0.0], np.cumsum(valid.astype(np.float64))])
+    index = np.arange(len(values))
+    low, high = np.maximum(index - half, 0), np.minimum(index + half + 1, len(values))
+    count = counts[high] - counts[low]
+    return np.asarray((sums[high] - sums[low]) / np.maximum(count, 1.0))
+
+
+def _by_bin(values: FloatArray, label: IntArray, used: BoolArray) -> FloatArray:
+    inside = used & (label >= 0)
+    size = int(label.max()) + 1
+    count = np.bincount(label[inside], minlength=size)
+    sums = np.bincount(label[inside], values[inside], minlength=size)
+    return np.where(count >= SPARE_ROWS, sums / np.maximum(count, 1), np.nan)
+
+
+def _bands(offset: FloatArray, used: BoolArray, timeline: Timeline) -> FloatArray:
+    levels = [offset, *(local_mean(offset, timeline.valid, seconds, timeline.step) for seconds in BANDS_S)]
+    inside = [level[used] for level in levels]
+    bands = [np.std(finer - coarser) for finer, coarser in zip(inside[:-1], inside[1:], strict=True)]
+    return np.array([*bands, np.std(inside[-1])])
+
+
+def _binned(values: FloatArray, valid: BoolArray) -> tuple[IntArray, FloatArray]:
+    seen = values[valid]
+    edges = np.unique(np.quantile(seen, np.linspace(0.0, 1.0, N_BINS + 1)[1:-1]))
+    label = np.searchsorted(edges, values, side="right")
+    if len(edges) and float(np.mean(seen > edges[-1])) < 0.01:
+        label = np.minimum(label, len(edges) - 1)
+    used, label = np.unique(label, return_inverse=True)
+    middle = np.array(
+        [
+            values[valid & (label == index)].mean() if np.any(valid & (label == index)) else np.nan
+            for index in range(len(used))
+        ]
+    )
+    return label.astype(np.intp), middle
+
+
+def _time_bins(timeline: Timeline, parts: int = 6) -> tuple[IntArray, FloatArray]:
+    label = np.full(len(timeline), -1, dtype=np.intp)
+    for span in timeline.spans:
+        rows = np.arange(span.start, span.stop)
+        inside = rows[timeline.valid[rows]]
+        if len(inside):
+            share = (rows - inside[0]) / max(1, inside[-1] - inside[0] + 1)
+            label[rows] = np.clip((share * parts).astype(np.intp), 0, parts - 1)
+    return label, (np.arange(parts) + 0.5) / parts
+
+
+def _filled(values: FloatArray, valid: BoolArray) -> FloatArray:
+    seen = values[valid & np.isfinite(values)]
+    return np.where(np.isfinite(values), values, seen.mean() if len(seen) else 0.0)
+
+
+def groups_named(cells: Cells, wanted: Sequence[str]) -> list[str]:
+    """Groups whose name ends in one of the wanted quantities."""
+    return [f"{what} by {name}" for name in wanted for what in ("mean", "spread") if name in cells.labels]

@@ -1,0 +1,197 @@
+"""Measured drives on one uniform grid, context throughout and offsets where road-following, for everything that the loop computes.
+
+Drives stand one after the other with a pad between them that is longer than any lag, so that shifting a column by a few
+seconds never brings in another drive's values.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from types import MappingProxyType
+
+import numpy as np
+from numpy.typing import NDArray
+
+from xosc_lateral.driver.series import STEP, CutRules, Drive, average, cut_runs, nearest, resample
+from xosc_lateral.errors import NotEnoughDataError
+
+FloatArray = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
+IntArray = NDArray[np.intp]
+
+COARSE = 5
+"""Samples of the 0.2 s grid per sample of the coarse grid: effects answer within seconds, so they are looked for at 1 Hz. [-]"""
+
+PAD = 75
+"""Samples before and after each drive in which the context holds its outermost value: 15 s. [-]"""
+
+TRACE_RULES = CutRules(lane_change_margin=6.0)
+"""What is cut for tracing: a little more around lane changes than for fitting, or their last second looks like an effect of
+the lane."""
+
+MIN_VALID_S = 120.0
+"""Road-following time below which nothing can be said. [s]"""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Timeline:
+    """All drives on the 0.2 s grid.
+
+    Parameters
+    ----------
+    names : tuple of str
+        Drives.
+    drive : int array, shape (n,)
+        Index into `names`.
+    time : array, shape (n,)
+        The drive's own clock. [s]
+    offset : array, shape (n,)
+        0 outside `valid`. [m]
+    valid : bool array, shape (n,)
+        Road-following, not cut out.
+    lane_width : array, shape (n,)
+        [m]
+    context : mapping of str to array, shape (n,)
+        NaN: there is none.
+    levels : frozenset of str
+        Columns of whole numbers.
+    """
+
+    names: tuple[str, ...]
+    drive: IntArray
+    time: FloatArray
+    offset: FloatArray
+    valid: BoolArray
+    lane_width: FloatArray
+    context: Mapping[str, FloatArray]
+    levels: frozenset[str]
+
+    def __len__(self) -> int:
+        return len(self.time)
+
+    @property
+    def step(self) -> float:
+        """Of the grid. [s]"""
+        return STEP
+
+    @property
+    def spans(self) -> list[slice]:
+        """Rows of each drive, pads included."""
+        edges = np.searchsorted(self.drive, np.arange(len(self.names) + 1))
+        return [slice(int(first), int(last)) for first, last in zip(edges[:-1], edges[1:], strict=True)]
+
+
+def join_drives(drives: Sequence[Drive], rules: CutRules = TRACE_RULES) -> Timeline:
+    """Put drives on one grid.
+
+    Raises
+    ------
+    NotEnoughDataError
+        When less than two minutes of road-following are left.
+    """
+    kept = [part for drive in drives if (part := _gridded(drive, rules)) is not None]
+    if kept:
+        kept[-1] = _lengthened(kept[-1], sum(len(part) for part in kept))
+    valid_s = STEP * sum(float(part.valid.sum()) for part in kept)
+    if valid_s < MIN_VALID_S:
+        raise NotEnoughDataError(
+            f"closing the loop: {valid_s:.0f} s of road-following in {len(drives)} drives, at least {MIN_VALID_S:.0f} s are needed"
+        )
+    common = set(kept[0].context).intersection(*(part.context for part in kept))
+    return Timeline(
+        names=tuple(part.names[0] for part in kept),
+        drive=np.repeat(np.arange(len(kept)), [len(part) for part in kept]),
+        time=np.concatenate([part.time for part in kept]),
+        offset=np.concatenate([part.offset for part in kept]),
+        valid=np.concatenate([part.valid for part in kept]),
+        lane_width=np.concatenate([part.lane_width for part in kept]),
+        context=MappingProxyType(
+            {name: np.concatenate([part.context[name] for part in kept]) for name in kept[0].context if name in common}
+        ),
+        levels=frozenset.intersection(*(part.levels for part in kept)),
+    )
+
+
+def coarse_mean(values: FloatArray) -> FloatArray:
+    """Mean over each second, shape (n // 5, ...)."""
+    n = len(values) // COARSE
+    return np.asarray(values[: n * COARSE].reshape(n, COARSE, *values.shape[1:]).mean(axis=1))
+
+
+def coarse_all(mask: BoolArray) -> BoolArray:
+    """Whether the whole second is valid, shape (n // 5,)."""
+    n = len(mask) // COARSE
+    return np.asarray(mask[: n * COARSE].reshape(n, COARSE).all(axis=1))
+
+
+def angular_period(values: FloatArray) -> float | None:
+    """360 or 2 pi when a column jumps across a full circle as only angles do, else None."""
+    finite = values[np.isfinite(values)]
+    if len(finite) < 2:
+        return None
+    low, high = float(finite.min()), float(finite.max())
+    jump = float(np.abs(np.diff(finite)).max())
+    for period in (360.0, 2.0 * np.pi):
+        within = -0.5 * period * 1.001 <= low and high <= period * 1.001 and high - low <= period * 1.001
+        if within and high - low > 0.9 * period and jump > 0.9 * period:
+            return period
+    return None
+
+
+def is_direction(name: str, values: FloatArray) -> float | None:
+    """Period of a column that holds a direction: by name and range, or because it wraps; else None."""
+    finite = values[np.isfinite(values)]
+    by_name = any(word in name.lower() for word in ("direction", "bearing", "azimuth"))
+    if by_name and len(finite) and finite.min() >= -180.5 and finite.max() <= 360.5:
+        return 360.0 if np.abs(finite).max() > 2.0 * np.pi else 2.0 * np.pi
+    return angular_period(values)
+
+
+def _gridded(drive: Drive, rules: CutRules) -> Timeline | None:
+    runs = cut_runs(drive, rules)
+    if not runs:
+        return None
+    inner = int((drive.time[-1] - drive.time[0]) / STEP) + 1
+    total = -(-(inner + 2 * PAD) // COARSE) * COARSE
+    grid = drive.time[0] + STEP * np.arange(inner)
+    offset, valid = np.zeros(inner), np.zeros(inner, dtype=np.bool_)
+    for run in runs:
+        first, last = np.searchsorted(grid, [run.time[0] - 1e-9, run.time[-1] + 1e-9])
+        rows = slice(*np.searchsorted(drive.time, [run.time[0] - 1e-9, run.time[-1] + STEP]))
+        offset[first:last] = resample(drive.time[rows], drive.offset[rows], grid[first:last])
+        valid[first:last] = True
+    pads = (PAD, total - inner - PAD)
+    context = {name: np.pad(_on_grid(drive, name, grid), pads, mode="edge") for name in drive.context}
+    return Timeline(
+        names=(drive.name,),
+        drive=np.zeros(total, dtype=np.intp),
+        time=drive.time[0] + STEP * (np.arange(total) - PAD),
+        offset=np.pad(offset, pads),
+        valid=np.pad(valid, pads),
+        lane_width=np.pad(average(drive.time, drive.lane_width, grid), pads, mode="edge"),
+        context=context,
+        levels=drive.levels,
+    )
+
+
+def _lengthened(part: Timeline, total: int) -> Timeline:
+    """Pad the last drive until the coarse grid has a length whose Fourier transform is quick."""
+    from scipy.fft import next_fast_len
+
+    more = COARSE * next_fast_len(total // COARSE, real=True) - total
+    longer = {
+        "drive": np.pad(part.drive, (0, more), mode="edge"),
+        "time": np.concatenate([part.time, part.time[-1] + STEP * np.arange(1, more + 1)]),
+        "offset": np.pad(part.offset, (0, more)),
+        "valid": np.pad(part.valid, (0, more)),
+        "lane_width": np.pad(part.lane_width, (0, more), mode="edge"),
+        "context": {name: np.pad(values, (0, more), mode="edge") for name, values in part.context.items()},
+    }
+    return Timeline(names=part.names, levels=part.levels, **longer)
+
+
+def _on_grid(drive: Drive, name: str, grid: FloatArray) -> FloatArray:
+    values = drive.context[name]
+    held = name in drive.levels or is_direction(name, values) is not None
+    return (nearest if held else average)(drive.time, values, grid)

@@ -1,0 +1,101 @@
+"""A closed loop as strict JSON."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from math import isfinite
+from pathlib import Path
+from typing import Any
+
+from xosc_lateral import __version__
+from xosc_lateral.driver.profile import DriverProfile
+from xosc_lateral.formats.hashes import file_hash
+from xosc_lateral.formats.profiles import canonical_json, profile_hash
+from xosc_lateral.loop.close import LoopResult
+from xosc_lateral.loop.distance import Distances
+from xosc_lateral.loop.findings import Finding
+
+MEASURE = (
+    "root mean square of measured minus expected over cells (mean and spread by fifths of every column, spread by time, "
+    "movement by frequency band, quantiles of local spread) on held-out blocks, m"
+)
+
+
+def loop_json(result: LoopResult, tables: Sequence[Path]) -> str:
+    """`report.json`, as DESIGN has it, and the provenance."""
+    return canonical_json(finite(loop_record(result, tables))) + "\n"
+
+
+def loop_record(result: LoopResult, tables: Sequence[Path]) -> dict[str, Any]:
+    """The same as plain values."""
+    error = {"before": result.error_before, "after": result.error_after, "floor": result.floor}
+    scores = result.scores
+    return {
+        "drives": list(result.names),
+        "base_profile": _profile(result.base) | {"given": result.given},
+        "refined_profile": _profile(result.refined),
+        "held_out": result.held_out,
+        "findings": [finding_record(finding) for finding in result.findings],
+        "consequences": [{"column": item.column, "why": item.why} for item in result.trace.consequences],
+        "rejected": [
+            {"columns": list(item.columns), "look": item.look, "p_value": item.p_value, "why": item.why}
+            for item in result.trace.tried
+        ],
+        "unused": [{"column": column, "why": why} for column, why in result.trace.unused.items()],
+        "error": {"measure": MEASURE, **error},
+        "metrics": {
+            "before": _metrics(scores.before),
+            "after": _metrics(scores.after),
+            "floor": _metrics(scores.floor),
+        },
+        "provenance": {
+            "package_version": __version__,
+            "seed": result.seed,
+            "inputs": {table.name: file_hash(table) for table in tables},
+        },
+    }
+
+
+def finding_record(finding: Finding) -> dict[str, Any]:
+    """One finding, as DESIGN has it, with its uncertainty and what the profile got."""
+    return {
+        "effect": finding.effect,
+        "kind": finding.kind,
+        "columns": list(finding.columns),
+        "lag_s": finding.lag_s,
+        "response_s": finding.response_s,
+        "shape": finding.shape,
+        "size_m": finding.size_m,
+        "size_error": finding.size_error,
+        "p_value": finding.p_value,
+        "error_before": finding.error_before,
+        "error_after": finding.error_after,
+        "measure": f"{finding.measure}, m",
+        "alike": list(finding.alike),
+        "added": [effect.to_dict() for effect in finding.effects],
+    }
+
+
+def finite(value: Any) -> Any:
+    """The same with plain floats, and None for what is not finite."""
+    if isinstance(value, Mapping):
+        return {key: finite(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [finite(item) for item in value]
+    if isinstance(value, bool | int | str) or value is None:
+        return value
+    number = float(value)
+    return number if isfinite(number) else None
+
+
+def _profile(profile: DriverProfile) -> dict[str, Any]:
+    return {
+        "name": profile.name,
+        "model": profile.model.kind,
+        "hash": profile_hash(profile),
+        "effects": len(profile.effects),
+    }
+
+
+def _metrics(distances: Distances | None) -> dict[str, float]:
+    return {} if distances is None else dict(distances.by_metric)
