@@ -33,7 +33,7 @@ class Spot:
 
 @dataclass(frozen=True, slots=True)
 class RoadGap:
-    """From one place to another along the roads: [m], lanes (positive to +t, lane 0 not counted), and whether opposite."""
+    """From one place to another along the roads: [m], lanes (positive to +t, lane 0 not counted), whether opposite."""
 
     ds: float
     dt: float

@@ -18,7 +18,7 @@ def drive(state: EntityState, distance: float) -> None:
     """Move an entity along its lane as far as it goes, lateral offset and relative heading kept.
 
     The way along the reference line follows from the curvature at the START of the step (explicit Euler, as the
-    reference player does it). Without a road there is no lane to follow: the entity stops; at the end of the road it does
+    reference player does it). Without a road there is no lane to follow: the entity stops; at a road's end it does
     so one frame after the first in which it has not moved.
 
     Parameters

@@ -1,4 +1,4 @@
-"""Nominal motion: what the maneuvers alone give, before offsets. The player makes it; segments, writer and report read it."""
+"""Nominal motion: what the maneuvers alone give, before offsets. The player makes it; segments, writer, report read it."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 """Play a scenario: frame by frame, triggers first, then actions, then the default driver.
 
 A frame from time T: the triggers are evaluated with T and the state at T; actions that start do so at once; all running
-actions step, in the order of the file; time moves on; entities that no action has moved follow their lanes; trailers are
+actions step, in the file's order; time moves on; entities that no action has moved follow their lanes; trailers are
 drawn along. The first frame has no length: it starts the init actions and gives the row of time 0, and time 0 is
 evaluated once more in the frame after it.
 """

@@ -141,7 +141,7 @@ class EntityState:
 
     @property
     def free_pose(self) -> Pose | None:
-        """World pose as it was given; None while the entity follows its lane. z, pitch, roll may be NaN (the road's)."""
+        """World pose as given; None while the entity follows its lane. z, pitch, roll may be NaN (the road's)."""
         return self._free_pose
 
     @property

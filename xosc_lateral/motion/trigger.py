@@ -1,6 +1,6 @@
 """Triggers while playing: groups (or) of conditions (and), with edges and delays.
 
-As the standard has it, and where it is silent as the reference player: a group is evaluated from left to right and stops
+As the standard has it, where it is silent as the reference player: a group is evaluated from left to right and stops
 at the first false condition, except that conditions with a delay are always evaluated; the first evaluation after a
 trigger was armed never gives an edge; a delayed condition looks at the history of its (edge-filtered) values.
 """

@@ -49,10 +49,7 @@ class RunningFollowTrajectory(RunningAction):
         point = path.at(self._s)
         self._time = path.time_at(self._s) if self._is_timed else 0.0
         along = copysign(1.0, state.speed) if not self._is_timed else 1.0
-        if path.has_headings:
-            heading = point.heading
-        else:
-            heading = wrap(point.tangent + (0.0 if along > 0.0 else pi))
+        heading = point.heading if path.has_headings else wrap(point.tangent + (0.0 if along > 0.0 else pi))
         self._backwards = abs(difference(heading, point.tangent)) > HALF_PI + EPSILON
         self._put(point, heading)
         state.path = PathProgress(path, self._s)

@@ -17,8 +17,8 @@ from xosc_lateral.scenario.enums import DynamicsDimension, DynamicsShape
 class RunningLaneChange(RunningAction):
     """From the present lateral position to the target lane, while moving on.
 
-    The lateral position is measured from the centre of the target lane, whose width and course are thereby followed. The
-    way of one frame on the entity's own track is `speed * step`; what goes sideways is missing ahead. The heading follows
+    The lateral position is measured from the centre of the target lane: its width and course are thereby followed. The
+    way of one frame on the entity's track is `speed * step`; what goes sideways is missing ahead. The heading follows
     the movement of the frame and is 0 again at the end.
     """
 
@@ -47,7 +47,7 @@ class RunningLaneChange(RunningAction):
             there = ", ".join(str(info.id) for info in self.run.network.lanes_at(state.road, state.s))
             road = self.run.network.road_ids[state.road]
             self.note(
-                f"road '{road}' has no lane {lane} at s = {state.s:.1f} m (lanes: {there}): the lane change is not played"
+                f"road '{road}' has no lane {lane} at s = {state.s:.1f} m (lanes: {there}): lane change not played"
             )
             return
         state.turn(0.0 if state.is_forward else pi)

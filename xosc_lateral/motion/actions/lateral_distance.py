@@ -25,7 +25,7 @@ STIFFNESS = 0.4
 class RunningLateralDistance(RunningAction):
     """Sideways at the speed allowed, or by a critically damped spring where an acceleration is given.
 
-    With free space, the distance is that between boxes that stand side by side. The way of one frame on the entity's own
+    With free space, the distance is that between boxes standing side by side. The way of one frame on the entity's own
     track is `speed * step`: what goes sideways is missing ahead. Nothing moves in the first frame.
     """
 

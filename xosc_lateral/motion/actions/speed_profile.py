@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from math import inf
 from typing import NamedTuple
 
@@ -98,7 +99,7 @@ class RunningSpeedProfile(RunningAction):
                 points[-1] = (points[-1][0], target)
             else:
                 points.append((time, target))
-        slopes = [(b[1] - a[1]) / (b[0] - a[0]) for a, b in zip(points, points[1:], strict=False)]
+        slopes = [(b[1] - a[1]) / (b[0] - a[0]) for a, b in itertools.pairwise(points)]
         return [Target(t, v, k) for (t, v), k in zip(points, (*slopes, 0.0), strict=True)]
 
 

@@ -37,7 +37,7 @@ class Mode(Enum):
 class RunningSynchronize(RunningAction):
     """Speeds that bring both to their places at the same time.
 
-    Without a final speed: one constant acceleration, worked out anew in each frame. With one: two constant accelerations
+    Without a final speed: one constant acceleration, worked out anew in each frame. With one: two accelerations
     that differ in sign (first up then down, or first down then up, perhaps with a stop in between).
     """
 
@@ -203,7 +203,7 @@ def _on_line(final: float, distance: float, time_left: float) -> float:
 
 
 def _two_accelerations(now: float, final: float, s: float, t: float) -> tuple[float, float]:
-    """Speed between two accelerations of equal amount that cover s in t, and the first of them; (0, 0): there is none."""
+    """Speed between two accelerations of equal amount that cover s in t, and the first of them; (0, 0): none."""
     if abs(final - now) < EPSILON:
         apex = (s - 0.5 * t * now) / (0.5 * t)
         return apex, (apex - now) / (0.5 * t)

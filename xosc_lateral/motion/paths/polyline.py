@@ -7,6 +7,7 @@ so does the speed.
 
 from __future__ import annotations
 
+import itertools
 from bisect import bisect_left
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -22,7 +23,7 @@ CORNER = 2.0
 
 @dataclass(frozen=True, slots=True)
 class Corner:
-    """A vertex: [m], [rad], [s]. NaN in `heading`: that of the pieces; in z, pitch, roll: the road's; in `time`: none."""
+    """A vertex: [m], [rad], [s]. NaN in `heading`: the pieces'; in z, pitch, roll: the road's; in `time`: none."""
 
     x: float
     y: float
@@ -173,7 +174,7 @@ def _constant_acceleration(speed: float, ds: float, dt: float) -> tuple[float, f
 
 def _lengths(corners: Sequence[Corner]) -> tuple[float, ...]:
     lengths = [0.0]
-    for a, b in zip(corners, corners[1:], strict=False):
+    for a, b in itertools.pairwise(corners):
         lengths.append(lengths[-1] + hypot(b.x - a.x, b.y - a.y))
     return tuple(lengths)
 
@@ -181,7 +182,7 @@ def _lengths(corners: Sequence[Corner]) -> tuple[float, ...]:
 def _tangents(corners: Sequence[Corner]) -> tuple[float, ...]:
     """Direction of the piece that begins at each corner, at the last that of the piece before."""
     tangents: list[float] = []
-    for a, b in zip(corners, corners[1:], strict=False):
+    for a, b in itertools.pairwise(corners):
         if hypot(b.x - a.x, b.y - a.y) >= EPSILON:
             tangents.append(wrap(atan2(b.y - a.y, b.x - a.x)))
         else:
