@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral import __version__
+from xosc_lateral.driver.best_fit import fit_best
 from xosc_lateral.driver.core import CoreModel
 from xosc_lateral.driver.kinds import ModelKind
 from xosc_lateral.driver.profile import DriverProfile, Provenance
@@ -88,7 +89,9 @@ def fit_core(
         For each run the drive that it comes from: runs of a drive are of one driver.
     model : ModelKind or str
     """
-    return fit_two_level(rel_offsets)
+    if ModelKind(model) is ModelKind.TWO_LEVEL:
+        return fit_two_level(rel_offsets)
+    return fit_best(rel_offsets, drives)
 
 
 def _fit_notes(kind: ModelKind, core: CoreModel) -> Mapping[str, Any]:

@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from xosc_lateral.driver.best import BestModel
 from xosc_lateral.driver.core import CoreModel
 from xosc_lateral.driver.two_level import TwoLevelModel
 from xosc_lateral.errors import DriverProfileError
 
-CORE_MODELS: tuple[type[CoreModel], ...] = (TwoLevelModel,)
+CORE_MODELS: tuple[type[CoreModel], ...] = (TwoLevelModel, BestModel)
 """Every model that a profile file may name, by its `kind`."""
 
 

@@ -1,0 +1,306 @@
+"""Fitting our model. First what can be read off the data, then a few rounds of simulating and comparing.
+
+1. Mean, and the variance between drivers: the covariance that is left between moments far apart in a run.
+2. Coarse movement: autoregression on the low-passed offset about the driver's (shrunken) mean, fitted to stretches that
+   are weighted by how calm they are.
+3. Fine noise: what the coarse movement lacks of the offset's power spectrum, from spectra normalised likewise.
+4. Liveliness: how much more, and for how long, the power in short windows varies than it would in steady movement.
+5. Rounds of simulating: snippets of the model from the measured snippets' starts must show the same mean and
+   variance of log standard deviation (coarse) and of log roughness (fine), and the same covariance of the two. What
+   differs corrects the scales, the livelinesses and their correlation (indirect inference: Gourieroux et al. 1993).
+
+Everything is deterministic: the simulations draw from a fixed seed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from xosc_lateral.driver.autoregression import Autoregression, fit_autoregression
+from xosc_lateral.driver.bands import BORDER, COARSE_EVERY, building_low_pass, split_bands
+from xosc_lateral.driver.best import BestModel
+from xosc_lateral.driver.best_batch import sample_batch
+from xosc_lateral.driver.liveliness import MAX_LAG, Liveliness, autocovariance, fit_liveliness, log_power
+from xosc_lateral.driver.noise import NOISE_VARIANCE, ShapedNoise
+from xosc_lateral.driver.series import STEP
+from xosc_lateral.errors import NotEnoughDataError
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class BestSettings:
+    """Constants of the fit.
+
+    Parameters
+    ----------
+    order : int
+        Memory of the coarse movement. [s]
+    calm_window : float
+        Over which the local variance is taken that calm stretches are told by. [s]
+    n_knots : int
+        Knots of the fine noise's damping.
+    n_taps : int
+        Of its kernel.
+    fine_from : float
+        The fine noise has nothing below this. [Hz]
+    spectrum_windows : tuple of float
+        Lengths of spectral windows, the first that enough runs are as long as. [s]
+    fine_window, coarse_window : float
+        Windows that liveliness is seen by. [s]
+    far : tuple of float
+        Two moments are far apart when this share of the typical run (by time) is between them, up to `farthest`.
+    farthest : float
+        [s]
+    snippet : float
+        Length of the simulated snippets. [s]
+    n_snippets : int
+        Simulated at least, in each round.
+    rounds : int
+    damping : float
+        Share of a difference that one round corrects.
+    seed : int
+        Of the simulations.
+    """
+
+    order: int = 16
+    calm_window: float = 10.0
+    n_knots: int = 51
+    n_taps: int = 51
+    fine_from: float = 0.25
+    spectrum_windows: tuple[float, ...] = (20.0, 10.0, 5.0)
+    fine_window: float = 2.0
+    coarse_window: float = 5.0
+    far: tuple[float, float] = (0.5, 1.0)
+    farthest: float = 120.0
+    snippet: float = 10.0
+    n_snippets: int = 2000
+    rounds: int = 6
+    damping: float = 0.8
+    seed: int = 20240517
+    step: float = STEP
+
+
+DEFAULT_SETTINGS = BestSettings()
+
+
+def fit_best(
+    rel_offsets: Sequence[FloatArray], drives: Sequence[str], settings: BestSettings = DEFAULT_SETTINGS
+) -> BestModel:
+    """Fit to relative offsets, one array per run at 5 Hz; runs of one drive are of one driver.
+
+    Raises
+    ------
+    NotEnoughDataError
+        When no run lasts one snippet, or the offset never moves.
+    """
+    runs = [np.asarray(run, dtype=np.float64) for run in rel_offsets]
+    longest = max(map(len, runs), default=0)
+    if longest < round(settings.snippet / settings.step) + 1:
+        raise NotEnoughDataError(
+            f"the longest run lasts {longest * settings.step:.1f} s, the fit needs {settings.snippet:g} s"
+        )
+    everything = np.concatenate(runs)
+    if everything.std() < 1e-7:
+        raise NotEnoughDataError(f"the offset never moves: standard deviation {everything.std():.2g} lane widths")
+    mean, between = _drivers(runs, drives, settings)
+    bands = [split_bands(run, settings.step) for run in runs]
+    coarse = _fit_coarse([slow for slow, _ in bands], _shrunken_means(runs, drives, mean, between), settings)
+    low, high = max(-0.5, float(everything.min())), min(0.5, float(everything.max()))
+    model = BestModel(
+        mean=mean,
+        between_drivers=float(np.sqrt(between)),
+        coarse=coarse,
+        fine=_fit_fine(runs, coarse, settings),
+        coarse_liveliness=Liveliness(),
+        fine_liveliness=Liveliness(),
+        correlation=0.0,
+        limits=(min(low, mean - 1e-3), max(high, mean + 1e-3)),
+        step=settings.step,
+    )
+    model = _with_liveliness(model, bands, len(set(drives)) > 1, settings)
+    return _rounded(_matched(model, runs, settings))
+
+
+def _drivers(runs: Sequence[FloatArray], drives: Sequence[str], settings: BestSettings) -> tuple[float, float]:
+    """Mean of all, and variance of the drivers' means: covariance of moments far apart in one run. [-]"""
+    lengths = np.array([len(run) for run in runs])
+    mean = float(np.concatenate(runs).mean())
+    count = len(set(drives))
+    if count < 2:
+        return mean, 0.0
+    order = np.argsort(lengths)
+    typical = lengths[order][np.searchsorted(np.cumsum(lengths[order]), 0.5 * lengths.sum())]
+    reach = min(float(typical), settings.farthest / settings.step)
+    lags = range(int(settings.far[0] * reach), int(settings.far[1] * reach), COARSE_EVERY)
+    total, pairs = 0.0, 0
+    for run in runs:
+        about = run - mean
+        for lag in lags:
+            if len(about) > lag:
+                total += float(about[lag:] @ about[: len(about) - lag])
+                pairs += len(about) - lag
+    variance = float(np.concatenate(runs).var())
+    # The common mean was taken out, and with it a part of the differences between a few drivers.
+    return mean, float(np.clip(total / max(pairs, 1) * count / (count - 1), 0.0, 0.9 * variance))
+
+
+def _shrunken_means(runs: Sequence[FloatArray], drives: Sequence[str], mean: float, between: float) -> list[float]:
+    """For each run its driver's mean, drawn towards the common one by as little as its data say. [-]"""
+    within = max(float(np.concatenate(runs).var()) - between, 1e-12)
+    sums: dict[str, tuple[float, int]] = {}
+    for run, drive in zip(runs, drives, strict=True):
+        total, count = sums.get(drive, (0.0, 0))
+        sums[drive] = (total + float((run - mean).sum()), count + len(run))
+    means = {}
+    for drive, (total, count) in sums.items():
+        independent = max(1.0, count * STEP / INDEPENDENT_AFTER)
+        means[drive] = mean + total / count * between / (between + within / independent)
+    return [means[drive] for drive in drives]
+
+
+INDEPENDENT_AFTER = 12.0
+"""Two offsets of a driver this far apart count as independent when a mean's precision is judged. [s]"""
+
+
+def _fit_coarse(slow: Sequence[FloatArray], means: Sequence[float], settings: BestSettings) -> Autoregression:
+    longest = max(map(len, slow)) * settings.step
+    order = max(2, min(settings.order, int(0.4 * longest * settings.step * COARSE_EVERY)))
+    about = [values - mean for values, mean in zip(slow, means, strict=True)]
+    return fit_autoregression(about, order, every=COARSE_EVERY, window=round(settings.calm_window / settings.step))
+
+
+def _fit_fine(runs: Sequence[FloatArray], coarse: Autoregression, settings: BestSettings) -> ShapedNoise:
+    frequency, power = _typical_power(runs, settings)
+    knots = np.linspace(0.0, 0.5, settings.n_knots)  # in cycles per sample
+    kernel = building_low_pass()
+    gain = np.abs(np.exp(-2j * np.pi * np.outer(knots, np.arange(len(kernel)))) @ kernel)
+    coarse_power = coarse.power(knots * COARSE_EVERY) * gain**2 / COARSE_EVERY
+    measured = np.exp(np.interp(knots, frequency, np.log(np.maximum(power, 1e-30))))
+    lacking = np.where(knots >= settings.fine_from * settings.step, np.maximum(measured - coarse_power, 0.0), 0.0)
+    return ShapedNoise(np.sqrt(lacking / NOISE_VARIANCE), settings.n_taps)
+
+
+def _typical_power(runs: Sequence[FloatArray], settings: BestSettings) -> tuple[FloatArray, FloatArray]:
+    """Power spectrum of steady movement: windows count alike above the border, however lively they are.
+
+    Returns
+    -------
+    frequency, power : array
+        In cycles per sample, and with white noise of variance 1 at 1 everywhere.
+    """
+    for seconds in settings.spectrum_windows:
+        size = round(seconds / settings.step)
+        if sum(len(run) // size for run in runs) >= 20:
+            break
+    size = min(size, max(map(len, runs)))
+    taper = np.hanning(size + 2)[1:-1]
+    taper /= np.sqrt((taper**2).sum())
+    powers = []
+    for run in runs:
+        if len(run) >= size:
+            pieces = np.lib.stride_tricks.sliding_window_view(run, size)[:: size // 2]
+            slope = np.linspace(0.0, 1.0, size) * (pieces[:, -1:] - pieces[:, :1])
+            powers.append(np.abs(np.fft.rfft((pieces - pieces[:, :1] - slope) * taper, axis=1)) ** 2)
+    power = np.concatenate(powers)
+    frequency = np.fft.rfftfreq(size)
+    above = frequency > BORDER * settings.step
+    strength = power[:, above].mean(axis=1, keepdims=True) + 1e-30
+    typical = (power / strength).mean(axis=0) * np.exp(np.log(strength).mean())
+    return frequency, np.where(above, typical, power.mean(axis=0))
+
+
+def _with_liveliness(
+    model: BestModel, bands: Sequence[tuple[FloatArray, FloatArray]], population: bool, settings: BestSettings
+) -> BestModel:
+    """Livelinesses and their correlation from the excess covariance of log power over that of steady movement."""
+    steady = sample_batch(model, np.zeros(64), 2000, np.random.default_rng(settings.seed), start=False)
+    reference = [split_bands(row, settings.step) for row in steady]
+    found = []
+    for which, seconds in ((_wiggle, settings.coarse_window), (_fine_of, settings.fine_window)):
+        window = round(seconds / settings.step)
+        n_lags = max(2, int(MAX_LAG / seconds))
+        measured = [log_power(which(pair), window) for pair in bands if len(which(pair)) >= window]
+        covariance, counts = autocovariance(measured, n_lags)
+        expected, _ = autocovariance([log_power(which(pair), window) for pair in reference], n_lags)
+        found.append(fit_liveliness(covariance - expected, counts, seconds, population=population))
+    floor = Liveliness(0.0, 1e-3, 10.0)
+    coarse, fine = (part if part.total > floor.total else floor for part in found)
+    return replace(model, coarse_liveliness=coarse, fine_liveliness=fine, correlation=0.5)
+
+
+def _wiggle(pair: tuple[FloatArray, FloatArray]) -> FloatArray:
+    """Second difference of the slow part over a second: coarse movement without its slow wander."""
+    slow, every = pair[0], COARSE_EVERY
+    return np.asarray(slow[2 * every :] - 2.0 * slow[every:-every] + slow[: -2 * every])
+
+
+def _fine_of(pair: tuple[FloatArray, FloatArray]) -> FloatArray:
+    return pair[1]
+
+
+def _matched(model: BestModel, runs: Sequence[FloatArray], settings: BestSettings) -> BestModel:
+    """Correct scales and livelinesses until simulated snippets vary as the measured ones do."""
+    length = round(settings.snippet / settings.step) + 1
+    real = np.concatenate([run[: len(run) // length * length].reshape(-1, length) for run in runs if len(run) >= length])
+    starts = np.resize(real[:, 0], max(settings.n_snippets, len(real)))
+    target = _moments(real)
+    for _ in range(settings.rounds):
+        simulated = sample_batch(model, starts, length, np.random.default_rng(settings.seed), start=True)
+        model = _corrected(model, target - _moments(simulated), settings.damping)
+    return model
+
+
+def _moments(snippets: FloatArray) -> FloatArray:
+    """Mean and variance of log standard deviation and of log roughness (second difference), and their covariance."""
+    spread = np.log(snippets.std(axis=1) + 1e-12)
+    rough = np.log(np.diff(snippets, 2, axis=1).std(axis=1) + 1e-12)
+    return np.array([spread.mean(), rough.mean(), spread.var(), rough.var(), np.cov(spread, rough)[0, 1]])
+
+
+def _corrected(model: BestModel, lacks: FloatArray, damping: float) -> BestModel:
+    coarse, fine = model.coarse_liveliness, model.fine_liveliness
+    factors = [
+        float(np.clip(1.0 + damping * lack / max(part.total, 0.02), 0.5, 2.0))
+        for lack, part in ((lacks[2], coarse), (lacks[3], fine))
+    ]
+    both = max(np.sqrt(coarse.total * fine.total), 0.02)
+    return replace(
+        model,
+        coarse=Autoregression(model.coarse.coefficients, model.coarse.scale * float(np.exp(lacks[0]))),
+        fine=ShapedNoise(model.fine.damping * float(np.exp(lacks[1])), model.fine.n_taps),
+        coarse_liveliness=coarse.scaled(factors[0]),
+        fine_liveliness=fine.scaled(factors[1]),
+        correlation=float(np.clip(model.correlation + damping * lacks[4] / both, 0.0, 0.95)),
+    )
+
+
+DIGITS = 9
+"""Significant digits kept of a fitted number: what differs beyond is the processor's rounding. [-]"""
+
+
+def _rounded(model: BestModel) -> BestModel:
+    def tidy(value: float) -> float:
+        return float(f"{value:.{DIGITS}g}")
+
+    def tidy_all(values: FloatArray) -> FloatArray:
+        return np.array([tidy(value) for value in values])
+
+    def tidy_part(part: Liveliness) -> Liveliness:
+        return Liveliness(tidy(part.between), tidy(part.within), part.memory)
+
+    return BestModel(
+        mean=tidy(model.mean),
+        between_drivers=tidy(model.between_drivers),
+        coarse=Autoregression(tidy_all(model.coarse.coefficients), tidy(model.coarse.scale)),
+        fine=ShapedNoise(tidy_all(model.fine.damping), model.fine.n_taps),
+        coarse_liveliness=tidy_part(model.coarse_liveliness),
+        fine_liveliness=tidy_part(model.fine_liveliness),
+        correlation=tidy(model.correlation),
+        limits=(tidy(model.limits[0]), tidy(model.limits[1])),
+        step=model.step,
+    )
