@@ -182,13 +182,17 @@ def _matches(pattern: str, settings: ConvertSettings, variants: int, leave_out: 
     parts = Path(pattern).parts
     wild = next(index for index, part in enumerate(parts) if _GLOB_CHARACTERS & set(part))
     base = Path(*parts[:wild]) if wild else Path()
-    found = sorted(base.glob(str(Path(*parts[wild:]))))
+    found = [path for path in sorted(base.glob(str(Path(*parts[wild:])))) if not _is_hidden(path.relative_to(base))]
     if not found:
         raise FormatError("nothing matches", path=pattern)
     avoided = None if leave_out is None else leave_out.resolve()
     for path in found:
         if path.is_file() and (avoided is None or avoided not in path.resolve().parents):
             yield Request(path, settings, variants, base, listed=False)
+
+
+def _is_hidden(path: Path) -> bool:
+    return any(part.startswith(".") for part in path.parts)
 
 
 def _read_text_table(path: Path) -> pd.DataFrame:
@@ -207,8 +211,6 @@ def _read_text_table(path: Path) -> pd.DataFrame:
 def _as_text(value: object) -> str:
     if value is None or value != value or type(value).__name__ in ("NAType", "NaTType"):
         return ""
-    if isinstance(value, float) and value.is_integer():
-        return str(int(value))  # a column of whole numbers with a missing one comes as floats
     return json.dumps(value) if isinstance(value, dict | list) else str(value)
 
 
@@ -241,7 +243,7 @@ def _whole_number(cells: Mapping[str, str], name: str, otherwise: int, *, smalle
     if name not in cells:
         return otherwise
     try:
-        number = int(cells[name])
+        number = int(cells[name].removesuffix(".0"))  # whole numbers with a missing one are often written as floats
     except ValueError as error:
         raise ValueError(f"{name} {cells[name]!r} is no whole number") from error
     if number < smallest:
