@@ -37,7 +37,7 @@ from xosc_lateral.formats.openscenario.write import (
     write_lane_offset_scenario,
     write_trajectory_scenario,
 )
-from xosc_lateral.formats.openscenario.write.lane_offset_scenario import TOLERANCE, targets
+from xosc_lateral.formats.openscenario.write.offset_chain import TOLERANCE, ramps
 from xosc_lateral.motion.nominal import NominalMotion
 from xosc_lateral.motion.playback import play
 from xosc_lateral.motion.trajectory import Trajectory
@@ -333,14 +333,24 @@ def sine_chain(entity_name: str, begin: float, end: float) -> OffsetChain:
     return OffsetChain(entity_name, time, 0.3 * np.sin(2 * np.pi * (time - begin) / 8.0))
 
 
-def test_offset_targets_follow_the_chain_within_the_tolerance_with_few_actions() -> None:
+def test_ramps_follow_the_chain_within_the_tolerance_and_are_few() -> None:
     chain = sine_chain("Ego", 0.0, 30.0)
-    times, offsets = targets(chain)
-    settled = chain.time >= times[0]
-    error = np.interp(chain.time[settled], times, offsets) - chain.offset_t[settled]
+    found = ramps(chain)
+    ends, offsets = [ramp.end for ramp in found], [ramp.target for ramp in found]
+    settled = chain.time >= ends[0]
+    error = np.interp(chain.time[settled], ends, offsets) - chain.offset_t[settled]
     assert np.abs(error).max() <= TOLERANCE + 1e-9
-    assert len(times) < 60
-    assert np.diff(times).min() >= 0.2 - 1e-9
+    assert len(found) < 60
+    assert min(ramp.end - ramp.start for ramp in found) >= 0.2 - 1e-9
+
+
+def test_nothing_is_commanded_where_the_t_axis_flips() -> None:
+    chain = sine_chain("Ego", 0.0, 20.0)
+    side = np.where(chain.time < 10.0, 1.0, -1.0)
+    flipped = OffsetChain("Ego", chain.time, chain.offset_t * side, flips=(10.0,))
+    found = ramps(flipped)
+    assert all(ramp.end <= 9.71 or ramp.start >= 10.29 for ramp in found)
+    assert any(ramp.start >= 10.29 for ramp in found)
 
 
 @pytest.mark.parametrize("minor", [0, 1, 2, 3])
@@ -360,6 +370,8 @@ def test_lane_offset_output_is_valid_and_keeps_the_maneuvers(
     schema(minor).assertValid(etree.parse(str(tmp_path / "out.xosc")))
     again = read_scenario(tmp_path / "out.xosc")
     assert [found.name for found in again.storyboard.stories] == ["story", "xosc-lateral"]
+    names = [element.get("name") for element in etree.parse(str(tmp_path / "out.xosc")).iter("Act", "ManeuverGroup")]
+    assert len(set(names)) == len(names)
 
 
 def test_offsets_come_out_when_the_lane_offset_scenario_is_played(tmp_path: Path) -> None:

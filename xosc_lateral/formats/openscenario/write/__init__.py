@@ -1,11 +1,8 @@
 """Writing scenarios: trajectories in place of maneuvers, or lane offsets on top of them."""
 
 from xosc_lateral.formats.openscenario.provenance import provenance_of, refuse_converted
-from xosc_lateral.formats.openscenario.write.lane_offset_scenario import (
-    OffsetChain,
-    offset_chain,
-    write_lane_offset_scenario,
-)
+from xosc_lateral.formats.openscenario.write.lane_offset_scenario import write_lane_offset_scenario
+from xosc_lateral.formats.openscenario.write.offset_chain import OffsetChain, offset_chain
 from xosc_lateral.formats.openscenario.write.result import WrittenScenario
 from xosc_lateral.formats.openscenario.write.trajectory_scenario import write_trajectory_scenario
 

@@ -1,0 +1,84 @@
+"""Lateral actions of a storyboard, and how a condition refers to them."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+from xosc_lateral.scenario import Action, Event, Scenario
+from xosc_lateral.scenario.actions import (
+    FollowTrajectoryAction,
+    LaneChangeAction,
+    LaneOffsetAction,
+    LateralDistanceAction,
+)
+
+LATERAL = (LaneChangeAction, LaneOffsetAction, LateralDistanceAction, FollowTrajectoryAction)
+
+
+@dataclass(frozen=True, slots=True)
+class LateralAction:
+    """A lateral action: its names from the story down, and the type and name that a condition refers to it by."""
+
+    path: tuple[str, ...]
+    kind: str
+    reference: str
+
+
+@dataclass(frozen=True, slots=True)
+class LateralActions:
+    """Lateral actions of events, per entity in file order, and by their names."""
+
+    by_entity: Mapping[str, tuple[LateralAction, ...]]
+    by_path: Mapping[tuple[str, ...], LateralAction]
+
+
+def lateral_actions(scenario: Scenario) -> LateralActions:
+    """All of a scenario's."""
+    names = Counter(_names(scenario))
+    by_entity: dict[str, dict[LateralAction, None]] = {}
+    by_path = {}
+    for above, event, action, actors in _event_actions(scenario):
+        if isinstance(action.content, LATERAL):
+            found = _referable((*above, event.name, action.name), len(event.actions) == 1, names)
+            by_path[found.path] = found
+            for actor in actors:
+                by_entity.setdefault(actor, {})[found] = None
+    return LateralActions({entity: tuple(actions) for entity, actions in by_entity.items()}, by_path)
+
+
+def _referable(path: tuple[str, ...], is_alone: bool, names: Mapping[str, int]) -> LateralAction:
+    """By its own name where no other element has it, else by its event's, else by the whole path."""
+    if names[path[-1]] == 1:
+        return LateralAction(path, "action", path[-1])
+    if is_alone and names[path[-2]] == 1:
+        return LateralAction(path, "event", path[-2])
+    return LateralAction(path, "action", "::".join(path))
+
+
+def _event_actions(scenario: Scenario) -> Iterator[tuple[tuple[str, ...], Event, Action, tuple[str, ...]]]:
+    """Every action of every event, with the names above the event and the actors."""
+    for story in scenario.storyboard.stories:
+        for act in story.acts:
+            for group in act.maneuver_groups:
+                for maneuver in group.maneuvers:
+                    for event in maneuver.events:
+                        for action in event.actions:
+                            above = (story.name, act.name, group.name, maneuver.name)
+                            yield above, event, action, group.actors.entity_refs
+
+
+def _names(scenario: Scenario) -> Iterator[str]:
+    """Name of every element of the storyboard."""
+    for story in scenario.storyboard.stories:
+        yield story.name
+        for act in story.acts:
+            yield act.name
+            for group in act.maneuver_groups:
+                yield group.name
+                for maneuver in group.maneuvers:
+                    yield maneuver.name
+                    for event in maneuver.events:
+                        yield event.name
+                        yield from (action.name for action in event.actions)
