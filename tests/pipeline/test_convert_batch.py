@@ -1,0 +1,148 @@
+"""Batches on the real converter, and from the command line."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import pandas as pd
+import pytest
+from lxml import etree
+
+from tests.pipeline.test_batch import tree
+from tests.profiles import simulated_profile
+from xosc_lateral.cli import main
+from xosc_lateral.formats.hashes import file_hash
+from xosc_lateral.formats.profiles import write_profile
+from xosc_lateral.pipeline.batch import State, convert_many
+from xosc_lateral.pipeline.jobs import plan_batch
+from xosc_lateral.pipeline.manifest import MANIFEST
+from xosc_lateral.pipeline.settings import ConvertSettings
+from xosc_lateral.templates import find_template
+
+
+@pytest.fixture(scope="module")
+def profile(tmp_path_factory: pytest.TempPathFactory) -> str:
+    path = tmp_path_factory.mktemp("profile") / "simulated.json"
+    write_profile(simulated_profile(), path)
+    return str(path)
+
+
+@pytest.fixture
+def database(tmp_path: Path) -> Path:
+    """Two scenarios in folders of their own, and one that can't be played."""
+    for template in ("cut-in", "curves"):
+        folder = tmp_path / "db" / template
+        folder.mkdir(parents=True)
+        for file, text in find_template(template).files({}).items():
+            (folder / file).write_text(text, encoding="utf-8")
+    (tmp_path / "db" / "broken.xosc").write_text("<OpenSCENARIO>\n<FileHeader/></OpenSCENARIO>")
+    return tmp_path / "db"
+
+
+@pytest.fixture
+def run(database: Path, profile: str, capsys: pytest.CaptureFixture[str]) -> Callable[..., tuple[int, str, str]]:
+    def convert(*arguments: str) -> tuple[int, str, str]:
+        code = main(["convert", *arguments, "--profile", profile, "--seed", "3"])
+        return code, *capsys.readouterr()
+
+    return convert
+
+
+def test_a_folder_becomes_a_folder_with_a_manifest(database: Path, tmp_path: Path, run) -> None:
+    code, out, errors = run(str(database), "-o", str(tmp_path / "out"), "--variants", "2")
+    assert code == 1  # the broken one
+    assert "4 written, 2 failed of 6" in out
+    assert errors.count("xosc-lateral: ") == errors.count("broken.xosc") == 2
+    rows = pd.read_parquet(tmp_path / "out" / MANIFEST).set_index("output")
+    assert list(rows.index[rows.error == ""]) == [
+        "curves/curves_01.xosc",
+        "curves/curves_02.xosc",
+        "cut-in/cut-in_01.xosc",
+        "cut-in/cut-in_02.xosc",
+    ]
+    row = rows.loc["cut-in/cut-in_02.xosc"]
+    assert row.output_hash == file_hash(tmp_path / "out" / "cut-in" / "cut-in_02.xosc")
+    assert row.scenario_hash == file_hash(database / "cut-in" / "cut-in.xosc")
+    assert row.road_hash == file_hash(database / row.road)
+    assert json.loads(row.inputs)["cut-in/cut-in.xosc"] == row.scenario_hash
+    assert (row.seed, row.variant) == (3, 1)
+    assert set(json.loads(row.profiles).values()) == set(json.loads(row.profile_hashes)) == {simulated_profile().name}
+    assert len(row.enriched) > 0
+    assert row.segment_seconds > 5.0
+    assert 0.02 < row.offset_spread < 1.0
+    assert row.gap_after > 0.0
+    assert rows.output_hash[rows.error == ""].is_unique
+    assert not [path for path in (tmp_path / "out").rglob("*") if path.name.startswith(".")]
+
+
+def test_roads_and_catalogs_resolve_from_where_the_output_is(database: Path, tmp_path: Path, run) -> None:
+    run(str(database), "-o", str(tmp_path / "else" / "where" / "out"))
+    outputs = sorted((tmp_path / "else").rglob("*.xosc"))
+    assert len(outputs) == 2
+    for output in outputs:
+        road = etree.parse(output).getroot().find(".//LogicFile").get("filepath")
+        assert not Path(road).is_absolute()
+        assert (output.parent / road).resolve() == next((database / output.stem).glob("*.xodr"))
+
+
+def test_two_processes_leave_the_same_bytes_as_one_and_a_second_run_nothing(
+    database: Path, tmp_path: Path, run
+) -> None:
+    run(str(database), "-o", str(tmp_path / "one"))
+    run(str(database), "-o", str(tmp_path / "two"), "--jobs", "2", "--quiet")
+    one = tree(tmp_path / "one")
+    assert one == tree(tmp_path / "two")
+    code, out, _ = run(str(database), "-o", str(tmp_path / "one"), "--json")
+    summary = json.loads(out)
+    assert code == 1
+    assert (summary["written"], summary["up_to_date"], summary["failed"]) == (0, 2, 1)
+    assert summary["failures"][0][0] == "broken.xosc"
+    assert tree(tmp_path / "one") == one
+
+
+def test_a_variant_is_what_the_single_conversion_writes(database: Path, tmp_path: Path, run) -> None:
+    run(str(database / "cut-in"), "-o", str(tmp_path / "batch"), "--variants", "2")
+    (tmp_path / "single").mkdir()
+    code, *_ = run(
+        str(database / "cut-in" / "cut-in.xosc"), "-o", str(tmp_path / "single" / "cut-in.xosc"), "--variants", "2"
+    )
+    assert code == 0
+    single = {path.name: path.read_bytes() for path in (tmp_path / "single").glob("*.xosc")}
+    batch = {path.name: path.read_bytes() for path in (tmp_path / "batch").glob("*.xosc")}
+    assert single == batch
+    assert len(batch) == 2
+
+
+def test_changed_roads_and_catalogs_are_noticed(database: Path, tmp_path: Path, profile: str) -> None:
+    def states() -> list[State]:
+        batch = plan_batch([database / "cut-in"], tmp_path / "out", ConvertSettings(profile=profile))
+        return [outcome.state for outcome in convert_many(batch)]
+
+    assert states() == [State.WRITTEN]
+    assert states() == [State.UP_TO_DATE]
+    road = next((database / "cut-in").glob("*.xodr"))
+    road.write_text(road.read_text() + "<!-- surveyed again -->")
+    assert states() == [State.WRITTEN]
+
+
+def test_the_log_is_json_and_wrong_usage_is_2(database: Path, tmp_path: Path, run) -> None:
+    code, _, errors = run(str(database / "cut-in"), "-o", str(tmp_path / "out"), "--log-json")
+    assert code == 0
+    assert [json.loads(line)["event"] for line in errors.splitlines()] == ["start", "written", "end"]
+    code, _, errors = run(str(database))
+    assert code == 2
+    assert "several scenarios need a folder" in errors
+    code, _, errors = run(str(database / "*.nothing"), "-o", str(tmp_path / "out"))
+    assert code == 1
+    assert errors.endswith("nothing matches\n")
+    assert errors.count("\n") == 1
+
+
+def test_a_file_in_the_place_of_the_output_folder_is_one_line(database: Path, tmp_path: Path, run) -> None:
+    (tmp_path / "out").write_text("mine")
+    code, _, errors = run(str(database / "cut-in"), "-o", str(tmp_path / "out"), "--jobs", "2")
+    assert code == 1
+    assert errors.count("\n") == 1
+    assert (tmp_path / "out").read_text() == "mine"
