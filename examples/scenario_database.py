@@ -65,7 +65,10 @@ def enrich(database: sqlite3.Connection, tag: str, folder: Path) -> None:
     requests = [Request(Path(path), ConvertSettings(profile="motorway-car", seed=seed)) for path, _, seed in selected]
     ids = {Path(path).name: scenario_id for path, scenario_id, _ in selected}
     batch = plan_batch(requests, folder)
-    new = [outcome for outcome in convert_many(batch) if outcome.state is not State.UP_TO_DATE]
+    known = dict(database.execute("SELECT path, sha256 FROM lifelike").fetchall())
+    outcomes = list(convert_many(batch))
+    new = [outcome for outcome in outcomes if known.get(str(folder / outcome.row.output)) != outcome.row.output_hash]
+    converted = sum(outcome.state is not State.UP_TO_DATE for outcome in outcomes)
     with database:
         database.executemany(
             "INSERT OR REPLACE INTO lifelike VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
