@@ -75,9 +75,8 @@ def enrich(database: sqlite3.Connection, tag: str, folder: Path) -> None:
             [record(outcome, folder, ids) for outcome in new],
         )
     count, gap = database.execute("SELECT count(*), min(smallest_gap) FROM lifelike WHERE error = ''").fetchone()
-    print(
-        f"{len(selected)} tagged {tag!r}, {len(new)} converted now; {count} in the database, smallest gap {gap:.2f} m"
-    )
+    print(f"{len(selected)} tagged {tag!r}: {converted} converted, {len(new)} recorded")
+    print(f"{count} in the database, smallest gap {gap:.2f} m")
 
 
 def record(outcome: Outcome, folder: Path, ids: dict[str, int]) -> tuple[object, ...]:

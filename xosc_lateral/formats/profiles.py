@@ -6,6 +6,8 @@ import hashlib
 import json
 import math
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -76,7 +78,25 @@ def profile_bytes(profile: DriverProfile) -> bytes:
 
 def profile_hash(profile: DriverProfile) -> str:
     """SHA-256 of the profile file's bytes, in hexadecimal: what outputs name their profile by."""
-    return hashlib.sha256(profile_bytes(profile)).hexdigest()
+    return _hash_of(_Identity(profile))
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class _Identity:
+    """A profile as a key: by identity, for it never changes and its parts can't all be hashed."""
+
+    profile: DriverProfile
+
+    def __hash__(self) -> int:
+        return id(self.profile)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _Identity) and other.profile is self.profile
+
+
+@lru_cache(maxsize=32)  # a batch names the same few profiles in thousands of outputs
+def _hash_of(key: _Identity) -> str:
+    return hashlib.sha256(profile_bytes(key.profile)).hexdigest()
 
 
 def describe_profile(profile: DriverProfile, *, as_json: bool = False) -> str:
