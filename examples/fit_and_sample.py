@@ -2,7 +2,7 @@
 
     python examples/fit_and_sample.py [OUTPUT FOLDER [TABLE OF DRIVES]]
 
-Without a table of your own, four simulated drivers stand in: see `tests/simulators`.
+Without a table of your own, three simulated drivers stand in: see `tests/simulators`.
 """
 
 from __future__ import annotations
@@ -39,11 +39,11 @@ def spread(offset: np.ndarray) -> str:
 
 
 def simulated(path: Path) -> Path:
-    """Four drivers, a quarter of an hour each, as a drive table."""
+    """Three drivers, ten minutes each, as a drive table."""
     sys.path.insert(0, str(Path(__file__).resolve().parents[1]))  # the simulator lies beside the tests
     from tests.simulators import simulate_population
 
-    simulate_population(4, duration=900.0, seed=3).to_csv(path, index=False)
+    simulate_population(3, duration=600.0, seed=3).to_csv(path, index=False)
     return path
 
 

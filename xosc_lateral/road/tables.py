@@ -48,8 +48,8 @@ class NetworkTables:
         sections = [section for road in roads for section in road.sections]
         self.lanes: list[Lane] = [lane for section in sections for lane in (*section.lanes, section.centre)]
         ids = [lane.id for lane in self.lanes]
-        self._lowest = min(ids)
-        self._slots = max(ids) - self._lowest + 1
+        self._lowest = min(ids, default=0)  # a file may hold no road at all
+        self._slots = max(ids, default=0) - self._lowest + 1
         self._row_of = np.full(len(sections) * self._slots, -1, dtype=np.int32)
         row = 0
         self.section_first = np.empty(len(sections), dtype=np.int32)
