@@ -28,6 +28,7 @@ def test_the_first_two_commands_are_make_demo_and_make_test():
     assert [line.split("#")[0].split() for line in first_block[1].splitlines()] == [["make", "demo"], ["make", "test"]]
 
 
+@pytest.mark.slow
 def test_every_command_runs_as_shown(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     assert len(commands()) > 8
