@@ -25,7 +25,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.errors import FormatError
+from xosc_lateral.errors import FormatError, NotEnoughDataError
 from xosc_lateral.formats.importers.cuts import DEFAULT_CUTS, CutSettings, lane_changes, long_gaps, name_states
 from xosc_lateral.formats.importers.lanes_from_tracks import LaneCentre, fit_lane_centre
 from xosc_lateral.formats.importers.neighbours import find_neighbours
@@ -104,7 +104,12 @@ def read_tracks(source: Path) -> pd.DataFrame:
     import pandas as pd
 
     frame = pd.concat([_read_csv(stream, source) for stream in _trajectory_files(source)], ignore_index=True)
-    stamps = pd.to_datetime(frame["timestamp"], utc=True)
+    try:
+        stamps = pd.to_datetime(frame["timestamp"], utc=True)
+    except ValueError as error:
+        raise FormatError(f"no time: {error}", path=source, element="timestamp") from error
+    if frame.empty:
+        raise NotEnoughDataError(f"{source}: no rows")
     frame["time"] = (stamps - stamps.min()).dt.total_seconds()
     frame = frame.drop_duplicates(["id", "time"]).sort_values(["id", "time"], ignore_index=True)
     frame["vehicle"] = np.unique(frame["id"].to_numpy(), return_inverse=True)[1]
@@ -115,14 +120,18 @@ def _trajectory_files(source: Path) -> list[io.BufferedIOBase]:
     """The trajectory CSV files in a CSV, a zip, or a zip in a wheel."""
     if not zipfile.is_zipfile(source):
         return [source.open("rb")]
-    archive = zipfile.ZipFile(source)
-    inner = [name for name in archive.namelist() if "DLR-Highway-Traffic" in name and name.endswith(".zip")]
-    if inner:
-        archive = zipfile.ZipFile(io.BytesIO(archive.read(sorted(inner)[-1])))
-    names = sorted(name for name in archive.namelist() if "/trajectories" in name and name.endswith(".csv"))
-    if not names:
+    try:
+        archive = zipfile.ZipFile(source)
+        inner = [name for name in archive.namelist() if "DLR-Highway-Traffic" in name and name.endswith(".zip")]
+        if inner:
+            archive = zipfile.ZipFile(io.BytesIO(archive.read(sorted(inner)[-1])))
+        names = sorted(name for name in archive.namelist() if "/trajectories" in name and name.endswith(".csv"))
+        files: list[io.BufferedIOBase] = [io.BytesIO(archive.read(name)) for name in names]
+    except zipfile.BadZipFile as error:
+        raise FormatError(f"damaged zip: {error}", path=source) from error
+    if not files:
         raise FormatError("holds no DLR Highway Traffic trajectories (trajectories_*.csv)", path=source)
-    return [io.BytesIO(archive.read(name)) for name in names]
+    return files
 
 
 def _read_csv(stream: io.BufferedIOBase, source: Path) -> pd.DataFrame:
@@ -134,14 +143,23 @@ def _read_csv(stream: io.BufferedIOBase, source: Path) -> pd.DataFrame:
         if missing:
             raise FormatError(f"no column {', '.join(missing)}; is this a DLR HT trajectory file?", path=source, line=1)
         stream.seek(0)
-        frame = pd.read_csv(stream, usecols=list(COLUMNS), engine="pyarrow")
-    numbers = frame.drop(columns=["timestamp"]).to_numpy(dtype=np.float64)
-    if not np.isfinite(numbers).all():
-        row, column = np.argwhere(~np.isfinite(numbers))[0]
-        raise FormatError(
-            "missing value", path=source, line=int(row) + 2, element=frame.columns.drop("timestamp")[column]
-        )
+        try:
+            frame = pd.read_csv(stream, usecols=list(COLUMNS), engine="pyarrow")
+        except ValueError as error:  # pandas' and pyarrow's parser errors are both of this kind
+            raise FormatError(f"can't be read as CSV: {error}", path=source) from error
+    for name in frame.columns.drop("timestamp"):
+        _check_numbers(frame[name], source)
     return frame
+
+
+def _check_numbers(column: pd.Series, source: Path) -> None:
+    """Refuse text and missing values, with the line of the first."""
+    import pandas as pd
+
+    numbers = pd.to_numeric(column, errors="coerce").to_numpy(dtype=np.float64)
+    if not np.isfinite(numbers).all():
+        row = int(np.argmin(np.isfinite(numbers)))
+        raise FormatError(f"no number: {column.iloc[row]}", path=source, line=row + 2, element=str(column.name))
 
 
 def _travels_north(tracks: pd.DataFrame) -> NDArray[np.bool_]:

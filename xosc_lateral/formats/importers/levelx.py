@@ -103,7 +103,10 @@ def _read(path: Path) -> pd.DataFrame:
         raise FormatError(
             "missing; a recording is XX_tracks.csv, XX_tracksMeta.csv and XX_recordingMeta.csv", path=path
         )
-    return pd.read_csv(path, low_memory=False)
+    try:
+        return pd.read_csv(path, low_memory=False)
+    except ValueError as error:  # also pandas' parser errors and what is no UTF-8
+        raise FormatError(f"can't be read as CSV: {error}", path=path) from error
 
 
 def _cell(frame: pd.DataFrame, column: str, path: Path) -> str:
