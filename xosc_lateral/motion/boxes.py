@@ -15,7 +15,7 @@ HEIGHT_APART = 2.5
 
 def corners(state: EntityState) -> tuple[Point, Point, Point, Point]:
     """Corners of an entity's box, counter-clockwise from front left."""
-    box, pose = state.entity.bounding_box, state.pose
+    box, pose = state.entity.bounding_box, state.plane
     c, s = cos(pose.heading), sin(pose.heading)
     front, rear = box.center_x + 0.5 * box.length, box.center_x - 0.5 * box.length
     left, right = box.center_y + 0.5 * box.width, box.center_y - 0.5 * box.width
@@ -39,10 +39,10 @@ def axis_gap(own: tuple[Point, ...], other: tuple[Point, ...], axis: Point) -> f
 
 def overlap(a: EntityState, b: EntityState) -> bool:
     """Whether the boxes touch (separating axes), on the same level."""
-    pa, pb = a.pose, b.pose
+    pa, pb = a.plane, b.plane
     box_a, box_b = a.entity.bounding_box, b.entity.bounding_box
     reach = hypot(box_a.length + box_b.length, box_a.width + box_b.width)
-    if hypot(pb.x - pa.x, pb.y - pa.y) > reach or abs(pb.z - pa.z) > HEIGHT_APART:
+    if hypot(pb.x - pa.x, pb.y - pa.y) > reach or abs(b.pose.z - a.pose.z) > HEIGHT_APART:
         return False
     own, other = corners(a), corners(b)
     for heading in (pa.heading, pb.heading):
@@ -54,7 +54,8 @@ def overlap(a: EntityState, b: EntityState) -> bool:
 
 def gaps(own: EntityState, shape: tuple[Point, ...]) -> tuple[float, float]:
     """Gap from the own box to a shape along the own axes: (longitudinal, lateral), 0 where they overlap."""
-    c, s = cos(own.pose.heading), sin(own.pose.heading)
+    heading = own.plane.heading
+    c, s = cos(heading), sin(heading)
     mine = corners(own)
     return axis_gap(mine, shape, (c, s)), axis_gap(mine, shape, (-s, c))
 

@@ -53,6 +53,12 @@ def ahead_and_left(state: EntityState, x: float, y: float) -> tuple[float, float
     return dx * c + dy * s, dy * c - dx * s
 
 
+def apart(state: EntityState, x: float, y: float) -> float:
+    """Euclidian distance in the plane, never negative. [m]"""
+    pose = state.plane
+    return hypot(pose.x - x, pose.y - y)
+
+
 def straight_distance(state: EntityState, x: float, y: float) -> float:
     """Euclidian distance, negative when the point is behind."""
     ahead, left = ahead_and_left(state, x, y)
@@ -143,7 +149,7 @@ def spot_distance(
 def spot_for(state: EntityState, system: CoordinateSystem, kind: RelativeDistanceType) -> Spot:
     """Where an entity is, with road coordinates only when the distance needs them."""
     if kind is RelativeDistanceType.EUCLIDIAN or system not in (CoordinateSystem.ROAD, CoordinateSystem.LANE):
-        pose = state.pose
+        pose = state.plane
         return Spot(pose.x, pose.y, NOWHERE, 0, 0.0, 0.0)
     return spot_of(state)
 

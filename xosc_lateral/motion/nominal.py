@@ -1,4 +1,4 @@
-"""Nominal motion: what the maneuvers alone give, before offsets. The player makes it; segments, writer, report read it."""
+"""Nominal motion: what maneuvers alone give, before offsets. Made by the player; read by segments, writer, report."""
 
 from __future__ import annotations
 

@@ -118,7 +118,7 @@ class _Player:
         pull_trailers(run.entities)
         if run.derives_motion:
             for state in run.entities:
-                _derive_motion(state, step)
+                _derive_motion(state, step, height=run.derives_height)
         else:
             self._speeds_of_moved(step)
         if run.derives_states:
@@ -193,9 +193,9 @@ class _Player:
         )
 
 
-def _derive_motion(state: EntityState, step: float) -> None:
+def _derive_motion(state: EntityState, step: float, *, height: bool = False) -> None:
     """Velocity, acceleration and way travelled from the movement of the frame; speed, if nobody has set it."""
-    pose, before = state.pose, state.previous
+    pose, before = state.pose if height else state.plane, state.previous
     state.previous = pose
     if step <= EPSILON or before is None or state.teleported:
         velocity = (state.speed * cos(pose.heading), state.speed * sin(pose.heading), 0.0)
@@ -203,7 +203,8 @@ def _derive_motion(state: EntityState, step: float) -> None:
             state.acceleration = _rate(velocity, state.velocity, step)
         state.velocity = velocity
         return
-    move = (pose.x - before.x, pose.y - before.y, pose.z - before.z)
+    rise = pose.z - before.z
+    move = (pose.x - before.x, pose.y - before.y, rise if rise == rise else 0.0)
     velocity = (move[0] / step, move[1] / step, move[2] / step)
     state.acceleration = _rate(velocity, state.velocity, step)
     state.velocity = velocity

@@ -49,23 +49,6 @@ class Rows:
         self._speed.append(state.speed)
         self._activity.append(state.activity | Activity.ROAD_END if state.at_road_end else state.activity)
 
-    def overwrite(self) -> None:
-        """Replace the last row by where the entity is now."""
-        if self._free_rows and self._free_rows[-1] == len(self._road) - 1:
-            self._free_rows.pop()
-            del self._free[-6:]
-        for column in (
-            self._road,
-            self._lane,
-            self._s,
-            self._offset_t,
-            self._relative_heading,
-            self._speed,
-            self._activity,
-        ):
-            column.pop()
-        self.write()
-
     def motion(self, network: RoadNetwork, time: FloatArray) -> EntityMotion:
         """All rows, with world poses and directions of travel."""
         road: IntArray = np.frombuffer(self._road, dtype=np.int32).copy()

@@ -43,6 +43,8 @@ class Run:
         """What the environment's clock showed, whether it goes on, and when it was set. [s]"""
         self.derives_motion = False
         """Somebody asks for velocities, accelerations or the way travelled."""
+        self.derives_height = False
+        """Somebody asks for their vertical components, which cost a look at the road for entities on trajectories."""
         self.derives_states = False
         """Somebody asks since when an entity has stood, been at the end of its road, or off it."""
         self.derives_off_road = False

@@ -140,6 +140,12 @@ class EntityState:
         return self._pose
 
     @property
+    def plane(self) -> Pose:
+        """World pose whose z, pitch and roll may be NaN (the road's): cheap where nobody needs them. [m], [rad]"""
+        free = self._free_pose
+        return self.pose if free is None else free
+
+    @property
     def free_pose(self) -> Pose | None:
         """World pose as given; None while the entity follows its lane. z, pitch, roll may be NaN (the road's)."""
         return self._free_pose
@@ -229,7 +235,8 @@ class EntityState:
 
     def body_frame(self, vector: tuple[float, float, float]) -> tuple[float, float, float]:
         """A world vector along the entity's own axes (in the plane)."""
-        c, s = cos(self.pose.heading), sin(self.pose.heading)
+        heading = self.plane.heading
+        c, s = cos(heading), sin(heading)
         return vector[0] * c + vector[1] * s, vector[1] * c - vector[0] * s, vector[2]
 
     # ---- in detail ---------------------------------------------------------------------------------------------------

@@ -31,7 +31,7 @@ def align_trailers(tow: EntityState) -> None:
     """Put all trailers straight behind their tractor."""
     front = tow
     while (trailer := front.trailer) is not None:
-        pose = front.pose
+        pose = front.plane
         reach = _hitch(front) - _coupler(trailer)
         trailer.put_in_world(free(pose.x + reach * cos(pose.heading), pose.y + reach * sin(pose.heading), pose.heading))
         trailer.set_speed(tow.speed)
@@ -51,7 +51,7 @@ def pull_trailers(entities: Iterable[EntityState]) -> None:
 
 
 def _pull(tow: EntityState, trailer: EntityState) -> None:
-    pose, own = tow.pose, trailer.pose
+    pose, own = tow.plane, trailer.plane
     hitch_x = pose.x + _hitch(tow) * cos(pose.heading)
     hitch_y = pose.y + _hitch(tow) * sin(pose.heading)
     dx, dy = own.x - hitch_x, own.y - hitch_y

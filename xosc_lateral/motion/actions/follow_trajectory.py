@@ -40,7 +40,7 @@ class RunningFollowTrajectory(RunningAction):
         """Lay the path out and jump onto it."""
         state, content = self.state, self.content
         follow = content.following_mode is FollowingMode.FOLLOW
-        before = state.pose
+        before = state.plane
         path = path_of(content.trajectory, self.run, follower=state, follow=follow, speed=state.speed)
         self._path = path
         if content.timing is not None and not self._is_timed:

@@ -1,6 +1,6 @@
 """Speed over time with limited jerk: the straight lines of a speed profile with rounded corners.
 
-A line of constant acceleration goes through each pair of targets; between two lines, a piece of constant jerk leads from
+A line of constant acceleration runs through each two targets; between two lines, a piece of constant jerk leads from
 one acceleration to the other, touching both. A single target is reached with zero acceleration: one piece of jerk at
 either end, and a line between them where there is time for it.
 """

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from enum import Enum
-from math import copysign, cos, hypot, inf, sin, sqrt
+from math import copysign, cos, inf, sin, sqrt
 
 from xosc_lateral.motion.actions.base import Domain, RunningAction
-from xosc_lateral.motion.distances import FAR, Spot, road_gap
+from xosc_lateral.motion.distances import FAR, Spot, apart, road_gap
 from xosc_lateral.motion.paths.base import Path, PathProgress, nearest_s
 from xosc_lateral.motion.positions.resolve import spot_at
 from xosc_lateral.motion.state import EntityState
@@ -101,7 +101,7 @@ class RunningSynchronize(RunningAction):
         gap = road_gap(self.run.network, entity, spot)
         if gap is not None:
             return abs(gap.ds)
-        return hypot(spot.x - entity.pose.x, spot.y - entity.pose.y)
+        return apart(entity, spot.x, spot.y)
 
     def _target_s(self, progress: PathProgress, spot: Spot, position: Position) -> float:
         """Where on a path the place is; looked for once for each path. [m]"""

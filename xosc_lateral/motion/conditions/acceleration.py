@@ -5,7 +5,7 @@ from __future__ import annotations
 from math import copysign, hypot
 
 from xosc_lateral.motion.conditions.base import EntityCheck
-from xosc_lateral.motion.conditions.direction import component
+from xosc_lateral.motion.conditions.direction import component, watch_motion
 from xosc_lateral.motion.run import Run
 from xosc_lateral.motion.state import EntityState
 from xosc_lateral.motion.values import holds
@@ -14,8 +14,8 @@ from xosc_lateral.scenario.conditions import AccelerationCondition
 
 def prepare(content: AccelerationCondition, run: Run) -> EntityCheck:
     """Finite difference of velocities. Without a direction: its length, negative when it points backwards. [m/s2]"""
-    run.derives_motion = True
     direction = content.direction
+    watch_motion(run, direction)
 
     def check(state: EntityState) -> bool:
         ahead, left, up = state.body_frame(state.acceleration)

@@ -4,18 +4,27 @@ from __future__ import annotations
 
 from xosc_lateral.motion.conditions.base import EntityCheck
 from xosc_lateral.motion.conditions.measure import measure_of
-from xosc_lateral.motion.distances import FAR, spot_distance
+from xosc_lateral.motion.distances import FAR, apart, spot_distance
 from xosc_lateral.motion.positions.resolve import spot_at
 from xosc_lateral.motion.run import Run
 from xosc_lateral.motion.state import EntityState
 from xosc_lateral.motion.values import holds
 from xosc_lateral.scenario.conditions import DistanceCondition
+from xosc_lateral.scenario.enums import RelativeDistanceType
 
 
 def prepare(content: DistanceCondition, run: Run) -> EntityCheck:
     """Its amount counts; where no road leads there, it is huge. [m]"""
     system, kind = measure_of(content)
     spot = spot_at(content.position, run)
+
+    if kind is RelativeDistanceType.EUCLIDIAN and not content.freespace:
+
+        def check_straight(state: EntityState) -> bool:
+            target = spot()
+            return holds(apart(state, target.x, target.y), content.rule, content.value)
+
+        return check_straight
 
     def check(state: EntityState) -> bool:
         distance = spot_distance(run.network, state, spot(), system, kind, freespace=content.freespace)

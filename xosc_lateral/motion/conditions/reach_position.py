@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from math import hypot
-
 from xosc_lateral.motion.conditions.base import EntityCheck
+from xosc_lateral.motion.distances import apart
 from xosc_lateral.motion.positions.resolve import spot_at
 from xosc_lateral.motion.run import Run
 from xosc_lateral.motion.state import EntityState
@@ -16,7 +15,7 @@ def prepare(content: ReachPositionCondition, run: Run) -> EntityCheck:
     spot = spot_at(content.position, run)
 
     def check(state: EntityState) -> bool:
-        target, pose = spot(), state.pose
-        return hypot(pose.x - target.x, pose.y - target.y) < content.tolerance
+        target = spot()
+        return apart(state, target.x, target.y) < content.tolerance
 
     return check

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from xosc_lateral.motion.conditions.base import EntityCheck
-from xosc_lateral.motion.conditions.direction import component
+from xosc_lateral.motion.conditions.direction import component, watch_motion
 from xosc_lateral.motion.run import Run
 from xosc_lateral.motion.state import EntityState
 from xosc_lateral.motion.values import holds
@@ -15,7 +15,7 @@ def prepare(content: RelativeSpeedCondition, run: Run) -> EntityCheck:
     other = run.entity(content.entity_ref, content.place)
     direction = content.direction
     if direction is not None:
-        run.derives_motion = True
+        watch_motion(run, direction)
 
     def check(state: EntityState) -> bool:
         if not other.active:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from xosc_lateral.motion.conditions.base import EntityCheck
-from xosc_lateral.motion.conditions.direction import component
+from xosc_lateral.motion.conditions.direction import component, watch_motion
 from xosc_lateral.motion.run import Run
 from xosc_lateral.motion.state import EntityState
 from xosc_lateral.motion.values import holds
@@ -15,7 +15,7 @@ def prepare(content: SpeedCondition, run: Run) -> EntityCheck:
     direction = content.direction
     if direction is None:
         return lambda state: holds(state.speed, content.rule, content.value)
-    run.derives_motion = True
+    watch_motion(run, direction)
 
     def check(state: EntityState) -> bool:
         return holds(component(state.body_frame(state.velocity), direction), content.rule, content.value)
