@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import errno
 import os
 import random
 import signal
@@ -210,12 +209,11 @@ def test_a_journal_that_can_not_grow_says_so_and_keeps_its_rows(tmp_path: Path) 
     handler = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)  # then writing beyond the limit is an OSError
     try:
         resource.setrlimit(resource.RLIMIT_FSIZE, (10_000, limits[1]))
-        with pytest.raises(OSError, match="File too large") as raised:
+        with pytest.raises(BatchStoppedError, match="out: File too large; what is finished is kept"):
             run(inputs, out)
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, limits)
         signal.signal(signal.SIGXFSZ, handler)
-    assert raised.value.errno == errno.EFBIG
     again = list(states(run(inputs, out)).values())
     assert 5 < again.count(State.UP_TO_DATE) < 30
     run(inputs, tmp_path / "calm")
@@ -243,7 +241,7 @@ def test_the_lock_of_a_dead_process_is_no_obstacle(tmp_path: Path) -> None:
 def test_a_folder_without_write_permission_is_said(tmp_path: Path) -> None:
     out = tmp_path / "out"
     out.mkdir(mode=0o500)
-    with pytest.raises(PermissionError):
+    with pytest.raises(BatchStoppedError, match=r"out/\.xosc-lateral: Permission denied"):
         run(make_inputs(tmp_path / "in", 1), out)
 
 

@@ -34,6 +34,8 @@ _HALF_WRITTEN = re.compile(r"\..+\.[0-9a-z_]{8}\.tmp(\.\w+)?")
 _STOPPING = frozenset({errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EACCES, errno.EPERM, errno.EMFILE, errno.ENFILE})
 """Errors of the system that the next scenario would meet as well."""
 
+_KEPT = "what is finished is kept, run it again to go on"
+
 
 class State(StrEnum):
     """What became of a job."""
@@ -95,7 +97,7 @@ def convert_many(
     ------
     FolderInUseError
         Another run writes into the folder.
-    BatchStoppedError, OSError
+    BatchStoppedError
         The folder can't be written, the disk is full. Everything finished so far is kept.
     ClusterError
         The cluster can't be reached, or is gone.
@@ -109,6 +111,14 @@ def convert_many(
         from xosc_lateral.pipeline.convert_job import convert_job
 
         converter = convert_job
+    try:
+        yield from _outcomes(batch, converter, workers, cluster, again)
+    except OSError as error:
+        where = error.filename or batch.folder
+        raise BatchStoppedError(f"{where}: {error.strerror or error}; {_KEPT}") from error
+
+
+def _outcomes(batch: Batch, converter: Converter, workers: int, cluster: str | None, again: bool) -> Iterator[Outcome]:
     state = batch.folder / STATE
     with folder_lock(state / "lock"):
         _sweep(batch.folder)
@@ -165,7 +175,7 @@ def _noted(job: Job, answer: _Answer | WorkerDiedError, journal: Journal) -> Out
     if isinstance(answer, WorkerDiedError):
         answer = _Answer(job.row(f"{job.source}: {answer}"), 0.0)
     if answer.stop:
-        raise BatchStoppedError(f"{answer.stop}; what is finished is kept, run it again to go on")
+        raise BatchStoppedError(f"{answer.stop}; {_KEPT}")
     if answer.row.error and job.name in journal:
         job.output.unlink(missing_ok=True)  # of a former run, when the scenario could still be converted
     journal.add(answer.row, answer.seconds)
