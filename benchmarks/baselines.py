@@ -158,7 +158,7 @@ def score(rows: dict[str, Row], runs: list[Run], rng: np.random.Generator, split
 
     def note(name: str, sampled: FloatArray, free: list[FloatArray] | None, settings: str = "") -> None:
         row = rows.setdefault(name, Row(name))
-        row.settings = settings or row.settings
+        row.settings = row.settings or settings
         row.distances.append(metric_distances(real, snippet_metrics(sampled)))
         if free is not None:
             power = spectrum(free, STEP).density + 1e-12
@@ -206,10 +206,11 @@ def markdown(rows: dict[str, Row], splits: int) -> str:
     for row in rows.values():
         mean = mean_distances(row.distances)
         cells = [row.name, *(f"{mean.by_metric[name]:.2f}" for name in METRICS), f"{mean.mean:.3f}"]
-        cells += [f"{mean.mean / floor.mean:.2f}", f"{np.mean(row.spectrum):.1f}"]
+        flat = np.mean(row.spectrum) > 60.0  # no movement at all
+        cells += [f"{mean.mean / floor.mean:.2f}", "none" if flat else f"{np.mean(row.spectrum):.1f}"]
         cells += ["" if row.auc is None else f"{row.auc:.3f}", row.settings]
         lines.append("| " + " | ".join(cells) + " |")
-    return "\n".join([*lines, "", f"Mean over {splits} random halves of the drives; AUC on the first."])
+    return "\n".join([*lines, "", f"Mean over {splits} random halves of the drives; AUC and fitted numbers on the first."])
 
 
 def write_between_markers(path: Path, text: str, marker: str = MARKER) -> None:
