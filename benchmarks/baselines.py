@@ -24,7 +24,7 @@ from xosc_lateral.driver.fitting import fit_runs
 from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.driver.series import STEP, Run, all_runs
 from xosc_lateral.formats.drives import read_drives
-from xosc_lateral.formats.output import write_whole
+from xosc_lateral.formats.atomic import write_atomically
 from xosc_lateral.loop.classifier import told_apart
 from xosc_lateral.loop.distance import Distances, mean_distances, metric_distances
 from xosc_lateral.loop.longterm import spectrum
@@ -220,7 +220,7 @@ def write_between_markers(path: Path, text: str, marker: str = MARKER) -> None:
     document = path.read_text(encoding="utf-8")
     if not pattern.search(document):
         raise SystemExit(f"{path}: no markers {begin} ... {end}")
-    write_whole(path, pattern.sub(lambda _: f"{begin}\n{text}\n{end}", document))
+    write_atomically(path, pattern.sub(lambda _: f"{begin}\n{text}\n{end}", document))
 
 
 def main() -> None:

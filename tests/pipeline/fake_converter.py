@@ -10,8 +10,8 @@ import time
 from dataclasses import replace
 
 from xosc_lateral.errors import FormatError
+from xosc_lateral.formats.atomic import write_atomically
 from xosc_lateral.formats.hashes import file_hash
-from xosc_lateral.formats.output import write_whole
 from xosc_lateral.pipeline.jobs import Job
 from xosc_lateral.pipeline.manifest import ManifestRow
 
@@ -31,7 +31,7 @@ def convert(job: Job) -> ManifestRow:
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(job.output))
     road = job.source.parent / "road.xodr"
     content = f"{text}{road.read_text()}{job.settings.seed} {job.variant} {dict(job.settings.parameters)}"
-    write_whole(job.output, content)
+    write_atomically(job.output, content)
     inputs = {"road.xodr": file_hash(road), job.scenario: file_hash(job.source)}
     output_hash = hashlib.sha256(content.encode()).hexdigest()
     return replace(job.row(), output_hash=output_hash, inputs=inputs, road="road.xodr", road_hash=inputs["road.xodr"])

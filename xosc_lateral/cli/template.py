@@ -36,9 +36,9 @@ def write_template(
     ] = None,
 ) -> None:
     """Write a template's scenario and its road."""
-    from xosc_lateral.formats.output import write_whole
+    from xosc_lateral.formats.atomic import write_atomically
     from xosc_lateral.templates import find_template, read_settings
 
     for file, text in find_template(name).files(read_settings(settings or [])).items():
-        write_whole(out / file, text)
+        write_atomically(out / file, text)
         typer.echo(out / file)

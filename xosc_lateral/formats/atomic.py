@@ -11,12 +11,12 @@ from pathlib import Path
 
 
 def write_atomically(path: Path | str, data: bytes | str) -> Path:
-    """Write bytes or UTF-8 text to a temporary file beside the target, then move it there.
+    """Write bytes or UTF-8 text to a temporary file beside the target, then move it there; missing folders are made.
 
     Raises
     ------
     OSError
-        Disk full, no permission, no such folder: the target is as it was, and no temporary file stays behind.
+        Disk full, no permission: the target is as it was, and no temporary file stays behind.
     """
     content = data.encode() if isinstance(data, str) else data
 
@@ -41,6 +41,7 @@ def replace_atomically(path: Path | str, write: Callable[[Path], object]) -> Pat
 @contextmanager
 def _temporary_beside(path: Path) -> Iterator[Path]:
     # The suffix stays: some writers (Parquet, CSV.gz) choose the format by it.
+    path.parent.mkdir(parents=True, exist_ok=True)
     descriptor, name = tempfile.mkstemp(prefix=f".{path.stem[:40]}.", suffix=f".tmp{path.suffix}", dir=path.parent)
     os.close(descriptor)
     temporary = Path(name)

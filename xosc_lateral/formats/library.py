@@ -23,11 +23,11 @@ from xosc_lateral.driver.fitting import fit_runs
 from xosc_lateral.driver.profile import DriverProfile, Provenance
 from xosc_lateral.driver.series import STEP, Run, all_runs
 from xosc_lateral.errors import NotEnoughDataError
+from xosc_lateral.formats.atomic import write_atomically
 from xosc_lateral.formats.drives import read_drives
 from xosc_lateral.formats.hashes import file_hash
 from xosc_lateral.formats.importers.dlr_ht import LICENCE, import_dlr_ht
 from xosc_lateral.formats.importers.table import write_imported
-from xosc_lateral.formats.output import write_whole
 from xosc_lateral.formats.profiles import write_profile
 from xosc_lateral.loop.compare import told_from_each_other
 from xosc_lateral.loop.metrics import snippet_metrics
@@ -239,7 +239,7 @@ def main(argv: Sequence[str] | None = None) -> None:
     if said.cards is not None:
         from xosc_lateral.report.cards import card_markdown
 
-        write_whole(said.cards, "\n".join([CARDS_HEAD, *map(card_markdown, profiles)]))
+        write_atomically(said.cards, "\n".join([CARDS_HEAD, *map(card_markdown, profiles)]))
 
 
 if __name__ == "__main__":

@@ -13,8 +13,8 @@ from xosc_lateral import __version__
 from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.driver.snippets import Sampled
 from xosc_lateral.errors import FormatError
+from xosc_lateral.formats.atomic import write_atomically
 from xosc_lateral.formats.hashes import file_hash
-from xosc_lateral.formats.output import write_whole
 from xosc_lateral.formats.profiles import canonical_json, profile_hash
 
 METADATA_KEY = b"xosc-lateral"
@@ -67,10 +67,10 @@ def write_offsets(sampled: Iterable[Sampled], path: Path, provenance: Mapping[st
     columns = _columns(list(sampled), snippets=snippets)
     suffix = path.suffix.lower()
     if suffix == ".parquet":
-        write_whole(path, _parquet(columns, provenance))
+        write_atomically(path, _parquet(columns, provenance))
     elif suffix == ".csv":
-        write_whole(path.with_name(path.name + SIDECAR_SUFFIX), canonical_json(provenance) + "\n")
-        write_whole(path, _csv(columns))
+        write_atomically(path.with_name(path.name + SIDECAR_SUFFIX), canonical_json(provenance) + "\n")
+        write_atomically(path, _csv(columns))
     else:
         raise FormatError(f"can't write {suffix or 'a file without suffix'}: expected .csv or .parquet", path=path)
     return len(columns["time"])

@@ -13,7 +13,7 @@ from typing import Any
 
 from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.errors import DriverProfileError, FormatError
-from xosc_lateral.formats.output import write_whole
+from xosc_lateral.formats.atomic import write_atomically
 
 SHIPPED = Path(__file__).resolve().parents[1] / "resources" / "driver_profiles"
 """Profiles that come with the package."""
@@ -68,7 +68,7 @@ def write_profile(profile: DriverProfile, path: str | Path) -> None:
     OSError
         When it can't be written.
     """
-    write_whole(Path(path), profile_bytes(profile))
+    write_atomically(Path(path), profile_bytes(profile))
 
 
 def profile_bytes(profile: DriverProfile) -> bytes:

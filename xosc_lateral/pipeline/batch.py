@@ -29,7 +29,7 @@ STATE = ".xosc-lateral"
 """Folder inside the output folder, there only while a batch is unfinished: journal and lock."""
 
 _HALF_WRITTEN = re.compile(r"\..+\.[0-9a-z_]{8}\.tmp(\.\w+)?")
-"""Names that files have while they are being written (`formats.output`, `formats.atomic`)."""
+"""Names that files have while they are being written (`formats.atomic`)."""
 
 _STOPPING = frozenset({errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EACCES, errno.EPERM, errno.EMFILE, errno.ENFILE})
 """Errors of the system that the next scenario would meet as well."""

@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from xosc_lateral.errors import FormatError
-from xosc_lateral.formats.output import write_whole
+from xosc_lateral.formats.atomic import write_atomically
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -186,7 +186,7 @@ def _write_table(path: Path, schema: pa.Schema, rows: Iterator[dict[str, Any]]) 
             writer.write_table(pa.Table.from_pylist(group, schema=schema))
     data = buffer.getvalue()
     if not path.exists() or path.read_bytes() != data:
-        write_whole(path, data)
+        write_atomically(path, data)
 
 
 def _read_table(path: Path) -> Iterator[dict[str, Any]]:

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from xosc_lateral import __version__
 from xosc_lateral.driver.profile import DriverProfile
+from xosc_lateral.formats.atomic import write_atomically
 from xosc_lateral.formats.hashes import file_hash
-from xosc_lateral.formats.output import write_whole
 from xosc_lateral.formats.profiles import profile_hash
 from xosc_lateral.loop.longterm import Margins
 from xosc_lateral.loop.metrics import METRICS
@@ -76,7 +76,7 @@ def evaluation_json(scores: ProfileScores, profile: DriverProfile, tables: Seque
 
 def write_evaluation(scores: ProfileScores, profile: DriverProfile, tables: Sequence[Path], path: Path) -> None:
     """Write the report, whole or not at all."""
-    write_whole(path, evaluation_page(scores, profile, tables).html())
+    write_atomically(path, evaluation_page(scores, profile, tables).html())
 
 
 def evaluation_page(scores: ProfileScores, profile: DriverProfile, tables: Sequence[Path]) -> Page:

@@ -12,10 +12,9 @@ from typing import TYPE_CHECKING
 
 from xosc_lateral import __version__
 from xosc_lateral.errors import FormatError
-from xosc_lateral.formats.atomic import replace_atomically
+from xosc_lateral.formats.atomic import replace_atomically, write_atomically
 from xosc_lateral.formats.hashes import file_hash
 from xosc_lateral.formats.importers.cuts import KEPT
-from xosc_lateral.formats.output import write_whole
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -91,8 +90,8 @@ def write_imported(imported: Imported, path: Path) -> None:
         replace_atomically(path, lambda temporary: _write_parquet(imported, temporary))
     elif path.name.endswith((".csv", ".csv.gz")):
         text = imported.table.to_csv(index=False, lineterminator="\n").encode()
-        write_whole(path, gzip.compress(text, mtime=0) if path.suffix == ".gz" else text)
-        write_whole(path.with_name(path.name + ".provenance.json"), imported.provenance.line() + "\n")
+        write_atomically(path, gzip.compress(text, mtime=0) if path.suffix == ".gz" else text)
+        write_atomically(path.with_name(path.name + ".provenance.json"), imported.provenance.line() + "\n")
     else:
         raise FormatError("a drive table is written as .parquet, .csv or .csv.gz", path=path)
 
