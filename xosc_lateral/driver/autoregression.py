@@ -1,4 +1,4 @@
-"""Linear prediction of a series from its own past: fitted to runs of uneven strength, kept stable, its spectrum known."""
+"""Linear prediction of a series from its past: fitted to runs of uneven strength, kept stable, its spectrum known."""
 
 from __future__ import annotations
 
@@ -92,7 +92,7 @@ def fit_autoregression(runs: Sequence[FloatArray], order: int, *, every: int, wi
              for run in runs if len(run) > every * order + every]  # fmt: skip
     nexts = [run[every * order :] for run in runs if len(run) > every * order + every]
     smallest = 1e-12 * float(np.mean([np.mean(y**2) for y in nexts])) + 1e-300
-    coefficients = np.zeros(order)
+    coefficients: FloatArray = np.zeros(order)
     variances: list[FloatArray] = [np.ones(len(y)) for y in nexts]
     for _ in range(ROUNDS + 1):
         normal, right = np.zeros((order, order)), np.zeros(order)
@@ -101,7 +101,7 @@ def fit_autoregression(runs: Sequence[FloatArray], order: int, *, every: int, wi
             normal += weighted.T @ past
             right += weighted.T @ value
         normal += RIDGE * np.trace(normal) / order * np.eye(order)
-        coefficients = np.linalg.solve(normal, right)
+        coefficients = np.asarray(np.linalg.solve(normal, right), dtype=np.float64)
         variances = [
             _moving_mean((value - past @ coefficients) ** 2, window) + smallest
             for past, value in zip(pasts, nexts, strict=True)

@@ -59,7 +59,7 @@ def phases() -> FloatArray:
 
 
 def split_bands(values: FloatArray, step: float) -> tuple[FloatArray, FloatArray]:
-    """Part slower and part faster than `BORDER`, shape of `values`; past its ends the series goes on mirrored in a point."""
+    """Part slower and part faster than `BORDER`, shape of `values`, which go on mirrored in a point past their ends."""
     kernel = measuring_low_pass(step)
     half = len(kernel) // 2
     reach = min(half, len(values) - 1)

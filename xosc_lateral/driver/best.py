@@ -5,7 +5,7 @@ Two levels as in the paper's, x = kappa + phi, each repaired where it falls shor
 - kappa is the driver's own mean plus an autoregression of order 16 at one step a second, brought to 5 Hz by a low-pass:
   memory beyond one step, and a smooth path instead of a staircase.
 - phi is uniform white noise shaped by a kernel, as in the paper, with a spectrum that complements that of kappa.
-- A factor on either, the driver's liveliness, differs between drivers and wanders while driving; the two are correlated.
+- A factor on either, the driver's liveliness, differs between drivers and wanders while driving; both are correlated.
 - A driver is drawn for a whole drive. A drive that must start at an offset is one of those that pass through it: the
   driver is drawn given the offset, and the movement is conditioned on it, exactly for Gaussian movement.
 """

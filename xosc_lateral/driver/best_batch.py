@@ -42,7 +42,9 @@ def sample_batch(model: BestModel, starts: FloatArray, n: int, rng: np.random.Ge
     skip = rng.integers(COARSE_EVERY, size=m)
     rows = np.arange(m)[:, None]
     coarse = _coarse(model, lively[0], rng)[rows, begin - COARSE_EVERY * TICKS + skip[:, None] + np.arange(n)]
-    fine = _fine(model, lively[1], begin - half, begin + COARSE_EVERY + n + half, rng)[rows, skip[:, None] + np.arange(n)]
+    fine = _fine(model, lively[1], begin - half, begin + COARSE_EVERY + n + half, rng)[
+        rows, skip[:, None] + np.arange(n)
+    ]
     coarse *= coarse_factor[:, None]
     fine *= fine_factor[:, None]
     offsets = mean[:, None] + coarse + fine
@@ -51,7 +53,7 @@ def sample_batch(model: BestModel, starts: FloatArray, n: int, rng: np.random.Ge
         covariance = np.outer(coarse_factor**2, model.coarse_covariance[:lags])
         covariance += np.outer(fine_factor**2, model.fine_covariance[:lags])
         offsets[:, :lags] += covariance / covariance[:, :1] * (starts - offsets[:, 0])[:, None]
-    return offsets
+    return np.asarray(offsets)
 
 
 def _drivers(
@@ -80,13 +82,15 @@ def _factors(model: BestModel, m: int, n: int, rng: np.random.Generator) -> tupl
     """Wandering factors at every coarse step, shape (m, n) each."""
     normal = rng.standard_normal((2, n, m))
     normal[1] = model.correlation * normal[0] + np.sqrt(1.0 - model.correlation**2) * normal[1]
+    steady = rng.standard_normal((2, m))  # slow wander stands still during a short drive
+    steady[1] = model.correlation * steady[0] + np.sqrt(1.0 - model.correlation**2) * steady[1]
     factors = []
-    for part, noise in zip((model.coarse_liveliness, model.fine_liveliness), normal, strict=True):
+    for part, noise, slow in zip((model.coarse_liveliness, model.fine_liveliness), normal, steady, strict=True):
         keep = np.exp(-model.step * COARSE_EVERY / part.memory)
         logs = noise * np.sqrt(part.within)
         for t in range(1, n):
             logs[t] = keep * logs[t - 1] + np.sqrt(1.0 - keep**2) * logs[t]
-        factors.append(np.exp(logs - part.within).T)
+        factors.append(np.exp(logs + np.sqrt(part.slow) * slow - part.within - part.slow).T)
     return factors[0], factors[1]
 
 

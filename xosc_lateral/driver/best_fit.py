@@ -5,9 +5,9 @@
    are weighted by how calm they are.
 3. Fine noise: what the coarse movement lacks of the offset's power spectrum, from spectra normalised likewise.
 4. Liveliness: how much more, and for how long, the power in short windows varies than it would in steady movement.
-5. Rounds of simulating: snippets of the model from the measured snippets' starts must show the same mean and
-   variance of log standard deviation (coarse) and of log roughness (fine), and the same covariance of the two. What
-   differs corrects the scales, the livelinesses and their correlation (indirect inference: Gourieroux et al. 1993).
+5. Rounds of simulating: snippets of the model from the measured snippets' starts must show the same moments of log
+   standard deviation, of the offset and of its differences. What differs corrects the scales, the livelinesses, how
+   long moods last, and the correlation (indirect inference: Gourieroux, Monfort, Renault 1993).
 
 Everything is deterministic: the simulations draw from a fixed seed.
 """
@@ -24,7 +24,7 @@ from xosc_lateral.driver.autoregression import Autoregression, fit_autoregressio
 from xosc_lateral.driver.bands import BORDER, COARSE_EVERY, building_low_pass, split_bands
 from xosc_lateral.driver.best import BestModel
 from xosc_lateral.driver.best_batch import sample_batch
-from xosc_lateral.driver.liveliness import MAX_LAG, Liveliness, autocovariance, fit_liveliness, log_power
+from xosc_lateral.driver.liveliness import MAX_LAG, MEMORIES, Liveliness, autocovariance, fit_liveliness, log_power
 from xosc_lateral.driver.noise import NOISE_VARIANCE, ShapedNoise
 from xosc_lateral.driver.series import STEP
 from xosc_lateral.errors import NotEnoughDataError
@@ -61,8 +61,9 @@ class BestSettings:
     n_snippets : int
         Simulated at least, in each round.
     rounds : int
-    damping : float
-        Share of a difference that one round corrects.
+    coarse_gain, fine_gain : float
+        How far a round corrects the variance of a liveliness, per missing variance of what is compared: the fine
+        part's moods are shorter than a snippet, which shows a fraction of their variance.
     seed : int
         Of the simulations.
     """
@@ -79,8 +80,9 @@ class BestSettings:
     farthest: float = 120.0
     snippet: float = 10.0
     n_snippets: int = 2000
-    rounds: int = 6
-    damping: float = 0.8
+    rounds: int = 8
+    coarse_gain: float = 1.0
+    fine_gain: float = 3.0
     seed: int = 20240517
     step: float = STEP
 
@@ -186,7 +188,7 @@ def _fit_fine(runs: Sequence[FloatArray], coarse: Autoregression, settings: Best
 
 
 def _typical_power(runs: Sequence[FloatArray], settings: BestSettings) -> tuple[FloatArray, FloatArray]:
-    """Power spectrum of steady movement: windows count alike above the border, however lively they are.
+    """Power spectrum of steady movement: windows count alike on either side of the border, however lively.
 
     Returns
     -------
@@ -209,9 +211,11 @@ def _typical_power(runs: Sequence[FloatArray], settings: BestSettings) -> tuple[
     power = np.concatenate(powers)
     frequency = np.fft.rfftfreq(size)
     above = frequency > BORDER * settings.step
-    strength = power[:, above].mean(axis=1, keepdims=True) + 1e-30
-    typical = (power / strength).mean(axis=0) * np.exp(np.log(strength).mean())
-    return frequency, np.where(above, typical, power.mean(axis=0))
+    typical = np.empty(len(frequency))
+    for side in (above, ~above):
+        strength = power[:, side].mean(axis=1, keepdims=True) + 1e-30
+        typical[side] = (power[:, side] / strength).mean(axis=0) * np.exp(np.log(strength).mean())
+    return np.asarray(frequency, dtype=np.float64), typical
 
 
 def _with_liveliness(
@@ -246,38 +250,49 @@ def _fine_of(pair: tuple[FloatArray, FloatArray]) -> FloatArray:
 def _matched(model: BestModel, runs: Sequence[FloatArray], settings: BestSettings) -> BestModel:
     """Correct scales and livelinesses until simulated snippets vary as the measured ones do."""
     length = round(settings.snippet / settings.step) + 1
-    real = np.concatenate([run[: len(run) // length * length].reshape(-1, length) for run in runs if len(run) >= length])
+    real = np.concatenate(
+        [run[: len(run) // length * length].reshape(-1, length) for run in runs if len(run) >= length]
+    )
     starts = np.resize(real[:, 0], max(settings.n_snippets, len(real)))
     target = _moments(real)
     for _ in range(settings.rounds):
         simulated = sample_batch(model, starts, length, np.random.default_rng(settings.seed), start=True)
-        model = _corrected(model, target - _moments(simulated), settings.damping)
+        model = _corrected(model, target - _moments(simulated), settings)
     return model
 
 
 def _moments(snippets: FloatArray) -> FloatArray:
-    """Mean and variance of log standard deviation and of log roughness (second difference), and their covariance."""
-    spread = np.log(snippets.std(axis=1) + 1e-12)
-    rough = np.log(np.diff(snippets, 2, axis=1).std(axis=1) + 1e-12)
-    return np.array([spread.mean(), rough.mean(), spread.var(), rough.var(), np.cov(spread, rough)[0, 1]])
+    """What snippets are compared by, from the logarithms of three standard deviations of each.
+
+    Mean and variance of that of the offset, the same of that of its second difference, the covariance of the two, and
+    the variance of that of the first difference.
+    """
+    spread, pace, rough = (np.log(np.diff(snippets, k, axis=1).std(axis=1) + 1e-12) for k in range(3))
+    return np.array([spread.mean(), spread.var(), rough.mean(), rough.var(), np.cov(spread, rough)[0, 1], pace.var()])
 
 
-def _corrected(model: BestModel, lacks: FloatArray, damping: float) -> BestModel:
+def _corrected(model: BestModel, lacks: FloatArray, settings: BestSettings) -> BestModel:
     coarse, fine = model.coarse_liveliness, model.fine_liveliness
     factors = [
-        float(np.clip(1.0 + damping * lack / max(part.total, 0.02), 0.5, 2.0))
-        for lack, part in ((lacks[2], coarse), (lacks[3], fine))
+        float(np.clip(1.0 + gain * lack / max(part.total, 0.02), 0.5, 2.0))
+        for gain, lack, part in ((settings.coarse_gain, lacks[1], coarse), (settings.fine_gain, lacks[3], fine))
     ]
+    # The offset's spread averages over a snippet, its pace over moments: how they differ tells how long moods last.
+    memory = coarse.memory * float(np.exp(np.clip(MEMORY_PER_VARIANCE * (lacks[5] - lacks[1]), -0.5, 0.5)))
+    coarse = replace(coarse, memory=float(np.clip(memory, MEMORIES[0], MEMORIES[-1])))
     both = max(np.sqrt(coarse.total * fine.total), 0.02)
     return replace(
         model,
         coarse=Autoregression(model.coarse.coefficients, model.coarse.scale * float(np.exp(lacks[0]))),
-        fine=ShapedNoise(model.fine.damping * float(np.exp(lacks[1])), model.fine.n_taps),
+        fine=ShapedNoise(model.fine.damping * float(np.exp(lacks[2])), model.fine.n_taps),
         coarse_liveliness=coarse.scaled(factors[0]),
         fine_liveliness=fine.scaled(factors[1]),
-        correlation=float(np.clip(model.correlation + damping * lacks[4] / both, 0.0, 0.95)),
+        correlation=float(np.clip(model.correlation + lacks[4] / both, 0.0, 0.95)),
     )
 
+
+MEMORY_PER_VARIANCE = 10.0
+"""Change of the logarithm of the memory per missing variance of the log pace. [-]"""
 
 DIGITS = 9
 """Significant digits kept of a fitted number: what differs beyond is the processor's rounding. [-]"""
@@ -291,7 +306,7 @@ def _rounded(model: BestModel) -> BestModel:
         return np.array([tidy(value) for value in values])
 
     def tidy_part(part: Liveliness) -> Liveliness:
-        return Liveliness(tidy(part.between), tidy(part.within), part.memory)
+        return Liveliness(tidy(part.between), tidy(part.within), tidy(part.memory), tidy(part.slow))
 
     return BestModel(
         mean=tidy(model.mean),

@@ -12,6 +12,7 @@ from xosc_lateral.driver.autoregression import recur
 from xosc_lateral.driver.bands import COARSE_EVERY, TICKS, phases
 from xosc_lateral.driver.compiled import Loop, worth_compiling
 from xosc_lateral.driver.core import Start
+from xosc_lateral.driver.liveliness import SLOW_MEMORY
 from xosc_lateral.driver.noise import convolve
 from xosc_lateral.driver.pace import Paced
 from xosc_lateral.driver.seeds import child
@@ -48,6 +49,7 @@ class BestStream:
     def __init__(self, model: BestModel, seed: np.random.SeedSequence, start: Start | None) -> None:
         setup = np.random.default_rng(child(seed, _SETUP))
         self.driver = draw_driver(model, start, setup)
+        self._coarse_pull, self._fine_pull = np.empty(0), np.empty(0)
         skip = int(setup.integers(COARSE_EVERY))  # no sample of the 5 Hz grid is special
         past = model.start_factor @ setup.standard_normal(model.coarse.order)
         half = len(model.kernel) // 2
@@ -77,7 +79,6 @@ class BestStream:
 
     def _begin(self, model: BestModel, start: Start | None) -> None:
         """Condition the movement on its start: add what the covariance with the first value makes of what it lacks."""
-        self._coarse_pull, self._fine_pull = np.empty(0), np.empty(0)
         first = self.driver.mean
         if start is not None:
             coarse, fine = self._coarse.first(), self._fine.first()
@@ -116,7 +117,9 @@ def draw_driver(model: BestModel, start: Start | None, rng: np.random.Generator)
     if start is None:
         return Driver(model.mean + model.between_drivers * mean_normal, float(coarse[0]), float(fine[0]))
     between = model.between_drivers**2
-    moving = (start.spread * coarse) ** 2 * model.coarse_covariance[0] + (start.fine * fine) ** 2 * model.fine_covariance[0]
+    moving = (start.spread * coarse) ** 2 * model.coarse_covariance[0] + (
+        start.fine * fine
+    ) ** 2 * model.fine_covariance[0]
     away = start.rel_offset - model.mean
     with np.errstate(divide="ignore", invalid="ignore"):
         log_weight = -0.5 * np.log(between + moving) - 0.5 * away**2 / (between + moving)
@@ -206,26 +209,54 @@ class _Factors:
     """The wandering parts of both livelinesses, one value a coarse step. Two with one seed give the same values."""
 
     def __init__(self, model: BestModel, seed: np.random.SeedSequence) -> None:
-        self._rng = np.random.default_rng(child(seed, _LIVELINESS))
-        self._parts = (model.coarse_liveliness, model.fine_liveliness)
-        self._mix = np.array([model.correlation, np.sqrt(1.0 - model.correlation**2)])
         step = model.step * COARSE_EVERY
-        self._keep = np.array([np.exp(-step / part.memory) for part in self._parts])
-        self._gain = np.array([np.sqrt(part.within * (1.0 - np.exp(-2.0 * step / part.memory))) for part in self._parts])
-        normal = self._rng.standard_normal(2)
-        mixed = self._mix[0] * normal[0] + self._mix[1] * normal[1]
-        self._logs = np.array([normal[0], mixed]) * np.sqrt([part.within for part in self._parts])
+        coarse, fine = model.coarse_liveliness, model.fine_liveliness
+        self._offsets = np.array([coarse.within + coarse.slow, fine.within + fine.slow])
+        self._wander = _Wander(
+            np.array([coarse.within, fine.within]),
+            np.exp(-step / np.array([coarse.memory, fine.memory])),
+            model.correlation,
+            child(seed, _LIVELINESS, 0),
+        )
+        self._slow = _Wander(
+            np.array([coarse.slow, fine.slow]),
+            np.exp(-step / np.full(2, SLOW_MEMORY)),
+            model.correlation,
+            child(seed, _LIVELINESS, 1),
+        )
 
     def take(self, n: int) -> tuple[FloatArray, FloatArray]:
         """Next n factors on the coarse and on the fine movement; their mean square is 1."""
-        normal = self._rng.standard_normal((n, 2))
-        logs = []
-        for k in range(2):
-            noise = normal[:, 0] if k == 0 else self._mix[0] * normal[:, 0] + self._mix[1] * normal[:, 1]
-            series = recur(self._logs[k : k + 1], noise * self._gain[k], self._keep[k : k + 1])
-            self._logs[k] = series[-1]
-            logs.append(np.exp(series[1:] - self._parts[k].within))
-        return logs[0], logs[1]
+        logs = self._wander.take(n)
+        if self._slow.is_needed:
+            logs = logs + self._slow.take(n)
+        factors = np.exp(logs - self._offsets[:, None])
+        return factors[0], factors[1]
+
+
+class _Wander:
+    """Two correlated first-order autoregressions, stationary from the start."""
+
+    def __init__(
+        self, variance: FloatArray, keep: FloatArray, correlation: float, seed: np.random.SeedSequence
+    ) -> None:
+        self.is_needed = bool((variance > 0.0).any())
+        self._rng = np.random.default_rng(seed)
+        self._mix = np.array([correlation, np.sqrt(1.0 - correlation**2)])
+        self._keep, self._gain = keep, np.sqrt(variance * (1.0 - keep**2))
+        self._values = self._mixed(1)[:, 0] * np.sqrt(variance)
+
+    def take(self, n: int) -> FloatArray:
+        """Next n values of both, shape (2, n)."""
+        noise = self._mixed(n) * self._gain[:, None]
+        series = np.stack([recur(self._values[k : k + 1], noise[k], self._keep[k : k + 1]) for k in range(2)])
+        self._values = series[:, -1].copy()
+        return np.asarray(series[:, 1:])
+
+    def _mixed(self, n: int) -> FloatArray:
+        normal = self._rng.standard_normal((n, 2)).T.copy()
+        normal[1] = self._mix[0] * normal[0] + self._mix[1] * normal[1]
+        return normal
 
 
 def _factor(variance: float, normal: FloatArray) -> FloatArray:

@@ -1,7 +1,10 @@
 """How lively a driver moves: a factor on the movement that differs between drivers and wanders while driving.
 
-The logarithm of the factor is the sum of a part that a driver keeps (normal between drivers) and one that wanders about
-it (first-order autoregression, normal). Factors are scaled so that their mean square is 1.
+The logarithm of the factor is the sum of three normal parts: one that a driver keeps, one that wanders over minutes and
+one that wanders over seconds (both first-order autoregressions). Factors are scaled so that their mean square is 1.
+
+One drive alone can't tell what its driver keeps from what wanders slowly: all that lasts longer than the lags looked at
+counts as slow wander there, and as a difference between drivers where there are several.
 """
 
 from __future__ import annotations
@@ -17,8 +20,11 @@ from xosc_lateral.errors import DriverProfileError
 
 FloatArray = NDArray[np.float64]
 
-MEMORIES = (1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0, 12.0, 16.0, 24.0, 32.0, 48.0, 64.0)
-"""Correlation times of the wandering part that are tried. [s]"""
+MEMORIES = (2.0, 3.0, 4.0, 6.0, 8.0, 12.0, 16.0, 24.0, 32.0, 48.0, 64.0)
+"""Correlation times of the wandering part that are tried; one value a second can't hold shorter ones. [s]"""
+
+SLOW_MEMORY = 300.0
+"""Correlation time of the slow wander. [s]"""
 
 MAX_LAG = 60.0
 """Lags up to this are looked at. [s]"""
@@ -36,6 +42,8 @@ class Liveliness:
         Variance of its wandering part. [-]
     memory : float
         Correlation time of the wandering part. [s]
+    slow : float
+        Variance of the part that wanders with the correlation time `SLOW_MEMORY`. [-]
 
     Raises
     ------
@@ -46,22 +54,22 @@ class Liveliness:
     between: float = 0.0
     within: float = 0.0
     memory: float = 10.0
+    slow: float = 0.0
 
     def __post_init__(self) -> None:
         """Check."""
-        if not (self.between >= 0 and self.within >= 0 and self.memory > 0):
-            raise DriverProfileError(f"liveliness: {self}")
-        if not all(map(isfinite, (self.between, self.within, self.memory))):
+        numbers = (self.between, self.within, self.memory, self.slow)
+        if not all(map(isfinite, numbers)) or min(self.between, self.within, self.slow) < 0 or self.memory <= 0:
             raise DriverProfileError(f"liveliness: {self}")
 
     @property
     def total(self) -> float:
         """Variance of the logarithm over all drivers and times. [-]"""
-        return self.between + self.within
+        return self.between + self.within + self.slow
 
     def scaled(self, factor: float) -> Liveliness:
-        """Both variances times a factor."""
-        return Liveliness(self.between * factor, self.within * factor, self.memory)
+        """All variances times a factor."""
+        return Liveliness(self.between * factor, self.within * factor, self.memory, self.slow * factor)
 
 
 def log_power(values: FloatArray, window: int) -> FloatArray:
@@ -93,22 +101,23 @@ def fit_liveliness(excess: FloatArray, counts: FloatArray, seconds: float, *, po
     seconds : float
         Length of a window. [s]
     population : bool
-        Whether there are several drivers; one alone has no variance between drivers.
+        Whether there are several drivers: what lasts is then a difference between them, else slow wander.
     """
     best, least = Liveliness(), np.inf
     weights = np.sqrt(counts / max(counts.max(), 1.0))
     for memory in MEMORIES:
         shape = averaged_memory(len(excess), seconds, memory)
-        for basis in ([shape, np.ones(len(excess))] if population else [shape], [shape]):
+        for basis in ([shape, np.ones(len(excess))], [shape]):
             columns = np.stack(basis, axis=1)
             found = np.linalg.lstsq(columns * weights[:, None], excess * weights, rcond=None)[0]
             if (found < 0).any():
                 continue
             error = float((((columns @ found - excess) * weights) ** 2).sum())
             if error < least - 1e-12:
-                best, least = Liveliness(float(found[1]) if len(found) > 1 else 0.0, float(found[0]), memory), error
+                lasting = float(found[1]) if len(found) > 1 else 0.0
+                best, least = Liveliness(lasting, float(found[0]), memory), error
             break
-    return best
+    return best if population else Liveliness(0.0, best.within, best.memory, best.between)
 
 
 def averaged_memory(n_lags: int, seconds: float, memory: float) -> FloatArray:

@@ -14,6 +14,7 @@ from xosc_lateral.driver.effects.growing_spread import GrowingSpread
 from xosc_lateral.driver.effects.levels import Levels
 from xosc_lateral.driver.effects.linear import Linear
 from xosc_lateral.driver.effects.nearness import Nearness
+from xosc_lateral.driver.effects.piecewise import Piecewise
 from xosc_lateral.driver.effects.population import Population
 from xosc_lateral.driver.effects.product import Factor, Form, Product
 from xosc_lateral.driver.effects.regimes import Regimes
@@ -27,6 +28,7 @@ EFFECTS = (
     Linear,
     Threshold,
     Saturating,
+    Piecewise,
     Levels,
     Nearness,
     Angular,
@@ -77,6 +79,7 @@ __all__ = [
     "Levels",
     "Linear",
     "Nearness",
+    "Piecewise",
     "Population",
     "Product",
     "Regimes",
