@@ -10,8 +10,16 @@ from contextlib import contextmanager
 from pathlib import Path
 
 
-def write_atomically(path: Path | str, data: bytes | str) -> Path:
+def write_atomically(path: Path | str, data: bytes | str, *, durable: bool = False) -> Path:
     """Write bytes or UTF-8 text to a temporary file beside the target, then move it there; missing folders are made.
+
+    Parameters
+    ----------
+    path : path
+    data : bytes or str
+    durable : bool
+        Return only when the disk has it, so that not even a power cut takes it back. On a busy disk that is a tenth of
+        a second: for what ten thousand others depend on, not for each of the ten thousand.
 
     Raises
     ------
@@ -23,8 +31,9 @@ def write_atomically(path: Path | str, data: bytes | str) -> Path:
     def write(temporary: Path) -> None:
         with temporary.open("wb") as file:
             file.write(content)
-            file.flush()
-            os.fsync(file.fileno())
+            if durable:
+                file.flush()
+                os.fsync(file.fileno())
 
     return replace_atomically(path, write)
 

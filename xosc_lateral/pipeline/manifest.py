@@ -186,7 +186,7 @@ def _write_table(path: Path, schema: pa.Schema, rows: Iterator[dict[str, Any]]) 
             writer.write_table(pa.Table.from_pylist(group, schema=schema))
     data = buffer.getvalue()
     if not path.exists() or path.read_bytes() != data:
-        write_atomically(path, data)
+        write_atomically(path, data, durable=True)
 
 
 def _read_table(path: Path) -> Iterator[dict[str, Any]]:
