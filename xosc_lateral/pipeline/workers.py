@@ -23,7 +23,7 @@ Answer = TypeVar("Answer")
 AHEAD = 2
 """Tasks handed out per worker: one at work, one to begin with at once."""
 
-TRIES_ALONE = 2
+TRIES_ALONE = 3
 """Tries of a task that may have killed its worker; more than one, for a worker may be killed from outside as well."""
 
 CONNECT_TIMEOUT = 10.0
