@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import atan2, hypot, nan
@@ -13,6 +14,9 @@ from xosc_lateral.motion.transition import EPSILON
 
 SAMPLE = 1.0
 """Length of the control polygon per sample. [m]"""
+
+MOST_SAMPLES = 20_000
+"""Longer curves are sampled more coarsely. [-]"""
 
 _TANGENT_STEP = 0.001
 """Step in the curve's parameter that its direction is taken over. [-]"""
@@ -85,7 +89,7 @@ class NurbsPath:
     def point(self, parameter: float) -> tuple[float, float, list[float]]:
         """x, y and the share of each control point at a parameter."""
         t = min(max(parameter, self.knots[0]), self.knots[-1] - EPSILON)
-        shares = [basis(t, i, self.order, self.knots) for i in range(len(self.controls))]
+        shares = basis(t, self.order, self.knots)
         total = sum(share * control.weight for share, control in zip(shares, self.controls, strict=True))
         x = sum(share * c.weight * c.x for share, c in zip(shares, self.controls, strict=True)) / total
         y = sum(share * c.weight * c.y for share, c in zip(shares, self.controls, strict=True)) / total
@@ -93,8 +97,8 @@ class NurbsPath:
 
     # ---- in detail ---------------------------------------------------------------------------------------------------
     def _sample(self) -> PolylinePath:
-        polygon = sum(hypot(b.x - a.x, b.y - a.y) for a, b in zip(self.controls, self.controls[1:], strict=False))
-        steps = int(1 + polygon / SAMPLE)
+        polygon = sum(hypot(b.x - a.x, b.y - a.y) for a, b in itertools.pairwise(self.controls))
+        steps = min(int(1 + polygon / SAMPLE), MOST_SAMPLES)
         step = self.knots[-1] / steps
         self._parameters = [i * step for i in range(steps + 1)]
         samples = [self.point(t) for t in self._parameters]
@@ -139,15 +143,17 @@ def clamped_knots(count: int, order: int) -> tuple[float, ...]:
     return tuple(min(max((i + 1 - order) / inner, 0.0), 1.0) for i in range(count + order))
 
 
-def basis(t: float, i: int, order: int, knots: Sequence[float]) -> float:
-    """B-spline basis function by the recursion of Cox and de Boor."""
-    if order == 1:
-        return 1.0 if knots[i] <= t < knots[i + 1] else 0.0
-    value = 0.0
-    left = knots[i + order - 1] - knots[i]
-    right = knots[i + order] - knots[i + 1]
-    if left > 0.0:
-        value += (t - knots[i]) / left * basis(t, i, order - 1, knots)
-    if right > 0.0:
-        value += (knots[i + order] - t) / right * basis(t, i + 1, order - 1, knots)
-    return value
+def basis(t: float, order: int, knots: Sequence[float]) -> list[float]:
+    """All B-spline basis functions of an order at a parameter, by the recursion of Cox and de Boor."""
+    row = [1.0 if a <= t < b else 0.0 for a, b in itertools.pairwise(knots)]
+    for k in range(2, order + 1):
+        row = [
+            _ratio(t - knots[i], knots[i + k - 1] - knots[i]) * row[i]
+            + _ratio(knots[i + k] - t, knots[i + k] - knots[i + 1]) * row[i + 1]
+            for i in range(len(knots) - k)
+        ]
+    return row
+
+
+def _ratio(part: float, whole: float) -> float:
+    return part / whole if whole > 0.0 else 0.0

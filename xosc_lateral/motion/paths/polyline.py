@@ -10,7 +10,7 @@ from __future__ import annotations
 import itertools
 from bisect import bisect_left
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import atan2, hypot, nan
 
 from xosc_lateral.motion.angles import difference, wrap
@@ -52,6 +52,7 @@ class PolylinePath:
         self.follow = follow
         self.has_headings = all(c.heading == c.heading for c in self.corners)
         self.lengths = _lengths(self.corners)
+        self._times = [corner.time for corner in self.corners]
         self.tangents = _tangents(self.corners)
         self.headings = tuple(
             tangent if c.heading != c.heading else wrap(c.heading)
@@ -95,7 +96,7 @@ class PolylinePath:
 
     def s_at(self, time: float) -> float:
         """Length at a time: before the first and after the last time stamp, the ends."""
-        times = [corner.time for corner in self.corners]
+        times = self._times
         if time > times[-1] or len(times) == 1:
             return self.length
         i = max(bisect_left(times, time) - 1, 0)
@@ -208,3 +209,23 @@ def merge_close(corners: Sequence[Corner], radius: float, angle: float = 0.1) ->
         if not near or turned > angle:
             kept.append(corner)
     return (*kept, corners[-1])
+
+
+def has_gaps_in_time(corners: Sequence[Corner]) -> bool:
+    """Whether the first and the last corner have a time, but not all between them."""
+    first, *_, last = corners if len(corners) > 1 else (corners[0], corners[0])
+    return first.time == first.time and last.time == last.time and any(c.time != c.time for c in corners)
+
+
+def fill_times(corners: Sequence[Corner]) -> list[Corner]:
+    """Give corners without a time one, evenly along the way between those that have one."""
+    lengths = _lengths(corners)
+    known = [i for i, corner in enumerate(corners) if corner.time == corner.time]
+    filled = list(corners)
+    for a, b in itertools.pairwise(known):
+        way = lengths[b] - lengths[a]
+        for i in range(a + 1, b):
+            share = (lengths[i] - lengths[a]) / way if way > 0.0 else 0.0
+            time = corners[a].time + share * (corners[b].time - corners[a].time)
+            filled[i] = replace(corners[i], time=time)
+    return filled

@@ -2,22 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import itertools
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from math import nan
+from math import inf, nan
 from typing import Any
 
 from xosc_lateral.errors import PlaybackError, UnsupportedElementError
 from xosc_lateral.motion.paths.base import Path
 from xosc_lateral.motion.paths.clothoid import ClothoidPath, ClothoidPiece
 from xosc_lateral.motion.paths.nurbs import Control, NurbsPath, clamped_knots
-from xosc_lateral.motion.paths.polyline import Corner, PolylinePath, merge_close
+from xosc_lateral.motion.paths.polyline import Corner, PolylinePath, fill_times, has_gaps_in_time, merge_close
 from xosc_lateral.motion.run import Run
 from xosc_lateral.motion.state import EntityState
 from xosc_lateral.road.positions import Pose
 from xosc_lateral.scenario import Place, Unsupported
 from xosc_lateral.scenario.position import Position, WorldPosition
 from xosc_lateral.scenario.trajectory import Clothoid, ClothoidSpline, Nurbs, Polyline, Shape, Trajectory
+
+MOST_TURNING = 1e4
+"""Clothoids that turn by more are refused. [rad]"""
 
 VERTEX_RADIUS = 0.1
 """Vertices of a polyline nearer than this count as one. [m]"""
@@ -45,8 +49,12 @@ def _polyline(shape: Polyline, layout: Layout) -> Path:
         z, pitch, roll = (nan, nan, nan) if on_road else (pose.z, pose.pitch, pose.roll)
         time = nan if vertex.time is None else vertex.time
         corners.append(Corner(pose.x, pose.y, z, pose.heading if headed else nan, pitch, roll, time))
+    _check_times([corner.time for corner in corners], "vertex", layout.place)
     if any(corner.z != corner.z for corner in corners):
         corners = [Corner(c.x, c.y, nan, c.heading, nan, nan, c.time) for c in corners]
+    if has_gaps_in_time(corners):
+        layout.run.note("vertices without a time get it by their distance from those that have one", layout.place)
+        corners = fill_times(corners)
     merged = merge_close(corners, VERTEX_RADIUS)
     if len(merged) < len(corners):
         left_out = len(corners) - len(merged)
@@ -60,6 +68,7 @@ def _clothoid(shape: Clothoid, layout: Layout) -> Path:
     pose = _pose(shape.position, layout.run)
     end = shape.curvature + shape.curvature_prime * shape.length
     start_time = nan if shape.start_time is None else shape.start_time
+    _check_turning(shape.curvature, end, shape.length, layout.place)
     piece = ClothoidPiece(pose.x, pose.y, pose.heading, shape.curvature, end, shape.length, start_time)
     return ClothoidPath([piece], nan if shape.stop_time is None else shape.stop_time)
 
@@ -75,15 +84,36 @@ def _clothoid_spline(shape: ClothoidSpline, layout: Layout) -> Path:
         elif pieces:
             x, y, heading = pieces[-1].at(pieces[-1].length)
         elif layout.follower is not None:
-            x, y, heading = layout.follower.pose.x, layout.follower.pose.y, layout.follower.pose.heading
+            pose = layout.follower.plane
+            x, y, heading = pose.x, pose.y, pose.heading
         else:
             raise _error("the clothoid spline has no start", layout.place)
         time = nan if segment.time_start is None else segment.time_start
         heading += segment.h_offset
+        _check_turning(segment.curvature_start, segment.curvature_end, segment.length, layout.place)
         pieces.append(
             ClothoidPiece(x, y, heading, segment.curvature_start, segment.curvature_end, segment.length, time)
         )
     return ClothoidPath(pieces, nan if shape.time_end is None else shape.time_end)
+
+
+def _check_turning(start: float, end: float, length: float, place: Place) -> None:
+    """A curvature that makes an entity spin is a mistake in the file (and would take for ever to integrate)."""
+    if not (length >= 0.0 and max(abs(start), abs(end)) * length <= MOST_TURNING):
+        raise _error(
+            f"a clothoid of {length:g} m with curvatures {start:g} to {end:g} 1/m: needs a length of at least 0 m and "
+            f"less than {MOST_TURNING:g} rad of turning",
+            place,
+        )
+
+
+def _check_times(times: Sequence[float], what: str, place: Place) -> None:
+    """Times never run backwards."""
+    last = -inf
+    for k, time in enumerate(times):
+        if time < last:
+            raise _error(f"time {time:g} s of {what} {k + 1} is before that of an earlier one, {last:g} s", place)
+        last = time if time == time else last
 
 
 def _nurbs(shape: Nurbs, layout: Layout) -> Path:
@@ -99,6 +129,11 @@ def _nurbs(shape: Nurbs, layout: Layout) -> Path:
     for point in shape.control_points:
         pose = _pose(point.position, layout.run)
         controls.append(Control(pose.x, pose.y, point.weight, nan if point.time is None else point.time))
+    _check_times([control.time for control in controls], "control point", layout.place)
+    if any(b < a for a, b in itertools.pairwise(knots)) or not knots[-1] > knots[0]:
+        raise _error("the knots of a NURBS curve must not decrease, and the last must be above the first", layout.place)
+    if not all(control.weight > 0.0 for control in controls):
+        raise _error("the weights of the control points of a NURBS curve must be above 0", layout.place)
     return NurbsPath(controls, knots, shape.order)
 
 
@@ -139,8 +174,8 @@ def duration(shape: Shape) -> float:
     elif isinstance(shape, ClothoidSpline):
         ends = (shape.segments[0].time_start if shape.segments else None, shape.time_end)
     elif isinstance(shape, Nurbs):
-        points = shape.control_points
-        ends = (points[0].time, points[-1].time) if points else (None, None)
+        times = [point.time for point in shape.control_points]
+        ends = (times[0], times[-1]) if times and None not in times else (None, None)
     else:
         return 0.0
     start, end = ends
@@ -152,7 +187,7 @@ def _pose(position: Position, run: Run) -> Pose:
 
     scout = EntityState(run.entities[0].entity, run.network)
     scout.put(resolve(position, run))
-    return scout.pose
+    return scout.plane
 
 
 def _gives_heading(position: Position) -> bool:
