@@ -17,6 +17,9 @@ from xosc_lateral.scenario.place import Place
 
 E = TypeVar("E", bound=StrEnum)
 
+LARGEST = 1e15
+"""Largest finite number that is taken: its square is still far from overflow, and no unit makes sense of it."""
+
 _TRUE = {"true", "1", "1.0000000000", "yes"}
 _FALSE = {"false", "0", "0.0000000000", "no"}
 
@@ -95,7 +98,9 @@ class Element:
         except ValueError:
             self.fail(f"{name}='{text[:60]}' is no number")
         if math.isnan(value) or (finite and math.isinf(value)):
-            self.fail(f"{name}='{text}' is not finite")
+            self.fail(f"{name}='{text[:60]}' is not finite")
+        if finite and abs(value) > LARGEST:
+            self.fail(f"{name}='{text[:60]}' is beyond anything on earth (at most {LARGEST:g})")
         return value
 
     def number(self, name: str, default: float | None = None, *, finite: bool = True) -> float:

@@ -269,6 +269,10 @@ def _nurbs(e: Element, context: Context) -> Shape:
         e.fail(f"{len(knots)} knots, {len(points)} control points and order {order} need {len(points) + order}")
     if any(after < before for before, after in pairwise(knots)):
         e.fail("knots decrease")
+    if knots[order - 1] >= knots[len(points)]:
+        e.fail("the knots span no curve")
+    if any(point.weight <= 0 for point in points):
+        e.fail("a weight is not positive")
     return Nurbs(order, points, knots)
 
 
