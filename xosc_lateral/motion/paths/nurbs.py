@@ -88,7 +88,9 @@ class NurbsPath:
 
     def point(self, parameter: float) -> tuple[float, float, list[float]]:
         """x, y and the share of each control point at a parameter."""
-        t = min(max(parameter, self.knots[0]), self.knots[-1] - EPSILON)
+        # Outside of these knots the shares don't sum to 1 (an unclamped curve begins after its first knot).
+        first, last = self.knots[self.order - 1], self.knots[len(self.controls)]
+        t = min(max(parameter, first), max(first, last - EPSILON))
         shares = basis(t, self.order, self.knots)
         total = sum(share * control.weight for share, control in zip(shares, self.controls, strict=True))
         x = sum(share * c.weight * c.x for share, c in zip(shares, self.controls, strict=True)) / total
