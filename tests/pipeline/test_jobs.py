@@ -14,6 +14,7 @@ from xosc_lateral.pipeline.settings import ConvertSettings
 
 SCENARIO = "<OpenSCENARIO><FileHeader/><RoadNetwork/><Entities/><Storyboard/></OpenSCENARIO>"
 CATALOG = '<!-- Storyboard --><OpenSCENARIO><FileHeader/><Catalog name="Vehicles"/></OpenSCENARIO>'
+CONVERTED = SCENARIO.replace("<FileHeader/>", '<FileHeader description="Cut-in [xosc-lateral: seed 0]"/>')
 VARIED = """<OpenSCENARIO><FileHeader revMajor="1" revMinor="1"/><ParameterDeclarations>
 <ParameterDeclaration name="Speed" parameterType="double" value="20"/></ParameterDeclarations>
 <RoadNetwork/><Entities/><Storyboard/></OpenSCENARIO>"""
@@ -47,7 +48,15 @@ def test_the_output_tree_mirrors_a_folder(database: Path, tmp_path: Path) -> Non
     assert names(batch) == ["a/b/y.xosc", "a/x.xosc", "z.XOSC"]
     assert [job.scenario for job in batch.jobs] == names(batch)
     assert batch.jobs[0].output == tmp_path / "out" / "a" / "b" / "y.xosc"
-    assert [path.name for path in batch.left_out] == ["Vehicles.xosc"]
+    assert [(path.name, kind) for path, kind in batch.left_out] == [("Vehicles.xosc", DocumentKind.CATALOG)]
+
+
+def test_what_was_converted_before_is_left_out_where_it_is_found(database: Path, tmp_path: Path) -> None:
+    (database / "z_lifelike.xosc").write_text(CONVERTED)
+    batch = plan_batch([database], tmp_path / "out")
+    assert names(batch) == ["a/b/y.xosc", "a/x.xosc", "z.XOSC"]
+    assert DocumentKind.CONVERTED in {kind for _, kind in batch.left_out}
+    assert names(plan_batch([database / "z_lifelike.xosc"], tmp_path / "out")) == ["z_lifelike.xosc"]
 
 
 def test_outputs_inside_the_input_folder_are_no_inputs_of_the_next_run(database: Path) -> None:
@@ -181,6 +190,7 @@ def test_kinds_of_documents_are_told_by_their_elements(tmp_path: Path) -> None:
         (SCENARIO, DocumentKind.SCENARIO),
         (CATALOG, DocumentKind.CATALOG),
         (DISTRIBUTION, DocumentKind.DISTRIBUTION),
+        (CONVERTED, DocumentKind.CONVERTED),
         ("no xml", DocumentKind.SCENARIO),
         ("", DocumentKind.SCENARIO),
         (DISTRIBUTION[:30], DocumentKind.SCENARIO),

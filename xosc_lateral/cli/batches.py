@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
@@ -44,7 +45,8 @@ def convert_batch(
     if as_json:
         typer.echo(json.dumps({"folder": str(batch.folder), "left_out": len(batch.left_out), **asdict(summary)}))
     else:
-        left_out = f"; {len(batch.left_out)} catalogs left out" if batch.left_out else ""
-        typer.echo(f"{output}: {summary.text()}{left_out}")
+        kinds = Counter(kind.value for _, kind in batch.left_out)
+        left_out = ", ".join(f"{count} {kind}{'s' if count > 1 else ''}" for kind, count in kinds.items())
+        typer.echo(f"{output}: {summary.text()}{f'; left out: {left_out}' if left_out else ''}")
     if summary.failed:
         raise typer.Exit(1)

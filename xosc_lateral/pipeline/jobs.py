@@ -87,14 +87,14 @@ class Batch:
         Folder that it mirrors. Absolute.
     jobs : tuple of Job
         By name.
-    left_out : tuple of Path
-        Files found in folders that hold no scenario: catalogs.
+    left_out : tuple of (Path, DocumentKind)
+        Files found in folders that are not to be converted: catalogs, outputs of former conversions.
     """
 
     folder: Path
     base: Path
     jobs: tuple[Job, ...]
-    left_out: tuple[Path, ...] = ()
+    left_out: tuple[tuple[Path, DocumentKind], ...] = ()
 
     def __len__(self) -> int:
         return len(self.jobs)
@@ -142,12 +142,12 @@ def plan_batch(
     base = _common_folder(requests)
     fingerprints = _Fingerprints()
     jobs: dict[str, Job] = {}
-    left_out: list[Path] = []
+    left_out: list[tuple[Path, DocumentKind]] = []
     asked: dict[Path, dict[tuple[str, int], None]] = {}
     for request in requests:
         kind = document_kind(request.scenario)
-        if kind is DocumentKind.CATALOG and not request.listed:
-            left_out.append(request.scenario)
+        if kind in (DocumentKind.CATALOG, DocumentKind.CONVERTED) and not request.listed:
+            left_out.append((request.scenario, kind))
             continue
         before = asked.setdefault(request.scenario, {})
         key = (fingerprints.of(request.settings, 0), request.variants)

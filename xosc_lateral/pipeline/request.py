@@ -14,6 +14,7 @@ from lxml import etree
 
 from xosc_lateral.errors import FormatError
 from xosc_lateral.formats.openscenario.element import local_name
+from xosc_lateral.formats.openscenario.provenance import HEADER_MARK
 from xosc_lateral.pipeline.manifest import MANIFEST
 from xosc_lateral.pipeline.settings import ConvertSettings
 
@@ -34,6 +35,7 @@ class DocumentKind(Enum):
     SCENARIO = "scenario"
     CATALOG = "catalog"
     DISTRIBUTION = "parameter value distribution"
+    CONVERTED = "converted scenario"
 
 
 _KINDS = {"Catalog": DocumentKind.CATALOG, "ParameterValueDistribution": DocumentKind.DISTRIBUTION}
@@ -54,7 +56,8 @@ class Request:
     base : Path or None
         Folder whose layout below the output tree mirrors; None: the scenario's own.
     listed : bool
-        Named one by one. What was merely found in a folder is left out if it is a catalog.
+        Named one by one. What was merely found in a folder is left out if it is a catalog or was
+        converted already.
     """
 
     scenario: Path
@@ -156,6 +159,8 @@ def _kind_from(file: IO[bytes]) -> DocumentKind:
         parent = element.getparent()
         if parent is not None and parent.getparent() is None and isinstance(element.tag, str):
             name = local_name(element)
+            if name == "FileHeader" and HEADER_MARK in (element.get("description") or ""):
+                return DocumentKind.CONVERTED
             if name in _KINDS or name in _SCENARIO_PARTS:
                 return _KINDS.get(name, DocumentKind.SCENARIO)
     return DocumentKind.SCENARIO
