@@ -27,8 +27,12 @@ from tests.formats.made_scenario import (
     teleport,
     write_scenario,
 )
-from xosc_lateral.errors import FormatError
+from xosc_lateral.errors import FormatError, XoscLateralError
+from xosc_lateral.formats.opendrive import read_opendrive
 from xosc_lateral.formats.openscenario import read_distribution, read_scenario
+from xosc_lateral.formats.openscenario.write import write_trajectory_scenario
+from xosc_lateral.motion.playback import play
+from xosc_lateral.motion.trajectory import Trajectory
 
 DATA = Path(__file__).parents[1] / "data" / "xosc"
 SLOWEST = 5.0
@@ -161,6 +165,28 @@ def test_the_files_load_before_they_are_mutated(tmp_path: Path) -> None:
 def test_mutated_scenarios(folder: Path, data: st.DataObject) -> None:
     lay_out(folder, mutate(data, SCENARIO), CATALOG.encode(), b"")
     loads_or_is_refused_in_one_line(folder)
+
+
+@settings(fuzz, max_examples=60)
+@given(data=st.data())
+def test_mutated_scenarios_that_load_are_played_and_written_or_refused(folder: Path, data: st.DataObject) -> None:
+    lay_out(folder, mutate(data, SCENARIO), CATALOG.encode(), b"")
+    output = folder / "out.xosc"
+    output.unlink(missing_ok=True)
+    try:
+        scenario = read_scenario(folder / "made.xosc")
+        if scenario.road_file is None:
+            return
+        motion = play(scenario, read_opendrive(scenario.road_file), step=0.02, time_limit=2.0)
+        paths = {
+            e.name: Trajectory(e.time, e.x, e.y, e.z, e.heading, e.pitch, e.roll, e.speed) for e in motion.entities
+        }
+        write_trajectory_scenario(scenario, motion, paths, output, provenance={}, summary="fuzz")
+    except XoscLateralError as error:
+        assert "\n" not in str(error)
+        assert not output.exists()
+        return
+    read_scenario(output)
 
 
 @fuzz
