@@ -27,7 +27,7 @@ from tests.formats.made_scenario import (
     time_condition,
     write_scenario,
 )
-from xosc_lateral.errors import FormatError
+from xosc_lateral.errors import FormatError, PlaybackError
 from xosc_lateral.formats.opendrive import read_opendrive
 from xosc_lateral.formats.openscenario import read_scenario
 from xosc_lateral.formats.openscenario.write import (
@@ -421,3 +421,10 @@ def test_a_lane_change_overrules_the_offsets_whenever_it_comes(tmp_path: Path) -
     shifted = np.interp(ego.time, chains[1].time - 3.0, chains[1].offset_t)
     settled = (ego.time > 12.5) & (ego.time < 20)
     assert np.abs(ego.offset - shifted)[settled].max() < 0.05
+
+
+def test_a_scenario_that_is_over_at_once_is_refused(tmp_path: Path) -> None:
+    scenario = made(tmp_path, stop=time_condition(-1))
+    with pytest.raises(PlaybackError, match=r"made.xosc:\d+: StopTrigger: the scenario is over at 0 s"):
+        converted(scenario, tmp_path / "out.xosc")
+    assert not (tmp_path / "out.xosc").exists()

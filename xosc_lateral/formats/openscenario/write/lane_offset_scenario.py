@@ -18,8 +18,9 @@ from lxml import etree
 
 from xosc_lateral.formats.atomic import write_atomically
 from xosc_lateral.formats.openscenario.element import local_name
-from xosc_lateral.formats.openscenario.provenance import mark, refuse_converted
+from xosc_lateral.formats.openscenario.provenance import mark
 from xosc_lateral.formats.openscenario.write import build
+from xosc_lateral.formats.openscenario.write.checks import check_convertible
 from xosc_lateral.formats.openscenario.write.lateral_actions import (
     LATERAL,
     LateralAction,
@@ -75,7 +76,7 @@ def write_lane_offset_scenario(
     """
     output = Path(output)
     root = parse_xml(scenario.source, scenario.path)
-    refuse_converted(root, scenario.path)
+    check_convertible(root, scenario, motion)
     story = build.story("xosc-lateral")
     lateral = lateral_actions(scenario)
     for number, chain in enumerate(chains, start=1):

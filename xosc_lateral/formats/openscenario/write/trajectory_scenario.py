@@ -13,8 +13,9 @@ from numpy.typing import NDArray
 
 from xosc_lateral.formats.atomic import write_atomically
 from xosc_lateral.formats.openscenario.element import local_name
-from xosc_lateral.formats.openscenario.provenance import mark, refuse_converted
+from xosc_lateral.formats.openscenario.provenance import mark
 from xosc_lateral.formats.openscenario.write import build
+from xosc_lateral.formats.openscenario.write.checks import check_convertible
 from xosc_lateral.formats.openscenario.write.entities import remove_controllers, rewrite_init
 from xosc_lateral.formats.openscenario.write.kept import (
     CONTROLLER,
@@ -83,7 +84,7 @@ def write_trajectory_scenario(
     output = Path(output)
     root = parse_xml(scenario.source, scenario.path)
     untouched = parse_xml(scenario.source, scenario.path)
-    refuse_converted(root, scenario.path)
+    check_convertible(root, scenario, motion)
     scope = global_scope(scenario)
     pulled = _trailers(scenario, motion)
     moving = {
