@@ -1,7 +1,7 @@
 """Everything that could drive the offset: each column in every shape, and pairs of columns.
 
-A candidate costs something before it has said anything: a shape with a free limit, or one of the many pairs, has more
-chances to fit noise than a plain column. The cost is in units of chi-square and is paid in the choice and in the null alike.
+A candidate costs something before it has said anything: a shape with a free limit, or one of the many pairs, has
+more chances to fit noise than a plain column. The cost, in chi-square, is paid in the choice and in the null alike.
 """
 
 from __future__ import annotations

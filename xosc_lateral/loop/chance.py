@@ -14,7 +14,7 @@ TAIL_SHARE = 0.25
 """Share of the null sample that the tail is fitted on."""
 
 LIGHTEST_TAIL = 2.0
-"""Mean excess of a chi-square of one degree of freedom far out: the fitted tail is never taken as lighter. [chi-square]"""
+"""Mean excess of a chi-square of one degree of freedom far out: the tail is never taken as lighter. [chi-square]"""
 
 
 def tail_probability(observed: float, null: FloatArray) -> float:

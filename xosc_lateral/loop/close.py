@@ -323,6 +323,7 @@ def _in_words(timeline: Timeline, blocks: IntArray) -> str:
     if number == len(timeline.names):
         return f"{number} drives in {folds} folds: every drive is scored by profiles fitted on the other folds' drives"
     return (
-        f"{number} blocks of about {BLOCK_S:g} s in {folds} folds: every block is scored by profiles whose base model and effect "
-        "sizes were fitted on the other folds; which effects there are was decided on all blocks, its chance of error is the p-value"
+        f"{number} blocks of about {BLOCK_S:g} s in {folds} folds: every block is scored by profiles whose base model "
+        "and effect sizes were fitted on the other folds; which effects there are was decided on all blocks, its chance of "
+        "error is the p-value"
     )

@@ -18,7 +18,7 @@ MEMORIES = (6.0, 15.0, 40.0)
 """Lengths of regimes that are looked for. [s]"""
 
 SHORTEST = 5
-"""Loudness that comes and goes faster than this is how people steer, by now and then a correction, and no regime. [s]"""
+"""Loudness that comes and goes faster is how people steer, by a correction now and then, and no regime. [s]"""
 
 PERIODS = (4.0, 60.0)
 """Weaves that are looked for. [s]"""
@@ -29,8 +29,14 @@ WIDTHS = (1, 3, 7)
 SURROUNDINGS = 60
 """Frequencies to each side that say how high the spectrum is without a weave. [-]"""
 
-STEP_COST = 8.0
-"""A step has a free moment: about 2 ln(number of distinguishable moments). [chi-square]"""
+STEP_COST = 5.0
+"""A step has a free moment. [chi-square]"""
+
+DRIFT_COST = 2.0
+"""A drift may take one to eight half cosines. [chi-square]"""
+
+EDGE_S, STEP_GRID_S = 60, 15
+"""Least time on either side of a step, and between the moments that are tried. [s]"""
 
 UNREMARKABLE = 6.0
 """A wander with a lower score is not compared with simulated drives: chance gives it in every few. [chi-square]"""
@@ -38,8 +44,11 @@ UNREMARKABLE = 6.0
 N_SIMULATED = 300
 """Drives without drift or step, of the same movement, that the drift look is compared with."""
 
-SLOW_BAND = (60.0, 300.0)
+SLOW_BAND = (50.0, 600.0)
 """Periods that are slow, but no drift yet. [s]"""
+
+MOODS_S = np.array([20.0, 40.0, 70.0, 110.0, 160.0])
+"""Correlation times of a wander that counts as ordinary. [s]"""
 
 DRIFT_SIZES = (1, 2, 4, 8)
 """Numbers of half cosines tried for a drift."""
@@ -125,7 +134,7 @@ def find_clustering(coarse: Coarse, fitted: Fitted, rng: np.random.Generator) ->
     return Clustering(
         float(observed[best]),
         MEMORIES[best],
-        tail_probability(_signed_square(observed[best]), _signed_square(np.array(null))),
+        tail_probability(float(_signed_square(observed[best])), _signed_square(np.asarray(null))),
     )
 
 
@@ -146,71 +155,83 @@ def find_peak(coarse: Coarse, fitted: Fitted) -> Peak | None:
 
 
 def find_wander(coarse: Coarse, fitted: Fitted, rng: np.random.Generator) -> Wander | None:
-    """Drift and step at once, against simulated drives of the same movement that go through the same procedure."""
+    """Drift and step at once, against simulated rows of the same spectrum that go through the same procedure.
+
+    People wander about what they take for the middle within a minute or two; that is memory, and any core model's
+    business. So the whitened rows' spectrum is fitted between 50 s and 10 min with a wander of up to 160 s, and only
+    what goes beyond its continuation to longer periods counts.
+    """
     drift = coarse.drift_terms()
     if drift.shape[1] == 0 or fitted.terms.drift or fitted.terms.step_at is not None:
         return None
     left = np.where(coarse.valid, fitted.movement * fitted.scale, 0.0)
     basis = np.linalg.qr(np.column_stack([np.ones(len(left)), drift]) * coarse.valid[:, None])[0]
-    scores, at = _wander_scores(coarse, fitted, left, drift, basis)
-    if max(scores) < UNREMARKABLE:
-        return Wander(*scores, at, 1.0)
+    movement = np.where(coarse.valid, (left - basis @ (basis.T @ left)) / fitted.scale, 0.0)
+    process = fit_autoregression(movement, coarse.valid, fitted.terms.order)
+    whitener = Whitener(process, coarse.valid, coarse.drive, fitted.scale)
+    rows, columns = whitener.rows(left), whitener.rows(drift)
+    level = float(np.sqrt(np.mean(rows[coarse.valid] ** 2)))
+    steps, moments = _steps(coarse, whitener)
+    drift_score, step_score, best = _wander_scores(rows / level, columns, steps)
+    at = int(moments[best]) if len(moments) else 0
+    if max(drift_score, step_score) < UNREMARKABLE:
+        return Wander(drift_score, step_score, at, 1.0)
+    excess = np.sqrt(_slow_excess(rows / level))
     null = []
-    whole = fitted.whitener.process
-    for path in whole.simulate(len(coarse), rng, runs=N_SIMULATED):
-        simulated = np.where(coarse.valid, path * fitted.scale, 0.0)
-        null.append(max(_wander_scores(coarse, fitted, simulated, drift, basis)[0]))
-    return Wander(*scores, at, tail_probability(max(scores), np.asarray(null)))
+    for _ in range(N_SIMULATED):
+        white = np.where(coarse.valid, rng.normal(size=len(rows)), 0.0)
+        simulated = np.where(coarse.valid, np.fft.irfft(np.fft.rfft(white) * excess, len(rows)), 0.0)
+        null.append(max(_wander_scores(whitener.without_intercepts(simulated), columns, steps)[:2]))
+    return Wander(drift_score, step_score, at, tail_probability(max(drift_score, step_score), np.asarray(null)))
 
 
-def _wander_scores(
-    coarse: Coarse, fitted: Fitted, left: FloatArray, drift: FloatArray, basis: FloatArray
-) -> tuple[tuple[float, float], int]:
+def _wander_scores(rows: FloatArray, columns: FloatArray, steps: FloatArray) -> tuple[float, float, int]:
+    """Best scores of a drift and of a step [chi-square], and which step."""
     from xosc_lateral.loop.scan import as_one_degree
 
-    inside = coarse.valid
-    movement = np.where(inside, (left - basis @ (basis.T @ left)) / fitted.scale, 0.0)
-    process = fit_autoregression(movement, inside, fitted.terms.order)
-    whitener = Whitener(process, inside, coarse.drive, fitted.scale)
-    response, columns = whitener.rows(left), whitener.rows(drift)
-    level = _slow_level(response)
+    flat = 1.0 / np.sqrt(_slow_excess(rows))[:, None]
+
+    def even(values: FloatArray) -> FloatArray:
+        return np.asarray(np.fft.irfft(np.fft.rfft(values, axis=0) * flat, len(rows), axis=0))
+
+    response, drift = even(rows[:, None])[:, 0], even(columns)
     best = 0.0
-    per_drive = drift.shape[1] // DRIFT_TERMS
+    per_drive = columns.shape[1] // DRIFT_TERMS
     for size in DRIFT_SIZES:
-        chosen = np.concatenate(
-            [columns[:, DRIFT_TERMS * k : DRIFT_TERMS * k + size] for k in range(per_drive)], axis=1
-        )
+        chosen = np.concatenate([drift[:, DRIFT_TERMS * k : DRIFT_TERMS * k + size] for k in range(per_drive)], axis=1)
         moments = chosen.T @ response
         gained = float(moments @ np.linalg.pinv(chosen.T @ chosen) @ moments)
-        best = max(best, float(as_one_degree(np.array([gained / level]), chosen.shape[1])[0]) - 2.0)
-    step, at = _best_step(coarse, whitener, response)
-    return (best, step / level - STEP_COST), at
-
-
-def _slow_level(rows: FloatArray) -> float:
-    """Power of the rows between 1 and 5 min over their mean, at least 1: what a mere continuation to longer periods gives."""
-    power = np.square(np.abs(np.fft.rfft(rows)))
-    frequency = np.fft.rfftfreq(len(rows))
-    band = (frequency >= 1.0 / SLOW_BAND[1]) & (frequency <= 1.0 / SLOW_BAND[0])
-    return max(1.0, float(power[band].mean() / max(float(power[1:].mean()), 1e-30)))
-
-
-def _best_step(coarse: Coarse, whitener: Whitener, response: FloatArray) -> tuple[float, int]:
-    """Best chi-square of one jump, and where; at least 30 s of driving on either side, single long drives only."""
-    if int(coarse.drive.max()) > 0:
-        return 0.0, 0
-    ones = whitener.white(np.ones(len(response)))
-    gain = float(whitener.process.polynomial.sum())
-    # far from the jump a whitened step is a constant; its edge of a few seconds hardly counts against minutes
-    after = np.cumsum((gain * coarse.valid / whitener.scale * response)[::-1])[::-1]
-    weight = np.cumsum((ones**2)[::-1])[::-1]
-    total = weight[0]
-    variance = weight * (1.0 - weight / total)
-    count = np.cumsum(coarse.valid)
-    possible = (count >= 30) & (count <= count[-1] - 30)
-    chi_square = np.where(possible, after**2 / np.maximum(variance, 1e-9 * total), 0.0)
+        best = max(best, float(as_one_degree(np.array([gained]), chosen.shape[1])[0]) - DRIFT_COST)
+    if steps.shape[1] == 0:
+        return best, 0.0, 0
+    jumps = even(steps)
+    chi_square = (jumps.T @ response) ** 2 / np.maximum(np.square(jumps).sum(axis=0), 1e-12)
     at = int(np.argmax(chi_square))
-    return float(chi_square[at]), at
+    return best, float(chi_square[at]) - STEP_COST, at
+
+
+def _slow_excess(rows: FloatArray) -> FloatArray:
+    """1 + what a wander of at most 160 s adds to the spectrum of rows, shape (n // 2 + 1,); fitted on `SLOW_BAND`."""
+    n = len(rows)
+    frequency = np.fft.rfftfreq(n)
+    power = np.square(np.abs(np.fft.rfft(rows))) / max(float(rows @ rows), 1e-30)
+    band = (frequency >= 1.0 / SLOW_BAND[1]) & (frequency <= 1.0 / SLOW_BAND[0])
+    shapes = 1.0 / (1.0 + np.square(2.0 * np.pi * np.outer(MOODS_S, frequency)))
+    size = np.concatenate([[0.0], np.geomspace(0.1, 60.0, 40)])
+    level = 1.0 + size[:, None, None] * shapes[None, :, band]
+    likelihood = -np.sum(power[band] / level + np.log(level), axis=2)
+    best_size, best_shape = np.unravel_index(int(np.argmax(likelihood)), likelihood.shape)
+    return np.asarray(1.0 + size[best_size] * shapes[best_shape])
+
+
+def _steps(coarse: Coarse, whitener: Whitener) -> tuple[FloatArray, NDArray[np.intp]]:
+    """Whitened jumps of the mean at moments 15 s apart, and these moments; for a single long drive only."""
+    count = np.cumsum(coarse.valid)
+    if int(coarse.drive.max()) > 0:
+        return np.zeros((len(coarse), 0)), np.zeros(0, dtype=np.intp)
+    inside = np.flatnonzero(coarse.valid & (count >= EDGE_S) & (count <= count[-1] - EDGE_S))[::STEP_GRID_S]
+    jumps = (np.arange(len(coarse))[:, None] >= inside).astype(np.float64)
+    return whitener.rows(jumps), inside
 
 
 def _peak(rows: FloatArray) -> Peak | None:
@@ -254,8 +275,9 @@ def _clustering_scores(squares: FloatArray, valid: BoolArray) -> FloatArray:
 
 def _correlation(values: FloatArray, valid: BoolArray, lag: int) -> float:
     both = float(np.sum(valid[:-lag] & valid[lag:]))
-    return float(values[:-lag] @ values[lag:]) / max(both, 1.0) / max(float(values @ values) / valid.sum(), 1e-12)
+    power = float(values @ values) / max(float(valid.sum()), 1.0)
+    return float(values[:-lag] @ values[lag:]) / max(both, 1.0) / max(power, 1e-12)
 
 
-def _signed_square(values: FloatArray | float) -> FloatArray | float:
-    return np.sign(values) * np.square(values)
+def _signed_square(values: FloatArray) -> FloatArray:
+    return np.asarray(np.sign(values) * np.square(values))

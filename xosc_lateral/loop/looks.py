@@ -26,7 +26,7 @@ FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
 
 FEW_DRIVES = 4
-"""Up to this many drives their intercepts are terms of the scan; beyond, the calibration by shifts stands in for them."""
+"""Up to this many drives their intercepts are terms of the scan; beyond, the calibration stands in for them."""
 
 PULL_S = 3.0
 """Time over which the recent offset is averaged that the restoring acts on. [s]"""
@@ -111,7 +111,7 @@ def pull(coarse: Coarse, fitted: Fitted) -> FloatArray:
 
 def _location(coarse: Coarse, fitted: Fitted) -> Rows:
     whitener = fitted.whitener
-    # rows near a cut are whitened by a filter of their own, which no shift-invariant formula knows: the scan leaves them out
+    # rows near a cut are whitened by a filter of their own, which no shift-invariant formula knows: left out here
     settled = positions_in_stretch(coarse.valid) >= whitener.process.order
     groups = int(coarse.drive.max()) + 1
     own = (

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -75,7 +76,7 @@ def _shapes(offset: FloatArray, timeline: Timeline) -> FloatArray:
     """Logarithm of each band's size over the whole movement's, per block, shape (blocks, bands)."""
     valid = timeline.valid
     levels = [offset, *(local_mean(offset, valid, seconds, timeline.step) for seconds in TIMES_S)]
-    bands = [finer - coarser for finer, coarser in zip(levels[:-1], levels[1:], strict=True)]
+    bands = [finer - coarser for finer, coarser in pairwise(levels)]
     slow = offset - local_mean(offset, valid, 30.0, timeline.step)
     rows = []
     inside = np.flatnonzero(valid)

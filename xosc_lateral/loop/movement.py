@@ -7,7 +7,6 @@ squared innovations: adding an effect corrects the ones found before.
 
 from __future__ import annotations
 
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
@@ -49,8 +48,8 @@ class Coarse:
     time : array, shape (n,)
         [s]
     context : mapping of str to array
-        Columns on the fine grid, lane width included, clipped to what occurs while road-following: a traffic jam that is
-        cut out must not stretch a column's range.
+        Columns on the fine grid, lane width included, clipped to what occurs while road-following: a traffic jam that
+        is cut out must not stretch a column's range.
     """
 
     timeline: Timeline
@@ -88,7 +87,7 @@ class Coarse:
         answer = answer - answer[self.valid].mean(axis=0)
         if keep:
             self._answers[key] = answer
-        return answer
+        return np.asarray(answer, dtype=np.float64)
 
     def drift_terms(self) -> FloatArray:
         """Half cosines over every drive that lasts long enough, shape (n, terms)."""
@@ -211,14 +210,16 @@ def fit_movement(coarse: Coarse, terms: Terms, *, process: Autoregression | None
     covariance = np.zeros((len(sizes), len(sizes)))
     intercepts = np.zeros(int(coarse.drive.max()) + 1)
     fixed = process
+    scale = np.ones(len(coarse))
+    rows = movement = np.zeros(len(coarse))
     for attempt in range(4):
         scale = np.exp(scales @ log_sizes + (0.0 if terms.regime_scale is None else terms.regime_scale))
         left = np.where(coarse.valid, coarse.offset - columns @ sizes, 0.0)
         if attempt == 0:
             intercepts = _group_means(left, coarse)
         movement = np.where(coarse.valid, (left - intercepts[coarse.drive]) / scale, 0.0)
-        process = fixed or fit_autoregression(movement, coarse.valid, terms.order)
-        whitener = Whitener(process, coarse.valid, coarse.drive, scale)
+        noise = fixed or fit_autoregression(movement, coarse.valid, terms.order)
+        whitener = Whitener(noise, coarse.valid, coarse.drive, scale)
         response, design = whitener.rows(coarse.offset), whitener.rows(columns)
         sizes, covariance = _least_squares(design, response)
         rows = response - design @ sizes
@@ -228,9 +229,7 @@ def fit_movement(coarse: Coarse, terms: Terms, *, process: Autoregression | None
     scale_covariance = _scale_covariance(scales, coarse.valid)
     n = int(coarse.valid.sum())
     variance = float(rows @ rows) / max(1, n - len(sizes))
-    likelihood = (
-        -0.5 * float(rows @ rows) - n * np.log(process.deviations[-1]) - float(np.log(scale[coarse.valid]).sum())
-    )
+    likelihood = -0.5 * float(rows @ rows) - n * np.log(noise.deviations[-1]) - float(np.log(scale[coarse.valid]).sum())
     left = np.where(coarse.valid, coarse.offset - columns @ sizes - intercepts[coarse.drive], 0.0)
     return Fitted(
         terms, whitener, columns, sizes, covariance * variance, intercepts, scales, log_sizes, scale_covariance,
@@ -308,7 +307,7 @@ def _least_squares(design: FloatArray, response: FloatArray) -> tuple[FloatArray
     if design.shape[1] == 0:
         return np.zeros(0), np.zeros((0, 0))
     inverse = np.linalg.pinv(design.T @ design)
-    return inverse @ (design.T @ response), inverse
+    return inverse @ (design.T @ response), np.asarray(inverse, dtype=np.float64)
 
 
 def _log_scale_step(scales: FloatArray, rows: FloatArray, valid: BoolArray) -> FloatArray:

@@ -1,4 +1,4 @@
-"""The movement that no effect explains, as an autoregression, and whitening by it: what generalised least squares needs.
+"""The movement that no effect explains as an autoregression, and whitening by it, for generalised least squares.
 
 Whitening is exact within each valid stretch (the first rows of a stretch use the lower-order predictors of the same
 process, by stepping the Levinson recursion down) and treats stretches as independent. Every drive has an intercept of
@@ -43,7 +43,7 @@ class Autoregression:
     @property
     def polynomial(self) -> FloatArray:
         """(1, -a_1, ..., -a_p) / sd: turns the process into white noise of variance 1."""
-        return np.concatenate([[1.0], -self.lags[-1]]) / self.deviations[-1]
+        return np.asarray(np.concatenate([[1.0], -self.lags[-1]]) / self.deviations[-1], dtype=np.float64)
 
     def simulate(self, n: int, rng: np.random.Generator, *, runs: int = 1) -> FloatArray:
         """Stationary sample paths, shape (runs, n)."""
@@ -64,7 +64,7 @@ def moving_sum(weights: FloatArray, values: FloatArray) -> FloatArray:
     result = weights[0] * values
     for lag, weight in enumerate(weights[1:], start=1):
         result[lag:] += weight * values[:-lag]
-    return np.asarray(result)
+    return np.asarray(result, dtype=np.float64)
 
 
 def positions_in_stretch(valid: BoolArray) -> IntArray:
@@ -95,11 +95,11 @@ def fit_autoregression(values: FloatArray, valid: BoolArray, order: int) -> Auto
     gram[np.diag_indices(order)] *= 1.0 + 1e-9
     lags = np.linalg.solve(gram, past.T @ now)
     variance = float(np.mean((now - past @ lags) ** 2)) * len(rows) / max(1, len(rows) - order)
-    return _stepped_down(lags, max(variance, 1e-300))
+    return _stepped_down(np.asarray(lags, dtype=np.float64), max(variance, 1e-300))
 
 
 def _stepped_down(lags: FloatArray, variance: float) -> Autoregression:
-    """All lower-order predictors of the process, by the Levinson recursion backwards, then forwards from safe reflections."""
+    """All lower-order predictors, by the Levinson recursion backwards, then forwards from safe reflections."""
     reflections = []
     current = lags.copy()
     for order in range(len(lags), 0, -1):

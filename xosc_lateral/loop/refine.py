@@ -4,15 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
+from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.driver.effects import ColumnEffect, Saturating, Threshold
+from xosc_lateral.driver.effects import ColumnEffect, Linear, Piecewise, Saturating, Threshold
 from xosc_lateral.loop.candidates import COST_SHAPE, Candidate
 from xosc_lateral.loop.looks import Look, fine_rows, pull
-from xosc_lateral.loop.movement import Coarse, Fitted, squared_innovations
+from xosc_lateral.loop.movement import CLIP, Coarse, Fitted, squared_innovations
 from xosc_lateral.loop.scan import Scan, as_one_degree
+from xosc_lateral.loop.sizing import log_sizes
 
 FloatArray = NDArray[np.float64]
 
@@ -24,6 +26,15 @@ RESPONSES = (0.3, 0.6, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0)
 
 WITHIN = 25.0
 """Candidates whose score is lower than the best by up to this are refined too. [chi-square]"""
+
+KNOTS = (0.1, 0.3, 0.5, 0.7, 0.9)
+"""Quantiles at which a curve may bend. [-]"""
+
+MIN_VALUES = 8
+"""A column with fewer different values has no curve."""
+
+COST_BEND = 2.0
+"""Of every bend, beside its degree of freedom. [chi-square]"""
 
 CONTENDERS = 6
 """At most so many."""
@@ -105,6 +116,9 @@ def refine(
     target = target_of(look, coarse, fitted)
     contenders = sorted({best, *_contenders(candidates, result, usable)})
     refined = [_refined(coarse, target, candidates[index], float(result.lag[index])) for index in contenders]
+    refined += _bent(coarse, target, max(refined, key=lambda scored: scored[1])[0])
+    if look in (Look.SPREAD, Look.FINE):
+        refined = _by_likelihood(coarse, look, fitted, refined)
     refined.sort(key=lambda scored: -scored[1])
     winner, score = refined[0]
     rivals = _rivals(coarse, target, winner, score, refined[1:])
@@ -166,6 +180,50 @@ def _refined(coarse: Coarse, target: Target, candidate: Candidate, lag_s: float)
                 if reached > score + 1e-6:
                     best, score, improved = variant, reached, True
     return replace(candidate, effect=best), score
+
+
+def _by_likelihood(
+    coarse: Coarse, look: Look, fitted: Fitted, refined: list[tuple[Candidate, float]]
+) -> list[tuple[Candidate, float]]:
+    """Score again by what a log-linear spread gains in likelihood: a score test prefers what suits the squares."""
+    if look is Look.SPREAD:
+        squares, valid = np.minimum(fitted.rows**2, CLIP), coarse.valid
+    else:
+        fine = fine_rows(coarse, fitted, raw=True)
+        squares, valid = fine.squares, fine.valid
+    scored = []
+    for candidate, _ in refined:
+        answer = coarse.answer(candidate.effect)
+        log_scale = (answer @ log_sizes(squares, valid, answer)[0])[valid]
+        inside = squares[valid]
+        level = float(np.mean(inside / np.exp(2.0 * log_scale)))
+        gain = float(np.sum(np.log(inside.mean()) - np.log(level) - 2.0 * log_scale))
+        scored.append(
+            (candidate, float(as_one_degree(np.array([max(gain, 0.0)]), answer.shape[1])[0]) - candidate.cost)
+        )
+    return scored
+
+
+def _bent(coarse: Coarse, target: Target, winner: Candidate) -> list[tuple[Candidate, float]]:
+    """Curves with one and two bends in place of the winner, if it acts by a single number."""
+    effect = winner.effect
+    if not isinstance(effect, Linear | Threshold | Saturating):
+        return []
+    seen = coarse.context[effect.column][coarse.timeline.valid]
+    seen = seen[np.isfinite(seen)]
+    if len(np.unique(seen[:: max(1, len(seen) // 2000)])) < MIN_VALUES:
+        return []
+    inner = np.unique(np.quantile(seen, KNOTS))
+    inner = inner[(inner > seen.min()) & (inner < seen.max())]
+    knots = [(float(knot),) for knot in inner] + [(float(low), float(high)) for low, high in combinations(inner, 2)]
+    bent = []
+    for chosen in knots:
+        curve = Piecewise(
+            acts=effect.acts, column=effect.column, knots=chosen, lag_s=effect.lag_s, response_s=effect.response_s
+        )
+        candidate = Candidate(curve, COST_SHAPE + COST_BEND * len(chosen))
+        bent.append((candidate, score_of(coarse, target, candidate)))
+    return bent
 
 
 def _timings(step: float) -> Callable[[ColumnEffect, Coarse], Iterator[ColumnEffect]]:

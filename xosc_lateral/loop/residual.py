@@ -1,16 +1,17 @@
 """The residual: where measured drives and a profile's own runs under the same context differ, in metres.
 
-Both are described by the same set of cells: the mean offset and the spread of the faster movement in each fifth of every
-context column, the spread in each sixth of the drive, the movement's size in six bands of frequency, and the quantiles of
-the local spread. The error is the root mean square over the cells of measured minus expected, with the expectation taken
-over several runs of the profile. If no cell differs by more than the floor (what measured data differs from itself), then
-no test that looks at means, spreads, spectra or their dependence on context can tell the profile from the driver.
+Both are described by the same set of cells: the mean offset and the spread of the faster movement in each fifth of
+every context column, the spread in each sixth of the drive, the movement's size in bands of frequency, and quantiles of
+the local spread. The error is the root mean square over the cells of measured minus expected, with the expectation
+taken over several runs of the profile. If no cell differs by more than the floor (what measured data differs from
+itself), no test of means, spreads, spectra or their dependence on context can tell the profile from the driver.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -174,7 +175,7 @@ def _by_bin(values: FloatArray, label: IntArray, used: BoolArray) -> FloatArray:
 def _bands(offset: FloatArray, used: BoolArray, timeline: Timeline) -> FloatArray:
     levels = [offset, *(local_mean(offset, timeline.valid, seconds, timeline.step) for seconds in BANDS_S)]
     inside = [level[used] for level in levels]
-    bands = [np.std(finer - coarser) for finer, coarser in zip(inside[:-1], inside[1:], strict=True)]
+    bands = [np.std(finer - coarser) for finer, coarser in pairwise(inside)]
     return np.array([*bands, np.std(inside[-1])])
 
 

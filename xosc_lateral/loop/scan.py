@@ -28,12 +28,12 @@ LAGS = np.arange(-4, 5)
 GUARD_S = 40
 """Circular shifts closer to zero than this are not used as null. [s]"""
 
-TYPICAL_RANGE = (0.9, 9.0)
+TYPICAL_RANGE = (0.9, 50.0)
 """A calibration beyond this is not believed. [-]"""
 
 SMOOTHING = (8, 0.3)
-"""The rows' spectrum is averaged over so many frequencies to each side at least, and this share of the frequency. Without
-it a slow column would be calibrated by the one or two frequencies that it holds. [-]"""
+"""The rows' spectrum is averaged over so many frequencies to each side at least, and this share of the frequency.
+Without it a slow column would be calibrated by the one or two frequencies that it holds. [-]"""
 
 N_SHIFTS = 400
 """Circular shifts drawn for the null."""
@@ -74,8 +74,8 @@ class Scan:
         Best chi-square over the lags, calibrated, as of one degree of freedom, less the candidate's cost.
     chi_square : array, shape (m,)
         The same before calibration, degrees of freedom and cost.
-    typical : array, shape (m,)
-        Mean chi-square per degree of freedom that chance gives: 1 if the rows are white at the candidate's frequencies.
+    calibrations : list of Calibration
+        What chance gives at each candidate's frequencies.
     lag : int array, shape (m,)
         Where. [coarse samples]
     null : array, shape (m, number of shifts)
@@ -84,7 +84,7 @@ class Scan:
 
     statistic: FloatArray
     chi_square: FloatArray
-    typical: FloatArray
+    calibrations: list[Calibration]
     lag: IntArray
     null: FloatArray
 
@@ -102,7 +102,9 @@ def transform_answers(answers: Sequence[FloatArray]) -> list[ComplexArray]:
     """Fourier transforms of answers, shape (k, n // 2 + 1) each: the same in every look and round."""
     from scipy import fft
 
-    return [fft.rfft(np.ascontiguousarray(answer.T, dtype=np.float32), axis=1) for answer in answers]
+    return [
+        fft.rfft(np.ascontiguousarray(answer.T, dtype=np.float32), axis=1).astype(np.complex64) for answer in answers
+    ]
 
 
 def scan(
@@ -130,35 +132,50 @@ def scan(
     at_lags = lags % n
     at_shifts = (shifts[:, None] + lags[None, :]) % n
     prepared = _Prepared(rows, n)
-    statistic, raw, typical = np.empty((3, len(answers)))
+    statistic, raw = np.empty((2, len(answers)))
+    calibrations: list[Calibration] = []
     lag = np.empty(len(answers), dtype=np.intp)
     null = np.empty((len(answers), len(shifts)))
     for index, (answer, transform) in enumerate(zip(answers, transforms, strict=True)):
         chi_square, degrees = prepared.chi_square(answer, transform), answer.shape[1]
         elsewhere = chi_square[at_shifts]
-        typical[index] = prepared.typical(transform)
+        calibration = prepared.calibration(transform)
+        calibrations.append(calibration)
         best = int(np.argmax(chi_square[at_lags]))
         raw[index], lag[index] = chi_square[at_lags][best], lags[best]
-        statistic[index] = calibrated(raw[index], typical[index], degrees) - costs[index]
-        null[index] = calibrated(elsewhere.max(axis=1), typical[index], degrees) - costs[index]
-    return Scan(statistic, raw, typical, lag, null)
+        statistic[index] = float(calibration.without(raw[index]).apply(raw[index], degrees)) - costs[index]
+        null[index] = calibration.apply(elsewhere.max(axis=1), degrees) - costs[index]
+    return Scan(statistic, raw, calibrations, lag, null)
 
 
-def smooth_spectrum(white: FloatArray) -> FloatArray:
-    """Spectrum of rows, 1 on average, smoothed; shape (n // 2 + 1,)."""
-    power = np.square(np.abs(np.fft.rfft(white)))
-    power[0] = power[1]
-    index = np.arange(len(power))
-    half = np.maximum(SMOOTHING[0], (SMOOTHING[1] * index).astype(np.intp))
-    low, high = np.maximum(index - half, 1), np.minimum(index + half, len(power) - 1)
-    sums = np.concatenate([[0.0], np.cumsum(power)])
-    smooth = (sums[high + 1] - sums[low]) / (high + 1 - low)
-    return np.asarray(smooth / max(float(power[1:].mean()), 1e-30))
+@dataclass(frozen=True, slots=True)
+class Calibration:
+    """What chance gives a candidate, judged by the rows' spectrum at the candidate's frequencies.
 
+    Parameters
+    ----------
+    typical : float
+        Mean chi-square per degree of freedom: 1 if the rows are white there.
+    freedom : float
+        Degrees of freedom that this is known with: few for a slow column, which rests on few frequencies.
+    own : float
+        What a chi-square of 1 of the candidate itself adds to `typical`.
+    """
 
-def calibrated(chi_square: FloatArray | float, typical: float, degrees: int) -> FloatArray:
-    """Chi-square over its typical value, as of one degree of freedom."""
-    return as_one_degree(np.asarray(chi_square) / typical, degrees)
+    typical: float
+    freedom: float
+    own: float
+
+    def without(self, chi_square: float) -> Calibration:
+        """The same if what the candidate explains is not counted as noise."""
+        left = (self.typical - self.own * chi_square) * self.freedom / max(self.freedom - 1.0, 1.0)
+        return Calibration(float(np.clip(left, *TYPICAL_RANGE)), max(self.freedom - 1.0, 1.0), self.own)
+
+    def apply(self, chi_square: FloatArray | float, degrees: int) -> FloatArray:
+        """Chi-square of one degree of freedom and known noise with the same tail probability (Wallace's formula)."""
+        relative = as_one_degree(np.asarray(chi_square, dtype=np.float64) / self.typical, degrees)
+        v = self.freedom
+        return np.asarray(((8.0 * v + 1.0) / (8.0 * v + 3.0)) ** 2 * v * np.log1p(relative / v))
 
 
 def as_one_degree(chi_square: FloatArray, degrees: int) -> FloatArray:
@@ -186,7 +203,13 @@ class _Prepared:
         against = np.concatenate([rows.response[None, :], rows.taken]).astype(np.float32)
         self._against = np.conj(fft.rfft(against, axis=1))
         self._weight = np.conj(fft.rfft(rows.weight.astype(np.float32)))
-        self._spectrum = smooth_spectrum(rows.white)
+        power = np.square(np.abs(np.fft.rfft(rows.white)))
+        self._power = power / max(float(power[1:].mean()), 1e-30)
+        self._valid_share = float(np.mean(rows.white != 0.0))
+        index = np.arange(len(power))
+        half = np.maximum(SMOOTHING[0], (SMOOTHING[1] * index).astype(np.intp))
+        self._low, self._high = np.maximum(index - half, 1), np.minimum(index + half, len(power) - 1)
+        self._width = self._high + 1 - self._low
         self._gain = np.square(np.abs(fft.rfft(rows.polynomial, n)))
 
     def chi_square(self, answer: FloatArray, transform: ComplexArray) -> FloatArray:
@@ -206,16 +229,23 @@ class _Prepared:
             total += products[0] ** 2 / np.maximum(left, SMALLEST_SHARE * power.mean())
         return np.concatenate([total[:1], total[:0:-1]])
 
-    def typical(self, transform: ComplexArray) -> float:
-        """Mean chi-square that the rows' own smooth spectrum gives an answer of this spectrum."""
+    def calibration(self, transform: ComplexArray) -> Calibration:
+        """Weigh the rows' smoothed spectrum with the candidate's."""
         power = np.square(np.abs(transform)).sum(axis=0) * self._gain
         power[0] = 0.0
-        return float(np.clip(power @ self._spectrum / max(float(power.sum()), 1e-30), *TYPICAL_RANGE))
+        share = power / max(float(power.sum()), 1e-30)
+        # transpose of the smoothing: the weight that every single frequency of the rows has in the mean
+        spread = np.zeros(len(share) + 1)
+        np.add.at(spread, self._low, share / self._width)
+        np.add.at(spread, self._high + 1, -share / self._width)
+        weight = np.cumsum(spread)[:-1]
+        typical = float(np.clip(weight @ self._power, *TYPICAL_RANGE))
+        return Calibration(typical, 2.0 / float(weight @ weight), 0.5 * float(weight @ share) / self._valid_share)
 
     def _filtered(self, answer: FloatArray) -> FloatArray:
         memory = len(self._polynomial) - 1
         if memory == 0:
-            return answer * self._polynomial[0]
+            return np.asarray(answer * self._polynomial[0], dtype=np.float64)
         wrapped = np.concatenate([answer[-memory:], answer])
         return moving_sum(self._polynomial, wrapped)[memory:]
 

@@ -41,8 +41,8 @@ class Sized:
     Parameters
     ----------
     groups : mapping of str to tuple of Effect
-        Per finding what the profile gets: key "location 0", "scale 0", "weave", "step" ...; the first is the effect proper,
-        further ones what goes with it (fine noise beside spread).
+        Per finding what the profile gets: key "location 0", "scale 0", "weave", "step" ...; the first is the effect
+        proper, further ones are what goes with it (fine noise beside spread).
     """
 
     groups: Mapping[str, tuple[Effect, ...]]

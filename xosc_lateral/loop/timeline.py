@@ -1,4 +1,4 @@
-"""Measured drives on one uniform grid, context throughout and offsets where road-following, for everything that the loop computes.
+"""Measured drives on one uniform grid, context throughout, offsets where road-following: what the loop computes on.
 
 Drives stand one after the other with a pad between them that is longer than any lag, so that shifting a column by a few
 seconds never brings in another drive's values.
@@ -7,7 +7,8 @@ seconds never brings in another drive's values.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import pairwise
 from types import MappingProxyType
 
 import numpy as np
@@ -21,14 +22,14 @@ BoolArray = NDArray[np.bool_]
 IntArray = NDArray[np.intp]
 
 COARSE = 5
-"""Samples of the 0.2 s grid per sample of the coarse grid: effects answer within seconds, so they are looked for at 1 Hz. [-]"""
+"""Samples of the 0.2 s grid per sample of the coarse one: effects take seconds, so they are looked for at 1 Hz. [-]"""
 
 PAD = 75
 """Samples before and after each drive in which the context holds its outermost value: 15 s. [-]"""
 
 TRACE_RULES = CutRules(lane_change_margin=6.0)
-"""What is cut for tracing: a little more around lane changes than for fitting, or their last second looks like an effect of
-the lane."""
+"""What is cut for tracing: a little more around lane changes than for fitting, or their last second looks like an
+effect of the lane."""
 
 MIN_VALID_S = 120.0
 """Road-following time below which nothing can be said. [s]"""
@@ -79,7 +80,7 @@ class Timeline:
     def spans(self) -> list[slice]:
         """Rows of each drive, pads included."""
         edges = np.searchsorted(self.drive, np.arange(len(self.names) + 1))
-        return [slice(int(first), int(last)) for first, last in zip(edges[:-1], edges[1:], strict=True)]
+        return [slice(int(first), int(last)) for first, last in pairwise(edges)]
 
 
 def join_drives(drives: Sequence[Drive], rules: CutRules = TRACE_RULES) -> Timeline:
@@ -96,7 +97,7 @@ def join_drives(drives: Sequence[Drive], rules: CutRules = TRACE_RULES) -> Timel
     valid_s = STEP * sum(float(part.valid.sum()) for part in kept)
     if valid_s < MIN_VALID_S:
         raise NotEnoughDataError(
-            f"closing the loop: {valid_s:.0f} s of road-following in {len(drives)} drives, at least {MIN_VALID_S:.0f} s are needed"
+            f"{valid_s:.0f} s of road-following in {len(drives)} drives; closing the loop needs {MIN_VALID_S:.0f} s"
         )
     common = set(kept[0].context).intersection(*(part.context for part in kept))
     return Timeline(
@@ -180,15 +181,15 @@ def _lengthened(part: Timeline, total: int) -> Timeline:
     from scipy.fft import next_fast_len
 
     more = COARSE * next_fast_len(total // COARSE, real=True) - total
-    longer = {
-        "drive": np.pad(part.drive, (0, more), mode="edge"),
-        "time": np.concatenate([part.time, part.time[-1] + STEP * np.arange(1, more + 1)]),
-        "offset": np.pad(part.offset, (0, more)),
-        "valid": np.pad(part.valid, (0, more)),
-        "lane_width": np.pad(part.lane_width, (0, more), mode="edge"),
-        "context": {name: np.pad(values, (0, more), mode="edge") for name, values in part.context.items()},
-    }
-    return Timeline(names=part.names, levels=part.levels, **longer)
+    return replace(
+        part,
+        drive=np.pad(part.drive, (0, more), mode="edge"),
+        time=np.concatenate([part.time, part.time[-1] + STEP * np.arange(1, more + 1)]),
+        offset=np.pad(part.offset, (0, more)),
+        valid=np.pad(part.valid, (0, more)),
+        lane_width=np.pad(part.lane_width, (0, more), mode="edge"),
+        context={name: np.pad(values, (0, more), mode="edge") for name, values in part.context.items()},
+    )
 
 
 def _on_grid(drive: Drive, name: str, grid: FloatArray) -> FloatArray:

@@ -1,4 +1,4 @@
-"""Trace what is left over to the effect that explains it: choose, refine, and prove against chance; again until nothing is left."""
+"""Trace what is left to the effect that explains it: choose, refine, prove against chance; until nothing is left."""
 
 from __future__ import annotations
 
@@ -23,28 +23,32 @@ from xosc_lateral.loop.hidden import (
     find_peak,
     find_wander,
 )
-from xosc_lateral.loop.looks import Look, look_rows
+from xosc_lateral.loop.looks import Look, fine_rows, look_rows
 from xosc_lateral.loop.movement import Coarse, Fitted, Terms, fit_movement
 from xosc_lateral.loop.refine import refine, target_of
 from xosc_lateral.loop.regimes import regime_log_scale
-from xosc_lateral.loop.scan import ComplexArray, Scan, calibrated, draw_shifts, scan, transform_answers
+from xosc_lateral.loop.scan import ComplexArray, Scan, draw_shifts, scan, transform_answers
+from xosc_lateral.loop.sizing import log_sizes
 
 FloatArray = NDArray[np.float64]
 
 LEVEL = {
     "location": 0.018,
     "scale": 0.01,
-    "dynamics": 0.004,
+    "dynamics": 0.003,
     "fine": 0.004,
     "growth": 0.003,
     "regime": 0.003,
     "periodic": 0.003,
-    "wander": 0.005,
+    "wander": 0.002,
 }
 """Probability of a false finding that each look may spend: 5 % together, hidden effects included."""
 
 MAX_FINDINGS = 8
 """More effects than this in one table are not looked for."""
+
+LEAST_FACTOR = {Look.SPREAD: 1.1, Look.FINE: 1.25}
+"""A change of the spread, or of the fine noise (a centimetre), by less is no finding, however sure. [-]"""
 
 MIN_SUPPORT_PACE = 200.0
 """The same for the restoring strength, of which every second tells little. [s]"""
@@ -194,7 +198,7 @@ def trace_effects(
         Told what is being done, in a few words.
     """
     columns, unused = known_columns(coarse.timeline)
-    unused |= {name: "left out on request" for name in excluded}
+    unused |= dict.fromkeys(excluded, "left out on request")
     progress("consequences of the car's own movement")
     consequences = find_consequences(coarse.timeline, columns)
     barred = {consequence.column for consequence in consequences} | set(excluded)
@@ -299,7 +303,7 @@ def _exact_best(
     for index in np.argsort(-np.where(usable, result.statistic, -np.inf))[:RECHECKED]:
         gain = target.gain(_at_lag(search, int(index), result))
         degrees = search.answers[index].shape[1]
-        score = float(calibrated(gain, result.typical[index], degrees)) - float(search.costs[index])
+        score = float(result.calibrations[index].without(gain).apply(gain, degrees)) - float(search.costs[index])
         if score > reached and usable[index]:
             best, reached = int(index), score
     return best, reached
@@ -344,12 +348,30 @@ def _proven(search: _Search, look: Look, fitted: Fitted, result: Scan, best: int
     null = null_scan.null[usable].max(axis=0)
     degrees = search.answers[best].shape[1]
     exact = target_of(look, search.coarse, fitted).gain(_at_lag(search, best, result))
-    observed = float(calibrated(exact, null_scan.typical[best], degrees)) - search.costs[best]
+    if look in LEAST_FACTOR and (factor := _factor(search.coarse, look, after, candidate)) < LEAST_FACTOR[look]:
+        return Tried(look.value, candidate.columns, 1.0, f"a factor of {factor:.2f} is too little to matter")
+    calibration = null_scan.calibrations[best].without(0.0)
+    observed = float(calibration.apply(exact, degrees)) - search.costs[best]
     p_value = tail_probability(observed, null)
     if p_value > LEVEL[look.value]:
         why = f"chance gives as much in {100 * p_value:.2g} % of tables; {100 * LEVEL[look.value]:g} % is allowed"
         return Tried(look.value, candidate.columns, p_value, why)
     return Found(look.value, p_value, fitted, after, candidate, chosen.rivals)
+
+
+def _factor(coarse: Coarse, look: Look, after: Fitted, candidate: Candidate) -> float:
+    """Factor between the 5 % and 95 % quantile of an effect's strength, at least 1."""
+    answer = coarse.answer(candidate.effect)
+    if look is Look.SPREAD:
+        last = len(after.scale_sizes) - (1 if after.terms.growth else 0)
+        strength = answer @ after.scale_sizes[last - answer.shape[1] : last]
+    else:
+        fine = fine_rows(coarse, after, raw=True)
+        strength = answer @ log_sizes(fine.squares, fine.valid, answer)[0]
+    low, high = np.quantile(strength[coarse.valid], [0.05, 0.95])
+    if high <= low:
+        low, high = strength[coarse.valid].min(), strength[coarse.valid].max()
+    return float(np.exp(high - low))
 
 
 def _at_lag(search: _Search, index: int, result: Scan) -> FloatArray:

@@ -31,9 +31,8 @@ def loop_text(result: LoopResult) -> str:
     lines = lines or ["nothing found that chance would not give"]
     for item in result.trace.consequences:
         lines.append(f"{item.column}: a consequence of the car's movement, not a cause")
-    lines.append(
-        f"held-out error {result.error_before:.4f} m before, {result.error_after:.4f} m after (floor {result.floor:.4f} m)"
-    )
+    error = f"{result.error_before:.4f} m before, {result.error_after:.4f} m after (floor {result.floor:.4f} m)"
+    lines.append(f"held-out error {error}")
     return "\n".join(lines)
 
 
@@ -86,8 +85,9 @@ def _lead(page: Page, result: LoopResult) -> None:
         "Nothing was found that chance would not give." if not number else f"{number} effect{'s' * (number > 1)} found."
     )
     page.lead(
-        f"{words} The error is what differs between the measured drives and the profile's own runs under the same context, "
-        "on stretches that the profile was not fitted on; the floor is what the measured drives differ from themselves.",
+        f"{words} The error is what differs between the measured drives and the profile's own runs under the same "
+        "context, on stretches that the profile was not fitted on; the floor is what the measured drives differ from "
+        "themselves.",
         [
             KeyFigure(f"{100 * result.error_before:.2f} cm", "error before"),
             KeyFigure(f"{100 * result.error_after:.2f} cm", "error after", tone="good" if number else ""),

@@ -122,10 +122,11 @@ def _spectrum(values: FloatArray, valid: NDArray[np.bool_], step: float) -> tupl
         share = float(valid[rows].mean())
         if share > 0.8:
             powers.append(np.abs(np.fft.rfft(centred[rows] * window)) ** 2 / share)
-    frequency = np.fft.rfftfreq(SPECTRUM_ROWS, step)
+    frequency = np.asarray(np.fft.rfftfreq(SPECTRUM_ROWS, step), dtype=np.float64)
     if not powers:
         return frequency, np.full(len(frequency), np.nan)
-    return frequency, 2.0 * step * np.mean(powers, axis=0) / float(np.sum(window**2))
+    density = 2.0 * step * np.mean(powers, axis=0) / float(np.sum(window**2))
+    return frequency, np.asarray(density, dtype=np.float64)
 
 
 def _curve(result: LoopResult, effect: ColumnEffect) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -135,11 +136,11 @@ def _curve(result: LoopResult, effect: ColumnEffect) -> tuple[FloatArray, FloatA
     if len(effect.columns) == 1:
         seen = context[effect.columns[0]]
         seen = seen[np.isfinite(seen)]
-        over = np.linspace(*np.quantile(seen, [0.01, 0.99]), 200)
+        over = np.linspace(float(np.quantile(seen, 0.01)), float(np.quantile(seen, 0.99)), 200)
         quantity = effect.quantity({effect.columns[0]: over})
     else:
         values = effect.quantity(context)[:, 0]
-        over = np.linspace(*np.nanquantile(values, [0.01, 0.99]), 200)
+        over = np.linspace(float(np.nanquantile(values, 0.01)), float(np.nanquantile(values, 0.99)), 200)
         quantity = over[:, None]
     about = quantity - np.asarray(effect.reference)
     return over, about @ np.asarray(effect.coefficients), np.sqrt(about**2 @ np.square(effect.errors))

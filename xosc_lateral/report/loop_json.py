@@ -16,8 +16,8 @@ from xosc_lateral.loop.distance import Distances
 from xosc_lateral.loop.findings import Finding
 
 MEASURE = (
-    "root mean square of measured minus expected over cells (mean and spread by fifths of every column, spread by time, "
-    "movement by frequency band, quantiles of local spread) on held-out blocks, m"
+    "root mean square of measured minus expected over cells (mean and spread by fifths of every column, spread by "
+    "time, movement by frequency band, quantiles of local spread) on held-out blocks, m"
 )
 
 

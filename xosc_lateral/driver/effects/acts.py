@@ -17,7 +17,7 @@ log-linear effect would run away. [-]"""
 
 
 class Acts(StrEnum):
-    """Part of the movement that an effect changes. The strength is [m] for location, a natural logarithm for the rest."""
+    """Part of the movement that an effect changes; its strength is [m] for location, else a natural logarithm."""
 
     LOCATION = "location"
     SPREAD = "spread"

@@ -78,7 +78,7 @@ class ColumnEffect(ABC):
 
     @abstractmethod
     def quantity(self, context: Mapping[str, FloatArray]) -> FloatArray:
-        """Driving quantity before the response, shape (n, k); NaN where the context says "there is none" and that is neutral."""
+        """Driving quantity before the response, shape (n, k); NaN where "there is none" and that is neutral."""
 
     def answer(self, step: float, context: Mapping[str, FloatArray]) -> FloatArray:
         """Driving quantity as the driver answers to it, shape (n, k), on a grid of the given step [s]."""
@@ -110,17 +110,24 @@ class ColumnEffect(ABC):
     def from_dict(cls, data: Mapping[str, Any]) -> Self:
         """Read back what `to_dict` gave."""
         known = {item.name for item in fields(cls)}
-        values = {name: value for name, value in data.items() if name != "kind"}
+        values: dict[str, Any] = {name: value for name, value in data.items() if name != "kind"}
         if unknown := sorted(set(values) - known):
             raise DriverProfileError(f"effect {cls.kind}: unknown field {unknown[0]!r}")
         try:
-            return cls(**{name: tuple(value) if isinstance(value, list) else value for name, value in values.items()})
+            plain: dict[str, Any] = {
+                key: tuple(value) if isinstance(value, list) else value for key, value in values.items()
+            }
+            return cls(**plain)
         except (TypeError, ValueError) as error:
             raise DriverProfileError(f"effect {cls.kind}: {error}") from error
 
 
 def _step(time: FloatArray) -> float:
     return float(time[1] - time[0]) if len(time) > 1 else 1.0
+
+
+def _tupled(value: Any) -> Any:
+    return tuple(value) if isinstance(value, list) else value
 
 
 def _finite_mean(values: FloatArray) -> float:

@@ -52,4 +52,6 @@ class Piecewise(ColumnEffect):
     def quantity(self, context: Mapping[str, FloatArray]) -> FloatArray:
         """The column, and how far it is beyond each knot; shape (n, number of knots + 1)."""
         values = np.asarray(context[self.column], dtype=np.float64)
-        return np.stack([values, *(np.where(values > knot, values - knot, 0.0 * values) for knot in self.knots)], axis=1)
+        return np.stack(
+            [values, *(np.where(values > knot, values - knot, 0.0 * values) for knot in self.knots)], axis=1
+        )

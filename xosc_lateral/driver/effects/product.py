@@ -53,9 +53,9 @@ class Factor:
         if self.form is Form.COSINE:
             return np.asarray(np.cos(2.0 * np.pi / self.at * column))
         if self.form is Form.EQUALS:
-            return (np.rint(column) == self.at).astype(np.float64)
+            return np.asarray(np.rint(column) == self.at, dtype=np.float64)
         if self.form is Form.PRESENCE:
-            return np.isfinite(column).astype(np.float64)
+            return np.asarray(np.isfinite(column), dtype=np.float64)
         if self.form is Form.NEARNESS:
             near = self.at / np.maximum(np.abs(column), self.at)
             return np.nan_to_num(near, nan=0.0)
