@@ -23,8 +23,8 @@ from numpy.typing import NDArray
 from xosc_lateral.driver.fitting import fit_runs
 from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.driver.series import STEP, Run, all_runs
-from xosc_lateral.formats.drives import read_drives
 from xosc_lateral.formats.atomic import write_atomically
+from xosc_lateral.formats.drives import read_drives
 from xosc_lateral.loop.classifier import told_apart
 from xosc_lateral.loop.distance import Distances, mean_distances, metric_distances
 from xosc_lateral.loop.longterm import spectrum
@@ -210,7 +210,8 @@ def markdown(rows: dict[str, Row], splits: int) -> str:
         cells += [f"{mean.mean / floor.mean:.2f}", "none" if flat else f"{np.mean(row.spectrum):.1f}"]
         cells += ["" if row.auc is None else f"{row.auc:.3f}", row.settings]
         lines.append("| " + " | ".join(cells) + " |")
-    return "\n".join([*lines, "", f"Mean over {splits} random halves of the drives; AUC and fitted numbers on the first."])
+    note = f"Mean over {splits} random halves of the drives; AUC and fitted numbers on the first."
+    return "\n".join([*lines, "", note])
 
 
 def write_between_markers(path: Path, text: str, marker: str = MARKER) -> None:

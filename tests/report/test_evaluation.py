@@ -10,6 +10,7 @@ import pandas as pd
 import pytest
 
 from xosc_lateral.cli import main
+from xosc_lateral.errors import NotEnoughDataError
 from xosc_lateral.formats.library import GROUPS, most_different
 from xosc_lateral.formats.profiles import list_profiles, read_profile
 from xosc_lateral.loop.compare import free_runs
@@ -48,6 +49,14 @@ def test_evaluate_prints_one_json_object_with_everything(table, profile, capsys)
     assert values["spectrum"]["frequency_hz"][0] < 0.03
     assert set(values["provenance"]["inputs"]) == {"drives.parquet"}
     assert len(values["provenance"]["profile_sha256"]) == 64
+    assert values["provenance"]["fitted_on_these"] is True
+
+
+def test_a_profile_scored_on_the_drives_it_was_fitted_to_says_so(table, profile, capsys):
+    assert main(["evaluate", "-p", "motorway", str(table), "--json", "--no-classify"]) == 0
+    assert json.loads(capsys.readouterr().out)["provenance"]["fitted_on_these"] is False
+    assert main(["evaluate", "-p", str(profile), str(table), "--no-classify"]) == 0
+    assert "was fitted to these drives" in capsys.readouterr().out
 
 
 def test_evaluate_tells_a_person_the_same(table, profile, capsys):
@@ -99,12 +108,20 @@ def test_population_classes_lanes_and_single_vehicles_are_shipped():
     assert sum(name.startswith("motorway-vehicle-") for name in names) >= 5
 
 
-def test_most_different_picks_the_odd_ones():
+def test_most_different_picks_the_odd_ones_that_stay_as_they_are():
     rng = np.random.default_rng(2)
-    snippets = {f"plain{k}": rng.normal(0, 0.1, (12, 51)) for k in range(8)}
-    snippets["left"] = snippets["plain0"] + 0.6
-    snippets["restless"] = 5.0 * snippets["plain1"]
-    assert {"left", "restless"} <= set(most_different(snippets, 3))
+    snippets = {f"plain{k}": rng.normal(0, 0.1, (12, 51)) for k in range(16)}
+    weave = np.tile(np.sin(np.arange(51) / 4), (12, 1))
+    snippets["left"] = 0.6 + 0.1 * weave
+    snippets["restless"] = 0.5 * weave
+    snippets["fickle"] = snippets["plain2"] + np.where(np.arange(12) < 6, -0.8, 0.8)[:, None]
+    chosen = most_different(snippets, 3)
+    assert {"left", "restless"} <= set(chosen) and "fickle" not in chosen
+
+
+def test_too_few_vehicles_are_refused_with_their_number():
+    with pytest.raises(NotEnoughDataError, match=r"3 vehicles .* 12 are needed"):
+        most_different({f"d{k}": np.zeros((4, 51)) for k in range(3)})
 
 
 def test_profiles_list_show_and_compare_see_own_folders(profile, capsys):

@@ -39,4 +39,4 @@ def register(app: typer.Typer) -> None:
         scores = score_profile(driver, runs, seed=seed, classify=classify)
         if report is not None:
             write_evaluation(scores, driver, tables, report)
-        typer.echo(evaluation_json(scores, driver, tables) if as_json else evaluation_text(scores))
+        typer.echo(evaluation_json(scores, driver, tables) if as_json else evaluation_text(scores, driver, tables))

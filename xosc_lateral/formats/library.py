@@ -29,7 +29,7 @@ from xosc_lateral.formats.hashes import file_hash
 from xosc_lateral.formats.importers.dlr_ht import LICENCE, import_dlr_ht
 from xosc_lateral.formats.importers.table import write_imported
 from xosc_lateral.formats.profiles import write_profile
-from xosc_lateral.loop.compare import told_from_each_other
+from xosc_lateral.loop.compare import habits_of, told_from_each_other
 from xosc_lateral.loop.metrics import snippet_metrics
 from xosc_lateral.loop.scores import SNIPPET, score_profile, scores_to_dict
 from xosc_lateral.loop.snippets import snippets_of
@@ -40,6 +40,7 @@ SOURCE = "DLR Highway Traffic v1.1.0 (A39 near Braunschweig, 7 October 2024, 5 m
 SEED = 20241007  # the day of the recording
 SINGLE_VEHICLES = 6
 LONG_DRIVE = 140.0  # [s]; of road-following, for a profile of one vehicle
+SPREAD_FACTOR = 1.35  # a single vehicle's profile whose spread is off by more than this is not shipped
 FITTED_SHARE = 0.6  # of a single vehicle's drive; the rest is held out
 
 
@@ -126,6 +127,8 @@ def _single_profiles(
     for run in runs:
         by_vehicle.setdefault(run.drive, []).append(run)
     long = {name: mine for name, mine in by_vehicle.items() if sum(map(len, mine)) * STEP >= LONG_DRIVE}
+    whole = {name: fit_runs(mine, name=name, model=model) for name, mine in long.items()}
+    long = {name: mine for name, mine in long.items() if _describes(whole[name], mine)}
     chosen = most_different({name: snippets_of(mine, SNIPPET, STEP).offset for name, mine in long.items()})
     parts = {name: split_in_time(long[name]) for name in chosen}
     early = [fit_runs(parts[name][0], name=name, model=model) for name in chosen]
@@ -149,31 +152,44 @@ def _single_profiles(
     return profiles
 
 
-def most_different(snippets: Mapping[str, FloatArray], count: int = SINGLE_VEHICLES) -> list[str]:
-    """Names of drivers that differ visibly: each next one is farthest from all chosen before it.
+def _describes(profile: DriverProfile, runs: Sequence[Run]) -> bool:
+    """Whether free runs of the profile spread about as widely as the drive did: two minutes don't always suffice."""
+    measured = float(np.concatenate([run.offset for run in runs]).std())
+    return 1.0 / SPREAD_FACTOR <= habits_of(profile).spread / measured <= SPREAD_FACTOR
 
-    Drivers are compared by the mean of their ten metrics, in units of its spread between drivers.
+
+def most_different(snippets: Mapping[str, FloatArray], count: int = SINGLE_VEHICLES) -> list[str]:
+    """Names of drivers that differ visibly and keep their habits: each next one is farthest from all before it.
+
+    Drivers are compared by the mean of their ten metrics, in units of what one driver's mean changes by from the first
+    half of the drive to the second. The half of the drivers that changes most is left out: a profile of somebody who
+    drives differently every minute is a profile of nobody.
 
     Parameters
     ----------
     snippets : mapping of str to array, shape (n, m)
-        Driver -> snippets. [m]
+        Driver -> snippets in the order of time, at least two. [m]
 
     Raises
     ------
     NotEnoughDataError
-        If there are fewer drivers than asked for.
+        If there are fewer than twice as many drivers as asked for.
     """
     names = sorted(snippets)
-    if len(names) < count:
-        raise NotEnoughDataError(f"{len(names)} vehicles with {LONG_DRIVE:g} s of road-following; {count} are needed")
-    means = np.array([snippet_metrics(snippets[name]).mean(axis=0) for name in names])
-    points = (means - means.mean(axis=0)) / means.std(axis=0)
-    chosen = [int(np.argmin((points**2).sum(axis=1)))]  # the most ordinary one first
+    if len(names) < 2 * count:
+        raise NotEnoughDataError(
+            f"{len(names)} vehicles with {LONG_DRIVE:g} s of road-following; {2 * count} are needed to choose {count}"
+        )
+    metrics = [snippet_metrics(snippets[name]) for name in names]
+    change = np.array([one[: len(one) // 2].mean(axis=0) - one[len(one) // 2 :].mean(axis=0) for one in metrics])
+    unit = np.sqrt((change**2).mean(axis=0))
+    steady = np.argsort(((change / unit) ** 2).sum(axis=1), kind="stable")[: max(count, len(names) // 2)]
+    points = np.array([metrics[k].mean(axis=0) for k in steady]) / unit
+    chosen = [int(np.argmin(((points - points.mean(axis=0)) ** 2).sum(axis=1)))]  # the most ordinary one first
     while len(chosen) < count:
         nearest = np.min([((points - points[k]) ** 2).sum(axis=1) for k in chosen], axis=0)
         chosen.append(int(np.argmax(nearest)))
-    return [names[k] for k in chosen]
+    return [names[steady[k]] for k in chosen]
 
 
 def split_in_time(runs: Sequence[Run]) -> tuple[list[Run], list[Run]]:

@@ -45,10 +45,11 @@ SHOWN_QUANTILES = (0.001, 0.999)
 """Violins are drawn within these; minimum and maximum are bars of their own."""
 
 
-def evaluation_text(scores: ProfileScores) -> str:
+def evaluation_text(scores: ProfileScores, profile: DriverProfile, tables: Sequence[Path]) -> str:
     """A table for the terminal."""
     lines = [
         f"{scores.profile} on {scores.hours:.2f} h of {scores.drives} drives ({scores.runs} runs), seed {scores.seed}",
+        *([FITTED] if _fitted_on(profile, tables) else []),
         *_snippet_lines(scores.snippets),
     ]
     if scores.long_snippets is not None:
@@ -67,6 +68,11 @@ def evaluation_text(scores: ProfileScores) -> str:
         )
     lines.append(f"classifier AUC: {_auc(scores.classifier_auc)}")
     return "\n".join(lines)
+
+
+FITTED = (
+    "The profile was fitted to these drives: the scores say how well it describes them, not what it is worth on others."
+)
 
 
 def evaluation_json(scores: ProfileScores, profile: DriverProfile, tables: Sequence[Path]) -> str:
@@ -94,6 +100,8 @@ def evaluation_page(scores: ProfileScores, profile: DriverProfile, tables: Seque
             KeyFigure(f"{scores.spectrum_error:.1f} dB", "spectrum", "rms difference over the bands"),
         ],
     )
+    if _fitted_on(profile, tables):
+        page.warning(FITTED)
     page.section("Ten metrics of 10 s snippets")
     _metric_table(page, scores.snippets)
     page.figure(
@@ -102,7 +110,7 @@ def evaluation_page(scores: ProfileScores, profile: DriverProfile, tables: Seque
         f"Ten pairs of violins; mean distance {scores.evaluations[3].distances.mean:.3f}.",
     )
     if scores.long_snippets is not None:
-        page.section("Snippets of 60 s", "The same metrics over a minute: what a profile does between two curves.")
+        page.section("Snippets of 60 s", "The same over a minute: slow movement, which 10 s don't show.")
         _metric_table(page, scores.long_snippets)
     _parts_section(page, scores)
     page.section("Spectrum and memory")
@@ -265,11 +273,17 @@ def _auc(value: float | None) -> str:
     return "not computed" if value is None else f"{value:.3f}"
 
 
+def _fitted_on(profile: DriverProfile, tables: Sequence[Path]) -> bool:
+    known = set(profile.provenance.inputs.values())
+    return any(file_hash(table) in known for table in tables)
+
+
 def _provenance(scores: ProfileScores, profile: DriverProfile, tables: Sequence[Path]) -> dict[str, Any]:
     return {
         "profile": profile.name,
         "profile_sha256": profile_hash(profile),
         "inputs": {table.name: file_hash(table) for table in tables},
+        "fitted_on_these": _fitted_on(profile, tables),
         "seed": scores.seed,
         "package_version": __version__,
     }
