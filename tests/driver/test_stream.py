@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import tracemalloc
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -27,6 +28,7 @@ from xosc_lateral.driver.stream import OffsetStream
 from xosc_lateral.driver.two_level import fit_two_level
 from xosc_lateral.driver.upsampling import upsample
 from xosc_lateral.errors import DriverProfileError
+from xosc_lateral.formats.profiles import read_profile
 from xosc_lateral.segment import Segment
 
 STEP = 0.2
@@ -173,6 +175,20 @@ def test_a_saved_stream_goes_on_bit_by_bit(rate: float, stop: int) -> None:
     again = OffsetStream.from_dict(profile, saved)
     rest = [again.step(context) for context in contexts[ahead + stop :]]
     np.testing.assert_array_equal(np.concatenate([first, rest]), whole)
+
+
+@pytest.mark.parametrize("effects", [(), PACED, HIDDEN], ids=["bare", "paced", "hidden"])
+def test_shipped_profiles_stream_and_go_on_like_the_batch_call(effects: tuple[Effect, ...]) -> None:
+    profile = replace(read_profile("motorway-car"), effects=effects)
+    assert profile.model.kind == "best"
+    columns = make_contexts(500)
+    contexts = rows(columns)
+    stream = OffsetStream(profile, 9, start=0.2)
+    first = [stream.step(context) for context in contexts[:201]]
+    stream = OffsetStream.from_dict(profile, json.loads(json.dumps(stream.to_dict())))
+    rest = [stream.step(context) for context in contexts[201:]]
+    expected = sample_offsets(profile, segment(columns), 9, start=0.2)
+    np.testing.assert_allclose([*first, *rest], expected, rtol=0, atol=1e-13)
 
 
 def test_the_state_of_another_profile_is_refused() -> None:

@@ -11,6 +11,7 @@ import json
 import math
 from collections import deque
 from collections.abc import Mapping
+from dataclasses import asdict
 from typing import Any, Self
 
 import numpy as np
@@ -335,6 +336,7 @@ class _Movement:
             effect.running(np.random.default_rng(child(seed, 1, index))) for index, effect in enumerate(hidden)
         ]
         self._core: CoreStream | None = None
+        self._begun: Start | None = None
         self.paced = False
         self._row = 0
         self._terms = EffectTerms()
@@ -347,20 +349,24 @@ class _Movement:
         if place == 0 and self._hidden:
             self._terms = self._hidden_terms()
         terms = combine([_at(self._terms, place), *answers])
-        if self._core is None:
-            self._core = self._model.stream(child(self._seed, 0), _start(start, width, terms))
-            self._mean = self._core.mean
+        core = self._core or self._begin(_start(start, width, terms))
         if self.paced or terms.rate is not None:
-            coarse, fine = (float(values[0]) for values in self._core.take(1, terms.rate))
+            coarse, fine = (float(values[0]) for values in core.take(1, terms.rate))
         else:
             if place == 0:
-                self._coarse, self._fine = self._core.take(BLOCK)
+                self._coarse, self._fine = core.take(BLOCK)
             coarse, fine = float(self._coarse[place]), float(self._fine[place])
         self._row += 1
         moved = coarse if terms.spread is None else self._mean + float(terms.spread[0]) * (coarse - self._mean)
         moved = moved + (fine if terms.fine is None else float(terms.fine[0]) * fine)
         offset = moved * width
         return offset if terms.location is None else offset + float(terms.location[0])
+
+    def _begin(self, start: Start | None) -> CoreStream:
+        self._begun = start
+        self._core = self._model.stream(child(self._seed, 0), start)
+        self._mean = self._core.mean
+        return self._core
 
     def _hidden_terms(self) -> EffectTerms:
         step = self._model.step
@@ -370,6 +376,7 @@ class _Movement:
     def to_dict(self) -> dict[str, Any]:
         """Its state."""
         return {
+            "begun": None if self._begun is None else asdict(self._begun),
             "core": None if self._core is None else state_of(self._core),
             "hidden": [state_of(effect) for effect in self._hidden],
             "paced": self.paced,
@@ -382,9 +389,7 @@ class _Movement:
     def restore(self, state: Mapping[str, Any]) -> None:
         """Back to a state."""
         if state["core"] is not None:
-            self._core = self._model.stream(child(self._seed, 0))
-            restore(self._core, state["core"])
-            self._mean = self._core.mean
+            restore(self._begin(None if state["begun"] is None else Start(**state["begun"])), state["core"])
         for effect, saved in zip(self._hidden, state["hidden"], strict=True):
             restore(effect, saved)
         self.paced, self._row = state["paced"], state["row"]
