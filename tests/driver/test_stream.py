@@ -10,7 +10,9 @@ import numpy as np
 import pytest
 
 from xosc_lateral.driver.effects import (
+    EFFECTS,
     Acts,
+    ColumnEffect,
     Drift,
     Effect,
     GrowingSpread,
@@ -175,6 +177,17 @@ def test_a_saved_stream_goes_on_bit_by_bit(rate: float, stop: int) -> None:
     again = OffsetStream.from_dict(profile, saved)
     rest = [again.step(context) for context in contexts[ahead + stop :]]
     np.testing.assert_array_equal(np.concatenate([first, rest]), whole)
+
+
+def test_every_kind_of_effect_is_covered_here() -> None:
+    assert {type(effect) for effect in HIDDEN} == {kind for kind in EFFECTS if not issubclass(kind, ColumnEffect)}
+    for kind in EFFECTS:
+        if issubclass(kind, ColumnEffect):  # the stream knows their quantity, and how they all answer to it
+            assert (kind.answer, kind.strength, kind.terms) == (
+                ColumnEffect.answer,
+                ColumnEffect.strength,
+                ColumnEffect.terms,
+            )
 
 
 @pytest.mark.parametrize("effects", [(), PACED, HIDDEN], ids=["bare", "paced", "hidden"])
