@@ -76,15 +76,12 @@ class RunningCondition:
         return now is not self._last
 
     def _delayed(self, time: float) -> bool:
-        """Whether a value was true since the last look, up to `time`; the last value once all have been looked at."""
-        history = self._history
-        if self._read >= len(history):
-            return history[-1][1]
-        value = False
+        """Value at an earlier time; a true one that came and went since the last look counts, too."""
+        history, before = self._history, self._read
         while self._read < len(history) and time > history[self._read][0] - EPSILON:
-            value = value or history[self._read][1]
             self._read += 1
-        return value
+        changes = history[max(before - (self._read == before), 0) : self._read]
+        return any(value for _, value in changes)
 
 
 class RunningTrigger:
