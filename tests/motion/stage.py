@@ -249,10 +249,12 @@ def maneuvers(*events: str, actors: tuple[str, ...] = ("Ego",), count: int = 1, 
 class Stage:
     """A folder in which a test writes a road and a scenario, and plays it."""
 
-    def __init__(self, folder: Path, roads: str = STRAIGHT) -> None:
+    def __init__(self, folder: Path, roads: str | None = STRAIGHT) -> None:
         self.folder = folder
-        self.network_file = folder / "roads.xodr"
-        self.network_file.write_text(roads)
+        self.logic_file = ""
+        if roads is not None:
+            (folder / "roads.xodr").write_text(roads)
+            self.logic_file = '<LogicFile filepath="roads.xodr"/>'
 
     def play(
         self,
@@ -283,7 +285,7 @@ class Stage:
         path = self.folder / "scenario.xosc"
         path.write_text(
             f'<?xml version="1.0"?>\n<OpenSCENARIO>{_HEADER.format(minor=minor)}{declared}<CatalogLocations/>'
-            f'<RoadNetwork><LogicFile filepath="{self.network_file.name}"/>{signals}</RoadNetwork>'
+            f"<RoadNetwork>{self.logic_file}{signals}</RoadNetwork>"
             f"<Entities>{objects}</Entities><Storyboard><Init><Actions>{global_init}{privates}</Actions></Init>{act}"
             f"{(stop or when(time_is(last))).xml('StopTrigger')}</Storyboard></OpenSCENARIO>"
         )
