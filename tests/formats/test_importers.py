@@ -19,6 +19,7 @@ from xosc_lateral.formats.importers.dlr_ht import import_dlr_ht, read_tracks
 from xosc_lateral.formats.importers.lanes_from_tracks import fit_lane_centre
 from xosc_lateral.formats.importers.levelx import import_levelx
 from xosc_lateral.formats.importers.neighbours import REACH, find_neighbours
+from xosc_lateral.formats.importers.road_from_tracks import fit_reference_line
 from xosc_lateral.formats.importers.table import METADATA_KEY, Imported
 
 # ---- neighbours and cuts ---------------------------------------------------------------------------------------------
@@ -133,6 +134,23 @@ def test_a_lane_without_traffic_is_refused_with_the_count():
     s = np.arange(0, 1000, 30.0)
     with pytest.raises(NotEnoughDataError, match=r"at most 1 drives share 100 m .* 10 are needed"):
         fit_lane_centre(s, np.zeros(len(s)), np.full(len(s), 1.5), np.zeros(len(s), dtype=np.int64))
+
+
+@pytest.mark.parametrize("turn", [0.0, 100.0, 200.0, 300.0])
+def test_reference_line_runs_with_the_first_direction_whatever_its_heading(turn):
+    rng = np.random.default_rng(8)
+    rows, forward = [], []
+    for k in range(40):
+        way = 1 if k % 2 else -1
+        along = np.arange(rng.uniform(0, 300), rng.uniform(1500, 1800), 1.5)[::way]
+        rows.append(np.column_stack([along, np.full(len(along), -4.0 * way)]))
+        forward.append(np.full(len(along), way == 1))
+    angle = np.radians(turn)
+    rotation = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
+    mine = np.concatenate(forward)
+    _, s, d = fit_reference_line(np.concatenate(rows) @ rotation, mine)
+    assert np.median(np.diff(s[mine])) > 0 > np.median(np.diff(s[~mine]))
+    assert d[mine] == pytest.approx(-4.0, abs=0.01) and d[~mine] == pytest.approx(4.0, abs=0.01)
 
 
 # ---- DLR HT ----------------------------------------------------------------------------------------------------------

@@ -18,7 +18,7 @@ References
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -286,7 +286,7 @@ def _ids(column: pd.Series) -> IntArray:
     return np.nan_to_num(_first(column), nan=-1.0).astype(np.int64)
 
 
-def _rows_by_frame_and_track(tracks: pd.DataFrame):  # type: ignore[no-untyped-def]
+def _rows_by_frame_and_track(tracks: pd.DataFrame) -> Callable[[IntArray], IntArray]:
     """Function from track ids, one per row, to the row of that track at the same frame (-1: none)."""
     frame, track = tracks["frame"].to_numpy(dtype=np.int64), tracks["trackId"].to_numpy(dtype=np.int64)
     size = int(track.max()) + 2

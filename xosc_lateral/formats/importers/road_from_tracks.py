@@ -4,11 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.errors import NotEnoughDataError
+
+if TYPE_CHECKING:
+    from scipy.interpolate import BSpline
 
 FloatArray = NDArray[np.float64]
 
@@ -56,7 +60,7 @@ def fit_reference_line(xy: FloatArray, forward: NDArray[np.bool_]) -> tuple[Refe
     Parameters
     ----------
     xy : array, shape (n, 2)
-        Positions of all vehicles. [m]
+        Positions of all vehicles, sorted by vehicle and time. [m]
     forward : array of bool, shape (n,)
         True where the vehicle travels in the first direction (`s` grows with it).
 
@@ -73,7 +77,8 @@ def fit_reference_line(xy: FloatArray, forward: NDArray[np.bool_]) -> tuple[Refe
 
     middle = xy.mean(axis=0)
     axis = np.linalg.svd(xy[:: max(1, len(xy) // 20_000)] - middle, full_matrices=False)[2][0]
-    if forward.any() and (np.diff(xy[forward] @ axis)[:1000].sum() < 0):  # any sign will do; keep it the travel's
+    # Most rows follow one of the same vehicle, so the median step tells the direction of travel.
+    if forward.any() and np.median(np.diff(xy[forward] @ axis)) < 0.0:
         axis = -axis
     along, across = (xy - middle) @ axis, (xy - middle) @ np.array([-axis[1], axis[0]])
     u, v = _bin_middles(along, across, forward)
@@ -117,7 +122,7 @@ def _bin_middles(along: FloatArray, across: FloatArray, forward: NDArray[np.bool
     return along.min() + BIN_LENGTH * (np.flatnonzero(known) + 0.5), middle[known]
 
 
-def _smooth(u: FloatArray, v: FloatArray, spacing: float):  # type: ignore[no-untyped-def]
+def _smooth(u: FloatArray, v: FloatArray, spacing: float) -> BSpline[np.float64]:
     """Cubic least-squares spline with evenly spaced knots."""
     from scipy.interpolate import make_lsq_spline
 
@@ -125,7 +130,8 @@ def _smooth(u: FloatArray, v: FloatArray, spacing: float):  # type: ignore[no-un
     return make_lsq_spline(u, v, np.r_[[u[0]] * 4, inner, [u[-1]] * 4], 3)
 
 
-def _straight_outside(line, u: FloatArray, at: FloatArray) -> FloatArray:  # type: ignore[no-untyped-def]
+def _straight_outside(line: BSpline[np.float64], u: FloatArray, at: FloatArray) -> FloatArray:
+    """The line at `at`, continued straight beyond both ends of `u`."""
     inside = np.clip(at, u[0], u[-1])
     values: FloatArray = line(inside) + line.derivative()(inside) * (at - inside)
     return values
