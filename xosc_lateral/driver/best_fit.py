@@ -3,11 +3,11 @@
 1. Mean, and the variance between drivers: the covariance that is left between moments far apart in a run.
 2. Coarse movement: autoregression on the low-passed offset about the driver's (shrunken) mean, fitted to stretches that
    are weighted by how calm they are.
-3. Fine noise: what the coarse movement lacks of the offset's power spectrum, from spectra normalised likewise.
+3. Fine noise: what the coarse movement lacks of the offset's power spectrum, geometric mean over windows.
 4. Liveliness: how much more, and for how long, the power in short windows varies than it would in steady movement.
 5. Rounds of simulating: snippets of the model from the measured snippets' starts must show the same moments of log
-   standard deviation, of the offset and of its differences. What differs corrects the scales, the livelinesses, how
-   long moods last, and the correlation (indirect inference: Gourieroux, Monfort, Renault 1993).
+   standard deviation, of the offset and of its differences. What differs corrects the scales, the livelinesses and
+   their correlation (indirect inference: Gourieroux, Monfort, Renault 1993).
 
 Everything is deterministic: the simulations draw from a fixed seed.
 """
@@ -21,10 +21,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.driver.autoregression import Autoregression, fit_autoregression
-from xosc_lateral.driver.bands import BORDER, COARSE_EVERY, building_low_pass, split_bands
+from xosc_lateral.driver.bands import COARSE_EVERY, building_low_pass, split_bands
 from xosc_lateral.driver.best import BestModel
 from xosc_lateral.driver.best_batch import sample_batch
-from xosc_lateral.driver.liveliness import MAX_LAG, MEMORIES, Liveliness, autocovariance, fit_liveliness, log_power
+from xosc_lateral.driver.liveliness import MAX_LAG, Liveliness, autocovariance, fit_liveliness, log_power
 from xosc_lateral.driver.noise import NOISE_VARIANCE, ShapedNoise
 from xosc_lateral.driver.series import STEP
 from xosc_lateral.errors import NotEnoughDataError
@@ -44,10 +44,12 @@ class BestSettings:
         Over which the local variance is taken that calm stretches are told by. [s]
     n_knots : int
         Knots of the fine noise's damping.
-    n_taps : int
-        Of its kernel.
-    fine_from : float
-        The fine noise has nothing below this. [Hz]
+    n_taps, taper : int, float
+        Of its kernel: measured noise falls by five decades between 0.3 and 2.5 Hz, so nothing may leak.
+    scale_band : tuple of float
+        Frequencies at which all power is taken to be coarse. [Hz]
+    fine_from : tuple of float
+        The fine noise has nothing below the first frequency, all that the coarse movement lacks above the second. [Hz]
     spectrum_windows : tuple of float
         Lengths of spectral windows, the first that enough runs are as long as. [s]
     fine_window, coarse_window : float
@@ -60,6 +62,8 @@ class BestSettings:
         Length of the simulated snippets. [s]
     n_snippets : int
         Simulated at least, in each round.
+    pace_weight : float
+        The coarse scale is corrected by what snippets lack in pace with this weight, by what in spread with the rest.
     rounds : int
     coarse_gain, fine_gain : float
         How far a round corrects the variance of a liveliness, per missing variance of what is compared: the fine
@@ -71,8 +75,10 @@ class BestSettings:
     order: int = 16
     calm_window: float = 10.0
     n_knots: int = 51
-    n_taps: int = 51
-    fine_from: float = 0.25
+    n_taps: int = 71
+    taper: float = 5.0
+    scale_band: tuple[float, float] = (0.1, 0.3)
+    fine_from: tuple[float, float] = (0.2, 0.33)
     spectrum_windows: tuple[float, ...] = (20.0, 10.0, 5.0)
     fine_window: float = 2.0
     coarse_window: float = 5.0
@@ -80,6 +86,7 @@ class BestSettings:
     farthest: float = 120.0
     snippet: float = 10.0
     n_snippets: int = 2000
+    pace_weight: float = 0.3
     rounds: int = 8
     coarse_gain: float = 1.0
     fine_gain: float = 3.0
@@ -112,12 +119,13 @@ def fit_best(
     mean, between = _drivers(runs, drives, settings)
     bands = [split_bands(run, settings.step) for run in runs]
     coarse = _fit_coarse([slow for slow, _ in bands], _shrunken_means(runs, drives, mean, between), settings)
+    coarse, fine = _fit_spectrum(runs, coarse, settings)
     low, high = max(-0.5, float(everything.min())), min(0.5, float(everything.max()))
     model = BestModel(
         mean=mean,
         between_drivers=float(np.sqrt(between)),
         coarse=coarse,
-        fine=_fit_fine(runs, coarse, settings),
+        fine=fine,
         coarse_liveliness=Liveliness(),
         fine_liveliness=Liveliness(),
         correlation=0.0,
@@ -176,19 +184,43 @@ def _fit_coarse(slow: Sequence[FloatArray], means: Sequence[float], settings: Be
     return fit_autoregression(about, order, every=COARSE_EVERY, window=round(settings.calm_window / settings.step))
 
 
-def _fit_fine(runs: Sequence[FloatArray], coarse: Autoregression, settings: BestSettings) -> ShapedNoise:
+def _fit_spectrum(
+    runs: Sequence[FloatArray], coarse: Autoregression, settings: BestSettings
+) -> tuple[Autoregression, ShapedNoise]:
+    """Scale of the coarse movement, and fine noise that has what the coarse lacks of the measured power."""
     frequency, power = _typical_power(runs, settings)
     knots = np.linspace(0.0, 0.5, settings.n_knots)  # in cycles per sample
     kernel = building_low_pass()
     gain = np.abs(np.exp(-2j * np.pi * np.outer(knots, np.arange(len(kernel)))) @ kernel)
     coarse_power = coarse.power(knots * COARSE_EVERY) * gain**2 / COARSE_EVERY
-    measured = np.exp(np.interp(knots, frequency, np.log(np.maximum(power, 1e-30))))
-    lacking = np.where(knots >= settings.fine_from * settings.step, np.maximum(measured - coarse_power, 0.0), 0.0)
-    return ShapedNoise(np.sqrt(lacking / NOISE_VARIANCE), settings.n_taps)
+    measured = np.exp(np.interp(knots, frequency, np.log(power)))
+    hertz = knots / settings.step
+    shared = (hertz >= settings.scale_band[0]) & (hertz <= settings.scale_band[1])
+    scale = float(np.exp(np.log(measured[shared] / coarse_power[shared]).mean()))
+    lacking = np.maximum(measured - scale * coarse_power, 0.0)
+    low, high = settings.fine_from
+    rise = np.sin(0.5 * np.pi * np.clip((hertz - low) / (high - low), 0.0, 1.0)) ** 2
+    noise = _shaped(np.sqrt(lacking / NOISE_VARIANCE) * rise, settings)
+    return replace(coarse, scale=coarse.scale * np.sqrt(scale)), noise
+
+
+def _shaped(wanted: FloatArray, settings: BestSettings) -> ShapedNoise:
+    """Noise whose kernel has the wanted gain at the knots, although it is short and faded out."""
+    half = settings.n_taps // 2
+    knots = np.linspace(0.0, 0.5, len(wanted))
+    waves = np.cos(2.0 * np.pi * np.outer(knots, np.arange(-half, half + 1)))
+    noise = ShapedNoise(wanted, settings.n_taps, settings.taper)
+    for _ in range(GAIN_ROUNDS):
+        gain = np.abs(waves @ noise.kernel)
+        ratio = np.where(wanted > 0.0, wanted / np.maximum(gain, 1e-30), 1.0)
+        noise = replace(noise, damping=noise.damping * np.clip(ratio, 0.5, 2.0))
+    return noise
 
 
 def _typical_power(runs: Sequence[FloatArray], settings: BestSettings) -> tuple[FloatArray, FloatArray]:
-    """Power spectrum of steady movement: windows count alike on either side of the border, however lively.
+    """Power spectrum of steady movement: geometric means over windows, so that lively ones don't outweigh the others.
+
+    (A periodogram's logarithm lies on average Euler's constant below that of the power.)
 
     Returns
     -------
@@ -210,12 +242,8 @@ def _typical_power(runs: Sequence[FloatArray], settings: BestSettings) -> tuple[
             powers.append(np.abs(np.fft.rfft((pieces - pieces[:, :1] - slope) * taper, axis=1)) ** 2)
     power = np.concatenate(powers)
     frequency = np.fft.rfftfreq(size)
-    above = frequency > BORDER * settings.step
-    typical = np.empty(len(frequency))
-    for side in (above, ~above):
-        strength = power[:, side].mean(axis=1, keepdims=True) + 1e-30
-        typical[side] = (power[:, side] / strength).mean(axis=0) * np.exp(np.log(strength).mean())
-    return np.asarray(frequency, dtype=np.float64), typical
+    typical = np.exp(np.log(power + 1e-30).mean(axis=0) + np.euler_gamma)
+    return np.asarray(frequency, dtype=np.float64), np.asarray(typical)
 
 
 def _with_liveliness(
@@ -264,35 +292,40 @@ def _matched(model: BestModel, runs: Sequence[FloatArray], settings: BestSetting
 def _moments(snippets: FloatArray) -> FloatArray:
     """What snippets are compared by, from the logarithms of three standard deviations of each.
 
-    Mean and variance of that of the offset, the same of that of its second difference, the covariance of the two, and
-    the variance of that of the first difference.
+    Mean and variance of that of the offset (spread), of its first difference (pace) and of its second difference
+    (roughness), and the covariance of spread and roughness.
     """
     spread, pace, rough = (np.log(np.diff(snippets, k, axis=1).std(axis=1) + 1e-12) for k in range(3))
-    return np.array([spread.mean(), spread.var(), rough.mean(), rough.var(), np.cov(spread, rough)[0, 1], pace.var()])
+    spreads = (part for series in (spread, pace, rough) for part in (series.mean(), series.var()))
+    return np.array([*spreads, np.cov(spread, rough)[0, 1]])
 
 
 def _corrected(model: BestModel, lacks: FloatArray, settings: BestSettings) -> BestModel:
+    """The model with each parameter moved against what its moment lacks."""
     coarse, fine = model.coarse_liveliness, model.fine_liveliness
+    spread_mean, spread_variance, pace_mean, pace_variance, rough_mean, rough_variance, covariance = lacks
+    larger = np.exp((1.0 - settings.pace_weight) * spread_mean + settings.pace_weight * pace_mean)
+    # Calm and lively snippets differ in spread and in pace; one variance has to serve both, so it meets them half-way.
     factors = [
         float(np.clip(1.0 + gain * lack / max(part.total, 0.02), 0.5, 2.0))
-        for gain, lack, part in ((settings.coarse_gain, lacks[1], coarse), (settings.fine_gain, lacks[3], fine))
+        for gain, lack, part in (
+            (settings.coarse_gain, 0.5 * (spread_variance + pace_variance), coarse),
+            (settings.fine_gain, rough_variance, fine),
+        )
     ]
-    # The offset's spread averages over a snippet, its pace over moments: how they differ tells how long moods last.
-    memory = coarse.memory * float(np.exp(np.clip(MEMORY_PER_VARIANCE * (lacks[5] - lacks[1]), -0.5, 0.5)))
-    coarse = replace(coarse, memory=float(np.clip(memory, MEMORIES[0], MEMORIES[-1])))
     both = max(np.sqrt(coarse.total * fine.total), 0.02)
     return replace(
         model,
-        coarse=Autoregression(model.coarse.coefficients, model.coarse.scale * float(np.exp(lacks[0]))),
-        fine=ShapedNoise(model.fine.damping * float(np.exp(lacks[2])), model.fine.n_taps),
+        coarse=Autoregression(model.coarse.coefficients, model.coarse.scale * float(larger)),
+        fine=replace(model.fine, damping=model.fine.damping * float(np.exp(rough_mean))),
         coarse_liveliness=coarse.scaled(factors[0]),
         fine_liveliness=fine.scaled(factors[1]),
-        correlation=float(np.clip(model.correlation + lacks[4] / both, 0.0, 0.95)),
+        correlation=float(np.clip(model.correlation + covariance / both, 0.0, 0.95)),
     )
 
 
-MEMORY_PER_VARIANCE = 10.0
-"""Change of the logarithm of the memory per missing variance of the log pace. [-]"""
+GAIN_ROUNDS = 20
+"""Rounds in which the damping is corrected for what the kernel's window does to it. [-]"""
 
 DIGITS = 9
 """Significant digits kept of a fitted number: what differs beyond is the processor's rounding. [-]"""
@@ -312,7 +345,7 @@ def _rounded(model: BestModel) -> BestModel:
         mean=tidy(model.mean),
         between_drivers=tidy(model.between_drivers),
         coarse=Autoregression(tidy_all(model.coarse.coefficients), tidy(model.coarse.scale)),
-        fine=ShapedNoise(tidy_all(model.fine.damping), model.fine.n_taps),
+        fine=replace(model.fine, damping=tidy_all(model.fine.damping)),
         coarse_liveliness=tidy_part(model.coarse_liveliness),
         fine_liveliness=tidy_part(model.fine_liveliness),
         correlation=tidy(model.correlation),

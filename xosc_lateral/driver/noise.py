@@ -39,6 +39,8 @@ class ShapedNoise:
         Damping at frequencies evenly spaced from 0 to half the sampling rate; >= 0. [lane widths]
     n_taps : int
         Length of the kernel, odd.
+    taper : float
+        Shape of the Kaiser window that the kernel is faded out by; 0: cut off, as in the paper. [-]
 
     Raises
     ------
@@ -48,6 +50,7 @@ class ShapedNoise:
 
     damping: FloatArray
     n_taps: int = KERNEL_TAPS
+    taper: float = 0.0
 
     def __post_init__(self) -> None:
         """Check, copy and freeze."""
@@ -64,7 +67,8 @@ class ShapedNoise:
         """Inverse transform of the damping function: real, symmetric about its middle, shape (n_taps,)."""
         frequency = np.arange(self.n_taps // 2 + 1) * 2.0 / self.n_taps  # in units of half the sampling rate
         damping = np.interp(frequency, np.linspace(0.0, 1.0, len(self.damping)), self.damping)
-        return np.asarray(np.roll(np.fft.irfft(damping, self.n_taps), self.n_taps // 2))
+        kernel = np.roll(np.fft.irfft(damping, self.n_taps), self.n_taps // 2)
+        return np.asarray(kernel * np.kaiser(self.n_taps, self.taper))
 
 
 def fit_shaped_noise(
