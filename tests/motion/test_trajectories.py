@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from math import cos, pi, sin
 from pathlib import Path
 
@@ -231,9 +230,3 @@ def test_a_nurbs_curve_is_driven(tmp_path: Path) -> None:
     assert motion.x[row(motion, 3.0)] == pytest.approx(40.0, abs=1.0)
     assert motion.y[row(motion, 3.0)] == pytest.approx(20.0, abs=1.0)
     assert np.hypot(np.diff(motion.x), np.diff(motion.y))[2:].max() < 0.7
-
-
-def test_knots_that_span_nothing_are_refused(tmp_path: Path) -> None:
-    way = re.sub('<Knot value="[^"]*"/>', '<Knot value="1"/>', nurbs((0, 0, 0), (2, 40, 0), (4, 40, 40)))
-    with pytest.raises(PlaybackError, match="knots"):
-        Stage(tmp_path).play(maneuvers(event(follow(way))), start=EGO)

@@ -82,6 +82,9 @@ class _Player:
         for element in self.init:
             element.start()
         self.root.start()
+        if run.derives_motion:
+            for state in run.entities:
+                _derive_motion(state, 0.0, height=run.derives_height)
         going = self._frame(0.0)
         self._write(0.0)
         last = time_limit - 0.5 * self.step_size

@@ -50,12 +50,17 @@ def prepare(content: RelativeClearanceCondition, run: Run) -> EntityCheck:
             return False
         return any(
             info.type in DRIVING
-            and in_range(info.id - state.lane)
+            and in_range(_lanes_between(state.lane, info.id))
             and (content.opposite_lanes or info.id * state.lane > 0)
             for info in run.network.lanes_at(state.road, state.s)
         )
 
     return check
+
+
+def _lanes_between(lane: int, other: int) -> int:
+    difference = other - lane
+    return difference - (1 if difference > 0 else -1) if lane * other < 0 else difference
 
 
 def _gap(run: Run, state: EntityState, other: EntityState, reach: float, *, freespace: bool) -> RoadGap | None:

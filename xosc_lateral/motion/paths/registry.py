@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from math import inf, nan
@@ -130,10 +129,6 @@ def _nurbs(shape: Nurbs, layout: Layout) -> Path:
         pose = _pose(point.position, layout.run)
         controls.append(Control(pose.x, pose.y, point.weight, nan if point.time is None else point.time))
     _check_times([control.time for control in controls], "control point", layout.place)
-    if any(b < a for a, b in itertools.pairwise(knots)) or not knots[-1] > knots[0]:
-        raise _error("the knots of a NURBS curve must not decrease, and the last must be above the first", layout.place)
-    if not all(control.weight > 0.0 for control in controls):
-        raise _error("the weights of the control points of a NURBS curve must be above 0", layout.place)
     return NurbsPath(controls, knots, shape.order)
 
 

@@ -32,12 +32,22 @@ def project(reference: str | None, latitude: float, longitude: float) -> tuple[f
             "the road network has no geoReference with a PROJ string: geographic positions have no place"
         )
     given = _settings(reference)
-    kind = given.get("proj", "")
+    try:
+        return _project(given, latitude, longitude)
+    except ProjectionError:
+        raise
+    except (KeyError, ValueError, ZeroDivisionError) as error:
+        raise ProjectionError(f"the road network's geoReference '{reference.strip()}' is not usable: {error}") from error
+
+
+def _project(given: dict[str, str], latitude: float, longitude: float) -> tuple[float, float]:
+    kind = given["proj"]
     if kind == "utm":
         zone = int(given["zone"])
         given |= {
             "lon_0": str(6 * zone - 183),
             "k": str(_UTM_SCALE),
+            "lat_0": "0",
             "x_0": str(_UTM_EASTING),
             "y_0": str(_UTM_SOUTH if "south" in given else 0.0),
         }
