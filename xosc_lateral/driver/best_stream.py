@@ -283,7 +283,7 @@ def interpolate(steps: FloatArray) -> FloatArray:
     n = len(steps) - len(table) + 1
     if worth_compiling(n):
         result = np.empty(n * COARSE_EVERY)
-        _interpolate_loop(n, (steps, table.reshape(-1), COARSE_EVERY), (result,))
+        _interpolate_compiled()(steps, table, result)
         return result
     blocks = steps[:n, None] * table[0]
     for k in range(1, len(table)):
@@ -291,14 +291,23 @@ def interpolate(steps: FloatArray) -> FloatArray:
     return np.asarray(blocks.reshape(-1))
 
 
-def _interpolate_body(steps, table, every, result):  # type: ignore[no-untyped-def]
-    width = len(table) // every
-    for t in range(len(result) // every):
+def _interpolate_body(steps, table, result):  # type: ignore[no-untyped-def]
+    width, every = table.shape
+    block = 512
+    out = np.empty(block)
+    for first in range(0, len(steps) - width + 1, block):
+        n = min(block, len(steps) - width + 1 - first)
         for p in range(every):
-            result[t * every + p] = steps[t] * table[p]
-        for k in range(1, width):
-            for p in range(every):
-                result[t * every + p] += steps[t + k] * table[k * every + p]
+            at = steps[first : first + n]
+            for i in range(n):
+                out[i] = at[i] * table[0, p]
+            for k in range(1, width):
+                weight = table[k, p]
+                at = steps[first + k : first + k + n]
+                for i in range(n):
+                    out[i] += at[i] * weight
+            for i in range(n):
+                result[(first + i) * every + p] = out[i]
 
 
-_interpolate_loop = Loop(_interpolate_body)
+_interpolate_compiled = Loop(_interpolate_body).compiled

@@ -122,15 +122,19 @@ def _convolve_body(values, kernel, result):  # type: ignore[no-untyped-def]
     block = 512  # stays in the first-level cache through all taps
     for first in range(0, len(result), block):
         last = min(first + block, len(result))
-        for i in range(first, last):
-            result[i] = kernel[half] * values[i + half]
+        out = result[first:last]
+        middle = values[first + half : last + half]
+        for i in range(last - first):
+            out[i] = kernel[half] * middle[i]
         for k in range(half):
             weight = kernel[k]
-            for i in range(first, last):
-                result[i] += weight * (values[i + k] + values[i + taps - 1 - k])
+            before = values[first + k : last + k]
+            behind = values[first + taps - 1 - k : last + taps - 1 - k]
+            for i in range(last - first):  # slices, so that the compiler sees plain indices and vectorises
+                out[i] += weight * (before[i] + behind[i])
 
 
-_convolve_loop = Loop(_convolve_body)
+_convolve_compiled = Loop(_convolve_body).compiled
 
 
 def convolve(values: FloatArray, kernel: FloatArray) -> FloatArray:
@@ -141,7 +145,7 @@ def convolve(values: FloatArray, kernel: FloatArray) -> FloatArray:
     n = len(values) - len(kernel) + 1
     if worth_compiling(n):
         result = np.empty(n)
-        _convolve_loop(n, (values, kernel), (result,))
+        _convolve_compiled()(values, kernel, result)
         return result
     half = len(kernel) // 2
     result = kernel[half] * values[half : half + n]
