@@ -14,7 +14,7 @@ from xosc_lateral.driver.kinds import ModelKind
 from xosc_lateral.driver.profile import DriverProfile, Provenance
 from xosc_lateral.driver.series import Drive
 from xosc_lateral.errors import NotEnoughDataError
-from xosc_lateral.loop.findings import Finding, describe_finding, memory_finding
+from xosc_lateral.loop.findings import Finding, describe_finding, helps, memory_finding
 from xosc_lateral.loop.memory import Memory, test_memory
 from xosc_lateral.loop.movement import Coarse, Fitted, Terms, fit_movement
 from xosc_lateral.loop.residual import Cells, cells_of, error_between, expected, floor_of, own_runs
@@ -22,7 +22,7 @@ from xosc_lateral.loop.scorecard import Scorecard, score_runs
 from xosc_lateral.loop.sizing import Sized, size_effects
 from xosc_lateral.loop.strip import effects_share, stripped_runs
 from xosc_lateral.loop.timeline import COARSE, Timeline, coarse_all, join_drives
-from xosc_lateral.loop.trace import Trace, trace_effects
+from xosc_lateral.loop.trace import Trace, trace_effects, without
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
@@ -142,31 +142,18 @@ def close_loop(
         progress=lambda what: progress(0.1, what),
     )
     refined_kind = ModelKind.BEST if memory.found and kind is ModelKind.TWO_LEVEL else kind
-    progress(0.6, "refitting")
-    sized = size_effects(coarse, trace.final)
-    refined = _fit(timeline, coarse, trace.final, sized, everything, refined_kind, name, provenance)
-    progress(0.7, "scoring held-out blocks")
     blocks = hold_out_blocks(timeline)
-    fixed = base if given else None
-    runs_before, runs_after = _held_out_runs(
-        timeline,
-        coarse,
-        trace,
-        blocks,
-        fixed,
-        kind,
-        refined_kind,
-        root,
-        lambda share, what: progress(0.7 + 0.25 * share, what),
-    )
-    cells = cells_of(timeline, _quantities(coarse, trace, sized))
-    real = cells.describe(timeline.offset, timeline.valid)
-    before, after = expected(cells, runs_before, timeline.valid), expected(cells, runs_after, timeline.valid)
+    setting = _Setting(timeline, coarse, blocks, base if given else None, kind, refined_kind, root)
+    scored = _score(setting, trace, lambda share, what: progress(0.6 + 0.2 * share, what))
+    useless = [found for found, finding in zip(trace.found, scored.findings, strict=True) if not helps(finding)]
+    if useless:
+        trace = without(trace, useless)
+        scored = _score(setting, trace, lambda share, what: progress(0.8 + 0.15 * share, what))
+    progress(0.95, "refitting on everything")
+    refined = _fit(timeline, coarse, trace.final, scored.sized, everything, refined_kind, name, provenance)
+    cells, real, before, after = scored.cells, scored.real, scored.before, scored.after
     rng = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(9,)))
-    findings = [
-        describe_finding(found, index, coarse, trace, sized, (real, before, after))
-        for index, found in enumerate(trace.found)
-    ]
+    findings = list(scored.findings)
     if refined_kind is not kind:
         findings.append(memory_finding(memory, (real, before, after)))
     progress(1.0, "done")
@@ -186,9 +173,9 @@ def close_loop(
         error_before=error_between(real, before),
         error_after=error_between(real, after),
         floor=floor_of(cells, timeline.offset, blocks, rng),
-        scores=score_runs(timeline, runs_before, runs_after, blocks, rng),
-        runs_before=runs_before,
-        runs_after=runs_after,
+        scores=score_runs(timeline, scored.runs_before, scored.runs_after, blocks, rng),
+        runs_before=scored.runs_before,
+        runs_after=scored.runs_after,
         seed=seed,
     )
 
@@ -223,53 +210,73 @@ def hold_out_blocks(timeline: Timeline) -> IntArray:
     return blocks
 
 
-def _held_out_runs(
-    timeline: Timeline,
-    coarse: Coarse,
-    trace: Trace,
-    blocks: IntArray,
-    fixed: DriverProfile | None,
-    kind: ModelKind,
-    refined_kind: ModelKind,
-    root: np.random.SeedSequence,
-    progress: Progress,
-) -> tuple[FloatArray, FloatArray]:
+@dataclass(frozen=True, eq=False)
+class _Setting:
+    """What stays the same when findings are scored."""
+
+    timeline: Timeline
+    coarse: Coarse
+    blocks: IntArray
+    fixed: DriverProfile | None
+    kind: ModelKind
+    refined_kind: ModelKind
+    root: np.random.SeedSequence
+
+
+@dataclass(frozen=True, eq=False)
+class _Scored:
+    """Findings with their errors on held-out blocks."""
+
+    sized: Sized
+    cells: Cells
+    real: dict[str, FloatArray]
+    before: dict[str, FloatArray]
+    after: dict[str, FloatArray]
+    runs_before: FloatArray
+    runs_after: FloatArray
+    findings: list[Finding]
+
+
+def _score(setting: _Setting, trace: Trace, progress: Progress) -> _Scored:
+    timeline, coarse = setting.timeline, setting.coarse
+    sized = size_effects(coarse, trace.final)
+    runs_before, runs_after = _held_out_runs(setting, trace, progress)
+    cells = cells_of(timeline, _quantities(coarse, trace, sized))
+    real = cells.describe(timeline.offset, timeline.valid)
+    before, after = expected(cells, runs_before, timeline.valid), expected(cells, runs_after, timeline.valid)
+    compared = (real, before, after)
+    findings = [describe_finding(found, i, coarse, trace, sized, compared) for i, found in enumerate(trace.found)]
+    return _Scored(sized, cells, real, before, after, runs_before, runs_after, findings)
+
+
+def _held_out_runs(setting: _Setting, trace: Trace, progress: Progress) -> tuple[FloatArray, FloatArray]:
     """Runs of both profiles over all rows; every row comes from profiles that were fitted without its fold."""
+    blocks = setting.blocks
     composite: list[FloatArray] = [np.zeros(0), np.zeros(0)]
     folds = min(FOLDS, int(blocks.max()) + 1)
     for fold in range(folds):
         progress(fold / folds, f"held-out fold {fold + 1} of {folds}")
         held = blocks % folds == fold
         used = ~held if folds > 1 else np.ones(len(held), dtype=np.bool_)
-        profiles = _fold_profiles(timeline, coarse, trace, used, fixed, kind, refined_kind)
-        for side, profile in enumerate(profiles):
-            runs = own_runs(profile, timeline, np.random.SeedSequence(root.entropy, spawn_key=(5, side, fold)))
+        for side, profile in enumerate(_fold_profiles(setting, trace, used)):
+            seed = np.random.SeedSequence(setting.root.entropy, spawn_key=(5, side, fold))
+            runs = own_runs(profile, setting.timeline, seed)
             if not len(composite[side]):
                 composite[side] = np.zeros_like(runs)
             composite[side][:, held] = runs[:, held]
     return composite[0], composite[1]
 
 
-def _fold_profiles(
-    timeline: Timeline,
-    coarse: Coarse,
-    trace: Trace,
-    used: BoolArray,
-    fixed: DriverProfile | None,
-    kind: ModelKind,
-    refined_kind: ModelKind,
-) -> tuple[DriverProfile, DriverProfile]:
-    part = replace(
-        coarse, valid=coarse.valid & coarse_all(np.pad(used, (0, -len(used) % COARSE), mode="edge"))[: len(coarse)]
-    )
-    before = fixed
+def _fold_profiles(setting: _Setting, trace: Trace, used: BoolArray) -> tuple[DriverProfile, DriverProfile]:
+    timeline, coarse, kind = setting.timeline, setting.coarse, setting.kind
+    whole = coarse_all(np.pad(used, (0, -len(used) % COARSE), mode="edge"))
+    part = replace(coarse, valid=coarse.valid & whole[: len(coarse)])
+    before = setting.fixed
     if before is None:
-        plain = fit_movement(part, Terms())
-        before = _fit(timeline, part, plain, Sized({}), used, kind, "before", None)
-    terms = trace.final.terms
-    fitted = fit_movement(part, terms)
-    sized = size_effects(part, fitted)
-    return before, _fit(timeline, part, fitted, sized, used, refined_kind, "after", None)
+        before = _fit(timeline, part, fit_movement(part, Terms()), Sized({}), used, kind, "before", None)
+    fitted = fit_movement(part, trace.final.terms)
+    after = _fit(timeline, part, fitted, size_effects(part, fitted), used, setting.refined_kind, "after", None)
+    return before, after
 
 
 def _fit(
@@ -324,6 +331,6 @@ def _in_words(timeline: Timeline, blocks: IntArray) -> str:
         return f"{number} drives in {folds} folds: every drive is scored by profiles fitted on the other folds' drives"
     return (
         f"{number} blocks of about {BLOCK_S:g} s in {folds} folds: every block is scored by profiles whose base model "
-        "and effect sizes were fitted on the other folds; which effects there are was decided on all blocks, its chance of "
-        "error is the p-value"
+        "and effect sizes were fitted on the other folds; which effects there are was decided on all blocks, the chance "
+        "of error of which is the p-value"
     )

@@ -22,6 +22,7 @@ KINDS = {
     "location": "location",
     "scale": "scale",
     "fine": "scale",
+    "slow": "scale",
     "dynamics": "dynamics",
     "growth": "scale",
     "regime": "regime",
@@ -92,6 +93,11 @@ def describe_finding(
     return _of_nothing(found, sized, compared)
 
 
+def helps(finding: Finding) -> bool:
+    """Whether the effect brings its own error down on blocks that it was not fitted on."""
+    return finding.error_after < finding.error_before
+
+
 def memory_finding(memory: Memory, compared: Compared) -> Finding:
     """The core model is replaced: the first-order chain forgets too fast."""
     worst = int(np.argmax(np.abs(np.log(memory.ratio))))
@@ -125,9 +131,13 @@ def _of_columns(found: Found, key: str, coarse: Coarse, group: tuple[Effect, ...
     error = abs(strength) * relative * (1.0 if on_mean else size)
     cell = f"{'mean' if on_mean else 'spread'} by effect: {key}"
     before, after = _errors(compared, cell)
-    what = {"location": "mean offset", "scale": "spread", "dynamics": "restoring strength", "fine": "fine noise"}[
-        found.look
-    ]
+    what = {
+        "location": "mean offset",
+        "scale": "spread",
+        "dynamics": "restoring strength",
+        "fine": "fine noise",
+        "slow": "spread",
+    }[found.look]
     return Finding(
         effect=f"{what} by {_words(effect)}",
         kind=KINDS[found.look],

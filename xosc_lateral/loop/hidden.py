@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.loop.chance import LEAST, tail_probability
+from xosc_lateral.loop.looks import slow_rows, standardised
 from xosc_lateral.loop.movement import DRIFT_TERMS, MIN_DRIFT_S, Coarse, Fitted, elapsed, squared_innovations
 from xosc_lateral.loop.noise import Whitener, fit_autoregression
 
@@ -17,7 +18,7 @@ BoolArray = NDArray[np.bool_]
 MEMORIES = (6.0, 15.0, 40.0)
 """Lengths of regimes that are looked for. [s]"""
 
-SHORTEST = 5
+SHORTEST = 8
 """Loudness that comes and goes faster is how people steer, by a correction now and then, and no regime. [s]"""
 
 PERIODS = (4.0, 60.0)
@@ -41,7 +42,7 @@ EDGE_S, STEP_GRID_S = 60, 15
 UNREMARKABLE = 6.0
 """A wander with a lower score is not compared with simulated drives: chance gives it in every few. [chi-square]"""
 
-N_SIMULATED = 300
+N_SIMULATED = 400
 """Drives without drift or step, of the same movement, that the drift look is compared with."""
 
 SLOW_BAND = (50.0, 600.0)
@@ -108,14 +109,23 @@ class Wander:
 
 def find_growth(coarse: Coarse, fitted: Fitted) -> Growth:
     """Regress the squared innovations on time; clustered seconds count for less (Newey-West over 2 min)."""
+    return _growth(coarse, squared_innovations(fitted.rows, coarse.valid), coarse.valid)
+
+
+def find_slow_growth(coarse: Coarse, fitted: Fitted) -> Growth:
+    """The same for the slower movement."""
+    slow = slow_rows(coarse, fitted)
+    return _growth(coarse, standardised(slow.squares, slow.valid), slow.valid)
+
+
+def _growth(coarse: Coarse, squares: FloatArray, valid: BoolArray) -> Growth:
     from scipy.stats import norm
 
-    squares = squared_innovations(fitted.rows, coarse.valid)
-    time = np.where(coarse.valid, elapsed(coarse), 0.0)
-    time = time - np.where(coarse.valid, time[coarse.valid].mean(), 0.0)
+    time = np.where(valid, elapsed(coarse), 0.0)
+    time = time - np.where(valid, time[valid].mean(), 0.0)
     slope = float(time @ squares) / float(time @ time)
-    left = np.where(coarse.valid, squares - slope * time, 0.0)
-    inflation = 1.0 + 2.0 * sum((1.0 - lag / 121.0) * _correlation(left, coarse.valid, lag) for lag in range(1, 121))
+    left = np.where(valid, squares - slope * time, 0.0)
+    inflation = 1.0 + 2.0 * sum((1.0 - lag / 121.0) * _correlation(left, valid, lag) for lag in range(1, 121))
     z = slope * np.sqrt(float(time @ time)) / np.sqrt(max(inflation, 1.0))
     return Growth(z, max(2.0 * float(norm.sf(abs(z))), LEAST))
 

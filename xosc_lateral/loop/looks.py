@@ -11,13 +11,13 @@ References
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
 
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.loop.movement import CLIP, Coarse, Fitted, squared_innovations
+from xosc_lateral.loop.movement import CLIP, Coarse, Fitted, elapsed, squared_innovations
 from xosc_lateral.loop.noise import fit_autoregression, moving_sum, positions_in_stretch
 from xosc_lateral.loop.scan import Rows
 from xosc_lateral.loop.timeline import COARSE, coarse_all, coarse_mean
@@ -34,6 +34,13 @@ PULL_S = 3.0
 FINE_ORDER = 15
 """Past samples (3 s) that the fine movement's autoregression sees."""
 
+SLOW_S = 8
+"""Whitened seconds that are averaged for the slower movement: below 1/16 Hz. [s]"""
+
+KERNELS = ((-3.0, 2.0), (-1.5, 1.0), (1.5, 1.0), (3.0, 2.0), (0.0, 0.3), (0.0, 6.0))
+"""Lags added and response times set [s], to stand for what a response fitted as a first-order lag leaves of its effect:
+without them the rest would be blamed on whatever resembles the quantity."""
+
 NEUTRAL_FILTER = np.ones(1)
 
 
@@ -44,6 +51,7 @@ class Look(Enum):
     SPREAD = "scale"
     PACE = "dynamics"
     FINE = "fine"
+    SLOW = "slow"
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -70,6 +78,9 @@ def look_rows(look: Look, coarse: Coarse, fitted: Fitted) -> Rows:
     if look is Look.SPREAD:
         squares = squared_innovations(fitted.rows, coarse.valid)
         return _plain(squares, coarse.valid, fitted.scale_columns)
+    if look is Look.SLOW:
+        slow = slow_rows(coarse, fitted)
+        return _plain(standardised(slow.squares, slow.valid), slow.valid, slow_columns(coarse, fitted))
     fine = fine_rows(coarse, fitted)
     known = fitted.terms.regime_scale
     # an effect on the mean is followed with errors of its own, the larger the more it moves the car
@@ -98,6 +109,41 @@ def fine_rows(coarse: Coarse, fitted: Fitted, *, raw: bool = False) -> FineRows:
     return FineRows(np.where(valid, (mean - centre) / max(deviation, 1e-12), 0.0), valid)
 
 
+def slow_rows(coarse: Coarse, fitted: Fitted) -> FineRows:
+    """Clipped squares of the slower movement, whitened, variance 1."""
+    sums = moving_sum(np.ones(SLOW_S), fitted.rows)
+    count = moving_sum(np.ones(SLOW_S), coarse.valid.astype(np.float64))
+    valid = coarse.valid & (count >= SLOW_S - 0.5)
+    slow = np.where(valid, sums, 0.0)
+    deviation = float(slow[valid].std()) if valid.any() else 1.0
+    return FineRows(np.where(valid, np.minimum((slow / max(deviation, 1e-12)) ** 2, CLIP), 0.0), valid)
+
+
+def slow_columns(coarse: Coarse, fitted: Fitted) -> FloatArray:
+    """What is known of the slower movement's spread, shape (n, k)."""
+    columns = [fitted.scale_columns, *(coarse.answer(effect) for effect in fitted.terms.slow)]
+    if fitted.terms.slow_growth:
+        columns.append(elapsed(coarse)[:, None])
+    if fitted.terms.regime_scale is not None:
+        columns.append(fitted.terms.regime_scale[:, None])
+    return np.concatenate(columns, axis=1)
+
+
+def standardised(squares: FloatArray, valid: BoolArray) -> FloatArray:
+    """Mean 0 and variance 1 over the valid rows, 0 elsewhere."""
+    return np.where(valid, (squares - squares[valid].mean()) / max(float(squares[valid].std()), 1e-12), 0.0)
+
+
+def kernel_terms(coarse: Coarse, fitted: Fitted) -> FloatArray:
+    """Every location effect's quantity at other lags and response times, shape (n, k)."""
+    variants = [
+        coarse.answer(replace(effect, lag_s=effect.lag_s + lag, response_s=response))
+        for effect in fitted.terms.location
+        for lag, response in KERNELS
+    ]
+    return np.concatenate(variants, axis=1) if variants else np.zeros((len(coarse), 0))
+
+
 def pull(coarse: Coarse, fitted: Fitted) -> FloatArray:
     """Recent movement before each second, unit variance: what the driver steers back from; 0 where unknown."""
     from scipy.signal import lfilter
@@ -119,7 +165,8 @@ def _location(coarse: Coarse, fitted: Fitted) -> Rows:
         if groups <= FEW_DRIVES
         else np.zeros((len(coarse), 0))
     )
-    terms = whitener.white(np.concatenate([fitted.location_columns, own], axis=1)) * settled[:, None]
+    known = np.concatenate([fitted.location_columns, kernel_terms(coarse, fitted), own], axis=1)
+    terms = whitener.white(known) * settled[:, None]
     basis = _orthonormal(terms) if terms.shape[1] else terms
     rows = np.where(settled, fitted.rows, 0.0)
     rows = rows - basis @ (basis.T @ rows)

@@ -120,7 +120,8 @@ class Terms:
 
     Parameters
     ----------
-    location, spread, pace, fine : tuple of ColumnEffect
+    location, spread, pace, fine, slow : tuple of ColumnEffect
+        `slow` act on the spread of the slower movement only: more is let pass, but what is done is done as always.
     weave : float, optional
         Frequency of a swing. [1/s]
     weave_width : int
@@ -129,8 +130,8 @@ class Terms:
         Coarse row at which the mean jumps.
     drift : bool
         Whether slow drift is taken out.
-    growth : bool
-        Whether the spread changes steadily with time.
+    growth, slow_growth : bool
+        Whether the spread, or that of the slower movement only, changes steadily with time.
     order : int
         Of the autoregression.
     regime_scale : array, shape (n,), optional
@@ -141,11 +142,13 @@ class Terms:
     spread: tuple[ColumnEffect, ...] = ()
     pace: tuple[ColumnEffect, ...] = ()
     fine: tuple[ColumnEffect, ...] = ()
+    slow: tuple[ColumnEffect, ...] = ()
     weave: float | None = None
     weave_width: int = 1
     step_at: int | None = None
     drift: bool = False
     growth: bool = False
+    slow_growth: bool = False
     order: int = ORDER
     regime_scale: FloatArray | None = None
 

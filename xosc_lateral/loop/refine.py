@@ -11,7 +11,16 @@ from numpy.typing import NDArray
 
 from xosc_lateral.driver.effects import ColumnEffect, Linear, Piecewise, Saturating, Threshold
 from xosc_lateral.loop.candidates import COST_SHAPE, Candidate
-from xosc_lateral.loop.looks import Look, fine_rows, pull
+from xosc_lateral.loop.looks import (
+    SLOW_S,
+    Look,
+    fine_rows,
+    kernel_terms,
+    pull,
+    slow_columns,
+    slow_rows,
+    standardised,
+)
 from xosc_lateral.loop.movement import CLIP, Coarse, Fitted, squared_innovations
 from xosc_lateral.loop.scan import Scan, as_one_degree
 from xosc_lateral.loop.sizing import log_sizes
@@ -88,18 +97,24 @@ def target_of(look: Look, coarse: Coarse, fitted: Fitted) -> Target:
     ones = np.ones((len(coarse), 1))
     if look is Look.LOCATION:
         whitener = fitted.whitener
-        return _target(fitted.rows, whitener.rows, whitener.rows(fitted.location_columns))
+        known_terms = np.concatenate([fitted.location_columns, kernel_terms(coarse, fitted)], axis=1)
+        return _target(fitted.rows, whitener.rows, whitener.rows(known_terms))
     if look is Look.PACE:
         recent = pull(coarse, fitted)[:, None]
-        known = [ones, *(coarse.answer(effect) for effect in fitted.terms.pace)]
+        paces = [ones, *(coarse.answer(effect) for effect in fitted.terms.pace)]
         rows = np.where(coarse.valid, fitted.rows, 0.0)
-        return _target(rows, lambda answer: answer * recent, np.concatenate(known, axis=1) * recent)
+        return _target(rows, lambda answer: answer * recent, np.concatenate(paces, axis=1) * recent)
+    known = fitted.scale_columns
     if look is Look.SPREAD:
         squares, valid = squared_innovations(fitted.rows, coarse.valid), coarse.valid
+    elif look is Look.SLOW:
+        slow = slow_rows(coarse, fitted)
+        squares, valid = standardised(slow.squares, slow.valid), slow.valid
+        known = slow_columns(coarse, fitted)
     else:
         fine = fine_rows(coarse, fitted)
         squares, valid = fine.squares, fine.valid
-    known_columns = np.concatenate([ones, fitted.scale_columns], axis=1) * valid[:, None]
+    known_columns = np.concatenate([ones, known], axis=1) * valid[:, None]
     return _target(squares, lambda answer: answer * valid[:, None], known_columns)
 
 
@@ -117,7 +132,7 @@ def refine(
     contenders = sorted({best, *_contenders(candidates, result, usable)})
     refined = [_refined(coarse, target, candidates[index], float(result.lag[index])) for index in contenders]
     refined += _bent(coarse, target, max(refined, key=lambda scored: scored[1])[0])
-    if look in (Look.SPREAD, Look.FINE):
+    if look in (Look.SPREAD, Look.SLOW, Look.FINE):
         refined = _by_likelihood(coarse, look, fitted, refined)
     refined.sort(key=lambda scored: -scored[1])
     winner, score = refined[0]
@@ -189,15 +204,17 @@ def _by_likelihood(
     if look is Look.SPREAD:
         squares, valid = np.minimum(fitted.rows**2, CLIP), coarse.valid
     else:
-        fine = fine_rows(coarse, fitted, raw=True)
-        squares, valid = fine.squares, fine.valid
+        seconds = slow_rows(coarse, fitted) if look is Look.SLOW else fine_rows(coarse, fitted, raw=True)
+        squares, valid = seconds.squares, seconds.valid
+    # neighbouring averages of slow rows overlap: they count once in so many
+    apart = SLOW_S if look is Look.SLOW else 1
     scored = []
     for candidate, _ in refined:
         answer = coarse.answer(candidate.effect)
         log_scale = (answer @ log_sizes(squares, valid, answer)[0])[valid]
         inside = squares[valid]
         level = float(np.mean(inside / np.exp(2.0 * log_scale)))
-        gain = float(np.sum(np.log(inside.mean()) - np.log(level) - 2.0 * log_scale))
+        gain = float(np.sum(np.log(inside.mean()) - np.log(level) - 2.0 * log_scale)) / apart
         scored.append(
             (candidate, float(as_one_degree(np.array([max(gain, 0.0)]), answer.shape[1])[0]) - candidate.cost)
         )

@@ -183,7 +183,7 @@ def _binned(values: FloatArray, valid: BoolArray) -> tuple[IntArray, FloatArray]
     seen = values[valid]
     edges = np.unique(np.quantile(seen, np.linspace(0.0, 1.0, N_BINS + 1)[1:-1]))
     label = np.searchsorted(edges, values, side="right")
-    if len(edges) and float(np.mean(seen > edges[-1])) < 0.01:
+    if len(edges) and float(np.mean(seen >= edges[-1])) < 0.01:
         label = np.minimum(label, len(edges) - 1)
     used, label = np.unique(label, return_inverse=True)
     middle = np.array(

@@ -18,7 +18,7 @@ from xosc_lateral.driver.effects import (
     Step,
     Weave,
 )
-from xosc_lateral.loop.looks import FineRows, fine_rows, pull
+from xosc_lateral.loop.looks import SLOW_S, FineRows, fine_rows, pull, slow_rows
 from xosc_lateral.loop.movement import DRIFT_TERMS, Coarse, Fitted, Terms, elapsed, fit_movement
 from xosc_lateral.loop.regimes import fit_regimes
 
@@ -174,8 +174,30 @@ def _scale_effects(coarse: Coarse, fitted: Fitted, fine: FineRows | None) -> dic
         found[f"fine {index}"] = _fine_twin(coarse, effect, fine, always=True)
     if terms.growth:
         found["growth"] = (_growth(coarse, float(fitted.scale_sizes[at]), float(errors[at]), fine),)
+    if terms.slow or terms.slow_growth:
+        found |= _slow_effects(coarse, fitted)
     if terms.regime_scale is not None:
         found["regime"] = (_regimes(coarse, fitted, fine),)
+    return found
+
+
+def _slow_effects(coarse: Coarse, fitted: Fitted) -> dict[str, tuple[Effect, ...]]:
+    """Spread of the slower movement, all jointly; neighbouring averages overlap, so errors are wider."""
+    terms, slow = fitted.terms, slow_rows(coarse, fitted)
+    blocks = [coarse.answer(effect) for effect in terms.slow]
+    if terms.slow_growth:
+        blocks.append(elapsed(coarse)[:, None])
+    sizes, errors = log_sizes(slow.squares, slow.valid, np.concatenate(blocks, axis=1))
+    errors = errors * np.sqrt(SLOW_S)
+    found: dict[str, tuple[Effect, ...]] = {}
+    at = 0
+    for index, effect in enumerate(terms.slow):
+        width = blocks[index].shape[1]
+        own = slice(at, at + width)
+        found[f"slow {index}"] = (_sized(coarse, effect, Acts.SPREAD, sizes[own], errors[own]),)
+        at += width
+    if terms.slow_growth:
+        found["growth"] = (_growth(coarse, float(sizes[at]), float(errors[at]), None),)
     return found
 
 

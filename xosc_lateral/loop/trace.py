@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.driver.effects import Acts
+from xosc_lateral.driver.effects import Acts, ColumnEffect
 from xosc_lateral.loop.candidates import Candidate, product_candidates, single_candidates, with_responses
 from xosc_lateral.loop.chance import tail_probability
 from xosc_lateral.loop.columns import Column, known_columns
@@ -21,12 +21,13 @@ from xosc_lateral.loop.hidden import (
     find_clustering,
     find_growth,
     find_peak,
+    find_slow_growth,
     find_wander,
 )
-from xosc_lateral.loop.looks import Look, fine_rows, look_rows
+from xosc_lateral.loop.looks import Look, fine_rows, look_rows, slow_rows
 from xosc_lateral.loop.movement import Coarse, Fitted, Terms, fit_movement
 from xosc_lateral.loop.refine import refine, target_of
-from xosc_lateral.loop.regimes import regime_log_scale
+from xosc_lateral.loop.regimes import fit_regimes, regime_log_scale
 from xosc_lateral.loop.scan import ComplexArray, Scan, draw_shifts, scan, transform_answers
 from xosc_lateral.loop.sizing import log_sizes
 
@@ -34,20 +35,27 @@ FloatArray = NDArray[np.float64]
 
 LEVEL = {
     "location": 0.018,
-    "scale": 0.01,
-    "dynamics": 0.003,
+    "scale": 0.006,
+    "dynamics": 0.001,
     "fine": 0.004,
-    "growth": 0.003,
+    "slow": 0.006,
+    "growth": 0.002,
     "regime": 0.003,
     "periodic": 0.003,
-    "wander": 0.002,
+    "wander": 0.001,
 }
 """Probability of a false finding that each look may spend: 5 % together, hidden effects included."""
 
 MAX_FINDINGS = 8
 """More effects than this in one table are not looked for."""
 
-LEAST_FACTOR = {Look.SPREAD: 1.1, Look.FINE: 1.25}
+RESEMBLING, SHADOW_SHARE = 0.5, 0.15
+"""A quantity so correlated to an effect's is its shadow if it explains less than this share of what that does. [-]"""
+
+MIN_REGIME_S = 10.0
+"""Shorter regimes are none. [s]"""
+
+LEAST_FACTOR = {Look.SPREAD: 1.1, Look.SLOW: 1.1, Look.FINE: 1.25}
 """A change of the spread, or of the fine noise (a centimetre), by less is no finding, however sure. [-]"""
 
 MIN_SUPPORT_PACE = 200.0
@@ -217,6 +225,44 @@ def trace_effects(
     return Trace(coarse, found, tried, consequences, unused, columns, start, fitted)
 
 
+def without(trace: Trace, useless: Sequence[Found]) -> Trace:
+    """The trace without some of its findings, refitted; they are listed among what was tried."""
+    terms = trace.final.terms
+    for found in useless:
+        terms = _removed(terms, found)
+    kept = [found for found in trace.found if found not in useless]
+    why = "chance does not explain it, but adding it did not bring the error down on held-out blocks"
+    tried = [
+        Tried(found.look, found.candidate.columns if found.candidate else (), found.p_value, why) for found in useless
+    ]
+    final = fit_movement(trace.coarse, terms)
+    return replace(trace, found=kept, tried=[*trace.tried, *tried], final=final)
+
+
+def _removed(terms: Terms, found: Found) -> Terms:
+    if found.candidate is None:
+        neutral: dict[str, Terms] = {
+            "growth": replace(terms, growth=False, slow_growth=False),
+            "regime": replace(terms, regime_scale=None),
+            "periodic": replace(terms, weave=None),
+            "wander": replace(terms, drift=False, step_at=None),
+        }
+        return neutral[found.look]
+    columns = found.candidate.columns
+
+    def kept(effects: tuple[ColumnEffect, ...]) -> tuple[ColumnEffect, ...]:
+        return tuple(effect for effect in effects if effect.columns != columns)
+
+    by_look: dict[str, Terms] = {
+        "location": replace(terms, location=kept(terms.location)),
+        "scale": replace(terms, spread=kept(terms.spread)),
+        "dynamics": replace(terms, pace=kept(terms.pace)),
+        "fine": replace(terms, fine=kept(terms.fine)),
+        "slow": replace(terms, slow=kept(terms.slow)),
+    }
+    return by_look[found.look]
+
+
 def _search(
     coarse: Coarse, columns: list[Column], seed: np.random.SeedSequence, progress: Callable[[str], None]
 ) -> _Search:
@@ -270,7 +316,7 @@ def _column_proposals(search: _Search, fitted: Fitted) -> Iterable[_Proposal]:
     for look in Look:
         search.progress(f"columns that act on the {look.value}")
         result = scans[look] = search.scan(look, fitted)
-        usable = _usable(search, look, fitted)
+        usable = _usable(search, look, fitted) & ~_shadows(search, look, fitted, result)
         if not usable.any():
             continue
         best, statistic = _exact_best(search, look, fitted, result, usable)
@@ -317,14 +363,14 @@ def _usable(search: _Search, look: Look, fitted: Fitted) -> NDArray[np.bool_]:
         repeats = {effect.columns for effect in present}
         return np.array([candidate.columns not in repeats or candidate.cost > 0 for candidate in search.candidates])
     barred: set[str] = set()
-    for effect in (*terms.spread, *terms.pace, *terms.fine):
+    for effect in (*terms.spread, *terms.pace, *terms.fine, *terms.slow):
         barred |= set(effect.columns)
-    if look is not Look.SPREAD:
+    if look not in (Look.SPREAD, Look.SLOW):
         # how a driver gets to where an effect moves him is not wholly in the model: it looks like noise by that column
         for effect in terms.location:
             barred |= set(effect.columns)
     single = look in (Look.PACE, Look.FINE)
-    entangled = terms.growth or terms.regime_scale is not None or bool(terms.spread)
+    entangled = terms.growth or terms.slow_growth or terms.regime_scale is not None or bool(terms.spread or terms.slow)
     if look is Look.FINE and entangled:
         return np.zeros(len(search.candidates), dtype=np.bool_)
     least = MIN_SUPPORT_PACE if look is Look.PACE else 0.0
@@ -338,9 +384,31 @@ def _usable(search: _Search, look: Look, fitted: Fitted) -> NDArray[np.bool_]:
     )
 
 
+def _shadows(search: _Search, look: Look, fitted: Fitted, result: Scan) -> NDArray[np.bool_]:
+    """Candidates that resemble an effect on the mean and explain little beside it: what its shape leaves of it."""
+    shadows = np.zeros(len(search.candidates), dtype=np.bool_)
+    if look is not Look.LOCATION:
+        return shadows
+    inside, at = search.coarse.valid, 0
+    for effect in fitted.terms.location:
+        own = search.coarse.answer(effect)
+        rows = slice(at, at + own.shape[1])
+        at = rows.stop
+        sizes, covariance = fitted.location_sizes[rows], fitted.location_covariance[rows, rows]
+        explained = float(sizes @ np.linalg.pinv(covariance) @ sizes)
+        strength = (own @ sizes)[inside]
+        strength = strength / max(float(np.linalg.norm(strength)), 1e-12)
+        for index, answer in enumerate(search.answers):
+            columns = answer[inside] - answer[inside].mean(axis=0)
+            basis = np.linalg.qr(columns)[0]
+            alike = float(np.linalg.norm(basis.T @ strength))
+            shadows[index] |= alike > RESEMBLING and result.chi_square[index] < SHADOW_SHARE * explained
+    return shadows
+
+
 def _proven(search: _Search, look: Look, fitted: Fitted, result: Scan, best: int) -> Found | Tried:
     """Refine, refit with it, and take the null from what is left then."""
-    usable = _usable(search, look, fitted)
+    usable = _usable(search, look, fitted) & ~_shadows(search, look, fitted, result)
     chosen = refine(search.coarse, look, fitted, search.candidates, result, usable, best)
     candidate = chosen.candidate
     after = fit_movement(search.coarse, with_effect(fitted.terms, look, candidate))
@@ -354,8 +422,7 @@ def _proven(search: _Search, look: Look, fitted: Fitted, result: Scan, best: int
     observed = float(calibration.apply(exact, degrees)) - search.costs[best]
     p_value = tail_probability(observed, null)
     if p_value > LEVEL[look.value]:
-        why = f"chance gives as much in {100 * p_value:.2g} % of tables; {100 * LEVEL[look.value]:g} % is allowed"
-        return Tried(look.value, candidate.columns, p_value, why)
+        return _not_enough(look.value, p_value, candidate.columns)
     return Found(look.value, p_value, fitted, after, candidate, chosen.rivals)
 
 
@@ -366,8 +433,8 @@ def _factor(coarse: Coarse, look: Look, after: Fitted, candidate: Candidate) -> 
         last = len(after.scale_sizes) - (1 if after.terms.growth else 0)
         strength = answer @ after.scale_sizes[last - answer.shape[1] : last]
     else:
-        fine = fine_rows(coarse, after, raw=True)
-        strength = answer @ log_sizes(fine.squares, fine.valid, answer)[0]
+        seconds = slow_rows(coarse, after) if look is Look.SLOW else fine_rows(coarse, after, raw=True)
+        strength = answer @ log_sizes(seconds.squares, seconds.valid, answer)[0]
     low, high = np.quantile(strength[coarse.valid], [0.05, 0.95])
     if high <= low:
         low, high = strength[coarse.valid].min(), strength[coarse.valid].max()
@@ -387,7 +454,26 @@ def with_effect(terms: Terms, look: Look, candidate: Candidate) -> Terms:
         return replace(terms, spread=(*terms.spread, replace(candidate.effect, acts=Acts.SPREAD)))
     if look is Look.PACE:
         return replace(terms, pace=(*terms.pace, replace(candidate.effect, acts=Acts.RATE)))
+    if look is Look.SLOW:
+        return replace(terms, slow=(*terms.slow, replace(candidate.effect, acts=Acts.SPREAD)))
     return replace(terms, fine=(*terms.fine, replace(candidate.effect, acts=Acts.FINE)))
+
+
+def _prove_regimes(search: _Search, fitted: Fitted, clustering: Clustering) -> Found | Tried:
+    """Clusters of loud seconds count as regimes if they last."""
+    if clustering.p_value > LEVEL["regime"]:
+        return _not_enough("regime", clustering.p_value)
+    regimes = fit_regimes(fitted.rows, search.coarse.valid)
+    if min(regimes.on_s, regimes.off_s) < MIN_REGIME_S:
+        why = f"loud stretches last {regimes.on_s:.0f} s only: that is how people correct, and no regime"
+        return Tried("regime", (), clustering.p_value, why)
+    terms = replace(fitted.terms, regime_scale=regime_log_scale(search.coarse, fitted))
+    return Found("regime", clustering.p_value, fitted, fit_movement(search.coarse, terms), detail=clustering)
+
+
+def _not_enough(look: str, p_value: float, columns: tuple[str, ...] = ()) -> Tried:
+    why = f"chance gives as much in {100 * p_value:.2g} % of tables; {100 * LEVEL[look]:g} % is allowed"
+    return Tried(look, columns, p_value, why)
 
 
 def _hidden_proposals(search: _Search, fitted: Fitted, number: int) -> Sequence[_Proposal]:
@@ -399,24 +485,19 @@ def _hidden_proposals(search: _Search, fitted: Fitted, number: int) -> Sequence[
     ) -> None:
         def prove() -> Found | Tried:
             if p_value > LEVEL[look]:
-                why = f"chance gives as much in {100 * p_value:.2g} % of tables; {100 * LEVEL[look]:g} % is allowed"
-                return Tried(look, (), p_value, why)
+                return _not_enough(look, p_value)
             return Found(look, p_value, fitted, fit_movement(coarse, change()), detail=detail)
 
         proposals.append(_Proposal(look, p_value, prove))
 
     search.progress("changes with time")
-    if not terms.growth:
-        growth = find_growth(coarse, fitted)
+    if not (terms.growth or terms.slow_growth):
+        growth, slow_growth = find_growth(coarse, fitted), find_slow_growth(coarse, fitted)
         add("growth", growth.p_value, growth, lambda: replace(terms, growth=True))
+        add("growth", slow_growth.p_value, slow_growth, lambda: replace(terms, slow_growth=True))
     if terms.regime_scale is None:
         clustering = find_clustering(coarse, fitted, search.rng(1, number))
-        add(
-            "regime",
-            clustering.p_value,
-            clustering,
-            lambda: replace(terms, regime_scale=regime_log_scale(coarse, fitted)),
-        )
+        proposals.append(_Proposal("regime", clustering.p_value, lambda: _prove_regimes(search, fitted, clustering)))
     if terms.weave is None and (peak := find_peak(coarse, fitted)) is not None:
         add("periodic", peak.p_value, peak, lambda: replace(terms, weave=peak.frequency, weave_width=peak.width))
     search.progress("slow drift and steps")

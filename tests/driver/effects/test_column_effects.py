@@ -1,0 +1,212 @@
+"""Effects of context columns: each quantity against its definition, the response against its closed form."""
+
+import json
+
+import numpy as np
+import pytest
+
+from xosc_lateral.driver.effects import (
+    EFFECTS,
+    Acts,
+    Angular,
+    ColumnEffect,
+    Drift,
+    Factor,
+    Form,
+    GrowingSpread,
+    Levels,
+    Linear,
+    Nearness,
+    Piecewise,
+    Population,
+    Product,
+    Regimes,
+    Saturating,
+    Step,
+    Threshold,
+    Weave,
+    effect_from_dict,
+    missing_columns,
+)
+from xosc_lateral.driver.effects.response import respond
+from xosc_lateral.errors import DriverProfileError
+
+STEP = 0.2
+TIME = STEP * np.arange(500)
+ONE = {"coefficients": (0.5,), "errors": (0.1,), "reference": (0.0,)}
+EXAMPLES = (
+    Linear(acts=Acts.LOCATION, column="x", lag_s=-1.2, response_s=2.0, **ONE),
+    Threshold(acts=Acts.LOCATION, column="x", at=1.0, above=False, jump=False, **ONE),
+    Saturating(acts=Acts.SPREAD, column="x", middle=0.0, scale=2.0, **ONE),
+    Piecewise(
+        acts=Acts.SPREAD, column="x", knots=(1.0,), coefficients=(1.0, -1.0), errors=(0.1, 0.1), reference=(0.0, 0.0)
+    ),
+    Levels(acts=Acts.LOCATION, column="x", levels=(1.0,), **ONE),
+    Nearness(acts=Acts.FINE, column="x", scale=10.0, **ONE),
+    Angular(
+        acts=Acts.LOCATION, column="x", period=360.0, coefficients=(0.3, 0.1), errors=(0.1, 0.1), reference=(0.0, 0.0)
+    ),
+    Product(
+        acts=Acts.RATE,
+        factors=(Factor(column="x"), Factor(column="y", form=Form.SINE, at=360.0)),
+        **ONE,
+    ),
+    Drift(size=0.2),
+    Step(size=0.2, at_s=40.0),
+    GrowingSpread(factor=2.0, to_s=100.0),
+    Weave(amplitude=0.1, period_s=12.0),
+    Regimes(factor=2.0, on_s=20.0, off_s=40.0),
+    Population(shift=0.1, log_spread=0.2),
+)
+
+
+def strength(effect: ColumnEffect, **context: np.ndarray) -> np.ndarray:
+    found = effect.strength(STEP, context)
+    assert found is not None
+    return found
+
+
+def test_a_step_is_answered_like_a_first_order_lag_after_the_delay() -> None:
+    jump = (TIME >= 20.0).astype(float)
+    answer = respond(jump, STEP, 3.0, 2.0)
+    late = TIME - 23.0
+    # the discrete lag answers within the sample in which the input moves: half a step ahead of the continuous one
+    expected = np.where(late >= -1e-9, 1.0 - np.exp(-(late + STEP) / 2.0), 0.0)
+    assert answer == pytest.approx(expected, abs=1e-9)
+
+
+def test_a_negative_lag_looks_ahead_and_holds_the_last_value() -> None:
+    ramp = TIME.copy()
+    answer = respond(ramp, STEP, -1.0, 0.0)
+    assert answer[:-5] == pytest.approx(ramp[5:])
+    assert answer[-5:] == pytest.approx(np.full(5, ramp[-1]))
+
+
+def test_the_answer_starts_settled() -> None:
+    assert respond(np.full(50, 7.0), STEP, 0.5, 4.0) == pytest.approx(np.full(50, 7.0))
+
+
+def test_linear_acts_about_its_reference_and_is_neutral_where_there_is_none() -> None:
+    effect = Linear(acts=Acts.LOCATION, column="x", coefficients=(2.0,), errors=(0.1,), reference=(3.0,))
+    values = np.array([3.0, 4.0, np.nan])
+    assert strength(effect, x=values) == pytest.approx([0.0, 2.0, 0.0])
+
+
+@pytest.mark.parametrize(
+    ("above", "jump", "expected"),
+    [
+        (True, True, [0.0, 0.0, 1.0, 0.0]),
+        (False, True, [1.0, 0.0, 0.0, 0.0]),
+        (True, False, [0.0, 0.0, 2.0, 0.0]),
+        (False, False, [3.0, 0.0, 0.0, 0.0]),
+    ],
+)
+def test_a_threshold_acts_on_one_side_only(above: bool, jump: bool, expected: list[float]) -> None:
+    effect = Threshold(acts=Acts.LOCATION, column="x", at=5.0, above=above, jump=jump)
+    assert effect.quantity({"x": np.array([2.0, 5.0, 7.0, np.nan])})[:, 0] == pytest.approx(expected)
+
+
+def test_a_curve_bends_at_its_knots() -> None:
+    effect = Piecewise(
+        acts=Acts.LOCATION,
+        column="x",
+        knots=(1.0, 3.0),
+        coefficients=(1.0, -1.0, 2.0),
+        errors=(0.0, 0.0, 0.0),
+        reference=(0.0, 0.0, 0.0),
+    )
+    assert strength(effect, x=np.array([0.0, 1.0, 2.0, 3.0, 4.0])) == pytest.approx([0.0, 1.0, 1.0, 1.0, 3.0])
+
+
+def test_an_angle_has_no_seam() -> None:
+    effect = Angular(acts=Acts.LOCATION, column="x", coefficients=(1.0, 1.0), errors=(0.0, 0.0), reference=(0.0, 0.0))
+    low, high = strength(effect, x=np.array([0.01])), strength(effect, x=np.array([359.99]))
+    assert low == pytest.approx(high, abs=1e-3)
+
+
+def test_nearness_fades_with_distance_and_is_nothing_where_there_is_none() -> None:
+    effect = Nearness(acts=Acts.LOCATION, column="x", scale=10.0)
+    assert effect.quantity({"x": np.array([5.0, 10.0, 40.0, np.nan])})[:, 0] == pytest.approx([1.0, 1.0, 0.25, 0.0])
+    there = Nearness(acts=Acts.LOCATION, column="x", presence=True)
+    assert there.quantity({"x": np.array([5.0, np.nan])})[:, 0] == pytest.approx([1.0, 0.0])
+
+
+def test_a_side_wind_is_the_product_of_speed_and_the_sine_of_its_direction() -> None:
+    effect = Product(
+        acts=Acts.LOCATION,
+        factors=(Factor(column="speed"), Factor(column="direction", form=Form.SINE, at=360.0)),
+        **ONE,
+    )
+    found = strength(effect, speed=np.array([10.0, 10.0, 10.0]), direction=np.array([90.0, 180.0, 270.0]))
+    assert found == pytest.approx([5.0, 0.0, -5.0], abs=1e-9)
+
+
+def test_levels_have_a_value_each_and_others_none() -> None:
+    effect = Levels(
+        acts=Acts.LOCATION,
+        column="lane",
+        levels=(1.0, 2.0),
+        coefficients=(0.1, 0.3),
+        errors=(0.0, 0.0),
+        reference=(0.0, 0.0),
+    )
+    assert strength(effect, lane=np.array([0.0, 1.0, 2.0, 3.0])) == pytest.approx([0.0, 0.1, 0.3, 0.0])
+
+
+@pytest.mark.parametrize("acts", [Acts.SPREAD, Acts.RATE, Acts.FINE])
+def test_factors_multiply_and_stay_within_bounds(acts: Acts) -> None:
+    effect = Linear(acts=acts, column="x", coefficients=(1.0,), errors=(0.0,), reference=(0.0,))
+    context = {"x": np.array([0.0, np.log(2.0), 100.0, -100.0])}
+    terms = effect.terms(TIME[:4], context, np.random.default_rng(0))
+    factor = {Acts.SPREAD: terms.spread, Acts.RATE: terms.rate, Acts.FINE: terms.fine}[acts]
+    assert factor == pytest.approx([1.0, 2.0, 5.0, 0.2])
+    assert terms.location is None
+
+
+def test_a_missing_column_leaves_the_movement_alone_and_is_named() -> None:
+    effect = Linear(acts=Acts.LOCATION, column="rain", **ONE)
+    terms = effect.terms(TIME, {"speed": TIME}, np.random.default_rng(0))
+    assert (terms.location, terms.spread, terms.rate, terms.fine) == (None, None, None, None)
+    assert missing_columns([effect], {"speed": TIME}) == ("rain",)
+
+
+def test_every_known_effect_is_tried_here() -> None:
+    assert {type(example) for example in EXAMPLES} == set(EFFECTS)
+
+
+@pytest.mark.parametrize("effect", EXAMPLES, ids=lambda effect: effect.kind)
+def test_effects_survive_json(effect: ColumnEffect) -> None:
+    again = effect_from_dict(json.loads(json.dumps(effect.to_dict(), allow_nan=False)))
+    assert again == effect
+
+
+@pytest.mark.parametrize("effect", EXAMPLES, ids=lambda effect: effect.kind)
+def test_terms_are_finite_and_repeatable(effect: ColumnEffect) -> None:
+    context = {"x": np.sin(TIME), "y": 10.0 * TIME}
+    first, second = (effect.terms(TIME, context, np.random.default_rng(3)) for _ in range(2))
+    for name in ("location", "spread", "rate", "fine"):
+        one, other = getattr(first, name), getattr(second, name)
+        if one is None:
+            assert other is None
+        else:
+            assert np.isfinite(one).all()
+            assert np.array_equal(one, other)
+
+
+@pytest.mark.parametrize(
+    ("data", "message"),
+    [
+        ({"kind": "psychic"}, "psychic"),
+        ({"kind": "linear", "acts": "location", "column": "x", "coefficients": [1.0]}, "as many"),
+        ({"kind": "linear", "acts": "location", "column": "x", "sise": 1.0}, "sise"),
+        ({"kind": "linear", "acts": "telepathy", "column": "x"}, "telepathy"),
+        ({"kind": "saturating", "acts": "location", "column": "x", "middle": 0.0, "scale": 0.0}, "scale"),
+        ({"kind": "piecewise", "acts": "location", "column": "x", "knots": [2.0, 1.0]}, "increase"),
+        ({"kind": "drift", "size": -1.0}, "size"),
+        ({"kind": "weave", "amplitude": 0.1}, "period_s"),
+        ({"kind": "product", "acts": "location", "factors": [{"column": "x", "form": "value", "at": 0}]}, "factors"),
+    ],
+)
+def test_what_is_no_effect_is_refused_with_its_name(data: dict, message: str) -> None:
+    with pytest.raises(DriverProfileError, match=message):
+        effect_from_dict(data)
