@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from math import cos, pi
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +14,13 @@ from xosc_lateral.pipeline.load import Played, play_scenario
 
 WIDTH = 3.5
 """Of all lanes. [m]"""
+
+CURVES: dict[str, Callable[[float], float]] = {
+    "linear": lambda u: u,
+    "cubic": lambda u: u * u * (3.0 - 2.0 * u),
+    "sinusoidal": lambda u: 0.5 * (1.0 - cos(pi * u)),
+}
+"""Share of the change at a share of the time, for each shape of a transition."""
 
 _HEADER = '<FileHeader revMajor="1" revMinor="{minor}" date="2024-01-01T00:00:00" description="" author=""/>'
 

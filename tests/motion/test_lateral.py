@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from tests.motion.stage import (
+    CURVES,
     STRAIGHT,
     WIDTH,
     Stage,
@@ -36,12 +37,6 @@ from xosc_lateral.pipeline.load import Played
 
 LEFT_HAND = map_of(road("1", line(), 1000.0, rule="LHT"))
 FOUR = map_of(road("1", line(), 1000.0, sections=section(lanes(4, 3, 2, 1), lanes(-1, -2, -3, -4))))
-
-CURVES = {
-    "linear": lambda u: u,
-    "cubic": lambda u: u * u * (3.0 - 2.0 * u),
-    "sinusoidal": lambda u: 0.5 * (1.0 - cos(pi * u)),
-}
 
 
 def end_of(played: Played) -> float | None:
@@ -187,7 +182,7 @@ def test_a_lane_offset_takes_the_time_its_lateral_acceleration_needs(tmp_path: P
     motion = entity(played)
     duration = factor * sqrt(1.0 / 0.8)
     u = np.clip((motion.time - 1.02) / duration, 0.0, 1.0)
-    np.testing.assert_allclose(motion.offset, [CURVES[shape](x) for x in u], atol=1e-9)
+    np.testing.assert_allclose(motion.offset, np.array([CURVES[shape](x) for x in u]), atol=1e-9)
     np.testing.assert_allclose(np.diff(motion.x), 0.4, atol=1e-9)
 
 

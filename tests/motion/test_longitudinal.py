@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from math import cos, pi
+from math import pi
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from tests.motion.stage import (
+    CURVES,
     Stage,
     after,
     car,
@@ -28,12 +29,6 @@ from xosc_lateral.pipeline.load import Played
 
 TWO = {"Ego": teleport(on_lane(-1, 10.0)) + speed(20.0), "Lead": teleport(on_lane(-1, 100.0)) + speed(15.0)}
 
-CURVES = {
-    "linear": lambda u: u,
-    "cubic": lambda u: u * u * (3.0 - 2.0 * u),
-    "sinusoidal": lambda u: 0.5 * (1.0 - cos(pi * u)),
-}
-
 
 def action_times(played: Played, name: str = "event-0") -> tuple[float, float | None]:
     found = next(a for a in played.motion.actions if a.path[-1:] == (name,))
@@ -45,7 +40,7 @@ def test_a_speed_follows_its_curve_from_the_frame_of_the_start(tmp_path: Path, s
     played = Stage(tmp_path).play(maneuvers(event(speed(30.0, shape, over=4.0), trigger=after(1.0))))
     motion = entity(played)
     u = np.clip((motion.time - 1.0) / 4.0, 0.0, 1.0)
-    np.testing.assert_allclose(motion.speed, [20.0 + 10.0 * CURVES[shape](x) for x in u], atol=1e-9)
+    np.testing.assert_allclose(motion.speed, np.array([20.0 + 10.0 * CURVES[shape](x) for x in u]), atol=1e-9)
     assert action_times(played) == (1.0, 5.0)
 
 

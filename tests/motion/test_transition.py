@@ -2,23 +2,19 @@
 
 from __future__ import annotations
 
-from math import cos, pi
+from math import pi
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from tests.motion.stage import CURVES
 from xosc_lateral.motion.transition import Transition
 from xosc_lateral.scenario.enums import DynamicsDimension, DynamicsShape
 
-CURVES = {
-    DynamicsShape.LINEAR: lambda u: u,
-    DynamicsShape.CUBIC: lambda u: u * u * (3.0 - 2.0 * u),
-    DynamicsShape.SINUSOIDAL: lambda u: 0.5 * (1.0 - cos(pi * u)),
-}
 RANGE_OF_RATE = {DynamicsShape.LINEAR: 1.0, DynamicsShape.CUBIC: 1.5, DynamicsShape.SINUSOIDAL: pi / 2.0}
-SHAPES = list(CURVES)
+SHAPES = list(RANGE_OF_RATE)
 
 
 def begun(shape: DynamicsShape, dimension: DynamicsDimension, value: float, start: float, target: float) -> Transition:
@@ -32,9 +28,9 @@ def test_values_and_slopes_are_those_of_the_closed_form(shape: DynamicsShape) ->
     transition = begun(shape, DynamicsDimension.TIME, 4.0, 3.0, -2.0)
     for p in np.linspace(0.0, 4.0, 41):
         transition.parameter = float(p)
-        assert transition.value() == pytest.approx(3.0 - 5.0 * CURVES[shape](p / 4.0), abs=1e-12)
+        assert transition.value() == pytest.approx(3.0 - 5.0 * CURVES[shape.value](p / 4.0), abs=1e-12)
         if 0.0 < p < 4.0:
-            numeric = -5.0 * (CURVES[shape]((p + 1e-6) / 4.0) - CURVES[shape]((p - 1e-6) / 4.0)) / 2e-6
+            numeric = -5.0 * (CURVES[shape.value]((p + 1e-6) / 4.0) - CURVES[shape.value]((p - 1e-6) / 4.0)) / 2e-6
             assert transition.slope() == pytest.approx(numeric, abs=1e-6)
 
 
@@ -86,6 +82,6 @@ def test_the_range_for_a_curvature_keeps_the_second_derivative_under_it(shape: D
     transition.range = transition.range_for_curvature(0.5)
     u = np.linspace(0.0, 1.0, 2001)
     if shape is not DynamicsShape.LINEAR:
-        values = np.array([3.0 * CURVES[shape](x) for x in u])
+        values = np.array([3.0 * CURVES[shape.value](x) for x in u])
         second = np.diff(values, 2) / (transition.range / 2000) ** 2
         assert np.abs(second).max() == pytest.approx(0.5, rel=1e-2)

@@ -1,0 +1,42 @@
+"""The verb `play`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from tests.motion.stage import Stage, after, event, lane_change, maneuvers, to_lane
+from xosc_lateral.cli import app
+
+RUN = CliRunner()
+
+
+@pytest.fixture
+def scenario(tmp_path: Path) -> Path:
+    Stage(tmp_path).play(maneuvers(event(lane_change(to_lane(-9)), trigger=after(1.0))), last=2.0)
+    return tmp_path / "scenario.xosc"
+
+
+def test_it_writes_the_table_and_tells_what_was_not_played(scenario: Path, tmp_path: Path) -> None:
+    result = RUN.invoke(app, ["play", str(scenario), "-o", str(tmp_path / "states.csv"), "--step", "0.1"])
+    assert result.exit_code == 0
+    lines = (tmp_path / "states.csv").read_text().splitlines()
+    assert lines[0] == "time,name,x,y,z,h,speed,road,lane,offset_t,s"
+    assert len(lines) == 1 + 21
+    assert "lane -9" in result.stderr
+    assert "scenario.xosc:" in result.stderr
+
+
+def test_the_time_limit_counts(scenario: Path, tmp_path: Path) -> None:
+    result = RUN.invoke(app, ["play", str(scenario), "-o", str(tmp_path / "s.csv"), "--time-limit", "1"])
+    assert result.exit_code == 0
+    assert (tmp_path / "s.csv").read_text().splitlines()[-1].startswith("1.000,")
+    assert "time limit" in result.stderr
+
+
+def test_a_scenario_that_is_not_there_leaves_no_table(tmp_path: Path) -> None:
+    result = RUN.invoke(app, ["play", str(tmp_path / "none.xosc"), "-o", str(tmp_path / "s.csv")])
+    assert result.exit_code != 0
+    assert not (tmp_path / "s.csv").exists()

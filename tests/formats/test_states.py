@@ -1,0 +1,64 @@
+"""The state table."""
+
+from __future__ import annotations
+
+import csv
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tests.motion.stage import Stage, after, event, lane_change, maneuvers, on_lane, speed, teleport, to_lane
+from xosc_lateral.formats.states import COLUMNS, write_states
+from xosc_lateral.motion.nominal import Activity
+
+
+def table(path: Path) -> list[dict[str, str]]:
+    with path.open(newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def test_one_row_per_entity_and_step_in_order_of_time(tmp_path: Path) -> None:
+    start = {
+        "Ego": teleport(on_lane(-1, 10.0)) + speed(20.0),
+        "Other": teleport(on_lane(1, 500.0, offset=0.5)) + speed(10.0),
+    }
+    played = Stage(tmp_path).play(maneuvers(event(lane_change(to_lane(-2)), trigger=after(1.0))), start=start, last=2.0)
+    write_states(played.motion, played.network, tmp_path / "states.csv")
+    rows = table(tmp_path / "states.csv")
+    assert ",".join(rows[0]) == ",".join(COLUMNS) == "time,name,x,y,z,h,speed,road,lane,offset_t,s"
+    assert [row["name"] for row in rows[:4]] == ["Ego", "Other", "Ego", "Other"]
+    assert len(rows) == 2 * 101
+    ego, other = played.motion.entities
+    for column, values in (("x", ego.x), ("y", ego.y), ("s", ego.s), ("speed", ego.speed), ("time", ego.time)):
+        np.testing.assert_allclose([float(row[column]) for row in rows[::2]], values, atol=5.1e-4)
+    assert {row["road"] for row in rows} == {"1"}
+    assert float(rows[1]["offset_t"]) == pytest.approx(0.5)
+    assert other.offset[0] == pytest.approx(-0.5)
+
+
+def test_entities_that_are_not_there_have_no_row(tmp_path: Path) -> None:
+    played = Stage(tmp_path).play(last=0.1)
+    ego = played.motion.entities[0]
+    activity = ego.activity.copy()
+    activity[:3] &= ~np.uint8(Activity.ACTIVE)
+    write_states(
+        replace(played.motion, entities=(replace(ego, activity=activity),)), played.network, tmp_path / "s.csv"
+    )
+    assert [row["time"] for row in table(tmp_path / "s.csv")] == ["0.060", "0.080", "0.100"]
+
+
+def test_names_with_commas_and_quotes_come_back(tmp_path: Path) -> None:
+    played = Stage(tmp_path).play(last=0.1)
+    ego = played.motion.entities[0]
+    odd = replace(ego, entity=replace(ego.entity, name='a "b", c'))
+    write_states(replace(played.motion, entities=(odd,)), played.network, tmp_path / "s.csv")
+    assert table(tmp_path / "s.csv")[0]["name"] == 'a "b", c'
+
+
+def test_without_a_road_the_field_is_empty(tmp_path: Path) -> None:
+    played = Stage(tmp_path, None).play(start={"Ego": teleport('<WorldPosition x="1" y="2"/>')}, last=0.1)
+    write_states(played.motion, played.network, tmp_path / "s.csv")
+    row = table(tmp_path / "s.csv")[0]
+    assert (row["road"], row["x"], row["y"]) == ("", "1.0000", "2.0000")
