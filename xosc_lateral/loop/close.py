@@ -331,6 +331,6 @@ def _in_words(timeline: Timeline, blocks: IntArray) -> str:
         return f"{number} drives in {folds} folds: every drive is scored by profiles fitted on the other folds' drives"
     return (
         f"{number} blocks of about {BLOCK_S:g} s in {folds} folds: every block is scored by profiles whose base model "
-        "and effect sizes were fitted on the other folds; which effects there are was decided on all blocks, the chance "
-        "of error of which is the p-value"
+        "and effect sizes were fitted on the other folds; which effects there are was decided on all blocks, and "
+        "the chance that this is wrong is the p-value"
     )

@@ -18,6 +18,9 @@ FloatArray = NDArray[np.float64]
 Compared = tuple[Mapping[str, FloatArray], Mapping[str, FloatArray], Mapping[str, FloatArray]]
 """Cells of measured offsets, of the runs before and after."""
 
+NO_WORSE = 1.1
+"""What the core model had already taken up may go into an effect without the error falling; it must not rise. [-]"""
+
 KINDS = {
     "location": "location",
     "scale": "scale",
@@ -94,8 +97,8 @@ def describe_finding(
 
 
 def helps(finding: Finding) -> bool:
-    """Whether the effect brings its own error down on blocks that it was not fitted on."""
-    return finding.error_after < finding.error_before
+    """Whether the effect brings its own error down, or all but down, on blocks that it was not fitted on."""
+    return finding.error_after < NO_WORSE * finding.error_before
 
 
 def memory_finding(memory: Memory, compared: Compared) -> Finding:

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.loop.chance import LEAST
-from xosc_lateral.loop.residual import local_mean, own_runs
-from xosc_lateral.loop.timeline import Timeline
+from xosc_lateral.loop.residual import own_runs
+from xosc_lateral.loop.timeline import Timeline, local_mean
 
 FloatArray = NDArray[np.float64]
 

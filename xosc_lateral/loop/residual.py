@@ -9,7 +9,7 @@ itself), no test of means, spreads, spectra or their dependence on context can t
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -20,7 +20,7 @@ from xosc_lateral.driver.effects.response import respond
 from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.driver.sampling import OffsetSampler
 from xosc_lateral.driver.seeds import child
-from xosc_lateral.loop.timeline import PAD, Timeline
+from xosc_lateral.loop.timeline import LOCAL_S, PAD, Timeline, local_mean
 from xosc_lateral.segment import Segment
 
 FloatArray = NDArray[np.float64]
@@ -32,9 +32,6 @@ N_BINS = 5
 
 ANSWER_S = 2.0
 """Columns are smoothed as a driver answers before they are binned. [s]"""
-
-LOCAL_S = 20.0
-"""Movement slower than this counts as mean, faster as spread. [s]"""
 
 BANDS_S = (1.0, 3.0, 8.0, 20.0, 60.0, 200.0)
 """Averaging times between which the bands of the movement lie. [s]"""
@@ -84,6 +81,21 @@ class Cells:
         found["quantiles of local spread"] = (
             np.quantile(inside, LOCAL_QUANTILES) if len(inside) else np.full(len(LOCAL_QUANTILES), np.nan)
         )
+        return found
+
+    def balance(self, half: BoolArray) -> dict[str, FloatArray]:
+        """Square root of the product of both parts' shares of the rows, by cell: 1/2 for equal halves."""
+        valid = self.timeline.valid
+        overall = float(np.sqrt(np.mean(half[valid]) * np.mean(~half[valid])))
+        found: dict[str, FloatArray] = {}
+        for name, label in self.labels.items():
+            size = int(label.max()) + 1
+            inside = valid & (label >= 0)
+            total = np.maximum(np.bincount(label[inside], minlength=size), 1)
+            share = np.bincount(label[inside & half], minlength=size) / total
+            found[f"mean by {name}"] = found[f"spread by {name}"] = np.sqrt(share * (1.0 - share))
+        found["movement by band"] = np.full(len(BANDS_S) + 1, overall)
+        found["quantiles of local spread"] = np.full(len(LOCAL_QUANTILES), overall)
         return found
 
 
@@ -142,26 +154,19 @@ def error_between(first: Mapping[str, FloatArray], second: Mapping[str, FloatArr
 def floor_of(cells: Cells, offset: FloatArray, blocks: IntArray, rng: np.random.Generator, splits: int = 8) -> float:
     """What measured data differs from itself: halves of the blocks against each other.
 
-    Two halves of n/2 rows differ by twice the standard error that all n rows have against an exact expectation: halved.
+    Two parts of a and b rows differ by a standard deviation of sigma sqrt(1/a + 1/b); all n = a + b rows against an
+    exact expectation have sigma / sqrt(n). So every cell's difference is scaled by sqrt(a b) / n: 1/2 for halves.
     """
     numbers = np.unique(blocks[cells.timeline.valid])
     found = []
     for _ in range(splits):
         chosen = rng.permutation(numbers)[: len(numbers) // 2]
         half = np.isin(blocks, chosen)
-        found.append(0.5 * error_between(cells.describe(offset, half), cells.describe(offset, ~half)))
+        first, second = cells.describe(offset, half), cells.describe(offset, ~half)
+        balance = cells.balance(half)
+        scaled = {name: balance[name] * (first[name] - second[name]) for name in first}
+        found.append(error_between(scaled, {name: np.zeros_like(values) for name, values in scaled.items()}))
     return float(np.mean(found))
-
-
-def local_mean(values: FloatArray, valid: BoolArray, seconds: float, step: float) -> FloatArray:
-    """Moving average over the valid rows within `seconds`, shape (n,); 0 where there are none."""
-    half = max(1, round(0.5 * seconds / step))
-    sums = np.concatenate([[0.0], np.cumsum(np.where(valid, values, 0.0))])
-    counts = np.concatenate([[0.0], np.cumsum(valid.astype(np.float64))])
-    index = np.arange(len(values))
-    low, high = np.maximum(index - half, 0), np.minimum(index + half + 1, len(values))
-    count = counts[high] - counts[low]
-    return np.asarray((sums[high] - sums[low]) / np.maximum(count, 1.0))
 
 
 def _by_bin(values: FloatArray, label: IntArray, used: BoolArray) -> FloatArray:
@@ -209,8 +214,3 @@ def _time_bins(timeline: Timeline, parts: int = 6) -> tuple[IntArray, FloatArray
 def _filled(values: FloatArray, valid: BoolArray) -> FloatArray:
     seen = values[valid & np.isfinite(values)]
     return np.where(np.isfinite(values), values, seen.mean() if len(seen) else 0.0)
-
-
-def groups_named(cells: Cells, wanted: Sequence[str]) -> list[str]:
-    """Groups whose name ends in one of the wanted quantities."""
-    return [f"{what} by {name}" for name in wanted for what in ("mean", "spread") if name in cells.labels]

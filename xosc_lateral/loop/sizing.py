@@ -231,9 +231,13 @@ def _regimes(coarse: Coarse, fitted: Fitted, fine: FineRows | None) -> Regimes:
     fit = fit_regimes(bare.rows, coarse.valid)
     fine_size = 0.0 if fine is None else float(log_sizes(fine.squares, fine.valid, fit.on[:, None])[0][0])
     loud = float(np.sum(fit.on[coarse.valid]))
+    # regimes are told by the innovations; what they do to the movement itself may be more
+    slow = slow_rows(coarse, bare)
+    moved = float(log_sizes(slow.squares, slow.valid, fit.on[:, None])[0][0])
+    factor = max(float(np.exp(moved)), fit.factor)
     return Regimes(
-        factor=fit.factor,
-        factor_error=fit.factor / np.sqrt(2.0 * max(loud, 1.0)),
+        factor=factor,
+        factor_error=factor / np.sqrt(2.0 * max(loud / SLOW_S, 1.0)),
         fine_factor=float(np.exp(fine_size)),
         on_s=fit.on_s,
         off_s=fit.off_s,

@@ -31,6 +31,9 @@ TRACE_RULES = CutRules(lane_change_margin=6.0)
 """What is cut for tracing: a little more around lane changes than for fitting, or their last second looks like an
 effect of the lane."""
 
+LOCAL_S = 20.0
+"""Movement slower than this counts as mean, faster as spread. [s]"""
+
 MIN_VALID_S = 120.0
 """Road-following time below which nothing can be said. [s]"""
 
@@ -124,6 +127,17 @@ def coarse_all(mask: BoolArray) -> BoolArray:
     """Whether the whole second is valid, shape (n // 5,)."""
     n = len(mask) // COARSE
     return np.asarray(mask[: n * COARSE].reshape(n, COARSE).all(axis=1))
+
+
+def local_mean(values: FloatArray, valid: BoolArray, seconds: float, step: float) -> FloatArray:
+    """Moving average over the valid rows within `seconds`, shape (n,); 0 where there are none."""
+    half = max(1, round(0.5 * seconds / step))
+    sums = np.concatenate([[0.0], np.cumsum(np.where(valid, values, 0.0))])
+    counts = np.concatenate([[0.0], np.cumsum(valid.astype(np.float64))])
+    index = np.arange(len(values))
+    low, high = np.maximum(index - half, 0), np.minimum(index + half + 1, len(values))
+    count = counts[high] - counts[low]
+    return np.asarray((sums[high] - sums[low]) / np.maximum(count, 1.0))
 
 
 def angular_period(values: FloatArray) -> float | None:
