@@ -2,9 +2,9 @@
 
     python -m xosc_lateral.formats.library tasi-0.15.4-py3-none-any.whl -o FOLDER [--cards docs/profiles.md]
 
-The same wheel gives the same bytes on the same kind of processor. Every profile is scored before it is written: for groups of drivers a fit to half
-of the vehicles is scored on the other half; for single vehicles a fit to the first part of the drive is held against
-the last part of its own drive and those of the others. What is written is fitted to everything.
+The same wheel gives the same bytes on the same kind of processor. Every profile is scored before it is written: for
+groups of drivers a fit to half of the vehicles is scored on the other half; for single vehicles a fit to the first part
+of the drive is held against the last part of its own drive and those of the others. What is written is fitted to all.
 """
 
 from __future__ import annotations
@@ -235,10 +235,10 @@ def _habit(runs: Sequence[Run]) -> str:
 # ---- command ---------------------------------------------------------------------------------------------------------
 CARDS_HEAD = """# The profile library
 
-`xosc-lateral profiles list` names them, `profiles show NAME` prints a card, `profiles compare A B` sets two side by side.
-This page and the profiles are written by `make profiles` from the public wheel: the same bytes every time, on any number
-of threads (another family of processors may change a ninth digit). How the data was read, and what may be shipped:
-[real_data.md](real_data.md).
+`xosc-lateral profiles list` names them, `profiles show NAME` prints a card, `profiles compare A B` sets two side by
+side. This page and the profiles are written by `make profiles` from the public wheel: the same bytes every time, on any
+number of threads (another family of processors may change a ninth digit). How the data was read, and what may be
+shipped: [real_data.md](real_data.md).
 """
 
 
