@@ -2,8 +2,8 @@
 
     python benchmarks/playback.py FOLDER [--step 0.02] [--time-limit 60] [--slowest 10] [--repeat 3]
 
-Reading the scenario with its road and playing it are timed apart; starting Python counts in neither. A row is one entity
-at one step.
+Reading the scenario with its road and playing it are timed apart; starting Python counts in neither. A row is one
+entity at one step.
 """
 
 from __future__ import annotations
@@ -78,7 +78,8 @@ def main() -> None:
     rows, simulated = sum(cost.rows for cost in found), sum(cost.simulated for cost in found)
     print(
         f"{len(found)} scenarios, on average: reading {reading / len(found):.3f} s, "
-        f"playing {playing / len(found):.3f} s, {1e6 * playing / rows:.1f} us per row, {simulated / playing:.0f} times faster than real time"
+        f"playing {playing / len(found):.3f} s, {1e6 * playing / rows:.1f} us per row, "
+        f"{simulated / playing:.0f} times faster than real time"
     )
 
 
