@@ -297,7 +297,7 @@ def _moments(snippets: FloatArray) -> FloatArray:
     """
     spread, pace, rough = (np.log(np.diff(snippets, k, axis=1).std(axis=1) + 1e-12) for k in range(3))
     spreads = (part for series in (spread, pace, rough) for part in (series.mean(), series.var()))
-    return np.array([*spreads, np.cov(spread, rough)[0, 1]])
+    return np.array([*spreads, np.mean((spread - spread.mean()) * (rough - rough.mean()))])
 
 
 def _corrected(model: BestModel, lacks: FloatArray, settings: BestSettings) -> BestModel:

@@ -153,4 +153,6 @@ def _checked(values: Mapping[str, Any]) -> Mapping[str, Any]:
     for key, kinds in (("effects", list), ("provenance", Mapping), ("lane_width", (int, float))):
         if key in values and not isinstance(values[key], kinds):
             raise DriverProfileError(f'"{key}" is of the wrong kind')
+    if not all(isinstance(effect, Mapping) for effect in values.get("effects", ())):
+        raise DriverProfileError('"effects" holds something that is no object')
     return values

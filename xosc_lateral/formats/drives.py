@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from xosc_lateral.driver.series import MIN_RUN, Drive
 from xosc_lateral.errors import FormatError, NotEnoughDataError
 from xosc_lateral.formats.units import factor
+from xosc_lateral.segment import CONTEXT_UNITS
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -125,6 +126,7 @@ def read_table(path: Path) -> pd.DataFrame:
     name = path.name.lower()
     if not name.endswith(TABLE_SUFFIXES):
         raise FormatError(f"not a drive table: expected a name ending in {', '.join(TABLE_SUFFIXES)}", path=path)
+    path.stat()  # a missing file is the system's error, in its words
     try:
         if name.endswith(".parquet"):
             return pd.read_parquet(path)
@@ -153,7 +155,7 @@ def _drives_of(path: Path, mapping: Mapping[str, ColumnSource]) -> list[Drive]:
     if not len(table):
         raise NotEnoughDataError(f"{path}: the table has no rows; {MIN_RUN:g} s of driving are needed")
     columns = _numeric_columns(table, path)
-    levels = frozenset(name for name, values in columns.items() if name not in _OWN and _holds_levels(values))
+    levels = frozenset(name for name, values in columns.items() if _may_hold_levels(name) and _holds_levels(values))
     _require_columns(columns, path)
     if "drive" in table.columns:
         names, first_rows = _drive_names(table, path)
@@ -218,13 +220,18 @@ def _as_numbers(column: pd.Series, path: Path, name: str) -> FloatArray:
     from pandas.api import types
 
     if types.is_datetime64_any_dtype(column):
-        return np.asarray((column - column.min()).dt.total_seconds(), dtype=np.float64)
+        return np.array((column - column.min()).dt.total_seconds(), dtype=np.float64)
     numbers = pd.to_numeric(column, errors="coerce")
     strange = numbers.isna() & column.notna()
     if strange.any():
         row = int(np.flatnonzero(strange)[0])
         raise FormatError(f"{column.iloc[row]!r} is no number", path=path, line=row + 2, element=f"column {name!r}")
     return np.array(numbers.to_numpy(dtype=np.float64, na_value=np.nan))
+
+
+def _may_hold_levels(name: str) -> bool:
+    """Counts, indices and flags do; a speed that happens to be constant doesn't."""
+    return name not in _OWN and CONTEXT_UNITS.get(name, "-") == "-"
 
 
 def _holds_levels(values: FloatArray) -> bool:
