@@ -206,3 +206,23 @@ def test_a_route_assigned_on_the_way_counts_from_then_on(tmp_path: Path) -> None
     motion = entity(played)
     assert played.network.road_ids[motion.road[-1]] == "4"
     assert row(motion, 1.0)
+
+
+def direct_junction() -> str:
+    """Road 1 goes over into road 2; without connecting roads."""
+    roads = [
+        road("1", line(length=100.0), 100.0, link='<successor elementType="junction" elementId="100"/>'),
+        road("2", line(100.0, length=200.0), 200.0, link='<predecessor elementType="junction" elementId="100"/>'),
+    ]
+    links = "".join(f'<laneLink from="{k}" to="{k}"/>' for k in (2, 1, -1, -2))
+    connection = f'<connection id="0" incomingRoad="1" linkedRoad="2" contactPoint="start">{links}</connection>'
+    return map_of(*roads, f'<junction id="100" name="j" type="direct">{connection}</junction>')
+
+
+@pytest.mark.parametrize(("road_id", "lane", "s", "way"), [("1", -2, 50.0, 1.0), ("2", 1, 50.0, -1.0)])
+def test_a_direct_junction_is_driven_both_ways(tmp_path: Path, road_id: str, lane: int, s: float, way: float) -> None:
+    played = Stage(tmp_path, direct_junction()).play(start=ego(lane, s, road=road_id), last=4.0)
+    motion = entity(played)
+    np.testing.assert_allclose(motion.x, motion.x[0] + way * 20.0 * motion.time, atol=1e-9)
+    assert len(set(motion.road.tolist())) == 2
+    assert set(motion.lane.tolist()) == {lane}

@@ -38,6 +38,7 @@ class Links:
             return
         if link.element_type == "junction":
             yield from self._through_junction(here, found, link)
+            yield from self._back_through_direct_junction(here, found, link, direction)
             return
         other = self._index.get(link.element_id)
         if other is None:
@@ -56,6 +57,29 @@ class Links:
             for target in self._connected_ids(connection, lane, self.roads[other], contact):
                 if target in _end_section(self.roads[other], contact).by_id:
                     yield self._enter(other, target, contact)
+
+    def _back_through_direct_junction(
+        self, here: Road, lane: Lane, link: RoadLink, direction: int
+    ) -> Iterator[LaneLink]:
+        """Direct junctions have no connecting roads whose own links lead back: their connections hold both ways."""
+        for connection, other, contact in self._direct_connections(here, link, direction):
+            section = _end_section(self.roads[other], contact)
+            for source, target in connection.lanes:
+                if target == lane.id and source in section.by_id:
+                    yield self._enter(other, source, contact)
+
+    def _direct_connections(self, here: Road, link: RoadLink, direction: int) -> Iterator[tuple[Connection, int, str]]:
+        """Connections of a direct junction that end where this road is left; incoming road, and its end there."""
+        junction = self._junctions.get(link.element_id)
+        for connection in junction.connections if junction and here.junction != link.element_id else ():
+            other = self._index.get(connection.incoming_road)
+            touches = "end" if direction > 0 else "start"
+            if connection.connecting_road != here.id or (connection.contact or "start") != touches or other is None:
+                continue
+            incoming = self.roads[other]
+            for back, contact in ((incoming.successor, "end"), (incoming.predecessor, "start")):
+                if back and back.element_type == "junction" and back.element_id == link.element_id:
+                    yield connection, other, contact
 
     def _connected_ids(self, connection: Connection, lane: Lane, other: Road, contact: str) -> list[int]:
         """Lanes of the connecting road; without any laneLink, those that name the lane as their own link."""
@@ -107,6 +131,8 @@ class Links:
             other = self._index.get(connection.connecting_road)
             if connection.incoming_road == here.id and other is not None:
                 yield other, 1 if connection.contact != "end" else -1
+        for _, other, contact in self._direct_connections(here, link, direction):
+            yield other, 1 if contact == "start" else -1
         # Files list a connection from the road that drives into it only; on the way back it is found by its own links.
         for other, there in enumerate(self.roads):
             if there.junction != link.element_id:
