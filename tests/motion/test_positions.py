@@ -153,6 +153,12 @@ def test_projections(reference: str, latitude: float, longitude: float, expected
     assert project(reference, radians(latitude), radians(longitude)) == pytest.approx(expected, abs=2e-3)
 
 
+def test_a_utm_reference_with_an_origin_instead_of_a_zone_means_that_origin() -> None:
+    local = "+lat_0=37.3 +lon_0=-122 +k_0=1 +x_0=0 +y_0=0 +datum=WGS84"
+    place = radians(37.31), radians(-122.02)
+    assert project(f"+proj=utm {local}", *place) == project(f"+proj=tmerc {local}", *place)
+
+
 def test_a_transverse_mercator_keeps_angles_and_small_distances() -> None:
     """A metre north and a metre east on the ellipsoid are k metres each on the plane, at right angles."""
     reference = "+proj=tmerc +lat_0=48 +lon_0=11 +k=1 +datum=WGS84"

@@ -37,11 +37,15 @@ def project(reference: str | None, latitude: float, longitude: float) -> tuple[f
     except ProjectionError:
         raise
     except (KeyError, ValueError, ZeroDivisionError) as error:
-        raise ProjectionError(f"the road network's geoReference '{reference.strip()}' is not usable: {error}") from error
+        raise ProjectionError(
+            f"the road network's geoReference '{reference.strip()}' is not usable: {error}"
+        ) from error
 
 
 def _project(given: dict[str, str], latitude: float, longitude: float) -> tuple[float, float]:
     kind = given["proj"]
+    if kind == "utm" and "zone" not in given and {"lat_0", "lon_0"} <= given.keys():
+        kind = "tmerc"  # field maps name an origin of their own instead of a zone: it is the map's
     if kind == "utm":
         zone = int(given["zone"])
         given |= {
