@@ -86,7 +86,7 @@ class BestSettings:
     farthest: float = 120.0
     snippet: float = 10.0
     n_snippets: int = 2000
-    pace_weight: float = 0.3
+    pace_weight: float = 0.7
     rounds: int = 8
     coarse_gain: float = 1.0
     fine_gain: float = 3.0

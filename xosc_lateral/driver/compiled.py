@@ -13,8 +13,8 @@ from typing import Any
 
 import numpy as np
 
-WORTH_IMPORTING = 200_000
-"""Loop steps from which on numba is imported for them."""
+WORTH_IMPORTING = 50_000
+"""Loop steps from which on numba is imported for them: three hours of driving. Who samples that much does so often."""
 
 WORTH_CALLING = 200
 """Loop steps from which on the compiled loop is used when numba is there already."""
