@@ -35,10 +35,11 @@ from xosc_lateral.driver.effects import (
 from xosc_lateral.driver.series import Drive as Measured
 from xosc_lateral.formats.drives import read_drives
 from xosc_lateral.loop.close import LoopResult, close_loop
-from xosc_lateral.loop.looks import Look
+from xosc_lateral.loop.looks import SLOW_S, Look
 from xosc_lateral.loop.movement import Coarse, Terms, fit_movement
 from xosc_lateral.loop.refine import target_of
 from xosc_lateral.loop.residual import cells_of, expected, own_runs
+from xosc_lateral.loop.sizing import size_effects
 from xosc_lateral.loop.timeline import join_drives
 from xosc_lateral.loop.trace import Trace, trace_effects
 
@@ -141,11 +142,15 @@ def oracle_z(case: Case, coarse: Coarse) -> float:
     """Square root of the best chi-square over responses and lags of the true quantity; nan for hidden effects."""
     best = 0.0
     for effect in case.oracle:
-        look = {Acts.LOCATION: Look.LOCATION, Acts.SPREAD: Look.SPREAD, Acts.RATE: Look.PACE}[effect.acts]
-        target = target_of(look, coarse, fit_movement(coarse, Terms()))
-        for response in RESPONSES:
-            for lag in (-2.0, -1.0, 0.0, 1.0, 2.0):
-                best = max(best, target.gain(coarse.answer(replace(effect, response_s=response, lag_s=lag))))
+        looks = {Acts.LOCATION: (Look.LOCATION,), Acts.SPREAD: (Look.SPREAD, Look.SLOW), Acts.RATE: (Look.PACE,)}
+        for look in looks[effect.acts]:
+            # squares of overlapping averages count once in so many
+            apart = SLOW_S if look is Look.SLOW else 1
+            target = target_of(look, coarse, fit_movement(coarse, Terms()))
+            for response in RESPONSES:
+                for lag in (-2.0, -1.0, 0.0, 1.0, 2.0):
+                    answer = coarse.answer(replace(effect, response_s=response, lag_s=lag))
+                    best = max(best, target.gain(answer) / apart)
     return float(np.sqrt(best)) if case.oracle else float("nan")
 
 
@@ -166,20 +171,41 @@ def named(case: Case, trace: Trace) -> tuple[bool, str]:
 
 
 def second_drive(case: Case, result: LoopResult, drive: Drive, seed: int, duration: float, folder: Path) -> str:
-    """Error of the conditional mean by the planted quantity on another drive of the same driver: base, refined, known."""
+    """Error of the conditional mean by the planted quantity on another drive of the same driver.
+
+    Of the base, of the refined profile, and of a profile that was told the effect (shape, lag and response; the size is
+    fitted): the last is what knowing the effect in advance would give.
+    """
     other = simulate_drive(duration, seed + 5000, driver=drive.truth.driver, effects=drive.truth.effects)
     timeline = join_drives(measured(other, folder))
     coarse = Coarse.of(timeline)
-    effect = replace(case.oracle[0], response_s=2.0)
-    cells = cells_of(timeline, {"planted": _quantity(effect, coarse)})
+    cells = cells_of(timeline, {"planted": _quantity(case.oracle[0], coarse)})
     group = ("mean" if case.kind == "location" else "spread") + " by planted"
     real = cells.describe(timeline.offset, timeline.valid)[group]
-    errors = []
-    for profile in (result.base, result.refined):
+    first = result.trace.coarse
+    told = size_effects(first, fit_movement(first, Terms(location=(best_oracle(case, first),)))).effects
+    errors, spans = [], []
+    for effects in ((), result.refined.effects, told):
+        profile = replace(result.base, effects=effects)
         own = expected(cells, own_runs(profile, timeline, np.random.SeedSequence(1)), timeline.valid)[group]
         centre = (real - real.mean()) - (own - own.mean())
-        errors.append(float(np.sqrt(np.mean(centre**2))))
-    return f"second drive {group}: {100 * errors[0]:.1f} -> {100 * errors[1]:.1f} cm"
+        errors.append(100.0 * float(np.sqrt(np.mean(centre**2))))
+        spans.append(100.0 * float(own[-1] - own[0]))
+    return (
+        f"| second drive {group}: base {errors[0]:.1f}, refined {errors[1]:.1f}, told {errors[2]:.1f} cm; first to "
+        f"last fifth: measured {100 * (real[-1] - real[0]):.1f}, refined {spans[1]:.1f}, told {spans[2]:.1f} cm |"
+    )
+
+
+def best_oracle(case: Case, coarse: Coarse) -> ColumnEffect:
+    """The true quantity at its best response time and lag."""
+    target = target_of(Look.LOCATION, coarse, fit_movement(coarse, Terms()))
+    tried = [
+        replace(case.oracle[0], response_s=response, lag_s=lag)
+        for response in RESPONSES
+        for lag in (-2.0, -1.0, 0.0, 1.0, 2.0)
+    ]
+    return max(tried, key=lambda effect: target.gain(coarse.answer(effect)))
 
 
 def _quantity(effect: ColumnEffect, coarse: Coarse) -> np.ndarray:
@@ -225,10 +251,8 @@ def main() -> None:
                 took = time.perf_counter() - started
                 if z >= 5:
                     seen, right_of_seen = seen + 1, right_of_seen + right
-                print(
-                    f"{case.name} {seed}: oracle z {z:.1f}: {'RIGHT' if right else 'wrong'}: {words} {after} ({took:.0f} s)",
-                    flush=True,
-                )
+                verdict = f"oracle z {z:.1f}: {'RIGHT' if right else 'wrong'}: {words} {after}"
+                print(f"{case.name} {seed}: {verdict} ({took:.0f} s)", flush=True)
         print(f"right cause in {right_of_seen} of {seen} drives on which the oracle has z >= 5")
 
 

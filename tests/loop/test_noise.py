@@ -61,9 +61,10 @@ def test_adjoint_is_the_transpose() -> None:
 
 
 def test_intercepts_of_drives_are_taken_out() -> None:
-    drive = np.repeat([0, 1], 100)
+    drive, valid = np.repeat([0, 1], 100), np.ones(200, dtype=bool)
+    valid[95:105] = False  # drives never touch on a timeline
     process = fit_autoregression(second_order(5_000, 5), np.ones(5_000, dtype=bool), 3)
-    whitener = Whitener(process, np.ones(200, dtype=bool), drive, np.ones(200))
+    whitener = Whitener(process, valid, drive, np.ones(200))
     assert whitener.rows(np.where(drive == 0, 3.0, -2.0)) == pytest.approx(np.zeros(200), abs=1e-9)
 
 

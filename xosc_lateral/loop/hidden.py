@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.loop.chance import LEAST, tail_probability
-from xosc_lateral.loop.looks import slow_rows, standardised
+from xosc_lateral.loop.looks import slow_columns, slow_rows, standardised
 from xosc_lateral.loop.movement import DRIFT_TERMS, MIN_DRIFT_S, Coarse, Fitted, elapsed, squared_innovations
 from xosc_lateral.loop.noise import Whitener, fit_autoregression
 
@@ -133,6 +133,10 @@ def _growth(coarse: Coarse, squares: FloatArray, valid: BoolArray) -> Growth:
 def find_clustering(coarse: Coarse, fitted: Fitted, rng: np.random.Generator) -> Clustering:
     """Autocorrelation of the squared innovations, weighted by exponentials; null: the same seconds in random order."""
     squares = squared_innovations(fitted.rows, coarse.valid)
+    known = slow_columns(coarse, fitted)
+    if known.shape[1]:
+        basis = np.linalg.qr((known - known[coarse.valid].mean(axis=0)) * coarse.valid[:, None])[0]
+        squares = squares - basis @ (basis.T @ squares)
     observed = _clustering_scores(squares, coarse.valid)
     null = []
     rows = np.flatnonzero(coarse.valid)

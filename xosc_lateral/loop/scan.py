@@ -35,6 +35,9 @@ SMOOTHING = (8, 0.3)
 """The rows' spectrum is averaged over so many frequencies to each side at least, and this share of the frequency.
 Without it a slow column would be calibrated by the one or two frequencies that it holds. [-]"""
 
+FAR = 200.0
+"""Chi-square beyond which tails are taken from their expansions."""
+
 N_SHIFTS = 400
 """Circular shifts drawn for the null."""
 
@@ -182,15 +185,17 @@ def as_one_degree(chi_square: FloatArray, degrees: int) -> FloatArray:
     """Chi-square of one degree of freedom with the same tail probability as one of `degrees`."""
     if degrees == 1:
         return np.asarray(chi_square)
-    from scipy.stats import chi2
+    from scipy.special import chdtrc, chdtri, gammaln
 
-    tail = chi2.logsf(chi_square, degrees)
-    # beyond double precision: sf1(x) ~ exp(-x/2) sqrt(2 / (pi x))
-    far = -2.0 * tail
-    for _ in range(3):
-        far = np.maximum(-2.0 * tail - np.log(np.maximum(far, 1.0) * np.pi / 2.0), 0.0)
-    near = chi2.isf(np.exp(np.maximum(tail, -600.0)), 1)
-    return np.asarray(np.where(tail < -30.0, far, near))
+    chi_square = np.asarray(chi_square, dtype=np.float64)
+    half, x = 0.5 * degrees, np.maximum(chi_square, 1e-12)
+    # far out, where tail probabilities leave double precision: leading terms of both tails' expansions
+    tail = -0.5 * x + (half - 1.0) * np.log(0.5 * x) - gammaln(half) + np.log1p((half - 1.0) / np.maximum(0.5 * x, 1.0))
+    far = np.maximum(-2.0 * tail, 1.0)
+    for _ in range(4):
+        far = np.maximum(-2.0 * tail - np.log(0.5 * np.pi * far), 1.0)
+    near = chdtri(1.0, np.maximum(chdtrc(float(degrees), np.minimum(x, FAR)), 1e-300))
+    return np.asarray(np.where(x > FAR, far, near))
 
 
 class _Prepared:

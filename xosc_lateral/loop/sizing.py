@@ -14,8 +14,12 @@ from xosc_lateral.driver.effects import (
     Drift,
     Effect,
     GrowingSpread,
+    Linear,
+    Piecewise,
     Regimes,
+    Saturating,
     Step,
+    Threshold,
     Weave,
 )
 from xosc_lateral.loop.looks import SLOW_S, FineRows, fine_rows, pull, slow_rows
@@ -75,19 +79,31 @@ def size_effects(coarse: Coarse, fitted: Fitted) -> Sized:
 
 
 def driving_range(coarse: Coarse, effect: ColumnEffect) -> tuple[FloatArray, FloatArray]:
-    """Quantity where the effect's strength is at its 5 % and its 95 % quantile while road-following, shape (k,) each.
+    """Quantity at the low and at the high end of what drives the effect, shape (k,) each.
 
-    For one component: the 5 % and 95 % quantile of the quantity itself, or its extremes when these are equal (a switch
-    that is on for less than 5 % of the time).
+    That is the 5 % and the 95 % quantile while road-following: of the column, where a single number drives it; of the
+    product; of the strength, for angles and levels. The extremes where both quantiles are the same (a switch that is on
+    for less than 5 % of the time).
     """
-    quantity = effect.quantity({column: coarse.context[column] for column in effect.columns})[coarse.timeline.valid]
+    inside = coarse.timeline.valid
+    if isinstance(effect, Linear | Threshold | Saturating | Piecewise):
+        seen = coarse.context[effect.column][inside]
+        ends = _ends(seen[np.isfinite(seen)])
+        low, high = effect.quantity({effect.column: ends})
+        if np.any(low != high):
+            return low, high
+    quantity = effect.quantity({column: coarse.context[column][inside] for column in effect.columns})
     quantity = quantity[np.isfinite(quantity).all(axis=1)]
     if quantity.shape[1] == 1:
-        low, high = np.quantile(quantity, [0.05, 0.95], axis=0)
-        return (low, high) if high[0] > low[0] else (quantity.min(axis=0), quantity.max(axis=0))
-    strength = quantity @ np.asarray(effect.coefficients)
-    order = np.argsort(strength)
+        low, high = _ends(quantity[:, 0])
+        return np.array([low]), np.array([high])
+    order = np.argsort(quantity @ np.asarray(effect.coefficients))
     return quantity[order[int(0.05 * len(order))]], quantity[order[min(len(order) - 1, int(0.95 * len(order)))]]
+
+
+def _ends(values: FloatArray) -> FloatArray:
+    low, high = np.quantile(values, [0.05, 0.95])
+    return np.array([low, high] if high > low else [values.min(), values.max()])
 
 
 def span(coarse: Coarse, effect: ColumnEffect) -> float:

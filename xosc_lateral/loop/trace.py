@@ -42,7 +42,7 @@ LEVEL = {
     "growth": 0.002,
     "regime": 0.003,
     "periodic": 0.003,
-    "wander": 0.001,
+    "wander": 0.003,
 }
 """Probability of a false finding that each look may spend: 5 % together, hidden effects included."""
 
