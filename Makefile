@@ -32,7 +32,7 @@ format: $(STAMP)
 # The shipped driver profiles, rebuilt from the public recording (50 MB from PyPI): byte for byte what is in the tree.
 WHEEL := out/data/tasi-0.15.4-py3-none-any.whl
 profiles: $(STAMP) $(WHEEL)
-	$(BIN)/python -m xosc_lateral.formats.library $(WHEEL) -o xosc_lateral/resources/driver_profiles --cards docs/profiles.md
+	$(BIN)/python -m xosc_lateral.cli.build_library $(WHEEL) -o xosc_lateral/resources/driver_profiles --cards docs/profiles.md
 
 $(WHEEL): | $(STAMP)
 	$(BIN)/python -m pip download --quiet --disable-pip-version-check --no-deps --dest $(@D) tasi==0.15.4

@@ -17,8 +17,8 @@ from baselines import write_between_markers
 from xosc_lateral.driver.fitting import fit_runs
 from xosc_lateral.driver.series import STEP, Run, all_runs
 from xosc_lateral.formats.drives import read_drives
-from xosc_lateral.formats.library import sliding_snippets, split_in_time
 from xosc_lateral.loop.compare import told_from_each_other
+from xosc_lateral.pipeline.library import sliding_snippets, split_in_time
 
 
 def main() -> None:

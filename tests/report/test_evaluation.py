@@ -11,9 +11,9 @@ import pytest
 
 from xosc_lateral.cli import main
 from xosc_lateral.errors import NotEnoughDataError
-from xosc_lateral.formats.library import GROUPS, most_different
 from xosc_lateral.formats.profiles import list_profiles, read_profile
 from xosc_lateral.loop.compare import free_runs
+from xosc_lateral.pipeline.library import GROUPS, most_different
 from xosc_lateral.report.evaluation import _density
 
 

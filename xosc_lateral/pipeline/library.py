@@ -1,6 +1,6 @@
 """The shipped profile library, built from the public recording.
 
-    python -m xosc_lateral.formats.library tasi-0.15.4-py3-none-any.whl -o FOLDER [--cards docs/profiles.md]
+    python -m xosc_lateral.cli.build_library tasi-0.15.4-py3-none-any.whl -o FOLDER [--cards docs/profiles.md]
 
 The same wheel gives the same bytes on the same kind of processor. Every profile is scored before it is written: for
 groups of drivers a fit to half of the vehicles is scored on the other half; for single vehicles a fit to the first part
@@ -9,7 +9,6 @@ of the drive is held against the last part of its own drive and those of the oth
 
 from __future__ import annotations
 
-import argparse
 import tempfile
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -23,12 +22,10 @@ from xosc_lateral.driver.fitting import fit_runs
 from xosc_lateral.driver.profile import DriverProfile, Provenance
 from xosc_lateral.driver.series import STEP, Run, all_runs
 from xosc_lateral.errors import NotEnoughDataError
-from xosc_lateral.formats.atomic import write_atomically
 from xosc_lateral.formats.drives import read_drives
 from xosc_lateral.formats.hashes import file_hash
 from xosc_lateral.formats.importers.dlr_ht import LICENCE, import_dlr_ht
 from xosc_lateral.formats.importers.table import write_imported
-from xosc_lateral.formats.profiles import write_profile
 from xosc_lateral.loop.compare import habits_of, told_from_each_other
 from xosc_lateral.loop.metrics import snippet_metrics
 from xosc_lateral.loop.scores import SNIPPET, score_profile, scores_to_dict
@@ -230,34 +227,3 @@ def _habit(runs: Sequence[Run]) -> str:
     place = "to the lane centre" if abs(mean) < 0.08 else f"{abs(mean):.2f} m to the {side} of the lane centre"
     calm = "steady" if spread < 0.13 else "restless" if spread > 0.22 else "ordinary"
     return f"keeps {place}, {calm} (std {spread:.2f} m)"
-
-
-# ---- command ---------------------------------------------------------------------------------------------------------
-CARDS_HEAD = """# The profile library
-
-`xosc-lateral profiles list` names them, `profiles show NAME` prints a card, `profiles compare A B` sets two side by
-side. This page and the profiles are written by `make profiles` from the public wheel: the same bytes every time, on any
-number of threads (another family of processors may change a ninth digit). How the data was read, and what may be
-shipped: [real_data.md](real_data.md).
-"""
-
-
-def main(argv: Sequence[str] | None = None) -> None:
-    """Build the library and write it, with its cards."""
-    ask = argparse.ArgumentParser(description="Build the shipped driver profiles from the public recording.")
-    ask.add_argument("source", type=Path)
-    ask.add_argument("-o", "--output", type=Path, required=True, metavar="FOLDER")
-    ask.add_argument("--cards", type=Path, metavar="PAGE.md")
-    ask.add_argument("--model", default="best")
-    said = ask.parse_args(argv)
-    profiles = build_library(said.source, model=said.model)
-    for profile in profiles:
-        write_profile(profile, said.output / f"{profile.name}.json")
-    if said.cards is not None:
-        from xosc_lateral.report.cards import card_markdown
-
-        write_atomically(said.cards, "\n".join([CARDS_HEAD, *map(card_markdown, profiles)]))
-
-
-if __name__ == "__main__":
-    main()
