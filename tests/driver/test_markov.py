@@ -98,17 +98,17 @@ def test_every_bin_leads_back_to_the_data_and_none_outside_is_entered() -> None:
 def test_stationary_share_is_where_a_long_walk_spends_its_time() -> None:
     matrix = made_chain()
     chain = fit_markov_chain([(sampled(matrix, 100_000, 4) + 0.5) / 20 - 0.5])
-    assert np.allclose(chain.stationary() @ chain.transition, chain.stationary(), atol=1e-10)
+    assert np.allclose(chain.stationary @ chain.transition, chain.stationary, atol=1e-10)
     # The made chain is Ehrenfest's urn: binomial.
     from math import comb
 
     binomial = np.array([comb(19, k) for k in range(20)]) / 2**19
-    assert np.abs(chain.stationary() - binomial).max() < 0.03
+    assert np.abs(chain.stationary - binomial).max() < 0.03
 
 
 def test_a_drive_that_never_leaves_one_bin_can_be_fitted() -> None:
     chain = fit_markov_chain([np.full(100, 0.01)])
-    assert chain.stationary()[10] == pytest.approx(1.0)
+    assert chain.stationary[10] == pytest.approx(1.0)
 
 
 def test_contradictions_are_refused() -> None:

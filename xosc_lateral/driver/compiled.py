@@ -25,6 +25,12 @@ def worth_compiling(steps: int) -> bool:
     return steps >= WORTH_IMPORTING or (steps >= WORTH_CALLING and "numba" in sys.modules)
 
 
+def prepare(steps: int) -> None:
+    """Have numba loaded when so many steps are worth it: for work that is then done in blocks that are not."""
+    if worth_compiling(steps):
+        import numba  # noqa: F401
+
+
 class Loop:
     """A function over arrays with a plain Python body; call it with the count of its steps first.
 

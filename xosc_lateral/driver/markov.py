@@ -15,6 +15,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,7 +30,7 @@ N_BINS = 20
 """Bins of the relative offset over [-0.5, 0.5]. [-]"""
 
 
-@dataclass(frozen=True, eq=False, slots=True)
+@dataclass(frozen=True, eq=False)  # no slots: what follows from the counts is worked out once
 class MarkovChain:
     """Coarse lateral position as a chain over bins of the relative offset.
 
@@ -66,7 +67,7 @@ class MarkovChain:
         """Bin centres, shape (n_bins,). [-]"""
         return (np.arange(self.n_bins) + 0.5) / self.n_bins - 0.5
 
-    @property
+    @cached_property
     def transition(self) -> FloatArray:
         """Probabilities of the next bin, shape (n_bins, n_bins), rows summing to 1, traps opened. [-]"""
         counts = open_traps(self.counts).astype(np.float64)
@@ -77,6 +78,7 @@ class MarkovChain:
         """Bins that were visited, shape (n_bins,)."""
         return np.asarray((self.counts.sum(axis=0) + self.counts.sum(axis=1)) > 0)
 
+    @cached_property
     def stationary(self) -> FloatArray:
         """Share of time in each bin in the long run, shape (n_bins,). [-]"""
         transition = self.transition
@@ -85,10 +87,15 @@ class MarkovChain:
         share = np.where(self.support, np.maximum(share, 0.0), 0.0)
         return np.asarray(share / share.sum())
 
+    @cached_property
+    def alias_table(self) -> AliasTable:
+        """The chain made ready for sampling."""
+        return AliasTable.of(self.transition)
+
     @property
     def mean(self) -> float:
         """Mean of the coarse part in the long run. [-]"""
-        return float(self.stationary() @ self.centres)
+        return float(self.stationary @ self.centres)
 
 
 def bin_of(rel_offset: FloatArray, n_bins: int = N_BINS) -> IntArray:

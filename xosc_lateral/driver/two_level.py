@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.driver.core import Start
-from xosc_lateral.driver.markov import N_BINS, AliasTable, MarkovChain, bin_of, fit_markov_chain, walk
+from xosc_lateral.driver.markov import N_BINS, MarkovChain, bin_of, fit_markov_chain, walk
 from xosc_lateral.driver.noise import KERNEL_TAPS, N_KNOTS, ShapedNoise, convolve, fit_shaped_noise
 from xosc_lateral.driver.pace import Paced
 from xosc_lateral.driver.seeds import child
@@ -125,13 +125,13 @@ class TwoLevelStream:
 
     def __init__(self, model: TwoLevelModel, seed: np.random.SeedSequence, start: Start | None) -> None:
         self.mean = model.mean
-        self._table = AliasTable.of(model.chain.transition)
+        self._table = model.chain.alias_table
         self._centres = model.chain.centres
         self._smoothing, self._kernel = model.settings.smoothing_kernel, model.noise.kernel
         self._chain_rng = np.random.default_rng(child(seed, 0))
         self._noise_rng = np.random.default_rng(child(seed, 1))
         if start is None:
-            bins = np.random.default_rng(child(seed, 2)).choice(model.chain.n_bins, p=model.chain.stationary())
+            bins = np.random.default_rng(child(seed, 2)).choice(model.chain.n_bins, p=model.chain.stationary)
         else:
             within = self.mean + (start.rel_offset - self.mean) / start.spread
             bins = bin_of(np.array([within]), model.chain.n_bins)[0]
