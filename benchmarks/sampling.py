@@ -2,8 +2,8 @@
 
     python benchmarks/sampling.py [DRIVE_TABLE]
 
-Times are processor time of one core, the best of several; compiling (once per machine, kept on disk) is left out. Without
-a table the profiles are fitted to simulated offsets.
+Times are processor time of one core, the best of several; compiling (once per machine, kept on disk) is left out.
+Without a table the profiles are fitted to simulated offsets.
 """
 
 from __future__ import annotations
@@ -86,8 +86,9 @@ def main() -> None:
         rich = DriverProfile("rich", profile.model, EFFECTS, profile.lane_width)
         bare, full = seconds(sampled(profile, segment)), seconds(sampled(rich, segment))
         print(
-            f"{model}: fit {fitting:.2f} s; sample {1e9 * bare / n:.1f} ns an offset, {bare / own:.1f} times the generator's, "
-            f"{HOURS * 3600 / bare / 1e6:.1f} million times real time; with {len(EFFECTS)} effects {full / own:.1f} times"
+            f"{model}: fit {fitting:.2f} s; sample {1e9 * bare / n:.1f} ns an offset, {bare / own:.1f} times the "
+            f"generator's, {HOURS * 3600 / bare / 1e6:.1f} million times real time; "
+            f"with {len(EFFECTS)} effects {full / own:.1f} times"
         )
 
 

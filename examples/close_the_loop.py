@@ -1,6 +1,6 @@
 """A driver who cuts curves: found in a drive, added to the profile, scored on stretches held out.
 
-    python examples/close_the_loop.py [OUTPUT FOLDER]
+python examples/close_the_loop.py [OUTPUT FOLDER]
 """
 
 from __future__ import annotations
