@@ -4,7 +4,7 @@ VENV ?= .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 
-.PHONY: demo test lint format bench profiles clean
+.PHONY: demo test lint format bench profiles loop-dlr clean
 
 $(STAMP): pyproject.toml
 	$(PYTHON) -m venv $(VENV)
@@ -33,6 +33,13 @@ format: $(STAMP)
 WHEEL := out/data/tasi-0.15.4-py3-none-any.whl
 profiles: $(STAMP) $(WHEEL)
 	$(BIN)/python -m xosc_lateral.cli.build_library $(WHEEL) -o xosc_lateral/resources/driver_profiles --cards docs/profiles.md
+
+# The loop over real motorway traffic: from the paper's model to what these drivers do; docs/closing_the_loop.md, section 6.
+loop-dlr: $(STAMP) $(WHEEL)
+	@mkdir -p out/loop-dlr
+	$(BIN)/xosc-lateral import dlr-ht $(WHEEL) -o out/loop-dlr/drives.parquet
+	$(BIN)/xosc-lateral fit out/loop-dlr/drives.parquet --model two-level -o out/loop-dlr/base.json
+	$(BIN)/xosc-lateral close-loop out/loop-dlr/drives.parquet --profile out/loop-dlr/base.json -o out/loop-dlr/refined.json --report out/loop-dlr --seed 1
 
 $(WHEEL): | $(STAMP)
 	$(BIN)/python -m pip download --quiet --disable-pip-version-check --no-deps --dest $(@D) tasi==0.15.4

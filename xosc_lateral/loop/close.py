@@ -14,9 +14,10 @@ from xosc_lateral.driver.kinds import ModelKind
 from xosc_lateral.driver.profile import DriverProfile, Provenance
 from xosc_lateral.driver.series import Drive
 from xosc_lateral.errors import NotEnoughDataError
-from xosc_lateral.loop.findings import Finding, describe_finding, helps, memory_finding
+from xosc_lateral.loop.findings import Finding, describe_finding, helps, memory_finding, population_finding
 from xosc_lateral.loop.memory import Memory, test_memory
 from xosc_lateral.loop.movement import Coarse, Fitted, Terms, fit_movement
+from xosc_lateral.loop.population import Population, test_population
 from xosc_lateral.loop.residual import Cells, cells_of, error_between, expected, floor_of, own_runs
 from xosc_lateral.loop.scorecard import Scorecard, score_runs
 from xosc_lateral.loop.sizing import Sized, size_effects
@@ -55,6 +56,8 @@ class LoopResult:
         Everything that was looked at.
     memory : Memory
         How the base's own runs compare with the drives from band to band.
+    population : Population or None
+        How much the drives differ; None with too few of them.
     held_out : str
         What was held out, in words.
     cells : Cells
@@ -76,6 +79,7 @@ class LoopResult:
     findings: tuple[Finding, ...]
     trace: Trace
     memory: Memory
+    population: Population | None
     held_out: str
     cells: Cells
     real: dict[str, FloatArray]
@@ -141,7 +145,9 @@ def close_loop(
         excluded=excluded,
         progress=lambda what: progress(0.1, what),
     )
-    refined_kind = ModelKind.BEST if memory.found and kind is ModelKind.TWO_LEVEL else kind
+    population = test_population(trace.final)
+    differ = population is not None and population.found
+    refined_kind = ModelKind.BEST if memory.found or differ else kind
     blocks = hold_out_blocks(timeline)
     setting = _Setting(timeline, coarse, blocks, base if given else None, kind, refined_kind, root)
     scored = _score(setting, trace, lambda share, what: progress(0.6 + 0.2 * share, what))
@@ -154,8 +160,12 @@ def close_loop(
     cells, real, before, after = scored.cells, scored.real, scored.before, scored.after
     rng = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(9,)))
     findings = list(scored.findings)
-    if refined_kind is not kind:
-        findings.append(memory_finding(memory, (real, before, after)))
+    if kind is ModelKind.TWO_LEVEL:
+        # what the core model lacks is found once, by replacing it; `best` has both
+        if memory.found:
+            findings.append(memory_finding(memory, (real, before, after)))
+        if population is not None and population.found:
+            findings.append(population_finding(population, (real, before, after)))
     progress(1.0, "done")
     return LoopResult(
         names=timeline.names,
@@ -165,6 +175,7 @@ def close_loop(
         findings=tuple(findings),
         trace=trace,
         memory=memory,
+        population=population,
         held_out=_in_words(timeline, blocks),
         cells=cells,
         real=real,
@@ -327,8 +338,8 @@ def _in_words(timeline: Timeline, blocks: IntArray) -> str:
     folds = min(FOLDS, number)
     if folds == 1:
         return "nothing: the table is too short to hold a block out"
-    if number == len(timeline.names):
-        return f"{number} drives in {folds} folds: every drive is scored by profiles fitted on the other folds' drives"
+    if number < 1.5 * len(timeline.names):
+        return f"{len(timeline.names)} drives in {folds} folds: every drive is scored by profiles fitted on the other folds"
     return (
         f"{number} blocks of about {BLOCK_S:g} s in {folds} folds: every block is scored by profiles whose base model "
         "and effect sizes were fitted on the other folds; which effects there are was decided on all blocks, and "

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from xosc_lateral.driver.effects import ColumnEffect, Drift, Effect, GrowingSpread, Regimes, Step, Weave
 from xosc_lateral.loop.memory import Memory
 from xosc_lateral.loop.movement import Coarse
+from xosc_lateral.loop.population import Population
 from xosc_lateral.loop.sizing import Sized, span
 from xosc_lateral.loop.trace import Found, Trace
 
@@ -121,6 +122,28 @@ def memory_finding(memory: Memory, compared: Compared) -> Finding:
         measure="size of the movement by frequency band",
         effects=(),
         cell="movement by band",
+    )
+
+
+def population_finding(population: Population, compared: Compared) -> Finding:
+    """The core model is replaced: one pooled driver can't be many."""
+    before, after = _errors(compared, "quantiles of local spread")
+    return Finding(
+        effect="drivers that differ",
+        kind="population",
+        columns=(),
+        alike=(),
+        lag_s=None,
+        response_s=None,
+        shape=f"{population.drives} drives; their spreads scatter by a factor of {np.exp(population.log_spread):.2f}",
+        size_m=population.shift,
+        size_error=population.shift / np.sqrt(2.0 * population.drives),
+        p_value=population.p_value,
+        error_before=before,
+        error_after=after,
+        measure="quantiles of local spread",
+        effects=(),
+        cell="quantiles of local spread",
     )
 
 

@@ -47,6 +47,7 @@ def finding_sentence(finding: Finding) -> str:
         "periodic": f"amplitude {finding.size_m:.2f}{about} m",
         "drift": f"{finding.size_m:.2f}{about} m (standard deviation)",
         "step": f"{finding.size_m:+.2f}{about} m",
+        "population": f"their means by {finding.size_m:.2f}{about} m (standard deviations)",
     }.get(finding.kind, "")
     when = ""
     if finding.lag_s is not None:
