@@ -32,6 +32,9 @@ IntArray = NDArray[np.intp]
 FOLDS = 4
 """Every part of the drives is held out once, and predicted from the other three."""
 
+BEFORE, AFTER, CORE = 0, 2, 1
+"""Profiles of a fold."""
+
 BLOCK_S = 150.0
 """Length of the blocks of a drive that are held out; drives shorter than three blocks are held out whole. [s]"""
 
@@ -151,7 +154,7 @@ def close_loop(
     blocks = hold_out_blocks(timeline)
     setting = _Setting(timeline, coarse, blocks, base if given else None, kind, refined_kind, root)
     scored = _score(setting, trace, lambda share, what: progress(0.6 + 0.2 * share, what))
-    useless = [found for found, finding in zip(trace.found, scored.findings, strict=True) if not helps(finding)]
+    useless = [found for found, finding in zip(trace.found, scored.beside_core, strict=True) if not helps(finding)]
     if useless:
         trace = without(trace, useless)
         scored = _score(setting, trace, lambda share, what: progress(0.8 + 0.15 * share, what))
@@ -246,48 +249,63 @@ class _Scored:
     runs_before: FloatArray
     runs_after: FloatArray
     findings: list[Finding]
+    beside_core: list[Finding]
+    """The same with the refined core model, without effects, in the place of the base: what the effects alone bring."""
 
 
 def _score(setting: _Setting, trace: Trace, progress: Progress) -> _Scored:
     timeline, coarse = setting.timeline, setting.coarse
     sized = size_effects(coarse, trace.final)
-    runs_before, runs_after = _held_out_runs(setting, trace, progress)
+    runs_before, runs_core, runs_after = _held_out_runs(setting, trace, progress)
     cells = cells_of(timeline, _quantities(coarse, trace, sized))
     real = cells.describe(timeline.offset, timeline.valid)
     before, after = expected(cells, runs_before, timeline.valid), expected(cells, runs_after, timeline.valid)
-    compared = (real, before, after)
-    findings = [describe_finding(found, i, coarse, trace, sized, compared) for i, found in enumerate(trace.found)]
-    return _Scored(sized, cells, real, before, after, runs_before, runs_after, findings)
+    core = before if runs_core is runs_before else expected(cells, runs_core, timeline.valid)
+
+    def described(first: dict[str, FloatArray]) -> list[Finding]:
+        compared = (real, first, after)
+        return [describe_finding(found, i, coarse, trace, sized, compared) for i, found in enumerate(trace.found)]
+
+    return _Scored(sized, cells, real, before, after, runs_before, runs_after, described(before), described(core))
 
 
-def _held_out_runs(setting: _Setting, trace: Trace, progress: Progress) -> tuple[FloatArray, FloatArray]:
-    """Runs of both profiles over all rows; every row comes from profiles that were fitted without its fold."""
+def _held_out_runs(setting: _Setting, trace: Trace, progress: Progress) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Runs of base, refined core and refined profile over all rows, each row's by profiles fitted without its fold."""
     blocks = setting.blocks
-    composite: list[FloatArray] = [np.zeros(0), np.zeros(0)]
+    same_core = setting.fixed is None and setting.kind is setting.refined_kind
+    composite: dict[int, FloatArray] = {}
     folds = min(FOLDS, int(blocks.max()) + 1)
     for fold in range(folds):
         progress(fold / folds, f"held-out fold {fold + 1} of {folds}")
         held = blocks % folds == fold
         used = ~held if folds > 1 else np.ones(len(held), dtype=np.bool_)
         for side, profile in enumerate(_fold_profiles(setting, trace, used)):
+            if side == CORE and same_core:
+                continue
             seed = np.random.SeedSequence(setting.root.entropy, spawn_key=(5, side, fold))
             runs = own_runs(profile, setting.timeline, seed)
-            if not len(composite[side]):
-                composite[side] = np.zeros_like(runs)
-            composite[side][:, held] = runs[:, held]
-    return composite[0], composite[1]
+            composite.setdefault(side, np.zeros_like(runs))[:, held] = runs[:, held]
+    return composite[BEFORE], composite[BEFORE if same_core else CORE], composite[AFTER]
 
 
-def _fold_profiles(setting: _Setting, trace: Trace, used: BoolArray) -> tuple[DriverProfile, DriverProfile]:
-    timeline, coarse, kind = setting.timeline, setting.coarse, setting.kind
+def _fold_profiles(
+    setting: _Setting, trace: Trace, used: BoolArray
+) -> tuple[DriverProfile, DriverProfile, DriverProfile]:
+    """Base, refined core, refined profile."""
+    timeline, coarse = setting.timeline, setting.coarse
     whole = coarse_all(np.pad(used, (0, -len(used) % COARSE), mode="edge"))
     part = replace(coarse, valid=coarse.valid & whole[: len(coarse)])
-    before = setting.fixed
-    if before is None:
-        before = _fit(timeline, part, fit_movement(part, Terms()), Sized({}), used, kind, "before", None)
+    plain = fit_movement(part, Terms())
+    core = _fit(timeline, part, plain, Sized({}), used, setting.refined_kind, "core", None)
+    if setting.fixed is not None:
+        before = setting.fixed
+    elif setting.kind is setting.refined_kind:
+        before = core
+    else:
+        before = _fit(timeline, part, plain, Sized({}), used, setting.kind, "before", None)
     fitted = fit_movement(part, trace.final.terms)
     after = _fit(timeline, part, fitted, size_effects(part, fitted), used, setting.refined_kind, "after", None)
-    return before, after
+    return before, core, after
 
 
 def _fit(
@@ -339,7 +357,7 @@ def _in_words(timeline: Timeline, blocks: IntArray) -> str:
     if folds == 1:
         return "nothing: the table is too short to hold a block out"
     if number < 1.5 * len(timeline.names):
-        return f"{len(timeline.names)} drives in {folds} folds: every drive is scored by profiles fitted on the other folds"
+        return f"{len(timeline.names)} drives in {folds} folds: each is scored by profiles fitted on the other folds"
     return (
         f"{number} blocks of about {BLOCK_S:g} s in {folds} folds: every block is scored by profiles whose base model "
         "and effect sizes were fitted on the other folds; which effects there are was decided on all blocks, and "
