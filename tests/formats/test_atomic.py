@@ -5,7 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from xosc_lateral.formats.atomic import replace_atomically, write_atomically
+from xosc_lateral.errors import FormatError
+from xosc_lateral.formats.atomic import refuse_targets, replace_atomically, write_atomically
 
 
 def test_text_and_bytes_arrive(tmp_path: Path) -> None:
@@ -48,3 +49,16 @@ def test_outputs_are_readable_for_others(tmp_path: Path) -> None:
 
 def test_a_missing_folder_is_made(tmp_path: Path) -> None:
     assert write_atomically(tmp_path / "no" / "such" / "a", "x").read_text() == "x"
+
+
+def test_targets_that_would_destroy_an_input_or_one_another_are_refused(tmp_path: Path) -> None:
+    source, link = write_atomically(tmp_path / "in.xosc", "x"), tmp_path / "link.xosc"
+    link.symlink_to(source)
+    refuse_targets([tmp_path / "out.xosc", tmp_path / "out.html", None], [source])
+    for target in (source, link, tmp_path / "sub" / ".." / "in.xosc"):
+        with pytest.raises(FormatError, match="is an input"):
+            refuse_targets([target], [source])
+    with pytest.raises(FormatError, match="named for two outputs"):
+        refuse_targets([tmp_path / "out", tmp_path / "out"])
+    with pytest.raises(FormatError, match="is a folder"):
+        refuse_targets([tmp_path], [source])

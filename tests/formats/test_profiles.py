@@ -18,6 +18,7 @@ from xosc_lateral.formats.profiles import (
     SCHEMA,
     SHIPPED,
     canonical_json,
+    find_profile,
     list_profiles,
     profile_bytes,
     profile_hash,
@@ -92,6 +93,11 @@ def broken(**changes: Any) -> str:
         else:
             values[key] = value
     return json.dumps(values)
+
+
+def test_a_folder_that_is_not_there_is_no_library(tmp_path: Path) -> None:
+    with pytest.raises(FormatError, match="nowhere: no such folder"):
+        find_profile("motorway-car", [tmp_path / "nowhere"])
 
 
 BAD = {

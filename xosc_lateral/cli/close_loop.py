@@ -32,6 +32,7 @@ def register(app: typer.Typer) -> None:
     ) -> None:
         """Find what measured drives do and a profile doesn't, trace it to an effect, add it, score it held out."""
         from xosc_lateral.driver.profile import Provenance
+        from xosc_lateral.formats.atomic import refuse_targets
         from xosc_lateral.formats.drives import parse_map, read_drives
         from xosc_lateral.formats.hashes import file_hash
         from xosc_lateral.formats.profiles import read_profile, write_profile
@@ -40,6 +41,7 @@ def register(app: typer.Typer) -> None:
         from xosc_lateral.report.loop_json import loop_json
         from xosc_lateral.report.progress import shown_progress
 
+        refuse_targets([output, report / "report.json"], tables)
         drives = read_drives(tables, parse_map(columns or []))
         base = None if profile is None else read_profile(profile, library or [])
         known = Provenance(

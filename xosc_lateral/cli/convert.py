@@ -49,6 +49,7 @@ def convert(
 ) -> None:
     """Give every car in a scenario the lateral movement of a real driver."""
     from xosc_lateral.cli.batches import convert_batch, is_batch
+    from xosc_lateral.formats.atomic import refuse_targets
     from xosc_lateral.pipeline.convert import convert_variants
     from xosc_lateral.report.conversion import as_text, to_json, write_report
 
@@ -66,6 +67,8 @@ def convert(
         time_limit=time_limit,
     )
     if is_batch(scenario):
+        if jobs == 0 or jobs < -1:
+            raise typer.BadParameter("at least 1, or -1 for one per core", param_hint="--jobs")
         if report is not None:
             raise typer.BadParameter("a page is made of one scenario, not of a batch", param_hint="--report")
         display = "json" if log_json else "quiet" if quiet else "auto"
@@ -73,6 +76,7 @@ def convert(
             scenario, output, settings, variants=variants, jobs=jobs, cluster=cluster, display=display, as_json=as_json
         )
         return
+    refuse_targets([output, report], [Path(scenario[0])])
     for conversion in convert_variants(Path(scenario[0]), output, settings, variants=variants):
         where = write_report(conversion, report, variants=variants) if report else None
         typer.echo(to_json(conversion, where) if as_json else as_text(conversion, where))

@@ -29,11 +29,13 @@ def register(app: typer.Typer) -> None:
     ) -> None:
         """Score a profile: ten metrics, the paper's four evaluations, distances and floors, spectrum, classifier."""
         from xosc_lateral.driver.series import all_runs
+        from xosc_lateral.formats.atomic import refuse_targets
         from xosc_lateral.formats.drives import parse_map, read_drives
         from xosc_lateral.formats.profiles import read_profile
         from xosc_lateral.loop.scores import score_profile
         from xosc_lateral.report.evaluation import evaluation_json, evaluation_text, write_evaluation
 
+        refuse_targets([report], tables)
         driver = read_profile(profile, library or [])
         runs = all_runs(read_drives(tables, parse_map(columns or [])))
         scores = score_profile(driver, runs, seed=seed, classify=classify)

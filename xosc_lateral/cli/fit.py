@@ -32,10 +32,12 @@ def register(app: typer.Typer) -> None:
         """Fit a driver profile to measured drives."""
         from xosc_lateral.driver.fitting import fit_profile
         from xosc_lateral.driver.profile import Provenance
+        from xosc_lateral.formats.atomic import refuse_targets
         from xosc_lateral.formats.drives import parse_map, read_drives
         from xosc_lateral.formats.hashes import file_hash
         from xosc_lateral.formats.profiles import describe_profile, write_profile
 
+        refuse_targets([output], tables)
         drives = read_drives(tables, parse_map(columns or []))
         provenance = Provenance(
             source=source or ", ".join(table.name for table in tables),

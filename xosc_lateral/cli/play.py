@@ -22,10 +22,12 @@ def play(
     ] = 60.0,
 ) -> None:
     """Play a scenario and write where every entity is at every step; what was not played is named on stderr."""
+    from xosc_lateral.formats.atomic import refuse_targets
     from xosc_lateral.formats.states import write_states
     from xosc_lateral.pipeline.load import play_scenario
 
     played = play_scenario(scenario, step=step, time_limit=time_limit)
+    refuse_targets([output], [*played.scenario.input_files, played.scenario.road_file or scenario])
     write_states(played.motion, played.network, output)
     for note in played.motion.notes:
         typer.echo(str(note), err=True)

@@ -40,10 +40,12 @@ def register(app: typer.Typer) -> None:
         if sum(choice is not None for choice in (like, context, duration)) != 1:
             raise typer.BadParameter("give one of --like, --context, --duration")
         from xosc_lateral.driver.snippets import sample_context, sample_free, sample_like
+        from xosc_lateral.formats.atomic import refuse_targets
         from xosc_lateral.formats.drives import parse_map, read_drives
         from xosc_lateral.formats.offsets import sampling_provenance, write_offsets
         from xosc_lateral.formats.profiles import read_profile
 
+        refuse_targets([output], [*(like or []), *(context or [])])
         driver = read_profile(profile, library or [])
         mapping = parse_map(columns or [])
         if like is not None:

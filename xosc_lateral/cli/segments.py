@@ -15,7 +15,9 @@ def register(app: typer.Typer) -> None:
 
 def segments(
     scenario: Annotated[Path, typer.Argument(help="Maneuver-based scenario (.xosc).", show_default=False)],
-    time_limit: Annotated[float, typer.Option(help="End of a scenario that does not end by itself [s].")] = 60.0,
+    time_limit: Annotated[
+        float, typer.Option(help="End of a scenario that does not end by itself [s].", min=0.0)
+    ] = 60.0,
     as_json: Annotated[bool, typer.Option("--json", help="For machines.")] = False,
 ) -> None:
     """Name each entity's road-following segments, and why the rest is none."""

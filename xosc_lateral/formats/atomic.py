@@ -5,9 +5,11 @@ from __future__ import annotations
 import contextlib
 import os
 import tempfile
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+
+from xosc_lateral.errors import FormatError
 
 
 def write_atomically(path: Path | str, data: bytes | str, *, durable: bool = False) -> Path:
@@ -45,6 +47,32 @@ def replace_atomically(path: Path | str, write: Callable[[Path], object]) -> Pat
         write(temporary)
         temporary.replace(path)
     return path
+
+
+def refuse_targets(targets: Iterable[Path | None], inputs: Iterable[Path] = ()) -> None:
+    """Refuse outputs that can't be meant, before any work is done and anything is written.
+
+    Parameters
+    ----------
+    targets : iterable of Path or None
+        Files to be written; None: not wanted.
+    inputs : iterable of Path
+        Files that are read.
+
+    Raises
+    ------
+    FormatError
+        If a target is a folder, an input (links resolved), or named twice.
+    """
+    taken = {path.resolve(): "is an input; choose another output" for path in inputs}
+    for target in targets:
+        if target is None:
+            continue
+        if target.is_dir():
+            raise FormatError("is a folder, not a file to write to", path=target)
+        if (why := taken.get(target.resolve())) is not None:
+            raise FormatError(why, path=target)
+        taken[target.resolve()] = "is named for two outputs"
 
 
 @contextmanager

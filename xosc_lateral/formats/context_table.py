@@ -25,11 +25,13 @@ def read_context(path: Path) -> Mapping[str, tuple[FloatArray, FloatArray]]:
     Raises
     ------
     FormatError
-        No `time` column, time that does not increase, or no context column.
+        No `time` column, time that does not increase, an infinite value, or no context column.
     """
     table = read_table(path)
     if "time" not in table:
         raise FormatError("no column 'time'", path=path)
+    if table["time"].dtype.kind not in "fiu":
+        raise FormatError("times have to be numbers", path=path, element="column 'time'")
     time = table["time"].to_numpy(dtype=np.float64)
     if len(time) == 0 or not np.isfinite(time).all() or (np.diff(time) <= 0).any():
         raise FormatError("times have to increase from row to row", path=path, element="column 'time'")
@@ -38,6 +40,9 @@ def read_context(path: Path) -> Mapping[str, tuple[FloatArray, FloatArray]]:
         if name == "time" or table[name].dtype.kind not in "fiub":
             continue
         values = table[name].to_numpy(dtype=np.float64)
+        if (endless := np.flatnonzero(np.isinf(values))).size:
+            what = f"{values[endless[0]]} at {time[endless[0]]:g} s is not finite"
+            raise FormatError(what, path=path, element=f"column {str(name)!r}")
         known = np.isfinite(values)
         if known.any():
             context[str(name)] = (time[known], values[known])

@@ -42,7 +42,7 @@ def read_profile(name_or_path: str | Path, folders: Iterable[str | Path] = ()) -
     DriverProfileError
         If no profile of that name is known; lists those that are.
     FormatError
-        If the file is no valid profile.
+        If the file is no valid profile, or a folder isn't one.
     """
     path = find_profile(name_or_path, folders)
     size = path.stat().st_size
@@ -119,6 +119,8 @@ def find_profile(name_or_path: str | Path, folders: Iterable[str | Path] = ()) -
     if isinstance(name_or_path, Path) or text.endswith(SUFFIX) or path.name != text:
         return path
     for folder in (*map(Path, folders), SHIPPED):
+        if not folder.is_dir():
+            raise FormatError("no such folder", path=folder)
         found = folder / f"{text}{SUFFIX}"
         if found.is_file():
             return found

@@ -11,6 +11,8 @@ from pathlib import Path
 from xosc_lateral import __version__
 from xosc_lateral.enrich.enrich import enrich
 from xosc_lateral.enrich.result import Enriched
+from xosc_lateral.errors import FormatError
+from xosc_lateral.formats.atomic import refuse_targets
 from xosc_lateral.formats.context_table import read_context
 from xosc_lateral.formats.hashes import file_hash
 from xosc_lateral.formats.openscenario.write import (
@@ -24,6 +26,9 @@ from xosc_lateral.pipeline.drivers import choose_drivers
 from xosc_lateral.pipeline.load import Played, play_scenario
 from xosc_lateral.pipeline.settings import ConvertSettings, Mode
 from xosc_lateral.scenario import Scenario
+
+NO_WIDTH = 0.01
+"""A lane narrower than this is none. [m]"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,6 +106,7 @@ def convert_scenario(source: Path, output: Path, settings: ConvertSettings, *, v
         time_limit=settings.time_limit,
         allowed=settings.allowed,
     )
+    refuse_targets([output], _read_files(played.scenario, settings))
     drivers = choose_drivers(played.scenario, settings)
     enriched = enrich(
         played.motion,
@@ -113,6 +119,7 @@ def convert_scenario(source: Path, output: Path, settings: ConvertSettings, *, v
         trailers=played.trailers,
         attempts=settings.attempts,
     )
+    _refuse_lanes_without_width(played, enriched)
     provenance = _provenance(played, enriched, settings, variant)
     written = _write(played, enriched, output, provenance, settings.mode)
     warnings = enriched.warnings() + tuple(
@@ -131,12 +138,9 @@ def _entropy(scenario: Scenario) -> tuple[int, ...]:
 
 def _provenance(played: Played, enriched: Enriched, settings: ConvertSettings, variant: int) -> Provenance:
     scenario = played.scenario
-    files = [*scenario.input_files, *([scenario.road_file] if scenario.road_file else [])]
-    if settings.context is not None:
-        files.append(settings.context)
     return Provenance(
         package_version=__version__,
-        inputs={_relative(path, scenario.path): file_hash(path) for path in files},
+        inputs={_relative(path, scenario.path): file_hash(path) for path in _read_files(scenario, settings)},
         profiles={
             entity.name: (entity.profile.name, profile_hash(entity.profile))
             for entity in enriched.entities
@@ -146,6 +150,27 @@ def _provenance(played: Played, enriched: Enriched, settings: ConvertSettings, v
         variant=variant,
         parameters=dict(sorted(settings.parameters.items())),
     )
+
+
+def _read_files(scenario: Scenario, settings: ConvertSettings) -> list[Path]:
+    """Every file that went in: scenario, catalogs, road, context table."""
+    return [*scenario.input_files, *(path for path in (scenario.road_file, settings.context) if path is not None)]
+
+
+def _refuse_lanes_without_width(played: Played, enriched: Enriched) -> None:
+    """A lane may begin or end with no width, but nobody follows one that has none all along."""
+    for entity in enriched.entities:
+        motion = entity.motion
+        for segment in entity.segments:
+            rows = slice(segment.stretch.first, segment.stretch.last + 1)
+            width = played.network.lane_width(motion.road[rows], motion.lane[rows], motion.s[rows])
+            if width.max() < NO_WIDTH:
+                first = segment.stretch.first
+                raise FormatError(
+                    f"lane {motion.lane[first]} has no width where {entity.name!r} follows it",
+                    path=played.scenario.road_file,
+                    element=f"road {played.network.road_ids[motion.road[first]]!r}",
+                )
 
 
 def _relative(path: Path, scenario: Path) -> str:
