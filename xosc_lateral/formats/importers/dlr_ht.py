@@ -47,9 +47,9 @@ COLUMNS = (
     *(f"classifications_{name}" for name in CLASSES),
 )
 LICENCE = (
-    "DLR Highway Traffic dataset (Deutsches Zentrum für Luft- und Raumfahrt, doi:10.5281/zenodo.14012005): listed "
-    "there under CC BY-NC-SA 4.0; its first file lies in the wheel of tasi, licensed Apache-2.0. No tracks are passed "
-    "on with a profile, only fitted parameters."
+    "DLR Highway Traffic dataset (Deutsches Zentrum für Luft- und Raumfahrt, doi:10.5281/zenodo.14012005), said by "
+    "others to be under CC BY-NC-SA 4.0; its first file lies in the wheel of tasi, licensed Apache-2.0. No tracks are "
+    "passed on with a profile, only fitted parameters."
 )
 
 
