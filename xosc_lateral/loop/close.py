@@ -282,7 +282,8 @@ def _held_out_runs(setting: _Setting, trace: Trace, progress: Progress) -> tuple
         for side, profile in enumerate(_fold_profiles(setting, trace, used)):
             if side == CORE and same_core:
                 continue
-            seed = np.random.SeedSequence(setting.root.entropy, spawn_key=(5, side, fold))
+            # the same luck for all sides: what differs is the profile
+            seed = np.random.SeedSequence(setting.root.entropy, spawn_key=(5, fold))
             runs = own_runs(profile, setting.timeline, seed)
             composite.setdefault(side, np.zeros_like(runs))[:, held] = runs[:, held]
     return composite[BEFORE], composite[BEFORE if same_core else CORE], composite[AFTER]

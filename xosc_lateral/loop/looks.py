@@ -13,10 +13,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from enum import Enum
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
+from xosc_lateral.driver.effects import Acts, Linear
 from xosc_lateral.loop.movement import CLIP, Coarse, Fitted, elapsed, squared_innovations
 from xosc_lateral.loop.noise import fit_autoregression, moving_sum, positions_in_stretch
 from xosc_lateral.loop.scan import Rows
@@ -40,6 +42,9 @@ SLOW_S = 8
 KERNELS = ((-3.0, 2.0), (-1.5, 1.0), (1.5, 1.0), (3.0, 2.0), (0.0, 0.3), (0.0, 6.0))
 """Lags added and response times set [s], to stand for what a response fitted as a first-order lag leaves of its effect:
 without them the rest would be blamed on whatever resembles the quantity."""
+
+TAILS = (0.3, 4.0, 8.0)
+"""Response times between which a lane change fades. [s]"""
 
 NEUTRAL_FILTER = np.ones(1)
 
@@ -141,7 +146,17 @@ def kernel_terms(coarse: Coarse, fitted: Fitted) -> FloatArray:
         for effect in fitted.terms.location
         for lag, response in KERNELS
     ]
+    if "lane_index" in coarse.context:
+        variants += _lane_change_tails(coarse)
     return np.concatenate(variants, axis=1) if variants else np.zeros((len(coarse), 0))
+
+
+def _lane_change_tails(coarse: Coarse) -> list[FloatArray]:
+    """What is left of a lane change beyond the cut: answers to the lane that fade, and stand for no place in it."""
+    lane = Linear(acts=Acts.LOCATION, column="lane_index")
+    answers = [coarse.answer(replace(lane, response_s=response)) for response in TAILS]
+    tails = [quick - slow for quick, slow in pairwise(answers)]
+    return [tail for tail in tails if np.any(np.abs(tail[coarse.valid]) > 1e-6)]
 
 
 def pull(coarse: Coarse, fitted: Fitted) -> FloatArray:
@@ -180,7 +195,8 @@ def _pace(coarse: Coarse, fitted: Fitted) -> Rows:
     taken = _orthonormal(np.stack(columns, axis=1) * recent[:, None])
     rows = np.where(coarse.valid, fitted.rows, 0.0)
     rows = rows - taken @ (taken.T @ rows)
-    return Rows(rows * recent, recent**2, (taken * recent[:, None]).T, NEUTRAL_FILTER, rows * recent)
+    # squares of the products themselves: a few loud seconds must not make a restoring strength
+    return Rows(rows * recent, (rows * recent) ** 2, np.zeros((0, len(coarse))), NEUTRAL_FILTER, rows * recent)
 
 
 def _plain(values: FloatArray, valid: BoolArray, columns: FloatArray) -> Rows:

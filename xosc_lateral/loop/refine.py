@@ -33,6 +33,12 @@ LAG_RANGE = (-5.0, 5.0)
 RESPONSES = (0.3, 0.6, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0)
 """Response times that are tried. [s]"""
 
+USUAL_LAG = (-0.5, 1.5)
+"""Middle and standard deviation of the delays that drivers have: from 2 s ahead to 1 s behind, and some beyond. [s]"""
+
+USUAL_RESPONSE = (2.0, 1.0)
+"""Middle [s] and standard deviation [factors of two] of the times that they take to answer."""
+
 WITHIN = 25.0
 """Candidates whose score is lower than the best by up to this are refined too. [chi-square]"""
 
@@ -76,6 +82,8 @@ class Target:
 
     rows: FloatArray
     transform: Callable[[FloatArray], FloatArray]
+    robust: bool = False
+    """Variance from the products of rows and answer themselves, for rows whose size goes with the answer's."""
 
     def gain(self, answer: FloatArray, beside: FloatArray | None = None) -> float:
         """Chi-square that the answer adds, beside another answer's transformed rows if given."""
@@ -89,6 +97,9 @@ class Target:
         if np.trace(gram) <= 1e-12:
             return 0.0
         projected = columns.T @ rows
+        if self.robust:
+            products = columns * rows[:, None]
+            gram = products.T @ products
         return float(projected @ np.linalg.pinv(gram) @ projected)
 
 
@@ -103,7 +114,8 @@ def target_of(look: Look, coarse: Coarse, fitted: Fitted) -> Target:
         recent = pull(coarse, fitted)[:, None]
         paces = [ones, *(coarse.answer(effect) for effect in fitted.terms.pace)]
         rows = np.where(coarse.valid, fitted.rows, 0.0)
-        return _target(rows, lambda answer: answer * recent, np.concatenate(paces, axis=1) * recent)
+        plain = _target(rows, lambda answer: answer * recent, np.concatenate(paces, axis=1) * recent)
+        return replace(plain, robust=True)
     known = fitted.scale_columns
     if look is Look.SPREAD:
         squares, valid = squared_innovations(fitted.rows, coarse.valid), coarse.valid
@@ -143,7 +155,15 @@ def refine(
 def score_of(coarse: Coarse, target: Target, candidate: Candidate) -> float:
     """Chi-square as of one degree of freedom, less cost."""
     answer = coarse.answer(candidate.effect)
-    return float(as_one_degree(np.array([target.gain(answer)]), answer.shape[1])[0]) - candidate.cost
+    score = float(as_one_degree(np.array([target.gain(answer)]), answer.shape[1])[0])
+    return score - candidate.cost - timing_cost(candidate.effect)
+
+
+def timing_cost(effect: ColumnEffect) -> float:
+    """What an unlikely timing costs: a delay and a slow answer make up for one another, and weak data can't tell."""
+    lag = (effect.lag_s - USUAL_LAG[0]) / USUAL_LAG[1]
+    response = np.log2(effect.response_s / USUAL_RESPONSE[0]) / USUAL_RESPONSE[1]
+    return float(lag**2 + response**2)
 
 
 def _target(rows: FloatArray, transform: Callable[[FloatArray], FloatArray], known: FloatArray) -> Target:
@@ -215,9 +235,8 @@ def _by_likelihood(
         inside = squares[valid]
         level = float(np.mean(inside / np.exp(2.0 * log_scale)))
         gain = float(np.sum(np.log(inside.mean()) - np.log(level) - 2.0 * log_scale)) / apart
-        scored.append(
-            (candidate, float(as_one_degree(np.array([max(gain, 0.0)]), answer.shape[1])[0]) - candidate.cost)
-        )
+        score = float(as_one_degree(np.array([max(gain, 0.0)]), answer.shape[1])[0])
+        scored.append((candidate, score - candidate.cost - timing_cost(candidate.effect)))
     return scored
 
 

@@ -38,7 +38,7 @@ LEVEL = {
     "scale": 0.006,
     "dynamics": 0.001,
     "fine": 0.004,
-    "slow": 0.006,
+    "slow": 0.004,
     "growth": 0.002,
     "regime": 0.003,
     "periodic": 0.003,

@@ -143,6 +143,9 @@ def _residual(page: Page, result: LoopResult) -> None:
         "Residual by context",
         "Measured minus expected on held-out blocks, by fifths of every column. Flat at zero: nothing is missing.",
     )
+    if not result.trace.columns:
+        page.text("The table holds no column that varies.")
+        return
     for what in ("mean", "spread"):
         page.figure(
             residual_figure(result, what),
