@@ -172,6 +172,20 @@ def test_a_lane_change_follows_a_widening_lane(tmp_path: Path) -> None:
     assert motion.y[k] == pytest.approx(-3.5 - 0.5 * (3.5 + 0.01 * motion.x[k]), abs=1e-9)
 
 
+def test_the_heading_is_that_of_the_path_where_lanes_are_not_parallel(tmp_path: Path) -> None:
+    wide = (
+        '<lane id="-1" type="driving"><width sOffset="0" a="3.5" b="0" c="0" d="0"/></lane>'
+        '<lane id="-2" type="driving"><width sOffset="0" a="3.5" b="0.1" c="0" d="0"/></lane>'
+    )
+    roads = map_of(road("1", line(), 1000.0, sections=section(lanes(1), wide)))
+    played = Stage(tmp_path, roads).play(maneuvers(event(lane_change(to_lane(-2)), trigger=after(1.0))))
+    motion = entity(played)
+    driven = np.arctan2(np.gradient(motion.y), np.gradient(motion.x))
+    changing = slice(row(motion, 1.1), row(motion, 4.9))
+    heading = (motion.heading[changing] + pi) % (2.0 * pi) - pi
+    np.testing.assert_allclose(heading, driven[changing], atol=0.003)  # half a frame at the sharpest turn
+
+
 # ---- lane offsets ----------------------------------------------------------------------------------------------------
 @pytest.mark.parametrize(
     ("shape", "factor"), [("cubic", sqrt(6.0)), ("linear", sqrt(6.0)), ("sinusoidal", pi / sqrt(2.0))]

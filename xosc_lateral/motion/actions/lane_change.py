@@ -136,14 +136,16 @@ class RunningLaneChange(RunningAction):
         t = guide.t
         found = network.lane_at(guide.road, guide.s, t)
         lane = found.lane or guide.lane
-        centre = network.lane_state_at(guide.road, lane, guide.s).centre_t
-        state.move_to(guide.road, lane, guide.s, t - centre)
+        under = network.lane_state_at(guide.road, lane, guide.s)
+        state.move_to(guide.road, lane, guide.s, t - under.centre_t)
+        # The course is relative to the target lane; lanes side by side are not parallel where one widens.
+        aside = atan(network.lane_state_at(guide.road, guide.lane, guide.s).slope) - atan(under.slope)
         state.section = (0.0, -1.0)
         state.at_road_end = guide.at_road_end
         if guide.is_forward:
-            state.turn(copysign(1.0, state.speed) * turn)
+            state.turn(copysign(1.0, state.speed) * turn + aside)
         else:
-            state.turn(pi - copysign(1.0, state.speed) * turn)
+            state.turn(pi - copysign(1.0, state.speed) * turn + aside)
 
     @staticmethod
     def _is_stuck(guide: EntityState) -> bool:
