@@ -56,8 +56,10 @@ def refuse_converted(root: etree._Element, path: object) -> None:
     found = provenance_of(root)
     if found is None:
         return
-    source = next(iter(found.get("inputs", {})), None)
-    hint = f"; convert {source} instead" if isinstance(source, str) else "; convert its source instead"
+    inputs = found.get("inputs")
+    # Seen from the scenario, which has no folder in its name then; a road or a catalog may lie beside it.
+    beside = [name for name in inputs if "/" not in name and name.endswith(".xosc")] if isinstance(inputs, dict) else []
+    hint = f"; convert {beside[0]} instead" if len(beside) == 1 else "; convert its source instead"
     header = root.find("{*}FileHeader")
     line = None if header is None else line_of(header)
     raise FormatError(f"was written by xosc-lateral already{hint}", path=path, line=line, element="FileHeader")
