@@ -162,6 +162,7 @@ def named(case: Case, trace: Trace) -> tuple[bool, str]:
         kind = {
             "growth": "scale",
             "fine": "scale",
+            "slow": "scale",
             "wander": "step" if trace.final.terms.step_at is not None else "drift",
         }.get(found.look, found.look)
         right |= kind == case.kind and set(columns) == set(case.columns)
