@@ -53,8 +53,9 @@ class BestStream:
         skip = int(setup.integers(COARSE_EVERY))  # no sample of the 5 Hz grid is special
         past = model.start_factor @ setup.standard_normal(model.coarse.order)
         half = len(model.kernel) // 2
-        self._coarse = _CoarseQueue(model, seed, self.driver, past)
-        self._fine = _FineQueue(model, seed, self.driver)
+        factors = _Factors(model, seed)
+        self._coarse = _CoarseQueue(model, seed, self.driver, factors, past)
+        self._fine = _FineQueue(model, seed, self.driver, factors)
         # The coarse queue begins at sample COARSE_EVERY * TICKS after step 0, the fine one at sample `half`.
         begin = max(half, COARSE_EVERY * TICKS) + skip
         self._coarse.take(begin - COARSE_EVERY * TICKS)
@@ -159,16 +160,17 @@ class _Queue:
 class _CoarseQueue(_Queue):
     """Coarse movement about the driver's mean; its first block belongs to step `TICKS`."""
 
-    def __init__(self, model: BestModel, seed: np.random.SeedSequence, driver: Driver, past: FloatArray) -> None:
+    def __init__(
+        self, model: BestModel, seed: np.random.SeedSequence, driver: Driver, factors: _Factors, past: FloatArray
+    ) -> None:
         super().__init__()
-        self._model, self._driver = model, driver
-        self._factors = _Factors(model, seed)
+        self._model, self._driver, self._factors = model, driver, factors
         self._rng = np.random.default_rng(child(seed, _COARSE))
         self._past = past
         self._held = self._steps(2 * TICKS + 1)
 
     def _steps(self, n: int) -> FloatArray:
-        noise = self._rng.standard_normal(n) * (self._model.coarse.scale * self._factors.take(n)[0])
+        noise = self._rng.standard_normal(n) * (self._model.coarse.scale * self._factors.take(_Factors.COARSE, n))
         series = recur(self._past, noise, self._model.coarse.coefficients)
         self._past = series[n:]
         return series[len(series) - n :]
@@ -182,16 +184,15 @@ class _CoarseQueue(_Queue):
 class _FineQueue(_Queue):
     """Fine movement; its first value is centred half a kernel after step 0."""
 
-    def __init__(self, model: BestModel, seed: np.random.SeedSequence, driver: Driver) -> None:
+    def __init__(self, model: BestModel, seed: np.random.SeedSequence, driver: Driver, factors: _Factors) -> None:
         super().__init__()
-        self._kernel, self._driver = model.kernel, driver
-        self._factors = _Factors(model, seed)
+        self._kernel, self._driver, self._factors = model.kernel, driver, factors
         self._rng = np.random.default_rng(child(seed, _FINE))
-        self._last_factor = self._factors.take(1)[1]
+        self._last_factor = factors.take(_Factors.FINE, 1)
         self._noise = np.empty(0)
 
     def _lively_noise(self, blocks: int) -> FloatArray:
-        factors = np.concatenate([self._last_factor, self._factors.take(blocks)[1]])
+        factors = np.concatenate([self._last_factor, self._factors.take(_Factors.FINE, blocks)])
         self._last_factor = factors[-1:]
         share = np.arange(COARSE_EVERY) / COARSE_EVERY
         between = factors[:-1, None] * (1.0 - share) + factors[1:, None] * share
@@ -206,7 +207,9 @@ class _FineQueue(_Queue):
 
 
 class _Factors:
-    """The wandering parts of both livelinesses, one value a coarse step. Two with one seed give the same values."""
+    """The wandering parts of both livelinesses, one value a coarse step; each part takes its own at its own pace."""
+
+    COARSE, FINE = 0, 1
 
     def __init__(self, model: BestModel, seed: np.random.SeedSequence) -> None:
         step = model.step * COARSE_EVERY
@@ -224,9 +227,17 @@ class _Factors:
             model.correlation,
             child(seed, _LIVELINESS, 1),
         )
+        self._made = [np.empty(0), np.empty(0)]
 
-    def take(self, n: int) -> tuple[FloatArray, FloatArray]:
-        """Next n factors on the coarse and on the fine movement; their mean square is 1."""
+    def take(self, part: int, n: int) -> FloatArray:
+        """Next n factors on the coarse or on the fine movement; their mean square is 1."""
+        missing = n - len(self._made[part])
+        if missing > 0:
+            self._made = [np.concatenate(both) for both in zip(self._made, self._next(missing), strict=True)]
+        taken, self._made[part] = self._made[part][:n], self._made[part][n:]
+        return taken
+
+    def _next(self, n: int) -> tuple[FloatArray, FloatArray]:
         logs = self._wander.take(n)
         if self._slow.is_needed:
             logs = logs + self._slow.take(n)

@@ -26,7 +26,7 @@ BLOCK = 12_288
 """Steps sampled at once: intermediate results stay in the cache. [-]"""
 
 HORIZON = 512
-"""Steps that hidden effects are first drawn for; doubled when a drive lasts longer. [-]"""
+"""Steps that hidden effects are first drawn for at least; doubled when a drive lasts longer. [-]"""
 
 
 class OffsetSampler:
@@ -136,8 +136,8 @@ def combine(terms: Sequence[EffectTerms]) -> EffectTerms:
 class _HiddenTerms:
     """Terms of the effects without a column, drawn from the start of the drive on.
 
-    Each is drawn anew from its own seed for a horizon that doubles as the drive goes on: an effect that draws in the
-    order of time gives the same beginning every time, so that pieces agree with the whole.
+    Each is drawn anew from its own seed for a horizon that at least doubles as the drive goes on: an effect that draws
+    in the order of time gives the same beginning every time, so that pieces agree with the whole.
     """
 
     effects: tuple[Effect, ...]
@@ -155,9 +155,7 @@ class _HiddenTerms:
         rows = np.maximum(np.round((time - self.begin) / step).astype(np.int64), 0)
         needed = int(rows[-1]) + 1
         if self.drawn is None or needed > self.horizon:
-            self.horizon = HORIZON
-            while self.horizon < needed:
-                self.horizon *= 2
+            self.horizon = max(needed, HORIZON, 2 * self.horizon)
             grid: FloatArray = self.begin + step * np.arange(self.horizon, dtype=np.float64)
             self.drawn = combine(
                 [

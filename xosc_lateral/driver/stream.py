@@ -22,6 +22,7 @@ from xosc_lateral.driver.effects import EffectTerms
 from xosc_lateral.driver.effects.acts import Acts, terms_of
 from xosc_lateral.driver.effects.column import ColumnEffect
 from xosc_lateral.driver.effects.hidden import HiddenEffect
+from xosc_lateral.driver.effects.response import split_shift
 from xosc_lateral.driver.effects.running import RunningTerms
 from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.driver.sampling import combine
@@ -265,11 +266,12 @@ class _Answer:
 
     def __init__(self, effect: ColumnEffect, step: float, ahead: int) -> None:
         self.effect = effect
-        self._shift = effect.lag_s / step
+        shift = effect.lag_s / step
+        self._whole, self._share = split_shift(shift)
         self._keep = float(np.exp(-step / effect.response_s)) if effect.response_s > 0 else None
-        self._reference, self._coefficients = np.asarray(effect.reference), np.asarray(effect.coefficients)
+        self._reference = np.asarray(effect.reference)
         # Rows that are still needed: from the one that a delay goes back to, to the one that is looked ahead to.
-        self._rows: deque[FloatArray] = deque(maxlen=ahead + max(0, math.ceil(self._shift)) + 2)
+        self._rows: deque[FloatArray] = deque(maxlen=ahead + max(0, math.ceil(shift)) + 2)
         self._taken = 0
         self._given = 0
         self._settled: FloatArray | None = None
@@ -288,24 +290,21 @@ class _Answer:
 
     def next(self) -> EffectTerms:
         """Terms at the next row, each of shape (1,)."""
-        strength = (self._respond() - self._reference)[None, :] @ self._coefficients
-        return terms_of(self.effect.acts, strength)
+        return terms_of(self.effect.acts, self.effect.weighed(self._respond()[None, :]))
 
     def _respond(self) -> FloatArray:
         """Shift and first-order lag, as `respond` has them."""
-        shifted = self._shifted(max(0.0, self._given - self._shift))
+        shifted = self._shifted(self._given + self._whole)
         self._given += 1
         if self._keep is not None:
             carried = self._keep * (shifted if self._settled is None else self._settled)
             shifted = self._settled = (1.0 - self._keep) * shifted + carried
         return shifted
 
-    def _shifted(self, where: float) -> FloatArray:
-        low = int(where)
-        share = where - low
-        if share == 0.0:
-            return self._row(low)
-        return (1.0 - share) * self._row(low) + share * self._row(low + 1)
+    def _shifted(self, low: int) -> FloatArray:
+        if low < 0 or self._share == 0.0:
+            return self._row(max(low, 0))
+        return (1.0 - self._share) * self._row(low) + self._share * self._row(low + 1)
 
     def _row(self, index: int) -> FloatArray:
         return self._rows[index - self._taken + len(self._rows)]

@@ -93,7 +93,12 @@ class ColumnEffect(ABC):
         """[m] or natural logarithm of a factor, shape (n,); None when a column is missing."""
         if any(column not in context for column in self.columns):
             return None
-        answer = self.answer(step, context)
+        return self.weighed(self.answer(step, context))
+
+    def weighed(self, answer: FloatArray) -> FloatArray:
+        """Strength of answers, shape (n, k): coefficients . (answer - reference), shape (n,)."""
+        if answer.shape[1] == len(self.coefficients) == 1:  # most effects; a matrix product takes five times as long
+            return np.asarray((answer[:, 0] - self.reference[0]) * self.coefficients[0])
         return np.asarray((answer - np.asarray(self.reference)) @ np.asarray(self.coefficients))
 
     def terms(self, time: FloatArray, context: Mapping[str, FloatArray], rng: np.random.Generator) -> EffectTerms:

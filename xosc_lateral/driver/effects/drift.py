@@ -9,6 +9,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from xosc_lateral.driver.autoregression import recur
 from xosc_lateral.driver.effects.base import EffectTerms
 from xosc_lateral.driver.effects.hidden import HiddenEffect
 from xosc_lateral.driver.effects.running import RunningTerms
@@ -38,13 +39,13 @@ class Drift(HiddenEffect):
 
     def terms(self, time: FloatArray, context: Mapping[str, FloatArray], rng: np.random.Generator) -> EffectTerms:
         """A wander of its own for every run, stationary from the start."""
-        from scipy.signal import lfilter
-
         step = float(time[1] - time[0]) if len(time) > 1 else 1.0
         keep = float(np.exp(-step / self.correlation_s))
-        noise = rng.normal(size=len(time)) * self.size * np.sqrt(1.0 - keep**2)
+        noise = rng.standard_normal(len(time))
+        noise *= self.size
+        noise *= np.sqrt(1.0 - keep**2)
         noise[:1] /= np.sqrt(1.0 - keep**2)
-        return EffectTerms(location=np.asarray(lfilter([1.0], [1.0, -keep], noise)))
+        return EffectTerms(location=recur(np.zeros(1), noise, np.array([keep]))[1:])
 
     def running(self, rng: np.random.Generator) -> RunningTerms:
         """See `HiddenEffect.running`."""

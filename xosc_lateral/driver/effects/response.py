@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
+
+from xosc_lateral.driver.autoregression import recur
 
 FloatArray = NDArray[np.float64]
 
@@ -26,24 +30,40 @@ def respond(values: FloatArray, step: float, lag_s: float, response_s: float) ->
     -------
     array, shape of `values`
     """
-    from scipy.signal import lfilter
-
-    shifted = _shifted(values, lag_s / step)
-    if response_s <= 0 or len(shifted) == 0:
-        return shifted
+    answer = _shifted(values, lag_s / step)
+    if response_s <= 0 or len(answer) == 0:
+        return answer
     keep = float(np.exp(-step / response_s))
-    settled = keep * shifted[:1]
-    return np.asarray(lfilter([1.0 - keep], [1.0, -keep], shifted, axis=0, zi=settled)[0])
+    for column in answer.reshape(len(answer), -1).T:  # views: answered in place
+        column[:] = recur(column[:1], (1.0 - keep) * column, np.array([keep]))[1:]
+    return answer
+
+
+def split_shift(steps: float) -> tuple[int, float]:
+    """Row i of a series delayed by `steps` is ``(1 - share) * values[i + whole] + share * values[i + whole + 1]``.
+
+    Returns
+    -------
+    whole : int
+    share : float
+        In [0, 1], the same for every row: rounding does not grow along the drive.
+    """
+    whole = math.floor(-steps)
+    return whole, -steps - whole
 
 
 def _shifted(values: FloatArray, steps: float) -> FloatArray:
-    """`values[i - steps]`, linear between samples."""
+    """`values[i - steps]`, linear between samples, as an array of its own."""
     n = len(values)
-    if steps == 0 or n == 0:
+    whole, share = split_shift(steps)
+    if n == 0 or whole == share == 0:
         return np.array(values, dtype=np.float64)
-    where = np.clip(np.arange(n) - steps, 0, n - 1)
-    low = np.minimum(where.astype(np.intp), max(n - 2, 0))
-    share = where - low
-    share = share if values.ndim == 1 else share[:, None]
-    high = np.minimum(low + 1, n - 1)
-    return np.asarray((1.0 - share) * values[low] + share * values[high])
+    result = np.empty(values.shape)
+    first, last = min(max(-whole, 0), n), max(min(n - 1 - whole, n), 0)
+    if first < last:
+        result[first:last] = values[first + whole : last + whole]
+        if share:
+            result[first:last] *= 1.0 - share
+            result[first:last] += share * values[first + whole + 1 : last + whole + 1]
+    result[:first], result[max(last, first) :] = values[0], values[-1]
+    return result
