@@ -28,7 +28,18 @@ def _files(folder: Path) -> dict[Path, bytes]:
         ("convert", ["-o", "cut-in.xodr"], "cut-in.xodr: is an input"),
         ("convert", ["-o", "out.xosc", "--report", "cut-in.xosc"], "cut-in.xosc: is an input"),
         ("convert", ["-o", "out.xosc", "--report", "out.xosc"], "out.xosc: is named for two outputs"),
+        ("convert", ["-o", "out.xosc", "--report", "cut-in.xodr"], "cut-in.xodr: is an input"),
         ("convert", ["-o", "out.xosc", "--report", "."], "is a folder"),
+        ("convert", ["-o", "out.xosc", "--report", "cut-in.xodr/r.html"], "cut-in.xodr/r.html: can't be written: "),
+        ("convert", ["-o", "cut-in.xodr/out.xosc"], "cut-in.xodr/out.xosc: can't be written: "),
+        (
+            "convert",
+            ["-o", "v.xosc", "--report", "cut-in.xodr/r.html", "--variants", "2"],
+            "r_01.html: can't be written",
+        ),
+        ("convert", ["-o", "out.xosc", "--allow", "nowhere"], "nowhere: no such folder to allow"),
+        ("convert", ["-o", "out.xosc", "--profile", "none.json"], "none.json: no such file"),
+        ("convert", ["-o", "out.xosc", "--context", "none.csv"], "none.csv: no such file or directory"),
         ("play", ["-o", "cut-in.xosc"], "cut-in.xosc: is an input"),
         ("play", ["-o", "cut-in.xodr"], "cut-in.xodr: is an input"),
     ],
@@ -68,9 +79,24 @@ def test_no_verb_writes_over_measured_drives(
     assert _files(tmp_path) == {tmp_path / "t.csv": b"time,offset,lane_width\n"}
 
 
-@pytest.mark.parametrize("limit", ["nan", "-1"])
-def test_segments_refuses_a_time_limit_that_is_none(scenario: Path, limit: str) -> None:
-    assert main(["segments", str(scenario), "--time-limit", limit]) == 2
+@pytest.mark.parametrize("limit", ["nan", "-1", "inf"])
+@pytest.mark.parametrize("verb", ["segments", "play", "convert"])
+def test_a_time_limit_that_is_none_is_wrong_usage(
+    scenario: Path, verb: str, limit: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    output = [] if verb == "segments" else ["-o", str(scenario.parent / "out")]
+    assert main([verb, str(scenario), *output, "--time-limit", limit]) == 2
+    assert "--time-limit" in capsys.readouterr().err
+    assert not (scenario.parent / "out").exists()
+
+
+def test_an_allowed_folder_that_is_not_there_stops_a_batch_at_once(
+    scenario: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    words = ["convert", str(scenario.parent), "-o", str(scenario.parent / "out"), "--allow", "nowhere"]
+    assert main(words) == 1
+    assert capsys.readouterr().err == "xosc-lateral: nowhere: no such folder to allow\n"
+    assert not (scenario.parent / "out").exists()
 
 
 @pytest.mark.parametrize("jobs", ["0", "-2"])

@@ -62,3 +62,14 @@ def test_targets_that_would_destroy_an_input_or_one_another_are_refused(tmp_path
         refuse_targets([tmp_path / "out", tmp_path / "out"])
     with pytest.raises(FormatError, match="is a folder"):
         refuse_targets([tmp_path], [source])
+
+
+def test_a_target_whose_folder_can_not_be_made_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    refuse_targets([tmp_path / "new" / "folder" / "out.html"])
+    file = write_atomically(tmp_path / "file", "x")
+    for target in (file / "out.html", file / "deeper" / "out.html"):
+        with pytest.raises(FormatError, match=r"out\.html: can't be written: .*file is a file, not a folder"):
+            refuse_targets([target])
+    monkeypatch.setattr("os.access", lambda *_: False)  # permissions don't bind the user that runs many a test
+    with pytest.raises(FormatError, match="no permission to write to"):
+        refuse_targets([tmp_path / "out.html"])

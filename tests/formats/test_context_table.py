@@ -13,7 +13,10 @@ BAD = {
     "time stands": ("time,wind\n0,1\n0,2\n", "times have to increase"),
     "time unknown": ("time,wind\nnan,1\n1,2\n", "times have to increase"),
     "infinite": ("time,wind\n0,1\n2.5,inf\n", "column 'wind': inf at 2.5 s is not finite"),
-    "words alone": ("time,wind\n0,strong\n", "no numeric column besides 'time'"),
+    "words": ("time,wind,gusts\n0,1,2\n1,2,\n3,2,strong\n", "column 'gusts': 'strong' at 3 s is no number; leave"),
+    "dates": ("time,wind,day\n0,1,2026-01-01\n", "column 'day': '2026-01-01' at 0 s is no number"),
+    "no values": ("time,wind\n0,\n1,\n", "no column with values besides 'time'"),
+    "time alone": ("time\n0\n1\n", "no column with values besides 'time'"),
     "ragged": ("time,wind\n0,1\n1,2,3,4\n", "can't be read as a table"),
     "empty": ("", "can't be read as a table"),
 }

@@ -55,10 +55,31 @@ def test_a_channel_that_is_not_there_is_named(log):
         import_mf4(log, [*MAP[:2], "speed=V"])
 
 
-def test_without_a_channel_map_the_verb_asks_for_one(tmp_path, capsys):
-    (tmp_path / "a.mf4").write_bytes(b"")
-    assert main(["import", "mf4", str(tmp_path / "a.mf4"), "-o", str(tmp_path / "t.csv")]) == 1
-    assert "channel map needs --map offset=CHANNEL" in capsys.readouterr().err
+@pytest.mark.filterwarnings("default")
+def test_without_a_channel_map_the_verb_says_what_to_map_and_which_channels_there_are(log, capsys):
+    assert main(["import", "mf4", str(log), "-o", str(log.with_name("t.csv"))]) == 2
+    said = " ".join(capsys.readouterr().err.replace("│", " ").split())
+    assert "--map distance_left=CHANNEL[:UNIT]" in said
+    assert "drive7.mf4 has 3 channels: LnLeft, LnRight, VehSpd" in said
+    assert not log.with_name("t.csv").exists()
+
+
+@pytest.mark.filterwarnings("default")
+def test_half_a_channel_map_is_told_what_it_lacks(log):
+    with pytest.raises(
+        FormatError, match=r"distance_right=CHANNEL.* 3 channels: LnLeft.*; mapped: distance_left, speed"
+    ):
+        import_mf4(log, [MAP[0], MAP[2]])
+
+
+@pytest.mark.filterwarnings("default")
+def test_a_file_that_is_no_log_is_refused_with_and_without_a_map(log, capsys):
+    bad = log.with_name("bad.mf4")
+    for content in (b"", b"no log at all"):
+        bad.write_bytes(content)
+        for channels in ([], [word for name in MAP for word in ("--map", name)]):
+            assert main(["import", "mf4", str(bad), *channels, "-o", str(log.with_name("t.csv"))]) == 1
+            assert "not an MDF file" in capsys.readouterr().err
 
 
 def test_without_asammdf_the_extra_is_named(tmp_path, monkeypatch):

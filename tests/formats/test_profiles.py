@@ -116,6 +116,7 @@ BAD = {
     "effect no object": (broken(effects=["magic"]), "effect"),
     "odd provenance": (broken(provenance={"x": 1}), "provenance"),
     "lane width 0": (broken(lane_width=0), "lane width 0"),
+    "lane width 1e9": (broken(lane_width=1e9), r"lane width 1000000000\.0 m, expected above 0, at most 10 m"),
     "no name": (broken(name=""), "needs a name"),
 }
 
@@ -129,6 +130,13 @@ def test_broken_files_are_refused_in_one_line(tmp_path: Path, case: str) -> None
         read_profile(path)
     assert str(caught.value).startswith(str(path))
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("name", ["none.json", "folder/none", "."])
+def test_a_path_without_a_file_is_told_in_our_words(tmp_path: Path, name: str) -> None:
+    with pytest.raises(FormatError, match="no such file" if name != "." else "is a folder, not a profile") as caught:
+        read_profile(tmp_path / name)
+    assert str(caught.value).startswith(str(tmp_path))
 
 
 def test_canonical_json_is_plain_json() -> None:

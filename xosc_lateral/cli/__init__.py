@@ -43,12 +43,19 @@ def _root(
     """Lifelike lateral movement for OpenSCENARIO traffic."""
 
 
+def _in_words(error: XoscLateralError | OSError) -> str:
+    """What went wrong; the system's errors in the form of ours, file first and without their number."""
+    if isinstance(error, OSError) and error.filename is not None and error.strerror:
+        return f"{error.filename}: {error.strerror[0].lower()}{error.strerror[1:]}"
+    return str(error)
+
+
 def main(argv: Sequence[str] | None = None) -> int:
     """Run one command; 0 done, 1 the input is at fault (one line on stderr), 2 wrong usage."""
     try:
         code = app(args=None if argv is None else list(argv), standalone_mode=False)
     except (XoscLateralError, OSError) as error:
-        print(f"xosc-lateral: {' '.join(str(error).split())}", file=sys.stderr)
+        print(f"xosc-lateral: {' '.join(_in_words(error).split())}", file=sys.stderr)
         code = 1
     except typer.Abort:
         code = 130

@@ -40,7 +40,7 @@ def convert(
     ] = Mode.TRAJECTORY,
     allow: Annotated[list[Path] | None, typer.Option(help="Folder that roads and catalogs may lie in.")] = None,
     resample: Annotated[int, typer.Option(help="Attempts while cars touch or leave their lane.", min=1)] = 1,
-    time_limit: Annotated[float, typer.Option(help="End of a scenario without one [s].", min=0.1)] = 60.0,
+    time_limit: Annotated[float, typer.Option(help="End of a scenario without one [s].", min=0.1, max=86_400)] = 60.0,
     jobs: Annotated[int, typer.Option(help="Batch: processes; -1: one per core.")] = 1,
     cluster: Annotated[str | None, typer.Option(metavar="ADDRESS", help="Batch: dask scheduler to work on.")] = None,
     quiet: Annotated[bool, typer.Option("--quiet", help="Batch: failures alone.")] = False,
@@ -49,7 +49,6 @@ def convert(
 ) -> None:
     """Give every car in a scenario the lateral movement of a real driver."""
     from xosc_lateral.cli.batches import convert_batch, is_batch
-    from xosc_lateral.formats.atomic import refuse_targets
     from xosc_lateral.pipeline.convert import convert_variants
     from xosc_lateral.report.conversion import as_text, to_json, write_report
 
@@ -76,7 +75,6 @@ def convert(
             scenario, output, settings, variants=variants, jobs=jobs, cluster=cluster, display=display, as_json=as_json
         )
         return
-    refuse_targets([output, report], [Path(scenario[0])])
-    for conversion in convert_variants(Path(scenario[0]), output, settings, variants=variants):
+    for conversion in convert_variants(Path(scenario[0]), output, settings, variants=variants, report=report):
         where = write_report(conversion, report, variants=variants) if report else None
         typer.echo(to_json(conversion, where) if as_json else as_text(conversion, where))

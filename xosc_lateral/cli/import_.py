@@ -21,7 +21,9 @@ def register(app: typer.Typer) -> None:
     def dlr_ht(
         source: Source,
         output: Output,
-        max_gap: Annotated[float, typer.Option(help="Longest bridge between two cameras that is kept. [s]")] = 1.0,
+        max_gap: Annotated[
+            float, typer.Option(help="Longest bridge between two cameras that is kept. [s]", min=0, max=60)
+        ] = 1.0,
         keep_cut: KeepCut = False,
         as_json: AsJson = False,
     ) -> None:
@@ -54,14 +56,18 @@ def register(app: typer.Typer) -> None:
                 "--map", metavar="NAME=CHANNEL[:UNIT]", help="Which channel is which column, e.g. speed=v_veh:km/h."
             ),
         ] = None,
-        step: Annotated[float, typer.Option(help="Step of the table; channels are interpolated to it. [s]")] = 0.04,
+        step: Annotated[
+            float, typer.Option(help="Step of the table; channels are interpolated to it. [s]", min=0.001, max=1)
+        ] = 0.04,
         as_json: AsJson = False,
     ) -> None:
         """ASAM MDF bus log (extra `mdf`): asks for a channel map, since no two cars name their signals alike."""
-        from xosc_lateral.formats.importers.mf4 import import_mf4
+        from xosc_lateral.formats.importers.mf4 import channels_wanted, import_mf4
         from xosc_lateral.formats.importers.table import describe, write_imported
 
-        imported = import_mf4(source, channels or [], step=step)
+        if not channels:
+            raise typer.BadParameter(channels_wanted(source), param_hint="--map")
+        imported = import_mf4(source, channels, step=step)
         write_imported(imported, output)
         typer.echo(describe(imported.provenance, as_json=as_json), err=not as_json)
 

@@ -18,7 +18,7 @@ def play(
     output: Annotated[Path, typer.Option("--output", "-o", help="CSV table to write.", show_default=False)],
     step: Annotated[float, typer.Option(help="Length of a frame [s].", min=0.001, max=1.0)] = 0.02,
     time_limit: Annotated[
-        float, typer.Option(help="End of a scenario that does not end by itself [s].", min=0.0)
+        float, typer.Option(help="End of a scenario that does not end by itself [s].", min=0.0, max=86_400)
     ] = 60.0,
 ) -> None:
     """Play a scenario and write where every entity is at every step; what was not played is named on stderr."""

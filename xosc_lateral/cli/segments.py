@@ -16,7 +16,7 @@ def register(app: typer.Typer) -> None:
 def segments(
     scenario: Annotated[Path, typer.Argument(help="Maneuver-based scenario (.xosc).", show_default=False)],
     time_limit: Annotated[
-        float, typer.Option(help="End of a scenario that does not end by itself [s].", min=0.0)
+        float, typer.Option(help="End of a scenario that does not end by itself [s].", min=0.0, max=86_400)
     ] = 60.0,
     as_json: Annotated[bool, typer.Option("--json", help="For machines.")] = False,
 ) -> None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
-from math import isfinite
 from types import MappingProxyType
 from typing import Any
 
@@ -16,6 +15,9 @@ from xosc_lateral.errors import DriverProfileError
 FORMAT = "xosc-lateral driver profile"
 VERSION = 1
 """Of the file format. A reader understands its own and every older version; new fields have a default."""
+
+MAX_LANE_WIDTH = 10.0
+"""Lanes that wide are none: 2 to 6 m is what measured ones have. [m]"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,7 +81,8 @@ class DriverProfile:
     effects : tuple of Effect
         In the order in which they were found.
     lane_width : float
-        Median width of the lanes that it was fitted on; where a lane's own width is unknown it stands in. [m]
+        Median width of the lanes that it was fitted on; where a lane's own width is unknown it stands in.
+        Above 0, at most `MAX_LANE_WIDTH`. [m]
     provenance : Provenance
 
     Raises
@@ -98,8 +101,10 @@ class DriverProfile:
         """Check."""
         if not self.name:
             raise DriverProfileError("a profile needs a name")
-        if not (isfinite(self.lane_width) and self.lane_width > 0):
-            raise DriverProfileError(f"profile {self.name}: lane width {self.lane_width} m")
+        if not 0 < self.lane_width <= MAX_LANE_WIDTH:
+            raise DriverProfileError(
+                f"profile {self.name}: lane width {self.lane_width} m, expected above 0, at most {MAX_LANE_WIDTH:g} m"
+            )
         object.__setattr__(self, "effects", tuple(self.effects))
 
     @property

@@ -62,7 +62,7 @@ def refuse_targets(targets: Iterable[Path | None], inputs: Iterable[Path] = ()) 
     Raises
     ------
     FormatError
-        If a target is a folder, an input (links resolved), or named twice.
+        If a target is a folder, an input (links resolved), or named twice, or its folder can't be made or written to.
     """
     taken = {path.resolve(): "is an input; choose another output" for path in inputs}
     for target in targets:
@@ -73,6 +73,11 @@ def refuse_targets(targets: Iterable[Path | None], inputs: Iterable[Path] = ()) 
         if (why := taken.get(target.resolve())) is not None:
             raise FormatError(why, path=target)
         taken[target.resolve()] = "is named for two outputs"
+        parent = next(folder for folder in target.absolute().parents if folder.exists())
+        if not parent.is_dir():
+            raise FormatError(f"can't be written: {parent} is a file, not a folder", path=target)
+        if not os.access(parent, os.W_OK | os.X_OK):
+            raise FormatError(f"can't be written: no permission to write to {parent}", path=target)
 
 
 @contextmanager

@@ -42,7 +42,7 @@ def read_profile(name_or_path: str | Path, folders: Iterable[str | Path] = ()) -
     DriverProfileError
         If no profile of that name is known; lists those that are.
     FormatError
-        If the file is no valid profile, or a folder isn't one.
+        If the file is not there or no valid profile, or a folder isn't one.
     """
     path = find_profile(name_or_path, folders)
     size = path.stat().st_size
@@ -117,6 +117,8 @@ def find_profile(name_or_path: str | Path, folders: Iterable[str | Path] = ()) -
     text = str(name_or_path)
     path = Path(name_or_path)
     if isinstance(name_or_path, Path) or text.endswith(SUFFIX) or path.name != text:
+        if not path.exists() or path.is_dir():
+            raise FormatError("is a folder, not a profile" if path.is_dir() else "no such file", path=path)
         return path
     for folder in (*map(Path, folders), SHIPPED):
         if not folder.is_dir():

@@ -79,7 +79,9 @@ class Conversion:
     warnings: tuple[str, ...]
 
 
-def convert_scenario(source: Path, output: Path, settings: ConvertSettings, *, variant: int = 0) -> Conversion:
+def convert_scenario(
+    source: Path, output: Path, settings: ConvertSettings, *, variant: int = 0, report: Path | None = None
+) -> Conversion:
     """Convert one scenario and write it.
 
     Parameters
@@ -91,6 +93,8 @@ def convert_scenario(source: Path, output: Path, settings: ConvertSettings, *, v
     settings : ConvertSettings
     variant : int
         Number of the variant: another one, other offsets.
+    report : Path or None
+        Where the caller will write a report: refused like the output if it can't be meant, before anything is written.
 
     Raises
     ------
@@ -106,7 +110,7 @@ def convert_scenario(source: Path, output: Path, settings: ConvertSettings, *, v
         time_limit=settings.time_limit,
         allowed=settings.allowed,
     )
-    refuse_targets([output], _read_files(played.scenario, settings))
+    refuse_targets([output, report], _read_files(played.scenario, settings))
     drivers = choose_drivers(played.scenario, settings)
     enriched = enrich(
         played.motion,
@@ -198,7 +202,7 @@ def _write(played: Played, enriched: Enriched, output: Path, provenance: Provena
 
 
 def convert_variants(
-    source: Path, output: Path | None, settings: ConvertSettings, *, variants: int = 1
+    source: Path, output: Path | None, settings: ConvertSettings, *, variants: int = 1, report: Path | None = None
 ) -> Iterator[Conversion]:
     """Convert one scenario into as many variants as wanted, one after another.
 
@@ -209,10 +213,20 @@ def convert_variants(
         None: ``NAME_lifelike.xosc`` beside the source. Several variants get their number before the suffix.
     settings : ConvertSettings
     variants : int
+    report : Path or None
+        Where the caller will write reports, numbered like the outputs.
+
+    Raises
+    ------
+    FormatError
+        An output or report that can't be meant: before the first variant is written.
     """
     target = output if output is not None else source.with_name(f"{source.stem}_lifelike{source.suffix or '.xosc'}")
-    for variant in range(variants):
-        yield convert_scenario(source, numbered(target, variant, variants), settings, variant=variant)
+    outputs = [numbered(target, variant, variants) for variant in range(variants)]
+    reports = [None if report is None else numbered(report, variant, variants) for variant in range(variants)]
+    refuse_targets([*outputs, *reports], [source])
+    for variant, (path, page) in enumerate(zip(outputs, reports, strict=True)):
+        yield convert_scenario(source, path, settings, variant=variant, report=page)
 
 
 def numbered(path: Path, variant: int, variants: int) -> Path:

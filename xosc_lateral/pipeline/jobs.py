@@ -13,6 +13,7 @@ from xosc_lateral import __version__
 from xosc_lateral.errors import FormatError, XoscLateralError
 from xosc_lateral.formats.hashes import file_hash
 from xosc_lateral.formats.openscenario.distribution import read_distribution
+from xosc_lateral.formats.openscenario.references import require_folders
 from xosc_lateral.formats.profiles import SHIPPED, SUFFIX, find_profile
 from xosc_lateral.pipeline.convert import numbered
 from xosc_lateral.pipeline.manifest import ManifestRow
@@ -130,11 +131,12 @@ def plan_batch(
     Raises
     ------
     FormatError
-        An input that isn't there, two inputs with the same output, an output on top of an input.
+        An input or allowed folder that isn't there, two inputs with the same output, an output on top of an input.
     DriverProfileError
         A profile that is unknown.
     """
     settings = settings or ConvertSettings()
+    require_folders(settings.allowed)
     for name in {settings.profile, *settings.entity_profiles.values()} - {AUTO}:
         file_hash(find_profile(name, settings.libraries))  # wrong for all is said once, wrong in a table's row there
     target = _normal(Path(folder))

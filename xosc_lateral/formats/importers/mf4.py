@@ -7,7 +7,8 @@ No two cars name their signals alike, so the reader asks for a channel map: ``NA
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -26,6 +27,9 @@ FloatArray = NDArray[np.float64]
 
 POSITIONS = (("offset", "lane_width"), ("distance_left", "distance_right"))
 LICENCE = "your own recording"
+
+LISTED = 40
+"""Channel names in a message, at most."""
 
 
 def import_mf4(source: Path, channels: Sequence[str], *, step: float = 0.04) -> Imported:
@@ -46,11 +50,7 @@ def import_mf4(source: Path, channels: Sequence[str], *, step: float = 0.04) -> 
     """
     mapping = parse_map(channels)
     if not any(set(pair) <= mapping.keys() for pair in POSITIONS):
-        raise FormatError(
-            "the channel map needs --map offset=CHANNEL and --map lane_width=CHANNEL, or --map distance_left=CHANNEL "
-            f"and --map distance_right=CHANNEL; it has {', '.join(mapping) or 'nothing'}",
-            path=source,
-        )
+        raise FormatError(f"{channels_wanted(source)}; mapped: {', '.join(mapping) or 'nothing'}", path=source)
     table = _table(_read_channels(source, mapping), mapping, source, step)
     record = make_provenance(
         table,
@@ -64,8 +64,35 @@ def import_mf4(source: Path, channels: Sequence[str], *, step: float = 0.04) -> 
     return Imported(drop_cut(table, keep_cut=False), record)
 
 
+def channels_wanted(source: Path) -> str:
+    """What the channel map has to name, and the channels that there are to choose from: for who has no map yet.
+
+    Raises
+    ------
+    FormatError
+        When it can't be read as MDF.
+    """
+    with _opened(source) as log:
+        # Every group's time base is a channel as well; names such as CAN1.Speed repeat others with their bus.
+        masters = {log.groups[group].channels[index].name for group, index in log.masters_db.items()}
+        names = sorted(set(log.channels_db) - masters)
+    listed = ", ".join(names[:LISTED]) + (", ..." if len(names) > LISTED else "")
+    return (
+        "the channel map needs --map offset=CHANNEL[:UNIT] and --map lane_width=CHANNEL[:UNIT], or "
+        "--map distance_left=CHANNEL[:UNIT] and --map distance_right=CHANNEL[:UNIT]; "
+        f"{source.name} has {len(names)} channels: {listed}"
+    )
+
+
 def _read_channels(source: Path, mapping: dict[str, ColumnSource]) -> dict[str, tuple[FloatArray, FloatArray]]:
     """Stamps and values of every mapped channel, unit applied."""
+    with _opened(source) as log:
+        return {name: _read_channel(log, name, wanted, source) for name, wanted in mapping.items()}
+
+
+@contextmanager
+def _opened(source: Path) -> Iterator[Any]:
+    """The log; `FormatError` when asammdf is not there or can't read it."""
     try:
         from asammdf import MDF
         from asammdf.blocks.utils import MdfException
@@ -75,7 +102,7 @@ def _read_channels(source: Path, mapping: dict[str, ColumnSource]) -> dict[str, 
         raise FileNotFoundError(f"{source}: no such file")
     try:
         with MDF(source) as log:
-            return {name: _read_channel(log, name, wanted, source) for name, wanted in mapping.items()}
+            yield log
     except MdfException as error:
         raise FormatError(f"not an MDF file that asammdf can read: {error}", path=source) from error
 

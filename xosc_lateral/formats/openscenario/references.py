@@ -30,10 +30,25 @@ _WINDOWS_DRIVE = re.compile(r"[A-Za-z]:[\\/]")
 
 
 def allowed_roots(scenario: Path, extra: Iterable[Path] = ()) -> tuple[Path, ...]:
-    """Folders that files named by this scenario may lie in, real paths."""
+    """Folders that files named by this scenario may lie in, real paths.
+
+    Raises
+    ------
+    FormatError
+        One of the further folders isn't one.
+    """
+    extra = list(extra)
+    require_folders(extra)
     folder = Path(os.path.realpath(scenario)).parent
     beside = Path(os.path.realpath(Path(scenario).absolute().parent))
     return tuple(dict.fromkeys([_highest(folder), _highest(beside), *(Path(os.path.realpath(path)) for path in extra)]))
+
+
+def require_folders(folders: Iterable[Path]) -> None:
+    """Refuse what is no folder: a typing error would otherwise allow nothing without a word."""
+    for folder in folders:
+        if not Path(folder).is_dir():
+            raise FormatError("no such folder to allow", path=folder)
 
 
 def _highest(folder: Path) -> Path:
