@@ -1,4 +1,4 @@
-"""Looks for what no column explains: growing spread, on/off regimes, a weave, a slow drift, a step."""
+"""Looks for what no column explains: growing spread, on/off regimes, a weave; drifts and steps are in `wander`."""
 
 from __future__ import annotations
 
@@ -9,8 +9,7 @@ from numpy.typing import NDArray
 
 from xosc_lateral.loop.chance import LEAST, tail_probability
 from xosc_lateral.loop.looks import slow_columns, slow_rows, standardised
-from xosc_lateral.loop.movement import DRIFT_TERMS, MIN_DRIFT_S, Coarse, Fitted, elapsed, squared_innovations
-from xosc_lateral.loop.noise import Whitener, fit_autoregression
+from xosc_lateral.loop.movement import MIN_DRIFT_S, Coarse, Fitted, elapsed, squared_innovations
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
@@ -30,29 +29,8 @@ WIDTHS = (1, 3, 7)
 SURROUNDINGS = 60
 """Frequencies to each side that say how high the spectrum is without a weave. [-]"""
 
-STEP_COST = 5.0
-"""A step has a free moment. [chi-square]"""
-
-DRIFT_COST = 2.0
-"""A drift may take one to eight half cosines. [chi-square]"""
-
-EDGE_S, STEP_GRID_S = 60, 15
-"""Least time on either side of a step, and between the moments that are tried. [s]"""
-
-UNREMARKABLE = 6.0
-"""A wander with a lower score is not compared with simulated drives: chance gives it in every few. [chi-square]"""
-
-N_SIMULATED = 400
-"""Drives without drift or step, of the same movement, that the drift look is compared with."""
-
-SLOW_BAND = (50.0, 600.0)
-"""Periods that are slow, but no drift yet. [s]"""
-
-MOODS_S = np.array([20.0, 40.0, 70.0, 110.0, 160.0])
-"""Correlation times of a wander that counts as ordinary. [s]"""
-
-DRIFT_SIZES = (1, 2, 4, 8)
-"""Numbers of half cosines tried for a drift."""
+N_SHUFFLED = 400
+"""Random orders of the seconds that the regimes' look is compared with."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,31 +58,6 @@ class Peak:
     width: int
     power: float
     p_value: float
-
-
-@dataclass(frozen=True, slots=True)
-class Wander:
-    """Slow change of the mean: which of drift and step, and how sure.
-
-    Parameters
-    ----------
-    drift, step : float
-        Score of either. [chi-square]
-    at : int
-        Coarse row of the best step.
-    p_value : float
-        Of the better of the two, against simulated drives.
-    """
-
-    drift: float
-    step: float
-    at: int
-    p_value: float
-
-    @property
-    def is_step(self) -> bool:
-        """Whether one step explains more than a slow wander."""
-        return self.step >= self.drift
 
 
 def find_growth(coarse: Coarse, fitted: Fitted) -> Growth:
@@ -141,7 +94,7 @@ def find_clustering(coarse: Coarse, fitted: Fitted, rng: np.random.Generator) ->
     null = []
     rows = np.flatnonzero(coarse.valid)
     shuffled = np.zeros(len(squares))
-    for _ in range(N_SIMULATED):
+    for _ in range(N_SHUFFLED):
         shuffled[rows] = rng.permutation(squares[rows])
         null.append(_clustering_scores(shuffled, coarse.valid).max())
     best = int(np.argmax(observed))
@@ -166,86 +119,6 @@ def find_peak(coarse: Coarse, fitted: Fitted) -> Peak | None:
     if best is None:
         return None
     return Peak(best.frequency, best.width, best.power, min(1.0, best.p_value * drives))
-
-
-def find_wander(coarse: Coarse, fitted: Fitted, rng: np.random.Generator) -> Wander | None:
-    """Drift and step at once, against simulated rows of the same spectrum that go through the same procedure.
-
-    People wander about what they take for the middle within a minute or two; that is memory, and any core model's
-    business. So the whitened rows' spectrum is fitted between 50 s and 10 min with a wander of up to 160 s, and only
-    what goes beyond its continuation to longer periods counts.
-    """
-    drift = coarse.drift_terms()
-    if drift.shape[1] == 0 or fitted.terms.drift or fitted.terms.step_at is not None:
-        return None
-    left = np.where(coarse.valid, fitted.movement * fitted.scale, 0.0)
-    basis = np.linalg.qr(np.column_stack([np.ones(len(left)), drift]) * coarse.valid[:, None])[0]
-    movement = np.where(coarse.valid, (left - basis @ (basis.T @ left)) / fitted.scale, 0.0)
-    process = fit_autoregression(movement, coarse.valid, fitted.terms.order)
-    whitener = Whitener(process, coarse.valid, coarse.drive, fitted.scale)
-    rows, columns = whitener.rows(left), whitener.rows(drift)
-    level = float(np.sqrt(np.mean(rows[coarse.valid] ** 2)))
-    steps, moments = _steps(coarse, whitener)
-    drift_score, step_score, best = _wander_scores(rows / level, columns, steps)
-    at = int(moments[best]) if len(moments) else 0
-    if max(drift_score, step_score) < UNREMARKABLE:
-        return Wander(drift_score, step_score, at, 1.0)
-    excess = np.sqrt(_slow_excess(rows / level))
-    null = []
-    for _ in range(N_SIMULATED):
-        white = np.where(coarse.valid, rng.normal(size=len(rows)), 0.0)
-        simulated = np.where(coarse.valid, np.fft.irfft(np.fft.rfft(white) * excess, len(rows)), 0.0)
-        null.append(max(_wander_scores(whitener.without_intercepts(simulated), columns, steps)[:2]))
-    return Wander(drift_score, step_score, at, tail_probability(max(drift_score, step_score), np.asarray(null)))
-
-
-def _wander_scores(rows: FloatArray, columns: FloatArray, steps: FloatArray) -> tuple[float, float, int]:
-    """Best scores of a drift and of a step [chi-square], and which step."""
-    from xosc_lateral.loop.scan import as_one_degree
-
-    flat = 1.0 / np.sqrt(_slow_excess(rows))[:, None]
-
-    def even(values: FloatArray) -> FloatArray:
-        return np.asarray(np.fft.irfft(np.fft.rfft(values, axis=0) * flat, len(rows), axis=0))
-
-    response, drift = even(rows[:, None])[:, 0], even(columns)
-    best = 0.0
-    per_drive = columns.shape[1] // DRIFT_TERMS
-    for size in DRIFT_SIZES:
-        chosen = np.concatenate([drift[:, DRIFT_TERMS * k : DRIFT_TERMS * k + size] for k in range(per_drive)], axis=1)
-        moments = chosen.T @ response
-        gained = float(moments @ np.linalg.pinv(chosen.T @ chosen) @ moments)
-        best = max(best, float(as_one_degree(np.array([gained]), chosen.shape[1])[0]) - DRIFT_COST)
-    if steps.shape[1] == 0:
-        return best, 0.0, 0
-    jumps = even(steps)
-    chi_square = (jumps.T @ response) ** 2 / np.maximum(np.square(jumps).sum(axis=0), 1e-12)
-    at = int(np.argmax(chi_square))
-    return best, float(chi_square[at]) - STEP_COST, at
-
-
-def _slow_excess(rows: FloatArray) -> FloatArray:
-    """1 + what a wander of at most 160 s adds to the spectrum of rows, shape (n // 2 + 1,); fitted on `SLOW_BAND`."""
-    n = len(rows)
-    frequency = np.fft.rfftfreq(n)
-    power = np.square(np.abs(np.fft.rfft(rows))) / max(float(rows @ rows), 1e-30)
-    band = (frequency >= 1.0 / SLOW_BAND[1]) & (frequency <= 1.0 / SLOW_BAND[0])
-    shapes = 1.0 / (1.0 + np.square(2.0 * np.pi * np.outer(MOODS_S, frequency)))
-    size = np.concatenate([[0.0], np.geomspace(0.1, 60.0, 40)])
-    level = 1.0 + size[:, None, None] * shapes[None, :, band]
-    likelihood = -np.sum(power[band] / level + np.log(level), axis=2)
-    best_size, best_shape = np.unravel_index(int(np.argmax(likelihood)), likelihood.shape)
-    return np.asarray(1.0 + size[best_size] * shapes[best_shape])
-
-
-def _steps(coarse: Coarse, whitener: Whitener) -> tuple[FloatArray, NDArray[np.intp]]:
-    """Whitened jumps of the mean at moments 15 s apart, and these moments; for a single long drive only."""
-    count = np.cumsum(coarse.valid)
-    if int(coarse.drive.max()) > 0:
-        return np.zeros((len(coarse), 0)), np.zeros(0, dtype=np.intp)
-    inside = np.flatnonzero(coarse.valid & (count >= EDGE_S) & (count <= count[-1] - EDGE_S))[::STEP_GRID_S]
-    jumps = (np.arange(len(coarse))[:, None] >= inside).astype(np.float64)
-    return whitener.rows(jumps), inside
 
 
 def _peak(rows: FloatArray) -> Peak | None:

@@ -17,12 +17,10 @@ from xosc_lateral.loop.hidden import (
     Clustering,
     Growth,
     Peak,
-    Wander,
     find_clustering,
     find_growth,
     find_peak,
     find_slow_growth,
-    find_wander,
 )
 from xosc_lateral.loop.looks import Look, fine_rows, look_rows, slow_rows
 from xosc_lateral.loop.movement import Coarse, Fitted, Terms, fit_movement
@@ -30,6 +28,7 @@ from xosc_lateral.loop.refine import refine, target_of
 from xosc_lateral.loop.regimes import fit_regimes, regime_log_scale
 from xosc_lateral.loop.scan import ComplexArray, Scan, draw_shifts, scan, transform_answers
 from xosc_lateral.loop.sizing import log_sizes
+from xosc_lateral.loop.wander import Wander, find_wander
 
 FloatArray = NDArray[np.float64]
 
