@@ -1,0 +1,108 @@
+"""Hidden effects as they most likely were on the measured drives: the courses that figures show beside the data."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from xosc_lateral.loop.close import LoopResult
+from xosc_lateral.loop.movement import fit_movement
+from xosc_lateral.loop.regimes import fit_regimes
+from xosc_lateral.loop.timeline import COARSE, LOCAL_S, coarse_mean, local_mean
+
+FloatArray = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Course:
+    """A quantity of the longest drive over time, at 1 Hz, shape (n,) each; road-following seconds only.
+
+    Parameters
+    ----------
+    time : array
+        The drive's own clock. [s]
+    measured, before, after : array
+        Of the measured drive, and the mean over the profiles' runs. [m]
+    """
+
+    time: FloatArray
+    measured: FloatArray
+    before: FloatArray
+    after: FloatArray
+
+
+def mean_course(result: LoopResult, seconds: float) -> Course:
+    """Moving mean of the offset over so many seconds."""
+    timeline = result.cells.timeline
+
+    def mean(offset: FloatArray) -> FloatArray:
+        return coarse_mean(local_mean(offset, timeline.valid, seconds, timeline.step))
+
+    return _course(result, mean(timeline.offset), *(mean(runs.mean(axis=0)) for runs in _runs(result)))
+
+
+def spread_course(result: LoopResult, seconds: float) -> Course:
+    """Root mean square of the movement faster than 20 s, over so many seconds."""
+    timeline = result.cells.timeline
+
+    def squares(offset: FloatArray) -> FloatArray:
+        fast = offset - local_mean(offset, timeline.valid, LOCAL_S, timeline.step)
+        return local_mean(fast**2, timeline.valid, seconds, timeline.step)
+
+    def spread(runs: FloatArray) -> FloatArray:
+        return coarse_mean(np.sqrt(np.mean([squares(run) for run in runs], axis=0)))
+
+    return _course(result, spread(timeline.offset[None]), *(spread(runs) for runs in _runs(result)))
+
+
+def hidden_mean(result: LoopResult) -> FloatArray:
+    """Step, drift and weave as fitted, about their mean, on the seconds of a `Course`. [m]"""
+    coarse, fitted = result.trace.coarse, result.trace.final
+    columns = sum(coarse.answer(effect).shape[1] for effect in fitted.terms.location)
+    hidden = fitted.location_columns[:, columns:] @ fitted.location_sizes[columns:]
+    return np.asarray((hidden - hidden[coarse.valid].mean())[_longest(result)])
+
+
+def regime_probability(result: LoopResult) -> FloatArray:
+    """Probability that the loud regime is on, given the whole drive, on the seconds of a `Course`."""
+    coarse, fitted = result.trace.coarse, result.trace.final
+    bare = fit_movement(coarse, replace(fitted.terms, regime_scale=None))
+    return fit_regimes(bare.rows, coarse.valid).on[_longest(result)]
+
+
+def by_drive(result: LoopResult, least_s: float) -> tuple[dict[str, FloatArray], dict[str, FloatArray]]:
+    """Mean offset, and spread about it, of every drive with so many road-following seconds.
+
+    Returns
+    -------
+    means, spreads : mapping of "measured", "before", "after" to array
+        Shape (drives,) or (runs * drives,). [m]
+    """
+    timeline = result.cells.timeline
+    rows = [np.flatnonzero(timeline.valid & (timeline.drive == index)) for index in range(len(timeline.names))]
+    rows = [own for own in rows if len(own) * timeline.step >= least_s]
+    series = {"measured": timeline.offset[None], "before": result.runs_before, "after": result.runs_after}
+    means = {name: np.concatenate([runs[:, own].mean(axis=1) for own in rows]) for name, runs in series.items()}
+    spreads = {name: np.concatenate([runs[:, own].std(axis=1) for own in rows]) for name, runs in series.items()}
+    return means, spreads
+
+
+def _runs(result: LoopResult) -> tuple[FloatArray, FloatArray]:
+    return result.runs_before, result.runs_after
+
+
+def _longest(result: LoopResult) -> BoolArray:
+    """Valid seconds of the drive that has most of them."""
+    coarse = result.trace.coarse
+    seconds = np.bincount(coarse.drive, coarse.valid.astype(np.float64))
+    return np.asarray(coarse.valid & (coarse.drive == int(np.argmax(seconds))))
+
+
+def _course(result: LoopResult, measured: FloatArray, before: FloatArray, after: FloatArray) -> Course:
+    shown = _longest(result)
+    n = len(result.trace.coarse)
+    time = result.cells.timeline.time[COARSE // 2 :: COARSE][:n]
+    return Course(time[shown], measured[shown], before[shown], after[shown])
