@@ -37,6 +37,7 @@ def register(app: typer.Typer) -> None:
         from xosc_lateral.formats.hashes import file_hash
         from xosc_lateral.formats.profiles import read_profile, write_profile
         from xosc_lateral.loop.close import close_loop
+        from xosc_lateral.loop.leftover import leftover_of
         from xosc_lateral.report.loop import loop_text, write_loop
         from xosc_lateral.report.loop_json import loop_json
         from xosc_lateral.report.progress import shown_progress
@@ -53,5 +54,6 @@ def register(app: typer.Typer) -> None:
                 drives, base, seed=seed, name=output.stem, provenance=known, excluded=leave_out or [], progress=progress
             )
         write_profile(result.refined, output)
-        write_loop(result, tables, report)
-        typer.echo(loop_json(result, tables) if as_json else loop_text(result))
+        leftover = leftover_of(result)
+        write_loop(result, leftover, tables, report)
+        typer.echo(loop_json(result, leftover, tables) if as_json else loop_text(result, leftover))

@@ -198,15 +198,20 @@ def violin_figure(evaluation: PartEvaluation) -> Figure:
 
 
 def _half_violin(axis: Axes, values: FloatArray, side: float, color: str) -> None:
-    low, high = np.quantile(values, SHOWN_QUANTILES)
-    grid = np.linspace(low, high, 120) if high > low else np.array([low - 1e-3, low, low + 1e-3])
-    density = _density(values, grid)
+    grid, density = density_over(values)
     width = 0.95 * density / density.max()
     axis.fill_betweenx(grid, 0.0, side * width, color=color, alpha=0.35, linewidth=0)
     axis.plot(side * width, grid, color=color, linewidth=0.8)
     for value, reach in ((values.min(), 0.35), (values.mean(), 0.8), (values.max(), 0.35)):
         axis.plot([0.0, side * reach], [value, value], color=color, linewidth=1.6)
     axis.axvline(0.0, color=GRID, linewidth=0.8)
+
+
+def density_over(values: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Grid over what violins show of the values, and their density on it (unscaled), shape (n,) each."""
+    low, high = np.quantile(values, SHOWN_QUANTILES)
+    grid = np.linspace(low, high, 120) if high > low else np.array([low - 1e-3, low, low + 1e-3])
+    return grid, _density(values, grid)
 
 
 def _density(values: FloatArray, grid: FloatArray) -> FloatArray:

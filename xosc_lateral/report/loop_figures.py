@@ -1,94 +1,98 @@
-"""Figures of a closed loop: residual by context, effect curves, spectra."""
+"""Figures of a closed loop: residual by context, effect curves, spectra, violins."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.driver.effects import Acts, ColumnEffect
-from xosc_lateral.loop.close import LoopResult
+from xosc_lateral.driver.effects import Acts, ColumnEffect, Product
+from xosc_lateral.loop.close import LoopResult, hold_out_blocks
 from xosc_lateral.loop.findings import Finding
-from xosc_lateral.report.figures import AFTER, BEFORE, MEASURED, MUTED, figure_style, new_figure
+from xosc_lateral.loop.leftover import Leftover
+from xosc_lateral.loop.metrics import METRICS
+from xosc_lateral.loop.partial import curve_of
+from xosc_lateral.report.evaluation import LABELS, density_over
+from xosc_lateral.report.figures import BLUE, GRID, MUTED, VERMILLION, figure_style, new_figure, new_panels
+from xosc_lateral.report.loop_words import column_label, product_label
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 FloatArray = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
+
+DRIVES, BEFORE, AFTER = BLUE, MUTED, VERMILLION
+"""Measured drives, the profile before and the profile after, in every figure of the loop."""
 
 SPECTRUM_ROWS = 512
 """Samples per segment of a spectrum: 102 s."""
 
+CHANCE = 2.0
+"""Half width of bands, in standard errors: chance leaves them 1 time in 20. [-]"""
+
+FLAT_AXIS_CM = 1.0
+"""A residual's axis reaches at least so far to both sides, lest noise look large. [cm]"""
+
+NEGLIGIBLE = 1e-3
+"""Share of a column's range that is written as 0. [-]"""
+
+MANY_SEGMENTS = 8
+"""With so many segments without a gap, spectra are taken from these only."""
+
+PANELS = 4
+"""Residual panels side by side."""
+
 
 @figure_style()
-def residual_figure(result: LoopResult, what: str) -> Figure:
+def residual_figure(result: LoopResult, leftover: Leftover, what: str) -> Figure:
     """Measured minus expected by every column's fifths, before and after; `what` is "mean" or "spread"."""
-    names = [
-        name for name in result.cells.labels if f"{what} by {name}" in result.real and not name.startswith("effect: ")
-    ]
-    columns = 4
-    rows = -(-len(names) // columns)
-    figure, axes = new_figure(rows, columns, height=1.55 * rows + 0.3)
+    names = _shown(result, what)
+    rows = -(-len(names) // PANELS)
+    figure, axes = new_panels(rows, PANELS, panel_height=0.95, between=0.55, sharey=True)
     for axis, name in zip(axes.ravel(), names, strict=False):
         group = f"{what} by {name}"
-        middle = result.cells.middles[name]
-        for cells, color, label in ((result.before, BEFORE, "before"), (result.after, AFTER, "after")):
-            axis.plot(middle, 100.0 * (result.real[group] - cells[group]), "o-", color=color, markersize=3, label=label)
+        place = np.arange(len(result.real[group]))
+        floor = 100.0 * CHANCE * leftover.floors[group]
+        axis.fill_between(place, -floor, floor, color=MUTED, alpha=0.2, linewidth=0, label="chance")
         axis.axhline(0.0, color=MUTED, linewidth=0.6)
-        axis.set_title(name)
+        for cells, color, label in ((result.before, BEFORE, "before"), (result.after, AFTER, "after")):
+            axis.plot(place, 100.0 * (result.real[group] - cells[group]), "o-", color=color, markersize=3, label=label)
+        _name_bins(axis, result.cells.middles[name], name)
+        axis.set_title(column_label(name, hint=False))
     for axis in axes.ravel()[len(names) :]:
         axis.set_visible(False)
+    low, high = axes[0, 0].get_ylim()
+    axes[0, 0].set_ylim(min(low, -FLAT_AXIS_CM), max(high, FLAT_AXIS_CM))
     for axis in axes[:, 0]:
         axis.set_ylabel("residual [cm]")
-    axes[0, 0].legend()
+    figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="lower right", ncols=3, borderaxespad=0.1)
     return figure
 
 
 @figure_style()
 def effect_figure(result: LoopResult, finding: Finding) -> Figure:
-    """An effect's curve over its driving quantity, with two standard errors, beside what held-out blocks show."""
+    """An effect's curve with its uncertainty over measured points, beside what held-out blocks show."""
     effect = finding.effects[0]
     assert isinstance(effect, ColumnEffect)
-    figure, axes = new_figure(1, 2, height=3.0)
-    quantity, strength, error = _curve(result, effect)
-    axis = axes[0, 0]
-    middle, low, high = (_in_unit(effect, values) for values in (strength, strength - 2 * error, strength + 2 * error))
-    axis.fill_between(quantity, low, high, color=AFTER, alpha=0.2, linewidth=0, label="two standard errors")
-    axis.plot(quantity, middle, color=AFTER, label="fitted")
-    axis.set_xlabel(_quantity_label(effect))
-    axis.set_ylabel("shift of the mean [m]" if effect.acts is Acts.LOCATION else "factor [-]")
-    axis.legend()
+    figure, axes = new_figure(1, 2, height=3.3)
+    _draw_curve(axes[0, 0], result, effect)
     axis = axes[0, 1]
     name = finding.cell.split(" by ", 1)[1]
     bins = _in_unit(effect, result.cells.middles[name])
     for cells, color, label in (
-        (result.real, MEASURED, "measured"),
+        (result.real, DRIVES, "measured"),
         (result.before, BEFORE, "profile before"),
-        (result.after, "#d55e00", "profile after"),
+        (result.after, AFTER, "profile after"),
     ):
         axis.plot(bins, cells[finding.cell], "o-", color=color, markersize=3.5, label=label)
-    axis.set_xlabel("shift by the effect [m]" if effect.acts is Acts.LOCATION else "factor by the effect [-]")
-    axis.set_ylabel(f"{finding.cell.split(' by ')[0]} of the offset, held out [m]")
-    axis.legend()
-    return figure
-
-
-@figure_style()
-def cells_figure(result: LoopResult, cell: str) -> Figure:
-    """One group of cells: measured, before, after."""
-    figure, axes = new_figure(1, 1, height=2.6, width=5.5)
-    axis = axes[0, 0]
-    index = np.arange(1, len(result.real[cell]) + 1)
-    for cells, color, label in (
-        (result.real, MEASURED, "measured"),
-        (result.before, BEFORE, "profile before"),
-        (result.after, "#d55e00", "profile after"),
-    ):
-        axis.plot(index, cells[cell], "o-", color=color, label=label)
-    axis.set_xticks(index)
-    axis.set_xlabel(cell)
-    axis.set_ylabel("[m]")
+    on_mean = effect.acts is Acts.LOCATION
+    axis.set_title("Held-out blocks")
+    axis.set_xlabel("shift by the effect [m]" if on_mean else "factor by the effect [-]")
+    axis.set_ylabel("mean offset [m]" if on_mean else "spread within 20 s [m]")
     axis.legend()
     return figure
 
@@ -96,54 +100,119 @@ def cells_figure(result: LoopResult, cell: str) -> Figure:
 @figure_style()
 def spectrum_figure(result: LoopResult) -> Figure:
     """Power density of measured offsets and of both profiles' held-out runs."""
-    timeline = result.trace.coarse.timeline
-    figure, axes = new_figure(1, 1, height=3.2)
+    figure, axes = new_figure(height=3.4)
     axis = axes[0, 0]
-    for series, color, label in (
-        (timeline.offset, MEASURED, "measured"),
-        (result.runs_before[0], BEFORE, "profile before"),
-        (result.runs_after[0], "#d55e00", "profile after"),
-    ):
-        frequency, density = _spectrum(series, timeline.valid, timeline.step)
-        axis.loglog(frequency[1:], density[1:], color=color, label=label)
-    axis.set_xlabel("frequency [Hz]")
-    axis.set_ylabel("power density [m²/Hz]")
+    draw_spectra(axis, result, SPECTRUM_ROWS)
+    axis.set_xscale("log")
+    axis.set_yscale("log")
     axis.legend()
     return figure
 
 
-def _spectrum(values: FloatArray, valid: NDArray[np.bool_], step: float) -> tuple[FloatArray, FloatArray]:
-    """Welch's estimate over segments that are mostly valid, gaps at the mean."""
-    centred = np.where(valid, values - values[valid].mean(), 0.0)
-    window = np.hanning(SPECTRUM_ROWS)
-    powers = []
-    for first in range(0, len(values) - SPECTRUM_ROWS, SPECTRUM_ROWS // 2):
-        rows = slice(first, first + SPECTRUM_ROWS)
-        share = float(valid[rows].mean())
-        if share > 0.8:
-            powers.append(np.abs(np.fft.rfft(centred[rows] * window)) ** 2 / share)
-    frequency = np.asarray(np.fft.rfftfreq(SPECTRUM_ROWS, step), dtype=np.float64)
-    if not powers:
-        return frequency, np.full(len(frequency), np.nan)
-    density = 2.0 * step * np.mean(powers, axis=0) / float(np.sum(window**2))
-    return frequency, np.asarray(density, dtype=np.float64)
+def draw_spectra(axis: Axes, result: LoopResult, segment: int, *, within_blocks: bool = True) -> None:
+    """Measured spectrum with its uncertainty, and the mean of either profile's runs; `segment` in samples."""
+    timeline = result.trace.coarse.timeline
+    seams = hold_out_blocks(timeline) if within_blocks else timeline.drive
+    frequency, density, number = spectrum(timeline.offset[None], timeline.valid, seams, timeline.step, segment)
+    # the mean of so many independent periodograms, which overlap by half
+    about = CHANCE / np.sqrt(max(0.75 * number, 1.0))
+    low, high = density * np.exp(-about), density * np.exp(about)
+    axis.fill_between(frequency, low, high, color=DRIVES, alpha=0.2, linewidth=0)
+    axis.plot(frequency, density, color=DRIVES, label="measured (band: chance)")
+    for runs, color, label, style in (
+        (result.runs_before, BEFORE, "profile before", "-"),
+        (result.runs_after, AFTER, "profile after", "--"),
+    ):
+        frequency, density, _ = spectrum(runs, timeline.valid, seams, timeline.step, segment)
+        axis.plot(frequency, density, color=color, label=label, linestyle=style)
+    axis.set_xlabel("frequency [Hz]")
+    axis.set_ylabel("power density [m²/Hz]")
 
 
-def _curve(result: LoopResult, effect: ColumnEffect) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Strength over the driving quantity (one column: over the column itself) and its standard error."""
-    coarse = result.trace.coarse
-    context = {column: coarse.context[column][coarse.timeline.valid] for column in effect.columns}
-    if len(effect.columns) == 1:
-        seen = context[effect.columns[0]]
-        seen = seen[np.isfinite(seen)]
-        over = np.linspace(float(np.quantile(seen, 0.01)), float(np.quantile(seen, 0.99)), 200)
-        quantity = effect.quantity({effect.columns[0]: over})
-    else:
-        values = effect.quantity(context)[:, 0]
-        over = np.linspace(float(np.nanquantile(values, 0.01)), float(np.nanquantile(values, 0.99)), 200)
-        quantity = over[:, None]
-    about = quantity - np.asarray(effect.reference)
-    return over, about @ np.asarray(effect.coefficients), np.sqrt(about**2 @ np.square(effect.errors))
+def spectrum(
+    series: FloatArray, valid: BoolArray, seams: NDArray[np.intp], step: float, segment: int
+) -> tuple[FloatArray, FloatArray, int]:
+    """Welch's estimate over segments that are mostly valid and lie within one part.
+
+    Parameters
+    ----------
+    series : array, shape (runs, n)
+        Gaps are filled with the mean. [m]
+    valid : bool array, shape (n,)
+    seams : int array, shape (n,)
+        Number of the part that a row belongs to: runs are put together from parts, with a jump between them.
+    step : float
+        [s]
+    segment : int
+        Samples.
+
+    Returns
+    -------
+    frequency : array [Hz], density : array [m^2/Hz], number of segments : int
+        Without frequency 0; the density is NaN if no segment is long enough.
+    """
+    centred = np.where(valid, series - series[:, valid].mean(axis=1, keepdims=True), 0.0)
+    window = np.hanning(segment)
+    sums = np.zeros(segment // 2 + 1)
+    starts = np.arange(0, valid.size - segment + 1, segment // 2)
+    shares = np.array([float(valid[first : first + segment].mean()) for first in starts])
+    usable = (shares > 0.8) & (seams[starts] == seams[starts + segment - 1])
+    whole = usable & (shares == 1.0)
+    chosen = np.flatnonzero(whole if whole.sum() >= MANY_SEGMENTS else usable)
+    number = len(chosen)
+    for index in chosen:
+        rows = slice(starts[index], starts[index] + segment)
+        sums += np.mean(np.abs(np.fft.rfft(centred[:, rows] * window, axis=1)) ** 2, axis=0) / shares[index]
+    frequency = np.asarray(np.fft.rfftfreq(segment, step), dtype=np.float64)
+    density = 2.0 * step * sums / number / float(np.sum(window**2)) if number else np.full(len(frequency), np.nan)
+    return frequency[1:], density[1:], number
+
+
+@figure_style()
+def violins_figure(result: LoopResult) -> Figure:
+    """The ten metrics: measured to the left, the profile after to the right, the profile before as an outline."""
+    scores = result.scores
+    figure, axes = new_figure(2, 5, height=5.2)
+    for k, (axis, name) in enumerate(zip(axes.ravel(), METRICS, strict=True)):
+        for values, side, color, filled in (
+            (scores.real[:, k], -1.0, DRIVES, True),
+            (scores.sampled_after[:, k], 1.0, AFTER, True),
+            (scores.sampled_before[:, k], 1.0, BEFORE, False),
+        ):
+            grid, density = density_over(values)
+            width = side * 0.95 * density / density.max()
+            if filled:
+                axis.fill_betweenx(grid, 0.0, width, color=color, alpha=0.35, linewidth=0)
+            axis.plot(width, grid, color=color, linewidth=0.9, linestyle="-" if filled else "--")
+            axis.plot([0.0, 0.8 * side], [values.mean()] * 2, color=color, linewidth=1.6 if filled else 1.0)
+        axis.axvline(0.0, color=GRID, linewidth=0.8)
+        axis.set_title(LABELS[name])
+        axis.set_xticks([-0.5, 0.5], ["measured", "profile"], fontsize=8.0)
+        axis.set_xlim(-1.15, 1.15)
+        axis.grid(False, axis="x")
+    for axis in axes[:, 0]:
+        axis.set_ylabel("[m]")
+    return figure
+
+
+def _draw_curve(axis: Axes, result: LoopResult, effect: ColumnEffect) -> None:
+    curve = curve_of(result, effect)
+    middle, low, high = (_in_unit(effect, curve.strength + share * curve.error) for share in (0.0, -CHANCE, CHANCE))
+    axis.fill_between(curve.over, low, high, color=AFTER, alpha=0.2, linewidth=0, label="two standard errors")
+    axis.plot(curve.over, middle, color=AFTER, label="fitted effect")
+    if len(curve.seen):
+        points, bottom, top = (
+            _in_unit(effect, curve.measured + share * curve.measured_error) for share in (0.0, -CHANCE, CHANCE)
+        )
+        axis.errorbar(
+            curve.seen, points, np.stack([points - bottom, top - points]),
+            color=DRIVES, fmt="o", markersize=3.5, elinewidth=1.0, label="measured",
+        )  # fmt: skip
+    axis.set_title("The effect")
+    axis.set_xlabel(_quantity_label(effect))
+    axis.set_ylabel("shift of the mean [m], + is left" if effect.acts is Acts.LOCATION else "factor [-]")
+    axis.locator_params(axis="x", nbins=6)
+    axis.legend()
 
 
 def _in_unit(effect: ColumnEffect, strength: FloatArray) -> FloatArray:
@@ -151,4 +220,31 @@ def _in_unit(effect: ColumnEffect, strength: FloatArray) -> FloatArray:
 
 
 def _quantity_label(effect: ColumnEffect) -> str:
-    return effect.columns[0] if len(effect.columns) == 1 else effect.shape
+    if isinstance(effect, Product):
+        return product_label(effect)
+    return column_label(effect.columns[0])
+
+
+def _shown(result: LoopResult, what: str) -> list[str]:
+    """Columns with a panel, those of the findings first."""
+    names = [
+        name for name in result.cells.labels if f"{what} by {name}" in result.real and not name.startswith("effect: ")
+    ]
+    acting = {column for finding in result.findings for column in finding.columns}
+    return sorted(names, key=lambda name: not any(column == name or f"({column})" in name for column in acting))
+
+
+def _name_bins(axis: Axes, middles: FloatArray, name: str) -> None:
+    """Fifths stand side by side; the outer ones and the middle one say what the column is there."""
+    last = len(middles) - 1
+    marked: Sequence[int] = sorted({0, last // 2, last})
+    # what a smoothed switch decays to is as good as 0
+    shown = np.where(np.abs(middles) < NEGLIGIBLE * np.abs(middles).max(), 0.0, middles)
+    labels = [f"{100 * shown[k]:.0f} %" if name == "time" else _short(shown[k]) for k in marked]
+    axis.set_xticks(list(marked), labels, fontsize=8.0)
+    axis.set_xlim(-0.3, last + 0.3)
+
+
+def _short(value: float) -> str:
+    """Two digits, without an exponent up to thousands."""
+    return f"{value:.0f}" if 10.0 <= abs(value) < 1e4 else f"{value:.2g}"

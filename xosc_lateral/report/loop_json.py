@@ -14,6 +14,8 @@ from xosc_lateral.formats.profiles import canonical_json, profile_hash
 from xosc_lateral.loop.close import LoopResult
 from xosc_lateral.loop.distance import Distances
 from xosc_lateral.loop.findings import Finding
+from xosc_lateral.loop.leftover import Leftover
+from xosc_lateral.report.loop_words import leftover_words, meaning
 
 MEASURE = (
     "root mean square of measured minus expected over cells (mean and spread by fifths of every column, spread by "
@@ -21,12 +23,12 @@ MEASURE = (
 )
 
 
-def loop_json(result: LoopResult, tables: Sequence[Path]) -> str:
-    """`report.json`, as DESIGN has it, and the provenance."""
-    return canonical_json(finite(loop_record(result, tables))) + "\n"
+def loop_json(result: LoopResult, leftover: Leftover, tables: Sequence[Path]) -> str:
+    """`report.json`: what people and machines ask of a closed loop, and the provenance."""
+    return canonical_json(finite(loop_record(result, leftover, tables))) + "\n"
 
 
-def loop_record(result: LoopResult, tables: Sequence[Path]) -> dict[str, Any]:
+def loop_record(result: LoopResult, leftover: Leftover, tables: Sequence[Path]) -> dict[str, Any]:
     """The same as plain values."""
     error = {"before": result.error_before, "after": result.error_after, "floor": result.floor}
     scores = result.scores
@@ -35,7 +37,7 @@ def loop_record(result: LoopResult, tables: Sequence[Path]) -> dict[str, Any]:
         "base_profile": _profile(result.base) | {"given": result.given},
         "refined_profile": _profile(result.refined),
         "held_out": result.held_out,
-        "findings": [finding_record(finding) for finding in result.findings],
+        "findings": [finding_record(finding) | {"meaning": meaning(finding, result)} for finding in result.findings],
         "consequences": [{"column": item.column, "why": item.why} for item in result.trace.consequences],
         "rejected": [
             {"columns": list(item.columns), "look": item.look, "p_value": item.p_value, "why": item.why}
@@ -43,6 +45,18 @@ def loop_record(result: LoopResult, tables: Sequence[Path]) -> dict[str, Any]:
         ],
         "unused": [{"column": column, "why": why} for column, why in result.trace.unused.items()],
         "error": {"measure": MEASURE, **error},
+        "unexplained": {
+            "measure": "root of error after squared minus floor squared, m",
+            "size_m": leftover.unexplained,
+            "p_value": leftover.p_value,
+            "clear": leftover.clear,
+            "where": [group.name for group in leftover.where] if leftover.clear else [],
+            "sentence": leftover_words(result, leftover),
+        },
+        "residual": [
+            {"group": group.name, "before": group.before, "after": group.after, "floor": group.floor}
+            for group in leftover.groups
+        ],
         "metrics": {
             "before": _metrics(scores.before),
             "after": _metrics(scores.after),

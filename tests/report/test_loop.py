@@ -1,0 +1,216 @@
+"""The page and the JSON of a closed loop: what a test engineer has to find there."""
+
+from __future__ import annotations
+
+import json
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tests.simulators.driver_simulator import simulate_drive
+from tests.simulators.plants import Response, ShiftBy
+from xosc_lateral.driver.effects import Acts, ColumnEffect, Drift, Effect, GrowingSpread, Linear, Regimes, Step, Weave
+from xosc_lateral.formats.drives import read_drives
+from xosc_lateral.loop.close import LoopResult, close_loop
+from xosc_lateral.loop.course import by_drive, spread_course
+from xosc_lateral.loop.findings import Finding
+from xosc_lateral.loop.leftover import Leftover, leftover_of
+from xosc_lateral.loop.partial import curve_of
+from xosc_lateral.report.loop import loop_page, loop_text
+from xosc_lateral.report.loop_figures import DRIVES, residual_figure, spectrum
+from xosc_lateral.report.loop_hidden_figures import DRAWINGS
+from xosc_lateral.report.loop_json import loop_json
+from xosc_lateral.report.loop_words import chance_words, leftover_words, meaning, size_words
+
+SHIFT = 0.4  # [m]
+
+HIDDEN: tuple[Effect, ...] = (
+    Weave(amplitude=0.1, period_s=12.0),
+    GrowingSpread(factor=2.0, factor_error=0.2, from_s=0.0, to_s=1500.0),
+    Regimes(factor=2.0, on_s=20.0, off_s=50.0),
+    Step(size=0.3, at_s=700.0),
+    Drift(size=0.2),
+)
+
+
+@pytest.fixture(scope="module")
+def table(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("loop") / "hills.parquet"
+    simulate_drive(1500.0, 5, effects=[ShiftBy(("grade",), SHIFT, Response(lag=1.0))]).table.to_parquet(path)
+    return path
+
+
+@pytest.fixture(scope="module")
+def result(table: Path) -> LoopResult:
+    return close_loop(read_drives([table]), seed=1)
+
+
+@pytest.fixture(scope="module")
+def leftover(result: LoopResult) -> Leftover:
+    return leftover_of(result)
+
+
+@pytest.fixture(scope="module")
+def page(result: LoopResult, leftover: Leftover, table: Path) -> str:
+    return loop_page(result, leftover, [table]).html()
+
+
+def hidden(result: LoopResult, effect: Effect | None, kind: str, cell: str = "movement by band") -> Finding:
+    """A finding without columns, as the loop would give it."""
+    return replace(
+        result.findings[0], effect="something hidden", kind=kind, columns=(), alike=(), lag_s=None, response_s=None,
+        effects=() if effect is None else (effect,), cell=cell, measure=cell,
+    )  # fmt: skip
+
+
+def test_the_page_says_in_words_what_was_found_how_sure_and_when(page: str, result: LoopResult) -> None:
+    finding = result.findings[0]
+    assert finding.columns == ("grade",)
+    assert f"mean offset by grade ({size_words(finding)})" in page
+    assert "further left" in page
+    assert "practically never (p = " in page
+    assert re.search(r"The driver acts (at once|[\d.]+ s (ahead of|after) it)", page)
+
+
+def test_the_page_has_every_part_that_a_reader_needs(page: str) -> None:
+    sections = re.findall(r"<h2[^>]*>([^<]+)", page)
+    assert sections == [
+        "What the profile lacked", "Residual by context", "Movement", "Consequences of the car&#x27;s own movement",
+        "Looked at and rejected", "How to read this page",
+    ]  # fmt: skip
+    assert page.count("<figure>") == 5  # effect, residual of mean and of spread, spectra, violins
+    assert "**" not in page
+
+
+def test_same_result_same_page(page: str, result: LoopResult, leftover: Leftover, table: Path) -> None:
+    assert loop_page(result, leftover, [table]).html() == page
+
+
+def test_the_effect_curve_goes_through_the_points_measured_without_other_effects(result: LoopResult) -> None:
+    effect = result.findings[0].effects[0]
+    assert isinstance(effect, ColumnEffect)
+    curve = curve_of(result, effect)
+    assert len(curve.seen) >= 5
+    fitted = np.interp(curve.seen, curve.over, curve.strength)
+    assert np.mean(np.abs(curve.measured - fitted) < 3.0 * curve.measured_error) > 0.7
+    slope = np.polyfit(fitted, curve.measured, 1)[0]
+    assert slope == pytest.approx(1.0, abs=0.5)  # 25 minutes hold few hills; an effect drawn amiss gives 0 or -1
+
+
+def test_a_spread_effect_is_drawn_as_factors_over_measured_ones(result: LoopResult) -> None:
+    effect = Linear(acts=Acts.SPREAD, column="speed", coefficients=(0.0,), errors=(0.01,), reference=(30.0,))
+    curve = curve_of(result, effect)
+    assert np.all(np.abs(curve.measured) < np.log(3.0))  # this driver moves about as widely at every speed
+    assert np.all(curve.measured_error > 0.0)
+
+
+def test_the_residual_stands_out_of_the_band_before_and_not_after(result: LoopResult, leftover: Leftover) -> None:
+    group = next(group for group in leftover.groups if group.name == "mean by grade")
+    assert group.before > 1.5 * group.floor
+    assert group.after < 0.6 * group.before
+    figure = residual_figure(result, leftover, "mean")
+    assert figure.axes[0].get_title(loc="left") == "grade [%]"  # columns of the effects come first
+
+
+def test_an_error_clearly_above_the_floor_is_called_unexplained(
+    result: LoopResult, leftover: Leftover, table: Path
+) -> None:
+    # the base in the place of the refined profile: the effect is in the drives, and nobody has explained it
+    worse = replace(
+        result, findings=(), after=result.before, error_after=3.0 * result.floor, runs_after=result.runs_before
+    )
+    left = leftover_of(worse)
+    assert left.clear
+    assert left.unexplained == pytest.approx(np.sqrt(8.0) * result.floor)
+    sentence = leftover_words(worse, left)
+    assert sentence.startswith(f"Unexplained residual of {1000 * left.unexplained:.0f}\N{NO-BREAK SPACE}mm")
+    record = json.loads(loop_json(worse, left, [table]))
+    assert record["unexplained"]["clear"] is True
+    assert record["unexplained"]["size_m"] == pytest.approx(left.unexplained)
+    assert record["unexplained"]["where"] == [group.name for group in left.where]
+    assert sentence in loop_text(worse, left)
+
+
+def test_an_error_at_the_floor_is_not_called_unexplained(result: LoopResult) -> None:
+    at_floor = leftover_of(replace(result, error_after=result.floor))
+    assert not at_floor.clear
+    assert "No residual is left" in leftover_words(result, at_floor)
+
+
+def test_the_json_keeps_to_the_schema_and_adds_the_meaning(result: LoopResult, leftover: Leftover, table: Path) -> None:
+    record = json.loads(loop_json(result, leftover, [table]))
+    assert {"drives", "base_profile", "held_out", "findings", "consequences", "rejected", "error", "metrics"} <= set(
+        record
+    )
+    finding = record["findings"][0]
+    assert finding["kind"] == "location"
+    assert "grade" in finding["meaning"]
+    assert {row["group"] for row in record["residual"]} == set(result.real)
+    assert record["unexplained"]["clear"] is leftover.clear
+
+
+@pytest.mark.parametrize("effect", HIDDEN, ids=lambda effect: effect.kind)
+def test_every_hidden_effect_has_a_picture_with_the_measured_drive_in_it(result: LoopResult, effect: Effect) -> None:
+    draw, caption = DRAWINGS[effect.kind]
+    figure = draw(result, hidden(result, effect, "periodic"))
+    lines = [line for axis in figure.axes for line in axis.get_lines()]
+    assert caption.endswith(".")
+    assert any(line.get_color() == DRIVES and len(np.asarray(line.get_xdata())) > 50 for line in lines)
+
+
+@pytest.mark.parametrize("kind", ["memory", "population"])
+def test_what_a_core_model_lacks_has_a_picture(result: LoopResult, kind: str) -> None:
+    draw, _ = DRAWINGS[kind]
+    assert draw(result, hidden(result, None, kind)).axes
+
+
+@pytest.mark.parametrize("kind", ["periodic", "drift", "step", "scale", "regime", "memory", "population"])
+def test_every_hidden_kind_is_told_in_plain_words(result: LoopResult, kind: str) -> None:
+    words = meaning(hidden(result, None, kind), result)
+    assert words[0].isupper()
+    assert not words.startswith("(")
+
+
+def test_chance_is_said_as_one_in_so_many_tables() -> None:
+    assert chance_words(0.004) == "in 1 of 250 tables"
+    assert chance_words(1e-9) == "practically never"
+
+
+def test_the_spectrum_of_white_noise_is_flat_and_holds_its_variance() -> None:
+    rng = np.random.default_rng(1)
+    series = rng.normal(size=(4, 20_000))
+    frequency, density, number = spectrum(
+        series, np.ones(20_000, dtype=np.bool_), np.zeros(20_000, dtype=np.intp), 0.2, 512
+    )
+    assert number == 77
+    assert density.sum() * frequency[0] == pytest.approx(1.0, rel=0.03)
+    assert density[:50].mean() == pytest.approx(density[-50:].mean(), rel=0.05)
+
+
+def test_a_jump_between_blocks_does_not_enter_the_spectrum() -> None:
+    rng = np.random.default_rng(2)
+    n = 8192
+    seams = np.arange(n) // 1024
+    valid = np.ones(n, dtype=np.bool_)
+    smooth = 0.01 * rng.normal(size=(1, n)).cumsum(axis=1)
+    jumping = smooth + 5.0 * seams
+    within = spectrum(jumping, valid, seams, 0.2, 512)[1]
+    across = spectrum(jumping, valid, np.zeros(n, dtype=np.intp), 0.2, 512)[1]
+    assert across[100:].mean() > 10.0 * within[100:].mean()
+
+
+def test_courses_leave_out_what_is_cut(result: LoopResult) -> None:
+    course = spread_course(result, 240.0)
+    assert len(course.time) == result.trace.coarse.valid.sum()
+    assert np.all(course.measured > 0.0)
+
+
+def test_drives_are_described_one_by_one(result: LoopResult) -> None:
+    means, spreads = by_drive(result, 20.0)
+    assert len(means["measured"]) == 1
+    assert len(spreads["after"]) == len(result.runs_after)
+    timeline = result.cells.timeline
+    assert means["measured"][0] == pytest.approx(timeline.offset[timeline.valid].mean())

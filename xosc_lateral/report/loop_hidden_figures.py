@@ -1,0 +1,225 @@
+"""Figures of effects that no column explains: each shows where in the data the effect can be seen."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from types import MappingProxyType
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from xosc_lateral.driver.effects import Drift, GrowingSpread, Regimes, Step, Weave
+from xosc_lateral.loop.close import LoopResult
+from xosc_lateral.loop.course import Course, by_drive, hidden_mean, mean_course, regime_probability, spread_course
+from xosc_lateral.loop.findings import Finding
+from xosc_lateral.report.figures import MUTED, ORANGE, figure_style, new_figure
+from xosc_lateral.report.loop_figures import AFTER, BEFORE, CHANCE, DRIVES, draw_spectra
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+FloatArray = NDArray[np.float64]
+
+WEAVE_ROWS = 4096
+"""Samples per segment of a weave's spectrum at most: 14 min, or a line would be smeared. [-]"""
+
+SURROUNDINGS_HZ = 0.07
+"""To either side of a weave's line. [Hz]"""
+
+MEAN_S, SPREAD_S, REGIME_S = 120.0, 240.0, 20.0
+"""Averaging times of the courses of the mean, of the spread, and of the spread with regimes. [s]"""
+
+GAP_S = 5.0
+"""Longer gaps in a drive interrupt a line. [s]"""
+
+LEAST_S = 20.0
+"""Drives with less road-following have no mean and spread worth drawing. [s]"""
+
+QUANTILES = (0.1, 0.3, 0.5, 0.7, 0.9)
+"""As `loop.residual.LOCAL_QUANTILES`."""
+
+
+@figure_style()
+def weave_figure(result: LoopResult, finding: Finding) -> Figure:
+    """Spectrum about the weave's frequency, the line marked."""
+    effect = finding.effects[0]
+    assert isinstance(effect, Weave)
+    figure, axes = new_figure(height=3.3)
+    axis = axes[0, 0]
+    longest = int(np.bincount(result.cells.timeline.drive).max())
+    segment = min(WEAVE_ROWS, 2 ** int(np.log2(longest)))
+    draw_spectra(axis, result, segment, within_blocks=False)
+    line = 1.0 / effect.period_s
+    axis.set_yscale("log")
+    low, high = max(0.0, line - SURROUNDINGS_HZ), line + SURROUNDINGS_HZ
+    axis.set_xlim(low, high)
+    _fit_height(axis, low, high)
+    label = f"fitted weave: {line:.3f} Hz, once in {effect.period_s:.1f} s"
+    axis.axvline(line, color=ORANGE, linewidth=6.0, alpha=0.4, zorder=0, label=label)
+    axis.legend()
+    return figure
+
+
+@figure_style()
+def spread_figure(result: LoopResult, finding: Finding) -> Figure:
+    """Spread over time, with the fitted course."""
+    effect = finding.effects[0]
+    assert isinstance(effect, GrowingSpread)
+    course = spread_course(result, SPREAD_S)
+    share = np.clip((course.time - effect.from_s) / max(effect.to_s - effect.from_s, 1e-9), 0.0, 1.0) - 0.5
+
+    def fitted(factor: float) -> FloatArray:
+        shape = max(factor, 1e-3) ** share
+        return shape * float(np.exp(np.mean(np.log(course.measured / shape))))
+
+    figure, axes = new_figure(height=3.2)
+    axis = axes[0, 0]
+    _draw_course(axis, course)
+    low, high = (fitted(effect.factor + sign * CHANCE * effect.factor_error) for sign in (-1.0, 1.0))
+    axis.fill_between(course.time, low, high, color=ORANGE, alpha=0.25, linewidth=0)
+    axis.plot(
+        course.time, fitted(effect.factor), color=ORANGE, label=f"fitted: factor {effect.factor:.2f} over the drive"
+    )
+    axis.set_ylim(bottom=0.0)
+    axis.set_ylabel(f"spread over {SPREAD_S / 60:.0f} min [m]")
+    axis.legend()
+    return figure
+
+
+@figure_style()
+def regime_figure(result: LoopResult, finding: Finding) -> Figure:
+    """Local spread over time with the probability of the loud regime, and how often which spread occurs."""
+    figure, axes = new_figure(2, 1, height=4.8, sharex=True, height_ratios=[2.2, 1.0])
+    course, on = spread_course(result, REGIME_S), regime_probability(result)
+    axis = axes[0, 0]
+    axis.plot(course.time, _gapped(course, course.measured), color=DRIVES, linewidth=0.8, label="measured")
+    loud = on > 0.5
+    top = float(course.measured.max()) * 1.05
+    axis.fill_between(
+        course.time, 0.0, top, where=list(loud), color=ORANGE, alpha=0.3, linewidth=0, label="loud more likely than not"
+    )
+    axis.set_ylim(0.0, top)
+    axis.set_ylabel(f"spread within {REGIME_S:.0f} s [m]")
+    axis.legend(loc="upper right")
+    axis = axes[1, 0]
+    axis.plot(course.time, _gapped(course, on), color=ORANGE, linewidth=0.8)
+    axis.set_ylim(-0.03, 1.03)
+    axis.set_ylabel("loud is on [-]")
+    axis.set_xlabel("time [s]")
+    return figure
+
+
+@figure_style()
+def mean_figure(result: LoopResult, finding: Finding) -> Figure:
+    """Moving mean with the fitted step or drift."""
+    course = mean_course(result, MEAN_S)
+    hidden = hidden_mean(result)
+    figure, axes = new_figure(height=3.2)
+    axis = axes[0, 0]
+    _draw_course(axis, course)
+    word = "step" if isinstance(finding.effects[0], Step) else "drift"
+    axis.plot(course.time, hidden + course.measured.mean(), color=ORANGE, linewidth=2.0, label=f"fitted {word}")
+    axis.set_ylabel(f"mean over {MEAN_S / 60:.0f} min [m], + is left")
+    axis.legend()
+    return figure
+
+
+@figure_style()
+def drivers_figure(result: LoopResult, finding: Finding) -> Figure:
+    """Mean and spread of every drive, as shares of drives below a value."""
+    figure, axes = new_figure(1, 2, height=3.2, sharey=True)
+    for axis, values, label in zip(
+        axes[0],
+        by_drive(result, LEAST_S),
+        ("mean offset of a drive [m], + is left", "spread of a drive [m]"),
+        strict=True,
+    ):
+        for name, color in (("measured", DRIVES), ("before", BEFORE), ("after", AFTER)):
+            ordered = np.sort(values[name])
+            share = (np.arange(len(ordered)) + 0.5) / len(ordered)
+            axis.plot(ordered, 100.0 * share, color=color, label=name if name == "measured" else f"profile {name}")
+        low, high = np.quantile(np.concatenate(list(values.values())), [0.002, 0.998])
+        axis.set_xlim(float(low), float(high))
+        axis.set_xlabel(label)
+    axes[0, 0].set_ylabel("drives below [%]")
+    axes[0, 0].legend()
+    return figure
+
+
+@figure_style()
+def memory_figure(result: LoopResult, finding: Finding) -> Figure:
+    """Size of the movement in bands of time: the profiles' over the measured."""
+    figure, axes = new_figure(height=3.0)
+    axis = axes[0, 0]
+    cell = finding.cell
+    labels = ["< 1 s", "1-3 s", "3-8 s", "8-20 s", "20-60 s", "60-200 s", "> 200 s"]
+    place = np.arange(len(result.real[cell]))
+    for cells, color, label in ((result.before, BEFORE, "profile before"), (result.after, AFTER, "profile after")):
+        axis.plot(place, cells[cell] / result.real[cell], "o-", color=color, label=label)
+    axis.axhline(1.0, color=DRIVES, label="measured")
+    axis.set_xticks(place, labels)
+    axis.set_xlabel("movement between averaging times")
+    axis.set_ylabel("size over the measured [-]")
+    axis.legend()
+    return figure
+
+
+@figure_style()
+def quantiles_figure(result: LoopResult) -> Figure:
+    """Quantiles of the local spread, measured and of both profiles."""
+    figure, axes = new_figure(height=2.8)
+    axis = axes[0, 0]
+    for cells, color, label in (
+        (result.real, DRIVES, "measured"),
+        (result.before, BEFORE, "profile before"),
+        (result.after, AFTER, "profile after"),
+    ):
+        axis.plot(100.0 * np.asarray(QUANTILES), cells["quantiles of local spread"], "o-", color=color, label=label)
+    axis.set_xlabel("share of the time with less spread [%]")
+    axis.set_ylabel("spread within 20 s [m]")
+    axis.set_ylim(bottom=0.0)
+    axis.legend()
+    return figure
+
+
+DRAWINGS: Mapping[str, tuple[Callable[[LoopResult, Finding], Figure], str]] = MappingProxyType(
+    {
+        Weave.kind: (weave_figure, "Power density about the weave: a line that the profile before does not have."),
+        GrowingSpread.kind: (spread_figure, "How widely the car moves, over the drive; orange: the fitted course."),
+        Regimes.kind: (regime_figure, "How widely the car moves, with the stretches that the model takes for loud."),
+        Step.kind: (mean_figure, "Mean position over the drive; orange: the fitted step."),
+        Drift.kind: (mean_figure, "Mean position over the drive; orange: the fitted drift."),
+        "memory": (memory_figure, "Size of the movement by pace: 1 is as large as measured."),
+        "population": (drivers_figure, "How much the drives differ in place (left) and in spread (right)."),
+    }
+)
+"""By kind of effect, or of finding: what draws it, and the caption."""
+
+
+def _draw_course(axis: Axes, course: Course) -> None:
+    for values, color, style, label in (
+        (course.measured, DRIVES, "-", "measured"),
+        (course.before, BEFORE, "-", "profile before, all runs"),
+        (course.after, AFTER, "--", "profile after, all runs"),
+    ):
+        axis.plot(course.time, _gapped(course, values), color=color, linestyle=style, linewidth=1.2, label=label)
+    axis.axhline(0.0, color=MUTED, linewidth=0.4)
+    axis.set_xlabel("time [s]")
+
+
+def _gapped(course: Course, values: FloatArray) -> FloatArray:
+    """NaN at the first second after a gap, so that no line is drawn across it."""
+    return np.where(np.diff(course.time, prepend=course.time[:1]) > GAP_S, np.nan, values)
+
+
+def _fit_height(axis: Axes, low: float, high: float) -> None:
+    """Height of what lies within the shown frequencies."""
+    shown = []
+    for curve in axis.get_lines():
+        frequency, density = np.asarray(curve.get_xdata()), np.asarray(curve.get_ydata())
+        inside = (frequency > low) & (frequency < high) & np.isfinite(density)
+        shown += [float(density[inside].min()), float(density[inside].max())] if inside.any() else []
+    if shown:
+        axis.set_ylim(min(shown) / 1.5, max(shown) * 2.0)

@@ -1,0 +1,230 @@
+"""A closed loop in plain words: what an effect means, how sure it is, what is left."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from types import MappingProxyType
+
+import numpy as np
+
+from xosc_lateral.driver.effects import Acts, Angular, ColumnEffect, Levels, Product
+from xosc_lateral.loop.close import LoopResult
+from xosc_lateral.loop.findings import Finding
+from xosc_lateral.loop.leftover import GroupError, Leftover
+from xosc_lateral.segment import CONTEXT_UNITS
+
+CERTAIN = 1e-4
+"""Chances below this are extrapolated beyond the null's sample: "certain", and no better known. [-]"""
+
+GAP = "\N{NO-BREAK SPACE}"
+"""Between a number and its unit: they stay on one line."""
+
+HINTS: Mapping[str, str] = MappingProxyType(
+    {
+        "curvature": "positive in left bends",
+        "crossfall": "positive: falls to the right",
+        "grade": "positive: rises ahead",
+        "lane_index": "0 is the rightmost lane",
+        "wind_direction": "90: blows to the left",
+    }
+)
+"""Signs that a reader of a figure has to know."""
+
+LOOKS: Mapping[str, str] = MappingProxyType(
+    {
+        "location": "a column that moves the mean",
+        "scale": "a column that changes the spread",
+        "slow": "a column that changes the spread of slow movement",
+        "fine": "a column that changes the fine noise",
+        "dynamics": "a column that changes how fast the driver corrects",
+        "growth": "spread that grows or shrinks with time",
+        "regime": "on/off regimes",
+        "periodic": "a weave",
+        "wander": "a slow drift or a step of the mean",
+    }
+)
+"""What each look of the trace asks."""
+
+_CELLS: Mapping[str, str] = MappingProxyType(
+    {
+        "movement by band": "size of the movement by frequency band",
+        "spread by time": "spread by sixths of the drive",
+        "mean by effect: step": "mean before and after it",
+    }
+)
+"""Groups of cells whose own name is not plain."""
+
+_HIDDEN: Mapping[str, str] = MappingProxyType(
+    {
+        "periodic": "The car sways to and fro at a steady pace, whatever the road and the traffic do.",
+        "drift": (
+            "The mean position moves slowly over minutes, without any column that goes along: a driver's mood, or a "
+            "camera whose calibration drifts with temperature."
+        ),
+        "step": (
+            "From one moment on the car keeps another place in the lane, without any column that changes there: a "
+            "camera that was calibrated anew, or a driver who changed."
+        ),
+        "scale": "How tightly the driver holds his place changes steadily as time goes on: fatigue, say.",
+        "regime": "There are loud and quiet stretches, and no column tells which is on: a phone, a conversation.",
+        "memory": (
+            "How the car moves now depends on more than where it was one step ago. The core model is replaced by "
+            "`best`, which remembers."
+        ),
+        "population": (
+            "The drives are of drivers who keep different places and move differently much. The refined profile draws "
+            "a driver for every vehicle."
+        ),
+    }
+)
+
+
+def column_label(column: str, *, hint: bool = True) -> str:
+    """A column with its unit where that is known, and what its sign means, for axes."""
+    unit = CONTEXT_UNITS.get(column, "").replace("m/s2", "m/s²").replace("-", "")
+    sign = HINTS.get(column, "") if hint else ""
+    return column + (f" [{unit}]" if unit else "") + (f" ({sign})" if sign else "")
+
+
+def product_label(effect: Product) -> str:
+    """Both factors of a product."""
+    return " × ".join(str(factor) for factor in effect.factors)
+
+
+def size_words(finding: Finding) -> str:
+    """Size with two standard errors and its unit."""
+    size, about = finding.size_m, 2.0 * finding.size_error
+    if finding.kind == "memory":
+        return f"factor{GAP}{size:.2f}"
+    spread = f"{GAP}±{GAP}{about:.2f}" if about else ""
+    if finding.kind in ("scale", "dynamics", "regime"):
+        return f"factor{GAP}{size:.2f}{spread}"
+    sign = "+" if finding.kind in ("location", "step") else ""
+    what = {"population": "means scatter by ", "drift": "scatters by ", "periodic": "amplitude "}.get(finding.kind, "")
+    return f"{what}{size:{sign}.2f}{spread}{GAP}m"
+
+
+def chance_words(p_value: float) -> str:
+    """How often chance alone gives as much, in words."""
+    if p_value < CERTAIN:
+        return "practically never"
+    return f"in 1 of {1.0 / p_value:,.0f} tables".replace(",", GAP)
+
+
+def when_words(finding: Finding) -> str:
+    """Lag and response, or nothing."""
+    if finding.lag_s is None or finding.response_s is None:
+        return ""
+    lag = finding.lag_s
+    start = "at once" if abs(lag) < 0.1 else f"{-lag:.1f} s ahead of it" if lag < 0 else f"{lag:.1f} s after it"
+    slow = f", with two thirds of the answer there {finding.response_s:.1f} s later" if finding.response_s > 0 else ""
+    return f"The driver acts {start}{slow}."
+
+
+def meaning(finding: Finding, result: LoopResult) -> str:
+    """What an effect means, in sentences that need no statistics."""
+    effect = finding.effects[0] if finding.effects else None
+    words = [
+        _column_sentence(finding, effect, result) if isinstance(effect, ColumnEffect) else _hidden_sentence(finding),
+        when_words(finding),
+        f"Chance alone gives as much {chance_words(finding.p_value)} (p = {finding.p_value:.1e}).",
+    ]
+    if finding.alike:
+        names = ", ".join(f"`{name}`" for name in finding.alike)
+        words.append(f"{names} would explain it as well: these drives can't tell which of them it is.")
+    measure = _CELLS.get(finding.cell, finding.measure)
+    change = f"{_cm(finding.error_before)} before, {_cm(finding.error_after)} now"
+    words.append(f"Error of the {measure} on held-out blocks: {change}.")
+    return " ".join(word for word in words if word)
+
+
+def outcome(result: LoopResult) -> str:
+    """What was found, in a sentence."""
+    if not result.findings:
+        return "Nothing was found that chance would not give: no effect was added."
+    several = len(result.findings) > 1
+    names = "; ".join(f"{finding.effect} ({size_words(finding)})" for finding in result.findings)
+    return f"{len(result.findings)} effect{'s' * several} found and added to the profile: {names}."
+
+
+def leftover_words(result: LoopResult, leftover: Leftover) -> str:
+    """What is left unexplained, in a sentence."""
+    if leftover.unexplained == 0.0:
+        return "No residual is left above the floor: what the profile still misses is less than the drives can tell."
+    if not leftover.clear:
+        return (
+            "No residual is left that stands out: the error after is above the floor, but in "
+            f"{100 * leftover.p_value:.0f}{GAP}% of random splits these drives differ as much from themselves."
+        )
+    where = ", ".join(
+        f"{group_words(group.name, result)} ({_mm(group.after)}, floor {_mm(group.floor)})" for group in most(leftover)
+    )
+    most_of_it = f" It stands out in: {where}." if where else ""
+    return (
+        f"Unexplained residual of {_mm(leftover.unexplained)}: the error after ({_mm(result.error_after)}) lies "
+        f"clearly above the floor ({_mm(result.floor)}), and no effect was found that explains the rest.{most_of_it}"
+    )
+
+
+def most(leftover: Leftover, number: int = 4) -> tuple[GroupError, ...]:
+    """The groups with the most left unexplained, a few."""
+    return leftover.where[:number]
+
+
+def group_words(name: str, result: LoopResult) -> str:
+    """A group of cells as a reader would call it."""
+    for finding in result.findings:
+        own = finding.cell.partition(" by effect: ")[2]
+        if own and name.endswith(f" by effect: {own}"):
+            return f"{name.partition(' by ')[0]} by the effect of {' and '.join(finding.columns) or finding.effect}"
+    return _CELLS.get(name, name)
+
+
+def _hidden_sentence(finding: Finding) -> str:
+    sentence = _HIDDEN.get(finding.kind, "")
+    detail = f"{finding.shape}; {size_words(finding)}"
+    return f"{sentence} ({detail[0].upper()}{detail[1:]}.)"
+
+
+def _column_sentence(finding: Finding, effect: ColumnEffect, result: LoopResult) -> str:
+    more = finding.size_m > (0.0 if effect.acts is Acts.LOCATION else 1.0)
+    size = size_words(finding).lstrip("+-")
+    if effect.acts is Acts.LOCATION:
+        does = f"drives {size} further {'left' if more else 'right'}"
+        subject = "the car"
+    else:
+        subject = {
+            Acts.SPREAD: "the movement about the mean",
+            Acts.FINE: "the fine noise",
+            Acts.RATE: "the driver's pull back to his place",
+        }[effect.acts]
+        does = f"changes by a {size}"
+    return f"{_between(effect, result)}, {subject} {does}."
+
+
+def _between(effect: ColumnEffect, result: LoopResult) -> str:
+    coarse = result.trace.coarse
+    inside = coarse.timeline.valid
+    if isinstance(effect, Levels):
+        return f"Where `{effect.column}` is {' or '.join(f'{level:g}' for level in effect.levels)}, beside elsewhere"
+    if isinstance(effect, Product):
+        return f"From the low to the high end of `{product_label(effect)}` (the middle 90 % of the time)"
+    column = effect.columns[0]
+    if isinstance(effect, Angular):
+        return f"From the `{column}` that acts least to the one that acts most (the middle 90 % of the time)"
+    seen = coarse.context[column][inside]
+    seen = seen[np.isfinite(seen)]
+    if set(np.unique(seen)) <= {0.0, 1.0}:
+        return f"While `{column}` is on"
+    low, high = np.quantile(seen, [0.05, 0.95])
+    unit = CONTEXT_UNITS.get(column, "")
+    unit = "" if unit in ("", "-") else f" {unit}"
+    return f"As `{column}` goes from {low:.3g} to {high:.3g}{unit} (5 % and 95 % quantile of these drives)"
+
+
+def _cm(value: float) -> str:
+    return f"{100.0 * value:.1f}{GAP}cm"
+
+
+def _mm(value: float) -> str:
+    return f"{1000.0 * value:.0f}{GAP}mm"
