@@ -2,8 +2,8 @@
 
 People wander about what they take for the middle within a minute or two; that is memory, and any core model's business.
 So the whitened rows' spectrum between 50 s and 10 min says how likely each wander of up to 160 s is, and only what goes
-beyond their continuation to longer periods counts. Everything is scored at low frequencies, where sums over time are sums over
-frequencies, weighted by that spectrum.
+beyond their continuation to longer periods counts. Everything is scored at low frequencies, where sums over time are
+sums over frequencies, weighted by that spectrum.
 
 Two nulls, and the less convinced one is believed: simulated rows with such a wander, and the drive's own rows with
 the sign of whole minutes drawn anew. The first knows how a wander goes on from minute to minute; the second knows how
