@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from tests.motion.stage import (
     STRAIGHT,
@@ -67,10 +68,10 @@ def test_world_and_road_coordinates_are_the_same_place(tmp_path: Path) -> None:
     x, y, z, heading, pitch, roll = played.network.lane_to_world(motion.road, motion.lane, motion.s, motion.offset)
     for mine, theirs in ((motion.x, x), (motion.y, y), (motion.z, z)):
         np.testing.assert_allclose(mine, theirs, atol=1e-9)
-    np.testing.assert_allclose(np.sin(motion.heading - heading - motion.heading_relative), 0.0, atol=1e-9)
-    standing_straight = np.abs(motion.heading_relative) < 1e-12
-    np.testing.assert_allclose(motion.pitch[standing_straight], pitch[standing_straight], atol=1e-9)
-    np.testing.assert_allclose(motion.roll[standing_straight], roll[standing_straight], atol=1e-9)
+    lane_frame = Rotation.from_euler("ZYX", np.column_stack([heading, pitch, roll]))
+    turned = lane_frame * Rotation.from_euler("Z", motion.heading_relative[:, None])
+    mine = Rotation.from_euler("ZYX", np.column_stack([motion.heading, motion.pitch, motion.roll]))
+    np.testing.assert_allclose(mine.as_matrix(), turned.as_matrix(), atol=1e-9)
     assert motion.z[0] > motion.z[-1]
 
 

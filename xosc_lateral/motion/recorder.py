@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from xosc_lateral.motion.nominal import Activity, EntityMotion, FloatArray, IntArray
 from xosc_lateral.motion.state import NOWHERE, EntityState
 from xosc_lateral.road import RoadNetwork
+from xosc_lateral.road.tables import turned_in_surface
 
 NO_LANE = "none"
 """Lane type of what is beside the road, though the road describes it."""
@@ -124,11 +125,13 @@ def _look_up(
 
 def _turn(pose: FloatArray, angle: FloatArray, rows: NDArray[np.bool_]) -> None:
     """Turn poses about the normal of the surface that they stand on."""
-    c, s = np.cos(angle[rows]), np.sin(angle[rows])
-    pitch, roll = pose[rows, 4], pose[rows, 5]
-    pose[rows, 3] += angle[rows]
-    pose[rows, 4] = pitch * c - roll * s
-    pose[rows, 5] = roll * c + pitch * s
+    turned = rows & (angle != 0.0)
+    sloped = turned & ((pose[:, 4] != 0.0) | (pose[:, 5] != 0.0))
+    flat = turned & ~sloped
+    pose[flat, 3] += angle[flat]
+    if sloped.any():
+        turn, pose[sloped, 4], pose[sloped, 5] = turned_in_surface(angle[sloped], pose[sloped, 4], pose[sloped, 5])
+        pose[sloped, 3] += turn
 
 
 def _lay_over(pose: FloatArray, rows: NDArray[np.int64], free: FloatArray) -> None:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from xosc_lateral.motion.angles import difference, is_forward, wrap
 from xosc_lateral.motion.nominal import Activity
 from xosc_lateral.road import Pose, RoadNetwork
+from xosc_lateral.road.places import turn_for_heading, turned_in_surface
 from xosc_lateral.scenario import Entity
 
 if TYPE_CHECKING:
@@ -268,18 +269,13 @@ def _or_zero(value: float) -> float:
 
 
 def turned(pose: Pose, angle: float) -> Pose:
-    """A pose on a surface, turned about the surface's normal (for slopes small against 1). [rad]"""
+    """A pose on a surface, turned about the surface's normal. [rad]"""
     if not angle:
         return pose
-    c, s = cos(angle), sin(angle)
-    return Pose(
-        pose.x,
-        pose.y,
-        pose.z,
-        wrap(pose.heading + angle),
-        pose.pitch * c - pose.roll * s,
-        pose.roll * c + pose.pitch * s,
-    )
+    turn, pitch, roll = angle, pose.pitch, pose.roll
+    if pitch or roll:
+        turn, pitch, roll = turned_in_surface(turn, pitch, roll)
+    return Pose(pose.x, pose.y, pose.z, wrap(pose.heading + turn), pitch, roll)
 
 
 def locate(network: RoadNetwork, pose: Pose, *, near: tuple[int, float] | None = None) -> Placement:
@@ -289,6 +285,8 @@ def locate(network: RoadNetwork, pose: Pose, *, near: tuple[int, float] | None =
     found = network.world_to_lane_at(pose.x, pose.y, pose.z if pose.z == pose.z else None, near=near)
     lane_pose = network.pose_at(found.road, found.lane, found.s, found.offset)
     heading = difference(pose.heading, lane_pose.heading)
+    if lane_pose.pitch or lane_pose.roll:
+        heading = turn_for_heading(heading, lane_pose.pitch, lane_pose.roll)
     if network.travel_direction(found.road, found.lane) < 0:
         heading += pi
     offset_t = network.offset_from_offset_t(found.road, found.lane, found.offset)

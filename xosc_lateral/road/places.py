@@ -88,6 +88,12 @@ def turned_in_surface(turn: float, pitch: float, roll: float) -> tuple[float, fl
     )
 
 
+def turn_for_heading(change: float, pitch: float, roll: float) -> float:
+    """Turn within a surface that pitches and rolls, for a change of heading: the reverse of `turned_in_surface`."""
+    sideways, ahead = sin(change), cos(change)
+    return atan2(cos(pitch) * sideways, cos(roll) * ahead - sin(pitch) * sin(roll) * sideways)
+
+
 def across_lane(lane: Lane, t: float, centre: float, width: float) -> float:
     """How far across a lane t lies, from its inner (0) to its outer edge (1)."""
     if width <= 0.0:

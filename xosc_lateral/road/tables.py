@@ -210,7 +210,7 @@ class NetworkTables:
             if profile.slope.any():
                 turn = np.arctan(profile.slope)
                 if pitch.any() or roll.any():
-                    turn, pitch, roll = _turned_in_surface(turn, pitch, roll)
+                    turn, pitch, roll = turned_in_surface(turn, pitch, roll)
                 heading = heading + turn
             backwards = profile.direction < 0
             if np.any(backwards):
@@ -391,7 +391,7 @@ def _one_or_many(index: ArrayLike, shape: tuple[int, ...]) -> IndexLike:
     return np.asarray(np.broadcast_to(array, shape).ravel(), dtype=np.int32)
 
 
-def _turned_in_surface(
+def turned_in_surface(
     turn: FloatArray, pitch: FloatArray, roll: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """`places.turned_in_surface` for arrays."""
