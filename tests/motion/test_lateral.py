@@ -17,6 +17,7 @@ from tests.motion.stage import (
     by_lanes,
     entity,
     event,
+    in_world,
     lane_change,
     lane_offset,
     lanes,
@@ -33,10 +34,16 @@ from tests.motion.stage import (
     teleport,
     to_lane,
 )
+from xosc_lateral.motion.nominal import Activity, EntityMotion
 from xosc_lateral.pipeline.load import Played
 
 LEFT_HAND = map_of(road("1", line(), 1000.0, rule="LHT"))
 FOUR = map_of(road("1", line(), 1000.0, sections=section(lanes(4, 3, 2, 1), lanes(-1, -2, -3, -4))))
+
+
+def jumps(motion: EntityMotion) -> list[float]:
+    """Times of the rows, from the second on, that the motion does not lead to."""
+    return [float(motion.time[k]) for k in np.flatnonzero(motion.activity & Activity.TELEPORTED) if k > 0]
 
 
 def end_of(played: Played) -> float | None:
@@ -103,6 +110,20 @@ def test_a_step_is_a_jump(tmp_path: Path) -> None:
     motion = entity(played)
     assert motion.y[row(motion, 1.0)] == pytest.approx(-0.5 * WIDTH)
     assert motion.y[row(motion, 1.02)] == pytest.approx(-1.5 * WIDTH)
+    assert jumps(motion) == pytest.approx([1.02])
+
+
+def test_a_lane_change_that_takes_its_time_is_no_jump(tmp_path: Path) -> None:
+    played = Stage(tmp_path).play(maneuvers(event(lane_change(to_lane(-2), over=2.0), trigger=after(1.0))))
+    assert jumps(entity(played)) == []
+
+
+@pytest.mark.parametrize(("offset", "times"), [(1.0, [1.02]), (0.04, [])])
+def test_a_lane_offset_at_once_is_a_jump_unless_it_is_tiny(tmp_path: Path, offset: float, times: list[float]) -> None:
+    change = lane_offset(f'<AbsoluteTargetLaneOffset value="{offset}"/>', shape="step")
+    motion = entity(Stage(tmp_path).play(maneuvers(event(change, trigger=after(1.0)))))
+    assert motion.offset[row(motion, 1.02)] == pytest.approx(offset)
+    assert jumps(motion) == pytest.approx(times)
 
 
 def test_over_several_lanes_the_lane_is_the_one_under_the_entity(tmp_path: Path) -> None:
@@ -231,6 +252,34 @@ def test_offsets_of_the_file_count_along_t_and_those_of_the_rows_to_the_left_of_
         assert motion.offset[-1] == pytest.approx(travel * 1.0, abs=1e-9)
 
 
+def test_a_heading_given_in_the_world_is_kept_on_a_banked_road(tmp_path: Path) -> None:
+    """A car that is put down askew slides along its lane askew."""
+    banked = '<lateralProfile><superelevation s="0" a="-1" b="0" c="0" d="0"/></lateralProfile>'
+    stage = Stage(tmp_path, map_of(road("1", line(), 1000.0, rest=banked)))
+    start = {"Ego": teleport(in_world(100.0, -1.75 * cos(1.0), 0.2)) + speed(20.0)}
+    motion = entity(stage.play(start=start, last=1.0))
+    np.testing.assert_allclose(motion.heading, 0.2, atol=1e-9)
+    assert motion.x[-1] > 110.0
+
+
+@pytest.mark.parametrize("bank", [0.1, -1.0])
+@pytest.mark.parametrize("lane", [-2, 2])
+def test_on_a_banked_road_heading_and_pitch_are_those_of_the_path_in_space(
+    tmp_path: Path, bank: float, lane: int
+) -> None:
+    banked = f'<lateralProfile><superelevation s="0" a="{bank}" b="0" c="0" d="0"/></lateralProfile>'
+    change = lane_change(by_lanes(1), over=2.0)
+    start = {"Ego": teleport(on_lane(lane, 500.0)) + speed(20.0)}
+    stage = Stage(tmp_path, map_of(road("1", line(), 1000.0, rest=banked)))
+    motion = entity(stage.play(maneuvers(event(change, trigger=after(1.0))), start=start))
+    between = slice(row(motion, 1.5), row(motion, 2.5))
+    dx, dy, dz = (np.diff(values)[between] for values in (motion.x, motion.y, motion.z))
+    after_frame = slice(between.start + 1, between.stop + 1)
+    off = motion.heading[after_frame] - np.arctan2(dy, dx)
+    np.testing.assert_allclose(np.angle(np.exp(1j * off)), 0.0, atol=2e-3)  # of up to 0.14; a frame late
+    np.testing.assert_allclose(motion.pitch[after_frame], -np.arctan2(dz, np.hypot(dx, dy)), atol=2e-3)
+
+
 # ---- lateral distance ------------------------------------------------------------------------------------------------
 def test_a_lateral_distance_without_limits_is_taken_at_once(tmp_path: Path) -> None:
     start = {
@@ -244,6 +293,7 @@ def test_a_lateral_distance_without_limits_is_taken_at_once(tmp_path: Path) -> N
     played = Stage(tmp_path).play(maneuvers(event(keep, trigger=after(1.0))), start=start)
     motion = entity(played)
     assert motion.y[-1] == pytest.approx(-0.5 * WIDTH - 3.0, abs=1e-6)
+    assert len(jumps(motion)) == 1
     assert sin(float(motion.heading[-1])) == pytest.approx(0.0, abs=1e-9)
 
 
@@ -260,4 +310,5 @@ def test_a_lateral_distance_with_limits_is_approached(tmp_path: Path) -> None:
     played = Stage(tmp_path).play(maneuvers(event(keep, trigger=after(1.0))), start=start, last=20.0)
     motion = entity(played)
     assert motion.y[-1] == pytest.approx(-0.5 * WIDTH - 3.0, abs=0.02)
+    assert jumps(motion) == []
     assert np.abs(np.diff(motion.y)).max() <= 0.1 + 1e-9

@@ -12,7 +12,7 @@ from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.motion.gaps import Gap
 from xosc_lateral.motion.nominal import EntityMotion, NominalMotion
 from xosc_lateral.motion.segments import Stretch
-from xosc_lateral.motion.trajectory import Trajectory
+from xosc_lateral.motion.trajectory import Trajectory, leaps
 from xosc_lateral.road.network import RoadNetwork
 
 FloatArray = NDArray[np.float64]
@@ -164,6 +164,12 @@ class Enriched:
         lines += [
             f"{departure.name} leaves its lane at {departure.time:.1f} s by {departure.beyond:.2f} m"
             for departure in self.departures
+        ]
+        lines += [
+            f"{entity.name} jumps {length:.1f} m at {time:.1f} s, as nominally: the lane that it follows closes, or "
+            "its road has a gap; a lane change before would be driven"
+            for entity in self.entities
+            for time, length in leaps(entity.motion)
         ]
         lines += [
             f"{entity.name}: {', '.join(entity.neutral)} not known in the scenario, taken as neutral"

@@ -26,7 +26,8 @@ class Activity(IntFlag):
     TRAJECTORY = 4
     """A FollowTrajectory or AcquirePosition-like action moves it."""
     TELEPORTED = 8
-    """It was placed anew in the step that ends with this row: motion is not continuous from the row before."""
+    """It was placed anew in the step that ends with this row: motion is not continuous from the row before. Besides
+    teleports: a trajectory that begins elsewhere, a lateral action that takes effect at once (shape `step`)."""
     OFF_ROAD = 16
     """Its reference point is on no road."""
     ROAD_END = 32
@@ -56,7 +57,7 @@ class EntityMotion:
     offset : array, shape (n,)
         From the centre of `lane`, positive to the LEFT of the lane's direction of travel. [m]
     heading_relative : array, shape (n,)
-        Heading relative to the lane's direction of travel. [rad]
+        Turn from the lane's direction of travel, about the normal of the road's surface. [rad]
     activity : array of uint8, shape (n,)
         `Activity` bits.
     """

@@ -16,6 +16,12 @@ FloatArray = NDArray[np.float64]
 _STANDSTILL = 1e-3
 """Displacement per step under which a direction of motion can't be read from it. [m]"""
 
+_LEAP = 0.3
+"""Further than what is driven in a step, and slid sideways at `_ASIDE`, by this much is no driving. [m]"""
+
+_ASIDE = 10.0
+"""No lateral action is faster. [m/s]"""
+
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Trajectory:
@@ -48,6 +54,20 @@ def distance_driven(motion: EntityMotion) -> FloatArray:
     ahead = np.hypot(np.diff(motion.x), np.diff(motion.y))
     placed_anew = (motion.activity[1:] & Activity.TELEPORTED) != 0
     return np.concatenate(([0.0], np.cumsum(np.where(placed_anew, 0.0, ahead))))
+
+
+def leaps(motion: EntityMotion) -> list[tuple[float, float]]:
+    """Times [s] and lengths [m] of jumps that nobody asked for: a followed lane closes, roads don't meet.
+
+    What a scenario places anew is none (`Activity.TELEPORTED`).
+    """
+    step = np.diff(motion.time)
+    driven = np.maximum(np.abs(motion.speed[1:]), np.abs(motion.speed[:-1])) * step
+    moved = np.hypot(np.diff(motion.x), np.diff(motion.y))
+    active = (motion.activity & Activity.ACTIVE) != 0
+    whole = active[1:] & active[:-1] & ((motion.activity[1:] & Activity.TELEPORTED) == 0)
+    found = np.flatnonzero(whole & (moved > driven + _LEAP + _ASIDE * step))
+    return [(float(motion.time[k + 1]), float(moved[k])) for k in found]
 
 
 def displace(motion: EntityMotion, network: RoadNetwork, deviation: FloatArray) -> Trajectory:

@@ -5,11 +5,17 @@ from __future__ import annotations
 from enum import IntFlag
 from typing import TYPE_CHECKING, Any
 
+from xosc_lateral.motion.nominal import Activity
+
 if TYPE_CHECKING:
     from xosc_lateral.motion.run import Run
     from xosc_lateral.motion.state import EntityState
     from xosc_lateral.motion.storyboard import ActionElement
     from xosc_lateral.scenario import Action
+
+
+JUMP = 0.05
+"""When an action puts the entity further away than this at once, the entity's motion is not continuous. [m]"""
 
 
 class Domain(IntFlag):
@@ -68,6 +74,11 @@ class RunningAction:
     def end(self) -> None:
         """Come to a regular end."""
         self.element.end()
+
+    def jumped(self, distance: float) -> None:
+        """The actor was put so far away at once [m]: up to here and from here on, its path is another one."""
+        if abs(distance) > JUMP:
+            self.state.activity |= Activity.TELEPORTED
 
     def note(self, what: str) -> None:
         """Say that something was not played, or not as written."""

@@ -14,9 +14,6 @@ from xosc_lateral.motion.transition import EPSILON
 from xosc_lateral.scenario.actions import FollowTrajectoryAction
 from xosc_lateral.scenario.enums import FollowingMode, ReferenceContext
 
-JUMP = 0.05
-"""When the path begins further away than this, the entity's motion is not continuous. [m]"""
-
 
 class RunningFollowTrajectory(RunningAction):
     """The entity jumps onto the path when the action starts (there is no approach).
@@ -56,8 +53,7 @@ class RunningFollowTrajectory(RunningAction):
         if self._is_timed:
             state.set_speed((-1.0 if self._backwards else 1.0) * path.speed_at(self._s))
         state.take_control(Activity.TRAJECTORY)
-        if hypot(point.x - before.x, point.y - before.y) > JUMP:
-            state.activity |= Activity.TELEPORTED
+        self.jumped(hypot(point.x - before.x, point.y - before.y))
 
     def step(self, time: float, step: float) -> None:
         """Move along."""

@@ -80,6 +80,8 @@ class RunningLaneChange(RunningAction):
         travel(guide, 1 if guide.is_forward else -1, on_line)
         self._follow_flip(flipped, offset)
         self._place(guide, turn)
+        if transition.is_step:
+            self.jumped(transition.target - transition.start)
         if guide.at_road_end and abs(distance) > EPSILON and self._is_stuck(guide):
             state.set_speed(0.0)
         state.speed_taken = True

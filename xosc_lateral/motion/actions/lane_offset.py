@@ -69,6 +69,8 @@ class RunningLaneOffset(RunningAction):
         along = 0.0 if state.is_forward else pi
         state.activity |= Activity.LATERAL
         if done:
+            if transition.is_step:
+                self.jumped(transition.target - state.offset_t)
             state.move_to(state.road, state.lane, state.s, transition.target)
             state.turn(along)
             self.end()

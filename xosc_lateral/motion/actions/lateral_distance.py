@@ -70,7 +70,10 @@ class RunningLateralDistance(RunningAction):
             self._is_first = False
             return
         rest = self._wanted - self._beside()
-        self._move(self._sideways(rest, step), step)
+        across = self._sideways(rest, step)
+        self._move(across, step)
+        if self._is_unlimited:
+            self.jumped(max(abs(across) - abs(state.speed) * step, 0.0))
         if not self.content.continuous and abs(rest) < CLOSE_ENOUGH:
             state.turn(0.0 if state.is_forward else pi)
             self.end()
@@ -96,6 +99,11 @@ class RunningLateralDistance(RunningAction):
         pull = min(max(pull, -limits.deceleration), limits.acceleration)
         self._speed = min(max(self._speed + pull * step, -limits.speed), limits.speed)
         return self._speed * step
+
+    @property
+    def _is_unlimited(self) -> bool:
+        limits = self._limits()
+        return limits.acceleration == inf and limits.speed == inf
 
     def _limits(self) -> Limits:
         """As given, not capped by what the entity can do ahead; without an acceleration there is no spring."""
