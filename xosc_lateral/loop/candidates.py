@@ -21,6 +21,7 @@ from xosc_lateral.driver.effects import (
     Form,
     Levels,
     Linear,
+    Magnitude,
     Nearness,
     Product,
     Saturating,
@@ -35,8 +36,9 @@ RESPONSES = (1.0, 2.0, 4.0)
 
 COST_SHAPE = 4.0
 COST_ANGLE = 1.0
+COST_MAGNITUDE = 2.0
 COST_PRODUCT = 9.0
-"""Head start of a plain column over a bent one, an angle's component, a product. [chi-square]"""
+"""Head start of a plain column over a bent one, an angle's component, its size, a product. [chi-square]"""
 
 QUANTILES = (0.1, 0.25, 0.5, 0.75, 0.9)
 """Where limits are tried first. [-]"""
@@ -113,6 +115,8 @@ def _number_shapes(column: Column, values: FloatArray) -> list[Candidate]:
     found = [Candidate(Linear(acts=acts, column=name), 0.0)]
     found.append(Candidate(Saturating(acts=acts, column=name, middle=middle, scale=scale), COST_SHAPE))
     if finite.min() < 0.0 < finite.max():
+        if min(-np.quantile(finite, 0.05), np.quantile(finite, 0.95)) > 0.0:
+            found.append(Candidate(Magnitude(acts=acts, column=name), COST_MAGNITUDE))
         found.append(Candidate(Saturating(acts=acts, column=name, middle=0.0, scale=0.5 * scale), COST_SHAPE))
     for limit in limits_of(finite):
         # above: for a distance with gaps "none" counts as not acting, so only the near side makes sense

@@ -9,7 +9,7 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.driver.effects import ColumnEffect, Linear, Piecewise, Saturating, Threshold
+from xosc_lateral.driver.effects import ColumnEffect, Linear, Magnitude, Piecewise, Saturating, Threshold
 from xosc_lateral.loop.candidates import COST_SHAPE, Candidate
 from xosc_lateral.loop.looks import (
     SLOW_S,
@@ -243,7 +243,7 @@ def _by_likelihood(
 def _bent(coarse: Coarse, target: Target, winner: Candidate) -> list[tuple[Candidate, float]]:
     """Curves with one and two bends in place of the winner, if it acts by a single number."""
     effect = winner.effect
-    if not isinstance(effect, Linear | Threshold | Saturating):
+    if not isinstance(effect, Linear | Magnitude | Threshold | Saturating):
         return []
     seen = coarse.context[effect.column][coarse.timeline.valid]
     seen = seen[np.isfinite(seen)]

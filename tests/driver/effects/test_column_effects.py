@@ -16,6 +16,7 @@ from xosc_lateral.driver.effects import (
     GrowingSpread,
     Levels,
     Linear,
+    Magnitude,
     Nearness,
     Piecewise,
     Population,
@@ -36,6 +37,7 @@ TIME = STEP * np.arange(500)
 ONE = {"coefficients": (0.5,), "errors": (0.1,), "reference": (0.0,)}
 EXAMPLES = (
     Linear(acts=Acts.LOCATION, column="x", lag_s=-1.2, response_s=2.0, **ONE),
+    Magnitude(acts=Acts.SPREAD, column="x", **ONE),
     Threshold(acts=Acts.LOCATION, column="x", at=1.0, above=False, jump=False, **ONE),
     Saturating(acts=Acts.SPREAD, column="x", middle=0.0, scale=2.0, **ONE),
     Piecewise(
@@ -90,6 +92,11 @@ def test_linear_acts_about_its_reference_and_is_neutral_where_there_is_none() ->
     effect = Linear(acts=Acts.LOCATION, column="x", coefficients=(2.0,), errors=(0.1,), reference=(3.0,))
     values = np.array([3.0, 4.0, np.nan])
     assert strength(effect, x=values) == pytest.approx([0.0, 2.0, 0.0])
+
+
+def test_a_magnitude_is_the_same_to_either_side() -> None:
+    effect = Magnitude(acts=Acts.LOCATION, column="x", coefficients=(2.0,), errors=(0.1,), reference=(1.0,))
+    assert strength(effect, x=np.array([-3.0, 3.0, 0.0, np.nan])) == pytest.approx([4.0, 4.0, -2.0, 0.0])
 
 
 @pytest.mark.parametrize(

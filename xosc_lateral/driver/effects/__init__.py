@@ -13,6 +13,7 @@ from xosc_lateral.driver.effects.drift import Drift
 from xosc_lateral.driver.effects.growing_spread import GrowingSpread
 from xosc_lateral.driver.effects.levels import Levels
 from xosc_lateral.driver.effects.linear import Linear
+from xosc_lateral.driver.effects.magnitude import Magnitude
 from xosc_lateral.driver.effects.nearness import Nearness
 from xosc_lateral.driver.effects.piecewise import Piecewise
 from xosc_lateral.driver.effects.population import Population
@@ -26,6 +27,7 @@ from xosc_lateral.errors import DriverProfileError
 
 EFFECTS = (
     Linear,
+    Magnitude,
     Threshold,
     Saturating,
     Piecewise,
@@ -78,6 +80,7 @@ __all__ = [
     "GrowingSpread",
     "Levels",
     "Linear",
+    "Magnitude",
     "Nearness",
     "Piecewise",
     "Population",
