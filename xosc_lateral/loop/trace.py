@@ -487,7 +487,7 @@ def _prove_regimes(search: _Search, fitted: Fitted, clustering: Clustering) -> F
 
 
 def _not_enough(look: str, p_value: float, columns: tuple[str, ...] = ()) -> Tried:
-    why = f"chance gives as much in {100 * p_value:.2g} % of tables; {100 * LEVEL[look]:g} % is allowed"
+    why = f"chance gives as much in {100 * p_value:.3g} % of tables; {100 * LEVEL[look]:g} % is allowed"
     return Tried(look, columns, p_value, why)
 
 
