@@ -64,6 +64,9 @@ MIN_SUPPORT_PACE = 200.0
 MIN_SUPPORT = 60.0
 """A quantity that hangs on fewer seconds than this is not looked at: anything may have happened just then. [s]"""
 
+CLEARLY = 3.0
+"""By so much a column must be likelier than time alone: many columns change slowly enough to look like time. [-]"""
+
 RECHECKED = 40
 """So many of the scan's best are scored exactly."""
 
@@ -317,7 +320,7 @@ def _better_explained(found: Found, proposals: Sequence[_Proposal]) -> Found:
         for other in by_column
         if isinstance(other, Found)
         and other.candidate is not None
-        and other.after.log_likelihood - 0.5 * other.candidate.cost > found.after.log_likelihood
+        and other.after.log_likelihood - 0.5 * other.candidate.cost - CLEARLY > found.after.log_likelihood
     ]
     return likelier[0] if likelier else found
 

@@ -16,7 +16,7 @@ FloatArray = NDArray[np.float64]
 
 @dataclass(frozen=True, kw_only=True)
 class Magnitude(ColumnEffect):
-    """|column|: a bend to the left does what one to the right does; where it is NaN ("there is none"), nothing changes."""
+    """|column|: to the left as to the right; where it is NaN ("there is none"), nothing changes."""
 
     kind: ClassVar[str] = "magnitude"
     column: str
