@@ -12,8 +12,9 @@ import pytest
 from xosc_lateral.cli import main
 from xosc_lateral.errors import NotEnoughDataError
 from xosc_lateral.formats.profiles import list_profiles, read_profile
-from xosc_lateral.loop.compare import free_runs
+from xosc_lateral.loop.compare import free_runs, habits_of
 from xosc_lateral.pipeline.library import GROUPS, most_different
+from xosc_lateral.report.cards import card_text
 from xosc_lateral.report.evaluation import _density
 
 
@@ -106,6 +107,22 @@ def test_population_classes_lanes_and_single_vehicles_are_shipped():
     names = {path.stem for path in list_profiles()}
     assert {group.name for group in GROUPS} <= names
     assert sum(name.startswith("motorway-vehicle-") for name in names) >= 5
+
+
+def test_the_refined_profile_says_what_the_loop_found_and_differs_little_from_the_direct_fit():
+    refined, direct = (read_profile(name) for name in ("motorway-refined", "motorway"))
+    loop = refined.provenance.fit["closed_loop"]
+    assert loop["base"] == "two-level"
+    assert {"memory beyond one step", "drivers that differ"} <= set(loop["found"])
+    assert refined.model.kind == "best"
+    assert f"found: {', '.join(loop['found'])}" in card_text(refined)
+    habits, others = habits_of(refined), habits_of(direct)
+    assert habits.spread == pytest.approx(others.spread, rel=0.1)
+    assert habits.lateral_speed == pytest.approx(others.lateral_speed, rel=0.2)
+
+
+def test_a_fitted_profile_has_no_word_about_a_loop(profile):
+    assert "found:" not in card_text(read_profile(str(profile)))
 
 
 def test_most_different_picks_the_odd_ones_that_stay_as_they_are():

@@ -3,8 +3,9 @@
     python -m xosc_lateral.cli.build_library tasi-0.15.4-py3-none-any.whl -o FOLDER [--cards docs/profiles.md]
 
 The same wheel gives the same bytes on the same kind of processor. Every profile is scored before it is written: for
-groups of drivers a fit to half of the vehicles is scored on the other half; for single vehicles a fit to the first part
-of the drive is held against the last part of its own drive and those of the others. What is written is fitted to all.
+groups of drivers a fit to half of the vehicles (for the refined profile, a closed loop over them) is scored on the
+other half; for single vehicles a fit to the first part of the drive is held against the last part of its own drive and
+those of the others. What is written is fitted to all.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ from numpy.typing import NDArray
 
 from xosc_lateral.driver.fitting import fit_runs
 from xosc_lateral.driver.profile import DriverProfile, Provenance
-from xosc_lateral.driver.series import STEP, Run, all_runs
+from xosc_lateral.driver.series import STEP, Drive, Run, all_runs
 from xosc_lateral.errors import NotEnoughDataError
 from xosc_lateral.formats.drives import read_drives
 from xosc_lateral.formats.hashes import file_hash
@@ -30,6 +31,7 @@ from xosc_lateral.loop.compare import habits_of, told_from_each_other
 from xosc_lateral.loop.metrics import snippet_metrics
 from xosc_lateral.loop.scores import SNIPPET, score_profile, scores_to_dict
 from xosc_lateral.loop.snippets import snippets_of
+from xosc_lateral.pipeline.refined import NOTES, refine_population, refined_profile
 
 FloatArray = NDArray[np.float64]
 
@@ -87,24 +89,43 @@ def build_library(source: Path, *, model: str = "best") -> list[DriverProfile]:
     with tempfile.TemporaryDirectory() as folder:
         table = Path(folder) / "dlr-ht.parquet"
         write_imported(imported, table)
-        runs = all_runs(read_drives(table))
+        drives = read_drives(table)
+    runs = all_runs(drives)
     known = Provenance(source=SOURCE, licence=LICENCE, inputs={source.name: file_hash(source)})
     groups = [
         _group_profile(group, [run for run in runs if group.holds(run, kind)], replace(known, notes=group.notes), model)
         for group in GROUPS
     ]
-    return groups + _single_profiles(runs, kind, known, model)
+    return [*groups, _refined_profile(drives, runs, known), *_single_profiles(runs, kind, known, model)]
 
 
 def _group_profile(group: Group, runs: Sequence[Run], known: Provenance, model: str) -> DriverProfile:
     """Score on held-out vehicles, then fit to all."""
-    vehicles = np.unique([run.drive for run in runs])
-    chosen = set(np.random.default_rng(SEED).permutation(vehicles)[: len(vehicles) // 2].tolist())
+    chosen = _fitted_half(runs)
     half = fit_runs([run for run in runs if run.drive in chosen], name=group.name, model=model)
-    scores = scores_to_dict(
-        score_profile(half, [run for run in runs if run.drive not in chosen], seed=SEED, classify=False)
-    )
-    evaluation = {
+    evaluation = _evaluation(half, [run for run in runs if run.drive not in chosen])
+    return fit_runs(runs, name=group.name, model=model, provenance=replace(known, evaluation=evaluation))
+
+
+def _refined_profile(drives: Sequence[Drive], runs: Sequence[Run], known: Provenance) -> DriverProfile:
+    """The same for what the closed loop makes of all vehicles, on the same halves."""
+    chosen = _fitted_half(runs)
+    half = refine_population([drive for drive in drives if drive.name in chosen], SEED).refined
+    evaluation = _evaluation(half, [run for run in runs if run.drive not in chosen])
+    known = replace(known, notes=NOTES, evaluation=evaluation)
+    return refined_profile(refine_population(drives, SEED, known))
+
+
+def _fitted_half(runs: Sequence[Run]) -> set[str]:
+    """Names of half of the vehicles, at random."""
+    vehicles = np.unique([run.drive for run in runs])
+    return set(np.random.default_rng(SEED).permutation(vehicles)[: len(vehicles) // 2].tolist())
+
+
+def _evaluation(half: DriverProfile, others: Sequence[Run]) -> dict[str, Any]:
+    """Scores of a profile of half of the vehicles on the others."""
+    scores = scores_to_dict(score_profile(half, others, seed=SEED, classify=False))
+    return {
         "held_out": "half of the vehicles, not fitted",
         "seed": SEED,
         "snippets": scores["snippets"],
@@ -112,7 +133,6 @@ def _group_profile(group: Group, runs: Sequence[Run], known: Provenance, model: 
         "spectrum_error_db": scores["spectrum"]["error_db"],
         "margins": scores["margins"],
     }
-    return fit_runs(runs, name=group.name, model=model, provenance=replace(known, evaluation=evaluation))
 
 
 # ---- single vehicles -------------------------------------------------------------------------------------------------

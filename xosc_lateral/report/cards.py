@@ -8,7 +8,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from xosc_lateral.driver.profile import DriverProfile
+from xosc_lateral.driver.profile import DriverProfile, Provenance
 from xosc_lateral.formats.profiles import list_profiles, profile_hash, read_profile
 from xosc_lateral.loop.compare import Habits, compare_profiles, habits_of
 from xosc_lateral.loop.metrics import METRICS
@@ -73,7 +73,7 @@ def card_text(profile: DriverProfile, *, as_json: bool = False) -> str:
         *_indented("source", known.source),
         *_indented("licence", known.licence),
         *(f"  input      {name} sha256 {digest}" for name, digest in known.inputs.items()),
-        *evaluation_lines(known.evaluation),
+        *(f"  {name:10s} {value}" for name, value in _provenance_items(known)),
         f"  sha256     {profile_hash(profile)}",
     ]
     return "\n".join(lines)
@@ -97,7 +97,7 @@ def card_markdown(profile: DriverProfile) -> str:
         f"| 5 % to 95 % | {habits.low:+.2f} m to {habits.high:+.2f} m |",
         f"| lateral speed | {habits.lateral_speed:.3f} m/s rms |",
     ]
-    rows += [f"| {name} | {value} |" for name, value in _evaluation_items(known.evaluation)]
+    rows += [f"| {name} | {value} |" for name, value in _provenance_items(known)]
     return "\n".join([*rows, ""])
 
 
@@ -114,9 +114,14 @@ def compare_text(one: DriverProfile, other: DriverProfile, *, seed: int, as_json
     return "\n".join([*lines, *(f"  {name:10s} {distances.by_metric[name]:.3f}" for name in METRICS)])
 
 
-def evaluation_lines(evaluation: Mapping[str, Any]) -> list[str]:
-    """What the profile's own evaluation on held-out drives found."""
-    return [f"  {name:10s} {value}" for name, value in _evaluation_items(evaluation)]
+def _provenance_items(known: Provenance) -> list[tuple[str, str]]:
+    """How a closed loop came to the profile, if one did, and its evaluation on held-out drives."""
+    items = _evaluation_items(known.evaluation)
+    loop = known.fit.get("closed_loop")
+    if not loop:
+        return items
+    found = ", ".join(loop["found"]) or "nothing"
+    return [("loop", f"from a {loop['base']} model, seed {loop['seed']}; found: {found}"), *items]
 
 
 def _evaluation_items(evaluation: Mapping[str, Any]) -> list[tuple[str, str]]:
