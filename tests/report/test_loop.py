@@ -12,7 +12,27 @@ import pytest
 
 from tests.simulators.driver_simulator import simulate_drive
 from tests.simulators.plants import Response, ShiftBy
-from xosc_lateral.driver.effects import Acts, ColumnEffect, Drift, Effect, GrowingSpread, Linear, Regimes, Step, Weave
+from xosc_lateral.driver.effects import (
+    Acts,
+    Angular,
+    ColumnEffect,
+    Drift,
+    Effect,
+    Factor,
+    Form,
+    GrowingSpread,
+    Levels,
+    Linear,
+    Magnitude,
+    Nearness,
+    Piecewise,
+    Product,
+    Regimes,
+    Saturating,
+    Step,
+    Threshold,
+    Weave,
+)
 from xosc_lateral.formats.drives import read_drives
 from xosc_lateral.loop.close import LoopResult, close_loop
 from xosc_lateral.loop.course import by_drive, spread_course
@@ -20,7 +40,7 @@ from xosc_lateral.loop.findings import Finding
 from xosc_lateral.loop.leftover import Leftover, leftover_of
 from xosc_lateral.loop.partial import curve_of
 from xosc_lateral.report.loop import loop_page, loop_text
-from xosc_lateral.report.loop_figures import DRIVES, residual_figure, spectrum
+from xosc_lateral.report.loop_figures import DRIVES, effect_figure, residual_figure, spectrum
 from xosc_lateral.report.loop_hidden_figures import DRAWINGS
 from xosc_lateral.report.loop_json import loop_json
 from xosc_lateral.report.loop_words import chance_words, leftover_words, meaning, size_words
@@ -33,6 +53,22 @@ HIDDEN: tuple[Effect, ...] = (
     Regimes(factor=2.0, on_s=20.0, off_s=50.0),
     Step(size=0.3, at_s=700.0),
     Drift(size=0.2),
+)
+
+ONE = {"coefficients": (0.1,), "errors": (0.02,), "reference": (0.3,), "acts": Acts.LOCATION}
+TWO = {"coefficients": (0.1, 0.05), "errors": (0.02, 0.02), "reference": (0.3, 0.3), "acts": Acts.LOCATION}
+SHAPES: tuple[ColumnEffect, ...] = (
+    Linear(column="truck_right", **ONE),
+    Linear(column="speed", **ONE | {"acts": Acts.FINE}),
+    Linear(column="speed", **ONE | {"acts": Acts.RATE}),
+    Magnitude(column="curvature", **ONE),
+    Threshold(column="grade", at=1.0, **ONE),
+    Saturating(column="grade", middle=0.0, scale=1.0, **ONE),
+    Piecewise(column="rain", knots=(1.0,), **TWO),
+    Levels(column="lane_index", levels=(1.0, 2.0), **TWO),
+    Nearness(column="lead_distance", scale=20.0, **ONE),
+    Angular(column="wind_direction", **TWO),
+    Product(factors=(Factor(column="wind_speed"), Factor(column="wind_direction", form=Form.SINE, at=360.0)), **ONE),
 )
 
 
@@ -172,6 +208,17 @@ def test_every_hidden_kind_is_told_in_plain_words(result: LoopResult, kind: str)
     words = meaning(hidden(result, None, kind), result)
     assert words[0].isupper()
     assert not words.startswith("(")
+
+
+@pytest.mark.parametrize("effect", SHAPES, ids=lambda effect: f"{effect.kind}-{effect.acts.value}")
+def test_every_shape_is_told_and_drawn(result: LoopResult, effect: ColumnEffect) -> None:
+    finding = replace(result.findings[0], effects=(effect,), columns=effect.columns)
+    words = meaning(finding, result)
+    assert all(column in words for column in effect.columns)
+    curve = curve_of(result, effect)
+    assert np.isfinite(curve.strength).all() and np.isfinite(curve.error).all()
+    assert np.isfinite(curve.measured).all() and (len(curve.seen) > 0) == (effect.acts is not Acts.RATE)
+    assert len(effect_figure(result, finding).axes) == 2
 
 
 def test_chance_is_said_as_one_in_so_many_tables() -> None:

@@ -37,7 +37,7 @@ CHANCE = 2.0
 FLAT_AXIS_CM = 1.0
 """A residual's axis reaches at least so far to both sides, lest noise look large. [cm]"""
 
-NEGLIGIBLE = 1e-3
+NEGLIGIBLE = 1e-2
 """Share of a column's range that is written as 0. [-]"""
 
 MANY_SEGMENTS = 8

@@ -7,7 +7,7 @@ from types import MappingProxyType
 
 import numpy as np
 
-from xosc_lateral.driver.effects import Acts, Angular, ColumnEffect, Levels, Product
+from xosc_lateral.driver.effects import Acts, Angular, ColumnEffect, Levels, Magnitude, Product
 from xosc_lateral.loop.close import LoopResult
 from xosc_lateral.loop.findings import Finding
 from xosc_lateral.loop.leftover import GroupError, Leftover
@@ -214,12 +214,15 @@ def _between(effect: ColumnEffect, result: LoopResult) -> str:
         return f"From the `{column}` that acts least to the one that acts most (the middle 90 % of the time)"
     seen = coarse.context[column][inside]
     seen = seen[np.isfinite(seen)]
+    name = f"`{column}`"
+    if isinstance(effect, Magnitude):
+        seen, name = np.abs(seen), f"the size of `{column}`, of either sign,"
     if set(np.unique(seen)) <= {0.0, 1.0}:
         return f"While `{column}` is on"
     low, high = np.quantile(seen, [0.05, 0.95])
     unit = CONTEXT_UNITS.get(column, "")
     unit = "" if unit in ("", "-") else f" {unit}"
-    return f"As `{column}` goes from {low:.3g} to {high:.3g}{unit} (5 % and 95 % quantile of these drives)"
+    return f"As {name} goes from {low:.3g} to {high:.3g}{unit} (5 % and 95 % quantile of these drives)"
 
 
 def _cm(value: float) -> str:
