@@ -1,0 +1,80 @@
+"""The closed loop over real motorway traffic: figures and tables of docs/closing_the_loop.md, section 6.
+
+    xosc-lateral import dlr-ht tasi-0.15.4-py3-none-any.whl -o dlr.parquet
+    python -m benchmarks.loop_dlr dlr.parquet [--seed 1] [--write docs/closing_the_loop.md] [--figures docs/figures]
+
+Starts from a two-level model of the same drives, as `make loop-dlr` does.
+"""
+
+from __future__ import annotations
+
+import argparse
+import re
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from xosc_lateral.formats.atomic import write_atomically
+from xosc_lateral.formats.drives import read_drives
+from xosc_lateral.loop.close import LoopResult
+from xosc_lateral.loop.leftover import Leftover, leftover_of
+from xosc_lateral.pipeline.refined import refine_population
+from xosc_lateral.report.figures import PAPER
+from xosc_lateral.report.loop import loop_text
+from xosc_lateral.report.loop_figures import residual_figure, spectrum_figure
+from xosc_lateral.report.loop_hidden_figures import DRAWINGS
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+DPI = 110
+"""Of figures in documents. [1/inch]"""
+
+
+def main() -> None:
+    """Run the loop, print what it found, write figures and table where asked."""
+    ask = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    ask.add_argument("table", type=Path)
+    ask.add_argument("--seed", type=int, default=1)
+    ask.add_argument("--write", type=Path, metavar="PAGE.md")
+    ask.add_argument("--figures", type=Path, metavar="FOLDER")
+    said = ask.parse_args()
+    started = time.perf_counter()
+    result = refine_population(read_drives([said.table]), said.seed)
+    took = time.perf_counter() - started
+    leftover = leftover_of(result)
+    text = f"```\n{loop_text(result, leftover)}\n```\n\nIn {took:.0f} s.\n\n{group_table(leftover)}"
+    print(text)
+    if said.write is not None:
+        page = said.write.read_text(encoding="utf-8")
+        marked = re.compile(r"(<!-- loop-dlr: begin -->\n).*(<!-- loop-dlr: end -->)", re.DOTALL)
+        write_atomically(said.write, marked.sub(lambda match: f"{match[1]}{text}\n{match[2]}", page))
+    if said.figures is not None:
+        draw(result, leftover, said.figures)
+
+
+def group_table(leftover: Leftover) -> str:
+    """Every group of cells, most left unexplained first."""
+    rows = ["| cells | before [mm] | after [mm] | floor [mm] | after / floor |", "|---|---|---|---|---|"]
+    for group in sorted(leftover.groups, key=lambda group: -group.unexplained):
+        numbers = f"{1e3 * group.before:.1f} | {1e3 * group.after:.1f} | {1e3 * group.floor:.1f}"
+        rows.append(f"| {group.name} | {numbers} | {group.after / group.floor:.2f} |")
+    return "\n".join(rows)
+
+
+def draw(result: LoopResult, leftover: Leftover, folder: Path) -> None:
+    """Figures on white, which light and dark pages show alike."""
+    folder.mkdir(parents=True, exist_ok=True)
+    for finding in result.findings:
+        figure, _ = DRAWINGS[finding.kind]
+        _save(figure(result, finding), folder / f"loop_dlr_{finding.kind}.png")
+    _save(spectrum_figure(result), folder / "loop_dlr_spectrum.png")
+    _save(residual_figure(result, leftover, "mean"), folder / "loop_dlr_residual.png")
+
+
+def _save(figure: Figure, path: Path) -> None:
+    figure.savefig(path, dpi=DPI, facecolor=PAPER, metadata={"Software": None})
+
+
+if __name__ == "__main__":
+    main()
