@@ -15,6 +15,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache
+from itertools import islice
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,8 +40,11 @@ EDGE_S, STEP_GRID_S = 60, 15
 UNREMARKABLE = 6.0
 """A wander with a lower score is not compared with chance: chance gives it in every few. [chi-square]"""
 
-N_NULL = 400
-"""Samples of either null."""
+N_NULL = 1200
+"""Samples of either null: a mixture's tail takes many."""
+
+N_FIRST, HOPELESS = 200, 0.05
+"""After so many samples a score is given up that chance reaches in more than this share of them. [-]"""
 
 SIGN_S = 60
 """Length of the stretches whose sign is drawn anew. [s]"""
@@ -103,8 +107,15 @@ def find_wander(coarse: Coarse, fitted: Fitted, rng: np.random.Generator) -> Wan
     p_value = 1.0
     if score >= UNREMARKABLE:
         nulls = (_simulated(rows, whitener, rng), _resigned(rows, whitener, rng))
-        p_value = max(tail_probability(score, np.array([max(scores(one)[:2]) for one in null])) for null in nulls)
+        p_value = max(_probability(score, (max(scores(one)[:2]) for one in null)) for null in nulls)
     return Wander(drift_score, step_score, at, p_value)
+
+
+def _probability(score: float, null: Iterator[float]) -> float:
+    sample = list(islice(null, N_FIRST))
+    if tail_probability(score, np.array(sample)) <= HOPELESS:
+        sample += null
+    return tail_probability(score, np.array(sample))
 
 
 class _Scores:
