@@ -78,7 +78,14 @@ def product_candidates(columns: Sequence[Column], context: Mapping[str, FloatArr
         for pair in combinations(factors, 2)
         if pair[0].column != pair[1].column
     )
-    return [Candidate(pair, COST_PRODUCT) for pair in pairs if _varies(pair.quantity(context))]
+    return [Candidate(pair, _cost(pair.factors)) for pair in pairs if _varies(pair.quantity(context))]
+
+
+def _cost(factors: tuple[Factor, ...]) -> float:
+    """Of a product; size and direction of the same thing (wind_speed, wind_direction) are one vector, not any pair."""
+    directions = [factor for factor in factors if factor.form in (Form.SINE, Form.COSINE)]
+    things = {factor.column.split("_")[0] for factor in factors}
+    return COST_ANGLE if len(directions) == 1 and len(things) == 1 else COST_PRODUCT
 
 
 def with_responses(candidates: Iterable[Candidate], responses: Sequence[float] = RESPONSES) -> list[Candidate]:
