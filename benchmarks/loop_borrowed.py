@@ -30,7 +30,7 @@ from xosc_lateral.loop.looks import SLOW_S, Look
 from xosc_lateral.loop.movement import Coarse, Terms, fit_movement
 from xosc_lateral.loop.refine import target_of
 from xosc_lateral.loop.sizing import size_effects
-from xosc_lateral.loop.strip import effects_share
+from xosc_lateral.loop.strip import bare_movement, effects_share, uninterrupted
 from xosc_lateral.loop.timeline import Timeline, join_drives
 from xosc_lateral.loop.trace import Trace, trace_effects
 
@@ -131,9 +131,10 @@ def bare_movements(folder: Path) -> dict[str, Timeline]:
         coarse = Coarse.of(timeline)
         final = trace_effects(coarse, np.random.SeedSequence(1)).final
         share = effects_share(coarse, final, size_effects(coarse, final))
-        left = timeline.offset - share.location
-        mean = left[timeline.valid].mean()
-        offset = np.where(timeline.valid, mean + (left - mean) / share.spread, 0.0)
+        mean = float((timeline.offset - share.location)[timeline.valid].mean())
+        offset = np.zeros(len(timeline))
+        for rows in uninterrupted(timeline.valid):
+            offset[rows] = bare_movement(timeline, share, rows, mean)
         bare[path.name.split(".")[0]] = replace(timeline, offset=offset)
     return bare
 

@@ -69,18 +69,23 @@ def stripped_runs(timeline: Timeline, share: Share, used: BoolArray) -> list[Run
     """Runs of the movement without effects, from the valid rows in `used`."""
     runs: list[Run] = []
     for index, name in enumerate(timeline.names):
-        for rows in _stretches(timeline.valid & used & (timeline.drive == index)):
+        for rows in uninterrupted(timeline.valid & used & (timeline.drive == index)):
             if (rows.stop - rows.start) * STEP < MIN_RUN:
                 continue
             runs.append(_run(timeline, share, rows, name, len(runs)))
     return runs
 
 
-def _run(timeline: Timeline, share: Share, rows: slice, name: str, index: int) -> Run:
+def bare_movement(timeline: Timeline, share: Share, rows: slice, mean: float | None = None) -> FloatArray:
+    """Offsets of one uninterrupted stretch without the effects, about their own mean or the given one [m]."""
     left = timeline.offset[rows] - share.location[rows]
-    mean = float(left.mean())
+    mean = float(left.mean()) if mean is None else mean
     slow = _smooth(left)
-    movement = mean + (slow - mean) / share.spread[rows] + (left - slow) / share.fine[rows]
+    return np.asarray(mean + (slow - mean) / share.spread[rows] + (left - slow) / share.fine[rows])
+
+
+def _run(timeline: Timeline, share: Share, rows: slice, name: str, index: int) -> Run:
+    movement = bare_movement(timeline, share, rows)
     width = timeline.lane_width[rows]
     rate = share.rate[rows]
     if np.any(rate != 1.0):
@@ -115,6 +120,7 @@ def _on_grid(values: FloatArray, n: int) -> FloatArray:
     return np.interp(np.arange(n), np.arange(len(values)) * COARSE + 0.5 * (COARSE - 1), values)
 
 
-def _stretches(mask: BoolArray) -> list[slice]:
+def uninterrupted(mask: BoolArray) -> list[slice]:
+    """Stretches of rows in a row, in order."""
     edges = np.flatnonzero(np.diff(np.concatenate([[0], mask.astype(np.int8), [0]])))
     return [slice(int(first), int(last)) for first, last in zip(edges[::2], edges[1::2], strict=True)]
