@@ -64,6 +64,8 @@ class LoopResult:
     held_out : str
         What was held out, in words.
     cells : Cells
+    unmoved : array, shape (n,)
+        Measured offsets less the effects on the mean. [m]
     real, before, after : mapping of str to array
         Cells of measured and expected offsets on held-out blocks. [m]
     error_before, error_after, floor : float
@@ -85,6 +87,7 @@ class LoopResult:
     population: Population | None
     held_out: str
     cells: Cells
+    unmoved: FloatArray
     real: dict[str, FloatArray]
     before: dict[str, FloatArray]
     after: dict[str, FloatArray]
@@ -161,6 +164,7 @@ def close_loop(
     progress(0.95, "refitting on everything")
     refined = _fit(timeline, coarse, trace.final, scored.sized, everything, refined_kind, name, provenance)
     cells, real, before, after = scored.cells, scored.real, scored.before, scored.after
+    unmoved = timeline.offset - effects_share(coarse, trace.final, scored.sized).location
     rng = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(9,)))
     findings = list(scored.findings)
     if kind is ModelKind.TWO_LEVEL:
@@ -181,12 +185,13 @@ def close_loop(
         population=population,
         held_out=_in_words(timeline, blocks),
         cells=cells,
+        unmoved=unmoved,
         real=real,
         before=before,
         after=after,
         error_before=error_between(real, before),
         error_after=error_between(real, after),
-        floor=floor_of(cells, timeline.offset, blocks, rng),
+        floor=floor_of(cells, unmoved, blocks, rng),
         scores=score_runs(timeline, scored.runs_before, scored.runs_after, blocks, rng),
         runs_before=scored.runs_before,
         runs_after=scored.runs_after,
@@ -282,8 +287,8 @@ def _held_out_runs(setting: _Setting, trace: Trace, progress: Progress) -> tuple
         for side, profile in enumerate(_fold_profiles(setting, trace, used)):
             if side == CORE and same_core:
                 continue
-            # the same luck for all sides: what differs is the profile
-            seed = np.random.SeedSequence(setting.root.entropy, spawn_key=(5, fold))
+            # the same luck for all sides and folds: what differs is the profile, and runs go on from fold to fold
+            seed = np.random.SeedSequence(setting.root.entropy, spawn_key=(5,))
             runs = own_runs(profile, setting.timeline, seed)
             composite.setdefault(side, np.zeros_like(runs))[:, held] = runs[:, held]
     return composite[BEFORE], composite[BEFORE if same_core else CORE], composite[AFTER]

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.loop.close import LoopResult, hold_out_blocks
-from xosc_lateral.loop.residual import Cells, error_between
+from xosc_lateral.loop.residual import size_of, split_differences
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
@@ -87,7 +87,7 @@ def leftover_of(result: LoopResult) -> Leftover:
     """Compare every group of cells, and all of them, with what the drives differ from themselves by (seeded)."""
     timeline = result.cells.timeline
     rng = np.random.default_rng(np.random.SeedSequence(result.seed, spawn_key=(11,)))
-    splits = _split_differences(result.cells, timeline.offset, hold_out_blocks(timeline), rng)
+    splits = split_differences(result.cells, result.unmoved, hold_out_blocks(timeline), rng, SPLITS)
     floors = {name: np.sqrt(_mean_of_finite(np.stack([split[name] for split in splits]) ** 2)) for name in result.real}
     groups = tuple(
         GroupError(
@@ -98,23 +98,9 @@ def leftover_of(result: LoopResult) -> Leftover:
         )
         for name, real in result.real.items()
     )
-    nothing = {name: np.zeros_like(values) for name, values in result.real.items()}
-    as_far = sum(error_between(split, nothing) >= result.error_after for split in splits)
+    as_far = sum(size_of(split) >= result.error_after for split in splits)
     p_value = (1.0 + as_far) / (1.0 + len(splits))
     return Leftover(floors, groups, _beyond(result.error_after, result.floor), p_value)
-
-
-def _split_differences(
-    cells: Cells, offset: FloatArray, blocks: IntArray, rng: np.random.Generator
-) -> list[dict[str, FloatArray]]:
-    """Cells of random halves of the blocks against each other, scaled as in `floor_of`; NaN: no rows in a half."""
-    numbers = np.unique(blocks[cells.timeline.valid])
-    splits = []
-    for _ in range(SPLITS):
-        half = np.isin(blocks, rng.permutation(numbers)[: len(numbers) // 2])
-        first, second, balance = cells.describe(offset, half), cells.describe(offset, ~half), cells.balance(half)
-        splits.append({name: balance[name] * (values - second[name]) for name, values in first.items()})
-    return splits
 
 
 def _beyond(error: float, floor: float) -> float:

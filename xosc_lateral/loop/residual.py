@@ -141,32 +141,43 @@ def expected(cells: Cells, runs: FloatArray, used: BoolArray) -> dict[str, Float
 
 
 def error_between(first: Mapping[str, FloatArray], second: Mapping[str, FloatArray]) -> float:
-    """Root mean square of the difference over groups, each group's mean square counting the same. [m]"""
-    squares = []
-    for name in first:
-        difference = first[name] - second[name]
-        difference = difference[np.isfinite(difference)]
-        if len(difference):
-            squares.append(float(np.mean(difference**2)))
-    return float(np.sqrt(np.mean(squares))) if squares else 0.0
+    """Size of the difference of two descriptions, as `size_of` has it. [m]"""
+    return size_of({name: values - second[name] for name, values in first.items()})
 
 
-def floor_of(cells: Cells, offset: FloatArray, blocks: IntArray, rng: np.random.Generator, splits: int = 8) -> float:
-    """What measured data differs from itself: halves of the blocks against each other.
+def split_differences(
+    cells: Cells, offset: FloatArray, blocks: IntArray, rng: np.random.Generator, splits: int
+) -> list[dict[str, FloatArray]]:
+    """What measured data differs from itself: cells of random halves of the blocks against each other; NaN: no rows.
 
     Two parts of a and b rows differ by a standard deviation of sigma sqrt(1/a + 1/b); all n = a + b rows against an
     exact expectation have sigma / sqrt(n). So every cell's difference is scaled by sqrt(a b) / n: 1/2 for halves.
+
+    Parameters
+    ----------
+    offset : array, shape (n,)
+        Measured, less the effects on the mean that are known: where the car should be is no chance.
+    blocks : int array, shape (n,)
+        What is dealt out.
     """
     numbers = np.unique(blocks[cells.timeline.valid])
     found = []
     for _ in range(splits):
-        chosen = rng.permutation(numbers)[: len(numbers) // 2]
-        half = np.isin(blocks, chosen)
-        first, second = cells.describe(offset, half), cells.describe(offset, ~half)
-        balance = cells.balance(half)
-        scaled = {name: balance[name] * (first[name] - second[name]) for name in first}
-        found.append(error_between(scaled, {name: np.zeros_like(values) for name, values in scaled.items()}))
-    return float(np.mean(found))
+        half = np.isin(blocks, rng.permutation(numbers)[: len(numbers) // 2])
+        first, second, balance = cells.describe(offset, half), cells.describe(offset, ~half), cells.balance(half)
+        found.append({name: balance[name] * (values - second[name]) for name, values in first.items()})
+    return found
+
+
+def size_of(differences: Mapping[str, FloatArray]) -> float:
+    """Root mean square over groups of cells, each group's mean square counting the same. [m]"""
+    squares = [float(np.mean(seen**2)) for values in differences.values() if len(seen := values[np.isfinite(values)])]
+    return float(np.sqrt(np.mean(squares))) if squares else 0.0
+
+
+def floor_of(cells: Cells, offset: FloatArray, blocks: IntArray, rng: np.random.Generator, splits: int = 8) -> float:
+    """Mean size of `split_differences`. [m]"""
+    return float(np.mean([size_of(split) for split in split_differences(cells, offset, blocks, rng, splits)]))
 
 
 def _by_bin(values: FloatArray, label: IntArray, used: BoolArray) -> FloatArray:
