@@ -262,7 +262,8 @@ def _score(setting: _Setting, trace: Trace, progress: Progress) -> _Scored:
     timeline, coarse = setting.timeline, setting.coarse
     sized = size_effects(coarse, trace.final)
     runs_before, runs_core, runs_after = _held_out_runs(setting, trace, progress)
-    cells = cells_of(timeline, _quantities(coarse, trace, sized))
+    # the weave's frequency is per second already: one row of the coarse grid
+    cells = cells_of(timeline, _quantities(coarse, trace, sized), trace.final.terms.weave)
     real = cells.describe(timeline.offset, timeline.valid)
     before, after = expected(cells, runs_before, timeline.valid), expected(cells, runs_after, timeline.valid)
     core = before if runs_core is runs_before else expected(cells, runs_core, timeline.valid)

@@ -12,6 +12,7 @@ from xosc_lateral.driver.effects import ColumnEffect, Drift, Effect, GrowingSpre
 from xosc_lateral.loop.memory import Memory
 from xosc_lateral.loop.movement import Coarse
 from xosc_lateral.loop.population import Population
+from xosc_lateral.loop.residual import SWING
 from xosc_lateral.loop.sizing import Sized, span
 from xosc_lateral.loop.trace import Found, Trace
 
@@ -213,7 +214,7 @@ def _of_nothing(found: Found, sized: Sized, compared: Compared) -> Finding:
 def _hidden_words(effect: Effect) -> tuple[str, str, str, float, float, str]:
     if isinstance(effect, Weave):
         shape = f"period {effect.period_s:.1f} s"
-        return "weave", "periodic", shape, effect.amplitude, effect.amplitude_error, "movement by band"
+        return "weave", "periodic", shape, effect.amplitude, effect.amplitude_error, SWING
     if isinstance(effect, Step):
         return "step", "step", f"at {effect.at_s:.0f} s", effect.size, effect.size_error, "mean by effect: step"
     if isinstance(effect, Drift):

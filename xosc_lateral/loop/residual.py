@@ -36,6 +36,9 @@ ANSWER_S = 2.0
 BANDS_S = (1.0, 3.0, 8.0, 20.0, 60.0, 200.0)
 """Averaging times between which the bands of the movement lie. [s]"""
 
+SWING, SWING_WIDTH = "movement at the weave's period", 2
+"""Name of that group, and frequencies to each side that belong to it. [-]"""
+
 LOCAL_QUANTILES = (0.1, 0.3, 0.5, 0.7, 0.9)
 
 N_RUNS = 12
@@ -57,11 +60,14 @@ class Cells:
         Bin of every row in each group, -1: none.
     middles : mapping of str to array
         Mean of the quantity per bin, for curves.
+    swing : float, optional
+        Frequency of a weave that was found. [1/s]
     """
 
     timeline: Timeline
     labels: Mapping[str, IntArray]
     middles: Mapping[str, FloatArray]
+    swing: float | None = None
 
     def describe(self, offset: FloatArray, used: BoolArray) -> dict[str, FloatArray]:
         """Cells of one series of offsets on the grid, by group. [m]"""
@@ -76,6 +82,8 @@ class Cells:
                 found[f"mean by {name}"] = mean
             found[f"spread by {name}"] = spread
         found["movement by band"] = _bands(offset, used, timeline)
+        if self.swing is not None:
+            found[SWING] = np.array([_amplitude(offset, used, timeline, self.swing)])
         local = np.sqrt(local_mean(fast**2, timeline.valid, LOCAL_S, timeline.step))
         inside = local[used]
         found["quantiles of local spread"] = (
@@ -95,12 +103,14 @@ class Cells:
             share = np.bincount(label[inside & half], minlength=size) / total
             found[f"mean by {name}"] = found[f"spread by {name}"] = np.sqrt(share * (1.0 - share))
         found["movement by band"] = np.full(len(BANDS_S) + 1, overall)
+        if self.swing is not None:
+            found[SWING] = np.array([overall])
         found["quantiles of local spread"] = np.full(len(LOCAL_QUANTILES), overall)
         return found
 
 
-def cells_of(timeline: Timeline, quantities: Mapping[str, FloatArray]) -> Cells:
-    """Bins for every quantity, shape (n,) each on the grid, and for time."""
+def cells_of(timeline: Timeline, quantities: Mapping[str, FloatArray], swing: float | None = None) -> Cells:
+    """Bins for every quantity, shape (n,) each on the grid, and for time; a weave's frequency [1/s] if there is one."""
     labels, middles = {}, {}
     for name, values in quantities.items():
         smooth = respond(_filled(values, timeline.valid), timeline.step, 0.0, ANSWER_S)
@@ -108,7 +118,7 @@ def cells_of(timeline: Timeline, quantities: Mapping[str, FloatArray]) -> Cells:
         if len(middle) > 1:
             labels[name], middles[name] = label, middle
     labels["time"], middles["time"] = _time_bins(timeline)
-    return Cells(timeline, labels, middles)
+    return Cells(timeline, labels, middles, swing)
 
 
 def own_runs(
@@ -193,6 +203,21 @@ def _bands(offset: FloatArray, used: BoolArray, timeline: Timeline) -> FloatArra
     inside = [level[used] for level in levels]
     bands = [np.std(finer - coarser) for finer, coarser in pairwise(inside)]
     return np.array([*bands, np.std(inside[-1])])
+
+
+def _amplitude(offset: FloatArray, used: BoolArray, timeline: Timeline, frequency: float) -> float:
+    """Amplitude of a swing of about that frequency: root mean square over drives of that of the lines around it."""
+    squares, rows = 0.0, 0
+    for span in timeline.spans:
+        inside = span.start + np.flatnonzero(used[span])
+        if len(inside) == 0:
+            continue
+        at = (inside - span.start) * timeline.step
+        around = frequency + np.arange(-SWING_WIDTH, SWING_WIDTH + 1) / ((span.stop - span.start) * timeline.step)
+        lines = np.exp(-2j * np.pi * np.outer(around, at)) @ (offset[inside] - offset[inside].mean())
+        squares += float(np.sum(np.abs(2.0 * lines / len(inside)) ** 2)) * len(inside)
+        rows += len(inside)
+    return float(np.sqrt(squares / max(rows, 1)))
 
 
 def _binned(values: FloatArray, valid: BoolArray) -> tuple[IntArray, FloatArray]:

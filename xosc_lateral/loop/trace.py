@@ -225,7 +225,7 @@ def trace_effects(
             break
         found.append(outcome)
         fitted = outcome.after
-    return Trace(coarse, found, tried, consequences, unused, columns, start, fitted)
+    return _without_explained(search, Trace(coarse, found, tried, consequences, unused, columns, start, fitted))
 
 
 def without(trace: Trace, useless: Sequence[Found]) -> Trace:
@@ -240,6 +240,39 @@ def without(trace: Trace, useless: Sequence[Found]) -> Trace:
     ]
     final = fit_movement(trace.coarse, terms)
     return replace(trace, found=kept, tried=[*trace.tried, *tried], final=final)
+
+
+def _without_explained(search: _Search, trace: Trace) -> Trace:
+    """Drop findings that later ones explain: where the mean moves by a column not known yet, spread does too."""
+    for found in trace.found[:-1]:
+        without_it = fit_movement(trace.coarse, _removed(trace.final.terms, found))
+        search.progress(f"looking at {found.look} again")
+        p_value = _probability_beside(search, found, without_it, trace.final)
+        if p_value is not None and p_value > LEVEL[found.look]:
+            why = f"the other findings explain it: beside them chance gives as much in {100 * p_value:.2g} % of tables"
+            columns = found.candidate.columns if found.candidate else ()
+            tried = [*trace.tried, Tried(found.look, columns, p_value, why)]
+            kept = [other for other in trace.found if other is not found]
+            trace = replace(trace, found=kept, tried=tried, final=without_it)
+    return trace
+
+
+def _probability_beside(search: _Search, found: Found, without_it: Fitted, final: Fitted) -> float | None:
+    """Probability of a finding on the movement's size beside all others; None for what acts on the mean."""
+    coarse = search.coarse
+    if found.look == "growth":
+        return min(find_growth(coarse, without_it).p_value, find_slow_growth(coarse, without_it).p_value)
+    if found.look == "regime":
+        return find_clustering(coarse, without_it, search.rng(3)).p_value
+    if found.candidate is None or found.look == Look.LOCATION.value:
+        return None
+    look, answer = Look(found.look), coarse.answer(found.candidate.effect)
+    answer = answer / answer[coarse.valid].std(axis=0)
+    costs, at_once = np.array([found.candidate.cost]), np.zeros(1, dtype=np.intp)
+    rows = look_rows(look, coarse, without_it)
+    statistic = scan(rows, [answer], transform_answers([answer]), costs, search.shifts, at_once).statistic[0]
+    usable = _usable(search, look, without_it)
+    return tail_probability(float(statistic), search.scan(look, final).null[usable].max(axis=0))
 
 
 def _removed(terms: Terms, found: Found) -> Terms:
