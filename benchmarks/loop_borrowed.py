@@ -32,7 +32,8 @@ from xosc_lateral.loop.refine import target_of
 from xosc_lateral.loop.sizing import size_effects
 from xosc_lateral.loop.strip import bare_movement, effects_share, uninterrupted
 from xosc_lateral.loop.timeline import Timeline, join_drives
-from xosc_lateral.loop.trace import Trace, trace_effects
+from xosc_lateral.loop.trace import trace_effects
+from xosc_lateral.loop.traced import Trace
 
 Context = Mapping[str, np.ndarray]
 Numbers = np.ndarray

@@ -41,7 +41,8 @@ from xosc_lateral.loop.refine import target_of
 from xosc_lateral.loop.residual import cells_of, expected, own_runs
 from xosc_lateral.loop.sizing import size_effects
 from xosc_lateral.loop.timeline import join_drives
-from xosc_lateral.loop.trace import Trace, trace_effects
+from xosc_lateral.loop.trace import trace_effects
+from xosc_lateral.loop.traced import Trace
 
 RESPONSES = (0.3, 1.0, 2.0, 3.0, 4.0, 6.0)
 

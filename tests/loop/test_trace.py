@@ -15,7 +15,8 @@ from tests.simulators import plants
 from xosc_lateral.driver.series import Drive
 from xosc_lateral.loop.movement import Coarse
 from xosc_lateral.loop.timeline import join_drives
-from xosc_lateral.loop.trace import Trace, trace_effects
+from xosc_lateral.loop.trace import trace_effects
+from xosc_lateral.loop.traced import Trace
 
 Driven = Callable[..., list[Drive]]
 

@@ -23,7 +23,8 @@ from xosc_lateral.loop.scorecard import Scorecard, score_runs
 from xosc_lateral.loop.sizing import Sized, size_effects
 from xosc_lateral.loop.strip import effects_share, stripped_runs
 from xosc_lateral.loop.timeline import COARSE, Timeline, coarse_all, join_drives
-from xosc_lateral.loop.trace import Trace, trace_effects, without
+from xosc_lateral.loop.trace import trace_effects
+from xosc_lateral.loop.traced import Trace, without
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]

@@ -14,7 +14,7 @@ from xosc_lateral.loop.movement import Coarse
 from xosc_lateral.loop.population import Population
 from xosc_lateral.loop.residual import SWING
 from xosc_lateral.loop.sizing import Sized, span
-from xosc_lateral.loop.trace import Found, Trace
+from xosc_lateral.loop.traced import Found, Trace
 
 FloatArray = NDArray[np.float64]
 Compared = tuple[Mapping[str, FloatArray], Mapping[str, FloatArray], Mapping[str, FloatArray]]
