@@ -187,8 +187,8 @@ def simulate_drive(
     context["lane_index"] = np.clip(np.rint(place / width), 0, N_LANES - 1)
     offset = place - width * context["lane_index"]
     context |= {"steering_wheel_angle": np.degrees(steering), "yaw_rate": yaw_rate}
-    time = _sample_times(n * STEP, sensor_rate, streams[4])
-    table = _measure(time, offset + intent.camera, context, streams[4])
+    time = sample_times(n * STEP, sensor_rate, streams[4])
+    table = measure(time, offset + intent.camera, context, streams[4])
     rows = np.minimum(np.rint(time / STEP).astype(int), n - 1)
     target, changing = driver.bias + intent.target, way != np.rint(way)
     truth = Truth(driver, tuple(effects), time, offset[rows], target[rows], changing[rows], corrections)
@@ -272,7 +272,7 @@ def _loop(aim, aim_rate, path, curvature, speed, tolerance, gain, care, attentio
     return place, steering, yaw, count
 
 
-def _sample_times(duration: float, rate: float | None, rng: np.random.Generator) -> np.ndarray:
+def sample_times(duration: float, rate: float | None, rng: np.random.Generator) -> np.ndarray:
     """Time stamps of the log [s]: jittered, to the millisecond, and now and then some rows are lost."""
     rate = float(rng.choice([18.0, 20.0, 25.0])) if rate is None else rate
     regular = np.arange(0.0, duration - 2.0 / rate, 1.0 / rate)
@@ -282,7 +282,7 @@ def _sample_times(duration: float, rate: float | None, rng: np.random.Generator)
     return kept[np.diff(kept, prepend=-1.0) > 0.0]
 
 
-def _measure(time: np.ndarray, offset: np.ndarray, context: Context, rng: np.random.Generator) -> pd.DataFrame:
+def measure(time: np.ndarray, offset: np.ndarray, context: Context, rng: np.random.Generator) -> pd.DataFrame:
     """What the sensors log at the given times: noise, and the resolution of each signal."""
     nearest = np.minimum(np.rint(time / STEP).astype(int), len(offset) - 1)
     grid = STEP * np.arange(len(offset))
