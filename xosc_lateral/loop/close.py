@@ -14,6 +14,7 @@ from xosc_lateral.driver.kinds import ModelKind
 from xosc_lateral.driver.profile import DriverProfile, Provenance
 from xosc_lateral.driver.series import Drive
 from xosc_lateral.errors import NotEnoughDataError
+from xosc_lateral.loop.between import between_shift, is_between
 from xosc_lateral.loop.findings import Finding, describe_finding, helps, memory_finding, population_finding
 from xosc_lateral.loop.memory import Memory, test_memory
 from xosc_lateral.loop.movement import Coarse, Fitted, Terms, fit_movement
@@ -152,7 +153,7 @@ def close_loop(
         excluded=excluded,
         progress=lambda what: progress(0.1, what),
     )
-    population = test_population(trace.final)
+    population = test_population(trace.final, between_shift(coarse, trace.final))
     differ = population is not None and population.found
     refined_kind = ModelKind.BEST if memory.found or differ else kind
     blocks = hold_out_blocks(timeline)
@@ -209,7 +210,8 @@ def initial_terms(base: DriverProfile, timeline: Timeline) -> Terms:
         return tuple(effect for effect in columns if effect.acts is acts)
 
     return Terms(
-        location=acting(Acts.LOCATION),
+        location=tuple(effect for effect in acting(Acts.LOCATION) if not is_between(effect)),
+        between=tuple(effect for effect in acting(Acts.LOCATION) if is_between(effect)),
         spread=acting(Acts.SPREAD),
         growth=any(isinstance(effect, GrowingSpread) for effect in base.effects),
         drift=any(isinstance(effect, Drift) for effect in base.effects),

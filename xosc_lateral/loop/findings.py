@@ -25,6 +25,7 @@ NO_WORSE = 1.1
 
 KINDS = {
     "location": "location",
+    "between": "location",
     "scale": "scale",
     "fine": "scale",
     "slow": "scale",
@@ -91,6 +92,7 @@ def describe_finding(
         same = sum(1 for other in trace.found[:index] if other.look == found.look)
         known = {
             "location": len(trace.start.terms.location),
+            "between": len(trace.start.terms.between),
             "scale": len(trace.start.terms.spread),
         }.get(found.look, 0)
         key = f"{found.look} {same + known}"
@@ -152,7 +154,7 @@ def _of_columns(found: Found, key: str, coarse: Coarse, group: tuple[Effect, ...
     effect = group[0]
     assert isinstance(effect, ColumnEffect)
     strength = span(coarse, effect)
-    on_mean = found.look == "location"
+    on_mean = found.look in ("location", "between")
     relative = _relative_error(effect)
     size = strength if on_mean else float(np.exp(strength))
     error = abs(strength) * relative * (1.0 if on_mean else size)
@@ -160,6 +162,7 @@ def _of_columns(found: Found, key: str, coarse: Coarse, group: tuple[Effect, ...
     before, after = _errors(compared, cell)
     what = {
         "location": "mean offset",
+        "between": "place that a drive keeps",
         "scale": "spread",
         "dynamics": "restoring strength",
         "fine": "fine noise",

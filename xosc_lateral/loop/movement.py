@@ -122,6 +122,8 @@ class Terms:
     ----------
     location, spread, pace, fine, slow : tuple of ColumnEffect
         `slow` act on the spread of the slower movement only: more is let pass, but what is done is done as always.
+    between : tuple of ColumnEffect
+        Go with the places that different drives keep; the drives' intercepts hold them.
     weave : float, optional
         Frequency of a swing. [1/s]
     weave_width : int
@@ -143,6 +145,7 @@ class Terms:
     pace: tuple[ColumnEffect, ...] = ()
     fine: tuple[ColumnEffect, ...] = ()
     slow: tuple[ColumnEffect, ...] = ()
+    between: tuple[ColumnEffect, ...] = ()
     weave: float | None = None
     weave_width: int = 1
     step_at: int | None = None

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from xosc_lateral.driver.effects import Acts, Angular, ColumnEffect, Product
 from xosc_lateral.driver.effects.response import respond
+from xosc_lateral.loop.between import is_between
 from xosc_lateral.loop.close import LoopResult, hold_out_blocks
 from xosc_lateral.loop.timeline import COARSE, LOCAL_S, coarse_mean, local_mean
 
@@ -102,7 +103,10 @@ def _driving(result: LoopResult, effect: ColumnEffect) -> tuple[FloatArray, Floa
 def _alone(result: LoopResult, effect: ColumnEffect) -> FloatArray:
     """Offsets less intercepts and all other effects on the mean, at 1 Hz. [m]"""
     coarse, fitted = result.trace.coarse, result.trace.final
-    rest = coarse.offset - fitted.intercepts[coarse.drive] - fitted.location_columns @ fitted.location_sizes
+    rest = coarse.offset - fitted.location_columns @ fitted.location_sizes
+    if is_between(effect):  # the places that the drives keep are what it explains
+        return np.asarray(rest)
+    rest = rest - fitted.intercepts[coarse.drive]
     strength = effect.strength(coarse.timeline.step, coarse.context)
     assert strength is not None, "the effect was found in these columns"
     return np.asarray(rest + coarse_mean(strength))

@@ -49,13 +49,14 @@ class Population:
         return self.p_value < LEVEL
 
 
-def test_population(fitted: Fitted) -> Population | None:
+def test_population(fitted: Fitted, known: FloatArray) -> Population | None:
     """Analysis of variance with every drive's halves as the noise; None with too few drives.
 
     Halves of a drive are as far apart in time as a drive is long: what wanders slowly counts as noise, not as a driver.
+    `known`, shape (drives,): where the drives keep by effects between them. [m]
     """
     whitener = fitted.whitener
-    offset = fitted.movement * whitener.scale + fitted.intercepts[whitener.drive]
+    offset = fitted.movement * whitener.scale + (fitted.intercepts - known)[whitener.drive]
     means, spreads = [], []
     for index in range(len(fitted.intercepts)):
         own = offset[whitener.valid & (whitener.drive == index)]

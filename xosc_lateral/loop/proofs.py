@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from xosc_lateral.loop.between import Between, find_between
 from xosc_lateral.loop.candidates import Candidate
 from xosc_lateral.loop.chance import tail_probability
 from xosc_lateral.loop.hidden import (
@@ -142,6 +143,14 @@ def _factor(coarse: Coarse, look: Look, after: Fitted, candidate: Candidate) -> 
     return float(np.exp(high - low))
 
 
+def _prove_between(search: Search, fitted: Fitted, between: Between) -> Found | Tried:
+    candidate = between.candidate
+    if between.p_value > LEVEL["between"]:
+        return not_enough("between", between.p_value, candidate.columns)
+    terms = replace(fitted.terms, between=(*fitted.terms.between, candidate.effect))
+    return Found("between", between.p_value, fitted, fit_movement(search.coarse, terms), candidate)
+
+
 def _prove_regimes(search: Search, fitted: Fitted, clustering: Clustering) -> Found | Tried:
     """Clusters of loud seconds count as regimes if they last."""
     if clustering.p_value > LEVEL["regime"]:
@@ -179,6 +188,8 @@ def hidden_proposals(search: Search, fitted: Fitted, number: int) -> Sequence[Pr
         proposals.append(Proposal("regime", clustering.p_value, lambda: _prove_regimes(search, fitted, clustering)))
     if terms.weave is None and (peak := find_peak(coarse, fitted)) is not None:
         add("periodic", peak.p_value, peak, lambda: replace(terms, weave=peak.frequency, weave_width=peak.width))
+    if (between := find_between(coarse, fitted, search.columns, search.rng(4, number))) is not None:
+        proposals.append(Proposal("between", between.p_value, lambda: _prove_between(search, fitted, between)))
     search.progress("slow drift and steps")
     if (wander := find_wander(coarse, fitted, search.rng(2, number))) is not None:
         change = replace(terms, step_at=wander.at) if wander.is_step else replace(terms, drift=True)

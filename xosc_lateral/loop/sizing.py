@@ -22,6 +22,7 @@ from xosc_lateral.driver.effects import (
     Threshold,
     Weave,
 )
+from xosc_lateral.loop.between import size_between
 from xosc_lateral.loop.looks import SLOW_S, FineRows, fine_rows, pull, slow_rows
 from xosc_lateral.loop.movement import DRIFT_TERMS, Coarse, Fitted, Terms, elapsed, fit_movement
 from xosc_lateral.loop.regimes import fit_regimes
@@ -69,6 +70,10 @@ def size_effects(coarse: Coarse, fitted: Fitted) -> Sized:
             _sized(coarse, effect, Acts.LOCATION, fitted.location_sizes[at : at + width], errors[at : at + width]),
         )
         at += width
+    sizes, size_errors = size_between(coarse, fitted) if terms.between else (np.zeros(0), np.zeros(0))
+    for index, effect in enumerate(terms.between):
+        own = slice(index, index + 1)
+        groups[f"between {index}"] = (_sized(coarse, effect, Acts.LOCATION, sizes[own], size_errors[own]),)
     groups |= _hidden_location(coarse, fitted, at, errors)
     needs_fine = terms.spread or terms.fine or terms.growth or terms.regime_scale is not None
     fine = fine_rows(coarse, fitted, raw=True) if needs_fine else None

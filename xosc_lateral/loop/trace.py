@@ -125,7 +125,7 @@ def _probability_beside(search: Search, found: Found, without_it: Fitted, final:
         return min(find_growth(coarse, without_it).p_value, find_slow_growth(coarse, without_it).p_value)
     if found.look == "regime":
         return find_clustering(coarse, without_it, search.rng(3)).p_value
-    if found.candidate is None or found.look == Look.LOCATION.value:
+    if found.candidate is None or found.look in (Look.LOCATION.value, "between"):
         return None
     look, answer = Look(found.look), coarse.answer(found.candidate.effect)
     answer = answer / answer[coarse.valid].std(axis=0)

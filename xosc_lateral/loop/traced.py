@@ -25,6 +25,7 @@ FloatArray = NDArray[np.float64]
 
 LEVEL = {
     "location": 0.010,
+    "between": 0.002,
     "scale": 0.005,
     "dynamics": 0.0003,
     "fine": 0.002,
@@ -34,7 +35,7 @@ LEVEL = {
     "periodic": 0.002,
     "wander": 0.003,
 }
-"""Probability of a false finding that each look may spend: 2.6 % together, hidden effects included. 5 % are allowed; no
+"""Probability of a false finding that each look may spend: 2.9 % together, hidden effects included. 5 % are allowed; no
 model of a driver is quite right, so drives without an effect show somewhat more than this adds up to."""
 
 
@@ -143,6 +144,7 @@ def without_finding(terms: Terms, found: Found) -> Terms:
 
     by_look: dict[str, Terms] = {
         "location": replace(terms, location=kept(terms.location)),
+        "between": replace(terms, between=kept(terms.between)),
         "scale": replace(terms, spread=kept(terms.spread)),
         "dynamics": replace(terms, pace=kept(terms.pace)),
         "fine": replace(terms, fine=kept(terms.fine)),

@@ -33,6 +33,7 @@ HINTS: Mapping[str, str] = MappingProxyType(
 LOOKS: Mapping[str, str] = MappingProxyType(
     {
         "location": "a column that moves the mean",
+        "between": "a column that goes with the place that different drives keep",
         "scale": "a column that changes the spread",
         "slow": "a column that changes the spread of slow movement",
         "fine": "a column that changes the fine noise",
