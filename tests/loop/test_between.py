@@ -60,7 +60,7 @@ def test_what_goes_with_a_drives_place_is_found_and_sized() -> None:
     linear = Linear(acts=found.candidate.effect.acts, column="speed", response_s=HABIT_S)
     sizes, errors = size_between(coarse, fit_movement(coarse, Terms(between=(linear,))))
     assert 10.0 * sizes[0] == pytest.approx(0.4, abs=3.0 * 10.0 * errors[0])
-    assert 10.0 * errors[0] < 0.06
+    assert 10.0 * errors[0] < 0.08
 
 
 def test_chance_finds_columns_between_drives_as_often_as_it_says() -> None:
