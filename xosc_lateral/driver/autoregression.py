@@ -1,4 +1,4 @@
-"""Linear prediction of a series from its past: fitted to runs of uneven strength, kept stable, its spectrum known."""
+"""Linear prediction of a series from its past: fitted to drivers of unlike size, kept stable, its spectrum known."""
 
 from __future__ import annotations
 
@@ -67,11 +67,12 @@ class Autoregression:
         return np.asarray(np.fft.irfft(power, GRID)[:n_lags])
 
 
-def fit_autoregression(runs: Sequence[FloatArray], order: int, *, every: int, window: int) -> Autoregression:
-    """Fit by least squares, each moment weighted by how calm its surroundings are.
+def fit_autoregression(runs: Sequence[FloatArray], order: int, *, every: int, drivers: Sequence[str]) -> Autoregression:
+    """Fit by least squares, each equation divided by its driver's mean square residual.
 
-    Stretches in which the driver moves twice as much would count four times; what is wanted is the shape that calm and
-    lively stretches have in common, so each equation is divided by the local residual variance.
+    A driver who moves twice as much as the others would count four times, so each is measured by his own size. Within a
+    driver all moments count the same: whoever corrects only what is too far off moves calmly while he drifts away and
+    briskly while he comes back. Weights by how calm a moment is drop his returns, and the rest is an endless wander.
 
     Parameters
     ----------
@@ -80,33 +81,33 @@ def fit_autoregression(runs: Sequence[FloatArray], order: int, *, every: int, wi
     order : int
     every : int
         One step of the model in samples of the runs.
-    window : int
-        Samples over which the residual's variance is taken.
+    drivers : sequence of str
+        Whose each run is.
 
     Returns
     -------
     Autoregression
-        Its scale is the geometric mean of the local residual's.
+        Its scale is the geometric mean of the drivers' residuals.
     """
+    long = [(run, driver) for run, driver in zip(runs, drivers, strict=True) if len(run) > every * order + every]
     pasts = [np.stack([run[every * (order - 1 - k) : len(run) - every * (k + 1)] for k in range(order)], axis=1)
-             for run in runs if len(run) > every * order + every]  # fmt: skip
-    nexts = [run[every * order :] for run in runs if len(run) > every * order + every]
+             for run, _ in long]  # fmt: skip
+    nexts = [run[every * order :] for run, _ in long]
+    whose = np.unique([driver for _, driver in long], return_inverse=True)[1]
+    counts = np.bincount(whose, [len(y) for y in nexts])
     smallest = 1e-12 * float(np.mean([np.mean(y**2) for y in nexts])) + 1e-300
     coefficients: FloatArray = np.zeros(order)
-    variances: list[FloatArray] = [np.ones(len(y)) for y in nexts]
+    variances = np.ones(len(counts))
     for _ in range(ROUNDS + 1):
         normal, right = np.zeros((order, order)), np.zeros(order)
-        for past, value, variance in zip(pasts, nexts, variances, strict=True):
-            weighted = past / variance[:, None]
-            normal += weighted.T @ past
-            right += weighted.T @ value
+        for past, value, variance in zip(pasts, nexts, variances[whose], strict=True):
+            normal += past.T @ past / variance
+            right += past.T @ value / variance
         normal += RIDGE * np.trace(normal) / order * np.eye(order)
         coefficients = np.asarray(np.linalg.solve(normal, right), dtype=np.float64)
-        variances = [
-            _moving_mean((value - past @ coefficients) ** 2, window) + smallest
-            for past, value in zip(pasts, nexts, strict=True)
-        ]
-    scale = float(np.exp(0.5 * np.mean(np.log(np.concatenate(variances)))))
+        squares = [float(np.sum((y - past @ coefficients) ** 2)) for past, y in zip(pasts, nexts, strict=True)]
+        variances = np.bincount(whose, squares) / counts + smallest
+    scale = float(np.exp(0.5 * np.average(np.log(variances), weights=counts)))
     return Autoregression(stabilise(coefficients), scale)
 
 
@@ -122,12 +123,6 @@ def stabilise(coefficients: FloatArray, largest: float = MAX_ROOT) -> FloatArray
 
 def _roots(coefficients: FloatArray) -> NDArray[np.complex128]:
     return np.roots(np.concatenate([[1.0], -coefficients])).astype(np.complex128)
-
-
-def _moving_mean(values: FloatArray, window: int) -> FloatArray:
-    size = min(window, len(values))
-    ones = np.ones(size)
-    return np.asarray(np.convolve(values, ones, "same") / np.convolve(np.ones(len(values)), ones, "same"))
 
 
 def _recur_body(noise, coefficients, order, series):  # type: ignore[no-untyped-def]

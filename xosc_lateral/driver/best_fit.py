@@ -1,8 +1,8 @@
 """Fitting our model. First what can be read off the data, then a few rounds of simulating and comparing.
 
 1. Mean, and the variance between drivers: the covariance that is left between moments far apart in a run.
-2. Coarse movement: autoregression on the low-passed offset about the driver's (shrunken) mean, fitted to stretches that
-   are weighted by how calm they are.
+2. Coarse movement: autoregression on the low-passed offset about the driver's (shrunken) mean, all moments of a driver
+   counting the same.
 3. Fine noise: what the coarse movement lacks of the offset's power spectrum, geometric mean over windows.
 4. Liveliness: how much more, and for how long, the power in short windows varies than it would in steady movement.
 5. Rounds of simulating: snippets of the model from the measured snippets' starts must show the same moments of log
@@ -40,8 +40,6 @@ class BestSettings:
     ----------
     order : int
         Memory of the coarse movement. [s]
-    calm_window : float
-        Over which the local variance is taken that calm stretches are told by. [s]
     n_knots : int
         Knots of the fine noise's damping.
     n_taps, taper : int, float
@@ -73,7 +71,6 @@ class BestSettings:
     """
 
     order: int = 16
-    calm_window: float = 10.0
     n_knots: int = 51
     n_taps: int = 71
     taper: float = 5.0
@@ -118,7 +115,7 @@ def fit_best(
         raise NotEnoughDataError(f"the offset never moves: standard deviation {everything.std():.2g} lane widths")
     mean, between = _drivers(runs, drives, settings)
     bands = [split_bands(run, settings.step) for run in runs]
-    coarse = _fit_coarse([slow for slow, _ in bands], _shrunken_means(runs, drives, mean, between), settings)
+    coarse = _fit_coarse([slow for slow, _ in bands], _shrunken_means(runs, drives, mean, between), drives, settings)
     coarse, fine = _fit_spectrum(runs, coarse, settings)
     low, high = max(-0.5, float(everything.min())), min(0.5, float(everything.max()))
     model = BestModel(
@@ -177,11 +174,13 @@ INDEPENDENT_AFTER = 12.0
 """Two offsets of a driver this far apart count as independent when a mean's precision is judged. [s]"""
 
 
-def _fit_coarse(slow: Sequence[FloatArray], means: Sequence[float], settings: BestSettings) -> Autoregression:
+def _fit_coarse(
+    slow: Sequence[FloatArray], means: Sequence[float], drives: Sequence[str], settings: BestSettings
+) -> Autoregression:
     longest = max(map(len, slow)) * settings.step
     order = max(2, min(settings.order, int(0.4 * longest * settings.step * COARSE_EVERY)))
     about = [values - mean for values, mean in zip(slow, means, strict=True)]
-    return fit_autoregression(about, order, every=COARSE_EVERY, window=round(settings.calm_window / settings.step))
+    return fit_autoregression(about, order, every=COARSE_EVERY, drivers=drives)
 
 
 def _fit_spectrum(

@@ -155,6 +155,7 @@ def _of_columns(found: Found, key: str, coarse: Coarse, group: tuple[Effect, ...
     assert isinstance(effect, ColumnEffect)
     strength = span(coarse, effect)
     on_mean = found.look in ("location", "between")
+    usual = found.look == "between"
     relative = _relative_error(effect)
     size = strength if on_mean else float(np.exp(strength))
     error = abs(strength) * relative * (1.0 if on_mean else size)
@@ -173,9 +174,9 @@ def _of_columns(found: Found, key: str, coarse: Coarse, group: tuple[Effect, ...
         kind=KINDS[found.look],
         columns=(*effect.columns, *found.rivals),
         alike=found.rivals,
-        lag_s=effect.lag_s,
-        response_s=effect.response_s,
-        shape=effect.shape,
+        lag_s=None if usual else effect.lag_s,
+        response_s=None if usual else effect.response_s,
+        shape=f"{effect.shape}, between drives" if usual else effect.shape,
         size_m=size,
         size_error=error,
         p_value=found.p_value,

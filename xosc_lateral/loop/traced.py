@@ -24,7 +24,7 @@ from xosc_lateral.loop.wander import Wander
 FloatArray = NDArray[np.float64]
 
 LEVEL = {
-    "location": 0.010,
+    "location": 0.007,
     "between": 0.002,
     "scale": 0.005,
     "dynamics": 0.0003,
@@ -35,7 +35,7 @@ LEVEL = {
     "periodic": 0.002,
     "wander": 0.003,
 }
-"""Probability of a false finding that each look may spend: 2.9 % together, hidden effects included. 5 % are allowed; no
+"""Probability of a false finding that each look may spend: 2.6 % together, hidden effects included. 5 % are allowed; no
 model of a driver is quite right, so drives without an effect show somewhat more than this adds up to."""
 
 

@@ -113,9 +113,9 @@ def chance_words(p_value: float) -> str:
 
 
 def when_words(finding: Finding) -> str:
-    """Lag and response, or nothing."""
+    """Lag and response, or nothing; what goes with whole drives has neither."""
     if finding.lag_s is None or finding.response_s is None:
-        return ""
+        return "It is each drive's usual value that counts, not its changes within a drive." if finding.columns else ""
     lag = finding.lag_s
     start = "at once" if abs(lag) < 0.1 else f"{-lag:.1f} s ahead of it" if lag < 0 else f"{lag:.1f} s after it"
     slow = f", with two thirds of the answer there {finding.response_s:.1f} s later" if finding.response_s > 0 else ""
