@@ -32,6 +32,11 @@ CLEARLY = 3.0
 """By so much a column must be likelier than time alone: many columns change slowly enough to look like time. [-]"""
 
 
+_TURN = {"between": 0, "regime": 2}
+"""Nothing else explains the places that different drives keep; and regimes explain whatever comes in clusters: they are
+asked last, when nothing that can be named does."""
+
+
 def trace_effects(
     coarse: Coarse,
     seed: np.random.SeedSequence,
@@ -78,8 +83,7 @@ def _one_round(search: Search, fitted: Fitted, number: int) -> tuple[Found | Non
     """The most urgent proposal that passes, and what did not."""
     proposals = [*column_proposals(search, fitted), *hidden_proposals(search, fitted, number)]
     tried: list[Tried] = []
-    # regimes explain whatever comes in clusters: they are asked last, when nothing that can be named explains it
-    for proposal in sorted(proposals, key=lambda proposal: (proposal.look == "regime", proposal.urgency)):
+    for proposal in sorted(proposals, key=lambda proposal: (_TURN.get(proposal.look, 1), proposal.urgency)):
         search.progress(f"round {number + 1}: proving {proposal.look}")
         outcome = proposal.prove()
         if isinstance(outcome, Found):
