@@ -37,15 +37,38 @@ def test_fit_recovers_coefficients_although_the_driver_is_lively_at_times(seed: 
     rng = np.random.default_rng(seed)
     mood = np.exp(0.8 * np.repeat(rng.normal(size=100), 50))
     values = series(SECOND_ORDER, mood * rng.normal(size=5000))
-    found = fit_autoregression([values[:2000], values[2000:]], 2, every=1, window=25)
-    # Standard error of each coefficient: sqrt((1 - 0.8^2) / n) = 0.0085.
-    assert np.abs(found.coefficients - SECOND_ORDER).max() < 5 * 0.0085
+    found = fit_autoregression([values[:2000], values[2000:]], 2, every=1, drivers=["a", "a"])
+    # Standard error of each coefficient: sqrt((1 - 0.8^2) / n) = 0.0085; lively moments count exp(4 * 0.8^2) times as
+    # much, and as much fewer are the moments that decide: for normal moods, sum(m^2)^2 / sum(m^4) = exp(-4 0.8^2) n.
+    assert np.abs(found.coefficients - SECOND_ORDER).max() < 3 * 0.0085 * np.exp(2 * 0.8**2)
+
+
+def test_a_driver_who_corrects_only_what_is_too_far_off_keeps_his_spread() -> None:
+    """Drifts at random within a tolerance, then comes back briskly: the stationary variance is the series' own."""
+    rng = np.random.default_rng(0)
+    values = np.zeros(20_000)
+    for t in range(1, len(values)):
+        far = abs(values[t - 1]) > 1.0
+        values[t] = values[t - 1] * (1.0 - 0.8 * far) + (0.3 if far else 0.1) * rng.normal()
+    found = fit_autoregression([values], 4, every=1, drivers=["a"])
+    assert np.sqrt(found.covariance(1)[0]) == pytest.approx(values.std(), rel=0.05)
+
+
+def test_each_driver_counts_by_his_own_size() -> None:
+    """Four calm drivers of one memory and a wild one of another: the wild one is no more than one of five."""
+    rng = np.random.default_rng(0)
+    calm = [series(np.array([0.5]), rng.normal(size=2000)) for _ in range(4)]
+    wild = 30.0 * series(np.array([0.9]), rng.normal(size=2000))
+    found = fit_autoregression([*calm, wild], 1, every=1, drivers=["a", "b", "c", "d", "e"])
+    alone = fit_autoregression([*calm, wild], 1, every=1, drivers=["a"] * 5)
+    assert 0.5 < found.coefficients[0] < 0.75
+    assert alone.coefficients[0] == pytest.approx(0.9, abs=0.03)
 
 
 def test_a_step_may_be_several_samples() -> None:
     rng = np.random.default_rng(0)
     slow = series(np.array([0.8]), rng.normal(size=4000))
-    found = fit_autoregression([np.repeat(slow, 5)[2:]], 1, every=5, window=50)
+    found = fit_autoregression([np.repeat(slow, 5)[2:]], 1, every=5, drivers=["a"])
     assert found.coefficients[0] == pytest.approx(0.8, abs=0.05)
 
 
