@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.driver.effects import Acts, Linear
-from xosc_lateral.loop.movement import CLIP, Coarse, Fitted, elapsed, squared_innovations
+from xosc_lateral.loop.movement import CLIP, Coarse, Fitted, elapsed, own_levels, squared_innovations
 from xosc_lateral.loop.noise import fit_autoregression, moving_sum, positions_in_stretch
 from xosc_lateral.loop.scan import Rows
 from xosc_lateral.loop.timeline import COARSE, coarse_all, coarse_mean
@@ -107,6 +107,8 @@ def fine_rows(coarse: Coarse, fitted: Fitted, *, raw: bool = False) -> FineRows:
     squares = np.where(whole, np.minimum(innovations**2, CLIP), 0.0)
     valid = coarse_all(whole)
     mean = coarse_mean(squares)
+    # sensors and drivers differ: what counts is what changes within a drive
+    mean = mean / own_levels(mean, valid, coarse.drive)[coarse.drive]
     if raw:
         return FineRows(mean, valid)
     deviation = mean[valid].std() if valid.any() else 1.0

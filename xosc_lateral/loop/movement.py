@@ -1,6 +1,7 @@
 """What the loop has explained so far, and the fit of all of it together.
 
-offset = intercept of the drive + location terms + scale * movement, with the movement an autoregression at 1 Hz. All
+offset = intercept of the drive + location terms + scale * movement, with the movement an autoregression at 1 Hz, and
+every drive's scale about its own level: drivers differ in both. All
 location terms are fitted jointly by generalised least squares, all scale terms jointly by iterated regression of the
 squared innovations: adding an effect corrects the ones found before.
 """
@@ -29,6 +30,9 @@ CLIP = 9.0
 
 DRIFT_TERMS = 8
 """Half cosines over a drive that stand for a slow drift while other effects are looked for."""
+
+OWN_LEVEL_S = 30.0
+"""A drive's level of the scale is its own as far as it lasts longer than this. [s]"""
 
 MIN_DRIFT_S = 600.0
 """A shorter drive tells nothing about drift. [s]"""
@@ -216,10 +220,12 @@ def fit_movement(coarse: Coarse, terms: Terms, *, process: Autoregression | None
     covariance = np.zeros((len(sizes), len(sizes)))
     intercepts = np.zeros(int(coarse.drive.max()) + 1)
     fixed = process
+    level = np.ones(len(intercepts))
     scale = np.ones(len(coarse))
     rows = movement = np.zeros(len(coarse))
     for attempt in range(4):
         scale = np.exp(scales @ log_sizes + (0.0 if terms.regime_scale is None else terms.regime_scale))
+        scale = scale * level[coarse.drive]
         left = np.where(coarse.valid, coarse.offset - columns @ sizes, 0.0)
         if attempt == 0:
             intercepts = _group_means(left, coarse)
@@ -231,8 +237,9 @@ def fit_movement(coarse: Coarse, terms: Terms, *, process: Autoregression | None
         rows = response - design @ sizes
         intercepts = _intercepts(whitener, np.where(coarse.valid, coarse.offset - columns @ sizes, 0.0))
         if scales.shape[1]:
-            log_sizes = log_sizes + _log_scale_step(scales, rows, coarse.valid)
-    scale_covariance = _scale_covariance(scales, coarse.valid)
+            log_sizes = log_sizes + _log_scale_step(scales, rows, coarse)
+        level = level * np.sqrt(own_levels(_clipped_squares(rows, coarse.valid), coarse.valid, coarse.drive))
+    scale_covariance = _scale_covariance(scales, coarse)
     n = int(coarse.valid.sum())
     variance = float(rows @ rows) / max(1, n - len(sizes))
     likelihood = -0.5 * float(rows @ rows) - n * np.log(noise.deviations[-1]) - float(np.log(scale[coarse.valid]).sum())
@@ -316,15 +323,36 @@ def _least_squares(design: FloatArray, response: FloatArray) -> tuple[FloatArray
     return inverse @ (design.T @ response), np.asarray(inverse, dtype=np.float64)
 
 
-def _log_scale_step(scales: FloatArray, rows: FloatArray, valid: BoolArray) -> FloatArray:
+def own_levels(squares: FloatArray, valid: BoolArray, drive: IntArray) -> FloatArray:
+    """Mean square of every drive over that of all, shape (drives,); 1 for a single drive, near 1 for short ones."""
+    groups = int(drive.max()) + 1
+    if groups == 1:
+        return np.ones(1)
+    relative = squares / max(float(squares[valid].mean()), 1e-300)
+    seconds = np.bincount(drive, valid.astype(float), minlength=groups)
+    sums = np.bincount(drive, np.where(valid, relative, 0.0), minlength=groups)
+    return np.asarray((sums + OWN_LEVEL_S) / (seconds + OWN_LEVEL_S))
+
+
+def _clipped_squares(rows: FloatArray, valid: BoolArray) -> FloatArray:
+    return np.asarray(np.minimum(np.square(rows) / np.mean(rows[valid] ** 2), CLIP))
+
+
+def _within_drives(scales: FloatArray, coarse: Coarse) -> FloatArray:
+    """Valid rows of the scale's design about their drive's mean."""
+    means = np.stack([_group_means(column, coarse) for column in scales.T], axis=1)
+    return np.asarray((scales - means[coarse.drive])[coarse.valid])
+
+
+def _log_scale_step(scales: FloatArray, rows: FloatArray, coarse: Coarse) -> FloatArray:
     """One Fisher-scoring step for log sd = scales . sizes (variance of a squared normal is 2)."""
-    variance = np.minimum(rows[valid] ** 2, CLIP)
-    design = scales[valid] - scales[valid].mean(axis=0)
+    variance = np.minimum(rows[coarse.valid] ** 2, CLIP)
+    design = _within_drives(scales, coarse)
     return np.asarray(np.linalg.pinv(2.0 * design.T @ design) @ (design.T @ (variance / variance.mean() - 1.0)))
 
 
-def _scale_covariance(scales: FloatArray, valid: BoolArray) -> FloatArray:
+def _scale_covariance(scales: FloatArray, coarse: Coarse) -> FloatArray:
     if scales.shape[1] == 0:
         return np.zeros((0, 0))
-    design = scales[valid] - scales[valid].mean(axis=0)
+    design = _within_drives(scales, coarse)
     return np.asarray(np.linalg.pinv(2.0 * design.T @ design))

@@ -35,6 +35,9 @@ FloatArray = NDArray[np.float64]
 MIN_REGIME_S = 10.0
 """Shorter regimes are none. [s]"""
 
+MIN_VISITS = 6.0
+"""What comes on less often than this is no regime. [-]"""
+
 LEAST_FACTOR = {Look.SPREAD: 1.1, Look.SLOW: 1.1, Look.FINE: 1.25}
 """A change of the spread, or of the fine noise (a centimetre), by less is no finding, however sure. [-]"""
 
@@ -158,6 +161,10 @@ def _prove_regimes(search: Search, fitted: Fitted, clustering: Clustering) -> Fo
     regimes = fit_regimes(fitted.rows, search.coarse.valid)
     if min(regimes.on_s, regimes.off_s) < MIN_REGIME_S:
         why = f"loud stretches last {regimes.on_s:.0f} s only: that is how people correct, and no regime"
+        return Tried("regime", (), clustering.p_value, why)
+    visits = float(search.coarse.valid.sum()) / (regimes.on_s + regimes.off_s)
+    if visits < MIN_VISITS:
+        why = f"it came on about {visits:.0f} times only: odd stretches are no regime, whatever they are"
         return Tried("regime", (), clustering.p_value, why)
     terms = replace(fitted.terms, regime_scale=regime_log_scale(search.coarse, fitted))
     return Found("regime", clustering.p_value, fitted, fit_movement(search.coarse, terms), detail=clustering)
