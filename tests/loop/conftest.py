@@ -1,4 +1,4 @@
-"""Simulated drives as coarse timelines."""
+"""Simulated drives as the loop gets them."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.simulators.driver_simulator import simulate_drive
+from tests.simulators.driver_simulator import Driver, simulate_drive
 from tests.simulators.plants import Plant
 from xosc_lateral.driver.series import Drive
 from xosc_lateral.formats.drives import read_drives
@@ -18,10 +18,14 @@ def driven(tmp_path: Path) -> Callable[..., list[Drive]]:
     """Drives as the loop gets them: simulated, written, and read back."""
 
     def drive(
-        seed: int, effects: Sequence[Plant] = (), duration: float = 3000.0, drop: Sequence[str] = ()
+        seed: int,
+        effects: Sequence[Plant] = (),
+        duration: float = 3000.0,
+        drop: Sequence[str] = (),
+        driver: Driver | None = None,
     ) -> list[Drive]:
         path = tmp_path / f"drive-{seed}.parquet"
-        simulate_drive(duration, seed, effects=effects, drop=drop).table.to_parquet(path)
+        simulate_drive(duration, seed, effects=effects, drop=drop, driver=driver).table.to_parquet(path)
         return read_drives([path])
 
     return drive

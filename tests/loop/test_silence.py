@@ -13,7 +13,8 @@ from xosc_lateral.driver.series import Drive
 from xosc_lateral.formats.drives import read_drives
 from xosc_lateral.loop.movement import Coarse
 from xosc_lateral.loop.timeline import join_drives
-from xosc_lateral.loop.trace import Trace, trace_effects
+from xosc_lateral.loop.trace import trace_effects
+from xosc_lateral.loop.traced import Trace
 
 Driven = Callable[..., list[Drive]]
 

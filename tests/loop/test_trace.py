@@ -7,12 +7,17 @@ sizes is the business of `benchmarks/loop_study.py`; these are single drives wit
 from __future__ import annotations
 
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from tests.simulators import plants
+from tests.simulators.driver_simulator import Driver
+from tests.simulators.movements import held, in_regimes, record_movement
+from xosc_lateral.driver.effects import ColumnEffect, Levels, Product, Saturating, Threshold
 from xosc_lateral.driver.series import Drive
+from xosc_lateral.formats.drives import read_drives
 from xosc_lateral.loop.movement import Coarse
 from xosc_lateral.loop.timeline import join_drives
 from xosc_lateral.loop.trace import trace_effects
@@ -43,6 +48,7 @@ def named(trace: Trace) -> set[tuple[str, tuple[str, ...]]]:
         (plants.Fatigue(2.5), ("growth", ())),
         (plants.Weave(0.15, 12.0), ("periodic", ())),
         (plants.CameraStep(0.6), ("wander", ())),
+        (plants.SensorDrift(1.2), ("wander", ())),
     ],
     ids=lambda value: getattr(value, "kind", ""),
 )
@@ -50,9 +56,62 @@ def test_a_planted_effect_is_named(driven: Driven, plant: plants.Plant, expected
     assert expected in named(traced(driven(101, [plant])))
 
 
-@pytest.mark.parametrize("seed", [1, 4, 9])
-def test_nothing_is_named_where_nothing_was_planted(driven: Driven, seed: int) -> None:
-    assert named(traced(driven(seed))) == set()
+@pytest.mark.parametrize(
+    ("plant", "shape"),
+    [
+        (plants.ShiftBy(("truck_right", "lane_index"), 0.5, plants.Response(lag=1.0)), Product),
+        (plants.ShiftBy(("grade",), 0.4, plants.Response(plants.threshold(2.0), lag=1.0)), Threshold),
+        (plants.ShiftBy(("grade",), 0.4, plants.Response(plants.saturating(1.0), lag=1.0)), Saturating),
+        (plants.LaneHabit((0.3, -0.3, 0.3)), Levels),
+    ],
+    ids=["product", "threshold", "saturating", "levels"],
+)
+def test_a_shift_is_named_by_its_column_and_its_shape(
+    driven: Driven, plant: plants.Plant, shape: type[ColumnEffect]
+) -> None:
+    trace = traced(driven(401, [plant], 2400.0))
+    assert ("location", tuple(sorted(plant.columns))) in named(trace)
+    found = next(found for found in trace.found if found.candidate and set(found.candidate.columns) <= {*plant.columns})
+    assert found.candidate is not None
+    assert isinstance(found.candidate.effect, shape)
+
+
+def test_an_answer_that_lags_is_told_from_one_that_does_not(driven: Driven) -> None:
+    trace = traced(driven(401, [plants.TruckAvoidance(0.5, lag=4.0)], 2000.0))
+    found = next(found for found in trace.found if found.candidate and found.candidate.columns == ("truck_right",))
+    assert found.candidate is not None
+    assert found.candidate.effect.lag_s + found.candidate.effect.response_s == pytest.approx(4.0, abs=1.5)
+
+
+def test_a_step_is_told_from_a_drift_and_dated(driven: Driven) -> None:
+    trace = traced(driven(403, [plants.CameraStep(0.6, at=0.45)], 2400.0))
+    assert ("wander", ()) in named(trace)
+    at = trace.final.terms.step_at
+    assert at is not None
+    assert trace.coarse.time[at] == pytest.approx(0.45 * 2400.0, abs=10.0)
+
+
+def test_a_spread_by_a_car_ahead_is_named(driven: Driven) -> None:
+    drives = driven(402, [plants.SpreadBy("lead_distance", 4.0)], driver=Driver())
+    assert ("scale", ("lead_distance",)) in named(traced(drives))
+
+
+def test_a_camera_that_shakes_by_a_column_is_fine_noise(driven: Driven) -> None:
+    trace = traced(driven(402, [plants.ShakyCamera("grade", 0.04)], 1500.0, driver=Driver()))
+    assert ("fine", ("grade",)) in named(trace)
+
+
+def test_regimes_of_loudness_are_named(tmp_path: Path) -> None:
+    path = tmp_path / "drive.parquet"
+    record_movement(in_regimes, 2400.0, 1).to_parquet(path)
+    assert named(traced(read_drives([path]))) == {("regime", ())}
+
+
+def test_a_pull_to_the_middle_by_a_column_is_blamed_on_that_column(tmp_path: Path) -> None:
+    """A stronger pull makes the slow movement smaller: to name either is right."""
+    path = tmp_path / "drive.parquet"
+    record_movement(held, 2400.0, 2, told_of="speed").to_parquet(path)
+    assert named(traced(read_drives([path]))) & {("dynamics", ("speed",)), ("scale", ("speed",))}
 
 
 def test_steering_and_yaw_rate_are_consequences_and_never_causes(driven: Driven) -> None:
@@ -63,8 +122,9 @@ def test_steering_and_yaw_rate_are_consequences_and_never_causes(driven: Driven)
 
 
 def test_two_effects_at_once_are_both_named(driven: Driven) -> None:
-    found = named(traced(driven(102, [plants.TruckAvoidance(0.3), plants.SpreadBy("rain", 2.2)])))
-    assert {("location", ("truck_right",)), ("scale", ("rain",))} <= found
+    both = [plants.TruckAvoidance(0.3), plants.SpreadBy("lead_distance", 4.0)]
+    found = named(traced(driven(402, both, driver=Driver())))
+    assert {("location", ("truck_right",)), ("scale", ("lead_distance",))} <= found
 
 
 def test_a_companion_of_the_cause_is_not_blamed(driven: Driven) -> None:

@@ -19,12 +19,12 @@ from tests.simulators.motorway import N_LANES, STEP, draw_motorway
 PACE = 0.1
 """Step of the movements [s]; the table interpolates between."""
 
-Movement = Callable[[int, np.random.Generator], np.ndarray]
-"""Offset from the lane centre [m] at `n` steps of `PACE`."""
+Movement = Callable[..., np.ndarray]
+"""Offset from the lane centre [m] at `n` steps of `PACE`, from `n` and a generator; and a column that it is told of."""
 
 
 def record_movement(
-    movement: Movement, duration: float, seed: int, *, resolution: float | None = None, stiff_by: str | None = None
+    movement: Movement, duration: float, seed: int, *, resolution: float | None = None, told_of: str | None = None
 ) -> pd.DataFrame:
     """Record a movement, with the context of a motorway drive that it has nothing to do with.
 
@@ -36,7 +36,7 @@ def record_movement(
     seed : int
     resolution : float, optional
         Distances to the lane markings are multiples of it. [m]
-    stiff_by : str, optional
+    told_of : str, optional
         Column that `movement` is told after all, between 0 and 1, as its third argument.
     """
     streams = np.random.default_rng([20262, seed]).spawn(3)
@@ -44,8 +44,8 @@ def record_movement(
     n = len(context["speed"])
     grid = np.arange(0.0, n * STEP + PACE, PACE)
     told = []
-    if stiff_by is not None:
-        column = context[stiff_by]
+    if told_of is not None:
+        column = context[told_of]
         told = [np.interp(grid, STEP * np.arange(n), (column - column.min()) / np.ptp(column))]
     moved = np.interp(STEP * np.arange(n), grid, movement(len(grid), streams[1], *told))
     way, width = context.pop("lane_change"), context["lane_width"].mean()
@@ -53,8 +53,9 @@ def record_movement(
     context["lane_index"] = np.clip(np.rint(place / width), 0, N_LANES - 1)
     time = sample_times(n * STEP, None, streams[2])
     table = measure(time, place - width * context["lane_index"], context, streams[2])
-    for side in ("distance_left", "distance_right") if resolution is not None else ():
-        table[side] = (np.rint(table[side] / resolution) * resolution).round(3)
+    if resolution is not None:
+        sides = ["distance_left", "distance_right"]
+        table[sides] = (np.rint(table[sides] / resolution) * resolution).round(3)
     return table
 
 
@@ -69,7 +70,7 @@ def heavy_tailed(n: int, rng: np.random.Generator) -> np.ndarray:
 
 
 def reflected(n: int, rng: np.random.Generator) -> np.ndarray:
-    """Diffuses freely within a tolerance, and is brought back to somewhere inside in two seconds when it leaves that."""
+    """Diffuses within a tolerance; having left it, the car is brought back to somewhere inside in two seconds."""
     tolerance, length = 0.35, round(2.0 / PACE)
     done = np.arange(1, length + 1) / length
     ease = done**3 * (10.0 - 15.0 * done + 6.0 * done**2)
@@ -88,21 +89,14 @@ def reflected(n: int, rng: np.random.Generator) -> np.ndarray:
     return _smooth(out)
 
 
-def delayed_control(n: int, rng: np.random.Generator, stiff: np.ndarray | None = None) -> np.ndarray:
-    """A mass that is pulled to the middle and damped, both 0.4 s late, and pushed by coloured noise.
-
-    `stiff`, shape (n,), 0..1: how stiffly it is held, from a fifth of the stiffest to that; the damping goes along, so
-    that nothing begins to swing, and the pushes stay what they are.
-    """
-    stiff = np.full(n, 0.5) if stiff is None else stiff
+def delayed_control(n: int, rng: np.random.Generator) -> np.ndarray:
+    """A mass that is pulled to the middle and damped, both 0.4 s late, and pushed by coloured noise."""
     late = round(0.4 / PACE)
-    stiffness = 0.5 * 0.2 ** (1.0 - stiff)
-    damping = 1.5 * np.sqrt(stiffness)
     push = 0.1 * _wander(n, rng, 1.0)
     place, speed = np.zeros(n), np.zeros(n)
     for t in range(1, n):
         seen = max(t - 1 - late, 0)
-        pull = -stiffness[t] * place[seen] - damping[t] * speed[seen] + push[t]
+        pull = -0.22 * place[seen] - 1.0 * speed[seen] + push[t]
         speed[t] = speed[t - 1] + PACE * pull
         place[t] = place[t - 1] + PACE * speed[t]
     return place
@@ -112,6 +106,30 @@ def clustered(n: int, rng: np.random.Generator) -> np.ndarray:
     """Loud and quiet by turns of seconds: how people correct, and no regime."""
     loudness = np.exp(0.6 * _wander(n, rng, rng.uniform(2.0, 6.0)))
     return 0.2 * _scaled(_smooth(_filtered(loudness * rng.normal(size=n), 5.0)))
+
+
+def in_regimes(n: int, rng: np.random.Generator) -> np.ndarray:
+    """For a minute at a time, pushed 2.5 times as hard; and then quiet for two."""
+    loud = np.ones(n)
+    start, on = 0, False
+    while start < n:
+        stop = start + max(1, round(rng.exponential(60.0 if on else 120.0) / PACE))
+        loud[start:stop] = 2.5 if on else 1.0
+        start, on = stop, not on
+    return 0.2 * _scaled(_smooth(_filtered(loud * rng.normal(size=n), 5.0)))
+
+
+def held(n: int, rng: np.random.Generator, strength: np.ndarray) -> np.ndarray:
+    """Drawn back to the middle the faster the more of `strength` there is, shape (n,), 0..1; the pushes stay the same.
+
+    The rate is 0.05 1/s where there is none, and thirty times that where there is all of it.
+    """
+    rate = 0.05 * 30.0**strength
+    pushes = 0.12 * np.sqrt(PACE) * rng.normal(size=n)
+    place = np.zeros(n)
+    for t in range(1, n):
+        place[t] = place[t - 1] * (1.0 - PACE * rate[t]) + pushes[t]
+    return _smooth(place)
 
 
 def _wander(n: int, rng: np.random.Generator, time_constant: float) -> np.ndarray:
@@ -129,4 +147,4 @@ def _smooth(values: np.ndarray) -> np.ndarray:
 
 
 def _scaled(values: np.ndarray) -> np.ndarray:
-    return (values - values.mean()) / values.std()
+    return np.asarray((values - values.mean()) / values.std())

@@ -235,6 +235,37 @@ class RestoringBy:
 
 
 @dataclass(frozen=True)
+class ShakyCamera:
+    """The camera reads less exactly where a column is high: fine noise, and no movement of the car.
+
+    Parameters
+    ----------
+    column : str
+    size : float
+        Standard deviation of the error at the 95 % quantile less that at the 5 % quantile; none at the smallest. [m]
+    memory : float
+        Correlation time of the error. [s]
+    """
+
+    column: str
+    size: float = 0.04
+    memory: float = 0.3
+    kind: str = "scale"
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """The one column."""
+        return (self.column,)
+
+    def apply(self, intent: Intent, context: Context, rng: np.random.Generator) -> None:
+        """Blur the measurement."""
+        strength = Response().scaled(context[self.column])
+        keep = np.exp(-STEP / self.memory)
+        error = lfilter([np.sqrt(1.0 - keep**2)], [1.0, -keep], rng.normal(size=len(strength)))
+        intent.camera += self.size * (strength - strength.min()) * error
+
+
+@dataclass(frozen=True)
 class Fatigue:
     """Spread grows steadily from the beginning to the end of the drive, by this factor. [-]"""
 
