@@ -41,7 +41,7 @@ SWING, SWING_WIDTH = "movement at the weave's period", 2
 
 LOCAL_QUANTILES = (0.1, 0.3, 0.5, 0.7, 0.9)
 
-N_RUNS = 12
+N_RUNS = 24
 """Runs of the profile that its expectation is taken over."""
 
 SPARE_ROWS = 75
