@@ -87,7 +87,6 @@ def test_growing_spread_is_named_and_helps(driven: Driven) -> None:
     assert result.error_after < result.error_before
 
 
-@pytest.mark.xfail(reason="dated some seconds off, where the jump itself hides most of the size", strict=True)
 def test_a_step_is_sized(driven: Driven) -> None:
     result = close_loop(driven(503, [plants.CameraStep(0.6)], 2400.0), seed=1)
     assert_closed(result, only_finding(result, "step", ()), 0.6)

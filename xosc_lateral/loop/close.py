@@ -17,7 +17,7 @@ from xosc_lateral.errors import NotEnoughDataError
 from xosc_lateral.loop.between import between_shift, is_between
 from xosc_lateral.loop.findings import Finding, describe_finding, helps, memory_finding, population_finding
 from xosc_lateral.loop.memory import Memory, test_memory
-from xosc_lateral.loop.movement import Coarse, Fitted, Terms, fit_movement
+from xosc_lateral.loop.movement import Coarse, Fitted, Terms, fit_movement, held_out_likelihood
 from xosc_lateral.loop.population import Population, test_population
 from xosc_lateral.loop.residual import Cells, cells_of, error_between, expected, floor_of, own_runs
 from xosc_lateral.loop.scorecard import Scorecard, score_runs
@@ -25,7 +25,7 @@ from xosc_lateral.loop.sizing import Sized, size_effects
 from xosc_lateral.loop.strip import effects_share, stripped_runs
 from xosc_lateral.loop.timeline import COARSE, Timeline, coarse_all, join_drives
 from xosc_lateral.loop.trace import trace_effects
-from xosc_lateral.loop.traced import Trace, without
+from xosc_lateral.loop.traced import Found, Trace, without, without_finding
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
@@ -33,6 +33,12 @@ IntArray = NDArray[np.intp]
 
 FOLDS = 4
 """Every part of the drives is held out once, and predicted from the other three."""
+
+CLEAR_GAIN = 4.0
+"""An effect that adds so much to the log-likelihood of held-out blocks stays, whatever its cells show. [-]"""
+
+SLOW_PRICE = 9.0
+"""What minus the logarithm of a p-value lies above a gain in log-likelihood, about. [-]"""
 
 BEFORE, AFTER, CORE = 0, 2, 1
 """Profiles of a fold."""
@@ -159,7 +165,11 @@ def close_loop(
     blocks = hold_out_blocks(timeline)
     setting = _Setting(timeline, coarse, blocks, base if given else None, kind, refined_kind, root)
     scored = _score(setting, trace, lambda share, what: progress(0.6 + 0.2 * share, what))
-    useless = [found for found, finding in zip(trace.found, scored.beside_core, strict=True) if not helps(finding)]
+    useless = [
+        found
+        for found, finding in zip(trace.found, scored.beside_core, strict=True)
+        if not helps(finding) and _held_out_gain(setting, trace, found) < CLEAR_GAIN
+    ]
     if useless:
         trace = without(trace, useless)
         scored = _score(setting, trace, lambda share, what: progress(0.8 + 0.15 * share, what))
@@ -296,6 +306,28 @@ def _held_out_runs(setting: _Setting, trace: Trace, progress: Progress) -> tuple
             runs = own_runs(profile, setting.timeline, seed)
             composite.setdefault(side, np.zeros_like(runs))[:, held] = runs[:, held]
     return composite[BEFORE], composite[BEFORE if same_core else CORE], composite[AFTER]
+
+
+def _held_out_gain(setting: _Setting, trace: Trace, found: Found) -> float:
+    """What a finding adds to the log-likelihood of blocks that its size was not fitted on.
+
+    Cells say whether a profile shows an effect, but the mean of a driver who wanders is a noisy measure of it. The
+    slower movement's spread is no part of the likelihood: the trace's own score stands in. 0: nothing is known.
+    """
+    if found.look == "slow" or (found.look == "growth" and trace.final.terms.slow_growth):
+        return float(-np.log(found.p_value) - SLOW_PRICE)
+    if found.look not in ("location", "scale", "growth", "periodic", "wander"):
+        return 0.0
+    coarse, gain = setting.coarse, 0.0
+    blocks = setting.blocks[COARSE // 2 :: COARSE][: len(coarse)]
+    for fold in range(FOLDS):
+        held = blocks % FOLDS == fold
+        part = replace(coarse, valid=coarse.valid & ~held)
+        if not part.valid.any():
+            return 0.0
+        for terms, sign in ((trace.final.terms, 1.0), (without_finding(trace.final.terms, found), -1.0)):
+            gain += sign * held_out_likelihood(coarse, fit_movement(part, terms), held)
+    return gain
 
 
 def _fold_profiles(

@@ -250,6 +250,20 @@ def fit_movement(coarse: Coarse, terms: Terms, *, process: Autoregression | None
     )  # fmt: skip
 
 
+def held_out_likelihood(coarse: Coarse, fitted: Fitted, held: BoolArray) -> float:
+    """Gaussian log-likelihood of the valid rows in `held`, shape (n,), under a model fitted without them.
+
+    Places that drives keep are taken from the held-out rows themselves. Fine noise, restoring strength and the slower
+    movement's spread are no part of it.
+    """
+    rows = coarse.valid & held
+    whitener = Whitener(fitted.whitener.process, rows, coarse.drive, fitted.scale)
+    left = coarse.offset - location_columns(coarse, fitted.terms) @ fitted.location_sizes
+    white = whitener.rows(np.where(rows, left, 0.0))
+    level = float(rows.sum()) * np.log(whitener.process.deviations[-1])
+    return float(-0.5 * (white @ white) - level - np.log(fitted.scale[rows]).sum())
+
+
 def location_columns(coarse: Coarse, terms: Terms) -> FloatArray:
     """Design of the mean: effects, step, drift; shape (n, k)."""
     blocks = [coarse.answer(effect, keep=True) for effect in terms.location]

@@ -90,7 +90,9 @@ def column_proposals(search: Search, fitted: Fitted) -> Iterable[Proposal]:
             if crude > WORTH_PROVING:
                 return Tried(look.value, search.candidates[best].columns, crude, "no stronger than what chance gives")
             if look is Look.FINE and spread is not None and float(spread.chi_square[best]) > 9.0:
-                return _proven(search, Look.SPREAD, fitted, result, best)
+                wider = _proven(search, Look.SPREAD, fitted, result, best)
+                if isinstance(wider, Found):
+                    return wider
             return _proven(search, look, fitted, result, best)
 
         yield Proposal(look.value, crude, prove)

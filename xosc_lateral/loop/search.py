@@ -97,7 +97,8 @@ def usable_candidates(search: Search, look: Look, fitted: Fitted) -> NDArray[np.
             barred |= set(effect.columns)
     single = look in (Look.PACE, Look.FINE)
     entangled = terms.growth or terms.slow_growth or terms.regime_scale is not None or bool(terms.spread or terms.slow)
-    if look is Look.FINE and entangled:
+    # a second effect on the fine noise would be what the first one's shape leaves of itself
+    if look is Look.FINE and (entangled or terms.fine):
         return np.zeros(len(search.candidates), dtype=np.bool_)
     least = MIN_SUPPORT_PACE if look is Look.PACE else 0.0
     return np.array(

@@ -132,9 +132,11 @@ def _probability_beside(search: Search, found: Found, without_it: Fitted, final:
     if found.candidate is None or found.look in (Look.LOCATION.value, "between"):
         return None
     look, answer = Look(found.look), coarse.answer(found.candidate.effect)
+    usable = usable_candidates(search, look, without_it)
+    if not usable.any():  # nothing else to compare it with
+        return None
     answer = answer / answer[coarse.valid].std(axis=0)
     costs, at_once = np.array([found.candidate.cost]), np.zeros(1, dtype=np.intp)
     rows = look_rows(look, coarse, without_it)
     statistic = scan(rows, [answer], transform_answers([answer]), costs, search.shifts, at_once).statistic[0]
-    usable = usable_candidates(search, look, without_it)
     return tail_probability(float(statistic), search.scan(look, final).null[usable].max(axis=0))

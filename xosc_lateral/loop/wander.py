@@ -108,6 +108,7 @@ def find_wander(coarse: Coarse, fitted: Fitted, rng: np.random.Generator) -> Wan
     if score >= UNREMARKABLE:
         nulls = (_simulated(rows, whitener, rng), _resigned(rows, whitener, rng))
         p_value = max(_probability(score, (max(scores(one)[:2]) for one in null)) for null in nulls)
+        at = _moment(coarse, whitener, rows, at)
     return Wander(drift_score, step_score, at, p_value)
 
 
@@ -214,6 +215,13 @@ def _levels(n: int) -> FloatArray:
     shapes = 1.0 / (1.0 + np.square(2.0 * np.pi * np.outer(MOODS_S, np.fft.rfftfreq(n))))
     sizes = np.concatenate([[0.0], np.geomspace(0.1, 60.0, 40)])
     return np.asarray((1.0 + sizes[:, None, None] * shapes).reshape(len(sizes) * len(MOODS_S), -1))
+
+
+def _moment(coarse: Coarse, whitener: Whitener, rows: FloatArray, at: int) -> int:
+    """The second at which a step near `at` is likeliest: a jump leaves its mark in the movement of that very second."""
+    near = np.arange(max(at - STEP_GRID_S, 1), min(at + STEP_GRID_S + 1, len(coarse)))
+    jumps = whitener.rows((np.arange(len(coarse))[:, None] >= near).astype(np.float64))
+    return int(near[np.argmax((jumps.T @ rows) ** 2 / np.maximum(np.square(jumps).sum(axis=0), 1e-12))])
 
 
 def _steps(coarse: Coarse, whitener: Whitener) -> tuple[FloatArray, NDArray[np.intp]]:
