@@ -37,6 +37,9 @@ DRIFT_COST = 2.0
 EDGE_S, STEP_GRID_S = 60, 15
 """Least time on either side of a step, and between the moments that are tried. [s]"""
 
+NEAR_S = 90
+"""A step is dated to the second within so much of where slow movement has it. [s]"""
+
 UNREMARKABLE = 6.0
 """A wander with a lower score is not compared with chance: chance gives it in every few. [chi-square]"""
 
@@ -219,7 +222,7 @@ def _levels(n: int) -> FloatArray:
 
 def _moment(coarse: Coarse, whitener: Whitener, rows: FloatArray, at: int) -> int:
     """The second at which a step near `at` is likeliest: a jump leaves its mark in the movement of that very second."""
-    near = np.arange(max(at - STEP_GRID_S, 1), min(at + STEP_GRID_S + 1, len(coarse)))
+    near = np.arange(max(at - NEAR_S, 1), min(at + NEAR_S + 1, len(coarse)))
     jumps = whitener.rows((np.arange(len(coarse))[:, None] >= near).astype(np.float64))
     return int(near[np.argmax((jumps.T @ rows) ** 2 / np.maximum(np.square(jumps).sum(axis=0), 1e-12))])
 
