@@ -21,7 +21,7 @@ from xosc_lateral.loop.leftover import Leftover, leftover_of
 from xosc_lateral.pipeline.refined import refine_population
 from xosc_lateral.report.figures import PAPER
 from xosc_lateral.report.loop import loop_text
-from xosc_lateral.report.loop_figures import residual_figure, spectrum_figure
+from xosc_lateral.report.loop_figures import effect_figure, residual_figure, spectrum_figure
 from xosc_lateral.report.loop_hidden_figures import DRAWINGS
 
 if TYPE_CHECKING:
@@ -66,8 +66,11 @@ def draw(result: LoopResult, leftover: Leftover, folder: Path) -> None:
     """Figures on white, which light and dark pages show alike."""
     folder.mkdir(parents=True, exist_ok=True)
     for finding in result.findings:
-        figure, _ = DRAWINGS[finding.kind]
-        _save(figure(result, finding), folder / f"loop_dlr_{finding.kind}.png")
+        if finding.columns:
+            _save(effect_figure(result, finding), folder / f"loop_dlr_{'_'.join(finding.columns)}.png")
+        else:
+            figure, _ = DRAWINGS[finding.kind]
+            _save(figure(result, finding), folder / f"loop_dlr_{finding.kind}.png")
     _save(spectrum_figure(result), folder / "loop_dlr_spectrum.png")
     _save(residual_figure(result, leftover, "mean"), folder / "loop_dlr_residual.png")
 
