@@ -35,7 +35,7 @@ OWN_LEVEL_S = 30.0
 """A drive's level of the scale is its own as far as it lasts longer than this. [s]"""
 
 MIN_DRIFT_S = 600.0
-"""A shorter drive tells nothing about drift. [s]"""
+"""A shorter drive tells nothing about drift or growing spread. [s]"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,6 +81,11 @@ class Coarse:
 
     def __len__(self) -> int:
         return len(self.offset)
+
+    @property
+    def lasts(self) -> bool:
+        """Whether a drive is long enough to change with time: minutes, not the minute of a passing vehicle."""
+        return bool(np.bincount(self.drive, self.valid.astype(float)).max() >= MIN_DRIFT_S)
 
     def answer(self, effect: ColumnEffect, *, keep: bool = False) -> FloatArray:
         """The effect's quantity as the driver answers to it, less its mean where valid; shape (n, k)."""

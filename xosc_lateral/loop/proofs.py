@@ -188,7 +188,7 @@ def hidden_proposals(search: Search, fitted: Fitted, number: int) -> Sequence[Pr
         proposals.append(Proposal(look, p_value, prove))
 
     search.progress("changes with time")
-    if not (terms.growth or terms.slow_growth):
+    if coarse.lasts and not (terms.growth or terms.slow_growth):
         growth, slow_growth = find_growth(coarse, fitted), find_slow_growth(coarse, fitted)
         add("growth", growth.p_value, growth, lambda: replace(terms, growth=True))
         add("growth", slow_growth.p_value, slow_growth, lambda: replace(terms, slow_growth=True))
