@@ -1,10 +1,10 @@
 """How often the loop names the right cause, and how often it names one where there is none, on simulated drives.
 
-    python -m benchmarks.loop_study [--seeds 4] [--duration 3000] [--only curve] [--nulls 20] [--second]
+    python -m benchmarks.loop_study [--seeds 4] [--duration 3000] [--only curve] [--nulls 20] [--movements 8] [--second]
 
 The simulator is the one of the tests (a human with intermittent, satisficing steering; no relative of the model). The
 oracle knows the columns, the shape and the kind, and takes the best of the response times: its z is what the data can
-show at all. `--second` also drives the same driver a second time and scores the refined profile on that drive.
+show at all. `--movements` also counts how often something is named in movements that no driver model made. `--second` also drives the same driver a second time and scores the refined profile on that drive.
 """
 
 from __future__ import annotations
@@ -17,8 +17,9 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import numpy as np
+import pandas as pd
 
-from tests.simulators import plants
+from tests.simulators import movements, plants
 from tests.simulators.driver_simulator import Drive, simulate_drive
 from xosc_lateral.driver.effects import (
     Acts,
@@ -43,6 +44,8 @@ from xosc_lateral.loop.sizing import size_effects
 from xosc_lateral.loop.timeline import join_drives
 from xosc_lateral.loop.trace import trace_effects
 from xosc_lateral.loop.traced import Trace
+
+MOVEMENTS = ("wandering", "heavy_tailed", "reflected", "delayed_control", "clustered")
 
 RESPONSES = (0.3, 1.0, 2.0, 3.0, 4.0, 6.0)
 
@@ -220,18 +223,21 @@ def main() -> None:
     ask.add_argument("--nulls", type=int, default=20)
     ask.add_argument("--duration", type=float, default=3000.0)
     ask.add_argument("--only", default="")
+    ask.add_argument("--movements", type=int, default=0)
     ask.add_argument("--second", action="store_true")
     said = ask.parse_args()
     with TemporaryDirectory() as name:
         folder = Path(name)
         silent = 0
         for seed in range(said.nulls):
-            trace, took = _traced(simulate_drive(said.duration, seed), folder)
+            trace, took = _traced(simulate_drive(said.duration, seed).table, folder)
             _, words = named(CASES[0], trace)
             silent += not trace.found
             print(f"null {seed}: {words} ({took:.0f} s)", flush=True)
         if said.nulls:
             print(f"silent on {silent} of {said.nulls} drives without an effect\n", flush=True)
+        if said.movements:
+            silent_on_movements(said.movements, said.duration, folder)
         seen = right_of_seen = 0
         for case in CASES:
             if said.only not in case.name:
@@ -258,8 +264,23 @@ def main() -> None:
         print(f"right cause in {right_of_seen} of {seen} drives on which the oracle has z >= 5")
 
 
-def _traced(drive: Drive, folder: Path) -> tuple[Trace, float]:
-    coarse = Coarse.of(join_drives(measured(drive, folder)))
+def silent_on_movements(seeds: int, duration: float, folder: Path) -> None:
+    """Count how often nothing is named in movements without any driver."""
+    kinds = {name: (getattr(movements, name), None) for name in MOVEMENTS} | {"5 cm": (movements.wandering, 0.05)}
+    silent = 0
+    for name, (movement, resolution) in kinds.items():
+        for seed in range(seeds):
+            table = movements.record_movement(movement, duration, seed, resolution=resolution)
+            trace, took = _traced(table, folder)
+            silent += not trace.found
+            print(f"{name} {seed}: {named(CASES[0], trace)[1]} ({took:.0f} s)", flush=True)
+    print(f"silent on {silent} of {seeds * len(kinds)} movements without a driver\n", flush=True)
+
+
+def _traced(table: pd.DataFrame, folder: Path) -> tuple[Trace, float]:
+    path = folder / "drive.parquet"
+    table.to_parquet(path)
+    coarse = Coarse.of(join_drives(read_drives([path])))
     started = time.perf_counter()
     return trace_effects(coarse, np.random.SeedSequence(1)), time.perf_counter() - started
 
