@@ -4,7 +4,8 @@
 
 The simulator is the one of the tests (a human with intermittent, satisficing steering; no relative of the model). The
 oracle knows the columns, the shape and the kind, and takes the best of the response times: its z is what the data can
-show at all. `--movements` also counts how often something is named in movements that no driver model made. `--second` also drives the same driver a second time and scores the refined profile on that drive.
+show at all. `--movements` also counts how often something is named in movements that no driver model made. `--second`
+also drives the same driver a second time and scores the refined profile on that drive.
 """
 
 from __future__ import annotations
