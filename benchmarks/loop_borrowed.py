@@ -222,7 +222,8 @@ def elsewhere(planted: Planted, trace: Trace, oracle: ColumnEffect, world: Timel
     context = Coarse.of(world).context
     acts = Acts.LOCATION if planted.case.kind == "location" else Acts.SPREAD
     effects = [effect for effect in size_effects(trace.coarse, trace.final).effects if isinstance(effect, ColumnEffect)]
-    refined = [effect.strength(world.step, context) for effect in effects if effect.acts is acts]
+    refined = [np.zeros(len(world))]
+    refined += [effect.weighed(effect.answer(world.step, context)) for effect in effects if effect.acts is acts]
     quantity = np.nan_to_num(planted.case.quantity(world.context))
     truth = planted.strength(world.context, world.step)
     knowing = oracle.strength(world.step, {"truth": np.clip(quantity, planted.low, planted.high)})
