@@ -26,9 +26,9 @@ where classes are known, a single vehicle where it has to be the same person eve
 closed loop's road to the same place. It starts from the two-level model, finds that it lacks memory, that drivers
 differ, and that vehicles of less than 25 m/s (trucks) keep 0.2 m further right, and ends at a `best` profile with that
 effect. It saw a little less than `motorway`, since the loop cuts 6 s around lane changes instead of 4. Held out, on the
-same half of the vehicles and at their own speeds, both do as well: see the cards. Take `motorway-refined` where slow and
-fast vehicles mix and their classes are not known, and `motorway` otherwise ([closing_the_loop.md](closing_the_loop.md),
-section 6).
+same half of the vehicles and at their own speeds, both do as well: see the cards. Take `motorway-refined` where slow
+and fast vehicles mix and their classes are not known, and `motorway` otherwise
+([closing_the_loop.md](closing_the_loop.md), section 6).
 """
 
 
