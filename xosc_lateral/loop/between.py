@@ -18,6 +18,7 @@ from xosc_lateral.loop.candidates import Candidate, single_candidates
 from xosc_lateral.loop.chance import tail_probability
 from xosc_lateral.loop.columns import Column
 from xosc_lateral.loop.movement import Coarse, Fitted
+from xosc_lateral.loop.search import support_of
 
 FloatArray = NDArray[np.float64]
 
@@ -96,7 +97,7 @@ def find_between(coarse: Coarse, fitted: Fitted, columns: Sequence[Column], rng:
     for candidate in single_candidates([column for column in columns if column.name not in present], seen):
         habit = replace(candidate, effect=replace(candidate.effect, response_s=HABIT_S))
         usual = usual_answers(coarse, habit.effect)
-        if usual.shape[1] == 1 and _support(places.left(usual)[:, 0]) >= MIN_SUPPORT:
+        if usual.shape[1] == 1 and support_of(places.left(usual)) >= MIN_SUPPORT:
             candidates.append(habit)
             means.append(usual[:, 0])
     if not candidates:
@@ -160,8 +161,3 @@ def _places(coarse: Coarse, fitted: Fitted) -> _Places:
             scatter + (float(left @ left) / freedom - 1.0) / max(float(places.weight[counted].mean()), 1e-30), 0.0
         )
     return places
-
-
-def _support(values: FloatArray) -> float:
-    squares = np.square(values)
-    return float(squares.sum() ** 2 / max(float(np.square(squares).sum()), 1e-300))

@@ -63,7 +63,7 @@ def prepare_search(
         deviation = answer[coarse.valid].std(axis=0)
         if not np.all(deviation > 1e-9 * (1e-9 + np.abs(answer).max(axis=0))):
             continue
-        support = _support(answer[coarse.valid])
+        support = support_of(answer[coarse.valid])
         if support >= MIN_SUPPORT:
             kept.append(candidate)
             supports.append(support)
@@ -75,8 +75,8 @@ def prepare_search(
     )
 
 
-def _support(answer: FloatArray) -> float:
-    """Seconds on which an answer's variance rests, for its scarcest component: (sum x^2)^2 / sum x^4."""
+def support_of(answer: FloatArray) -> float:
+    """Seconds (rows) on which an answer's variance rests, for its scarcest component: (sum x^2)^2 / sum x^4."""
     squares = np.square(answer - answer.mean(axis=0))
     return float((squares.sum(axis=0) ** 2 / np.maximum(np.square(squares).sum(axis=0), 1e-300)).min())
 
