@@ -134,6 +134,7 @@ def _outcomes(batch: Batch, converter: Converter, workers: int, cluster: str | N
                 with open_pool(min(workers, len(todo)), cluster) as pool:
                     for job, answer in run_tasks(pool, partial(_run, converter), todo):
                         yield _noted(job, answer, journal)
+                _sweep(batch.folder)
             _forget_missing(batch, journal)
             journal.finish()
     with suppress(OSError):  # the next run has begun already
@@ -206,7 +207,7 @@ def _forget_missing(batch: Batch, journal: Journal) -> None:
 
 
 def _sweep(folder: Path) -> None:
-    """Remove what a killed run was just writing."""
+    """Remove what a killed run, or a killed worker of this one, was just writing."""
     for path in folder.rglob(".*.tmp*"):
         if _HALF_WRITTEN.fullmatch(path.name):
             path.unlink(missing_ok=True)
