@@ -23,7 +23,7 @@ from xosc_lateral.loop.residual import Cells, cells_of, error_between, expected,
 from xosc_lateral.loop.scorecard import Scorecard, score_runs
 from xosc_lateral.loop.sizing import Sized, size_effects
 from xosc_lateral.loop.strip import effects_share, stripped_runs
-from xosc_lateral.loop.timeline import COARSE, Timeline, coarse_all, join_drives
+from xosc_lateral.loop.timeline import COARSE, Timeline, coarse_all, coarse_middle, join_drives
 from xosc_lateral.loop.trace import trace_effects
 from xosc_lateral.loop.traced import Found, Trace, without, without_finding
 
@@ -275,7 +275,6 @@ def _score(setting: _Setting, trace: Trace, progress: Progress) -> _Scored:
     timeline, coarse = setting.timeline, setting.coarse
     sized = size_effects(coarse, trace.final)
     runs_before, runs_core, runs_after = _held_out_runs(setting, trace, progress)
-    # the weave's frequency is per second already: one row of the coarse grid
     cells = cells_of(timeline, _quantities(coarse, trace, sized), trace.final.terms.weave)
     real = cells.describe(timeline.offset, timeline.valid)
     before, after = expected(cells, runs_before, timeline.valid), expected(cells, runs_after, timeline.valid)
@@ -319,7 +318,7 @@ def _held_out_gain(setting: _Setting, trace: Trace, found: Found) -> float:
     if found.look not in ("location", "scale", "growth", "periodic", "wander"):
         return 0.0
     coarse, gain = setting.coarse, 0.0
-    blocks = setting.blocks[COARSE // 2 :: COARSE][: len(coarse)]
+    blocks = coarse_middle(setting.blocks)
     for fold in range(FOLDS):
         held = blocks % FOLDS == fold
         part = replace(coarse, valid=coarse.valid & ~held)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from xosc_lateral.loop.close import LoopResult
 from xosc_lateral.loop.movement import fit_movement
 from xosc_lateral.loop.regimes import fit_regimes
-from xosc_lateral.loop.timeline import COARSE, LOCAL_S, coarse_mean, local_mean
+from xosc_lateral.loop.timeline import LOCAL_S, coarse_mean, coarse_middle, local_mean
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
@@ -104,5 +104,5 @@ def _longest(result: LoopResult) -> BoolArray:
 def _course(result: LoopResult, measured: FloatArray, before: FloatArray, after: FloatArray) -> Course:
     shown = _longest(result)
     n = len(result.trace.coarse)
-    time = result.cells.timeline.time[COARSE // 2 :: COARSE][:n]
+    time = coarse_middle(result.cells.timeline.time)[:n]
     return Course(time[shown], measured[shown], before[shown], after[shown])

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from xosc_lateral.driver.effects import Acts, ColumnEffect
 from xosc_lateral.loop.noise import Autoregression, Whitener, fit_autoregression
-from xosc_lateral.loop.timeline import COARSE, Timeline, coarse_all, coarse_mean
+from xosc_lateral.loop.timeline import Timeline, coarse_all, coarse_mean, coarse_middle
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
@@ -71,7 +71,7 @@ class Coarse:
             timeline,
             coarse_mean(timeline.offset),
             coarse_all(timeline.valid),
-            timeline.drive[COARSE // 2 :: COARSE][: len(timeline) // COARSE],
+            coarse_middle(timeline.drive),
             coarse_mean(timeline.time),
             {
                 name: _within(values, timeline.valid)

@@ -11,7 +11,7 @@ from xosc_lateral.driver.effects import Acts, Angular, ColumnEffect, Product
 from xosc_lateral.driver.effects.response import respond
 from xosc_lateral.loop.between import is_between
 from xosc_lateral.loop.close import LoopResult, hold_out_blocks
-from xosc_lateral.loop.timeline import COARSE, LOCAL_S, coarse_mean, local_mean
+from xosc_lateral.loop.timeline import LOCAL_S, coarse_mean, coarse_middle, local_mean
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
@@ -54,7 +54,7 @@ def curve_of(result: LoopResult, effect: ColumnEffect) -> Curve:
         return Curve(over, strength, error, nothing, nothing, nothing)
     where, own = _driving(result, effect)
     inside = result.trace.coarse.valid & np.isfinite(where)
-    blocks = hold_out_blocks(result.cells.timeline)[COARSE // 2 :: COARSE][: len(where)]
+    blocks = coarse_middle(hold_out_blocks(result.cells.timeline))
     if effect.acts is Acts.LOCATION:
         values = _alone(result, effect)
     else:
@@ -96,7 +96,7 @@ def _driving(result: LoopResult, effect: ColumnEffect) -> tuple[FloatArray, Floa
         return coarse_mean(effect.answer(step, coarse.context)[:, 0]), coarse_mean(own)
     column = coarse.context[effect.columns[0]]
     if isinstance(effect, Angular) or not np.isfinite(column).all():  # neither angles nor "none" can be averaged
-        return column[COARSE // 2 :: COARSE][: len(coarse)], coarse_mean(own)
+        return coarse_middle(column), coarse_mean(own)
     return coarse_mean(respond(column, step, effect.lag_s, effect.response_s)), coarse_mean(own)
 
 

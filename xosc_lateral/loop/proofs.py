@@ -153,7 +153,8 @@ def _prove_between(search: Search, fitted: Fitted, between: Between) -> Found | 
     if between.p_value > LEVEL["between"]:
         return not_enough("between", between.p_value, candidate.columns)
     terms = replace(fitted.terms, between=(*fitted.terms.between, candidate.effect))
-    return Found("between", between.p_value, fitted, fit_movement(search.coarse, terms), candidate)
+    # the drives' own places hold it: nothing is fitted anew
+    return Found("between", between.p_value, fitted, replace(fitted, terms=terms), candidate)
 
 
 def _prove_regimes(search: Search, fitted: Fitted, clustering: Clustering) -> Found | Tried:

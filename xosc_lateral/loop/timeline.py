@@ -10,6 +10,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -121,6 +122,11 @@ def coarse_mean(values: FloatArray) -> FloatArray:
     """Mean over each second, shape (n // 5, ...)."""
     n = len(values) // COARSE
     return np.asarray(values[: n * COARSE].reshape(n, COARSE, *values.shape[1:]).mean(axis=1))
+
+
+def coarse_middle(values: NDArray[Any]) -> NDArray[Any]:
+    """Value in the middle of each second, shape (n // 5,): for what can't be averaged."""
+    return values[COARSE // 2 :: COARSE][: len(values) // COARSE]
 
 
 def coarse_all(mask: BoolArray) -> BoolArray:

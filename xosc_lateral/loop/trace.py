@@ -32,6 +32,8 @@ CLEARLY = 3.0
 """By so much a column must be likelier than time alone: many columns change slowly enough to look like time. [-]"""
 
 
+_ON_THE_MEAN = (Look.LOCATION.value, "between", "periodic", "wander")
+
 _TURN = {"between": 0, "regime": 2}
 """Nothing else explains the places that different drives keep; and regimes explain whatever comes in clusters: they are
 asked last, when nothing that can be named does."""
@@ -110,10 +112,12 @@ def _better_explained(found: Found, proposals: Sequence[Proposal]) -> Found:
 def _without_explained(search: Search, trace: Trace) -> Trace:
     """Drop findings that later ones explain: where the mean moves by a column not known yet, spread does too."""
     for found in trace.found[:-1]:
+        if found.look in _ON_THE_MEAN:
+            continue
         without_it = fit_movement(trace.coarse, without_finding(trace.final.terms, found))
         search.progress(f"looking at {found.look} again")
         p_value = _probability_beside(search, found, without_it, trace.final)
-        if p_value is not None and p_value > LEVEL[found.look]:
+        if p_value > LEVEL[found.look]:
             why = f"the other findings explain it: beside them chance gives as much in {100 * p_value:.2g} % of tables"
             columns = found.candidate.columns if found.candidate else ()
             tried = [*trace.tried, Tried(found.look, columns, p_value, why)]
@@ -122,19 +126,18 @@ def _without_explained(search: Search, trace: Trace) -> Trace:
     return trace
 
 
-def _probability_beside(search: Search, found: Found, without_it: Fitted, final: Fitted) -> float | None:
-    """Probability of a finding on the movement's size beside all others; None for what acts on the mean."""
+def _probability_beside(search: Search, found: Found, without_it: Fitted, final: Fitted) -> float:
+    """Probability of a finding on the movement's size beside all others."""
     coarse = search.coarse
     if found.look == "growth":
         return min(find_growth(coarse, without_it).p_value, find_slow_growth(coarse, without_it).p_value)
     if found.look == "regime":
         return find_clustering(coarse, without_it, search.rng(3)).p_value
-    if found.candidate is None or found.look in (Look.LOCATION.value, "between"):
-        return None
+    assert found.candidate is not None, "all other looks are of columns"
     look, answer = Look(found.look), coarse.answer(found.candidate.effect)
     usable = usable_candidates(search, look, without_it)
-    if not usable.any():  # nothing else to compare it with
-        return None
+    if not usable.any():  # nothing to compare it with
+        return 0.0
     answer = answer / answer[coarse.valid].std(axis=0)
     costs, at_once = np.array([found.candidate.cost]), np.zeros(1, dtype=np.intp)
     rows = look_rows(look, coarse, without_it)
