@@ -3,21 +3,34 @@ PYTHON ?= python3
 VENV ?= .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
+DEV_STAMP := $(VENV)/.installed-dev
 
-.PHONY: demo test lint format bench profiles loop-dlr clean
+.PHONY: fuzz lock install-locked sbom licences test-matrix demo test fast lint format docs bench schema profiles templates loop-dlr picture clean
 
+# What running needs, and no more.
 $(STAMP): pyproject.toml
-	$(PYTHON) -m venv $(VENV)
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --upgrade pip
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[dev,cluster,classifier]'
-	touch $@
+	@echo "Setting up $(VENV): numpy, scipy, pandas, pyarrow, numba, matplotlib ... (a minute or two, 0.8 GB)"
+	@$(PYTHON) -m venv $(VENV)
+	@$(BIN)/python -m pip install --disable-pip-version-check --progress-bar on --upgrade pip | grep -v '^Requirement' || true
+	@$(BIN)/python -m pip install --disable-pip-version-check --progress-bar on -e .
+	@touch $@
+
+# And what checking needs: linters, types, tests, every extra.
+$(DEV_STAMP): pyproject.toml | $(STAMP)
+	@echo "Setting up what the tests need: ruff, mypy, pytest, dask, scikit-learn, asammdf ... (another minute or two)"
+	@$(BIN)/python -m pip install --disable-pip-version-check --progress-bar on -e '.[dev,mdf,cluster,classifier,mcap]'
+	@touch $@
 
 demo: $(STAMP)
 	@mkdir -p out/demo
-	@$(BIN)/xosc-lateral template write cut-in -o out/demo
+	@$(BIN)/xosc-lateral template write cut-in -o out/demo --force
 	@$(BIN)/xosc-lateral convert out/demo/cut-in.xosc -o out/demo/cut-in_lifelike.xosc --seed 1 --report out/demo/cut-in_report.html
+	@echo
+	@echo "Look at the report:     out/demo/cut-in_report.html (in a browser)"
+	@echo "Play it in esmini:      esmini --window 60 60 1000 500 --osc out/demo/cut-in_lifelike.xosc"
+	@echo "Use the command line:   source $(BIN)/activate && xosc-lateral --help"
 
-lint: $(STAMP)
+lint: $(DEV_STAMP)
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
@@ -25,16 +38,36 @@ lint: $(STAMP)
 test: lint
 	$(BIN)/python -m pytest -n 2
 
-format: $(STAMP)
+# Under a minute: everything but what simulates, fits or converts for long.
+fast: $(DEV_STAMP)
+	$(BIN)/python -m pytest -n 2 -q tests/road tests/scenario tests/formats tests/test_layers.py -m 'not slow'
+
+# Mutants of every input format against its reader, ten minutes or so; what hurts lands in out/faults.
+fuzz: $(DEV_STAMP)
+	$(BIN)/python -m tests.faults --count 300 --seed $(or $(SEED),1)
+
+format: $(DEV_STAMP)
 	$(BIN)/ruff check --fix .
 	$(BIN)/ruff format .
+
+# JSON Schema of profile files, from the types.
+schema: $(STAMP)
+	$(BIN)/python -c "import json; from xosc_lateral.driver.profile import profile_schema; from xosc_lateral.formats.profiles import SCHEMA; SCHEMA.write_text(json.dumps(profile_schema(), indent=1, ensure_ascii=False) + chr(10))"
 
 # The shipped driver profiles, rebuilt from the public recording (50 MB from PyPI): byte for byte what is in the tree.
 WHEEL := out/data/tasi-0.15.4-py3-none-any.whl
 profiles: $(STAMP) $(WHEEL)
-	$(BIN)/python -m xosc_lateral.cli.build_library $(WHEEL) -o xosc_lateral/resources/driver_profiles --cards docs/profiles.md
+	$(BIN)/python -m benchmarks.build_library $(WHEEL) -o driver_profiles --cards docs/profiles.md
 
-# The loop over real motorway traffic: from the paper's model to what these drivers do; docs/closing_the_loop.md, section 6.
+# The README's picture.
+picture: $(STAMP)
+	$(BIN)/python docs/figures/lifelike.py
+
+# The shipped templates as plain files: what their builders make of the defaults.
+templates: $(STAMP)
+	for name in $$(ls templates/*.xosc | xargs -n 1 basename -s .xosc); do $(BIN)/xosc-lateral template write $$name -o templates; done
+
+# The loop over real motorway traffic: from the paper's model to what these drivers do; docs/closing_the_loop.md, section 5.
 loop-dlr: $(STAMP) $(WHEEL)
 	@mkdir -p out/loop-dlr
 	$(BIN)/xosc-lateral import dlr-ht $(WHEEL) -o out/loop-dlr/drives.parquet
@@ -43,6 +76,39 @@ loop-dlr: $(STAMP) $(WHEEL)
 
 $(WHEEL): | $(STAMP)
 	$(BIN)/python -m pip download --quiet --disable-pip-version-check --no-deps --dest $(@D) tasi==0.15.4
+
+# Every package that development and CI install, with hashes; see SECURITY.md.
+LOCK := requirements/lock.txt
+UV ?= $(BIN)/uv
+MATRIX ?= 3.11 3.12 3.13
+
+lock: $(DEV_STAMP)
+	$(UV) pip compile pyproject.toml --all-extras --generate-hashes --python-version 3.11 --universal --quiet \
+		--custom-compile-command 'make lock' -o $(LOCK)
+
+install-locked:
+	$(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r $(LOCK)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps -e .
+
+sbom: $(DEV_STAMP)
+	@mkdir -p out
+	$(UV) tool run --from 'cyclonedx-bom>=7,<8' cyclonedx-py requirements $(LOCK) --pyproject pyproject.toml \
+		--output-reproducible -o out/sbom.json
+
+licences: $(DEV_STAMP)
+	$(UV) tool run --from 'pip-licenses>=5,<6' pip-licenses --python $(BIN)/python --order=license
+
+# Takes an hour: every Python, then the lower bounds of all dependencies. TESTS= chooses a part.
+test-matrix: $(DEV_STAMP)
+	for python in $(MATRIX); do \
+		$(UV) venv --quiet --clear --python $$python out/matrix/$$python && \
+		$(UV) pip install --quiet --python out/matrix/$$python/bin/python -e '.[dev,cluster,classifier,mdf]' && \
+		out/matrix/$$python/bin/python -m pytest -q $(TESTS) || exit 1; \
+	done
+	$(UV) venv --quiet --clear --python 3.11 out/matrix/lowest
+	$(UV) pip install --quiet --python out/matrix/lowest/bin/python --resolution lowest-direct -e '.[dev]'
+	out/matrix/lowest/bin/python -m pytest -q $(TESTS)
 
 clean:
 	rm -rf $(VENV) out build dist

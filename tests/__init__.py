@@ -1,1 +1,1 @@
-"""Tests; a package so that `tests.simulators` can be imported from examples and other tests."""
+"""Tests; a package, so that they can share what they make."""

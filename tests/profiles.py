@@ -6,10 +6,10 @@ from functools import lru_cache
 
 import numpy as np
 
-from tests.simulators.driver_simulator import simulate_drive
+from xosc_lateral.datasets.driver_simulator import simulate_drive
 from xosc_lateral.driver.fitting import fit_profile
 from xosc_lateral.driver.profile import DriverProfile
-from xosc_lateral.driver.series import Drive
+from xosc_lateral.drives.drive import Drive
 
 
 def as_drive(table: object, name: str = "simulated") -> Drive:

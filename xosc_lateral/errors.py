@@ -31,6 +31,10 @@ class FormatError(XoscLateralError, ValueError):
         super().__init__(" ".join(locate(what, path=path, line=line, element=element).split()))
 
 
+class MissingFileError(FormatError):
+    """A file that another one names is not there."""
+
+
 class UnsupportedElementError(FormatError):
     """An element that is understood but can't be played: named, never skipped."""
 

@@ -9,8 +9,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from tests.simulators import simulate_drive
 from xosc_lateral.cli import main
+from xosc_lateral.datasets import simulate_drive
 
 
 @pytest.fixture(scope="module")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 from pathlib import Path
 
@@ -25,11 +26,12 @@ def _files(folder: Path) -> dict[Path, bytes]:
     ("verb", "options", "what"),
     [
         ("convert", ["-o", "cut-in.xosc"], "cut-in.xosc: is an input"),
-        ("convert", ["-o", "cut-in.xodr"], "cut-in.xodr: is an input"),
-        ("convert", ["-o", "out.xosc", "--report", "cut-in.xosc"], "cut-in.xosc: is an input"),
-        ("convert", ["-o", "out.xosc", "--report", "out.xosc"], "out.xosc: is named for two outputs"),
-        ("convert", ["-o", "out.xosc", "--report", "cut-in.xodr"], "cut-in.xodr: is an input"),
-        ("convert", ["-o", "out.xosc", "--report", "."], "is a folder"),
+        ("convert", ["-o", "cut-in.xodr"], "cut-in.xodr: can't write .xodr: expected a name ending in .xosc"),
+        ("convert", ["-o", "out.xosc", "--report", "cut-in.xosc"], "cut-in.xosc: can't write .xosc"),
+        ("convert", ["-o", "out.xosc", "--report", "cut-in.xodr"], "cut-in.xodr: can't write .xodr"),
+        ("convert", ["-o", "theirs.xosc"], "theirs.xosc: exists and was not written by xosc-lateral"),
+        ("convert", ["-o", "out.xosc", "--report", "theirs.html"], "theirs.html: exists and was not written by"),
+        ("convert", ["-o", "v.xosc", "--variants", "2"], "v_02.xosc: exists and was not written by xosc-lateral"),
         ("convert", ["-o", "out.xosc", "--report", "cut-in.xodr/r.html"], "cut-in.xodr/r.html: can't be written: "),
         ("convert", ["-o", "cut-in.xodr/out.xosc"], "cut-in.xodr/out.xosc: can't be written: "),
         (
@@ -40,8 +42,9 @@ def _files(folder: Path) -> dict[Path, bytes]:
         ("convert", ["-o", "out.xosc", "--allow", "nowhere"], "nowhere: no such folder to allow"),
         ("convert", ["-o", "out.xosc", "--profile", "none.json"], "none.json: no such file"),
         ("convert", ["-o", "out.xosc", "--context", "none.csv"], "none.csv: no such file or directory"),
-        ("play", ["-o", "cut-in.xosc"], "cut-in.xosc: is an input"),
-        ("play", ["-o", "cut-in.xodr"], "cut-in.xodr: is an input"),
+        ("play", ["-o", "cut-in.xosc"], "cut-in.xosc: can't write .xosc"),
+        ("play", ["-o", "out.xlsx"], "out.xlsx: can't write .xlsx: expected a name ending in .csv"),
+        ("play", ["-o", "theirs.csv"], "theirs.csv: exists and was not written by xosc-lateral"),
     ],
 )
 def test_no_verb_writes_over_its_inputs(
@@ -53,6 +56,8 @@ def test_no_verb_writes_over_its_inputs(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     monkeypatch.chdir(scenario.parent)
+    for name in ("theirs.xosc", "theirs.html", "theirs.csv", "v_02.xosc"):
+        Path(name).write_text("<work of weeks/>")
     before = _files(scenario.parent)
     assert main([verb, "cut-in.xosc", *options]) == 1
     (line,) = capsys.readouterr().err.splitlines()
@@ -63,10 +68,8 @@ def test_no_verb_writes_over_its_inputs(
 @pytest.mark.parametrize(
     "words",
     [
-        ["fit", "t.csv", "-o", "t.csv"],
-        ["close-loop", "t.csv", "-o", "t.csv", "--report", "loop"],
         ["sample", "--profile", "motorway-car", "--like", "t.csv", "--seed", "1", "-o", "t.csv"],
-        ["evaluate", "t.csv", "--profile", "motorway-car", "--report", "t.csv"],
+        ["sample", "--profile", "motorway-car", "--context", "t.csv", "--force", "-o", "t.csv"],
     ],
 )
 def test_no_verb_writes_over_measured_drives(
@@ -115,3 +118,83 @@ def test_a_lane_without_width_is_refused_by_name(scenario: Path, capsys: pytest.
     (line,) = capsys.readouterr().err.splitlines()
     assert line.endswith("cut-in.xodr: road '1': lane -2 has no width where 'Ego' follows it")
     assert _files(scenario.parent) == before
+
+
+def test_what_this_package_wrote_is_written_again_and_what_was_edited_is_not(
+    scenario: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(scenario.parent)
+    words = ["play", "cut-in.xosc", "--time-limit", "1", "-q", "-o"]
+    for name in ("states.csv", "states.csv.gz", "states.parquet"):
+        assert main([*words, name]) == main([*words, name]) == 0
+    assert main(["template", "write", "cut-in", "-o", "."]) == 0
+    scenario.write_text(scenario.read_text().replace('value="30"', 'value="31"'))
+    edited = scenario.read_bytes()
+    assert main(["template", "write", "cut-in", "-o", "."]) == 1
+    assert "--force replaces it" in capsys.readouterr().err
+    assert scenario.read_bytes() == edited
+    with Path("states.csv").open("a") as file:
+        file.write("a note of mine\n")
+    assert main([*words, "states.csv"]) == 1
+    assert main([*words, "states.csv", "--force"]) == 0
+    assert "a note" not in Path("states.csv").read_text()
+
+
+def test_a_folder_is_meant_by_a_slash_and_by_being_there(
+    scenario: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(scenario.parent)
+    assert main(["convert", "cut-in.xosc", "-o", "new/", "--time-limit", "5", "--report", "new/"]) == 0
+    assert sorted(path.name for path in Path("new").iterdir()) == ["cut-in.html", "cut-in.xosc"]
+    assert main(["convert", "cut-in.xosc", "-o", ".", "--time-limit", "5"]) == 0
+    assert Path("cut-in_lifelike.xosc").exists()
+    assert main(["play", "cut-in.xosc", "-o", "new", "--time-limit", "1"]) == 0
+    assert Path("new/cut-in.csv").exists()
+
+
+def test_standard_output_gets_what_the_file_would_hold(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfdbinary: pytest.CaptureFixture[bytes]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert main(["template", "write", "cut-in", "-o", "."]) == 0
+    assert main(["convert", "cut-in.xosc", "-o", "same.xosc", "--time-limit", "5", "-q"]) == 0
+    assert main(["play", "cut-in.xosc", "-o", "same.csv", "--time-limit", "1", "-q"]) == 0
+    capfdbinary.readouterr()
+    assert main(["convert", "cut-in.xosc", "-o", "-", "--time-limit", "5"]) == 0
+    out, err = capfdbinary.readouterr()
+    assert out == Path("same.xosc").read_bytes()
+    assert b"segments" in err
+    assert main(["play", "cut-in.xosc", "-o", "-", "--time-limit", "1"]) == 0
+    assert capfdbinary.readouterr().out == Path("same.csv").read_bytes()
+
+
+def test_an_empty_folder_and_a_glob_without_a_match_are_errors(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("empty").mkdir()
+    assert main(["convert", "empty", "-o", "out"]) == 1
+    assert "empty: no .xosc file in this folder" in capsys.readouterr().err
+    assert main(["convert", "*.xosc", "-o", "out"]) == 1
+    assert "*.xosc: nothing matches" in capsys.readouterr().err
+    assert not Path("out").exists()
+
+
+def test_errors_are_json_too(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    broken = tmp_path / "broken.xosc"
+    broken.write_text("<OpenSCENARIO>\n<FileHeader></OpenSCENARIO>")
+    assert main(["segments", str(broken), "--json"]) == 1
+    said = capsys.readouterr()
+    error = json.loads(said.out)["error"]
+    assert (error["kind"], error["path"], error["line"]) == ("FormatError", str(broken), 2)
+    assert f"xosc-lateral: {error['message']}\n" == said.err
+
+
+def test_only_leaves_the_others_as_they_are(
+    scenario: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(scenario.parent)
+    assert main(["convert", "cut-in.xosc", "-o", "one.xosc", "--only", "Ego", "-q"]) == 0
+    written = Path("one.xosc").read_text()
+    assert written.count("<FollowTrajectoryAction>") == 1
+    assert "<LaneChangeAction>" in written

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import pytest
 from typer.testing import CliRunner
 
-from tests.motion.stage import Stage, after, event, lane_change, maneuvers, to_lane
+from tests.playback.stage import Stage, after, event, lane_change, maneuvers, to_lane
 from xosc_lateral.cli import app
+from xosc_lateral.errors import FormatError
 
 RUN = CliRunner()
 
@@ -40,3 +42,22 @@ def test_a_scenario_that_is_not_there_leaves_no_table(tmp_path: Path) -> None:
     result = RUN.invoke(app, ["play", str(tmp_path / "none.xosc"), "-o", str(tmp_path / "s.csv")])
     assert result.exit_code != 0
     assert not (tmp_path / "s.csv").exists()
+
+
+def test_a_missing_vehicle_catalog_is_an_error_when_strict(scenario: Path, tmp_path: Path) -> None:
+    text = scenario.read_text()
+    reference = '<CatalogReference catalogName="Cars" entryName="sports car"/>'
+    text, replaced = re.subn(r"<Vehicle .*?</Vehicle>", reference, text, count=1, flags=re.DOTALL)
+    assert replaced
+    scenario.write_text(text)
+    table, enriched = tmp_path / "states.csv", tmp_path / "out.xosc"
+    usual = RUN.invoke(app, ["play", str(scenario), "-o", str(table), "--time-limit", "1"])
+    assert usual.exit_code == 0
+    assert "played as a car of usual size" in usual.stderr
+    table.unlink()
+    for words in (["play", str(scenario), "-o", str(table)], ["convert", str(scenario), "-o", str(enriched)]):
+        refused = RUN.invoke(app, [*words, "--strict"])
+        assert isinstance(refused.exception, FormatError)
+        assert "catalog 'Cars' not found" in str(refused.exception)
+    assert not table.exists()
+    assert not enriched.exists()

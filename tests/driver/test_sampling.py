@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
+from msgspec.structs import replace
 
 from tests.profiles import simulated_profile
-from xosc_lateral.driver.core import Start
 from xosc_lateral.driver.effects import Acts, Drift, EffectTerms, Linear, Regimes, Weave
+from xosc_lateral.driver.models.base import Start
 from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.driver.sampling import OffsetSampler, combine, sample_offsets
 from xosc_lateral.driver.seeds import child

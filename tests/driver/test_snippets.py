@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from tests.profiles import as_drive, simulated_profile
-from tests.simulators import simulate_drive
-from xosc_lateral.driver.series import Drive, all_runs
+from xosc_lateral.datasets import simulate_drive
 from xosc_lateral.driver.snippets import cut_snippets, sample_context, sample_free, sample_like
+from xosc_lateral.drives.cuts import all_runs
+from xosc_lateral.drives.drive import Drive
 from xosc_lateral.errors import NotEnoughDataError
 
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import json
 import tracemalloc
-from dataclasses import replace
 
 import numpy as np
 import pytest
+from msgspec.structs import replace
 
 from xosc_lateral.driver.effects import (
     EFFECTS,
@@ -24,10 +24,10 @@ from xosc_lateral.driver.effects import (
     Step,
     Weave,
 )
+from xosc_lateral.driver.models.two_level.fit import fit_two_level
 from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.driver.sampling import sample_offsets
 from xosc_lateral.driver.stream import OffsetStream
-from xosc_lateral.driver.two_level import fit_two_level
 from xosc_lateral.driver.upsampling import upsample
 from xosc_lateral.errors import DriverProfileError
 from xosc_lateral.formats.profiles import read_profile
@@ -193,7 +193,7 @@ def test_every_kind_of_effect_is_covered_here() -> None:
 @pytest.mark.parametrize("effects", [(), PACED, HIDDEN], ids=["bare", "paced", "hidden"])
 def test_shipped_profiles_stream_and_go_on_like_the_batch_call(effects: tuple[Effect, ...]) -> None:
     profile = replace(read_profile("motorway-car"), effects=effects)
-    assert profile.model.kind == "best"
+    assert profile.model.kind == "autoregressive"
     columns = make_contexts(500)
     contexts = rows(columns)
     stream = OffsetStream(profile, 9, start=0.2)

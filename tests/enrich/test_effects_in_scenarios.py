@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+from msgspec.structs import replace
 
 from tests.motion.made_motion import RADIUS, drive, entity, together, two_roads
 from tests.profiles import simulated_profile
@@ -25,8 +25,8 @@ def _effect_alone(motion: NominalMotion, network: RoadNetwork, effect: Effect) -
     """Time and what the effect adds to the first vehicle's offset: the same seed with and without it."""
     base = simulated_profile()
     name = motion.entities[0].name
-    without = enrich(motion, network, {name: base}, seed=4).entity(name)
-    with_it = enrich(motion, network, {name: replace(base, effects=(effect,))}, seed=4).entity(name)
+    without = enrich(motion, network, {name: base}, seed=4, joint=False).entity(name)
+    with_it = enrich(motion, network, {name: replace(base, effects=(effect,))}, seed=4, joint=False).entity(name)
     assert not with_it.neutral
     (plain,), (changed,) = without.segments, with_it.segments
     return changed.time, changed.offset - plain.offset

@@ -5,39 +5,43 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
+from msgspec import structs
 
 from tests.motion.made_motion import drive, entity, together, two_roads
 from tests.profiles import simulated_profile
-from xosc_lateral.driver.effects import EffectTerms
+from xosc_lateral.driver.effects import Acts, ColumnEffect
 from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.enrich.enrich import enrich
 from xosc_lateral.motion.nominal import Activity
 from xosc_lateral.motion.trajectory import distance_driven
 
 
-class Shift:
-    """An effect that shows what it was given: moves by 1 m for each unit of a column."""
+class Shift(ColumnEffect, frozen=True, kw_only=True):
+    """An effect that moves by 1 m for each unit of a column."""
 
-    kind = "shift"
+    acts: Acts = Acts.LOCATION
+    coefficients: tuple[float, ...] = (1.0,)
+    errors: tuple[float, ...] = (0.0,)
+    reference: tuple[float, ...] = (0.0,)
+    column: str
 
-    def __init__(self, column: str) -> None:
-        self.columns = (column,)
-        self.seen: list[int] = []
+    @property
+    def columns(self) -> tuple[str, ...]:
+        return (self.column,)
 
-    def terms(self, time: np.ndarray, context: Mapping[str, np.ndarray], rng: np.random.Generator) -> EffectTerms:
-        self.seen.append(len(time))
-        return EffectTerms(location=np.nan_to_num(context.get(self.columns[0], np.zeros(len(time)))))
+    @property
+    def shape(self) -> str:
+        return "shift"
 
-    def to_dict(self) -> dict[str, Any]:
-        return {"kind": self.kind}
+    def quantity(self, context: Mapping[str, np.ndarray]) -> np.ndarray:
+        return np.nan_to_num(context[self.column])[:, None]
 
 
 def _with(profile: DriverProfile, *effects: object) -> DriverProfile:
-    return replace(profile, effects=effects)  # type: ignore[arg-type]
+    return structs.replace(profile, effects=effects)
 
 
 def test_the_path_deviates_by_the_sampled_offsets_to_a_centimetre_in_lane_coordinates(tmp_path: Path) -> None:
@@ -88,7 +92,7 @@ def test_each_entity_has_random_numbers_of_its_own(tmp_path: Path) -> None:
     profile = simulated_profile()
     a, b = drive(network, entity("a")), drive(network, entity("b"), lane=-1)
     alone = enrich(together(a), network, {"a": profile}, seed=5)
-    both = enrich(together(b, a), network, {"a": profile, "b": profile}, seed=5)
+    both = enrich(together(b, a), network, {"a": profile, "b": profile}, seed=5, joint=False)
     np.testing.assert_array_equal(alone.entity("a").deviation, both.entity("a").deviation)
     assert not np.array_equal(both.entity("a").deviation, both.entity("b").deviation)
     for other in ({"seed": 6}, {"seed": 5, "variant": 1}, {"seed": 5, "entropy": [1]}):
@@ -99,22 +103,21 @@ def test_each_entity_has_random_numbers_of_its_own(tmp_path: Path) -> None:
 def test_an_effect_sees_the_context_around_its_segment_and_acts_in_it(tmp_path: Path) -> None:
     network = two_roads(tmp_path)
     base = simulated_profile()
-    effect = Shift("curvature")
+    effect = Shift(column="curvature", lag_s=-1.0)
     activity = np.full(1001, int(Activity.ACTIVE), dtype=np.uint8)
     activity[300:400] |= int(Activity.LATERAL)
     motion = together(drive(network, entity(), start=200.0, duration=20.0, activity=activity))
     plain = enrich(motion, network, {"car": base}, seed=1).entity("car")
     shifted = enrich(motion, network, {"car": _with(base, effect)}, seed=1).entity("car")
     for with_effect, without in zip(shifted.segments, plain.segments, strict=True):
-        in_curve = 200.0 + 30.0 * with_effect.time > 500.0
+        in_curve = 200.0 + 30.0 * (with_effect.time + 1.0) > 500.0  # looked ahead by a second, beyond the segment too
         expected = np.where(in_curve, 1.0 / (400.0 + 5.25), 0.0)
         np.testing.assert_allclose(with_effect.offset - without.offset, expected, atol=1e-9)
-    assert effect.seen[0] > len(shifted.segments[0].time)
 
 
 def test_a_context_that_nobody_supplies_is_named_and_a_given_one_is_used(tmp_path: Path) -> None:
     network = two_roads(tmp_path)
-    driver = _with(simulated_profile(), Shift("wind_speed"))
+    driver = _with(simulated_profile(), Shift(column="wind_speed"))
     motion = together(drive(network, entity()))
     unknown = enrich(motion, network, {"car": driver}, seed=1)
     assert unknown.entity("car").neutral == ("wind_speed",)
@@ -130,13 +133,15 @@ def test_touching_and_leaving_the_lane_are_reported_and_resampled_on_request(tmp
     network = two_roads(tmp_path)
     motion = together(drive(network, entity("a"), lane=-2), drive(network, entity("b"), lane=-1))
     far_left = (np.array([0.0, 10.0]), np.array([2.2, 2.2]))
-    driver = _with(simulated_profile(), Shift("push"))
-    result = enrich(motion, network, {"a": driver}, seed=1, context={"push": far_left})
+    driver = _with(simulated_profile(), Shift(column="push"))
+    result = enrich(motion, network, {"a": driver}, seed=1, context={"push": far_left}, joint=False)
     assert [departure.name for departure in result.departures] == ["a"]
     assert [gap.names for gap in result.new_contacts] == [("a", "b")]
     assert len(result.warnings()) == 2
-    again = enrich(motion, network, {"a": driver}, seed=1, context={"push": far_left}, attempts=3)
+    again = enrich(motion, network, {"a": driver}, seed=1, context={"push": far_left}, attempts=3, joint=False)
     assert len(again.departures) == 1  # nothing helps against a driver who is pushed over the marking
+    jointly = enrich(motion, network, {"a": driver}, seed=1, context={"push": far_left})
+    assert not jointly.new_contacts, "a car that is there is given way to"
     calm = enrich(motion, network, {"a": simulated_profile()}, seed=1, attempts=3)
     assert calm.attempt == 0
     assert not calm.warnings()
@@ -183,7 +188,7 @@ def test_a_positive_offset_is_to_the_left_of_travel_in_both_traffic_rules(tmp_pa
     for lane in (-2, 2):
         motion = together(drive(network, entity(), lane=lane, start=100.0))
         base = enrich(motion, network, {"car": simulated_profile()}, seed=1).entity("car").trajectory
-        driver = _with(simulated_profile(), Shift("push"))
+        driver = _with(simulated_profile(), Shift(column="push"))
         pushed = enrich(motion, network, {"car": driver}, seed=1, context={"push": push}).entity("car").trajectory
         heading = motion.entities[0].heading
         left = -np.sin(heading) * (pushed.x - base.x) + np.cos(heading) * (pushed.y - base.y)

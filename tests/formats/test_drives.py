@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from xosc_lateral.driver.series import all_runs
+from xosc_lateral.drives.cuts import all_runs
 from xosc_lateral.errors import FormatError, NotEnoughDataError
 from xosc_lateral.formats.drives import parse_map, read_drives
 
@@ -134,7 +134,7 @@ BAD = {
     ),
     "no time": (table().drop(columns="time"), FormatError, "no column 'time'; there are distance_left"),
     "one marking": (table().drop(columns="distance_left"), FormatError, "needs distance_left and distance_right, or"),
-    "words": (changed(speed=["fast"] * 600), FormatError, r":2: column 'speed': 'fast' is no number"),
+    "words": (changed(speed=["fast"] * 600), FormatError, r":2: column 'speed': 'fast' is not a number"),
     "empty": (table().iloc[:0], NotEnoughDataError, r"no rows; 10 s of driving are needed"),
     "all missing": (changed(distance_left=np.nan), NotEnoughDataError, "no drive holds two rows"),
     "nameless drive": (changed(drive=["a"] * 599 + [None]), FormatError, ":601: column 'drive': no value"),
@@ -169,6 +169,7 @@ def test_a_drive_too_short_is_refused_when_it_is_cut(tmp_path: Path) -> None:
         ("no.csv", b'time,offset\n1,2\n3,4,5,6\n"'),
         ("no.txt", b"time,offset\n"),
     ],
+    ids=["no parquet", "gzip cut short", "no gzip", "empty", "no text", "ragged rows", "unknown suffix"],
 )
 def test_files_that_are_no_tables_are_refused(tmp_path: Path, name: str, content: bytes) -> None:
     path = tmp_path / name
@@ -179,8 +180,8 @@ def test_files_that_are_no_tables_are_refused(tmp_path: Path, name: str, content
     assert "\n" not in str(caught.value)
 
 
-def test_a_missing_file_is_the_systems_error(tmp_path: Path) -> None:
-    with pytest.raises(OSError, match="nowhere"):
+def test_a_missing_file_is_said_in_one_line(tmp_path: Path) -> None:
+    with pytest.raises(FormatError, match=r"nowhere\.parquet: no such file or directory"):
         read_drives(tmp_path / "nowhere.parquet")
 
 
@@ -202,3 +203,51 @@ def test_a_mapped_column_must_be_there(tmp_path: Path) -> None:
     table().to_parquet(path)
     with pytest.raises(FormatError, match="no column 'v' for speed; there are time"):
         read_drives(path, parse_map(["speed=v"]))
+
+
+@pytest.mark.parametrize("separator", [";", "\t"])
+def test_decimal_commas_are_read(tmp_path: Path, separator: str) -> None:
+    made = table().assign(range=np.linspace(1234.5, 2000.0, 600))
+    path = tmp_path / "mine.csv"
+    path.write_text(made.to_csv(index=False, sep=separator, decimal=","))
+    (drive,) = read_drives(path)
+    assert np.allclose(drive.offset, 0.2 * np.sin(made.time / 3))
+    assert np.allclose(drive.context["range"], made["range"])
+    path.write_text(path.read_text().replace("1234,5", "1.234,5"))
+    assert read_drives(path)[0].context["range"][0] == pytest.approx(1234.5)
+
+
+def test_decimal_commas_between_commas_are_refused_in_one_line(tmp_path: Path) -> None:
+    path = tmp_path / "mine.csv"
+    path.write_text("time,offset,lane_width\n0,00,0,12,3,75\n0,04,0,13,3,75\n")
+    with pytest.raises(FormatError, match=r"mine\.csv:2: 6 values under 3 headers; if numbers have a decimal comma"):
+        read_drives(path)
+
+
+@pytest.mark.parametrize(
+    "form",
+    [
+        "%Y-%m-%dT%H:%M:%S.%f+01:00",
+        "%Y-%m-%d %H:%M:%S.%f",
+        "%d.%m.%Y %H:%M:%S,%f",
+        "%m/%d/%Y %H:%M:%S.%f",
+        "%H:%M:%S,%f",
+    ],
+    ids=["iso", "plain", "german", "american", "clock"],
+)
+def test_dates_and_clock_times_become_seconds(tmp_path: Path, form: str) -> None:
+    made = table()
+    stamps = pd.Timestamp("2026-11-07 23:59:50") + pd.to_timedelta(made.time, unit="s")  # past midnight, also by clock
+    path = tmp_path / "mine.csv"
+    path.write_text(made.assign(time=stamps.dt.strftime(form)).to_csv(index=False, sep=";"))
+    (drive,) = read_drives(path)
+    assert np.allclose(drive.time - drive.time[0], made.time - made.time[0], atol=1e-5)
+
+
+def test_words_that_change_on_the_way_are_categories_and_names_are_not(tmp_path: Path) -> None:
+    made = pd.concat([table().assign(drive=name, driver=name) for name in ("a", "b")])
+    made["surface"] = np.where(made.time < 10, "dry", "wet")
+    made.to_csv(tmp_path / "mine.csv", index=False)
+    first, _ = read_drives(tmp_path / "mine.csv")
+    assert {"surface=dry", "surface=wet"} <= first.levels
+    assert not any("driver" in name for name in first.context)

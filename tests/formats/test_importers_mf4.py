@@ -86,3 +86,77 @@ def test_without_asammdf_the_extra_is_named(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "asammdf", None)
     with pytest.raises(FormatError, match=r"xosc-lateral\[mdf\]"):
         import_mf4(tmp_path / "a.mf4", MAP)
+
+
+@pytest.fixture
+def bus(tmp_path: Path) -> Path:
+    """Distances in cm, speed in km/h (units in the file), lane index and flag at 2 Hz, road state in words."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # asammdf's own imports
+        asammdf = pytest.importorskip("asammdf", reason="extra `mdf` is not installed")
+    fast, slow = np.arange(0, 60, 0.02), np.arange(0, 60, 0.5)
+    with asammdf.MDF(version="4.10") as mdf:
+        for name, values, unit in (("LnMrkLe_Dist", 180.0, "cm"), ("LnMrkRi_Dist", 170.0, "cm")):
+            mdf.append([asammdf.Signal(np.full(len(fast), values), fast, name=name, unit=unit)])
+        mdf.append([asammdf.Signal(np.full(len(slow), 108, dtype=np.uint8), slow, name="VehSpd", unit="Km/h")])
+        mdf.append([asammdf.Signal(np.full(len(slow), 12.0), slow, name="Strg", unit="°")])
+        mdf.append([asammdf.Signal((slow >= 30).astype(np.uint8), slow, name="LaneIdx")])
+        mdf.append([asammdf.Signal(slow >= 20.25, slow, name="Rain_Flg")])
+        words = np.where(slow < 40, b"DRY", b"WET")
+        mdf.append([asammdf.Signal(words, slow, name="RoadState", encoding="utf-8")])
+        mdf.save(tmp_path / "bus.mf4", overwrite=True)
+    return tmp_path / "bus.mf4"
+
+
+BUS = ["distance_left=LnMrkLe_Dist", "distance_right=LnMrkRi_Dist", "speed=VehSpd"]
+
+
+@pytest.mark.filterwarnings("default")
+def test_units_in_the_file_count_unless_the_map_names_another(bus):
+    table = import_mf4(bus, [*BUS, "steering_wheel_angle=Strg"]).table
+    assert table["distance_left"].to_numpy() == pytest.approx(1.8)
+    assert table["speed"].to_numpy() == pytest.approx(30.0)
+    assert table["steering_wheel_angle"].to_numpy() == pytest.approx(np.radians(12.0))
+    assert import_mf4(bus, [*BUS[:2], "speed=VehSpd:mph"]).table["speed"].to_numpy() == pytest.approx(108 * 0.44704)
+
+
+@pytest.mark.filterwarnings("default")
+def test_a_unit_of_something_else_is_refused_with_what_to_write(bus):
+    with pytest.raises(FormatError, match=r"Strg is in '°': speed is held in m/s.*--map speed=Strg:UNIT"):
+        import_mf4(bus, [*BUS[:2], "speed=Strg"])
+
+
+@pytest.mark.filterwarnings("default")
+def test_indices_flags_and_words_keep_their_values(bus, tmp_path):
+    from xosc_lateral.formats.drives import read_drives
+    from xosc_lateral.formats.importers.table import write_imported
+
+    imported = import_mf4(bus, [*BUS, "lane_index=LaneIdx", "wiper=Rain_Flg", "surface=RoadState"])
+    table = imported.table
+    assert set(table["lane_index"]) == {0.0, 1.0} and set(table["wiper"]) == {0.0, 1.0}
+    assert set(table["surface"]) == {"DRY", "WET"}
+    assert table.loc[table["lane_index"] == 1, "time"].min() == pytest.approx(29.76, abs=0.021), "half a sample before"
+    write_imported(imported, tmp_path / "t.parquet")
+    (drive,) = read_drives(tmp_path / "t.parquet")
+    assert {"lane_index", "wiper", "surface=DRY", "surface=WET"} <= drive.levels
+    assert drive.context["surface=WET"][drive.time > 40].min() == 1.0
+
+
+@pytest.mark.filterwarnings("default")
+def test_a_missing_channel_brings_up_the_like_of_it(bus):
+    with pytest.raises(FormatError, match=r"no channel lnmrkle_dst; like it are LnMrkLe_Dist"):
+        import_mf4(bus, ["distance_left=lnmrkle_dst", *BUS[1:]])
+
+
+@pytest.mark.filterwarnings("default")
+def test_several_logs_in_one_call_are_several_drives(bus, tmp_path, capsys):
+    other = tmp_path / "second.mf4"
+    other.write_bytes(bus.read_bytes())
+    words = [word for name in BUS for word in ("--map", name)]
+    assert main(["import", "mf4", str(bus), str(other), *words, "-o", str(tmp_path / "t.parquet")]) == 0
+    import pandas as pd
+
+    table = pd.read_parquet(tmp_path / "t.parquet")
+    assert table.groupby("drive").size().to_dict() == {"bus": 1500, "second": 1500}
+    assert main(["import", "mf4", str(bus), str(bus), *words, "-o", str(tmp_path / "t.parquet")]) == 1
+    assert "named twice" in capsys.readouterr().err

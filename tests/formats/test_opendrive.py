@@ -161,3 +161,15 @@ def test_a_damaged_file_is_refused_in_one_line_or_gives_finite_places(path, tmp_
                     assert np.isfinite(np.array(poses)).all()
                     assert network.advance(index, lane.id, section.start, 500.0).remaining <= 500.0
     assert 0 < refused < 25
+
+
+def test_the_offset_of_the_header_moves_what_leaves_the_program(tmp_path):
+    """Moved by (100, 200, 3), then turned by 90 degrees about the origin."""
+    text = (DATA / "valid" / "odd.xodr").read_text()
+    path = tmp_path / "moved.xodr"
+    path.write_text(text.replace("</header>", '<offset x="100" y="200" z="3" hdg="1.5707963267948966"/></header>'))
+    offset = read_opendrive(path).header_offset
+    x, y, z, heading = offset.apply(*(np.array([value]) for value in (1.0, 2.0, 0.5, 0.25)))
+    assert (x[0], y[0], z[0], heading[0]) == pytest.approx((-202.0, 101.0, 3.5, 0.25 + np.pi / 2))
+    assert offset.undo(-202.0, 101.0) == pytest.approx((1.0, 2.0))
+    assert not read_opendrive(DATA / "valid" / "odd.xodr").header_offset

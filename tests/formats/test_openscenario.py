@@ -29,6 +29,7 @@ from xosc_lateral.formats.openscenario import read_scenario
 from xosc_lateral.formats.openscenario.references import LEVELS_UP
 from xosc_lateral.scenario.actions import (
     AbsoluteTargetSpeed,
+    AssignRouteAction,
     FollowTrajectoryAction,
     LaneChangeAction,
     RelativeTargetLane,
@@ -39,8 +40,7 @@ from xosc_lateral.scenario.actions import (
 from xosc_lateral.scenario.conditions import SimulationTimeCondition, TimeHeadwayCondition
 from xosc_lateral.scenario.enums import ConditionEdge, DynamicsShape, Priority, Rule, VehicleCategory
 from xosc_lateral.scenario.place import Unsupported
-from xosc_lateral.scenario.position import LanePosition
-from xosc_lateral.scenario.trajectory import Polyline
+from xosc_lateral.scenario.position import LanePosition, Polyline
 
 DEEP = "/".join("abcdefgh"[: LEVELS_UP + 1])
 UP = "../" * (LEVELS_UP + 1)
@@ -304,7 +304,7 @@ def test_a_stale_road_path_falls_back_to_the_name_beside_the_scenario_with_a_rem
     assert [remark.kind for remark in scenario.remarks] == ["LogicFile"]
 
 
-def test_only_a_stated_hash_lets_our_own_output_name_files_elsewhere(tmp_path: Path) -> None:
+def test_a_forged_provenance_opens_no_file_elsewhere(tmp_path: Path) -> None:
     roads = tmp_path / "roads"
     roads.mkdir()
     road = roads / "far.xodr"
@@ -314,10 +314,9 @@ def test_only_a_stated_hash_lets_our_own_output_name_files_elsewhere(tmp_path: P
     digest = hashlib.sha256(road.read_bytes()).hexdigest()
     marked = f'<!-- xosc-lateral provenance: {{"inputs": {{"far.xodr": "{digest}"}}}} --><FileHeader'
     path.write_text(text.replace("<FileHeader", marked))
-    assert read_scenario(path).road_file == road
-    road.write_text("<OpenDRIVE>changed</OpenDRIVE>")
     with pytest.raises(FormatError, match="lies outside"):
         read_scenario(path)
+    assert read_scenario(path, allowed=[roads]).road_file == road
 
 
 def test_external_entity_reads_nothing(tmp_path: Path) -> None:
@@ -333,9 +332,9 @@ def test_external_entity_reads_nothing(tmp_path: Path) -> None:
 
 
 def test_missing_file_and_folder_are_refused(tmp_path: Path) -> None:
-    with pytest.raises(FormatError, match="does not exist"):
+    with pytest.raises(FormatError, match="no such file"):
         read_scenario(tmp_path / "nothing.xosc")
-    with pytest.raises(FormatError, match="not a file"):
+    with pytest.raises(FormatError, match="is a folder, not a file"):
         read_scenario(tmp_path)
 
 
@@ -356,3 +355,57 @@ def test_later_versions_are_read_as_the_newest_known(tmp_path: Path) -> None:
     scenario = read_scenario(write_scenario(tmp_path, scenario_text(minor=7, stop=time_condition(3))))
     assert scenario.header.version == (1, 7)
     assert [remark.kind for remark in scenario.remarks] == ["FileHeader"]
+
+
+TRAJECTORY = (
+    '<Trajectory name="way" closed="false">' + declarations(parameter("Far", "50")) + "<Shape><Polyline>"
+    '<Vertex><Position><WorldPosition x="0" y="0"/></Position></Vertex>'
+    '<Vertex><Position><WorldPosition x="$Far" y="0"/></Position></Vertex></Polyline></Shape></Trajectory>'
+)
+ROUTE = (
+    '<Route name="way" closed="false">' + declarations(parameter("Far", "50")) + '<Waypoint routeStrategy="shortest">'
+    '<Position><LanePosition roadId="1" laneId="-1" s="0"/></Position></Waypoint><Waypoint routeStrategy="shortest">'
+    '<Position><LanePosition roadId="1" laneId="-1" s="$Far"/></Position></Waypoint></Route>'
+)
+
+
+@pytest.mark.parametrize("assigned", [None, "80"])
+def test_a_trajectory_and_a_route_of_a_catalog_take_assigned_values(tmp_path: Path, assigned: str | None) -> None:
+    catalog(tmp_path / "catalogs", TRAJECTORY, name="Ways.xosc")
+    catalog(tmp_path / "routes", ROUTE, name="Routes.xosc")
+    for folder, name in (("catalogs", "Ways"), ("routes", "Routes")):
+        path = tmp_path / folder / f"{name}.xosc"
+        path.write_text(path.read_text().replace('name="Cars"', f'name="{name}"'))
+    given = "" if assigned is None else assign("Far", assigned)
+    follow = (
+        f"<PrivateAction><RoutingAction><FollowTrajectoryAction>{reference('way', given, catalog_name='Ways')}"
+        '<TimeReference><None/></TimeReference><TrajectoryFollowingMode followingMode="position"/>'
+        "</FollowTrajectoryAction></RoutingAction></PrivateAction>"
+    )
+    route = (
+        f"<PrivateAction><RoutingAction><AssignRouteAction>{reference('way', given, catalog_name='Routes')}"
+        "</AssignRouteAction></RoutingAction></PrivateAction>"
+    )
+    both = locations("catalogs", "TrajectoryCatalog") + locations("routes", "RouteCatalog")
+    scenario = made(tmp_path, catalogs=both, stories=story(event("e", action("a", follow), action("b", route))))
+    first, second = scenario.storyboard.stories[0].acts[0].maneuver_groups[0].maneuvers[0].events[0].actions
+    far = 50.0 if assigned is None else 80.0
+    assert isinstance(first.content, FollowTrajectoryAction)
+    assert isinstance(second.content, AssignRouteAction)
+    assert isinstance(first.content.trajectory.shape, Polyline)
+    assert first.content.trajectory.shape.vertices[1].position.x == far  # type: ignore[union-attr]
+    assert second.content.route.waypoints[1].position.s == far  # type: ignore[union-attr]
+
+
+def test_a_missing_vehicle_catalog_costs_a_remark_and_a_usual_car(tmp_path: Path) -> None:
+    parts = {"entities": entity("Ego", reference("sports car"))}
+    scenario = made(tmp_path, **parts)
+    assert scenario.entity("Ego").bounding_box.length == 5.0
+    assert "'Ego' is played as a car of usual size" in scenario.remarks[0].reason
+    with pytest.raises(FormatError, match="catalog 'Cars' not found"):
+        read_scenario(scenario.path, strict=True)
+
+
+def test_an_empty_action_is_nothing(tmp_path: Path) -> None:
+    scenario = made(tmp_path, stories=story(event("e", '<Action name="idle"/>')))
+    assert scenario.storyboard.stories[0].acts[0].maneuver_groups[0].maneuvers[0].events[0].actions == ()

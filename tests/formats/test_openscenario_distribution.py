@@ -129,7 +129,10 @@ def test_every_kind_of_draw_is_read(tmp_path: Path, content: str) -> None:
     [
         (f"<Deterministic>{single('Speed', stepped('0', '1', '0'))}</Deterministic>", "stepWidth of 0 is not positive"),
         (f"<Deterministic>{single('Speed', stepped('2', '1', '1'))}</Deterministic>", "is below lowerLimit"),
-        (f"<Deterministic>{single('Speed', stepped('0', '1', '1e-9'))}</Deterministic>", "more than 1000000 values"),
+        (
+            f"<Deterministic>{single('Speed', stepped('0', '1', '1e-9'))}</Deterministic>",
+            r"tried: 1000000001, at most 1000000",
+        ),
         (f"<Deterministic>{single('Speed', stepped('0', 'NaN', '1'))}</Deterministic>", "not finite"),
         (
             f"<Deterministic>{single('Speed', USER_DEFINED)}</Deterministic>",

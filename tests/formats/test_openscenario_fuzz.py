@@ -31,8 +31,8 @@ from xosc_lateral.errors import FormatError, XoscLateralError
 from xosc_lateral.formats.opendrive import read_opendrive
 from xosc_lateral.formats.openscenario import read_distribution, read_scenario
 from xosc_lateral.formats.openscenario.write import write_trajectory_scenario
-from xosc_lateral.motion.playback import play
 from xosc_lateral.motion.trajectory import Trajectory
+from xosc_lateral.playback.player import play
 
 DATA = Path(__file__).parents[1] / "data" / "xosc"
 SLOWEST = 5.0

@@ -122,3 +122,15 @@ def test_an_entity_that_is_added_later_is_placed() -> None:
 def test_a_move_shorter_than_the_spacing_has_no_vertices_but_its_start() -> None:
     time = STEP * np.arange(10)
     assert len(vertex_times(time, 0.01 * np.arange(10), np.zeros(10))) == 1
+
+
+def test_vertices_are_apart_in_the_plane_even_where_the_way_winds() -> None:
+    """A circle of 4 cm, driven once: along the way 0.25 m, in the plane never 0.1 m apart."""
+    time = np.arange(0.0, 5.0, 0.02)
+    angle = 2.0 * np.pi * np.clip(time - 2.0, 0.0, 1.0)
+    x = np.where(time < 2.0, time, np.where(time < 3.0, 2.0 + 0.04 * np.sin(angle), time - 1.0))
+    y = 0.04 * (1.0 - np.cos(angle))
+    times = vertex_times(time, x, y)
+    gaps = np.hypot(np.diff(np.interp(times, time, x)), np.diff(np.interp(times, time, y)))
+    assert gaps.min() >= 0.1
+    assert (times[0], times[-1]) == (time[0], time[-1])

@@ -25,6 +25,12 @@ def convert(job: Job) -> ManifestRow:
         raise FormatError("nothing to play", path=job.source, line=1)
     if "bug" in text:
         raise ZeroDivisionError("by nought")
+    if "hang" in text:
+        time.sleep(0.5)  # a library's call
+        while True:
+            time.sleep(0.01)
+    if "memory" in text:
+        bytearray(2_000_000_000)
     if "crash" in text:
         os.kill(os.getpid(), signal.SIGKILL)
     if "full" in text:
@@ -33,8 +39,10 @@ def convert(job: Job) -> ManifestRow:
     content = f"{text}{road.read_text()}{job.settings.seed} {job.variant} {dict(job.settings.parameters)}"
     write_atomically(job.output, content)
     inputs = {"road.xodr": file_hash(road), job.scenario: file_hash(job.source)}
-    output_hash = hashlib.sha256(content.encode()).hexdigest()
-    return replace(job.row(), output_hash=output_hash, inputs=inputs, road="road.xodr", road_hash=inputs["road.xodr"])
+    output_sha256 = hashlib.sha256(content.encode()).hexdigest()
+    return replace(
+        job.row(), output_sha256=output_sha256, inputs=inputs, road="road.xodr", road_sha256=inputs["road.xodr"]
+    )
 
 
 def convert_and_log(job: Job) -> ManifestRow:

@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
+import hashlib
 import os
 import random
 import signal
 import subprocess
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from tests.pipeline.fake_converter import convert, convert_and_log
 from xosc_lateral.pipeline.batch import STATE, BatchStoppedError, Outcome, State, convert_many
+from xosc_lateral.pipeline.guard import JobLimits
 from xosc_lateral.pipeline.jobs import plan_batch
 from xosc_lateral.pipeline.lock import FolderInUseError, folder_lock
 from xosc_lateral.pipeline.manifest import MANIFEST, TIMINGS, read_manifest
@@ -33,7 +36,7 @@ def make_inputs(folder: Path, count: int = 12, **special: str) -> Path:
 
 
 def run(
-    inputs: Path, folder: Path, converter=convert, workers: int = 1, variants: int = 1, **settings
+    inputs: Path, folder: Path, converter=convert, workers: int = 0, variants: int = 1, **settings
 ) -> list[Outcome]:
     batch = plan_batch([inputs], folder, ConvertSettings(**settings), variants=variants)
     return list(convert_many(batch, workers=workers, converter=converter))
@@ -93,18 +96,101 @@ def test_one_bad_scenario_costs_one_row(tmp_path: Path) -> None:
     rows = {row.output: row for row in read_manifest(tmp_path / "out" / MANIFEST)}
     assert {name for name, row in rows.items() if not row.error} == {"000.xosc", "001.xosc"}
     assert rows["broken.xosc"].error == errors["broken.xosc"]
-    assert rows["broken.xosc"].scenario_hash
+    assert rows["broken.xosc"].scenario_sha256
 
 
-def test_a_failed_scenario_is_tried_again_and_its_old_output_goes(tmp_path: Path) -> None:
-    inputs, out = make_inputs(tmp_path / "in", 1), tmp_path / "out"
+def test_a_failed_scenario_keeps_its_old_output_which_is_said_to_be_stale(tmp_path: Path) -> None:
+    inputs, out = make_inputs(tmp_path / "in", 2), tmp_path / "out"
     run(inputs, out)
+    calm = tree(out)
     good = (inputs / "000.xosc").read_text()
     (inputs / "000.xosc").write_text(good + "<!-- bad -->")
-    assert states(run(inputs, out)) == {"000.xosc": State.FAILED}
-    assert not (out / "000.xosc").exists()
+    for _ in range(2):
+        assert states(run(inputs, out)) == {"000.xosc": State.FAILED, "001.xosc": State.UP_TO_DATE}
+        row = next(iter(read_manifest(out / MANIFEST)))
+        assert row.stale and "nothing to play" in row.error
+        assert row.output_sha256 == hashlib.sha256((out / "000.xosc").read_bytes()).hexdigest()
+        assert row.scenario_sha256 == hashlib.sha256(good.encode()).hexdigest()  # of what the old output was made from
     (inputs / "000.xosc").write_text(good)
-    assert states(run(inputs, out)) == {"000.xosc": State.WRITTEN}
+    assert states(run(inputs, out)) == {"000.xosc": State.UP_TO_DATE, "001.xosc": State.UP_TO_DATE}
+    assert tree(out) == calm
+
+
+def test_a_road_folder_that_is_not_mounted_costs_no_output(tmp_path: Path) -> None:
+    inputs, out = make_inputs(tmp_path / "in", 3), tmp_path / "out"
+    run(inputs, out)
+    calm = tree(out)
+    (inputs / "road.xodr").rename(tmp_path / "away")
+    assert set(states(run(inputs, out)).values()) == {State.FAILED}
+    assert {name for name in tree(out) if name != MANIFEST} == {name for name in calm if name != MANIFEST}
+    (tmp_path / "away").rename(inputs / "road.xodr")
+    run(inputs, out)
+    assert tree(out) == calm
+
+
+def test_what_somebody_else_put_in_an_outputs_place_is_no_output_of_ours(tmp_path: Path) -> None:
+    inputs, out = make_inputs(tmp_path / "in", 1), tmp_path / "out"
+    run(inputs, out)
+    (inputs / "000.xosc").write_text("<OpenSCENARIO what='bad'/>")
+    (out / "000.xosc").write_text("mine")
+    run(inputs, out)
+    row = next(iter(read_manifest(out / MANIFEST)))
+    assert not row.stale and not row.output_sha256
+    assert (out / "000.xosc").read_text() == "mine"
+
+
+@pytest.mark.parametrize("name", [MANIFEST, TIMINGS])
+@pytest.mark.parametrize("what", ["half", "text", "folder"])
+def test_a_damaged_manifest_is_put_aside_and_the_run_goes_on(tmp_path: Path, name: str, what: str) -> None:
+    inputs, out = make_inputs(tmp_path / "in", 2), tmp_path / "out"
+    run(inputs, out)
+    calm, whole = tree(out), (out / name).read_bytes()
+    (out / name).unlink()
+    if what == "folder":
+        (out / name).mkdir()
+    else:
+        (out / name).write_bytes(whole[: len(whole) // 2] if what == "half" else b"no Parquet")
+    said: list[str] = []
+    list(convert_many(plan_batch([inputs], out), workers=0, converter=convert, notify=said.append))
+    assert len(said) == 1
+    assert name in said[0] and "put aside" in said[0]
+    assert {key: value for key, value in tree(out).items() if "damaged" not in key} == calm
+
+
+def test_two_files_that_break_planning_cost_a_row_each(tmp_path: Path) -> None:
+    inputs = make_inputs(tmp_path / "in", 1)
+    (inputs / os.fsdecode(b"caf\xe9.xosc")).write_text("<OpenSCENARIO><Storyboard/></OpenSCENARIO>")
+    (inputs / "many.xosc").write_text(
+        "<OpenSCENARIO><FileHeader revMajor='1' revMinor='1'/><ParameterValueDistribution>"
+        "<ScenarioFile filepath='000.xosc'/><Stochastic numberOfTestRuns='1000000000000'/>"
+        "</ParameterValueDistribution></OpenSCENARIO>"
+    )
+    (tmp_path / "out" / "000.xosc").mkdir(parents=True)
+    errors = {outcome.row.output: outcome.row.error for outcome in run(inputs, tmp_path / "out")}
+    assert "is no UTF-8; rename it" in errors["caf\\udce9.xosc"]
+    assert "1000000000000, at most 100000" in errors["many.xosc"]
+    assert "directory" in errors["000.xosc"].lower()
+    assert len(list(read_manifest(tmp_path / "out" / MANIFEST))) == 3
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="needs /proc")
+@pytest.mark.parametrize(("what", "message"), [("hang", "longer than 1 s"), ("memory", "more than 300 MB")])
+@pytest.mark.parametrize("workers", [0, 1])
+def test_a_job_beyond_its_limits_costs_one_row(tmp_path: Path, what: str, message: str, workers: int) -> None:
+    batch = plan_batch([make_inputs(tmp_path / "in", 3, greedy=what)], tmp_path / "out")
+    outcomes = list(convert_many(batch, workers=workers, converter=convert, limits=JobLimits(1.0, 300.0)))
+    errors = {outcome.row.output: outcome.row.error for outcome in outcomes if outcome.row.error}
+    assert list(errors) == ["greedy.xosc"]
+    assert message in errors["greedy.xosc"]
+
+
+def test_a_worker_of_another_version_stops_the_run_before_it_costs_rows(tmp_path: Path) -> None:
+    inputs, out = make_inputs(tmp_path / "in", 3), tmp_path / "out"
+    batch = plan_batch([inputs], out)
+    old = replace(batch, jobs=tuple(replace(job, package_version="0.0.1") for job in batch.jobs))
+    with pytest.raises(BatchStoppedError, match=r"planned by 0\.0\.1"):
+        list(convert_many(old, workers=0, converter=convert))
+    assert set(states(run(inputs, out)).values()) == {State.WRITTEN}
 
 
 def test_a_scenario_that_kills_its_worker_costs_one_row(tmp_path: Path) -> None:
@@ -141,7 +227,7 @@ for outcome in convert_many(plan_batch([sys.argv[1]], sys.argv[2]), workers=int(
 """
 
 
-@pytest.mark.parametrize("workers", [1, 2])
+@pytest.mark.parametrize("workers", [0, 2])
 def test_killed_three_times_the_outputs_are_those_of_a_calm_run(tmp_path: Path, workers: int) -> None:
     inputs = make_inputs(tmp_path / "in", 40, **{f"slow{index}": "slow" for index in range(10)})
     out = tmp_path / "out"
@@ -163,7 +249,7 @@ def test_killed_three_times_the_outputs_are_those_of_a_calm_run(tmp_path: Path, 
 
 def test_a_journal_cut_anywhere_is_good_up_to_its_last_whole_line(tmp_path: Path) -> None:
     inputs, out = make_inputs(tmp_path / "in", 4), tmp_path / "out"
-    outcomes = convert_many(plan_batch([inputs], out), converter=convert)
+    outcomes = convert_many(plan_batch([inputs], out), workers=0, converter=convert)
     for _ in range(3):
         next(outcomes)
     outcomes.close()  # type: ignore[attr-defined]
@@ -180,7 +266,7 @@ def test_a_journal_cut_anywhere_is_good_up_to_its_last_whole_line(tmp_path: Path
 
 def test_a_run_stopped_by_its_user_goes_on_where_it_was(tmp_path: Path) -> None:
     inputs = make_inputs(tmp_path / "in", 5)
-    outcomes = convert_many(plan_batch([inputs], tmp_path / "out"), converter=convert)
+    outcomes = convert_many(plan_batch([inputs], tmp_path / "out"), workers=0, converter=convert)
     first = {next(outcomes).row.output for _ in range(2)}
     outcomes.close()  # type: ignore[attr-defined]
     again = states(run(inputs, tmp_path / "out"))
@@ -222,7 +308,7 @@ def test_a_journal_that_can_not_grow_says_so_and_keeps_its_rows(tmp_path: Path) 
 
 def test_a_second_run_into_a_busy_folder_is_refused(tmp_path: Path) -> None:
     inputs, out = make_inputs(tmp_path / "in", 2), tmp_path / "out"
-    outcomes = convert_many(plan_batch([inputs], out), converter=convert)
+    outcomes = convert_many(plan_batch([inputs], out), workers=0, converter=convert)
     next(outcomes)
     with pytest.raises(FolderInUseError, match=rf"out: another run \(process {os.getpid()} on "):
         run(inputs, out)
@@ -249,7 +335,7 @@ def test_rows_of_other_outputs_in_the_folder_are_kept(tmp_path: Path) -> None:
     inputs, out = make_inputs(tmp_path / "in", 3), tmp_path / "out"
     run(inputs, out)
     whole = tree(out)
-    list(convert_many(plan_batch([inputs / "001.xosc"], out), converter=convert))
+    list(convert_many(plan_batch([inputs / "001.xosc"], out), workers=0, converter=convert))
     assert tree(out) == whole
     (inputs / "002.xosc").unlink()
     (out / "002.xosc").unlink()

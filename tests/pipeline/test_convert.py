@@ -11,10 +11,11 @@ import pytest
 
 from tests.profiles import simulated_profile
 from xosc_lateral.cli import main
+from xosc_lateral.enrich.conversion import Conversion
 from xosc_lateral.errors import FormatError
 from xosc_lateral.formats.profiles import write_profile
 from xosc_lateral.motion.nominal import Activity
-from xosc_lateral.pipeline.convert import Conversion, convert_scenario
+from xosc_lateral.pipeline.convert import convert_scenario
 from xosc_lateral.pipeline.load import play_scenario
 from xosc_lateral.pipeline.settings import ConvertSettings
 from xosc_lateral.templates import TEMPLATES, find_template
@@ -57,13 +58,13 @@ def test_the_output_played_again_is_where_it_was_written_to_5_cm(
 
 def test_same_inputs_and_seed_give_the_same_bytes_and_another_seed_does_not(tmp_path: Path, profile: str) -> None:
     source = _template(tmp_path, "cut-in")
-    first = convert_scenario(source, tmp_path / "out.xosc", ConvertSettings(profile=profile, seed=1)).output_hash
-    again = convert_scenario(source, tmp_path / "out.xosc", ConvertSettings(profile=profile, seed=1)).output_hash
-    other = convert_scenario(source, tmp_path / "out.xosc", ConvertSettings(profile=profile, seed=2)).output_hash
+    first = convert_scenario(source, tmp_path / "out.xosc", ConvertSettings(profile=profile, seed=1)).output_sha256
+    again = convert_scenario(source, tmp_path / "out.xosc", ConvertSettings(profile=profile, seed=1)).output_sha256
+    other = convert_scenario(source, tmp_path / "out.xosc", ConvertSettings(profile=profile, seed=2)).output_sha256
     variant = convert_scenario(source, tmp_path / "out.xosc", ConvertSettings(profile=profile, seed=1), variant=1)
     assert first == again
-    assert len({first, other, variant.output_hash}) == 3
-    assert variant.output_hash == hashlib.sha256((tmp_path / "out.xosc").read_bytes()).hexdigest()
+    assert len({first, other, variant.output_sha256}) == 3
+    assert variant.output_sha256 == hashlib.sha256((tmp_path / "out.xosc").read_bytes()).hexdigest()
 
 
 def test_a_converted_file_is_not_converted_again(tmp_path: Path, profile: str) -> None:
@@ -132,6 +133,6 @@ def test_bad_input_is_one_line_and_exit_1_and_nothing_is_written(
 def test_segments_are_listed_with_reasons(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     source = _template(tmp_path, "cut-in")
     assert main(["segments", str(source), "--json"]) == 0
-    rows = json.loads(capsys.readouterr().out)
+    rows = json.loads(capsys.readouterr().out)["segments"]
     assert any(row["road_following"] for row in rows)
     assert any(row["why"] == "lateral action" for row in rows)

@@ -156,10 +156,10 @@ def test_a_table_gives_each_scenario_its_settings(database: Path, tmp_path: Path
     ("table", "message"),
     [
         ("file,seed\nx.xosc,1\n", r"t\.csv:1: no column 'scenario'; there are file, seed"),
-        ("scenario,seed\nx.xosc,1\ny.xosc,one\n", r"t\.csv:3: seed 'one' is no whole number"),
+        ("scenario,seed\nx.xosc,1\ny.xosc,one\n", r"t\.csv:3: seed 'one' is not a whole number"),
         ("scenario,variants\nx.xosc,0\n", r"t\.csv:2: variants 0, at least 1"),
         ("scenario,seed\n,1\n", r"t\.csv:2: no scenario"),
-        ("scenario,parameters\nx.xosc,fast\n", r"t\.csv:2: parameters 'fast' is no JSON object"),
+        ("scenario,parameters\nx.xosc,fast\n", r"t\.csv:2: parameters 'fast' is not a JSON object"),
     ],
 )
 def test_a_table_that_is_wrong_is_said_with_its_line(tmp_path: Path, table: str, message: str) -> None:

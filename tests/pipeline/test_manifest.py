@@ -14,19 +14,19 @@ from xosc_lateral.pipeline.manifest import ManifestRow, read_manifest, read_timi
 ROW = ManifestRow(
     output="a/x.xosc",
     scenario="a/x.xosc",
-    scenario_hash="12",
+    scenario_sha256="12",
     variant=2,
     seed=7,
     profile="auto",
     parameters={"Speed": "30", "Straße": "ä"},
     settings="34",
     package_version="1.0",
-    output_hash="56",
+    output_sha256="56",
     road="../r.xodr",
-    road_hash="78",
+    road_sha256="78",
     inputs={"a/x.xosc": "12", "../r.xodr": "78"},
     profiles={"Ego": "car"},
-    profile_hashes={"car": "90"},
+    profile_sha256={"car": "90"},
     entities=3,
     enriched=("Ego", "Truck"),
     segment_seconds=12.5,
@@ -35,7 +35,7 @@ ROW = ManifestRow(
     gap_after=None,
     warnings=("one", "two"),
 )
-FAILED = replace(ROW, output="b.xosc", output_hash="", error="b.xosc:3: Event 'x': what")
+FAILED = replace(ROW, output="b.xosc", output_sha256="", error="b.xosc:3: Event 'x': what")
 
 
 def test_rows_come_back_as_they_were(tmp_path: Path) -> None:

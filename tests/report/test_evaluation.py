@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 
 import numpy as np
@@ -11,11 +12,11 @@ import pytest
 
 from xosc_lateral.cli import main
 from xosc_lateral.errors import NotEnoughDataError
+from xosc_lateral.evaluation.comparison import free_runs, habits_of
 from xosc_lateral.formats.profiles import list_profiles, read_profile
-from xosc_lateral.loop.compare import free_runs, habits_of
 from xosc_lateral.pipeline.library import GROUPS, most_different
 from xosc_lateral.report.cards import card_text
-from xosc_lateral.report.evaluation import _density
+from xosc_lateral.report.evaluation_figures import _density
 
 
 @pytest.fixture(scope="module")
@@ -60,6 +61,27 @@ def test_a_profile_scored_on_the_drives_it_was_fitted_to_says_so(table, profile,
     assert "was fitted to these drives" in capsys.readouterr().out
 
 
+def test_traces_of_measured_drives_stand_beside_sampled_ones(table, profile):
+    from xosc_lateral import evaluate
+
+    scores = evaluate(profile, table, classify=False)._scores
+    assert [trace.drive for trace in scores.traces] == [f"d{k}" for k in range(6)]
+    rows = pd.read_parquet(table)
+    for trace in scores.traces:
+        measured = rows[rows["drive"] == trace.drive]
+        there = np.interp(trace.step * np.arange(len(trace.real)), measured["time"], measured["offset"])
+        assert np.corrcoef(trace.real[5:-5], there[5:-5])[0, 1] > 0.95  # the same drive, at a coarser step
+        assert trace.sampled[0] == pytest.approx(trace.real[0])
+        assert abs(np.corrcoef(trace.real, trace.sampled)[0, 1]) < 0.95
+
+
+def test_a_profiles_card_is_a_page(tmp_path):
+    page = tmp_path / "card.html"
+    assert main(["profiles", "show", "motorway-car", "--report", str(page), "--quiet"]) == 0
+    html = page.read_text(encoding="utf-8")
+    assert "Driver profile motorway-car" in html and html.count("<svg") == 2
+
+
 def test_evaluate_tells_a_person_the_same(table, profile, capsys):
     assert main(["evaluate", "-p", str(profile), str(table), "--no-classify"]) == 0
     text = capsys.readouterr().out
@@ -73,9 +95,11 @@ def test_report_is_one_page_with_violins_and_the_same_bytes_each_time(table, pro
         assert main(words) == 0
         pages.append((tmp_path / name).read_text(encoding="utf-8"))
     assert pages[0] == pages[1]
-    assert pages[0].count("<svg") == 6, "four evaluations, spectrum, memory"
+    assert pages[0].count("<svg") == 7, "traces, four evaluations, spectrum, autocorrelation"
     assert "real" in pages[0] and "artificial" in pages[0] and "drives.parquet" in pages[0]
-    assert "src=" not in pages[0] and 'href="http' not in pages[0], "opens offline"
+    assert not re.search(r"\bsrc=|@import", pages[0].split("<script>")[0]) and 'href="http' not in pages[0], (
+        "opens offline"
+    )
 
 
 def test_density_integrates_to_the_sample():
@@ -114,7 +138,7 @@ def test_the_refined_profile_says_what_the_loop_found_and_differs_little_from_th
     loop = refined.provenance.fit["closed_loop"]
     assert loop["base"] == "two-level"
     assert {"memory beyond one step", "drivers that differ"} <= set(loop["found"])
-    assert refined.model.kind == "best"
+    assert refined.model.kind == "autoregressive"
     assert f"found: {', '.join(loop['found'])}" in card_text(refined)
     habits, others = habits_of(refined), habits_of(direct)
     assert habits.spread == pytest.approx(others.spread, rel=0.1)
@@ -144,15 +168,16 @@ def test_too_few_vehicles_are_refused_with_their_number():
 def test_profiles_list_show_and_compare_see_own_folders(profile, capsys):
     folder = ["--library", str(profile.parent)]
     assert main(["profiles", "list", *folder, "--json"]) == 0
-    listed = {one["name"]: one for one in json.loads(capsys.readouterr().out)}
+    listed = {one["id"]: one for one in json.loads(capsys.readouterr().out)["profiles"]}
     assert listed["mine"]["source"] == "made up" and "motorway-car" in listed
     assert main(["profiles", "show", "mine", *folder]) == 0
     card = capsys.readouterr().out
-    assert "made up" in card and "two-level" in card and "of the lane centre on average" in card
+    assert "made up" in card and "two-level" in card and "of the lane centre" in card
     assert main(["profiles", "show", "mine", *folder, "--json"]) == 0
-    assert json.loads(capsys.readouterr().out)["habits"]["spread"] == pytest.approx(0.25, abs=0.06)
+    assert json.loads(capsys.readouterr().out)["summary"]["spread"] == pytest.approx(0.25, abs=0.06)
     assert main(["profiles", "compare", "mine", "motorway-car", *folder, "--json"]) == 0
-    assert json.loads(capsys.readouterr().out)["mean"] > 0
+    compared = json.loads(capsys.readouterr().out)
+    assert compared["distance"][0][1] == compared["distance"][1][0] > compared["distance"][0][0] > 0
 
 
 def test_an_unknown_profile_is_answered_with_the_known_ones(capsys):

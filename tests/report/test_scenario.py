@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from tests.report.made_enriched import made_enriched
+from xosc_lateral.enrich.conversion import Conversion, ConversionProvenance
 from xosc_lateral.motion.gaps import Gap
 from xosc_lateral.motion.nominal import Activity, Note
-from xosc_lateral.pipeline.convert import Conversion, Provenance
 from xosc_lateral.report import scenario_figures as figures
 from xosc_lateral.report.path_dynamics import lateral_dynamics
 from xosc_lateral.report.road_drawing import view_along
@@ -34,20 +34,21 @@ def page(enriched, **more) -> str:
 
 
 def text(html: str) -> str:
-    return re.sub(r"\s+", " ", re.sub(r"<[^>]+>", " ", html.split("<body>", 1)[1]))
+    body = re.sub(r"<script.*?</script>", " ", html.split("<body>", 1)[1], flags=re.DOTALL)
+    return re.sub(r"\s+", " ", re.sub(r"<[^>]+>", " ", body))
 
 
 def test_the_page_holds_every_section_and_the_same_bytes_each_time(enriched, plain):
     assert plain == page(enriched)
     headings = re.findall(r"<h2[^>]*>([^<]+)", plain)
-    expected = ["Paths", "Offsets", "Speed and lateral dynamics", "Gaps", "Segments", "Not played as written"]
+    expected = ["Player", "Paths", "Offsets", "Speed and lateral dynamics", "Gaps", "Segments", "Not played as written"]
     assert headings == expected
     assert plain.count("<svg") == 7
 
 
 def test_numbers_on_the_page_are_those_of_the_result(enriched, plain):
     said = text(plain)
-    assert "2 of 3 entities move inside their lanes" in said
+    assert "2 of 3 entities now move inside their lanes" in said
     assert "road-following, all entities together 56 s" in said  # 30 s and 30 s less a lane change of 4 s
     ego = enriched.entity("Ego")
     acceleration = 0.3 * (2.0 * np.pi / 10.0) ** 2
@@ -84,7 +85,7 @@ def test_a_scenario_in_which_nothing_was_enriched_gets_a_page_that_says_so(enric
 
 
 def test_provenance_is_in_the_footer(enriched):
-    made = Provenance("0.1", {"cut-in.xosc": "a" * 64}, {"Ego": ("calm", "b" * 64)}, 7, 2, {"speed": "30"})
+    made = ConversionProvenance("0.1", {"cut-in.xosc": "a" * 64}, {"Ego": ("calm", "b" * 64)}, 7, 2, {"speed": "30"})
     conversion = Conversion(Path("in/cut-in.xosc"), Path("out/lively.xosc"), "c" * 64, enriched, made, ("mind this",))
     footer = text(conversion_page(conversion).split("<footer>")[1].join(["<body>", ""]))
     for fact in ("seed 7", "variant 2", "speed = 30", f"Ego: calm ({'b' * 12})", f"cut-in.xosc ({'a' * 12})", "c" * 64):

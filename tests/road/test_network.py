@@ -14,6 +14,8 @@ import pytest
 from tests.road.places import VALID, hand_written, random_places, wrapped
 from xosc_lateral.errors import PlaybackError
 from xosc_lateral.formats.opendrive import read_opendrive
+from xosc_lateral.road.piecewise import Piecewise
+from xosc_lateral.road.surface import Surface
 
 NAMES = sorted(path.stem for path in VALID.glob("*.xodr"))
 
@@ -174,7 +176,8 @@ def test_borders_count_from_the_centre_lane_and_widths_win_over_them():
 def test_superelevation_measures_t_in_the_leaning_surface():
     network = hand_written("leaning")
     pose = network.road_pose_at(network.index_of("bank"), 300.0, -5.0)
-    assert (pose.y, pose.z) == pytest.approx((-5.0 * cos(0.1), 10.0 + 15.0 - 5.0 * sin(0.1)))
+    height = 10.0 + 15.0 - 5.0 * sin(0.1) * cos(atan(0.05))
+    assert (pose.y, pose.z) == pytest.approx((-5.0 * cos(0.1), height))
     assert pose.roll == pytest.approx(0.1)
     assert pose.pitch == pytest.approx(-atan(0.05))
 
@@ -240,3 +243,18 @@ def test_a_place_off_the_road_or_nowhere_does_not_pass_quietly():
         network.lane_to_world(0, -1, [1.0, np.nan])
     with pytest.raises(ValueError, match="is no coordinate"):
         network.world_to_lane([0.0, np.inf], 0.0)
+
+
+def test_a_lean_on_a_grade_leads_along_s_and_finds_back():
+    """Ry(pitch) Rx(roll) (0, t, 0): t sin(pitch) sin(roll) ahead, t cos(roll) aside, t cos(pitch) sin(roll) up."""
+    grade, lean, t = -1.0, 0.5, -6.0
+    surface = Surface(
+        elevation=Piecewise((0.0,), ((0.0, grade, 0.0, 0.0),)),
+        superelevation=Piecewise((0.0,), ((lean, 0.0, 0.0, 0.0),)),
+    )
+    pitch = -atan(grade)
+    height, _, _, shrink, _, lead = surface.at(10.0, t)
+    assert lead == pytest.approx(t * sin(pitch) * sin(lean))
+    assert t * shrink == pytest.approx(t * cos(lean))
+    assert height == pytest.approx(10.0 * grade + t * cos(pitch) * sin(lean))
+    assert surface.lead_at(10.0, t * shrink) == pytest.approx(lead)

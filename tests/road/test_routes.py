@@ -12,27 +12,27 @@ from tests.road.places import hand_written
 def test_the_distance_along_roads_is_signed_by_the_way_that_is_shorter():
     network = hand_written("ring")
     lap = 200.0 * pi
-    assert network.path_distance((0, 50.0), (0, 80.0)) == pytest.approx(30.0)
-    assert network.path_distance((0, 80.0), (0, 50.0)) == pytest.approx(-30.0)
-    assert network.path_distance((0, 80.0), (0, 50.0), direction=-1) == pytest.approx(30.0)
+    assert network.path_between((0, 50.0), (0, 80.0)).ds == pytest.approx(30.0)
+    assert network.path_between((0, 80.0), (0, 50.0)).ds == pytest.approx(-30.0)
+    assert network.path_between((0, 80.0), (0, 50.0), direction=-1).ds == pytest.approx(30.0)
     # over the seam, on the road that is drawn the other way round
-    assert network.path_distance((0, 10.0), (1, 30.0)) == pytest.approx(-40.0)
-    assert network.path_distance((0, 300.0), (1, 300.0)) == pytest.approx(lap - 600.0)
+    assert network.path_between((0, 10.0), (1, 30.0)).ds == pytest.approx(-40.0)
+    assert network.path_between((0, 300.0), (1, 300.0)).ds == pytest.approx(lap - 600.0)
     # on the same road it may be shorter the other way round
-    assert network.path_distance((0, 5.0), (0, 310.0)) == pytest.approx(305.0)
+    assert network.path_between((0, 5.0), (0, 310.0)).ds == pytest.approx(305.0)
 
 
 def test_the_distance_to_a_road_that_drives_into_the_junction_leads_over_its_connection_backwards():
     network = hand_written("junction")
     west, east, south = (network.index_of(name) for name in ("west", "east", "south"))
-    assert network.path_distance((west, 90.0), (east, 10.0)) == pytest.approx(10 + 40 + 10)
-    assert network.path_distance((east, 10.0), (west, 90.0)) == pytest.approx(-60.0)
-    assert network.path_distance((east, 10.0), (south, 70.0)) == pytest.approx(-(10 + 10 * pi + 10))
-    assert network.path_distance((west, 90.0), (east, 10.0), limit=50.0) is None
+    assert network.path_between((west, 90.0), (east, 10.0)).ds == pytest.approx(10 + 40 + 10)
+    assert network.path_between((east, 10.0), (west, 90.0)).ds == pytest.approx(-60.0)
+    assert network.path_between((east, 10.0), (south, 70.0)).ds == pytest.approx(-(10 + 10 * pi + 10))
+    assert network.path_between((west, 90.0), (east, 10.0), limit=50.0) is None
 
 
 def test_roads_that_are_not_linked_have_no_distance():
-    assert hand_written("leaning").path_distance((0, 0.0), (1, 0.0)) is None
+    assert hand_written("leaning").path_between((0, 0.0), (1, 0.0)) is None
 
 
 def test_a_route_leads_through_the_junction_in_travel_direction():

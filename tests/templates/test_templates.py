@@ -117,7 +117,7 @@ def test_bends_go_to_both_sides_and_bank_towards_their_inside(tmp_path):
     [
         ({"ego_speed": "90"}, "ego_speed: 90 is out of range (15 to 45 m/s)"),
         ({"ego_speed": "nan"}, "ego_speed: nan is out of range (15 to 45 m/s)"),
-        ({"ego_speed": "fast"}, "ego_speed: 'fast' is no number (15 to 45 m/s)"),
+        ({"ego_speed": "fast"}, "ego_speed: 'fast' is not a number (15 to 45 m/s)"),
         ({"traffic": "both"}, "traffic: 'both' is none of right, left"),
         ({"ego_speed": "40", "passing_speed": "38"}, "passing_speed: 38 has to be more than ego_speed (40)"),
         ({"wings": "2"}, "unknown setting 'wings'; there are deceleration,"),
@@ -175,7 +175,7 @@ def test_write_names_the_files_that_it_wrote_and_list_names_all_templates(tmp_pa
     assert sorted(path.name for path in (tmp_path / "new" / "folder").iterdir()) == ["jam-end.xodr", "jam-end.xosc"]
     assert main(["template", "list", "--json"]) == 0
     listed = json.loads(capsys.readouterr().out)
-    assert [each["name"] for each in listed] == NAMES
-    assert all(setting["what"] and "default" in setting for each in listed for setting in each["settings"])
+    assert [each["name"] for each in listed["templates"]] == NAMES
+    assert all(setting["what"] and "default" in setting for each in listed["templates"] for setting in each["settings"])
     assert main(["template", "list", "curves"]) == 0
     assert "radius" in capsys.readouterr().out

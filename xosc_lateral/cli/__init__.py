@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import sys
 from collections.abc import Sequence
 from importlib import import_module
@@ -9,20 +10,36 @@ from typing import Annotated, Any, cast
 
 import typer
 
-from xosc_lateral import __version__
-from xosc_lateral.errors import XoscLateralError
+from xosc_lateral.errors import FormatError, XoscLateralError
+from xosc_lateral.formats.source import guarding_inputs
+from xosc_lateral.version import __version__
+
+HELP_NAMES = {"help_option_names": ["-h", "--help"]}
 
 app = typer.Typer(
     name="xosc-lateral",
     help="Lifelike lateral movement for OpenSCENARIO traffic.",
     no_args_is_help=True,
     pretty_exceptions_enable=False,
-    add_completion=False,
+    context_settings=HELP_NAMES,
     rich_markup_mode=None,  # units in help texts are in brackets, which rich would take for markup
 )
 
 # One module per verb, named like it; each has `register(app)`. They import nothing heavy at the top.
-VERBS = ("convert", "play", "segments", "import_", "fit", "sample", "evaluate", "close_loop", "profiles", "template")
+VERBS = (
+    "convert",
+    "view",
+    "play",
+    "segments",
+    "import_",
+    "fit",
+    "sample",
+    "evaluate",
+    "close_loop",
+    "benchmark",
+    "profiles",
+    "template",
+)
 
 for _verb in VERBS:
     import_module(f"xosc_lateral.cli.{_verb}").register(app)
@@ -50,14 +67,36 @@ def _in_words(error: XoscLateralError | OSError) -> str:
     return str(error)
 
 
+def _as_dict(error: XoscLateralError | OSError) -> dict[str, Any]:
+    """The error for machines: `kind`, `message`, and where it is, as far as that is known."""
+    place: dict[str, Any] = {"path": None, "line": None, "element": None}
+    if isinstance(error, FormatError):
+        path = None if error.path is None else str(error.path)
+        place = {"path": path, "line": error.line, "element": error.element}
+    elif isinstance(error, OSError) and error.filename is not None:
+        place["path"] = str(error.filename)
+    return {"error": {"kind": type(error).__name__, "message": " ".join(_in_words(error).split()), **place}}
+
+
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run one command; 0 done, 1 the input is at fault (one line on stderr), 2 wrong usage."""
+    """Run one command; 0 done, 1 the input is at fault (one line on stderr), 2 wrong usage, 130 interrupted."""
+    words = sys.argv[1:] if argv is None else list(argv)
     try:
-        code = app(args=None if argv is None else list(argv), standalone_mode=False)
+        with guarding_inputs():
+            code = app(args=words, standalone_mode=False)
     except (XoscLateralError, OSError) as error:
-        print(f"xosc-lateral: {' '.join(_in_words(error).split())}", file=sys.stderr)
-        code = 1
-    except typer.Abort:
+        if isinstance(error, BrokenPipeError):  # `... -o - | head` has seen enough
+            sys.stderr.close()
+            code = 0
+        else:
+            print(f"xosc-lateral: {' '.join(_in_words(error).split())}", file=sys.stderr)
+            if "--json" in words:
+                print(json.dumps(_as_dict(error), ensure_ascii=False))
+            code = 1
+    except (typer.Abort, KeyboardInterrupt):
+        print(
+            "\nxosc-lateral: stopped; what was written is whole, the rest is not there. Run it again.", file=sys.stderr
+        )
         code = 130
     except Exception as error:
         # Typer's usage errors come from a click that is vendored in some of its releases: told by their duck shape.

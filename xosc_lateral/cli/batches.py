@@ -2,17 +2,12 @@
 
 from __future__ import annotations
 
-import json
-from collections import Counter
-from collections.abc import Sequence
-from dataclasses import asdict
-from pathlib import Path
-from typing import TYPE_CHECKING
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 import typer
 
-if TYPE_CHECKING:
-    from xosc_lateral.pipeline.settings import ConvertSettings
+from xosc_lateral.cli.words import say_json
 
 
 def is_batch(inputs: Sequence[str]) -> bool:
@@ -24,29 +19,36 @@ def is_batch(inputs: Sequence[str]) -> bool:
 
 def convert_batch(
     inputs: Sequence[str],
-    output: Path | None,
-    settings: ConvertSettings,
+    output: str | None,
+    settings: Mapping[str, Any],
     *,
-    variants: int,
-    jobs: int,
-    cluster: str | None,
-    display: str,
+    strict: bool,
+    quiet: bool,
     as_json: bool,
 ) -> None:
-    """Convert all of them; exit code 1 if any failed."""
-    from xosc_lateral.pipeline.batch import convert_many
-    from xosc_lateral.pipeline.jobs import plan_batch
-    from xosc_lateral.pipeline.progress import Display, follow
+    """Convert all of them; exit code 1 if any failed, or with `strict` if anything is to be said of any."""
+    from xosc_lateral.api.batch import convert_many
 
-    if output is None:
-        raise typer.BadParameter("several scenarios need a folder for their outputs: -o FOLDER")
-    batch = plan_batch(inputs, output, settings, variants=variants)
-    summary = follow(convert_many(batch, workers=jobs, cluster=cluster), len(batch), Display(display))
+    if output is None or output == "-":
+        raise typer.BadParameter("several scenarios need a folder for their outputs: -o FOLDER", param_hint="-o")
+    finished = 0
+
+    def tell(row: Mapping[str, Any]) -> None:
+        nonlocal finished
+        finished += row["state"] != "failed"
+        if as_json:
+            say_json({"kind": "output", **row})
+
+    try:
+        result = convert_many(list(inputs), output, on_outcome=tell, **settings)
+    except KeyboardInterrupt:
+        typer.echo(
+            f"\nxosc-lateral: stopped; {finished} finished in {output} are kept: the same command goes on", err=True
+        )
+        raise typer.Exit(130) from None
     if as_json:
-        typer.echo(json.dumps({"folder": str(batch.folder), "left_out": len(batch.left_out), **asdict(summary)}))
-    else:
-        kinds = Counter(kind.value for _, kind in batch.left_out)
-        left_out = ", ".join(f"{count} {kind}{'s' if count > 1 else ''}" for kind, count in kinds.items())
-        typer.echo(f"{output}: {summary.text()}{f'; left out: {left_out}' if left_out else ''}")
-    if summary.failed:
+        say_json({"kind": "summary", **{name: value for name, value in result.to_dict().items() if name != "outputs"}})
+    elif not quiet:
+        typer.echo(str(result))
+    if result.failed or (strict and (result.with_warnings or result.nobody_enriched)):
         raise typer.Exit(1)

@@ -3,78 +3,179 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
-from xosc_lateral.cli.words import pairs
-from xosc_lateral.pipeline.settings import ConvertSettings, Mode
+from xosc_lateral.cli.words import (
+    AsJson,
+    Force,
+    Library,
+    Quiet,
+    Road,
+    RoadPath,
+    Seed,
+    TimeLimit,
+    examples,
+    pairs,
+    say,
+    write_stdout,
+)
+from xosc_lateral.limits import JOB_MEMORY, JOB_TIMEOUT
+from xosc_lateral.pipeline.settings import Mode
+
+EXAMPLES = examples(
+    "convert cut-in.xosc -o lifelike.xosc --seed 1 --report report.html",
+    "convert scenarios/ -o enriched/ --variants 3 --jobs 2",
+    "convert cut-in.xosc -o - --entity Truck=motorway-truck | grep Vertex",
+)
 
 
 def register(app: typer.Typer) -> None:
     """Add the verb to the command line."""
-    app.command("convert")(convert)
+    app.command("convert", short_help="Make scenarios lifelike: one, several, a folder.", epilog=EXAMPLES)(convert)
 
 
 def convert(
     scenario: Annotated[
         list[str],
         typer.Argument(
-            help="Maneuver-based scenario (.xosc); folder, glob, table or several: batch.", show_default=False
+            help="Maneuver-based scenario (.xosc). A folder, a glob, a table or several: a batch.", show_default=False
         ),
     ],
     output: Annotated[
-        Path | None, typer.Option("-o", "--output", help="Default: NAME_lifelike.xosc. Of a batch: folder.")
+        str | None,
+        typer.Option(
+            "-o", "--output", help="File, folder/, or - for stdout; default NAME_lifelike.xosc. Batch: a folder."
+        ),
     ] = None,
-    profile: Annotated[str, typer.Option(help="Name or path; auto: by the vehicle's class.")] = "auto",
-    seed: Annotated[int, typer.Option(help="Same inputs and seed, same bytes.", min=0)] = 0,
-    entity: Annotated[list[str] | None, typer.Option(metavar="NAME=PROFILE", help="Profile of one entity.")] = None,
-    only: Annotated[list[str] | None, typer.Option(metavar="NAME", help="Enrich this entity alone.")] = None,
-    variants: Annotated[int, typer.Option(help="Write so many, each with other offsets.", min=1)] = 1,
-    report: Annotated[Path | None, typer.Option(help="HTML page about what was changed.")] = None,
-    context: Annotated[Path | None, typer.Option(help="Table of context over time (time, wind_speed, ...).")] = None,
-    parameter: Annotated[list[str] | None, typer.Option("--set", metavar="NAME=VALUE")] = None,
-    library: Annotated[list[Path] | None, typer.Option(help="Folder with further profiles.")] = None,
+    profile: Annotated[
+        str, typer.Option("--profile", "-p", help="Name or path of a driver profile; auto: by the vehicle's class.")
+    ] = "auto",
+    seed: Seed = 0,
+    entity: Annotated[
+        list[str] | None, typer.Option(metavar="NAME=PROFILE", help="Profile of one entity; may be repeated.")
+    ] = None,
+    only: Annotated[
+        list[str] | None, typer.Option(metavar="NAME", help="Enrich only this entity; may be repeated.")
+    ] = None,
+    variants: Annotated[int, typer.Option(help="Number of outputs, each with different offsets.", min=1)] = 1,
+    report: Annotated[
+        str | None,
+        typer.Option(metavar="PAGE.html", help="Page that shows what was added; for a batch, a folder of pages."),
+    ] = None,
+    context: Annotated[
+        Path | None, typer.Option(help="Table of context over time (columns time, wind_speed, ...).")
+    ] = None,
+    parameter: Annotated[
+        list[str] | None,
+        typer.Option("--set", metavar="NAME=VALUE", help="Value of a scenario parameter; may be repeated."),
+    ] = None,
+    library: Library = None,
     mode: Annotated[
-        Mode, typer.Option(help="trajectory: maneuvers are played out; lane-offset: maneuvers stay reactive.")
+        Mode, typer.Option(help="trajectory: play the maneuvers out; lane-offset: keep them reactive.")
     ] = Mode.TRAJECTORY,
-    allow: Annotated[list[Path] | None, typer.Option(help="Folder that roads and catalogs may lie in.")] = None,
-    resample: Annotated[int, typer.Option(help="Attempts while cars touch or leave their lane.", min=1)] = 1,
-    time_limit: Annotated[float, typer.Option(help="End of a scenario without one [s].", min=0.1, max=86_400)] = 60.0,
-    jobs: Annotated[int, typer.Option(help="Batch: processes; -1: one per core.")] = 1,
-    cluster: Annotated[str | None, typer.Option(metavar="ADDRESS", help="Batch: dask scheduler to work on.")] = None,
-    quiet: Annotated[bool, typer.Option("--quiet", help="Batch: failures alone.")] = False,
-    log_json: Annotated[bool, typer.Option("--log-json", help="Batch: progress as JSON lines.")] = False,
-    as_json: Annotated[bool, typer.Option("--json", help="For machines.")] = False,
+    allow: Annotated[
+        list[Path] | None, typer.Option(help="Folder that roads and catalogs may be read from; may be repeated.")
+    ] = None,
+    road: Road = None,
+    road_path: RoadPath = None,
+    resample: Annotated[int, typer.Option(help="Attempts, as long as vehicles touch or leave their lane.", min=1)] = 1,
+    time_limit: TimeLimit = 60.0,
+    jobs: Annotated[int, typer.Option(help="Batch: number of processes; -1: one per core.")] = 1,
+    job_timeout: Annotated[
+        float, typer.Option(help="Batch: time limit per scenario [s].", min=1, max=86_400)
+    ] = JOB_TIMEOUT.value,
+    job_memory: Annotated[
+        float, typer.Option(help="Batch: memory limit per scenario [MB].", min=100, max=1e6)
+    ] = JOB_MEMORY.value,
+    cluster: Annotated[str | None, typer.Option(metavar="ADDRESS", help="Batch: address of a dask scheduler.")] = None,
+    strict: Annotated[
+        bool, typer.Option("--strict", help="Exit with 1 on warnings, a missing vehicle catalog, nobody enriched.")
+    ] = False,
+    log_json: Annotated[bool, typer.Option("--log-json", help="Batch: progress as JSON lines on stderr.")] = False,
+    force: Force = False,
+    quiet: Quiet = False,
+    as_json: AsJson = False,
 ) -> None:
     """Give every car in a scenario the lateral movement of a real driver."""
     from xosc_lateral.cli.batches import convert_batch, is_batch
-    from xosc_lateral.pipeline.convert import convert_variants
-    from xosc_lateral.report.conversion import as_text, to_json, write_report
 
-    settings = ConvertSettings(
-        profile=profile,
-        entity_profiles=pairs(entity, "--entity"),
-        only=frozenset(only) if only else None,
-        seed=seed,
-        context=context,
-        parameters=pairs(parameter, "--set"),
-        attempts=resample,
-        mode=mode,
-        libraries=tuple(library or ()),
-        allowed=tuple(allow or ()),
-        time_limit=time_limit,
-    )
+    settings: dict[str, Any] = {
+        "profile": profile,
+        "entity": pairs(entity, "--entity"),
+        "only": only or None,
+        "seed": seed,
+        "context": context,
+        "parameters": pairs(parameter, "--set"),
+        "attempts": resample,
+        "mode": mode.value,
+        "library": library or (),
+        "allow": allow or (),
+        "road": road,
+        "road_path": road_path or (),
+        "time_limit": time_limit,
+        "strict": strict,
+        "force": force,
+    }
     if is_batch(scenario):
         if jobs == 0 or jobs < -1:
             raise typer.BadParameter("at least 1, or -1 for one per core", param_hint="--jobs")
-        if report is not None:
-            raise typer.BadParameter("a page is made of one scenario, not of a batch", param_hint="--report")
-        display = "json" if log_json else "quiet" if quiet else "auto"
+        if report is not None and Path(report).is_file():
+            raise typer.BadParameter("of a batch: a folder, not a file", param_hint="--report")
+        show = "json" if log_json else "quiet" if quiet else "auto"
         convert_batch(
-            scenario, output, settings, variants=variants, jobs=jobs, cluster=cluster, display=display, as_json=as_json
+            scenario,
+            output,
+            {
+                **settings,
+                "variants": variants,
+                "report": report,
+                "workers": jobs,
+                "cluster": cluster,
+                "show": show,
+                "job_timeout": job_timeout,
+                "job_memory": job_memory,
+            },
+            strict=strict,
+            quiet=quiet,
+            as_json=as_json,
         )
-        return
-    for conversion in convert_variants(Path(scenario[0]), output, settings, variants=variants, report=report):
-        where = write_report(conversion, report, variants=variants) if report else None
-        typer.echo(to_json(conversion, where) if as_json else as_text(conversion, where))
+    else:
+        _convert_one(Path(scenario[0]), output, settings, variants, report, strict, quiet, as_json)
+
+
+def _convert_one(
+    source: Path,
+    output: str | None,
+    settings: dict[str, Any],
+    variants: int,
+    report: str | None,
+    strict: bool,
+    quiet: bool,
+    as_json: bool,
+) -> None:
+    from xosc_lateral.api.convert import REPORT_SUFFIXES, convert, lifelike, scenario_target
+    from xosc_lateral.formats.targets import STDOUT, claim, file_target
+    from xosc_lateral.pipeline.convert import numbered
+
+    if output == STDOUT:
+        if variants > 1 or as_json:
+            raise typer.BadParameter("standard output takes one scenario, and nothing beside it", param_hint="-o -")
+        result = convert(source, None, report=report, **settings)
+        write_stdout(result.data)
+        say(result, as_json=False, quiet=quiet, aside=True)
+        unclean = bool(result.warnings) or not result.enriched
+    else:
+        target = lifelike(source) if output is None else scenario_target(output, source)
+        page = None if report is None else file_target(report, f"{target.stem}.html", REPORT_SUFFIXES)
+        outputs = [numbered(target, variant, variants) for variant in range(variants)]
+        pages = [None if page is None else numbered(page, variant, variants) for variant in range(variants)]
+        claim([*outputs, *pages], [source], force=settings["force"])
+        unclean = False
+        for variant, (path, its_page) in enumerate(zip(outputs, pages, strict=True)):
+            result = convert(source, path, variant=variant, report=its_page, **settings)
+            say(result, as_json=as_json, quiet=quiet)
+            unclean |= bool(result.warnings) or not result.enriched
+    if strict and unclean:
+        raise typer.Exit(1)

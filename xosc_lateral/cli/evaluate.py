@@ -2,43 +2,40 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Annotated
 
 import typer
 
+from xosc_lateral.cli.words import AsJson, Columns, Force, Library, Profile, Quiet, Seed, Tables, examples, pairs, say
+
 
 def register(app: typer.Typer) -> None:
     """Add the verb to the command line."""
+    epilog = examples("evaluate drives.csv.gz -p mine.json --report evaluation.html")
+    app.command("evaluate", short_help="How true a profile is to measured drives.", epilog=epilog)(evaluate)
 
-    @app.command()
-    def evaluate(
-        tables: Annotated[
-            list[Path], typer.Argument(metavar="TABLE...", help="Drive tables: .csv, .csv.gz, .parquet.")
-        ],
-        profile: Annotated[str, typer.Option("--profile", "-p", metavar="NAME|PATH", help="Driver profile.")],
-        report: Annotated[Path | None, typer.Option(metavar="OUT.html", help="Write a report with figures.")] = None,
-        as_json: Annotated[bool, typer.Option("--json", help="Print the scores as JSON.")] = False,
-        seed: Annotated[int, typer.Option(help="Same inputs and seed, same numbers.", min=0)] = 0,
-        classify: Annotated[bool, typer.Option(help="Train a classifier (extra `classifier`).")] = True,
-        columns: Annotated[
-            list[str] | None,
-            typer.Option("--map", metavar="NAME=COLUMN[:UNIT]", help="Foreign header, e.g. speed=v_kmh:km/h."),
-        ] = None,
-        library: Annotated[list[Path] | None, typer.Option(help="Folder with further profiles.")] = None,
-    ) -> None:
-        """Score a profile: ten metrics, the paper's four evaluations, distances and floors, spectrum, classifier."""
-        from xosc_lateral.driver.series import all_runs
-        from xosc_lateral.formats.atomic import refuse_targets
-        from xosc_lateral.formats.drives import parse_map, read_drives
-        from xosc_lateral.formats.profiles import read_profile
-        from xosc_lateral.loop.scores import score_profile
-        from xosc_lateral.report.evaluation import evaluation_json, evaluation_text, write_evaluation
 
-        refuse_targets([report], tables)
-        driver = read_profile(profile, library or [])
-        runs = all_runs(read_drives(tables, parse_map(columns or [])))
-        scores = score_profile(driver, runs, seed=seed, classify=classify)
-        if report is not None:
-            write_evaluation(scores, driver, tables, report)
-        typer.echo(evaluation_json(scores, driver, tables) if as_json else evaluation_text(scores, driver, tables))
+def evaluate(
+    tables: Tables,
+    profile: Profile,
+    report: Annotated[str | None, typer.Option(metavar="PAGE.html", help="Write a report with figures.")] = None,
+    seed: Seed = 0,
+    classify: Annotated[bool, typer.Option(help="Also train a classifier (extra `classifier`).")] = True,
+    columns: Columns = None,
+    library: Library = None,
+    force: Force = False,
+    quiet: Quiet = False,
+    as_json: AsJson = False,
+) -> None:
+    """Score a profile on measured drives: ten metrics with their floors, four evaluations, spectrum, classifier."""
+    from xosc_lateral import evaluate
+    from xosc_lateral.api.convert import REPORT_SUFFIXES
+    from xosc_lateral.formats.targets import claim, file_target
+
+    page = None if report is None else file_target(report, "evaluation.html", REPORT_SUFFIXES)
+    claim([page], tables, force=force)
+    mapping = pairs(columns, "--map")
+    result = evaluate(profile, tables, seed=seed, classify=classify, columns=mapping, library=library or ())
+    if page is not None:
+        result.write_report(page, force=force)
+    say(result, as_json=as_json, quiet=quiet)

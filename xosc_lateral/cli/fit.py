@@ -2,48 +2,85 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from xosc_lateral.driver.kinds import ModelKind
+from xosc_lateral.cli.words import AsJson, Columns, Force, Quiet, Tables, examples, pairs, say_json, write_stdout
 
 
 def register(app: typer.Typer) -> None:
     """Add the verb to the command line."""
+    epilog = examples(
+        "fit drives.csv.gz -o mine.json",
+        "fit monday.csv tuesday.csv -o profiles/ --name anna --map speed=v_kmh:km/h",
+    )
+    app.command("fit", short_help="Measured drives into a profile.", epilog=epilog)(fit)
 
-    @app.command()
-    def fit(
-        tables: Annotated[
-            list[Path], typer.Argument(metavar="TABLE...", help="Drive tables: .csv, .csv.gz, .parquet.")
-        ],
-        output: Annotated[Path, typer.Option("--output", "-o", metavar="PROFILE.json", help="Profile to write.")],
-        model: Annotated[ModelKind, typer.Option(help="two-level: the paper's; best: ours.")] = ModelKind.BEST,
-        columns: Annotated[
-            list[str] | None,
-            typer.Option("--map", metavar="NAME=COLUMN[:UNIT]", help="Foreign header, e.g. speed=v_kmh:km/h."),
-        ] = None,
-        name: Annotated[str, typer.Option(help="Name of the profile; the file's where not given.")] = "",
-        source: Annotated[str, typer.Option(help="The drives in words, for the provenance.")] = "",
-        licence: Annotated[str, typer.Option(help="Of the drives, for the provenance.")] = "",
-        as_json: Annotated[bool, typer.Option("--json", help="Print a summary as JSON.")] = False,
-    ) -> None:
-        """Fit a driver profile to measured drives."""
-        from xosc_lateral.driver.fitting import fit_profile
-        from xosc_lateral.driver.profile import Provenance
-        from xosc_lateral.formats.atomic import refuse_targets
-        from xosc_lateral.formats.drives import parse_map, read_drives
-        from xosc_lateral.formats.hashes import file_hash
-        from xosc_lateral.formats.profiles import describe_profile, write_profile
 
-        refuse_targets([output], tables)
-        drives = read_drives(tables, parse_map(columns or []))
-        provenance = Provenance(
-            source=source or ", ".join(table.name for table in tables),
-            licence=licence,
-            inputs={table.name: file_hash(table) for table in tables},
-        )
-        profile = fit_profile(drives, name=name or output.stem, model=model, provenance=provenance)
-        write_profile(profile, output)
-        typer.echo(describe_profile(profile, as_json=as_json), err=not as_json)
+def _known_model(text: str) -> str:
+    from xosc_lateral.driver.models.registry import model_named
+    from xosc_lateral.errors import DriverProfileError
+
+    try:
+        return model_named(text).model.kind
+    except DriverProfileError as error:
+        raise typer.BadParameter(str(error)) from error
+
+
+def fit(
+    tables: Tables,
+    output: Annotated[
+        str, typer.Option("--output", "-o", metavar="PROFILE.json", help="Profile to write: file, folder/, or -.")
+    ],
+    model: Annotated[
+        str,
+        typer.Option(
+            parser=_known_model,
+            metavar="[two-level|autoregressive|PLUG-IN]",
+            help="two-level: Neis and Beyerer; autoregressive: ours (formerly best).",
+        ),
+    ] = "autoregressive",
+    columns: Columns = None,
+    name: Annotated[str, typer.Option(help="Name of the profile; default: the file's name.")] = "",
+    source: Annotated[str, typer.Option(help="Description of the drives, for the provenance.")] = "",
+    licence: Annotated[str, typer.Option(help="Licence of the drives, for the provenance.")] = "",
+    sensor_noise: Annotated[
+        float | None,
+        typer.Option(help="Standard deviation of the sensor's error [m]; default: estimated.", min=1e-4, max=2),
+    ] = None,
+    force: Force = False,
+    quiet: Quiet = False,
+    as_json: AsJson = False,
+) -> None:
+    """Fit a driver profile to measured drives."""
+    from xosc_lateral import fit, write_profile
+    from xosc_lateral.api.profiles import PROFILE_SUFFIXES
+    from xosc_lateral.driver.drivability import fit_warnings
+    from xosc_lateral.formats.profiles import describe_profile, profile_bytes, profile_record
+    from xosc_lateral.formats.targets import STDOUT, claim, file_target
+
+    usual = name or tables[0].name.split(".")[0]
+    target = None if output == STDOUT else file_target(output, f"{usual}.json", PROFILE_SUFFIXES)
+    claim([target], tables, force=force)
+    called = name or (usual if target is None else target.stem)
+    mapping = pairs(columns, "--map")
+    profile = fit(
+        tables,
+        name=called,
+        model=model,
+        columns=mapping,
+        source=source,
+        licence=licence,
+        sensor_noise=sensor_noise,
+    )
+    if target is None:
+        write_stdout(profile_bytes(profile))
+    else:
+        write_profile(profile, target, force=force)
+    if as_json and target is not None:
+        say_json({"output": str(target), **profile_record(profile)})
+    elif not quiet:
+        typer.echo(describe_profile(profile), err=True)
+    for warning in fit_warnings(profile):
+        typer.echo(f"xosc-lateral: warning: {warning}", err=True)

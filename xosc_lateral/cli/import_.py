@@ -2,73 +2,193 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
+from typer.core import TyperGroup
+
+from xosc_lateral.cli.words import AsJson, Force, Quiet, examples, pairs, say_json, write_stdout
 
 Source = Annotated[Path, typer.Argument(metavar="SOURCE", help="What to read.", show_default=False)]
-Output = Annotated[Path, typer.Option("--output", "-o", metavar="TABLE", help="Drive table: .parquet, .csv, .csv.gz.")]
-KeepCut = Annotated[bool, typer.Option("--keep-cut", help="Keep rows that are cut otherwise; column `state` says why.")]
-AsJson = Annotated[bool, typer.Option("--json", help="Print the provenance as one line of JSON.")]
+Output = Annotated[
+    str, typer.Option("--output", "-o", metavar="TABLE", help="Drive table: .parquet, .csv, .csv.gz, folder/, - .")
+]
+KeepCut = Annotated[
+    bool, typer.Option("--keep-cut", help="Keep rows that would be cut; the column `state` gives the reason.")
+]
 
 
 def register(app: typer.Typer) -> None:
     """Add the verb to the command line."""
-    formats = typer.Typer(help="Other people's recordings into the standard drive table.", no_args_is_help=True)
+    formats = typer.Typer(cls=_WithPlugins, help="Convert recordings in other formats into the standard drive table.")
+    dlr_example = examples("import dlr-ht tasi-0.15.4-py3-none-any.whl -o drives.parquet")
+    formats.command("dlr-ht", short_help="DLR Highway Traffic.", epilog=dlr_example)(dlr_ht)
+    formats.command("levelx", short_help="highD and exiD.", epilog=examples("import levelx highD/ -o highd.parquet"))(
+        levelx
+    )
+    mf4_example = examples("import mf4 log.mf4 -o drive.parquet --map offset=Lane_Lat --map lane_width=Lane_Width")
+    formats.command("mf4", short_help="ASAM MDF bus logs.", epilog=mf4_example)(mf4)
+    tracks_example = examples("import tracks tracks.csv --road road.xodr -o drives.parquet --map vehicle=obj")
+    formats.command("tracks", short_help="Tracks on an OpenDRIVE road.", epilog=tracks_example)(tracks)
+    commonroad_example = examples("import commonroad DEU_A9-1_1_T-1.xml -o drives.parquet")
+    formats.command("commonroad", short_help="CommonRoad scenarios.", epilog=commonroad_example)(commonroad)
+    app.add_typer(formats, name="import", short_help="Recordings into drive tables.", no_args_is_help=True)
 
-    @formats.command("dlr-ht")
-    def dlr_ht(
-        source: Source,
+
+def dlr_ht(
+    source: Source,
+    output: Output,
+    max_gap: Annotated[
+        float, typer.Option(help="Longest gap between two cameras that is kept [s].", min=0, max=60)
+    ] = 1.0,
+    keep_cut: KeepCut = False,
+    force: Force = False,
+    quiet: Quiet = False,
+    as_json: AsJson = False,
+) -> None:
+    """DLR Highway Traffic: the wheel of tasi 0.15.4, the data set's zip, or its trajectory CSV."""
+    from xosc_lateral.formats.importers.cuts import CutSettings
+
+    settings = {"settings": CutSettings(max_gap=max_gap), "keep_cut": keep_cut}
+    _import("dlr-ht", [source], output, settings, force, quiet, as_json)
+
+
+def levelx(
+    source: Source,
+    output: Output,
+    keep_cut: KeepCut = False,
+    force: Force = False,
+    quiet: Quiet = False,
+    as_json: AsJson = False,
+) -> None:
+    """HighD or exiD: a folder of recordings, or one XX_tracks.csv with its two meta files beside it."""
+    _import("levelx", [source], output, {"keep_cut": keep_cut}, force, quiet, as_json)
+
+
+def mf4(
+    sources: Annotated[
+        list[Path], typer.Argument(metavar="SOURCE...", help="Logs; each is a drive of its own.", show_default=False)
+    ],
+    output: Output,
+    channels: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--map",
+            metavar="NAME=CHANNEL[:UNIT]",
+            help="Channel of a column, e.g. speed=v_veh:km/h; default unit: the file's.",
+        ),
+    ] = None,
+    step: Annotated[
+        float, typer.Option(help="Time step of the table, to which channels are interpolated [s].", min=0.001, max=1)
+    ] = 0.04,
+    force: Force = False,
+    quiet: Quiet = False,
+    as_json: AsJson = False,
+) -> None:
+    """ASAM MDF bus logs (extra `mdf`): need a channel map, since signal names differ from car to car."""
+    from xosc_lateral.formats.importers.mf4 import channels_wanted
+
+    if not channels:
+        raise typer.BadParameter(channels_wanted(sources[0]), param_hint="--map")
+    _import("mf4", sources, output, {"channels": channels, "step": step}, force, quiet, as_json)
+
+
+def tracks(
+    source: Source,
+    output: Output,
+    road: Annotated[Path, typer.Option("--road", metavar="FILE.xodr", help="Road on which the tracks lie.")],
+    columns: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--map",
+            metavar="NAME=COLUMN[:UNIT]",
+            help="vehicle, time, x, y, heading, speed, length, vehicle_class, e.g. heading=psi:deg.",
+        ),
+    ] = None,
+    keep_cut: KeepCut = False,
+    force: Force = False,
+    quiet: Quiet = False,
+    as_json: AsJson = False,
+) -> None:
+    """A table of tracks (x, y and heading of any recording) on a known road: lanes, offsets, neighbours."""
+    options = {"road": road, "columns": columns or (), "keep_cut": keep_cut}
+    _import("tracks", [source], output, options, force, quiet, as_json)
+
+
+def commonroad(
+    sources: Annotated[list[Path], typer.Argument(metavar="SOURCE...", help="Scenarios (.xml).", show_default=False)],
+    output: Output,
+    keep_cut: KeepCut = False,
+    force: Force = False,
+    quiet: Quiet = False,
+    as_json: AsJson = False,
+) -> None:
+    """CommonRoad scenarios (extra `commonroad`): recorded obstacles between the bounds of their lanelets."""
+    _import("commonroad", sources, output, {"keep_cut": keep_cut}, force, quiet, as_json)
+
+
+def _import(
+    name: str,
+    sources: Sequence[Path],
+    output: str,
+    options: dict[str, Any],
+    force: bool,
+    quiet: bool,
+    as_json: bool,
+) -> None:
+    from xosc_lateral import import_drives
+    from xosc_lateral.formats.tables import TABLE_SUFFIXES
+    from xosc_lateral.formats.targets import STDOUT, claim, file_target
+
+    if output != STDOUT:
+        files = [source for source in sources if source.is_file()]
+        claim([file_target(output, "drives.parquet", TABLE_SUFFIXES)], files, force=force)
+    imported = import_drives(name, sources[0] if len(sources) == 1 else sources, **options)
+    written = None
+    if output == STDOUT:
+        write_stdout(imported.to_frame().to_csv(index=False, lineterminator="\n"))
+    else:
+        written = imported.write(output, force=force)
+    if as_json and written is not None:
+        say_json({"output": str(written), **imported.to_dict()})
+    elif not quiet:
+        typer.echo(str(imported), err=True)
+
+
+class _WithPlugins(TyperGroup):
+    """The formats of the package, and those of plug-ins: these take their options as ``--set KEY=VALUE``."""
+
+    def list_commands(self, ctx: Any) -> list[str]:
+        from xosc_lateral.formats.importers import GROUP
+        from xosc_lateral.plugins import plugin_names
+
+        return [*super().list_commands(ctx), *plugin_names(GROUP)]
+
+    def get_command(self, ctx: Any, cmd_name: str) -> Any:
+        known = super().get_command(ctx, cmd_name)
+        from xosc_lateral.formats.importers import GROUP
+        from xosc_lateral.plugins import plugin_names
+
+        return known if known is not None or cmd_name not in plugin_names(GROUP) else _plugin_command(cmd_name)
+
+
+def _plugin_command(name: str) -> Any:
+    from xosc_lateral.formats.importers import find_importer
+
+    one = typer.Typer(context_settings={"help_option_names": ["-h", "--help"]}, rich_markup_mode=None)
+
+    def command(
+        sources: Annotated[list[Path], typer.Argument(metavar="SOURCE...", show_default=False)],
         output: Output,
-        max_gap: Annotated[
-            float, typer.Option(help="Longest bridge between two cameras that is kept. [s]", min=0, max=60)
-        ] = 1.0,
-        keep_cut: KeepCut = False,
+        settings: Annotated[list[str] | None, typer.Option("--set", metavar="KEY=VALUE")] = None,
+        force: Force = False,
+        quiet: Quiet = False,
         as_json: AsJson = False,
     ) -> None:
-        """DLR Highway Traffic: the wheel of tasi 0.15.4, the data set's zip, or its trajectory CSV."""
-        from xosc_lateral.formats.importers.cuts import CutSettings
-        from xosc_lateral.formats.importers.dlr_ht import import_dlr_ht
-        from xosc_lateral.formats.importers.table import describe, write_imported
+        _import(name, sources, output, dict(pairs(settings, "--set")), force, quiet, as_json)
 
-        imported = import_dlr_ht(source, CutSettings(max_gap=max_gap), keep_cut=keep_cut)
-        write_imported(imported, output)
-        typer.echo(describe(imported.provenance, as_json=as_json), err=not as_json)
-
-    @formats.command("levelx")
-    def levelx(source: Source, output: Output, keep_cut: KeepCut = False, as_json: AsJson = False) -> None:
-        """HighD or exiD: a folder of recordings, or one XX_tracks.csv with its two meta files beside it."""
-        from xosc_lateral.formats.importers.levelx import import_levelx
-        from xosc_lateral.formats.importers.table import describe, write_imported
-
-        imported = import_levelx(source, keep_cut=keep_cut)
-        write_imported(imported, output)
-        typer.echo(describe(imported.provenance, as_json=as_json), err=not as_json)
-
-    @formats.command("mf4")
-    def mf4(
-        source: Source,
-        output: Output,
-        channels: Annotated[
-            list[str] | None,
-            typer.Option(
-                "--map", metavar="NAME=CHANNEL[:UNIT]", help="Which channel is which column, e.g. speed=v_veh:km/h."
-            ),
-        ] = None,
-        step: Annotated[
-            float, typer.Option(help="Step of the table; channels are interpolated to it. [s]", min=0.001, max=1)
-        ] = 0.04,
-        as_json: AsJson = False,
-    ) -> None:
-        """ASAM MDF bus log (extra `mdf`): asks for a channel map, since no two cars name their signals alike."""
-        from xosc_lateral.formats.importers.mf4 import channels_wanted, import_mf4
-        from xosc_lateral.formats.importers.table import describe, write_imported
-
-        if not channels:
-            raise typer.BadParameter(channels_wanted(source), param_hint="--map")
-        imported = import_mf4(source, channels, step=step)
-        write_imported(imported, output)
-        typer.echo(describe(imported.provenance, as_json=as_json), err=not as_json)
-
-    app.add_typer(formats, name="import")
+    said = (find_importer(name).__doc__ or "From a plug-in.").strip()
+    one.command(name, help=said, short_help=said.splitlines()[0])(command)
+    return typer.main.get_command(one)

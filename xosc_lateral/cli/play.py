@@ -7,27 +7,74 @@ from typing import Annotated
 
 import typer
 
+from xosc_lateral.cli.words import (
+    AsJson,
+    Force,
+    Quiet,
+    Road,
+    RoadPath,
+    TimeLimit,
+    examples,
+    pairs,
+    say_json,
+    write_stdout,
+)
+
+EXAMPLES = examples(
+    "play cut-in.xosc -o states.csv", "play cut-in.xosc -o states.parquet", "play cut-in.xosc -o - | head"
+)
+
 
 def register(app: typer.Typer) -> None:
     """Add the verb to the command line."""
-    app.command("play")(play)
+    app.command("play", short_help="Nominal motion as a table.", epilog=EXAMPLES)(play)
 
 
 def play(
     scenario: Annotated[Path, typer.Argument(help="Maneuver-based scenario (.xosc).", show_default=False)],
-    output: Annotated[Path, typer.Option("--output", "-o", help="CSV table to write.", show_default=False)],
+    output: Annotated[
+        str, typer.Option("--output", "-o", help="Table: .csv, .csv.gz, .parquet, folder/, - .", show_default=False)
+    ],
     step: Annotated[float, typer.Option(help="Length of a frame [s].", min=0.001, max=1.0)] = 0.02,
-    time_limit: Annotated[
-        float, typer.Option(help="End of a scenario that does not end by itself [s].", min=0.0, max=86_400)
-    ] = 60.0,
+    time_limit: TimeLimit = 60.0,
+    parameter: Annotated[
+        list[str] | None,
+        typer.Option("--set", metavar="NAME=VALUE", help="Value of a scenario parameter; may be repeated."),
+    ] = None,
+    allow: Annotated[
+        list[Path] | None, typer.Option(help="Folder that roads and catalogs may be read from; may be repeated.")
+    ] = None,
+    road: Road = None,
+    road_path: RoadPath = None,
+    strict: Annotated[bool, typer.Option("--strict", help="A missing vehicle catalog is an error.")] = False,
+    force: Force = False,
+    quiet: Quiet = False,
+    as_json: AsJson = False,
 ) -> None:
-    """Play a scenario and write where every entity is at every step; what was not played is named on stderr."""
-    from xosc_lateral.formats.atomic import refuse_targets
-    from xosc_lateral.formats.states import write_states
-    from xosc_lateral.pipeline.load import play_scenario
+    """Play a scenario without offsets and write every entity's position at every step."""
+    from xosc_lateral import play
+    from xosc_lateral.formats.tables import TABLE_SUFFIXES
+    from xosc_lateral.formats.targets import STDOUT, claim, file_target
 
-    played = play_scenario(scenario, step=step, time_limit=time_limit)
-    refuse_targets([output], [*played.scenario.input_files, played.scenario.road_file or scenario])
-    write_states(played.motion, played.network, output)
-    for note in played.motion.notes:
-        typer.echo(str(note), err=True)
+    if output != STDOUT:
+        claim([file_target(output, f"{scenario.stem}.csv", TABLE_SUFFIXES)], [scenario], force=force)
+    played = play(
+        scenario,
+        step=step,
+        time_limit=time_limit,
+        parameters=pairs(parameter, "--set"),
+        allow=allow or (),
+        road=road,
+        road_path=road_path or (),
+        strict=strict,
+    )
+    written = None
+    if output == STDOUT:
+        write_stdout(played.csv())
+    else:
+        written = played.write(output, force=force)
+    if as_json:
+        say_json({"output": None if written is None else str(written), **played.to_dict()})
+    elif not quiet:
+        for note in played.notes:
+            typer.echo(note, err=True)

@@ -7,43 +7,181 @@ from typing import Annotated
 
 import typer
 
-Library = Annotated[list[Path] | None, typer.Option(help="Folder with further profiles; may be repeated.")]
-AsJson = Annotated[bool, typer.Option("--json", help="Print as JSON.")]
-Profile = Annotated[str, typer.Argument(metavar="NAME|PATH", help="Driver profile.")]
+from xosc_lateral.cli.words import AsJson, Force, Library, Quiet, Seed, examples, pairs, say, say_json, write_stdout
+
+Name = Annotated[str, typer.Argument(metavar="NAME|PATH", help="Driver profile.", show_default=False)]
+Names = Annotated[list[str], typer.Argument(metavar="NAME|PATH...", help="Driver profiles.", show_default=False)]
+Page = Annotated[str | None, typer.Option(metavar="PAGE.html", help="Also write it as a page.")]
+Tags = Annotated[list[str] | None, typer.Option("--tag", metavar="TAG", help="May be repeated.")]
+Fields = Annotated[
+    list[str] | None,
+    typer.Option("--set", metavar="FIELD=VALUE", help="version, driver, vehicle, road, country, date or licence."),
+]
+
+HELP = {
+    "list": ("All profiles, or those with a tag.", examples("profiles list --tag truck --where country=DE")),
+    "show": ("One profile's card.", examples("profiles show motorway-car --report card.html")),
+    "compare": (
+        "Several side by side; which are alike.",
+        examples("profiles compare motorway-car motorway-truck --report compared.html"),
+    ),
+    "add": ("Put one into a library.", examples("profiles add mine.json --library team/ --tag truck --set country=DE")),
+    "tag": ("Change tags and metadata.", examples("profiles tag mine --library team/ --tag night --remove day")),
+    "export": ("Write profiles elsewhere.", examples("profiles export motorway-car motorway-truck -o for-a-friend/")),
+    "check": ("What is wrong in a library.", examples("profiles check --library team/")),
+}
 
 
 def register(app: typer.Typer) -> None:
     """Add the verb to the command line."""
-    profiles = typer.Typer(help="Profiles that come with the package, and your own.", no_args_is_help=True)
+    profiles = typer.Typer(help="Driver profiles: those shipped, and your own.", no_args_is_help=True)
+    for verb in (list_, show, compare, add, tag, export, check):
+        name = verb.__name__.rstrip("_")
+        short, epilog = HELP[name]
+        profiles.command(name, short_help=short, epilog=epilog)(verb)
+    app.add_typer(profiles, name="profiles", short_help="The library of drivers.")
 
-    @profiles.command("list")
-    def list_(library: Library = None, as_json: AsJson = False) -> None:
-        """Names, models and sources of all profiles."""
-        from xosc_lateral.report.cards import list_text
 
-        typer.echo(list_text(library or [], as_json=as_json))
+def list_(
+    library: Library = None,
+    tags: Tags = None,
+    where: Annotated[
+        list[str] | None, typer.Option(metavar="FIELD=VALUE", help="Only with this; may be repeated.")
+    ] = None,
+    quiet: Quiet = False,
+    as_json: AsJson = False,
+) -> None:
+    """Ids, models and sources of all profiles; a file that can't be read is said in a line."""
+    from xosc_lateral import list_profiles
 
-    @profiles.command("show")
-    def show(name: Profile, library: Library = None, as_json: AsJson = False) -> None:
-        """One profile's card: what it does, where it comes from, how true it is."""
-        from xosc_lateral.formats.profiles import read_profile
-        from xosc_lateral.report.cards import card_text
+    found = list_profiles(library or (), tags=tags or (), where=pairs(where, "--where"))
+    say(found, as_json=as_json, quiet=quiet)
 
-        typer.echo(card_text(read_profile(name, library or []), as_json=as_json))
 
-    @profiles.command("compare")
-    def compare(
-        one: Profile,
-        other: Profile,
-        library: Library = None,
-        seed: Annotated[int, typer.Option(help="Of the free runs that are compared.", min=0)] = 0,
-        as_json: AsJson = False,
-    ) -> None:
-        """How two profiles differ, metric by metric."""
-        from xosc_lateral.formats.profiles import read_profile
-        from xosc_lateral.report.cards import compare_text
+def show(
+    name: Name,
+    library: Library = None,
+    report: Page = None,
+    force: Force = False,
+    quiet: Quiet = False,
+    as_json: AsJson = False,
+) -> None:
+    """A profile's card: what it does, where it comes from, how realistic it is."""
+    from xosc_lateral import read_profile
+    from xosc_lateral.api.profiles import write_card
+    from xosc_lateral.report.cards import card, card_text
 
-        first, second = (read_profile(name, library or []) for name in (one, other))
-        typer.echo(compare_text(first, second, seed=seed, as_json=as_json))
+    profile = read_profile(name, library or ())
+    if report is not None:
+        write_card(profile, report, force=force)
+    if as_json:
+        say_json(card(profile))
+    elif not quiet:
+        typer.echo(card_text(profile))
 
-    app.add_typer(profiles, name="profiles")
+
+def compare(
+    names: Names,
+    library: Library = None,
+    seed: Seed = 0,
+    report: Page = None,
+    force: Force = False,
+    quiet: Quiet = False,
+    as_json: AsJson = False,
+) -> None:
+    """Compare profiles, and say which are alike."""
+    from xosc_lateral import compare_profiles
+
+    if len(names) < 2:
+        raise typer.BadParameter("two profiles at least", param_hint="NAME|PATH...")
+    compared = compare_profiles(*names, seed=seed, library=library or ())
+    if report is not None:
+        compared.write_report(report, force=force)
+    say(compared, as_json=as_json, quiet=quiet)
+
+
+def add(
+    name: Name,
+    library: Annotated[Path, typer.Option(metavar="FOLDER", help="Where to; made if it is missing.")],
+    called: Annotated[str | None, typer.Option("--name", help="Its id there; else its own.")] = None,
+    tags: Tags = None,
+    fields: Fields = None,
+    force: Force = False,
+    quiet: Quiet = False,
+    as_json: AsJson = False,
+) -> None:
+    """Put a profile into a library's folder, with tags and metadata."""
+    from xosc_lateral.api.profiles import add_profile
+
+    path = add_profile(name, library, name=called, tags=tags or (), metadata=pairs(fields, "--set"), force=force)
+    if as_json:
+        say_json({"id": path.stem, "output": str(path)})
+    elif not quiet:
+        typer.echo(path)
+
+
+def tag(
+    name: Name,
+    library: Library = None,
+    tags: Tags = None,
+    remove: Annotated[list[str] | None, typer.Option(metavar="TAG", help="Take it away; may be repeated.")] = None,
+    fields: Fields = None,
+    quiet: Quiet = False,
+    as_json: AsJson = False,
+) -> None:
+    """Change tags and metadata of a profile of your own, in its file."""
+    from xosc_lateral.api.profiles import tag_profile
+    from xosc_lateral.formats.library import facts_of
+
+    metadata = pairs(fields, "--set")
+    changed = tag_profile(name, library or (), add=tags or (), remove=remove or (), metadata=metadata)
+    facts = {**facts_of(changed), "tags": list(changed.metadata.tags)}
+    if as_json:
+        say_json(facts)
+    elif not quiet:
+        typer.echo(", ".join(f"{key} {value}" for key, value in facts.items() if value))
+
+
+def export(
+    names: Names,
+    output: Annotated[str, typer.Option("--output", "-o", help="File, folder/, or - for one.", show_default=False)],
+    library: Library = None,
+    force: Force = False,
+    quiet: Quiet = False,
+    as_json: AsJson = False,
+) -> None:
+    """Write profiles to a file or a folder, to pass them on."""
+    from xosc_lateral import read_profile, write_profile
+    from xosc_lateral.formats.profiles import profile_bytes
+    from xosc_lateral.formats.targets import STDOUT, is_folder
+
+    chosen = [read_profile(name, library or ()) for name in names]
+    if len(chosen) > 1 and not is_folder(output):
+        raise typer.BadParameter("several profiles go to a folder: -o FOLDER/", param_hint="-o")
+    if output == STDOUT:
+        write_stdout(profile_bytes(chosen[0]))
+        return
+    written = [write_profile(profile, output, force=force) for profile in chosen]
+    if as_json:
+        say_json({"outputs": [str(path) for path in written]})
+    elif not quiet:
+        for path in written:
+            typer.echo(path)
+
+
+def check(library: Library = None, quiet: Quiet = False, as_json: AsJson = False) -> None:
+    """Read every profile of the library; exit 1 if one is broken, foreign, or not called as its file."""
+    from xosc_lateral import list_profiles
+
+    found = list_profiles(library or ())
+    wrong = [entry.problem for entry in found if entry.problem]
+    if as_json:
+        problems = [{"path": str(entry.path), "problem": entry.problem} for entry in found if entry.problem]
+        say_json({"checked": len(found), "problems": problems})
+    else:
+        for problem in wrong:
+            typer.echo(problem)
+        if not quiet:
+            typer.echo(f"{len(found)} files, {len(wrong)} with problems")
+    if wrong:
+        raise typer.Exit(1)

@@ -7,23 +7,30 @@ from typing import Annotated
 
 import typer
 
+from xosc_lateral.cli.words import AsJson, Quiet, TimeLimit, examples, pairs, say
+
 
 def register(app: typer.Typer) -> None:
     """Add the verb to the command line."""
-    app.command("segments")(segments)
+    epilog = examples("segments cut-in.xosc", "segments cut-in.xosc --json")
+    app.command("segments", short_help="Where offsets are sampled, and why not elsewhere.", epilog=epilog)(segments)
 
 
 def segments(
     scenario: Annotated[Path, typer.Argument(help="Maneuver-based scenario (.xosc).", show_default=False)],
-    time_limit: Annotated[
-        float, typer.Option(help="End of a scenario that does not end by itself [s].", min=0.0, max=86_400)
-    ] = 60.0,
-    as_json: Annotated[bool, typer.Option("--json", help="For machines.")] = False,
+    time_limit: TimeLimit = 60.0,
+    parameter: Annotated[
+        list[str] | None,
+        typer.Option("--set", metavar="NAME=VALUE", help="Value of a scenario parameter; may be repeated."),
+    ] = None,
+    allow: Annotated[
+        list[Path] | None, typer.Option(help="Folder that roads and catalogs may be read from; may be repeated.")
+    ] = None,
+    quiet: Quiet = False,
+    as_json: AsJson = False,
 ) -> None:
-    """Name each entity's road-following segments, and why the rest is none."""
-    from xosc_lateral.pipeline.load import play_scenario
-    from xosc_lateral.pipeline.segments import scenario_segments
-    from xosc_lateral.report.segments import as_text, to_json
+    """List each entity's road-following segments, and the reason for everything else."""
+    from xosc_lateral import segments
 
-    found = scenario_segments(play_scenario(scenario, time_limit=time_limit))
-    typer.echo(to_json(found) if as_json else as_text(found))
+    found = segments(scenario, time_limit=time_limit, parameters=pairs(parameter, "--set"), allow=allow or ())
+    say(found, as_json=as_json, quiet=quiet)

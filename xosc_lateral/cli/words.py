@@ -1,10 +1,50 @@
-"""Words of the command line that several verbs read."""
+"""Words of the command line that several verbs share: options, and how results are said."""
 
 from __future__ import annotations
 
+import json
+import sys
 from collections.abc import Iterable
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
+
+if TYPE_CHECKING:
+    from xosc_lateral.api.result import Result
+
+AsJson = Annotated[bool, typer.Option("--json", help="Machine-readable: JSON on standard output, errors included.")]
+Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print errors only.")]
+Force = Annotated[bool, typer.Option("--force", help="Replace files that xosc-lateral did not write itself.")]
+Seed = Annotated[int, typer.Option(help="Random seed; the same inputs and seed give the same bytes.", min=0)]
+Library = Annotated[
+    list[Path] | None, typer.Option(metavar="FOLDER", help="Folder with more profiles; may be repeated.")
+]
+Profile = Annotated[str, typer.Option("--profile", "-p", metavar="NAME|PATH", help="Driver profile.")]
+Tables = Annotated[list[Path], typer.Argument(metavar="TABLE...", help="Drive tables: .csv, .csv.gz, .parquet.")]
+Columns = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--map",
+        metavar="NAME=COLUMN[:UNIT]",
+        help="Column under another name or unit, e.g. speed=v_kmh:km/h; may be repeated.",
+    ),
+]
+Road = Annotated[
+    Path | None, typer.Option("--road", help="OpenDRIVE file, whatever the scenario says.", show_default=False)
+]
+RoadPath = Annotated[
+    list[Path] | None,
+    typer.Option("--road-path", metavar="DIR", help='Folder with roads known by name ("Town04"); may be repeated.'),
+]
+TimeLimit = Annotated[
+    float, typer.Option(help="End time of a scenario that has none of its own [s].", min=0.1, max=86_400)
+]
+
+
+def examples(*lines: str) -> str:
+    """End of a verb's help."""
+    return "\b\nExamples:\n" + "\n".join(f"  xosc-lateral {line}" for line in lines)
 
 
 def pairs(words: Iterable[str] | None, option: str) -> dict[str, str]:
@@ -13,8 +53,28 @@ def pairs(words: Iterable[str] | None, option: str) -> dict[str, str]:
     for word in words or ():
         name, equals, value = word.partition("=")
         if not equals or not name:
-            raise typer.BadParameter(f"{option} {word!r}: expected NAME=VALUE")
+            raise typer.BadParameter(f"{word!r}: expected NAME=VALUE", param_hint=option)
         if name in found:
-            raise typer.BadParameter(f"{option} {name!r} is given twice")
+            raise typer.BadParameter(f"{name!r} is given twice", param_hint=option)
         found[name] = value
     return found
+
+
+def say(result: Result, *, as_json: bool, quiet: bool, aside: bool = False) -> None:
+    """Say what came out: JSON on standard output, else text there, or on standard error if that is only `aside`."""
+    if as_json:
+        say_json(result.to_dict())
+    elif not quiet:
+        typer.echo(str(result), err=aside)
+
+
+def say_json(values: Any) -> None:
+    """One line of JSON on standard output."""
+    typer.echo(json.dumps(values, ensure_ascii=False, allow_nan=False))
+
+
+def write_stdout(data: str | bytes) -> None:
+    """The output itself, byte by byte, for ``-o -``."""
+    sys.stdout.flush()
+    sys.stdout.buffer.write(data.encode() if isinstance(data, str) else data)
+    sys.stdout.buffer.flush()

@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from msgspec.structs import replace
 from numpy.typing import NDArray
 
-from xosc_lateral import __version__
-from xosc_lateral.driver.best_fit import fit_best
-from xosc_lateral.driver.core import CoreModel
-from xosc_lateral.driver.kinds import ModelKind
+from xosc_lateral.driver.models.base import CoreModel
+from xosc_lateral.driver.models.kinds import ModelKind
+from xosc_lateral.driver.models.registry import model_named
 from xosc_lateral.driver.profile import DriverProfile, Provenance
-from xosc_lateral.driver.series import PAPER_RULES, CutRules, Drive, Run, all_runs
-from xosc_lateral.driver.two_level import fit_two_level
+from xosc_lateral.driver.sensor.runs import driver_runs
+from xosc_lateral.drives.cuts import PAPER_RULES, CutRules, all_runs
+from xosc_lateral.drives.drive import Drive, Run
+from xosc_lateral.version import __version__
 
 FloatArray = NDArray[np.float64]
 
@@ -24,11 +25,12 @@ def fit_profile(
     drives: Sequence[Drive],
     *,
     name: str,
-    model: ModelKind | str = ModelKind.BEST,
+    model: ModelKind | str = ModelKind.AUTOREGRESSIVE,
     rules: CutRules = PAPER_RULES,
     provenance: Provenance | None = None,
+    sensor_noise: float | None = None,
 ) -> DriverProfile:
-    """Cut drives into runs and fit a profile without effects.
+    """Cut drives into runs, tell driver and sensor apart, and fit a profile without effects.
 
     Parameters
     ----------
@@ -40,25 +42,33 @@ def fit_profile(
         What is cut out.
     provenance : Provenance, optional
         What is known about the drives; hours, counts and fit settings are filled in.
+    sensor_noise : float, optional
+        Standard deviation of the sensor's error on the rows, where it is known. [m]
 
     Raises
     ------
     NotEnoughDataError
         When too little is left after cutting.
     """
-    return fit_runs(all_runs(drives, rules), name=name, model=model, provenance=provenance)
+    runs = all_runs(drives, rules)
+    if (
+        model_named(model).model.kind == ModelKind.TWO_LEVEL
+    ):  # to the letter: the paper takes offsets as they were measured
+        return fit_runs(runs, name=name, model=model, provenance=provenance)
+    cleaned, sensor = driver_runs(runs, drives, sensor_noise=sensor_noise)
+    profile = fit_runs(cleaned, name=name, model=model, provenance=provenance)
+    return replace(profile, sensor=sensor)
 
 
 def fit_runs(
     runs: Sequence[Run],
     *,
     name: str,
-    model: ModelKind | str = ModelKind.BEST,
+    model: ModelKind | str = ModelKind.AUTOREGRESSIVE,
     provenance: Provenance | None = None,
 ) -> DriverProfile:
     """Fit a profile to runs that are cut already."""
-    kind = ModelKind(model)
-    core = fit_core([run.rel_offset for run in runs], [run.drive for run in runs], model=kind)
+    core = fit_core([run.rel_offset for run in runs], [run.drive for run in runs], model=model)
     known = provenance or Provenance()
     seconds = sum(len(run) for run in runs) * core.step
     return DriverProfile(
@@ -70,29 +80,27 @@ def fit_runs(
             hours=round(seconds / 3600.0, 4),
             drives=len({run.drive for run in runs}),
             runs=len(runs),
-            fit={**known.fit, **_fit_notes(kind, core)},
+            fit={**known.fit, **_fit_notes(core)},
             package_version=__version__,
         ),
     )
 
 
 def fit_core(
-    rel_offsets: Sequence[FloatArray], drives: Sequence[str], *, model: ModelKind | str = ModelKind.BEST
+    rel_offsets: Sequence[FloatArray], drives: Sequence[str], *, model: ModelKind | str = ModelKind.AUTOREGRESSIVE
 ) -> CoreModel:
     """Fit a core model to relative offsets, which may be what is left once effects were taken out.
 
     Parameters
     ----------
-    rel_offsets : sequence of array
+    rel_offsets : sequence of array, shape (n_i,)
         One array per run, evenly at 5 Hz, finite. [-]
     drives : sequence of str
         For each run the drive that it comes from: runs of a drive are of one driver.
     model : ModelKind or str
     """
-    if ModelKind(model) is ModelKind.TWO_LEVEL:
-        return fit_two_level(rel_offsets)
-    return fit_best(rel_offsets, drives)
+    return model_named(model).fit(rel_offsets, drives)
 
 
-def _fit_notes(kind: ModelKind, core: CoreModel) -> Mapping[str, Any]:
-    return {"model": kind.value, "step_s": core.step}
+def _fit_notes(core: CoreModel) -> Mapping[str, Any]:
+    return {"model": core.kind, "step_s": core.step}

@@ -2,26 +2,28 @@
 
 from __future__ import annotations
 
+import hashlib
+import json
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field
-from types import MappingProxyType
-from typing import Any
+from functools import lru_cache
+from typing import Annotated, Any
 
-from xosc_lateral.driver.core import CoreModel
-from xosc_lateral.driver.effects import Effect, effect_from_dict
-from xosc_lateral.driver.models import core_model_from_dict
+import msgspec
+from msgspec import Meta, defstruct, field, structs
+
+from xosc_lateral.driver.effects import Effect, any_effect
+from xosc_lateral.driver.models.base import CoreModel
+from xosc_lateral.driver.models.registry import CORE_MODELS, any_model
+from xosc_lateral.driver.records import Record, plain, read_as, schema_hook, set_once
+from xosc_lateral.driver.sensor.model import SensorModel
+from xosc_lateral.driver.versions import FORMAT, VERSION, upgraded
 from xosc_lateral.errors import DriverProfileError
-
-FORMAT = "xosc-lateral driver profile"
-VERSION = 1
-"""Of the file format. A reader understands its own and every older version; new fields have a default."""
 
 MAX_LANE_WIDTH = 10.0
 """Lanes that wide are none: 2 to 6 m is what measured ones have. [m]"""
 
 
-@dataclass(frozen=True, slots=True)
-class Provenance:
+class Provenance(Record, frozen=True):
     """Where a profile comes from.
 
     Parameters
@@ -45,37 +47,60 @@ class Provenance:
     notes : str
     """
 
-    source: str = ""
-    licence: str = ""
-    hours: float = 0.0
-    drives: int = 0
-    runs: int = 0
-    inputs: Mapping[str, str] = field(default_factory=dict)
-    fit: Mapping[str, Any] = field(default_factory=dict)
-    evaluation: Mapping[str, Any] = field(default_factory=dict)
+    source: Annotated[str, Meta(description="The drives in words.")] = ""
+    licence: Annotated[str, Meta(description="Of the drives.")] = ""
+    hours: Annotated[float, Meta(ge=0, description="Driving fitted, after cutting. [h]")] = 0.0
+    drives: Annotated[int, Meta(ge=0)] = 0
+    runs: Annotated[int, Meta(ge=0)] = 0
+    inputs: Annotated[Mapping[str, str], Meta(description="File name to SHA-256.")] = field(default_factory=dict)
+    fit: Annotated[Mapping[str, Any], Meta(description="Model and settings of the fit.")] = field(default_factory=dict)
+    evaluation: Annotated[Mapping[str, Any], Meta(description="Results on held-out drives.")] = field(
+        default_factory=dict
+    )
     package_version: str = ""
     notes: str = ""
 
     def to_dict(self) -> dict[str, Any]:
         """Plain JSON values."""
-        return asdict(self)
-
-    @classmethod
-    def from_dict(cls, values: Mapping[str, Any]) -> Provenance:
-        """Back from `to_dict`; what is absent keeps its default."""
-        try:
-            return cls(**values)
-        except TypeError as error:
-            raise DriverProfileError(f"provenance: {error}") from error
+        values: dict[str, Any] = plain(self)
+        return values
 
 
-@dataclass(frozen=True, slots=True)
-class DriverProfile:
+class Metadata(Record, frozen=True):
+    """What a profile is of, to be searched by; all of it is optional.
+
+    Parameters
+    ----------
+    version : str
+        Of the profile itself, as its owners count: "2", "1.3".
+    driver, vehicle, road : str
+        Whom and what was measured, and where: "professional", "truck", "motorway".
+    country : str
+        ISO 3166-1 alpha-2: "DE".
+    date : str
+        When the drives were recorded, ISO 8601: "2026-05", "2026-05-03/2026-06-01".
+    licence : str
+        Of the profile.
+    tags : tuple of str
+    """
+
+    version: str = ""
+    driver: str = ""
+    vehicle: str = ""
+    road: str = ""
+    country: str = ""
+    date: str = ""
+    licence: str = ""
+    tags: tuple[str, ...] = ()
+
+
+class DriverProfile(Record, frozen=True):
     """What it takes to sample offsets.
 
     Parameters
     ----------
     name : str
+        Its id: the same in the file, in the file's name and wherever it is looked up.
     model : CoreModel
         Base movement.
     effects : tuple of Effect
@@ -84,6 +109,9 @@ class DriverProfile:
         Median width of the lanes that it was fitted on; where a lane's own width is unknown it stands in.
         Above 0, at most `MAX_LANE_WIDTH`. [m]
     provenance : Provenance
+    metadata : Metadata
+    sensor : SensorModel, optional
+        What the sensor added to the drives it was fitted on, where that is known.
 
     Raises
     ------
@@ -91,11 +119,13 @@ class DriverProfile:
         If it has no name or its lane width is no width.
     """
 
-    name: str
+    name: str = field(name="id")
     model: CoreModel
     effects: tuple[Effect, ...] = ()
     lane_width: float = 3.75
     provenance: Provenance = field(default_factory=Provenance)
+    metadata: Metadata = field(default_factory=Metadata)
+    sensor: SensorModel | None = None
 
     def __post_init__(self) -> None:
         """Check."""
@@ -105,7 +135,16 @@ class DriverProfile:
             raise DriverProfileError(
                 f"profile {self.name}: lane width {self.lane_width} m, expected above 0, at most {MAX_LANE_WIDTH:g} m"
             )
-        object.__setattr__(self, "effects", tuple(self.effects))
+        set_once(self, effects=tuple(self.effects))
+
+    def __repr__(self) -> str:
+        known = self.provenance
+        effects = f"{len(self.effects)} effect{'' if len(self.effects) == 1 else 's'}"
+        return f"<DriverProfile {self.name}: {self.model.kind}, {effects}, {known.hours:g} h of {known.drives} drives>"
+
+    def with_effects(self, *effects: Effect, name: str | None = None) -> DriverProfile:
+        """A profile with further effects, under another name if one is given."""
+        return structs.replace(self, name=name or self.name, effects=(*self.effects, *effects))
 
     @property
     def columns(self) -> tuple[str, ...]:
@@ -114,15 +153,10 @@ class DriverProfile:
 
     def to_dict(self) -> dict[str, Any]:
         """Plain JSON values, as the profile file holds them."""
-        return {
-            "format": FORMAT,
-            "version": VERSION,
-            "name": self.name,
-            "lane_width": self.lane_width,
-            "model": self.model.to_dict(),
-            "effects": [effect.to_dict() for effect in self.effects],
-            "provenance": self.provenance.to_dict(),
-        }
+        values = plain(self)
+        values["effects"] = [effect.to_dict() for effect in self.effects]
+        order = ("id", "metadata", "lane_width", "model", "effects", "sensor", "provenance")
+        return {"format": FORMAT, "version": VERSION, **{name: values[name] for name in order}}
 
     @classmethod
     def from_dict(cls, values: Mapping[str, Any]) -> DriverProfile:
@@ -131,33 +165,48 @@ class DriverProfile:
         Raises
         ------
         DriverProfileError
-            If it is no profile, of a newer version, or contradicts itself.
+            If it is no profile, of a newer version, or contradicts itself; names the field and where it stands.
         """
-        values = _checked(values)
-        effects = tuple(effect_from_dict(effect) for effect in values.get("effects", ()))
-        return cls(
-            name=str(values["name"]),
-            model=core_model_from_dict(values["model"]),
-            effects=effects,
-            lane_width=float(values.get("lane_width", 3.75)),
-            provenance=Provenance.from_dict(values.get("provenance", MappingProxyType({}))),
-        )
+        present = upgraded(values)
+        effects = present.get("effects")
+        effects = effects if isinstance(effects, list) else ()
+        kinds = [effect.get("kind") for effect in effects if isinstance(effect, Mapping)]
+        model = present.get("model")
+        kind = model.get("kind") if isinstance(model, Mapping) else None
+        read = read_as(file_type(str(kind), frozenset(map(str, kinds))), present)
+        return cls(**{name: getattr(read, name) for name in cls.__struct_fields__})
 
 
-def _checked(values: Mapping[str, Any]) -> Mapping[str, Any]:
-    if not isinstance(values, Mapping) or values.get("format") != FORMAT:
-        raise DriverProfileError(f'no driver profile: "format" is not "{FORMAT}"')
-    version = values.get("version")
-    if not isinstance(version, int) or version < 1:
-        raise DriverProfileError(f"version {version!r}, expected a whole number from 1")
-    if version > VERSION:
-        raise DriverProfileError(f"written by a newer version ({version}) than this package reads (up to {VERSION})")
-    for key, kind in (("name", str), ("model", Mapping)):
-        if not isinstance(values.get(key), kind):
-            raise DriverProfileError(f'"{key}" is missing or of the wrong kind')
-    for key, kinds in (("effects", list), ("provenance", Mapping), ("lane_width", (int, float))):
-        if key in values and not isinstance(values[key], kinds):
-            raise DriverProfileError(f'"{key}" is of the wrong kind')
-    if not all(isinstance(effect, Mapping) for effect in values.get("effects", ())):
-        raise DriverProfileError('"effects" holds something that is no object')
-    return values
+@lru_cache(maxsize=16)
+def file_type(model: str, effects: frozenset[str]) -> type[DriverProfile]:
+    """A profile's type with all models and effects spelt out, for reading and for the JSON Schema.
+
+    Parameters
+    ----------
+    model : str
+    effects : frozenset of str
+        Kinds in the file; plug-ins are looked for when one is not of this package.
+    """
+    known: Any = tuple[any_effect(effects), ...]  # type: ignore[misc]  # known only now
+    fields: list[Any] = [("model", any_model(model)), ("effects", known, ())]
+    made: Any = defstruct("DriverProfile", fields, bases=(DriverProfile,), frozen=True, kw_only=True)
+    return made  # type: ignore[no-any-return]
+
+
+def profile_schema() -> dict[str, Any]:
+    """JSON Schema of a profile file, generated from the types; plug-ins are not in it."""
+    schema = msgspec.json.schema(file_type(CORE_MODELS[0].model.kind, frozenset()), schema_hook=schema_hook)
+    own = schema["$defs"]["DriverProfile"]
+    head = {"format": {"const": FORMAT}, "version": {"const": VERSION}}
+    own["properties"] = head | own["properties"]
+    own["required"] = [*head, *own["required"]]
+    own["title"] = f"Driver profile of xosc-lateral, version {VERSION}"
+    own["description"] = "Offsets are relative to the lane width, positive to the left of travel."
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema}
+
+
+def sampling_hash(profile: DriverProfile) -> str:
+    """SHA-256 of what a profile's offsets depend on; what is only told about it may change."""
+    values = profile.to_dict()
+    parts = {name: values[name] for name in ("lane_width", "model", "effects")}
+    return hashlib.sha256(json.dumps(parts, sort_keys=True).encode()).hexdigest()

@@ -8,17 +8,24 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from xosc_lateral.driver.plausibility import check_offsets
 from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.driver.sampling import sample_offsets
 from xosc_lateral.driver.seeds import child
-from xosc_lateral.driver.series import PAPER_RULES, STEP, CutRules, Drive, Run, all_runs, whole_run
-from xosc_lateral.errors import NotEnoughDataError
+from xosc_lateral.driver.sensor.model import SensorModel
+from xosc_lateral.drives.cuts import PAPER_RULES, CutRules, all_runs, whole_run
+from xosc_lateral.drives.drive import Drive, Run
+from xosc_lateral.drives.resampling import STEP
+from xosc_lateral.errors import DriverProfileError, NotEnoughDataError
 from xosc_lateral.segment import Segment
 
 FloatArray = NDArray[np.float64]
 
 PAST, FUTURE = 30.0, 10.0
 """Context before and after a snippet that effects may look at. [s]"""
+
+SENSOR = 77
+"""Key of the sensor's random numbers among a drive's."""
 
 MEAN_SPEED = 30.0
 """Of a free run whose speed nobody named: about 108 km/h. [m/s]"""
@@ -37,12 +44,12 @@ class Snippet:
 
     @property
     def time(self) -> FloatArray:
-        """[s]"""
+        """Shape (n,). [s]"""
         return self.run.time[self.rows]
 
     @property
     def offset(self) -> FloatArray:
-        """As measured, positive left. [m]"""
+        """As measured, positive left, shape (n,). [m]"""
         return self.run.offset[self.rows]
 
 
@@ -99,28 +106,55 @@ def segment_of(run: Run, rows: slice | None = None) -> Segment:
 
 
 def sample_like(
-    profile: DriverProfile, drives: Sequence[Drive], seconds: float, seed: int, rules: CutRules = PAPER_RULES
+    profile: DriverProfile,
+    drives: Sequence[Drive],
+    seconds: float,
+    seed: int,
+    rules: CutRules = PAPER_RULES,
+    *,
+    with_sensor: bool = False,
 ) -> Iterator[Sampled]:
     """For each snippet of the measured drives a sampled one of the same length, start, lane width and context."""
+    sensor = _sensor(profile) if with_sensor else None
     numbers = {drive.name: number for number, drive in enumerate(drives)}
     root = np.random.SeedSequence(seed)
     for snippet in cut_snippets(all_runs(drives, rules), seconds):
         own = child(root, numbers[snippet.run.drive], snippet.index)
         segment = segment_of(snippet.run, snippet.rows)
-        offset = sample_offsets(profile, segment, own, start=float(snippet.offset[0]))
+        noise = _noise(sensor, len(snippet.time), own)
+        offset = sample_offsets(profile, segment, own, start=float(snippet.offset[0] - noise[0])) + noise
+        _check(offset, segment, profile, snippet.run.drive)
         yield Sampled(snippet.run.drive, snippet.index, snippet.time, offset, snippet.offset)
 
 
-def sample_context(profile: DriverProfile, drives: Sequence[Drive], seed: int) -> Iterator[Sampled]:
+def sample_context(
+    profile: DriverProfile, drives: Sequence[Drive], seed: int, *, with_sensor: bool = False
+) -> Iterator[Sampled]:
     """One free run per measured drive, under its context from its first row to its last, lane changes included."""
+    sensor = _sensor(profile) if with_sensor else None
     root = np.random.SeedSequence(seed)
     for number, drive in enumerate(drives):
         run = whole_run(drive)
-        yield Sampled(drive.name, 0, run.time, sample_offsets(profile, segment_of(run), child(root, number)), None)
+        own, segment = child(root, number), segment_of(run)
+        offset = sample_offsets(profile, segment, own) + _noise(sensor, len(run), own)
+        _check(offset, segment, profile, drive.name)
+        yield Sampled(drive.name, 0, run.time, offset, None)
+
+
+def _check(offset: FloatArray, segment: Segment, profile: DriverProfile, drive: str) -> None:
+    inside = segment.inside
+    who = f"profile {profile.name} under the context of drive {drive}"
+    check_offsets(offset, segment.lane_width[inside], who, segment.time[inside])
 
 
 def sample_free(
-    profile: DriverProfile, duration: float, seed: int, *, speed: float = MEAN_SPEED, lane_width: float | None = None
+    profile: DriverProfile,
+    duration: float,
+    seed: int,
+    *,
+    speed: float = MEAN_SPEED,
+    lane_width: float | None = None,
+    with_sensor: bool = False,
 ) -> Iterator[Sampled]:
     """One free run in even traffic: constant speed, no other context.
 
@@ -139,5 +173,26 @@ def sample_free(
     time: FloatArray = profile.model.step * np.arange(n, dtype=np.float64)
     width = profile.lane_width if lane_width is None else lane_width
     segment = Segment(time=time, lane_width=np.full(n, width), speed=np.full(n, speed))
-    offset = sample_offsets(profile, segment, child(np.random.SeedSequence(seed), 0))
+    own = child(np.random.SeedSequence(seed), 0)
+    offset = sample_offsets(profile, segment, own) + _noise(_sensor(profile) if with_sensor else None, n, own)
     yield Sampled(profile.name, 0, time, offset, None)
+
+
+def _sensor(profile: DriverProfile) -> SensorModel:
+    """What the profile's drives were measured by.
+
+    Raises
+    ------
+    DriverProfileError
+        When the profile doesn't know.
+    """
+    if profile.sensor is None:
+        raise DriverProfileError(f"profile {profile.name} holds no sensor: fit it anew, or sample the driver alone")
+    return profile.sensor
+
+
+def _noise(sensor: SensorModel | None, n: int, own: np.random.SeedSequence) -> FloatArray:
+    """What the sensor adds to n offsets, from random numbers of its own. [m]"""
+    if sensor is None:
+        return np.zeros(n)
+    return sensor.sample(n, STEP, np.random.default_rng(child(own, SENSOR)))

@@ -6,28 +6,19 @@ the model (5 Hz), on that moment's context; a bench that runs faster gets the cu
 
 from __future__ import annotations
 
-import hashlib
-import json
-import math
 from collections import deque
 from collections.abc import Mapping
-from dataclasses import asdict
 from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.driver.core import CoreStream, Start
-from xosc_lateral.driver.effects import EffectTerms
-from xosc_lateral.driver.effects.acts import Acts, terms_of
-from xosc_lateral.driver.effects.column import ColumnEffect
-from xosc_lateral.driver.effects.hidden import HiddenEffect
-from xosc_lateral.driver.effects.response import split_shift
-from xosc_lateral.driver.effects.running import RunningTerms
-from xosc_lateral.driver.profile import DriverProfile
-from xosc_lateral.driver.sampling import combine
-from xosc_lateral.driver.seeds import child
-from xosc_lateral.driver.state import restore, state_of
+from xosc_lateral.driver.effects import Acts, ColumnEffect, EffectTerms
+from xosc_lateral.driver.plausibility import check_context
+from xosc_lateral.driver.process import DriveProcess, combine
+from xosc_lateral.driver.profile import DriverProfile, sampling_hash
+from xosc_lateral.driver.records import plain, read_as
+from xosc_lateral.driver.stream_state import FORMAT, VERSION, AnswerState, SeedState, StreamState, upgraded
 from xosc_lateral.driver.upsampling import extrapolate, piece
 from xosc_lateral.errors import DriverProfileError
 
@@ -35,8 +26,6 @@ FloatArray = NDArray[np.float64]
 
 BLOCK = 64
 """Model steps drawn at once. [-]"""
-
-FORMAT = "xosc-lateral offset stream"
 
 _NEIGHBOURS = 2
 """Samples ahead that the curve between two samples needs. [-]"""
@@ -88,15 +77,15 @@ class OffsetStream:
         self._seed = seed if isinstance(seed, np.random.SeedSequence) else np.random.SeedSequence(seed)
         self._factor = _steps_per_model_step(rate, profile.model.step)
         self._start, self._time = start, time
-        effects = [effect for effect in profile.effects if isinstance(effect, ColumnEffect)]
-        shifts = [effect.lag_s / profile.model.step for effect in effects]
-        self._ahead = max([0, *(math.ceil(-shift) for shift in shifts)]) + (_NEIGHBOURS if self._factor > 1 else 0)
-        self._answers = tuple(_Answer(effect, profile.model.step, self._ahead) for effect in effects)
-        self._movement = _Movement(profile, self._seed, time)
+        self._process = DriveProcess(profile, self._seed, ahead=BLOCK)
+        self._process.begin_at(time)
+        self._answers = tuple(_Answer(effect, profile.model.step) for effect in self._process.columned)
+        self._ahead = max([0, *(answer.ahead for answer in self._answers)]) + (_NEIGHBOURS if self._factor > 1 else 0)
         self._known: tuple[str, ...] | None = None
         self._widths: deque[float] = deque()
         self._recalled = 0
         self._looked = 0
+        self._row = 0
         self._phase = 0
         self._samples: list[float] = []
         self._curve: tuple[float, ...] = ()
@@ -116,16 +105,18 @@ class OffsetStream:
 
         Without it, what comes first is taken to have lasted: the driver's answers start settled.
         """
+        self._check(context)
         if self._looked or self._samples:
             raise ValueError("recall what was before the drive before looking ahead and before the first step")
         self._recalled += 1
-        self._see(context)
+        self._see(context, before=True)
 
     def look(self, context: Mapping[str, float]) -> None:
         """Context from time 0 on, at the stream's rate: `preview_steps` calls before the first `step`, or none."""
         if self._samples or self._looked >= self.preview_steps:
             raise ValueError(f"look {self.preview_steps} steps ahead, before the first step")
         if self._looked % self._factor == 0:
+            self._check(context)
             self._take(context)
         self._looked += 1
 
@@ -147,7 +138,8 @@ class OffsetStream:
         Raises
         ------
         ValueError
-            If a name that the first context had is missing, or `look` was called too few times.
+            If a name that the first context had is missing, a value is none that a road has (`limits`), or `look` was
+            called too few times. The stream is as it was then, and goes on with the next good context.
         """
         phase = self._phase
         if phase == 0:
@@ -159,8 +151,18 @@ class OffsetStream:
         c0, c1, c2, c3, c4, c5 = self._curve
         return c0 + share * (c1 + share * (c2 + share * (c3 + share * (c4 + share * c5))))
 
+    def _check(self, context: Mapping[str, float]) -> None:
+        """Refuse a bad sample before anything has changed."""
+        check_context(context, "context")
+        if not float(context.get("lane_width", self.profile.lane_width)) > 0.0:
+            raise ValueError(f"context: lane_width {context['lane_width']} m")
+        missing = [column for column in self._known or () if column not in context]
+        if missing:
+            raise ValueError(f"the context has no {missing[0]!r}, which the first one had")
+
     def _advance(self, context: Mapping[str, float]) -> None:
         """To the next model step: read its context, complete the samples and the curve."""
+        self._check(context)
         if not self._samples:
             self._begin(context)
         self._take(context)
@@ -186,239 +188,125 @@ class OffsetStream:
     def _take(self, context: Mapping[str, float]) -> None:
         """One more row of the drive itself."""
         self._see(context)
-        width = float(context.get("lane_width", self.profile.lane_width))
-        if not width > 0.0:
-            raise ValueError(f"lane_width {width} m")
-        self._widths.append(width)
+        self._widths.append(float(context.get("lane_width", self.profile.lane_width)))
 
-    def _see(self, context: Mapping[str, float]) -> None:
-        """Let the effects see one more row of context."""
+    def _see(self, context: Mapping[str, float], *, before: bool = False) -> None:
+        """Let the effects see one more row of context, of the drive or from before it."""
         if self._known is None:
             columns = {column for answer in self._answers for column in answer.effect.columns}
-            self._known = tuple(sorted(columns & context.keys()))
-            self._answers = tuple(answer for answer in self._answers if set(answer.effect.columns) <= context.keys())
-            self._movement.paced |= any(answer.effect.acts is Acts.RATE for answer in self._answers)
-        try:
-            row = {column: np.array([context[column]], dtype=np.float64) for column in self._known}
-        except KeyError as error:
-            raise ValueError(f"the context has no {error}, which the first one had") from error
+            self._know(tuple(sorted(columns & context.keys())))
+        assert self._known is not None
+        row = {column: np.array([context[column]], dtype=np.float64) for column in self._known}
         for answer in self._answers:
-            answer.take(row)
-            answer.pass_by(self._recalled, self._ahead)
+            answer.take(row, before=before)
+
+    def _know(self, columns: tuple[str, ...]) -> None:
+        """From now on these columns of the context count."""
+        self._known = columns
+        self._answers = tuple(answer for answer in self._answers if set(answer.effect.columns) <= set(columns))
+        if any(answer.effect.acts is Acts.RATE for answer in self._answers):
+            self._process.draw_nothing_ahead()
 
     def _sample(self) -> float:
         """The next offset at the model's step; the context that it needs has been taken."""
-        width = self._widths.popleft()
-        return self._movement.next(width, [answer.next() for answer in self._answers], self._start)
+        hidden = self._process.hidden_terms_at(np.array([self._row]))
+        terms = combine([hidden, *(answer.next() for answer in self._answers)])
+        offset = self._process.take(terms, np.array([self._widths.popleft()]), None if self._row else self._start)
+        self._row += 1
+        return float(offset[0])
 
     def to_dict(self) -> dict[str, Any]:
         """The state as plain JSON values; `from_dict` goes on from it with the same profile."""
-        return {
-            "format": FORMAT,
-            "profile": _profile_hash(self.profile),
-            "seed": {"entropy": self._seed.entropy, "spawn_key": list(self._seed.spawn_key)},
-            "factor": self._factor,
-            "start": self._start,
-            "time": self._time,
-            "known": None if self._known is None else list(self._known),
-            "widths": list(self._widths),
-            "recalled": self._recalled,
-            "looked": self._looked,
-            "phase": self._phase,
-            "samples": list(self._samples),
-            "curve": list(self._curve),
-            "answers": [answer.to_dict() for answer in self._answers],
-            "movement": self._movement.to_dict(),
-        }
+        values: dict[str, Any] = plain(
+            StreamState(
+                profile=sampling_hash(self.profile),
+                seed=SeedState(self._seed.entropy, tuple(self._seed.spawn_key)),
+                factor=self._factor,
+                start=self._start,
+                time=self._time,
+                known=self._known,
+                widths=tuple(self._widths),
+                recalled=self._recalled,
+                looked=self._looked,
+                row=self._row,
+                phase=self._phase,
+                samples=tuple(self._samples),
+                curve=self._curve,
+                answers=tuple(answer.state() for answer in self._answers),
+                process=self._process.state,
+            )
+        )
+        return {"format": FORMAT, "version": VERSION, **values}
 
     @classmethod
     def from_dict(cls, profile: DriverProfile, state: Mapping[str, Any]) -> Self:
         """A stream that goes on where the one that gave `state` was.
 
+        Parameters
+        ----------
+        profile : DriverProfile
+        state : mapping
+            Of this version of the package or an older one.
+
         Raises
         ------
         DriverProfileError
-            If the state is none, or of another profile.
+            If the state is none, of a newer version, or of another profile.
         """
-        if state.get("format") != FORMAT:
-            raise DriverProfileError(f'no state of an offset stream: "format" is not "{FORMAT}"')
-        if state["profile"] != _profile_hash(profile):
+        saved = read_as(StreamState, upgraded(state, profile), "state")
+        if saved.profile != sampling_hash(profile):
             raise DriverProfileError(f"the state belongs to another profile than {profile.name}")
-        seed = np.random.SeedSequence(state["seed"]["entropy"], spawn_key=tuple(state["seed"]["spawn_key"]))
-        rate = state["factor"] / profile.model.step
-        stream = cls(profile, seed, rate=rate, start=state["start"], time=state["time"])
-        if state["known"] is not None:
-            stream._known = tuple(state["known"])
-            stream._answers = tuple(
-                answer for answer in stream._answers if set(answer.effect.columns) <= set(stream._known)
-            )
-        stream._widths.extend(state["widths"])
-        stream._recalled, stream._looked, stream._phase = state["recalled"], state["looked"], state["phase"]
-        stream._samples, stream._curve = list(state["samples"]), tuple(state["curve"])
-        for answer, saved in zip(stream._answers, state["answers"], strict=True):
-            answer.restore(saved)
-        stream._movement.restore(state["movement"])
+        seed = np.random.SeedSequence(saved.seed.entropy, spawn_key=saved.seed.spawn_key)
+        rate = saved.factor / profile.model.step
+        stream = cls(profile, seed, rate=rate, start=saved.start, time=saved.time)
+        if saved.known is not None:
+            stream._know(saved.known)
+        stream._widths.extend(saved.widths)
+        stream._recalled, stream._looked, stream._row, stream._phase = (
+            saved.recalled, saved.looked, saved.row, saved.phase,
+        )  # fmt: skip
+        stream._samples, stream._curve = list(saved.samples), saved.curve
+        for answer, own in zip(stream._answers, saved.answers, strict=True):
+            answer.restore(own)
+        stream._process.restore(saved.process, "state.process")
         return stream
 
 
 class _Answer:
-    """A driver's answer to one effect's columns, row by row: what `respond` does with whole arrays."""
+    """A driver's answer to one effect's columns, row by row."""
 
-    def __init__(self, effect: ColumnEffect, step: float, ahead: int) -> None:
+    def __init__(self, effect: ColumnEffect, step: float) -> None:
         self.effect = effect
-        shift = effect.lag_s / step
-        self._whole, self._share = split_shift(shift)
-        self._keep = float(np.exp(-step / effect.response_s)) if effect.response_s > 0 else None
-        self._reference = np.asarray(effect.reference)
-        # Rows that are still needed: from the one that a delay goes back to, to the one that is looked ahead to.
-        self._rows: deque[FloatArray] = deque(maxlen=ahead + max(0, math.ceil(shift)) + 2)
-        self._taken = 0
-        self._given = 0
-        self._settled: FloatArray | None = None
+        self._response = effect.response(step)
+        self._ready: deque[FloatArray] = deque()
+        self._drop = 0
 
-    def take(self, context: Mapping[str, FloatArray]) -> None:
-        """One more row of context, each column of shape (1,)."""
-        values = self.effect.quantity(context)[0]
-        missing = np.isnan(values)
-        self._rows.append(np.where(missing, self._reference, values) if missing.any() else values)
-        self._taken += 1
+    @property
+    def ahead(self) -> int:
+        """Rows that the driver looks ahead."""
+        return self._response.ahead
 
-    def pass_by(self, rows: int, ahead: int) -> None:
-        """Go through the first rows without asking for terms, as far as what they look ahead to has been taken."""
-        while self._given < min(rows, self._taken - ahead):
-            self._respond()
+    def take(self, row: Mapping[str, FloatArray], *, before: bool) -> None:
+        """One more row of context, each column of shape (1,); what answers a row before the drive is not given."""
+        self._drop += before
+        self._ready.extend(self._response.take(self.effect.known(row)))
+        while self._drop and self._ready:
+            self._ready.popleft()
+            self._drop -= 1
 
     def next(self) -> EffectTerms:
         """Terms at the next row, each of shape (1,)."""
-        return terms_of(self.effect.acts, self.effect.weighed(self._respond()[None, :]))
+        return self.effect.acting(self._ready.popleft()[None, :])
 
-    def _respond(self) -> FloatArray:
-        """Shift and first-order lag, as `respond` has them."""
-        shifted = self._shifted(self._given + self._whole)
-        self._given += 1
-        if self._keep is not None:
-            carried = self._keep * (shifted if self._settled is None else self._settled)
-            shifted = self._settled = (1.0 - self._keep) * shifted + carried
-        return shifted
-
-    def _shifted(self, low: int) -> FloatArray:
-        if low < 0 or self._share == 0.0:
-            return self._row(max(low, 0))
-        return (1.0 - self._share) * self._row(low) + self._share * self._row(low + 1)
-
-    def _row(self, index: int) -> FloatArray:
-        return self._rows[index - self._taken + len(self._rows)]
-
-    def to_dict(self) -> dict[str, Any]:
+    def state(self) -> AnswerState:
         """Its state."""
-        return {
-            "rows": [row.tolist() for row in self._rows],
-            "taken": self._taken,
-            "given": self._given,
-            "settled": None if self._settled is None else self._settled.tolist(),
-        }
+        return AnswerState(self._response.state, tuple(tuple(row.tolist()) for row in self._ready), self._drop)
 
-    def restore(self, state: Mapping[str, Any]) -> None:
+    def restore(self, state: AnswerState) -> None:
         """Back to a state."""
-        self._rows.extend(np.array(row) for row in state["rows"])
-        self._taken, self._given = state["taken"], state["given"]
-        self._settled = None if state["settled"] is None else np.array(state["settled"])
-
-
-class _Movement:
-    """The random part: core model and hidden effects, drawn ahead in blocks unless an effect sets the pace."""
-
-    def __init__(self, profile: DriverProfile, seed: np.random.SeedSequence, time: float) -> None:
-        self._model, self._seed, self._time = profile.model, seed, time
-        hidden = [effect for effect in profile.effects if isinstance(effect, HiddenEffect)]
-        self._hidden: list[RunningTerms] = [
-            effect.running(np.random.default_rng(child(seed, 1, index))) for index, effect in enumerate(hidden)
-        ]
-        self._core: CoreStream | None = None
-        self._begun: Start | None = None
-        self.paced = False
-        self._row = 0
-        self._terms = EffectTerms()
-        self._coarse: FloatArray = np.empty(0)
-        self._fine: FloatArray = np.empty(0)
-
-    def next(self, width: float, answers: list[EffectTerms], start: float | None) -> float:
-        """Next offset. [m]"""
-        place = self._row % BLOCK
-        if place == 0 and self._hidden:
-            self._terms = self._hidden_terms()
-        terms = combine([_at(self._terms, place), *answers])
-        core = self._core or self._begin(_start(start, width, terms))
-        if self.paced or terms.rate is not None:
-            coarse, fine = (float(values[0]) for values in core.take(1, terms.rate))
-        else:
-            if place == 0:
-                self._coarse, self._fine = core.take(BLOCK)
-            coarse, fine = float(self._coarse[place]), float(self._fine[place])
-        self._row += 1
-        moved = coarse if terms.spread is None else self._mean + float(terms.spread[0]) * (coarse - self._mean)
-        moved = moved + (fine if terms.fine is None else float(terms.fine[0]) * fine)
-        offset = moved * width
-        return offset if terms.location is None else offset + float(terms.location[0])
-
-    def _begin(self, start: Start | None) -> CoreStream:
-        self._begun = start
-        self._core = self._model.stream(child(self._seed, 0), start)
-        self._mean = self._core.mean
-        return self._core
-
-    def _hidden_terms(self) -> EffectTerms:
-        step = self._model.step
-        time = self._time + step * np.arange(self._row, self._row + BLOCK, dtype=np.float64)
-        return combine([effect.take(time) for effect in self._hidden])
-
-    def to_dict(self) -> dict[str, Any]:
-        """Its state."""
-        return {
-            "begun": None if self._begun is None else asdict(self._begun),
-            "core": None if self._core is None else state_of(self._core),
-            "hidden": [state_of(effect) for effect in self._hidden],
-            "paced": self.paced,
-            "row": self._row,
-            "terms": {name: _listed(getattr(self._terms, name)) for name in _TERMS},
-            "coarse": self._coarse.tolist(),
-            "fine": self._fine.tolist(),
-        }
-
-    def restore(self, state: Mapping[str, Any]) -> None:
-        """Back to a state."""
-        if state["core"] is not None:
-            restore(self._begin(None if state["begun"] is None else Start(**state["begun"])), state["core"])
-        for effect, saved in zip(self._hidden, state["hidden"], strict=True):
-            restore(effect, saved)
-        self.paced, self._row = state["paced"], state["row"]
-        arrays = {name: None if values is None else np.array(values) for name, values in state["terms"].items()}
-        self._terms = EffectTerms(**arrays)
-        self._coarse, self._fine = np.array(state["coarse"]), np.array(state["fine"])
-
-
-_TERMS = ("location", "spread", "rate", "fine")
-
-
-def _at(terms: EffectTerms, row: int) -> EffectTerms:
-    """One row of terms, each of shape (1,)."""
-    return EffectTerms(
-        *(None if (values := getattr(terms, name)) is None else values[row : row + 1] for name in _TERMS)
-    )
-
-
-def _listed(values: FloatArray | None) -> list[float] | None:
-    return None if values is None else values.tolist()
-
-
-def _start(offset: float | None, width: float, terms: EffectTerms) -> Start | None:
-    if offset is None:
-        return None
-    location, spread, fine = (
-        otherwise if values is None else float(values[0])
-        for values, otherwise in ((terms.location, 0.0), (terms.spread, 1.0), (terms.fine, 1.0))
-    )
-    return Start(rel_offset=(offset - location) / width, spread=spread, fine=fine)
+        self._response.state = state.response
+        self._ready.extend(np.array(row) for row in state.ready)
+        self._drop = state.drop
 
 
 def _steps_per_model_step(rate: float | None, step: float) -> int:
@@ -426,7 +314,3 @@ def _steps_per_model_step(rate: float | None, step: float) -> int:
     if rate is not None and (factor < 1 or abs(rate * step - factor) > 1e-9 * factor):
         raise ValueError(f"rate {rate:g} Hz, expected a whole multiple of the model's {1.0 / step:g} Hz")
     return factor
-
-
-def _profile_hash(profile: DriverProfile) -> str:
-    return hashlib.sha256(json.dumps(profile.to_dict(), sort_keys=True).encode()).hexdigest()

@@ -61,5 +61,5 @@ def upsample(offsets: FloatArray, factor: int) -> FloatArray:
 
 
 def extrapolate(before: float, last: float) -> float:
-    """The sample that would follow on a straight line."""
+    """The sample that would follow on a straight line. [unit of the samples]"""
     return 2.0 * last - before

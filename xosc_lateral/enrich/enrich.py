@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import zlib
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from xosc_lateral.driver.drivability import drivable
+from xosc_lateral.driver.plausibility import check_offsets
 from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.driver.sampling import OffsetSampler
+from xosc_lateral.enrich.give_way import Sampled, give_way
 from xosc_lateral.enrich.result import Enriched, EntityResult, LaneDeparture, SampledSegment
 from xosc_lateral.motion.context import entity_context
 from xosc_lateral.motion.deviation import SETTLING_TIME, SampledStretch, deviation_through
@@ -30,6 +33,11 @@ SAMPLE_STEP = 0.2
 PAST, FUTURE = 30.0, 10.0
 """Context before and after a segment that its effects may look at [s]: several response times, and any look-ahead."""
 
+NEIGHBOURS = frozenset(
+    f"{side}_{what}" for side in ("left", "right") for what in ("distance", "is_truck", "truck", "car")
+) | {"truck_left", "truck_right", "car_left", "car_right"}
+"""Columns by which a profile answers to neighbours by itself."""
+
 GAP_STEP = 0.1
 """Rows that gaps are looked for on. [s]"""
 
@@ -48,6 +56,7 @@ def enrich(
     context: Mapping[str, tuple[FloatArray, FloatArray]] | None = None,
     trailers: Mapping[str, str] | None = None,
     attempts: int = 1,
+    joint: bool = True,
 ) -> Enriched:
     """Enrich a played scenario.
 
@@ -69,6 +78,8 @@ def enrich(
         Entity that is pulled -> entity that pulls it: it follows in the tractor's track.
     attempts : int
         Sample anew up to so many times while vehicles touch or leave their lane that nominally don't; the best is kept.
+    joint : bool
+        Neighbours give way to each other (`give_way`); False: every vehicle as its profile alone has it.
     """
     trailers = trailers or {}
     stretches = {
@@ -77,8 +88,8 @@ def enrich(
     gaps_before = _gaps(motion, [_nominal(entity) for entity in motion.entities])
     best: Enriched | None = None
     for attempt in range(max(1, attempts)):
-        entities = tuple(
-            _enrich_entity(
+        drawn = [
+            _draw(
                 motion,
                 network,
                 index,
@@ -88,7 +99,8 @@ def enrich(
                 context or {},
             )
             for index, entity in enumerate(motion.entities)
-        )
+        ]
+        entities = tuple(_result(one, network) for one in (_apart(drawn, motion, network) if joint else drawn))
         entities = _with_trailers(entities, network, trailers)
         gaps_after = _gaps(motion, [entity.trajectory for entity in entities])
         departures = tuple(found for entity in entities for found in _departures(entity, network))
@@ -105,7 +117,36 @@ def _trouble(enriched: Enriched) -> int:
     return len(enriched.new_contacts) + len(enriched.departures)
 
 
-def _enrich_entity(
+@dataclass(frozen=True, eq=False)
+class _Drawn:
+    """One entity, its segments sampled.
+
+    Parameters
+    ----------
+    stretches : tuple of Stretch
+        All; `segments` are those that were sampled: stretch, rows of its samples, offsets there [m].
+    why : str
+        It was not sampled.
+    """
+
+    motion: EntityMotion
+    stretches: tuple[Stretch, ...]
+    profile: DriverProfile | None
+    why: str
+    segments: tuple[tuple[Stretch, IntArray, FloatArray], ...] = ()
+    neutral: tuple[str, ...] = ()
+
+    def deviation(self, distance: FloatArray) -> FloatArray:
+        """On every row, positive left. [m]"""
+        speed = self.motion.speed
+        parts = [
+            SampledStretch(distance[knots], offset, (SETTLING_TIME * speed[knots[0]], SETTLING_TIME * speed[knots[-1]]))
+            for _, knots, offset in self.segments
+        ]
+        return deviation_through(parts)(distance)
+
+
+def _draw(
     motion: NominalMotion,
     network: RoadNetwork,
     index: int,
@@ -113,15 +154,13 @@ def _enrich_entity(
     driver: DriverProfile | str,
     seed: np.random.SeedSequence,
     foreign_context: Mapping[str, tuple[FloatArray, FloatArray]],
-) -> EntityResult:
+) -> _Drawn:
     entity = motion.entities[index]
     if isinstance(driver, str):
-        return _untouched(entity, stretches, driver)
+        return _Drawn(entity, stretches, None, driver)
     sampler = OffsetSampler(driver, seed)
-    distance = distance_driven(entity)
     every = max(1, round(SAMPLE_STEP / motion.step))
-    segments: list[SampledSegment] = []
-    sampled: list[SampledStretch] = []
+    segments: list[tuple[Stretch, IntArray, FloatArray]] = []
     neutral: set[str] = set()
     for stretch in stretches:
         knots = np.arange(stretch.first, stretch.last + 1, every)
@@ -129,15 +168,63 @@ def _enrich_entity(
             continue
         segment = _segment(motion, network, index, knots, every, foreign_context)
         neutral |= _unknown(driver, segment)
-        offset = sampler.sample(segment)
-        segments.append(SampledSegment(stretch, entity.time[knots], offset))
-        settling = (SETTLING_TIME * entity.speed[knots[0]], SETTLING_TIME * entity.speed[knots[-1]])
-        sampled.append(SampledStretch(distance[knots], offset, settling))
+        wanted, inside = sampler.sample(segment), segment.inside
+        who = f"profile {driver.name} for {entity.name!r}"
+        check_offsets(wanted, segment.lane_width[inside], who, segment.time[inside])
+        segments.append((stretch, knots, wanted))
     if not segments:
-        return _untouched(entity, stretches, "no road-following segment")
-    deviation = deviation_through(sampled)(distance)
-    trajectory = displace(entity, network, deviation)
-    return EntityResult(entity, stretches, driver, "", tuple(segments), deviation, trajectory, tuple(sorted(neutral)))
+        return _Drawn(entity, stretches, None, "no road-following segment")
+    return _Drawn(entity, stretches, driver, "", tuple(segments), tuple(sorted(neutral)))
+
+
+def _apart(drawn: Sequence[_Drawn], motion: NominalMotion, network: RoadNetwork) -> list[_Drawn]:
+    """Neighbours give way to each other."""
+    if sum(bool(one.segments) for one in drawn) == 0 or len(drawn) < 2:
+        return list(drawn)
+    sampled = []
+    for one in drawn:
+        rows = len(one.motion.time)
+        deviation, can_move = np.zeros(rows), np.zeros(rows, dtype=np.bool_)
+        if one.segments:
+            deviation = one.deviation(distance_driven(one.motion))
+            for stretch, _, _ in one.segments:
+                can_move[stretch.first : stretch.last + 1] = True
+        heeds = one.profile is not None and any(column in NEIGHBOURS for column in one.profile.columns)
+        sampled.append(Sampled(one.motion, deviation, can_move, heeds))
+    every = max(1, round(SAMPLE_STEP / motion.step))
+    moves = give_way(motion, network, sampled, np.arange(0, len(motion.entities[0].time), every))
+    return [
+        one
+        if move is None
+        else replace(
+            one, segments=tuple((stretch, knots, offset + move[knots]) for stretch, knots, offset in one.segments)
+        )
+        for one, move in zip(drawn, moves, strict=True)
+    ]
+
+
+def _result(drawn: _Drawn, network: RoadNetwork) -> EntityResult:
+    """Paths through the offsets, smoothed where nobody could drive them."""
+    entity = drawn.motion
+    if not drawn.segments:
+        return _untouched(entity, drawn.stretches, drawn.why)
+    bounded = [drivable(offset, SAMPLE_STEP, entity.speed[knots]) for _, knots, offset in drawn.segments]
+    worst = max((bound for _, bound in bounded if bound), key=lambda bound: bound.before.excess, default=None)
+    segments = tuple(
+        (stretch, knots, offset) for (stretch, knots, _), (offset, _) in zip(drawn.segments, bounded, strict=True)
+    )
+    deviation = replace(drawn, segments=segments).deviation(distance_driven(entity))
+    return EntityResult(
+        entity,
+        drawn.stretches,
+        drawn.profile,
+        "",
+        tuple(SampledSegment(stretch, entity.time[knots], offset) for stretch, knots, offset in segments),
+        deviation,
+        displace(entity, network, deviation),
+        drawn.neutral,
+        worst,
+    )
 
 
 def _with_trailers(
@@ -214,8 +301,9 @@ def _departures(entity: EntityResult, network: RoadNetwork) -> list[LaneDepartur
     """Where the enriched reference point is outside the nominal lane although the nominal one is inside: worst row."""
     found = []
     motion = entity.motion
-    for segment in entity.segments:
-        rows = slice(segment.stretch.first, segment.stretch.last + 1)
+    stretches = [(segment.stretch.first, segment.stretch.last) for segment in entity.segments]
+    for first, last in stretches + _lateral_within_a_lane(motion):
+        rows = slice(first, last + 1)
         half = 0.5 * network.lane_width(motion.road[rows], motion.lane[rows], motion.s[rows])
         beyond = np.abs(motion.offset[rows] + entity.deviation[rows]) - half
         left = (beyond > 0.0) & (np.abs(motion.offset[rows]) <= half)
@@ -223,6 +311,19 @@ def _departures(entity: EntityResult, network: RoadNetwork) -> list[LaneDepartur
             worst = int(np.argmax(np.where(left, beyond, -np.inf)))
             found.append(LaneDeparture(entity.name, float(motion.time[rows][worst]), float(beyond[worst])))
     return found
+
+
+def _lateral_within_a_lane(motion: EntityMotion) -> list[tuple[int, int]]:
+    """First and last row of lateral actions that keep to one lane: distances kept beside others, offsets in the lane.
+
+    Lane changes cross markings anyway.
+    """
+    lateral = (
+        ((motion.activity & Activity.LATERAL) != 0) & ((motion.activity & Activity.ACTIVE) != 0) & (motion.road >= 0)
+    )
+    edges = np.flatnonzero(np.diff(np.concatenate(([False], lateral, [False])).astype(np.int8)))
+    runs = [(int(begin), int(end) - 1) for begin, end in zip(edges[::2], edges[1::2], strict=True)]
+    return [(a, b) for a, b in runs if len(set(motion.lane[a : b + 1].tolist())) == 1]
 
 
 def _gaps(motion: NominalMotion, trajectories: Sequence[Trajectory]) -> tuple[Gap, ...]:

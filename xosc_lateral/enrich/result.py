@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from xosc_lateral.driver.drivability import Bound
 from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.motion.gaps import Gap
 from xosc_lateral.motion.nominal import EntityMotion, NominalMotion
@@ -58,6 +59,8 @@ class EntityResult:
         The enriched path (the nominal one if not enriched).
     neutral : tuple of str
         Context columns that the profile's effects ask for and that were not known: taken as neutral.
+    bound : Bound or None
+        That sampled movement was smoothed since nobody could have driven it: the worst segment's.
     """
 
     motion: EntityMotion
@@ -68,6 +71,7 @@ class EntityResult:
     deviation: FloatArray
     trajectory: Trajectory
     neutral: tuple[str, ...] = ()
+    bound: Bound | None = None
 
     @property
     def name(self) -> str:
@@ -176,4 +180,5 @@ class Enriched:
             for entity in self.entities
             if entity.neutral
         ]
+        lines += [f"{entity.name}: {entity.bound}" for entity in self.entities if entity.bound is not None]
         return tuple(lines)

@@ -10,6 +10,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from xosc_lateral.errors import FormatError
+from xosc_lateral.formats.source import refuse_guarded
 
 
 def write_atomically(path: Path | str, data: bytes | str, *, durable: bool = False) -> Path:
@@ -41,8 +42,17 @@ def write_atomically(path: Path | str, data: bytes | str, *, durable: bool = Fal
 
 
 def replace_atomically(path: Path | str, write: Callable[[Path], object]) -> Path:
-    """Let `write` fill a temporary file beside the target, then move it there: for writers that want a path."""
+    """Let `write` fill a temporary file beside the target, then move it there: for writers that want a path.
+
+    Raises
+    ------
+    FormatError
+        The target is a file that was opened as an input (`source.guarding_inputs`).
+    OSError
+        As for `write_atomically`.
+    """
     path = Path(path)
+    refuse_guarded(path)
     with _temporary_beside(path) as temporary:
         write(temporary)
         temporary.replace(path)

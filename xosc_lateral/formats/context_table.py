@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from xosc_lateral.driver.plausibility import first_implausible, implausible
 from xosc_lateral.errors import FormatError
-from xosc_lateral.formats.drives import read_table
+from xosc_lateral.formats.tables import read_table
+from xosc_lateral.limits import TIME
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -18,25 +21,52 @@ if TYPE_CHECKING:
 FloatArray = NDArray[np.float64]
 
 
-def read_context(path: Path) -> Mapping[str, tuple[FloatArray, FloatArray]]:
+@dataclass(frozen=True, eq=False, slots=True)
+class ContextTable(Mapping[str, tuple[FloatArray, FloatArray]]):
+    """Context over time: name -> (time, values), shape (n,) each.
+
+    Parameters
+    ----------
+    columns : mapping of str to (array, array)
+    sha256 : str
+        Of the file's bytes.
+    """
+
+    columns: Mapping[str, tuple[FloatArray, FloatArray]]
+    sha256: str
+
+    def __getitem__(self, name: str) -> tuple[FloatArray, FloatArray]:
+        return self.columns[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.columns)
+
+    def __len__(self) -> int:
+        return len(self.columns)
+
+
+def read_context(path: Path) -> ContextTable:
     """Read a table with a `time` column [s from scenario start] and any context columns, all of them numbers.
 
     Returns
     -------
-    mapping of str to (time, values), shape (n,) each
+    ContextTable
         NaN values are left out row by row: between what is stated, values are interpolated.
 
     Raises
     ------
     FormatError
-        No `time` column, time that does not increase, a value that is infinite or no number, or no context column.
+        No `time` column, time that does not increase, a value that is infinite, no number or none that a road has
+        (`limits`), or no context column.
     """
-    table = read_table(path)
+    table, sha256 = read_table(path)
     if "time" not in table:
         raise FormatError("no column 'time'", path=path)
     if table["time"].dtype.kind not in "fiu":
         raise FormatError("times have to be numbers", path=path, element="column 'time'")
     time = table["time"].to_numpy(dtype=np.float64)
+    if len(time) and np.abs(time[[0, -1]]).max() > TIME.value:
+        raise FormatError(TIME.refusal(float(np.abs(time[[0, -1]]).max())), path=path, element="column 'time'")
     if len(time) == 0 or not np.isfinite(time).all() or (np.diff(time) <= 0).any():
         raise FormatError("times have to increase from row to row", path=path, element="column 'time'")
     context = {}
@@ -49,12 +79,15 @@ def read_context(path: Path) -> Mapping[str, tuple[FloatArray, FloatArray]]:
         if (endless := np.flatnonzero(np.isinf(values))).size:
             what = f"{values[endless[0]]} at {time[endless[0]]:g} s is not finite"
             raise FormatError(what, path=path, element=f"column {str(name)!r}")
+        if (row := first_implausible(str(name), values)) is not None:
+            what = f"{implausible(str(name), float(values[row]))} at {time[row]:g} s"
+            raise FormatError(what, path=path, element=f"column {str(name)!r}")
         known = np.isfinite(values)
         if known.any():
             context[str(name)] = (time[known], values[known])
     if not context:
         raise FormatError("no column with values besides 'time'", path=path)
-    return context
+    return ContextTable(context, sha256)
 
 
 def _no_number(column: pd.Series, time: FloatArray) -> str:
@@ -62,4 +95,4 @@ def _no_number(column: pd.Series, time: FloatArray) -> str:
 
     wrong = np.flatnonzero((pd.to_numeric(column.astype("string"), errors="coerce").isna() & column.notna()).to_numpy())
     row = int(wrong[0]) if len(wrong) else 0
-    return f"{str(column.iloc[row])!r} at {time[row]:g} s is no number; leave the column out if it is no context"
+    return f"{str(column.iloc[row])!r} at {time[row]:g} s is not a number; leave the column out if it is no context"

@@ -1,4 +1,4 @@
-"""SHA-256 of files, each read once per process for as long as it stays the same."""
+"""SHA-256 of files: of what lies on the disk now, and of what was parsed."""
 
 from __future__ import annotations
 
@@ -6,20 +6,35 @@ import hashlib
 from functools import lru_cache
 from pathlib import Path
 
+from xosc_lateral.formats.source import check_regular, last_read
+
 
 def file_hash(path: Path) -> str:
-    """Hexadecimal SHA-256 of a file's bytes.
+    """Hexadecimal SHA-256 of a file's bytes as they are now; read once per process for as long as it stays the same.
 
     Raises
     ------
     OSError
         When it can't be read.
+    FormatError
+        When it is not there, or no regular file.
     """
-    state = path.stat()
-    return _file_hash(path, state.st_mtime_ns, state.st_size)
+    state = check_regular(path)
+    return _file_hash(path, state.st_ino, state.st_ctime_ns, state.st_mtime_ns, state.st_size)
+
+
+def parsed_hash(path: Path) -> str:
+    """Hexadecimal SHA-256 of the bytes that this process parsed, whatever has become of the file since.
+
+    What an output states about its inputs. A file that was not parsed is hashed now.
+    """
+    try:
+        return last_read(path)
+    except KeyError:
+        return file_hash(path)
 
 
 @lru_cache(maxsize=1024)
-def _file_hash(path: Path, _modified: int, _size: int) -> str:
+def _file_hash(path: Path, *_state: int) -> str:
     with path.open("rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()

@@ -5,26 +5,40 @@ from __future__ import annotations
 import hashlib
 import json
 import math
+import os
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
+from xosc_lateral.driver.plausibility import check_profile
 from xosc_lateral.driver.profile import DriverProfile
+from xosc_lateral.driver.records import plain
 from xosc_lateral.errors import DriverProfileError, FormatError
 from xosc_lateral.formats.atomic import write_atomically
+from xosc_lateral.formats.source import read_source
+from xosc_lateral.formats.tables import foreign_errors
+from xosc_lateral.limits import JSON_DEPTH, PROFILE_SIZE
+from xosc_lateral.plugins import plugins
+from xosc_lateral.shipped import shipped_folder
 
-SHIPPED = Path(__file__).resolve().parents[1] / "resources" / "driver_profiles"
+SHIPPED = shipped_folder("driver_profiles")
 """Profiles that come with the package."""
 
-SCHEMA = SHIPPED.parent / "driver_profile.schema.json"
+SCHEMA = Path(__file__).resolve().parents[1] / "resources" / "driver_profile.schema.json"
 """JSON Schema of a profile file."""
 
 SUFFIX = ".json"
 
-MAX_BYTES = 50_000_000
-"""A file larger than this is no profile. [byte]"""
+_STRINGS = re.compile(r'"(?:[^"\\]|\\.)*"')
+_BRACKETS = re.compile(r"[\[\]{}]")
+LIBRARY_VARIABLE = "XOSC_LATERAL_LIBRARY"
+"""Environment variable with folders of profiles, separated as in PATH."""
+
+GROUP = "xosc_lateral.profiles"
+"""Entry points of folders with further profiles."""
 
 
 def read_profile(name_or_path: str | Path, folders: Iterable[str | Path] = ()) -> DriverProfile:
@@ -45,19 +59,40 @@ def read_profile(name_or_path: str | Path, folders: Iterable[str | Path] = ()) -
         If the file is not there or no valid profile, or a folder isn't one.
     """
     path = find_profile(name_or_path, folders)
-    size = path.stat().st_size
-    if size > MAX_BYTES:
-        raise FormatError(f"{size} bytes, a profile has at most {MAX_BYTES}", path=path)
+    values = parse_json(read_source(path, PROFILE_SIZE).data, path)
     try:
-        values = json.loads(path.read_bytes().decode("utf-8-sig"), parse_constant=_refuse_constant)
-    except json.JSONDecodeError as error:
-        raise FormatError(f"not JSON: {error.msg}", path=path, line=error.lineno) from error
-    except (UnicodeDecodeError, ValueError, RecursionError) as error:
-        raise FormatError(f"not JSON: {error}", path=path) from error
-    try:
-        return DriverProfile.from_dict(values)
+        with foreign_errors(path, "no driver profile"):
+            profile = DriverProfile.from_dict(values)
+            check_profile(profile)
+            return profile
     except DriverProfileError as error:
         raise FormatError(str(error), path=path) from error
+
+
+def parse_json(data: bytes, path: Path) -> Any:
+    """JSON of an input file.
+
+    Raises
+    ------
+    FormatError
+        Not UTF-8, no JSON, NaN or infinity in it, or nested deeper than `limits.JSON_DEPTH`.
+    """
+    try:
+        text = data.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise FormatError(f"not JSON: {error}", path=path) from error
+    depth = deepest = 0
+    for bracket in _BRACKETS.finditer(_STRINGS.sub("", text)):
+        depth += 1 if bracket[0] in "[{" else -1
+        deepest = max(deepest, depth)
+    if deepest > JSON_DEPTH.value:
+        raise FormatError(JSON_DEPTH.refusal(deepest), path=path)
+    try:
+        return json.loads(text, parse_constant=_refuse_constant)
+    except json.JSONDecodeError as error:
+        raise FormatError(f"not JSON: {error.msg}", path=path, line=error.lineno) from error
+    except ValueError as error:
+        raise FormatError(f"not JSON: {error}", path=path) from error
 
 
 def write_profile(profile: DriverProfile, path: str | Path) -> None:
@@ -99,17 +134,23 @@ def _hash_of(key: _Identity) -> str:
     return hashlib.sha256(profile_bytes(key.profile)).hexdigest()
 
 
-def describe_profile(profile: DriverProfile, *, as_json: bool = False) -> str:
-    """What was fitted, in a line, or as one line of JSON."""
+def profile_record(profile: DriverProfile) -> dict[str, Any]:
+    """What was fitted, as plain values."""
     known = profile.provenance
-    if as_json:
-        facts: dict[str, Any] = {"name": profile.name, "model": profile.model.kind, "sha256": profile_hash(profile)}
-        facts |= {"hours": known.hours, "drives": known.drives, "runs": known.runs, "lane_width": profile.lane_width}
-        return json.dumps(facts)
-    return (
+    facts: dict[str, Any] = {"id": profile.name, "model": profile.model.kind, "sha256": profile_hash(profile)}
+    if profile.sensor is not None:
+        facts["sensor"] = plain(profile.sensor) | {"share": profile.sensor.share}
+    return facts | {"hours": known.hours, "drives": known.drives, "runs": known.runs, "lane_width": profile.lane_width}
+
+
+def describe_profile(profile: DriverProfile) -> str:
+    """What was fitted, in a line; another for what of it is the sensor's."""
+    known = profile.provenance
+    said = (
         f"{profile.name}: {profile.model.kind} model from {known.hours:.2f} h in {known.runs} runs of {known.drives} "
         f"drives, {len(profile.effects)} effects"
     )
+    return said if profile.sensor is None else f"{said}\n{profile.sensor.in_words()}"
 
 
 def find_profile(name_or_path: str | Path, folders: Iterable[str | Path] = ()) -> Path:
@@ -120,30 +161,81 @@ def find_profile(name_or_path: str | Path, folders: Iterable[str | Path] = ()) -
         if not path.exists() or path.is_dir():
             raise FormatError("is a folder, not a profile" if path.is_dir() else "no such file", path=path)
         return path
-    for folder in (*map(Path, folders), SHIPPED):
-        if not folder.is_dir():
-            raise FormatError("no such folder", path=folder)
+    for folder in (*library_folders(folders), SHIPPED):
         found = folder / f"{text}{SUFFIX}"
         if found.is_file():
             return found
-    known = sorted(path.stem for path in list_profiles(folders))
+    if (offered := _from_plugins().get(text)) is not None:
+        return offered
+    known = sorted({path.stem for path in list_profiles(folders)})
     raise DriverProfileError(f"no profile {text!r}; known are {', '.join(known) or 'none'}, or give the path of a file")
 
 
 def list_profiles(folders: Iterable[str | Path] = ()) -> list[Path]:
-    """Profile files in the folders and among those shipped, in this order, by name within each.
+    """Profile files in the folders (see `library_folders`), among those shipped and of plug-ins, by name within each.
 
     Raises
     ------
     FormatError
         If a folder isn't one.
     """
-    found: list[Path] = []
-    for folder in map(Path, folders):
+    found = [path for folder in (*library_folders(folders), SHIPPED) for path in sorted(folder.glob(f"*{SUFFIX}"))]
+    return found + [path for _, path in sorted(_from_plugins().items())]
+
+
+def library_folders(folders: Iterable[str | Path] = ()) -> tuple[Path, ...]:
+    """Folders with profiles besides those shipped: named ones, the environment's, the configuration's.
+
+    ``XOSC_LATERAL_LIBRARY`` holds folders, separated as in PATH. The configuration is ``xosc-lateral/config.toml`` in
+    ``XDG_CONFIG_HOME`` (else ``~/.config``; on Windows ``APPDATA``) with ``library = ["FOLDER", ...]``.
+
+    Raises
+    ------
+    FormatError
+        If one of them isn't there.
+    """
+    said = [Path(name) for name in os.environ.get(LIBRARY_VARIABLE, "").split(os.pathsep) if name]
+    found = tuple(dict.fromkeys([*map(Path, folders), *said, *_configured()]))
+    for folder in found:
         if not folder.is_dir():
             raise FormatError("no such folder", path=folder)
-        found += sorted(folder.glob(f"*{SUFFIX}"))
-    return found + sorted(SHIPPED.glob(f"*{SUFFIX}"))
+    return found
+
+
+def configuration_file() -> Path:
+    """Where the user's configuration is looked for."""
+    home = os.environ.get("APPDATA" if os.name == "nt" else "XDG_CONFIG_HOME")
+    return (Path(home) if home else Path.home() / ".config") / "xosc-lateral" / "config.toml"
+
+
+def _configured() -> list[Path]:
+    path = configuration_file()
+    if not path.is_file():
+        return []
+    import tomllib
+
+    try:
+        values = tomllib.loads(path.read_text(encoding="utf-8"))
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise FormatError(f"not TOML: {error}", path=path) from error
+    unknown = sorted(values.keys() - {"library"})
+    library = values.get("library", [])
+    if unknown:
+        raise FormatError(f"unknown key {unknown[0]!r}; there is library", path=path)
+    if isinstance(library, str):
+        library = [library]
+    if not isinstance(library, list) or not all(isinstance(name, str) for name in library):
+        raise FormatError(f"library = {library!r}: expected a list of folders", path=path)
+    return [path.parent / Path(name).expanduser() for name in library]
+
+
+def _from_plugins() -> dict[str, Path]:
+    """Profiles that other packages offer: entry points that are a folder, or a function that gives one."""
+    found: dict[str, Path] = {}
+    for offered in plugins(GROUP).values():
+        folder = Path(offered() if callable(offered) else offered)
+        found |= {path.stem: path for path in sorted(folder.glob(f"*{SUFFIX}"))}
+    return found
 
 
 def canonical_json(value: Any, indent: int = 0) -> str:
@@ -172,4 +264,4 @@ def _is_scalar(value: Any) -> bool:
 
 
 def _refuse_constant(name: str) -> float:
-    raise ValueError(f"{name} is no number of JSON")
+    raise ValueError(f"{name} is not a number in JSON")

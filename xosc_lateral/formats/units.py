@@ -44,7 +44,40 @@ UNITS: Mapping[str, tuple[str, float]] = MappingProxyType(
     }
 )
 
+# Other spellings, as bus logs have them; in lower case and without spaces.
+_SPELLINGS = MappingProxyType(
+    {
+        **dict.fromkeys(("meter", "meters", "metre", "metres"), "m"),
+        **dict.fromkeys(("kmh", "kmph", "km/hr", "kph"), "km/h"),
+        **dict.fromkeys(("mps", "m/sec", "ms-1", "m.s-1"), "m/s"),
+        **dict.fromkeys(("sec", "second", "seconds"), "s"),
+        **dict.fromkeys(("msec",), "ms"),
+        **dict.fromkeys(("µs", "μs"), "us"),
+        **dict.fromkeys(("°", "grad", "degree", "degrees"), "deg"),
+        **dict.fromkeys(("radian", "radians"), "rad"),
+        **dict.fromkeys(("°/s", "deg/sec", "grad/s", "degree/s", "degrees/s"), "deg/s"),
+        **dict.fromkeys(("rad/sec",), "rad/s"),
+        **dict.fromkeys(("m/s^2", "m/s²", "m/s**2", "m/s/s", "mps2", "m/sec2", "m/sec^2"), "m/s2"),
+        **dict.fromkeys(("m^-1", "m-1", "m⁻¹", "rad/m"), "1/m"),
+        **dict.fromkeys(("percent", "prozent"), "%"),
+        **dict.fromkeys(("lux",), "lx"),
+        **dict.fromkeys(("1", "none", "unitless", "no_unit", "count", "counts", "bool", "enum"), "-"),
+    }
+)
+
 _TABLE_UNITS = MappingProxyType({"time": "s", "offset": "m", "distance_left": "m", "distance_right": "m"})
+
+
+def spelled(unit: str) -> str | None:
+    """The unit in the spelling of `UNITS`; empty where none is given, None where it is not known."""
+    bare = "".join(unit.split()).strip("[]()").lower()
+    known = _SPELLINGS.get(bare, bare)
+    return known if not known or known in UNITS else None
+
+
+def is_measured(unit: str) -> bool:
+    """Whether a unit of `UNITS` is that of a quantity, and not of a count, a flag or a share."""
+    return unit in UNITS and UNITS[unit][0] != "number"
 
 
 def factor(column: str, unit: str) -> float:

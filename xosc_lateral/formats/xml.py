@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -9,14 +11,23 @@ from typing import Any
 from lxml import etree
 
 from xosc_lateral.errors import FormatError
+from xosc_lateral.formats.source import check_regular, guard_input, read_source
+from xosc_lateral.limits import XML_TREE
 
-MAX_TREE_BYTES = 750_000_000
-"""Largest tree in memory, estimated before it is built: reading never takes more than 1 GB. A road of 25 MB fits."""
 MAX_CACHED_BYTES = 1_000_000
 """Larger files are read anew each time: catalogs are small, and 16 trees are kept."""
 
 # Measured with libxml2 2.14 on element-only, attribute-rich and text-rich files: within 15 % of the memory taken.
 _BYTES_PER_TAG, _BYTES_PER_ATTRIBUTE = 150, 250
+
+
+@dataclass(frozen=True, slots=True)
+class XmlDocument:
+    """A parsed file: root element, the bytes that it was parsed from, and their SHA-256."""
+
+    root: etree._Element
+    data: bytes
+    sha256: str
 
 
 def parse_xml(data: bytes, path: object) -> etree._Element:
@@ -51,46 +62,42 @@ def parse_xml(data: bytes, path: object) -> etree._Element:
 
 
 def read_xml(path: Path) -> tuple[etree._Element, bytes]:
-    """Root element and bytes of a file. The tree is shared between callers: never change it.
+    """Root element and bytes of a file; see `read_document`."""
+    document = read_document(path)
+    return document.root, document.data
+
+
+def read_document(path: Path) -> XmlDocument:
+    """Read a file. The tree is shared between callers: never change it.
 
     Raises
     ------
     FormatError
-        Missing, a folder, too large, or see `parse_xml`.
+        Missing, no regular file, too large, or see `parse_xml`.
     """
-    try:
-        status = path.stat()
-    except (OSError, ValueError) as error:
-        raise FormatError("the file does not exist or can't be read", path=path) from error
-    if not path.is_file():
-        raise FormatError("not a file", path=path)
-    if status.st_size > MAX_TREE_BYTES:
-        raise _too_large(status.st_size, path)
-    if status.st_size > MAX_CACHED_BYTES:
+    state = check_regular(path)
+    guard_input(path)
+    if state.st_size > MAX_CACHED_BYTES:
         return _read(path)
-    return _read_cached(str(path), status.st_mtime_ns, status.st_size)
+    return _read_cached(str(path), _state_key(state))
 
 
 @lru_cache(maxsize=16)  # catalogs are named by thousands of scenarios; a changed file has another key
-def _read_cached(path: str, _modified: int, _size: int) -> tuple[etree._Element, bytes]:
+def _read_cached(path: str, _state: tuple[int, ...]) -> XmlDocument:
     return _read(Path(path))
 
 
-def _read(path: Path) -> tuple[etree._Element, bytes]:
-    try:
-        data = path.read_bytes()
-    except OSError as error:
-        raise FormatError(f"can't be read ({error.strerror})", path=path) from error
-    return parse_xml(data, path), data
+def _state_key(state: os.stat_result) -> tuple[int, ...]:
+    """Changes whenever a file is replaced or written to, also by tools that put its time of change back."""
+    return state.st_ino, state.st_ctime_ns, state.st_mtime_ns, state.st_size
+
+
+def _read(path: Path) -> XmlDocument:
+    content = read_source(path, XML_TREE)
+    return XmlDocument(parse_xml(content.data, path), content.data, content.sha256)
 
 
 def _check_size(data: bytes, path: object) -> None:
     estimate = len(data) + _BYTES_PER_TAG * data.count(b"<") + _BYTES_PER_ATTRIBUTE * data.count(b"=")
-    if estimate > MAX_TREE_BYTES:
-        raise _too_large(estimate, path)
-
-
-def _too_large(size: int, path: object) -> FormatError:
-    return FormatError(
-        f"would take {size / 1e6:.0f} MB of memory, at most {MAX_TREE_BYTES / 1e6:.0f} MB are allowed", path=path
-    )
+    if estimate > XML_TREE.bytes:
+        raise FormatError(XML_TREE.refusal(estimate / 1e6), path=path)

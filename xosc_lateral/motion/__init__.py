@@ -1,1 +1,1 @@
-"""Playback of a storyboard on a road network, and what follows from it: segments, trajectories."""
+"""Nominal motion, and what follows from it: segments, context, deviations, trajectories, gaps."""

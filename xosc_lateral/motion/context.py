@@ -6,11 +6,13 @@ Distances between vehicles are free space: from bumper to bumper along the lane,
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from xosc_lateral.motion.nearby import pairs_within
 from xosc_lateral.motion.nominal import Activity, EntityMotion, NominalMotion
 from xosc_lateral.road.network import RoadNetwork
 from xosc_lateral.scenario import BoundingBox
@@ -23,6 +25,10 @@ IntArray = NDArray[np.int64]
 
 REACH = 200.0
 """How far a driver looks for others [m]; beyond it there is none (about what a series radar sees)."""
+
+IN_SIGHT = 2.0 * REACH + 100.0
+"""Vehicles never nearer than this in a straight line are not looked for along the lane. Free space is counted along the
+reference line, which on the tightest ramp is half as long as its outer lane; the rest is for two road trains. [m]"""
 
 ALONGSIDE = 10.0
 """A vehicle in the next lane counts as alongside within this free space lengthwise. [m]"""
@@ -141,8 +147,9 @@ def _neighbours(motion: NominalMotion, network: RoadNetwork, index: int, grid: I
     nearest = {side: np.full(n, np.nan) for side in ("lead", "left", "right", "oncoming")}
     truck = {side: np.zeros(n) for side in ("lead", "left", "right")}
     groups = _own_lane_groups(own, network, grid)
-    for other in motion.entities:
-        if other is own or not other.entity.is_vehicle:
+    for number in _in_sight(motion)[index]:
+        other = motion.entities[number]
+        if not other.entity.is_vehicle:
             continue
         seen = _see(other, network, grid, groups)
         gap = _free_space(seen, own.entity.bounding_box, other.entity.bounding_box)
@@ -167,6 +174,21 @@ def _neighbours(motion: NominalMotion, network: RoadNetwork, index: int, grid: I
         context[f"truck_{side}"] = (alongside & (truck[side] > 0)).astype(np.float64)
         context[f"car_{side}"] = (alongside & (truck[side] == 0)).astype(np.float64)
     return context
+
+
+@lru_cache(maxsize=1)  # asked for every entity of one motion after another
+def _in_sight(motion: NominalMotion) -> tuple[tuple[int, ...], ...]:
+    """For every entity those that it may see along its lane: whoever is not near in space is not near on the road."""
+    there = [(entity.activity & Activity.ACTIVE) != 0 for entity in motion.entities]
+    x, y = (
+        [np.where(on, values, np.nan) for on, values in zip(there, axis, strict=True)]
+        for axis in ([entity.x for entity in motion.entities], [entity.y for entity in motion.entities])
+    )
+    seen: list[list[int]] = [[] for _ in motion.entities]
+    for a, b in pairs_within(x, y, IN_SIGHT):
+        seen[a].append(b)
+        seen[b].append(a)
+    return tuple(tuple(sorted(others)) for others in seen)
 
 
 def _own_lane_groups(

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
+
+from xosc_lateral.motion.nearby import pairs_within
 
 FloatArray = NDArray[np.float64]
 
@@ -84,7 +85,9 @@ def smallest_gaps(time: FloatArray, paths: Sequence[BoxPath], *, reach: float = 
         [m]
     """
     gaps = []
-    for a, b in combinations(paths, 2):
+    extent = max((np.hypot(path.length, path.width) / 2 + abs(path.centre) for path in paths), default=0.0)
+    for first, second in pairs_within([path.x for path in paths], [path.y for path in paths], reach + 2 * extent):
+        a, b = paths[first], paths[second]
         half_diagonals = 0.5 * (np.hypot(a.length, a.width) + np.hypot(b.length, b.width))
         apart = np.hypot(a.x - b.x, a.y - b.y) - half_diagonals - abs(a.centre) - abs(b.centre)
         near = np.isfinite(apart) & (apart <= reach)

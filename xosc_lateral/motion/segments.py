@@ -65,6 +65,31 @@ class Stretch:
         return self.kind is StretchKind.ROAD_FOLLOWING
 
 
+@dataclass(frozen=True, slots=True)
+class SegmentRow:
+    """One stretch of one entity.
+
+    Parameters
+    ----------
+    entity : str
+    start, end : float
+        [s]
+    road_following : bool
+    why : str
+        Why it is no road-following segment; empty if it is one.
+    road, lane : str, int
+        Where it begins; empty and 0 off the road.
+    """
+
+    entity: str
+    start: float
+    end: float
+    road_following: bool
+    why: str
+    road: str
+    lane: int
+
+
 def cut_stretches(motion: EntityMotion, network: RoadNetwork, *, is_trailer: bool = False) -> tuple[Stretch, ...]:
     """Cut an entity's whole motion into stretches; teleports always cut.
 

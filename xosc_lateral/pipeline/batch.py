@@ -8,19 +8,20 @@ import re
 import time
 from collections.abc import Callable, Iterator
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from functools import partial
 from pathlib import Path
 
-from xosc_lateral import __version__
-from xosc_lateral.errors import XoscLateralError
+from xosc_lateral.errors import FormatError, XoscLateralError
 from xosc_lateral.formats.hashes import file_hash
+from xosc_lateral.pipeline.guard import JobLimitError, JobLimits, within_limits
 from xosc_lateral.pipeline.jobs import Batch, Job
 from xosc_lateral.pipeline.journal import Journal
 from xosc_lateral.pipeline.lock import folder_lock
 from xosc_lateral.pipeline.manifest import ManifestRow
 from xosc_lateral.pipeline.workers import WorkerDiedError, open_pool, run_tasks
+from xosc_lateral.version import __version__
 
 Converter = Callable[[Job], ManifestRow]
 """Makes a job's output and describes it; raises an `XoscLateralError` when the input is at fault."""
@@ -31,7 +32,9 @@ STATE = ".xosc-lateral"
 _HALF_WRITTEN = re.compile(r"\..+\.[0-9a-z_]{8}\.tmp(\.\w+)?")
 """Names that files have while they are being written (`formats.atomic`)."""
 
-_STOPPING = frozenset({errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EACCES, errno.EPERM, errno.EMFILE, errno.ENFILE})
+_STOPPING = frozenset(
+    {errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EMFILE, errno.ENFILE, errno.EIO, errno.ESTALE, errno.ENOTCONN}
+)
 """Errors of the system that the next scenario would meet as well."""
 
 _KEPT = "what is finished is kept, run it again to go on"
@@ -74,6 +77,8 @@ def convert_many(
     cluster: str | None = None,
     again: bool = False,
     converter: Converter | None = None,
+    limits: JobLimits | None = None,
+    notify: Callable[[str], None] | None = None,
 ) -> Iterator[Outcome]:
     """Convert a batch and yield what became of each job as it comes: first what is up to date, then in any order.
 
@@ -85,13 +90,17 @@ def convert_many(
     batch : Batch
         From `plan_batch`.
     workers : int
-        Processes on this machine; -1: one per core.
+        Processes on this machine; -1: one per core; 0: this process itself, which a scenario can then take down.
     cluster : str, optional
         Address of a dask.distributed scheduler: its workers are used instead.
     again : bool
         Convert also what is up to date.
     converter : callable, optional
         In place of `convert_job`; has to be picklable.
+    limits : JobLimits, optional
+        What one job may take.
+    notify : callable, optional
+        Gets a line for what a user has to know besides the outcomes (a manifest that can't be read, say).
 
     Raises
     ------
@@ -100,7 +109,7 @@ def convert_many(
     BatchStoppedError
         The folder can't be written, the disk is full. Everything finished so far is kept.
     ClusterError
-        The cluster can't be reached, or is gone.
+        The cluster can't be reached, is gone, or its workers have another version of this package.
 
     Examples
     --------
@@ -112,27 +121,42 @@ def convert_many(
 
         converter = convert_job
     try:
-        yield from _outcomes(batch, converter, workers, cluster, again)
+        yield from _outcomes(
+            batch, partial(_run, converter, limits or JobLimits()), workers, cluster, again, notify or _silent
+        )
     except OSError as error:
         where = error.filename or batch.folder
         raise BatchStoppedError(f"{where}: {error.strerror or error}; {_KEPT}") from error
 
 
-def _outcomes(batch: Batch, converter: Converter, workers: int, cluster: str | None, again: bool) -> Iterator[Outcome]:
+def _silent(_: str) -> None:
+    pass
+
+
+def _outcomes(
+    batch: Batch,
+    work: Callable[[Job], _Answer],
+    workers: int,
+    cluster: str | None,
+    again: bool,
+    notify: Callable[[str], None],
+) -> Iterator[Outcome]:
     state = batch.folder / STATE
     with folder_lock(state / "lock"):
         _sweep(batch.folder)
-        with Journal(batch.folder, state / "journal.jsonl") as journal:
+        with Journal(batch.folder, state / "journal.jsonl", notify) as journal:
             todo = []
             for job in batch.jobs:
                 row = None if again else _current_row(job, journal)
                 if row is None:
                     todo.append(job)
                 else:
+                    if journal.row(job.name).stale:
+                        journal.add(row, journal.seconds(job.name))
                     yield Outcome(State.UP_TO_DATE, row, 0.0)
             if todo:
                 with open_pool(min(workers, len(todo)), cluster) as pool:
-                    for job, answer in run_tasks(pool, partial(_run, converter), todo):
+                    for job, answer in run_tasks(pool, work, todo):
                         yield _noted(job, answer, journal)
                 _sweep(batch.folder)
             _forget_missing(batch, journal)
@@ -150,11 +174,16 @@ class _Answer:
     stop: str = ""
 
 
-def _run(converter: Converter, job: Job) -> _Answer:
+def _run(converter: Converter, limits: JobLimits, job: Job) -> _Answer:
     """One job, in a worker. Whatever goes wrong with this one scenario ends up in its row."""
     start = time.perf_counter()
+    if job.package_version != __version__:  # a worker of a cluster that came later
+        what = f"a worker has version {__version__}, the run was planned by {job.package_version}"
+        return _Answer(job.row(what), 0.0, what)
     try:
-        row = job.row(job.error) if job.error else _checked(converter, job)
+        row = job.row(job.error) if job.error else within_limits(converter, job, limits)
+    except JobLimitError as error:
+        row = job.row(f"{job.source}: {error}")
     except OSError as error:
         if error.errno in _STOPPING:
             return _Answer(job.row(str(error)), 0.0, f"{job.output}: {error.strerror or error}")
@@ -166,36 +195,43 @@ def _run(converter: Converter, job: Job) -> _Answer:
     return _Answer(row, time.perf_counter() - start)
 
 
-def _checked(converter: Converter, job: Job) -> ManifestRow:
-    if job.package_version != __version__:
-        raise XoscLateralError(f"the worker has version {__version__}, the run was planned by {job.package_version}")
-    return converter(job)
-
-
 def _noted(job: Job, answer: _Answer | WorkerDiedError, journal: Journal) -> Outcome:
     if isinstance(answer, WorkerDiedError):
         answer = _Answer(job.row(f"{job.source}: {answer}"), 0.0)
     if answer.stop:
         raise BatchStoppedError(f"{answer.stop}; {_KEPT}")
-    if answer.row.error and job.name in journal:
-        job.output.unlink(missing_ok=True)  # of a former run, when the scenario could still be converted
-    journal.add(answer.row, answer.seconds)
-    return Outcome(State.FAILED if answer.row.error else State.WRITTEN, answer.row, answer.seconds)
+    row = answer.row
+    if row.error and job.name in journal:
+        row = _kept(job, journal.row(job.name), row)
+    journal.add(row, answer.seconds)
+    return Outcome(State.FAILED if row.error else State.WRITTEN, row, answer.seconds)
+
+
+def _kept(job: Job, former: ManifestRow, failed: ManifestRow) -> ManifestRow:
+    """The row of an output of a former run that can't be made anew: what it was made of, and why not now."""
+    try:
+        there = bool(former.output_sha256) and file_hash(job.output) == former.output_sha256
+    except (OSError, FormatError):
+        there = False
+    return replace(former, error=failed.error, stale=True) if there else failed
 
 
 def _current_row(job: Job, journal: Journal) -> ManifestRow | None:
     """The journal's row if its output is still what a conversion would write."""
     if job.error or job.name not in journal:
         return None
-    row = journal.row(job.name)
-    if row.error or row.settings != job.fingerprint or row.scenario != job.scenario:
+    if job.page is not None and not job.page.is_file():
         return None
-    expected = {job.output: row.output_hash}
+    row = journal.row(job.name)
+    if (row.error and not row.stale) or row.settings != job.fingerprint or row.scenario != job.scenario:
+        return None
+    expected = {job.output: row.output_sha256}
     expected |= {Path(os.path.normpath(job.base / name)): value for name, value in row.inputs.items()}
     try:
-        return row if all(file_hash(path) == value for path, value in expected.items()) else None
-    except OSError:
+        current = all(file_hash(path) == value for path, value in expected.items())
+    except (OSError, FormatError):
         return None
+    return replace(row, error="", stale=False) if current else None
 
 
 def _forget_missing(batch: Batch, journal: Journal) -> None:

@@ -4,17 +4,16 @@ from __future__ import annotations
 
 import hashlib
 import os
-from collections.abc import Iterator, Mapping
-from dataclasses import asdict, dataclass, field
+from collections.abc import Mapping
+from dataclasses import asdict
 from pathlib import Path
 
-from xosc_lateral import __version__
+from xosc_lateral.enrich.conversion import Conversion, ConversionProvenance
 from xosc_lateral.enrich.enrich import enrich
 from xosc_lateral.enrich.result import Enriched
 from xosc_lateral.errors import FormatError
 from xosc_lateral.formats.atomic import refuse_targets
 from xosc_lateral.formats.context_table import read_context
-from xosc_lateral.formats.hashes import file_hash
 from xosc_lateral.formats.openscenario.write import (
     WrittenScenario,
     offset_chain,
@@ -22,65 +21,26 @@ from xosc_lateral.formats.openscenario.write import (
     write_trajectory_scenario,
 )
 from xosc_lateral.formats.profiles import profile_hash
+from xosc_lateral.formats.source import guarding_inputs
 from xosc_lateral.pipeline.drivers import choose_drivers
-from xosc_lateral.pipeline.load import Played, play_scenario
+from xosc_lateral.pipeline.load import Played, input_hashes, play_scenario
 from xosc_lateral.pipeline.settings import ConvertSettings, Mode
+from xosc_lateral.pipeline.shifted import shifted_events
 from xosc_lateral.scenario import Scenario
+from xosc_lateral.version import __version__
 
 NO_WIDTH = 0.01
 """A lane narrower than this is none. [m]"""
 
 
-@dataclass(frozen=True, slots=True)
-class Provenance:
-    """What went into an output: enough to make the same bytes again.
-
-    Parameters
-    ----------
-    package_version : str
-    inputs : mapping of str to str
-        File name -> SHA-256 of every file that was read (scenario, road, catalogs, context table).
-    profiles : mapping of str to (str, str)
-        Enriched entity -> name and SHA-256 of its profile.
-    seed, variant : int
-    parameters : mapping of str to str
-        Scenario parameters that were replaced.
-    """
-
-    package_version: str
-    inputs: Mapping[str, str]
-    profiles: Mapping[str, tuple[str, str]]
-    seed: int
-    variant: int
-    parameters: Mapping[str, str] = field(default_factory=dict)
-
-
-@dataclass(frozen=True, eq=False, slots=True)
-class Conversion:
-    """One converted scenario.
-
-    Parameters
-    ----------
-    source, output : Path
-    output_hash : str
-        SHA-256 of the output's bytes.
-    enriched : Enriched
-        Nominal and enriched motion, segments, gaps.
-    provenance : Provenance
-    warnings : tuple of str
-        What a user has to know, a line each.
-    """
-
-    source: Path
-    output: Path
-    output_hash: str
-    enriched: Enriched
-    provenance: Provenance
-    warnings: tuple[str, ...]
-
-
 def convert_scenario(
-    source: Path, output: Path, settings: ConvertSettings, *, variant: int = 0, report: Path | None = None
+    source: Path,
+    output: Path,
+    settings: ConvertSettings,
+    *,
+    variant: int = 0,
+    report: Path | None = None,
+    save: bool = True,
 ) -> Conversion:
     """Convert one scenario and write it.
 
@@ -95,6 +55,8 @@ def convert_scenario(
         Number of the variant: another one, other offsets.
     report : Path or None
         Where the caller will write a report: refused like the output if it can't be meant, before anything is written.
+    save : bool
+        Write the output; else the result holds its bytes, with file references as seen from `output`'s folder.
 
     Raises
     ------
@@ -103,14 +65,28 @@ def convert_scenario(
     OSError
         When the output can't be written; nothing is left half-written.
     """
+    with guarding_inputs():
+        return _convert(source, output, settings, variant, report, save)
+
+
+def _convert(
+    source: Path, output: Path, settings: ConvertSettings, variant: int, report: Path | None, save: bool
+) -> Conversion:
     played = play_scenario(
         source,
         parameters=settings.parameters,
         step=settings.step,
         time_limit=settings.time_limit,
         allowed=settings.allowed,
+        roads=settings.roads,
+        strict=settings.strict,
     )
-    refuse_targets([output, report], _read_files(played.scenario, settings))
+    _refuse_lane_offsets_for_carla(played.scenario, settings)
+    context = None if settings.context is None else read_context(settings.context)
+    inputs = dict(input_hashes(played.scenario, played.network))
+    if context is not None and settings.context is not None:
+        inputs[settings.context] = context.sha256
+    refuse_targets([output if save else None, report], inputs)
     drivers = choose_drivers(played.scenario, settings)
     enriched = enrich(
         played.motion,
@@ -119,17 +95,40 @@ def convert_scenario(
         seed=settings.seed,
         variant=variant,
         entropy=_entropy(played.scenario),
-        context=read_context(settings.context) if settings.context is not None else None,
+        context=context,
         trailers=played.trailers,
         attempts=settings.attempts,
     )
     _refuse_lanes_without_width(played, enriched)
-    provenance = _provenance(played, enriched, settings, variant)
-    written = _write(played, enriched, output, provenance, settings.mode)
+    provenance = _provenance(played, enriched, settings, variant, inputs)
+    written = _write(played, enriched, output, provenance, settings, save=save)
     warnings = enriched.warnings() + tuple(
         f"{removed.place.element}: left out ({removed.reason})" for removed in written.removed
     )
-    return Conversion(source, output, written.sha256, enriched, provenance, warnings)
+    if settings.mode is Mode.LANE_OFFSET and save:
+        warnings += tuple(_shifted(played, output, settings))
+    data = b"" if save else written.data
+    return Conversion(source, output, written.sha256, enriched, provenance, warnings, data)
+
+
+def _refuse_lane_offsets_for_carla(scenario: Scenario, settings: ConvertSettings) -> None:
+    if settings.mode is Mode.LANE_OFFSET and scenario.header.is_left_handed:
+        raise FormatError(
+            "is written for CARLA, whose lane offsets differ from the standard's; use --mode trajectory",
+            path=scenario.path,
+            element="FileHeader",
+        )
+
+
+def _shifted(played: Played, output: Path, settings: ConvertSettings) -> list[str]:
+    """What happens at other times in the output, whose triggers look at what happens: it is played once more."""
+    allowed = (*settings.allowed, *(path.parent for path in played.scenario.input_files))
+    if played.scenario.road_file is not None:
+        allowed = (*allowed, played.scenario.road_file.parent)
+    again = play_scenario(
+        output, step=settings.step, time_limit=settings.time_limit, allowed=allowed, roads=settings.roads
+    )
+    return shifted_events(played.motion, again.motion)
 
 
 def _entropy(scenario: Scenario) -> tuple[int, ...]:
@@ -140,11 +139,13 @@ def _entropy(scenario: Scenario) -> tuple[int, ...]:
     return tuple(int.from_bytes(digest.digest()[k : k + 4], "little") for k in range(0, 16, 4))
 
 
-def _provenance(played: Played, enriched: Enriched, settings: ConvertSettings, variant: int) -> Provenance:
+def _provenance(
+    played: Played, enriched: Enriched, settings: ConvertSettings, variant: int, inputs: Mapping[Path, str]
+) -> ConversionProvenance:
     scenario = played.scenario
-    return Provenance(
+    return ConversionProvenance(
         package_version=__version__,
-        inputs={_relative(path, scenario.path): file_hash(path) for path in _read_files(scenario, settings)},
+        inputs={_relative(path, scenario.path): sha256 for path, sha256 in inputs.items()},
         profiles={
             entity.name: (entity.profile.name, profile_hash(entity.profile))
             for entity in enriched.entities
@@ -154,11 +155,6 @@ def _provenance(played: Played, enriched: Enriched, settings: ConvertSettings, v
         variant=variant,
         parameters=dict(sorted(settings.parameters.items())),
     )
-
-
-def _read_files(scenario: Scenario, settings: ConvertSettings) -> list[Path]:
-    """Every file that went in: scenario, catalogs, road, context table."""
-    return [*scenario.input_files, *(path for path in (scenario.road_file, settings.context) if path is not None)]
 
 
 def _refuse_lanes_without_width(played: Played, enriched: Enriched) -> None:
@@ -182,51 +178,39 @@ def _relative(path: Path, scenario: Path) -> str:
     return Path(os.path.relpath(path.resolve(), scenario.resolve().parent)).as_posix()
 
 
-def _write(played: Played, enriched: Enriched, output: Path, provenance: Provenance, mode: Mode) -> WrittenScenario:
+def _write(
+    played: Played,
+    enriched: Enriched,
+    output: Path,
+    provenance: ConversionProvenance,
+    settings: ConvertSettings,
+    *,
+    save: bool,
+) -> WrittenScenario:
     profiles = sorted({name for name, _ in provenance.profiles.values()})
     summary = f"seed {provenance.seed}, variant {provenance.variant}, {', '.join(profiles) or 'no profile'}"
     facts = asdict(provenance)
-    if mode is Mode.LANE_OFFSET:
+    if settings.mode is Mode.LANE_OFFSET:
         chains = [
             offset_chain(entity.motion, played.network, entity.deviation, segment.stretch.first, segment.stretch.last)
             for entity in enriched.entities
             for segment in entity.segments
         ]
         return write_lane_offset_scenario(
-            played.scenario, played.motion, chains, output, provenance=facts, summary=summary
+            played.scenario, played.motion, chains, output, provenance=facts, summary=summary, save=save
         )
-    trajectories = {entity.name: entity.trajectory for entity in enriched.entities}
+    # Whom --only leaves out keeps its maneuvers and its controller.
+    chosen = None if settings.only is None else settings.only | _pulled_by(played, settings.only)
+    trajectories = {
+        entity.name: entity.trajectory for entity in enriched.entities if chosen is None or entity.name in chosen
+    }
     return write_trajectory_scenario(
-        played.scenario, played.motion, trajectories, output, provenance=facts, summary=summary
+        played.scenario, played.motion, trajectories, output, provenance=facts, summary=summary, save=save
     )
 
 
-def convert_variants(
-    source: Path, output: Path | None, settings: ConvertSettings, *, variants: int = 1, report: Path | None = None
-) -> Iterator[Conversion]:
-    """Convert one scenario into as many variants as wanted, one after another.
-
-    Parameters
-    ----------
-    source : Path
-    output : Path or None
-        None: ``NAME_lifelike.xosc`` beside the source. Several variants get their number before the suffix.
-    settings : ConvertSettings
-    variants : int
-    report : Path or None
-        Where the caller will write reports, numbered like the outputs.
-
-    Raises
-    ------
-    FormatError
-        An output or report that can't be meant: before the first variant is written.
-    """
-    target = output if output is not None else source.with_name(f"{source.stem}_lifelike{source.suffix or '.xosc'}")
-    outputs = [numbered(target, variant, variants) for variant in range(variants)]
-    reports = [None if report is None else numbered(report, variant, variants) for variant in range(variants)]
-    refuse_targets([*outputs, *reports], [source])
-    for variant, (path, page) in enumerate(zip(outputs, reports, strict=True)):
-        yield convert_scenario(source, path, settings, variant=variant, report=page)
+def _pulled_by(played: Played, tractors: frozenset[str]) -> frozenset[str]:
+    return frozenset(trailer for trailer, tractor in played.trailers.items() if tractor in tractors)
 
 
 def numbered(path: Path, variant: int, variants: int) -> Path:

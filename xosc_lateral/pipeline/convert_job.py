@@ -9,11 +9,14 @@ from pathlib import Path
 
 import numpy as np
 
+from xosc_lateral.enrich.conversion import Conversion
 from xosc_lateral.enrich.result import Enriched
+from xosc_lateral.errors import FormatError
 from xosc_lateral.motion.gaps import Gap
-from xosc_lateral.pipeline.convert import Conversion, convert_scenario
-from xosc_lateral.pipeline.jobs import Job
+from xosc_lateral.pipeline.convert import convert_scenario
+from xosc_lateral.pipeline.jobs import Job, fingerprint
 from xosc_lateral.pipeline.manifest import ManifestRow
+from xosc_lateral.pipeline.reports import write_page_and_thumbnail
 
 ROAD_SUFFIX = ".xodr"
 
@@ -28,8 +31,19 @@ def convert_job(job: Job) -> ManifestRow:
     OSError
         When the output can't be written.
     """
+    _refuse_changes(job)
     job.output.parent.mkdir(parents=True, exist_ok=True)
-    return describe(job, convert_scenario(job.source, job.output, job.settings, variant=job.variant))
+    conversion = convert_scenario(job.source, job.output, job.settings, variant=job.variant)
+    _refuse_changes(job)
+    if job.page is not None:
+        write_page_and_thumbnail(conversion, job.page)
+    return describe(job, conversion)
+
+
+def _refuse_changes(job: Job) -> None:
+    """The row states the profiles and the context table that the run was planned with."""
+    if fingerprint(job.settings, job.variant) != job.fingerprint:
+        raise FormatError("profile or context table changed during the run; run it again", path=job.source)
 
 
 def describe(job: Job, conversion: Conversion) -> ManifestRow:
@@ -39,14 +53,16 @@ def describe(job: Job, conversion: Conversion) -> ManifestRow:
     road = next((name for name in inputs if name.lower().endswith(ROAD_SUFFIX)), "")
     return replace(
         job.row(),
-        output_hash=conversion.output_hash,
+        scenario_sha256=provenance.inputs.get(job.source.name, ""),
+        output_sha256=conversion.output_sha256,
         road=road,
-        road_hash=inputs.get(road, ""),
+        road_sha256=inputs.get(road, ""),
         inputs=inputs,
         profiles={entity: name for entity, (name, _) in sorted(provenance.profiles.items())},
-        profile_hashes=dict(sorted(provenance.profiles.values())),
+        profile_sha256=dict(sorted(provenance.profiles.values())),
         entities=len(enriched.entities),
         enriched=tuple(entity.name for entity in enriched.entities if entity.is_enriched),
+        why_not={entity.name: entity.why for entity in enriched.entities if not entity.is_enriched},
         segment_seconds=_rounded(sum(entity.segment_seconds for entity in enriched.entities)),
         offset_spread=_rounded(_spread(enriched)),
         gap_before=_smallest(enriched.gaps_before),

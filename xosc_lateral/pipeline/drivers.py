@@ -9,6 +9,7 @@ from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.enrich.enrich import Drivers
 from xosc_lateral.errors import FormatError
 from xosc_lateral.formats.profiles import find_profile, read_profile
+from xosc_lateral.formats.source import check_regular, guard_input
 from xosc_lateral.pipeline.settings import AUTO, ConvertSettings
 from xosc_lateral.scenario import Entity, Scenario
 from xosc_lateral.scenario.enums import VehicleCategory
@@ -64,16 +65,17 @@ def _driver(entity: Entity, settings: ConvertSettings) -> DriverProfile | str:
         if category in NO_DRIVER:
             return NO_DRIVER[category]
         named = SHIPPED_BY_CLASS[category]
-    return load_profile(named, settings.libraries)
+    return named if isinstance(named, DriverProfile) else load_profile(named, settings.libraries)
 
 
 def load_profile(name_or_path: str, libraries: tuple[Path, ...]) -> DriverProfile:
     """Read a profile, once per process for as long as its file stays the same."""
     path = find_profile(name_or_path, libraries)
-    state = path.stat()
-    return _load_profile(path, state.st_mtime_ns, state.st_size)
+    state = check_regular(path)
+    guard_input(path)
+    return _load_profile(path, state.st_ino, state.st_ctime_ns, state.st_mtime_ns, state.st_size)
 
 
 @lru_cache(maxsize=128)
-def _load_profile(path: Path, _modified: int, _size: int) -> DriverProfile:
+def _load_profile(path: Path, *_state: int) -> DriverProfile:
     return read_profile(path)

@@ -7,18 +7,21 @@ import json
 import os
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, fields, replace
+from itertools import islice
 from pathlib import Path
 
-from xosc_lateral import __version__
+from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.errors import FormatError, XoscLateralError
 from xosc_lateral.formats.hashes import file_hash
 from xosc_lateral.formats.openscenario.distribution import read_distribution
 from xosc_lateral.formats.openscenario.references import require_folders
-from xosc_lateral.formats.profiles import SHIPPED, SUFFIX, find_profile
+from xosc_lateral.formats.profiles import SHIPPED, SUFFIX, find_profile, profile_hash
+from xosc_lateral.limits import BATCH_JOBS, PARAMETER_SETS, VARIANTS
 from xosc_lateral.pipeline.convert import numbered
-from xosc_lateral.pipeline.manifest import ManifestRow
+from xosc_lateral.pipeline.manifest import ManifestRow, printable
 from xosc_lateral.pipeline.request import DocumentKind, Request, document_kind, find_requests
 from xosc_lateral.pipeline.settings import AUTO, ConvertSettings
+from xosc_lateral.version import __version__
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,6 +44,8 @@ class Job:
         SHA-256 over everything but the input files that decides on the output's bytes.
     error : str
         Why it can't even be tried (a distribution that can't be read); empty normally.
+    page : Path or None
+        Where a report page about it is written, and its thumbnail beside that. Absolute.
     package_version : str
         Of the process that planned it: a worker with another one refuses.
     """
@@ -54,21 +59,22 @@ class Job:
     variant: int
     fingerprint: str
     error: str = ""
+    page: Path | None = None
     package_version: str = __version__
 
     def row(self, error: str = "") -> ManifestRow:
         """Its row as far as it is known before the conversion."""
         try:
-            scenario_hash = file_hash(self.source)
-        except OSError:
-            scenario_hash = ""
+            scenario_sha256 = file_hash(self.source)
+        except (OSError, FormatError):
+            scenario_sha256 = ""
         return ManifestRow(
             output=self.name,
             scenario=self.scenario,
-            scenario_hash=scenario_hash,
+            scenario_sha256=scenario_sha256,
             variant=self.variant,
             seed=self.settings.seed,
-            profile=self.settings.profile,
+            profile=self.settings.profile if isinstance(self.settings.profile, str) else self.settings.profile.name,
             parameters=dict(sorted(self.settings.parameters.items())),
             settings=self.fingerprint,
             package_version=self.package_version,
@@ -107,6 +113,7 @@ def plan_batch(
     settings: ConvertSettings | None = None,
     *,
     variants: int = 1,
+    report: str | Path | None = None,
 ) -> Batch:
     """Plan a batch; nothing is converted or written yet.
 
@@ -123,6 +130,8 @@ def plan_batch(
         For every input that has none of its own.
     variants : int
         Outputs per scenario.
+    report : str or Path, optional
+        Folder for a report page per output, in a tree like that of the outputs.
 
     Returns
     -------
@@ -137,8 +146,11 @@ def plan_batch(
     """
     settings = settings or ConvertSettings()
     require_folders(settings.allowed)
-    for name in {settings.profile, *settings.entity_profiles.values()} - {AUTO}:
-        file_hash(find_profile(name, settings.libraries))  # wrong for all is said once, wrong in a table's row there
+    for name in (settings.profile, *settings.entity_profiles.values()):
+        if isinstance(name, str) and name != AUTO:
+            file_hash(
+                find_profile(name, settings.libraries)
+            )  # wrong for all is said once, wrong in a table's row there
     target = _normal(Path(folder))
     requests = [_absolute(request) for request in _all_requests(inputs, settings, variants, target)]
     base = _common_folder(requests)
@@ -147,6 +159,8 @@ def plan_batch(
     left_out: list[tuple[Path, DocumentKind]] = []
     asked: dict[Path, dict[tuple[str, int], None]] = {}
     for request in requests:
+        if request.variants > VARIANTS.value:
+            raise FormatError(VARIANTS.refusal(request.variants), path=request.scenario)
         kind = document_kind(request.scenario)
         if kind in (DocumentKind.CATALOG, DocumentKind.CONVERTED) and not request.listed:
             left_out.append((request.scenario, kind))
@@ -162,8 +176,16 @@ def plan_batch(
             if earlier is not job:
                 what = f"would be written twice: from {earlier.scenario} and from {job.scenario}"
                 raise FormatError(what, path=job.output)
+            if len(jobs) > BATCH_JOBS.value:
+                raise FormatError(BATCH_JOBS.refusal(len(jobs)), path=request.scenario)
     _refuse_overwriting(jobs.values())
-    return Batch(target, base, tuple(jobs[name] for name in sorted(jobs)), tuple(left_out))
+    pages = None if report is None else _normal(Path(report))
+    planned = (jobs[name] if pages is None else _with_page(jobs[name], pages) for name in sorted(jobs))
+    return Batch(target, base, tuple(planned), tuple(left_out))
+
+
+def _with_page(job: Job, pages: Path) -> Job:
+    return replace(job, page=(pages / job.name).with_suffix(".html"))
 
 
 def _all_requests(
@@ -205,9 +227,12 @@ def _jobs(
         for variant in range(request.variants):
             named = relative.with_name(f"{relative.stem}{repeat}{suffix}{relative.suffix}")
             output = numbered(named, variant, request.variants)
+            name = printable(output.as_posix())
+            if name != output.as_posix():
+                error = error or f"{printable(str(source))}: the file's name is no UTF-8; rename it"
             yield Job(
-                name=output.as_posix(),
-                scenario=Path(os.path.relpath(source, base)).as_posix(),
+                name=name,
+                scenario=printable(Path(os.path.relpath(source, base)).as_posix()),
                 source=source,
                 output=target / output,
                 base=base,
@@ -225,9 +250,17 @@ def _concrete(request: Request, kind: DocumentKind) -> Iterator[tuple[Path, str,
         return
     try:
         logical = read_distribution(request.scenario, allowed=request.settings.allowed)
-        sets = list(logical.parameter_sets(request.settings.seed))
+        sets = list(islice(logical.parameter_sets(request.settings.seed), int(PARAMETER_SETS.value) + 1))
+        if len(sets) > PARAMETER_SETS.value:
+            raise FormatError(f"{PARAMETER_SETS.refusal(logical.count)}", path=request.scenario)
+        if not sets:
+            raise FormatError("no set of parameters satisfies the scenario's constraints", path=request.scenario)
     except (XoscLateralError, OSError) as error:
         yield request.scenario, "", request.settings, " ".join(str(error).split())
+        return
+    except Exception as error:  # a bug of ours in one file must not cost the others; the row says that it is one
+        what = f"{request.scenario}: internal error: {type(error).__name__}: {error}"
+        yield request.scenario, "", request.settings, " ".join(what.split())
         return
     for index, values in enumerate(sets):
         parameters = {**values, **request.settings.parameters}
@@ -242,6 +275,11 @@ def _refuse_overwriting(jobs: Iterable[Job]) -> None:
             raise FormatError("is an input: choose another output folder", path=job.output)
 
 
+def fingerprint(settings: ConvertSettings, variant: int) -> str:
+    """SHA-256 over everything but the input files that decides on an output's bytes, as it is now."""
+    return _Fingerprints().of(settings, variant)
+
+
 @dataclass(slots=True)
 class _Fingerprints:
     """Hashes of settings; files that settings name count by their bytes, not by their place."""
@@ -250,7 +288,9 @@ class _Fingerprints:
 
     def of(self, settings: ConvertSettings, variant: int) -> str:
         values = {item.name: getattr(settings, item.name) for item in fields(settings)}
-        del values["libraries"], values["allowed"]  # where files are looked for, not what is in them
+        del values["libraries"], values["allowed"], values["roads"]  # where files are looked for, not what is in them
+        if not settings.strict:  # refuses more, and changes no output; what was made without it is not trusted with it
+            del values["strict"]
         values["profile"] = self._profile(settings.profile, settings.libraries)
         values["entity_profiles"] = {
             entity: self._profile(name, settings.libraries) for entity, name in settings.entity_profiles.items()
@@ -261,7 +301,9 @@ class _Fingerprints:
         values |= {"package_version": __version__, "variant": variant}
         return hashlib.sha256(json.dumps(values, sort_keys=True).encode()).hexdigest()
 
-    def _profile(self, name: str, libraries: tuple[Path, ...]) -> str:
+    def _profile(self, name: str | DriverProfile, libraries: tuple[Path, ...]) -> str:
+        if isinstance(name, DriverProfile):
+            return profile_hash(name)
         key = (name, libraries)
         if key not in self._profiles:
             self._profiles[key] = _profile_state(name, libraries)

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
-from contextlib import suppress
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from types import TracebackType
 from typing import Self
 
+from xosc_lateral.errors import FormatError
 from xosc_lateral.pipeline.manifest import (
     MANIFEST,
     TIMINGS,
@@ -32,10 +33,12 @@ class Journal:
         Output folder; rows of its manifest count until the journal has newer ones.
     path : Path
         The journal.
+    notify : callable
+        Gets a line if manifest or timings can't be read: they are put aside, and the run goes on without.
     """
 
-    def __init__(self, folder: Path, path: Path) -> None:
-        self._folder, self._path = folder, path
+    def __init__(self, folder: Path, path: Path, notify: Callable[[str], None]) -> None:
+        self._folder, self._path, self._notify = folder, path, notify
         self._begin: dict[str, int] = {}
         self._seconds: dict[str, float] = {}
         self._end = self._intact_end()
@@ -63,6 +66,10 @@ class Journal:
         self._file.seek(self._begin[output])
         return ManifestRow.from_dict(json.loads(self._file.readline())["row"])
 
+    def seconds(self, output: str) -> float:
+        """What the newest conversion of an output took. [s]"""
+        return self._seconds[output]
+
     def add(self, row: ManifestRow, seconds: float) -> None:
         """Append a row. From the return on it survives the death of this process.
 
@@ -71,7 +78,7 @@ class Journal:
         OSError
             When the disk is full; rows added before are still there.
         """
-        line = json.dumps({"row": row.to_dict(), "seconds": seconds}, ensure_ascii=False).encode() + b"\n"
+        line = json.dumps({"row": row.to_dict(), "seconds": seconds}).encode() + b"\n"
         self._file.seek(self._end)
         self._file.write(line)
         self._file.flush()
@@ -103,8 +110,8 @@ class Journal:
             for line in file:
                 try:
                     values = json.loads(line)
-                    output, seconds = str(values["row"]["output"]), float(values["seconds"])
-                except (ValueError, KeyError, TypeError):
+                    output, seconds = ManifestRow.from_dict(values["row"]).output, float(values["seconds"])
+                except (ValueError, KeyError, TypeError, RecursionError):
                     break
                 if not line.endswith(b"\n"):
                     break
@@ -113,7 +120,20 @@ class Journal:
         return end
 
     def _adopt_manifest(self) -> None:
-        seconds = read_timings(self._folder / TIMINGS)
-        for row in read_manifest(self._folder / MANIFEST):
-            if row.output not in self._begin:
-                self.add(row, seconds.get(row.output, 0.0))
+        seconds: dict[str, float] = {}
+        with self._put_aside_if_damaged(TIMINGS):
+            seconds = read_timings(self._folder / TIMINGS)
+        with self._put_aside_if_damaged(MANIFEST):
+            for row in read_manifest(self._folder / MANIFEST):
+                if row.output not in self._begin:
+                    self.add(row, seconds.get(row.output, 0.0))
+
+    @contextmanager
+    def _put_aside_if_damaged(self, name: str) -> Iterator[None]:
+        path = self._folder / name
+        try:
+            yield
+        except FormatError as error:
+            aside = path.with_suffix(f".damaged{path.suffix}")
+            path.replace(aside)
+            self._notify(f"{error}; it is put aside as {aside.name}, outputs that it named are made anew")

@@ -1,6 +1,6 @@
 """The shipped profile library, built from the public recording.
 
-    python -m xosc_lateral.cli.build_library tasi-0.15.4-py3-none-any.whl -o FOLDER [--cards docs/profiles.md]
+    python -m benchmarks.build_library tasi-0.15.4-py3-none-any.whl -o FOLDER [--cards docs/profiles.md]
 
 The same wheel gives the same bytes on the same kind of processor. Every profile is scored before it is written: for
 groups of drivers a fit to half of the vehicles (for the refined profile, a closed loop over them) is scored on the
@@ -12,25 +12,28 @@ from __future__ import annotations
 
 import tempfile
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from msgspec.structs import replace
 from numpy.typing import NDArray
 
 from xosc_lateral.driver.fitting import fit_runs
-from xosc_lateral.driver.profile import DriverProfile, Provenance
-from xosc_lateral.driver.series import STEP, Drive, Run, all_runs
+from xosc_lateral.driver.profile import DriverProfile, Metadata, Provenance
+from xosc_lateral.drives.cuts import all_runs
+from xosc_lateral.drives.drive import Drive, Run
+from xosc_lateral.drives.resampling import STEP
 from xosc_lateral.errors import NotEnoughDataError
+from xosc_lateral.evaluation.comparison import habits_of, told_from_each_other
+from xosc_lateral.evaluation.metrics import snippet_metrics
+from xosc_lateral.evaluation.scores import SNIPPET, score_profile, scores_to_dict
+from xosc_lateral.evaluation.snippets import snippets_of
 from xosc_lateral.formats.drives import read_drives
-from xosc_lateral.formats.hashes import file_hash
+from xosc_lateral.formats.hashes import parsed_hash
 from xosc_lateral.formats.importers.dlr_ht import LICENCE, import_dlr_ht
 from xosc_lateral.formats.importers.table import write_imported
-from xosc_lateral.loop.compare import habits_of, told_from_each_other
-from xosc_lateral.loop.metrics import snippet_metrics
-from xosc_lateral.loop.scores import SNIPPET, score_profile, scores_to_dict
-from xosc_lateral.loop.snippets import snippets_of
 from xosc_lateral.pipeline.refined import NOTES, refine_population, refined_profile
 
 FloatArray = NDArray[np.float64]
@@ -91,12 +94,22 @@ def build_library(source: Path, *, model: str = "best") -> list[DriverProfile]:
         write_imported(imported, table)
         drives = read_drives(table)
     runs = all_runs(drives)
-    known = Provenance(source=SOURCE, licence=LICENCE, inputs={source.name: file_hash(source)})
+    known = Provenance(source=SOURCE, licence=LICENCE, inputs={source.name: parsed_hash(source)})
     groups = [
         _group_profile(group, [run for run in runs if group.holds(run, kind)], replace(known, notes=group.notes), model)
         for group in GROUPS
     ]
-    return [*groups, _refined_profile(drives, runs, known), *_single_profiles(runs, kind, known, model)]
+    profiles = [*groups, _refined_profile(drives, runs, known), *_single_profiles(runs, kind, known, model)]
+    return [replace(profile, metadata=shipped_metadata(profile)) for profile in profiles]
+
+
+def shipped_metadata(profile: DriverProfile) -> Metadata:
+    """What all shipped profiles have in common, and whose they are."""
+    single = "-vehicle-" in profile.name
+    words = f"{profile.name} {profile.provenance.notes}".lower() if single else profile.name
+    vehicle = next((kind for kind in ("truck", "car", "van") if kind in words), "")
+    tags = ("single-vehicle" if single else "population", *([vehicle] if vehicle else []))
+    return Metadata(version="1", vehicle=vehicle, road="motorway", country="DE", date="2024-10-07", tags=tags)
 
 
 def _group_profile(group: Group, runs: Sequence[Run], known: Provenance, model: str) -> DriverProfile:

@@ -9,9 +9,11 @@ from pathlib import Path
 
 from xosc_lateral.formats.opendrive import read_opendrive
 from xosc_lateral.formats.openscenario import read_scenario
+from xosc_lateral.formats.openscenario.read import NO_ROADS, RoadSearch
+from xosc_lateral.formats.source import check_regular, guard_input
 from xosc_lateral.motion.nominal import NominalMotion
-from xosc_lateral.motion.playback import play
 from xosc_lateral.pipeline.settings import STEP, TIME_LIMIT
+from xosc_lateral.playback.player import play
 from xosc_lateral.road.network import RoadNetwork
 from xosc_lateral.scenario import Scenario
 
@@ -37,6 +39,8 @@ def play_scenario(
     step: float = STEP,
     time_limit: float = TIME_LIMIT,
     allowed: Iterable[Path] = (),
+    roads: RoadSearch = NO_ROADS,
+    strict: bool = False,
 ) -> Played:
     """Read and play.
 
@@ -50,35 +54,38 @@ def play_scenario(
         [s]
     allowed : iterable of Path
         Folders, besides those around the scenario, that its road and catalogs may lie in.
+    roads : RoadSearch
+        Where else its road may lie.
+    strict : bool
+        Refuse a missing vehicle catalog, instead of playing a usual car.
 
     Raises
     ------
     FormatError, PlaybackError
         With file, line and element.
     """
-    scenario = read_scenario(path, parameters or {}, allowed=allowed)
+    scenario = read_scenario(path, parameters or {}, allowed=allowed, roads=roads, strict=strict)
     network = RoadNetwork(()) if scenario.road_file is None else road_network(scenario.road_file)
     values = tuple(sorted((parameters or {}).items()))
-    return _played(_Playable(_file_states(scenario), values, step, time_limit, scenario, network))
+    return _played(_Playable(input_hashes(scenario, network), values, step, time_limit, scenario, network))
+
+
+def input_hashes(scenario: Scenario, network: RoadNetwork) -> tuple[tuple[Path, str], ...]:
+    """Every file that was parsed and the SHA-256 of the bytes that were: scenario, catalogs, road."""
+    road = () if scenario.road_file is None else ((scenario.road_file, network.sha256),)
+    return (*scenario.input_hashes.items(), *road)
 
 
 @dataclass(frozen=True, slots=True)
 class _Playable:
     """What decides on how a scenario plays, as a key; the scenario itself goes along."""
 
-    files: tuple[tuple[Path, int, int], ...]
+    files: tuple[tuple[Path, str], ...]
     parameters: tuple[tuple[str, str], ...]
     step: float
     time_limit: float
     scenario: Scenario = field(compare=False)
     network: RoadNetwork = field(compare=False)
-
-
-def _file_states(scenario: Scenario) -> tuple[tuple[Path, int, int], ...]:
-    """Every file that went in, with time of change and size; links resolved, for one name may come to mean another."""
-    files = [*scenario.input_files, *([scenario.road_file] if scenario.road_file else [])]
-    states = ((path.resolve(), path.stat()) for path in (scenario.path, *files))
-    return tuple((path, state.st_mtime_ns, state.st_size) for path, state in states)
 
 
 @lru_cache(maxsize=2)  # variants of one scenario come one after another, and playing is most of their work
@@ -89,10 +96,11 @@ def _played(playable: _Playable) -> Played:
 
 def road_network(path: Path) -> RoadNetwork:
     """Read a road, once per process for as long as the file stays the same."""
-    state = path.stat()
-    return _road_network(path, state.st_mtime_ns, state.st_size)
+    state = check_regular(path)
+    guard_input(path)
+    return _road_network(path, state.st_ino, state.st_ctime_ns, state.st_mtime_ns, state.st_size)
 
 
 @lru_cache(maxsize=32)
-def _road_network(path: Path, _modified: int, _size: int) -> RoadNetwork:
+def _road_network(path: Path, *_state: int) -> RoadNetwork:
     return read_opendrive(path)

@@ -17,6 +17,8 @@ from typing import TYPE_CHECKING, Any
 
 from xosc_lateral.errors import FormatError
 from xosc_lateral.formats.atomic import write_atomically
+from xosc_lateral.formats.source import check_regular
+from xosc_lateral.formats.tables import foreign_errors
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -27,6 +29,15 @@ ROW_GROUP = 1000
 """Rows held in memory while writing."""
 
 
+_OLD_NAMES = {
+    "scenario_hash": "scenario_sha256",
+    "output_hash": "output_sha256",
+    "road_hash": "road_sha256",
+    "profile_hashes": "profile_sha256",
+}
+"""What columns were called in manifests of version 0.1."""
+
+
 @dataclass(frozen=True, slots=True)
 class ManifestRow:
     """One output, or why there is none.
@@ -35,7 +46,7 @@ class ManifestRow:
     ----------
     output : str
         Path of the output below the output folder, with forward slashes; names the row.
-    scenario, scenario_hash : str, str
+    scenario, scenario_sha256 : str, str
         Path of the input below the inputs' common folder, and SHA-256 of the file.
     variant, seed : int, int
     profile : str
@@ -45,20 +56,22 @@ class ManifestRow:
     settings : str
         SHA-256 over package version, settings, variant, profile files and context table.
     package_version : str
-    output_hash : str
+    output_sha256 : str
         SHA-256 of the output.
-    road, road_hash : str, str
+    road, road_sha256 : str, str
         As for the scenario; empty if it has none.
     inputs : mapping of str to str
         Every file that was read -> SHA-256.
     profiles : mapping of str to str
         Enriched entity -> name of its profile.
-    profile_hashes : mapping of str to str
+    profile_sha256 : mapping of str to str
         Profile name -> SHA-256.
     entities : int
         In the scenario.
     enriched : tuple of str
         Names of the entities that got offsets.
+    why_not : mapping of str to str
+        Entity that got none -> why.
     segment_seconds : float
         Road-following time of all enriched entities together. [s]
     offset_spread : float
@@ -67,32 +80,36 @@ class ManifestRow:
         Smallest gap between any two vehicles, nominal and enriched; None: no two come near each other. [m]
     warnings : tuple of str
     error : str
-        One line; empty if there is an output.
+        One line; empty if the output is what the inputs and settings give.
+    stale : bool
+        The output is that of a former run, which the other columns describe: it could not be made anew.
     """
 
     output: str
     scenario: str
-    scenario_hash: str
+    scenario_sha256: str
     variant: int
     seed: int
     profile: str
     parameters: Mapping[str, str]
     settings: str
     package_version: str
-    output_hash: str = ""
+    output_sha256: str = ""
     road: str = ""
-    road_hash: str = ""
+    road_sha256: str = ""
     inputs: Mapping[str, str] = field(default_factory=dict)
     profiles: Mapping[str, str] = field(default_factory=dict)
-    profile_hashes: Mapping[str, str] = field(default_factory=dict)
+    profile_sha256: Mapping[str, str] = field(default_factory=dict)
     entities: int = 0
     enriched: tuple[str, ...] = ()
+    why_not: Mapping[str, str] = field(default_factory=dict)
     segment_seconds: float = 0.0
     offset_spread: float = 0.0
     gap_before: float | None = None
     gap_after: float | None = None
     warnings: tuple[str, ...] = ()
     error: str = ""
+    stale: bool = False
 
     def to_dict(self) -> dict[str, Any]:
         """Plain JSON values."""
@@ -109,22 +126,38 @@ class ManifestRow:
         Raises
         ------
         TypeError
-            When a value is missing.
+            When a value is missing or of the wrong kind.
         """
+        values = {_OLD_NAMES.get(name, name): value for name, value in values.items()}
         names = {item.name for item in fields(cls)}
         known: dict[str, Any] = {name: value for name, value in values.items() if name in names}
         known |= {name: tuple(known[name]) for name in ("enriched", "warnings") if name in known}
-        return cls(**known)
+        row = cls(**known)
+        if not all(isinstance(getattr(row, name), Mapping) for name in _MAPPINGS) or not isinstance(row.output, str):
+            raise TypeError("a column is of the wrong kind")
+        return row
 
 
-_MAPPINGS = ("parameters", "inputs", "profiles", "profile_hashes")  # JSON text in the file: every reader takes it
+def printable(text: str) -> str:
+    """Text that can be written as UTF-8: bytes of a file name that are none appear as ``\\udcff``."""
+    return text.encode("utf-8", "backslashreplace").decode("utf-8")
+
+
+_MAPPINGS = (
+    "parameters",
+    "inputs",
+    "profiles",
+    "profile_sha256",
+    "why_not",
+)  # JSON text in the file: every reader takes it
 
 
 def manifest_schema() -> pa.Schema:
     """Columns of `manifest.parquet`."""
     import pyarrow as pa
 
-    types = {"variant": pa.int64(), "seed": pa.int64(), "entities": pa.int64()}
+    types: dict[str, pa.DataType] = {"stale": pa.bool_()}
+    types |= {"variant": pa.int64(), "seed": pa.int64(), "entities": pa.int64()}
     types |= dict.fromkeys(("segment_seconds", "offset_spread", "gap_before", "gap_after"), pa.float64())
     types |= dict.fromkeys(("enriched", "warnings"), pa.list_(pa.string()))
     return pa.schema([(item.name, types.get(item.name, pa.string())) for item in fields(ManifestRow)])
@@ -154,7 +187,7 @@ def read_manifest(path: Path) -> Iterator[ManifestRow]:
         try:
             unpacked = {name: json.loads(value) if name in _MAPPINGS else value for name, value in values.items()}
             yield ManifestRow.from_dict(unpacked)
-        except (TypeError, ValueError) as error:
+        except (TypeError, ValueError, RecursionError) as error:
             raise FormatError(f"not a manifest of this package: {error}", path=path) from error
 
 
@@ -167,12 +200,21 @@ def write_timings(seconds: Iterable[tuple[str, float]], path: Path) -> None:
 
 
 def read_timings(path: Path) -> dict[str, float]:
-    """Seconds per output; empty if there is no file."""
-    return {str(values["output"]): float(values["seconds"]) for values in _read_table(path)}
+    """Seconds per output; empty if there is no file.
+
+    Raises
+    ------
+    FormatError
+        When it is no such file.
+    """
+    try:
+        return {str(values["output"]): float(values["seconds"]) for values in _read_table(path)}
+    except (TypeError, ValueError, KeyError) as error:
+        raise FormatError(f"no timings of this package: {error}", path=path) from error
 
 
 def _packed(row: ManifestRow) -> dict[str, Any]:
-    values = row.to_dict()
+    values = {name: printable(value) if isinstance(value, str) else value for name, value in row.to_dict().items()}
     return values | {name: json.dumps(values[name], sort_keys=True, ensure_ascii=False) for name in _MAPPINGS}
 
 
@@ -192,12 +234,9 @@ def _write_table(path: Path, schema: pa.Schema, rows: Iterator[dict[str, Any]]) 
 def _read_table(path: Path) -> Iterator[dict[str, Any]]:
     if not path.exists():
         return
-    import pyarrow as pa
     import pyarrow.parquet as pq
 
-    try:
-        with pq.ParquetFile(path) as file:
-            for batch in file.iter_batches(ROW_GROUP):
-                yield from batch.to_pylist()
-    except (pa.ArrowInvalid, KeyError) as error:
-        raise FormatError(f"can't be read as Parquet: {error}", path=path) from error
+    check_regular(path)
+    with foreign_errors(path, "can't be read as Parquet"), pq.ParquetFile(path) as file:
+        for batch in file.iter_batches(ROW_GROUP):
+            yield from batch.to_pylist()

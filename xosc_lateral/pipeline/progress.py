@@ -12,6 +12,7 @@ from enum import StrEnum
 from typing import TextIO
 
 from xosc_lateral.pipeline.batch import Outcome, State
+from xosc_lateral.pipeline.manifest import ManifestRow
 
 LINES_EVERY = 30.0
 """Without a terminal a line of progress comes this often. [s]"""
@@ -26,6 +27,8 @@ class Display(StrEnum):
     """Failures alone."""
     JSON = "json"
     """One JSON object a line for every output, at the start and at the end."""
+    NOTHING = "nothing"
+    """For callers that look at the outcomes themselves."""
 
 
 @dataclass(slots=True)
@@ -38,16 +41,26 @@ class Summary:
         Jobs.
     seconds : float
         From start to end. [s]
+    stale : int
+        Of the failed ones: those whose output of a former run is kept.
     failures : list of (str, str)
         Output and error.
+    with_warnings : int
+        Outputs with at least one.
+    nobody_enriched : mapping of str to int
+        Why no entity of an output got offsets -> how many outputs.
     """
 
     total: int
     written: int = 0
     up_to_date: int = 0
     failed: int = 0
+    stale: int = 0
     seconds: float = 0.0
     failures: list[tuple[str, str]] = field(default_factory=list)
+    with_warnings: int = 0
+    nobody_enriched: dict[str, int] = field(default_factory=dict)
+    _said: set[tuple[str, str]] = field(default_factory=set, repr=False)
 
     def count(self, outcome: Outcome) -> None:
         """Take one more outcome into account."""
@@ -57,7 +70,20 @@ class Summary:
             self.up_to_date += 1
         else:
             self.failed += 1
+            self.stale += outcome.row.stale
             self.failures.append((outcome.row.output, outcome.row.error))
+            return
+        self.with_warnings += bool(outcome.row.warnings)
+        if not outcome.row.enriched:
+            why = _why_nobody(outcome.row)
+            self.nobody_enriched[why] = self.nobody_enriched.get(why, 0) + 1
+
+    def is_new(self, outcome: Outcome) -> bool:
+        """Whether a failure was not met yet: one that all variants of a scenario share is one line."""
+        key = (outcome.row.scenario, outcome.row.error)
+        before = len(self._said)
+        self._said.add(key)
+        return len(self._said) > before
 
     @property
     def finished(self) -> int:
@@ -74,11 +100,34 @@ class Summary:
         """At this rate; None as long as there is none. [s]"""
         return (self.total - self.finished) / self.rate if self.rate > 0 else None
 
+    @property
+    def is_clean(self) -> bool:
+        """Whether nothing failed, nothing is warned of, and somebody was enriched in every output."""
+        return not (self.failed or self.with_warnings or self.nobody_enriched)
+
+    def remarks(self) -> list[str]:
+        """What a person has to know besides the counts, a line each."""
+        lines = (
+            [f"  {self.with_warnings} with warnings (column `warnings` of the manifest)"] if self.with_warnings else []
+        )
+        if self.nobody_enriched:
+            lines.append(f"  {sum(self.nobody_enriched.values())} in which nobody was enriched:")
+            reasons = sorted(self.nobody_enriched.items(), key=lambda item: (-item[1], item[0]))
+            lines += [f"    {count}: {why}" for why, count in reasons]
+        return lines
+
+    def to_dict(self) -> dict[str, object]:
+        """Plain JSON values."""
+        values = {name: value for name, value in asdict(self).items() if name not in ("failures", "_said")}
+        failures = [{"output": output, "error": error} for output, error in self.failures]
+        return values | {"seconds": round(self.seconds, 3), "failures": failures}
+
     def text(self) -> str:
         """One line."""
         parts = [f"{self.written} written"]
         parts += [f"{self.up_to_date} up to date"] if self.up_to_date else []
-        parts += [f"{self.failed} failed"] if self.failed else []
+        kept = f" (of {self.stale} the former output is kept, stale)" if self.stale else ""
+        parts += [f"{self.failed} failed{kept}"] if self.failed else []
         return f"{', '.join(parts)} of {self.total} in {_clock(self.seconds)} ({self.rate:.1f} per second)"
 
 
@@ -109,6 +158,12 @@ def follow(
     return summary
 
 
+def _why_nobody(row: ManifestRow) -> str:
+    """The reasons of all entities, the same ones once: what an output without offsets is counted under."""
+    reasons = sorted({why for why in row.why_not.values() if why})
+    return "; ".join(reasons) or "there are no entities"
+
+
 Show = Callable[[Outcome], None]
 
 
@@ -118,7 +173,9 @@ def _shower(display: Display, summary: Summary, stream: TextIO) -> Iterator[Show
         with _json_lines(summary, stream) as show:
             yield show
     elif display is Display.QUIET:
-        yield lambda outcome: _say_failure(outcome, stream)
+        yield lambda outcome: _say_failure(outcome, summary, stream)
+    elif display is Display.NOTHING:
+        yield lambda outcome: None
     elif stream.isatty():
         with _bar(summary, stream) as show:
             yield show
@@ -133,12 +190,17 @@ def _json_lines(summary: Summary, stream: TextIO) -> Iterator[Show]:
 
     def show(outcome: Outcome) -> None:
         row = outcome.row
-        details = {"error": row.error} if row.error else {"sha256": row.output_hash, "warnings": list(row.warnings)}
+        details = (
+            {"error": row.error, "stale": row.stale}
+            if row.error
+            else {"sha256": row.output_sha256, "warnings": list(row.warnings)}
+        )
         say(outcome.state.value, output=row.output, scenario=row.scenario, seconds=round(outcome.seconds, 4), **details)
 
     say("start", total=summary.total)
     yield show
-    say("end", **{name: value for name, value in asdict(summary).items() if name != "failures"}, rate=summary.rate)
+    counts = {name: value for name, value in summary.to_dict().items() if name != "failures"}
+    say("end", **counts, rate=round(summary.rate, 3))
 
 
 @contextmanager
@@ -151,7 +213,7 @@ def _bar(summary: Summary, stream: TextIO) -> Iterator[Show]:
         task = progress.add_task("", total=summary.total, pace="")
 
         def show(outcome: Outcome) -> None:
-            if outcome.state is State.FAILED:
+            if outcome.state is State.FAILED and summary.is_new(outcome):
                 progress.console.print(_failure(outcome), markup=False, highlight=False, soft_wrap=True)
             progress.update(task, completed=summary.finished, pace=_pace(summary))
 
@@ -163,7 +225,7 @@ def _lines(summary: Summary, stream: TextIO) -> Show:
 
     def show(outcome: Outcome) -> None:
         nonlocal next_line
-        _say_failure(outcome, stream)
+        _say_failure(outcome, summary, stream)
         if summary.seconds >= next_line:
             next_line = summary.seconds + LINES_EVERY
             print(f"{summary.finished} of {summary.total}, {_pace(summary)}", file=stream, flush=True)
@@ -171,8 +233,8 @@ def _lines(summary: Summary, stream: TextIO) -> Show:
     return show
 
 
-def _say_failure(outcome: Outcome, stream: TextIO) -> None:
-    if outcome.state is State.FAILED:
+def _say_failure(outcome: Outcome, summary: Summary, stream: TextIO) -> None:
+    if outcome.state is State.FAILED and summary.is_new(outcome):
         print(_failure(outcome), file=stream, flush=True)
 
 

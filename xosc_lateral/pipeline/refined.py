@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+
+from msgspec.structs import replace
 
 from xosc_lateral.driver.fitting import fit_profile
-from xosc_lateral.driver.kinds import ModelKind
+from xosc_lateral.driver.models.kinds import ModelKind
 from xosc_lateral.driver.profile import DriverProfile, Provenance
-from xosc_lateral.driver.series import Drive
-from xosc_lateral.loop.close import LoopResult, close_loop
+from xosc_lateral.drives.drive import Drive
+from xosc_lateral.identification.close import LoopResult, close_loop
 
 NAME = "motorway-refined"
 NOTES = (
@@ -27,7 +28,7 @@ def refine_population(drives: Sequence[Drive], seed: int, known: Provenance | No
 def refined_profile(result: LoopResult) -> DriverProfile:
     """The refined profile, with what the loop found in its provenance.
 
-    The loop's errors are not in it: they are the loop's own figures (docs/closing_the_loop.md, section 6), and a change
+    The loop's errors are not in it: they are the loop's own figures (docs/closing_the_loop.md, section 5), and a change
     of how they are measured must not change a driver.
     """
     refined = result.refined

@@ -15,6 +15,9 @@ from lxml import etree
 from xosc_lateral.errors import FormatError
 from xosc_lateral.formats.openscenario.element import local_name
 from xosc_lateral.formats.openscenario.provenance import HEADER_MARK
+from xosc_lateral.formats.source import open_source
+from xosc_lateral.formats.tables import TABLE_SUFFIXES, as_text, read_text_table
+from xosc_lateral.limits import XML_TREE
 from xosc_lateral.pipeline.manifest import MANIFEST
 from xosc_lateral.pipeline.settings import ConvertSettings
 
@@ -22,7 +25,6 @@ if TYPE_CHECKING:
     import pandas as pd
 
 SCENARIO_SUFFIX = ".xosc"
-TABLE_SUFFIXES = (".csv", ".csv.gz", ".parquet")
 TABLE_COLUMNS = ("scenario", "profile", "seed", "variants", "parameters", "only")
 """Columns of a table of scenarios; further ones are ``profile:ENTITY`` and ``parameter:NAME``."""
 
@@ -91,12 +93,14 @@ def find_requests(
     for given in inputs:
         path = Path(given)
         if path.is_dir():
-            for found in _search(path, leave_out):
-                yield Request(found, settings, variants, path, listed=False)
-        elif path.is_file() and path.name.lower().endswith(TABLE_SUFFIXES):
+            found = list(_search(path, leave_out))
+            if not found:
+                raise FormatError(f"no {SCENARIO_SUFFIX} file in this folder or below", path=path)
+            yield from (Request(scenario, settings, variants, path, listed=False) for scenario in found)
+        elif path.exists() and path.name.lower().endswith(TABLE_SUFFIXES):
             yield from read_request_table(path, settings, variants=variants)
-        elif path.is_file():
-            yield Request(path, settings, variants)
+        elif path.exists():
+            yield Request(path, settings, variants)  # a device or a fifo: its reader says so
         elif _GLOB_CHARACTERS & set(str(given)):
             yield from _matches(str(given), settings, variants, leave_out)
         else:
@@ -115,11 +119,21 @@ def read_request_table(path: Path, settings: ConvertSettings, *, variants: int =
     FormatError
         With the line of the table (the header is line 1).
     """
-    table = _read_text_table(path)
+    yield from _table_requests(read_text_table(path), settings, variants, path.parent, path)
+
+
+def frame_requests(frame: pd.DataFrame, settings: ConvertSettings, *, variants: int = 1) -> Iterator[Request]:
+    """Scenarios of a frame with the columns of `read_request_table`; paths are as seen from the current folder."""
+    yield from _table_requests(as_text(frame), settings, variants, None, Path("DataFrame"))
+
+
+def _table_requests(
+    table: pd.DataFrame, settings: ConvertSettings, variants: int, base: Path | None, path: Path
+) -> Iterator[Request]:
     if "scenario" not in table.columns:
         known = ", ".join(map(str, table.columns[:12]))
         raise FormatError(f"no column 'scenario'; there are {known}", path=path, line=1)
-    folder = path.parent
+    folder = base or Path()
     for number, row in enumerate(table.to_dict("records"), start=2):
         cells = {str(name): text for name, value in row.items() if (text := str(value).strip())}
         try:
@@ -130,7 +144,7 @@ def read_request_table(path: Path, settings: ConvertSettings, *, variants: int =
             row_settings = _row_settings(cells, settings, folder)
         except ValueError as error:
             raise FormatError(str(error), path=path, line=number) from error
-        yield Request(folder / scenario, row_settings, rows_variants, folder)
+        yield Request(folder / scenario, row_settings, rows_variants, base)
 
 
 def is_single(given: str | Path) -> bool:
@@ -145,9 +159,9 @@ def is_single(given: str | Path) -> bool:
 def document_kind(path: Path) -> DocumentKind:
     """What a file holds, from its first elements; what can't be read counts as a scenario (its reader says why)."""
     try:
-        with path.open("rb") as file:
-            return _kind_from(file)
-    except (etree.XMLSyntaxError, OSError):
+        with open_source(path, XML_TREE) as source:
+            return _kind_from(source.file)
+    except (etree.XMLSyntaxError, FormatError, OSError, ValueError, LookupError):
         return DocumentKind.SCENARIO
 
 
@@ -200,25 +214,6 @@ def _is_hidden(path: Path) -> bool:
     return any(part.startswith(".") for part in path.parts)
 
 
-def _read_text_table(path: Path) -> pd.DataFrame:
-    """All cells as text, missing ones empty."""
-    import pandas as pd
-
-    try:
-        if path.name.lower().endswith(".parquet"):
-            table = pd.read_parquet(path)
-            return pd.DataFrame({str(name): [_as_text(value) for value in table[name]] for name in table.columns})
-        return pd.read_csv(path, dtype=str, keep_default_na=False, encoding="utf-8-sig", sep=None, engine="python")
-    except (ValueError, pd.errors.ParserError, UnicodeDecodeError) as error:
-        raise FormatError(f"can't be read as a table: {error}", path=path) from error
-
-
-def _as_text(value: object) -> str:
-    if value is None or value != value or type(value).__name__ in ("NAType", "NaTType"):
-        return ""
-    return json.dumps(value) if isinstance(value, dict | list) else str(value)
-
-
 def _row_settings(cells: Mapping[str, str], settings: ConvertSettings, folder: Path) -> ConvertSettings:
     profiles, parameters = dict(settings.entity_profiles), dict(settings.parameters)
     parameters.update(_json_object(cells.get("parameters", "{}")))
@@ -250,7 +245,7 @@ def _whole_number(cells: Mapping[str, str], name: str, otherwise: int, *, smalle
     try:
         number = int(cells[name].removesuffix(".0"))  # whole numbers with a missing one are often written as floats
     except ValueError as error:
-        raise ValueError(f"{name} {cells[name]!r} is no whole number") from error
+        raise ValueError(f"{name} {cells[name]!r} is not a whole number") from error
     if number < smallest:
         raise ValueError(f"{name} {number}, at least {smallest}")
     return number
@@ -259,8 +254,8 @@ def _whole_number(cells: Mapping[str, str], name: str, otherwise: int, *, smalle
 def _json_object(text: str) -> dict[str, str]:
     try:
         values: Any = json.loads(text)
-    except ValueError as error:
-        raise ValueError(f"parameters {text!r} is no JSON object: {error}") from error
+    except (ValueError, RecursionError) as error:
+        raise ValueError(f"parameters {text[:80]!r} is not a JSON object: {error}") from error
     if not isinstance(values, dict):
-        raise ValueError(f"parameters {text!r} is no JSON object")
+        raise ValueError(f"parameters {text!r} is not a JSON object")
     return {str(name): value if isinstance(value, str) else json.dumps(value) for name, value in values.items()}

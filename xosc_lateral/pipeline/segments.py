@@ -2,35 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
-from xosc_lateral.motion.segments import cut_stretches
+from xosc_lateral.motion.segments import SegmentRow, cut_stretches
 from xosc_lateral.pipeline.load import Played
-
-
-@dataclass(frozen=True, slots=True)
-class SegmentRow:
-    """One stretch of one entity.
-
-    Parameters
-    ----------
-    entity : str
-    start, end : float
-        [s]
-    road_following : bool
-    why : str
-        Why it is no road-following segment; empty if it is one.
-    road, lane : str, int
-        Where it begins; empty and 0 off the road.
-    """
-
-    entity: str
-    start: float
-    end: float
-    road_following: bool
-    why: str
-    road: str
-    lane: int
 
 
 def scenario_segments(played: Played) -> tuple[SegmentRow, ...]:

@@ -6,6 +6,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
 from pathlib import Path
+from typing import TYPE_CHECKING
+
+from xosc_lateral.formats.openscenario.read import NO_ROADS, RoadSearch
+
+if TYPE_CHECKING:
+    from xosc_lateral.driver.profile import DriverProfile
 
 STEP = 0.02
 """Of playback, as in the reference logs. [s]"""
@@ -30,10 +36,10 @@ class ConvertSettings:
 
     Parameters
     ----------
-    profile : str
-        Name or path of the profile for every vehicle; "auto": a shipped one by the vehicle's class.
-    entity_profiles : mapping of str to str
-        Entity name -> profile name or path, before `profile`.
+    profile : str or DriverProfile
+        Profile of every vehicle, or its name or path; "auto": a shipped one by the vehicle's class.
+    entity_profiles : mapping of str to str or DriverProfile
+        Entity name -> profile, its name or path, before `profile`.
     only : frozenset of str or None
         Enrich these entities alone.
     seed : int
@@ -48,12 +54,16 @@ class ConvertSettings:
         Folders with further profiles.
     allowed : tuple of Path
         Folders, besides those around the scenario, that its road and catalogs may lie in.
+    roads : RoadSearch
+        Where else its road may lie.
+    strict : bool
+        Refuse a missing vehicle catalog, instead of playing a usual car.
     step, time_limit : float
         Of playback. [s]
     """
 
-    profile: str = AUTO
-    entity_profiles: Mapping[str, str] = field(default_factory=dict)
+    profile: str | DriverProfile = AUTO
+    entity_profiles: Mapping[str, str | DriverProfile] = field(default_factory=dict)
     only: frozenset[str] | None = None
     seed: int = 0
     context: Path | None = None
@@ -62,5 +72,7 @@ class ConvertSettings:
     mode: Mode = Mode.TRAJECTORY
     libraries: tuple[Path, ...] = ()
     allowed: tuple[Path, ...] = ()
+    roads: RoadSearch = NO_ROADS
+    strict: bool = False
     step: float = STEP
     time_limit: float = TIME_LIMIT

@@ -16,6 +16,8 @@ from types import TracebackType
 from typing import Any, Protocol, Self, TypeVar
 
 from xosc_lateral.errors import XoscLateralError
+from xosc_lateral.pipeline.guard import let_worker_die
+from xosc_lateral.version import __version__
 
 Task = TypeVar("Task")
 Answer = TypeVar("Answer")
@@ -23,11 +25,24 @@ Answer = TypeVar("Answer")
 AHEAD = 2
 """Tasks handed out per worker: one at work, one to begin with at once."""
 
+LONG_TRY = 60.0
+"""A task that was alone and worked for so long before its worker died is not tried again: that was no accident. [s]"""
+
 TRIES_ALONE = 3
-"""Tries of a task that may have killed its worker; more than one, for a worker may be killed from outside as well."""
+"""Tries of a task that may have killed its worker; more than one, for a worker may be killed from outside as well.
+
+On a cluster one is enough: its scheduler has had the task on several workers before it says so, and each further try
+takes more of them down.
+"""
 
 CONNECT_TIMEOUT = 10.0
 """A scheduler that has not answered after this is not there. [s]"""
+
+CHECK_EVERY = 5.0
+"""How often it is looked whether a pool that does not answer still has workers. [s]"""
+
+WORKERLESS = 120.0
+"""A cluster without workers for so long is given up; restarting one takes seconds. [s]"""
 
 PARENT_CHECK = 0.5
 """How often a worker looks whether its run is still there. [s]"""
@@ -42,7 +57,15 @@ class WorkerDiedError(XoscLateralError):
 
 
 class Pool(AbstractContextManager["Pool"], Protocol):
-    """Workers; use as a context."""
+    """Workers; use as a context.
+
+    Attributes
+    ----------
+    tries_alone : int
+        How often a task that may have killed its worker is tried by itself.
+    """
+
+    tries_alone: int
 
     def capacity(self) -> int:
         """How many tasks may be handed out at once."""
@@ -58,6 +81,10 @@ class Pool(AbstractContextManager["Pool"], Protocol):
 
     def lost(self, error: BaseException) -> bool:
         """Whether a future's error means that its worker died, rather than that the task raised it."""
+        ...
+
+    def check(self) -> None:
+        """Raise `ClusterError` when no answer can come any more; called every few seconds without one."""
         ...
 
 
@@ -90,7 +117,10 @@ def run_tasks(
                 task = suspects.pop(0)
                 yield task, _alone(pool, work, task)
             continue
-        for future in wait(running, return_when=FIRST_COMPLETED).done:
+        done = wait(running, CHECK_EVERY, FIRST_COMPLETED).done
+        if not done:
+            pool.check()
+        for future in done:
             task = running.pop(future)
             try:
                 answer = future.result()
@@ -119,19 +149,28 @@ def _feed(
 
 
 def _alone(pool: Pool, work: Callable[[Task], Answer], task: Task) -> Answer | WorkerDiedError:
-    for _ in range(TRIES_ALONE):
+    deaths = 1
+    for _ in range(pool.tries_alone):
+        begin = time.monotonic()
         try:
-            return pool.submit(work, task).result()
+            future = pool.submit(work, task)
+            while not wait([future], CHECK_EVERY).done:
+                pool.check()
+            return future.result()
         except (Exception, CancelledError) as error:
             if not pool.lost(error):
                 raise
             pool.recover()
-    deaths = TRIES_ALONE + 1
+        deaths += 1
+        if time.monotonic() - begin > LONG_TRY:
+            break
     return WorkerDiedError(f"its worker process died {deaths} times (killed, out of memory, or a crash in a library)")
 
 
 class ThisProcess:
     """No workers: a task runs when it is handed out."""
+
+    tries_alone = TRIES_ALONE
 
     def __enter__(self) -> Self:
         return self
@@ -158,6 +197,9 @@ class ThisProcess:
         """Never."""
         return False
 
+    def check(self) -> None:
+        """It answers at once."""
+
 
 class LocalProcesses:
     """Worker processes of joblib's executor (loky).
@@ -167,6 +209,8 @@ class LocalProcesses:
     count : int
         How many.
     """
+
+    tries_alone = TRIES_ALONE
 
     def __init__(self, count: int) -> None:
         self._count = count
@@ -198,6 +242,9 @@ class LocalProcesses:
         """Whether the pool broke."""
         return isinstance(error, BrokenExecutor)
 
+    def check(self) -> None:
+        """The executor sees by itself when a process is gone."""
+
     def _start(self) -> Any:
         from joblib.externals.loky import ProcessPoolExecutor
 
@@ -212,6 +259,7 @@ class LocalProcesses:
 
 def _end_with_parent(parent: int) -> None:
     """End this worker soon after the run that it works for, even if that was killed and could not say so."""
+    let_worker_die()
 
     def watch() -> None:
         while os.getppid() == parent:
@@ -225,7 +273,8 @@ class Cluster:
     """Workers of a running dask.distributed cluster.
 
     They have to see the same files under the same paths, and have the same version of this package. The scheduler
-    itself gives a dead worker's tasks to another.
+    itself gives a dead worker's tasks to another. Whoever can talk to the scheduler can run code on the workers and
+    here: it has to be trusted.
 
     Parameters
     ----------
@@ -235,8 +284,10 @@ class Cluster:
     Raises
     ------
     ClusterError
-        The extra ``cluster`` is not installed, or nobody answers.
+        The extra ``cluster`` is not installed, nobody answers, or a worker has another version of this package.
     """
+
+    tries_alone = 1
 
     def __init__(self, address: str) -> None:
         try:
@@ -248,7 +299,8 @@ class Cluster:
             self._client: Any = library.Client(address, set_as_default=False, timeout=CONNECT_TIMEOUT)
         except (OSError, ValueError, TimeoutError) as error:
             raise ClusterError(f"no dask scheduler answers at {address}: {error}") from error
-        self._address = address
+        self._address, self._had_workers = address, time.monotonic()
+        self._check_versions()
         # pure=False: the key of a task must not come from its arguments, a repeated task has to run again
         self._executor: Executor = self._client.get_executor(pure=False)
 
@@ -275,26 +327,55 @@ class Cluster:
         self._check()
 
     def lost(self, error: BaseException) -> bool:
-        """Whether the scheduler has given the task up, or is gone."""
+        """Whether the scheduler has given the task up, rather than that it is gone."""
         from distributed import KilledWorker
 
         self._check()
         return isinstance(error, KilledWorker | CancelledError)
+
+    def check(self) -> None:
+        """Whether scheduler and workers are there; a worker that is being restarted has its time."""
+        self._check()
+        if self._client.nthreads():
+            self._had_workers = time.monotonic()
+        elif time.monotonic() - self._had_workers > WORKERLESS:
+            raise ClusterError(f"the dask scheduler at {self._address} has no workers left; run it again with some")
+
+    def _check_versions(self) -> None:
+        """Before the first job: afterwards every one of them would fail."""
+        try:
+            found: dict[str, str] = self._client.run(installed_version)
+        except Exception as error:  # what a worker without this package raises, dask hands on
+            self._client.close()
+            raise ClusterError(f"the workers at {self._address} can't run xosc-lateral: {error}") from error
+        wrong = {worker: version for worker, version in found.items() if version != __version__}
+        if wrong:
+            self._client.close()
+            worker, version = min(wrong.items())
+            raise ClusterError(
+                f"{len(wrong)} of {len(found)} workers at {self._address} have another version of xosc-lateral "
+                f"({worker}: {version}, here: {__version__}); nothing was converted"
+            )
 
     def _check(self) -> None:
         if self._client.status != "running":
             raise ClusterError(f"the dask scheduler at {self._address} is gone; what is finished is kept, run it again")
 
 
+def installed_version() -> str:
+    """Version of this package where the call is run."""
+    return __version__
+
+
 def open_pool(workers: int, cluster: str | None) -> Pool:
-    """Pool for so many processes on this machine (-1: one per core), or for a cluster.
+    """Pool for so many processes on this machine (-1: one per core; 0: this process), or for a cluster.
 
     Raises
     ------
     ClusterError
         The cluster can't be reached.
     ValueError
-        No workers at all.
+        Fewer than none.
     """
     if cluster is not None:
         return Cluster(cluster)
@@ -302,6 +383,6 @@ def open_pool(workers: int, cluster: str | None) -> Pool:
         import joblib
 
         workers = joblib.cpu_count()
-    if workers < 1:
-        raise ValueError(f"{workers} workers; at least 1, or -1 for one per core")
-    return ThisProcess() if workers == 1 else LocalProcesses(workers)
+    if workers < 0:
+        raise ValueError(f"{workers} workers; at least 0 (this process), or -1 for one per core")
+    return ThisProcess() if workers == 0 else LocalProcesses(workers)

@@ -1,44 +1,69 @@
-"""Profiles for people: a list, a card each, two side by side."""
+"""Profiles for people: a list, and a card each."""
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
-from pathlib import Path
 from typing import Any
 
 from xosc_lateral.driver.profile import DriverProfile, Provenance
-from xosc_lateral.formats.profiles import list_profiles, profile_hash, read_profile
-from xosc_lateral.loop.compare import Habits, compare_profiles, habits_of
-from xosc_lateral.loop.metrics import METRICS
+from xosc_lateral.evaluation.comparison import Habits, habits_of
+from xosc_lateral.formats.library import FIELDS, Entry, facts_of
+from xosc_lateral.formats.profiles import profile_hash
+from xosc_lateral.report.render import render_text
+from xosc_lateral.report.values import format_value
 
 
-def list_text(folders: Sequence[Path], *, as_json: bool) -> str:
-    """One line per profile: name, model, hours, drives, effects, where from."""
-    facts = [_facts(path) for path in list_profiles(folders)]
-    if as_json:
-        return json.dumps(facts)
-    if not facts:
-        return "no profiles"
-    width = max(len(one["name"]) for one in facts)
-    return "\n".join(
-        f"{one['name']:{width}s}  {one['model']:10s} {one['hours']:6.2f} h  {one['drives']:4d} drives  "
-        f"{one['effects']} effects  {one['notes'] or one['source']}"
-        for one in facts
-    )
+def list_text(entries: Sequence[Entry]) -> str:
+    """One line per profile: name, model, hours, drives, effects, where from; what is wrong with a file, in a line."""
+    good = [entry for entry in entries if entry.profile is not None]
+    width = max((len(entry.name) for entry in good), default=0)
+    lines = [_list_line(entry, width) for entry in good]
+    lines += [f"! {entry.problem}" for entry in entries if entry.problem]
+    for entry in entries:
+        if entry.hidden_by is not None:
+            shipped = "the shipped profile" if entry.is_shipped else str(entry.path)
+            lines.append(f"! {entry.hidden_by} hides {shipped} {entry.name!r}")
+    return "\n".join(lines) or "no profiles"
 
 
-def _facts(path: Path) -> dict[str, Any]:
-    profile = read_profile(path)
+def _list_line(entry: Entry, width: int) -> str:
+    profile = entry.profile
+    assert profile is not None, "only those that can be read are listed"
     known = profile.provenance
-    return {
-        "name": profile.name,
-        "path": str(path),
-        "model": profile.model.kind,
+    return (
+        f"{entry.name:{width}s}  {profile.model.kind:14s} {known.hours:6.2f} h  {known.drives:4d} drives  "
+        f"{len(profile.effects)} effects  {_tagged(profile)}{known.notes or known.source}"
+    ).rstrip()
+
+
+def _tagged(profile: DriverProfile) -> str:
+    return "".join(f"#{tag} " for tag in profile.metadata.tags)
+
+
+def list_record(entries: Sequence[Entry]) -> list[dict[str, Any]]:
+    """The same as plain values."""
+    return [_entry_record(entry) for entry in entries]
+
+
+def _entry_record(entry: Entry) -> dict[str, Any]:
+    place: dict[str, Any] = {
+        "id": entry.name,
+        "path": str(entry.path),
+        "problem": entry.problem,
+        "hidden_by": None if entry.hidden_by is None else str(entry.hidden_by),
+    }
+    if entry.profile is None:
+        return place
+    known = entry.profile.provenance
+    metadata = facts_of(entry.profile)
+    return place | {
+        "metadata": {name: metadata[name] for name in FIELDS} | {"tags": list(entry.profile.metadata.tags)},
+        "sha256": profile_hash(entry.profile),
+        "model": entry.profile.model.kind,
         "hours": known.hours,
         "drives": known.drives,
-        "effects": len(profile.effects),
+        "effects": len(entry.profile.effects),
         "notes": known.notes,
         "source": known.source,
     }
@@ -48,32 +73,31 @@ def card(profile: DriverProfile) -> dict[str, Any]:
     """Everything that a person asks first, as plain values."""
     known = profile.provenance
     return {
-        "name": profile.name,
+        "id": profile.name,
+        "metadata": {name: facts_of(profile)[name] for name in FIELDS} | {"tags": list(profile.metadata.tags)},
         "sha256": profile_hash(profile),
         "model": profile.model.kind,
         "effects": [effect.to_dict() for effect in profile.effects],
-        "lane_width_m": profile.lane_width,
-        "habits": {name: round(value, 4) for name, value in asdict(habits_of(profile)).items()},
+        "lane_width": profile.lane_width,
+        "summary": {name: round(value, 4) for name, value in asdict(habits_of(profile)).items()},
         "provenance": known.to_dict(),
     }
 
 
-def card_text(profile: DriverProfile, *, as_json: bool = False) -> str:
-    """The card for the terminal, or as JSON."""
-    if as_json:
-        return json.dumps(card(profile), ensure_ascii=False)
+def card_text(profile: DriverProfile) -> str:
+    """The card for the terminal."""
     known = profile.provenance
     lines = [
         profile.name,
         *_indented("", known.notes),
-        f"  model      {profile.model.kind}, {len(profile.effects)} effects, lane {profile.lane_width:.2f} m",
-        *(f"  effect     {_effect_line(effect.to_dict())}" for effect in profile.effects),
+        f"  model      {profile.model.kind}, {_effects(profile)}, lane width {profile.lane_width:.2f} m",
+        *(f"  effect     {effect_line(effect.to_dict())}" for effect in profile.effects),
         *_habit_lines(profile, habits_of(profile)),
-        f"  fitted on  {_amount(profile)}",
+        f"  fitted on  {amount(profile)}",
         *_indented("source", known.source),
         *_indented("licence", known.licence),
         *(f"  input      {name} sha256 {digest}" for name, digest in known.inputs.items()),
-        *(f"  {name:10s} {value}" for name, value in _provenance_items(known)),
+        *(f"  {name:10s} {value}" for name, value in provenance_items(known)),
         f"  sha256     {profile_hash(profile)}",
     ]
     return "\n".join(lines)
@@ -90,38 +114,31 @@ def card_markdown(profile: DriverProfile) -> str:
         "",
         "| | |",
         "|---|---|",
-        f"| model | {profile.model.kind}, {len(profile.effects)} effects |",
-        f"| fitted on | {_amount(profile)} |",
+        f"| model | {profile.model.kind}, {_effects(profile)} |",
+        f"| fitted on | {amount(profile)} |",
         f"| mean offset | {abs(habits.mean_offset):.2f} m to the {side} |",
         f"| spread | {_spread(profile, habits)} |",
         f"| 5 % to 95 % | {habits.low:+.2f} m to {habits.high:+.2f} m |",
         f"| lateral speed | {habits.lateral_speed:.3f} m/s rms |",
     ]
-    rows += [f"| {name} | {value} |" for name, value in _provenance_items(known)]
+    rows += [f"| {name} | {value} |" for name, value in provenance_items(known)]
     return "\n".join([*rows, ""])
 
 
-def compare_text(one: DriverProfile, other: DriverProfile, *, seed: int, as_json: bool) -> str:
-    """Habits of both, and the distance per metric."""
-    habits = {profile.name: asdict(habits_of(profile, seed)) for profile in (one, other)}
-    distances = compare_profiles(one, other, seed)
-    if as_json:
-        return json.dumps({"habits": habits, "distance": distances.by_metric, "mean": distances.mean, "seed": seed})
-    lines = [f"{'':16s} {one.name:>20s} {other.name:>20s}"]
-    first, second = habits.values() if len(habits) == 2 else (*habits.values(), *habits.values())
-    lines += [f"{name:16s} {first[name]:20.3f} {second[name]:20.3f}" for name in first]
-    lines.append(f"distance of 10 s snippets, in standard deviations of {one.name}: mean {distances.mean:.3f}")
-    return "\n".join([*lines, *(f"  {name:10s} {distances.by_metric[name]:.3f}" for name in METRICS)])
+def library_page(profiles: Sequence[DriverProfile]) -> str:
+    """Markdown page of a library: which profile is for what, and a card of each."""
+    refined = [profile for profile in profiles if profile.provenance.fit.get("closed_loop")]
+    return render_text("library.md", refined=refined, cards=[card_markdown(profile) for profile in profiles])
 
 
-def _provenance_items(known: Provenance) -> list[tuple[str, str]]:
+def provenance_items(known: Provenance) -> list[tuple[str, str]]:
     """How a closed loop came to the profile, if one did, and its evaluation on held-out drives."""
     items = _evaluation_items(known.evaluation)
     loop = known.fit.get("closed_loop")
     if not loop:
         return items
     found = ", ".join(loop["found"]) or "nothing"
-    return [("loop", f"from a {loop['base']} model, seed {loop['seed']}; found: {found}"), *items]
+    return [("loop", f"started from a {loop['base']} model, seed {loop['seed']}; found: {found}"), *items]
 
 
 def _evaluation_items(evaluation: Mapping[str, Any]) -> list[tuple[str, str]]:
@@ -137,7 +154,7 @@ def _evaluation_items(evaluation: Mapping[str, Any]) -> list[tuple[str, str]]:
             )
         )
     if evaluation.get("spectrum_error_db") is not None:
-        items.append(("spectrum", f"{evaluation['spectrum_error_db']:.1f} dB apart"))
+        items.append(("spectrum", f"differs by {evaluation['spectrum_error_db']:.1f} dB (rms over bands)"))
     if evaluation.get("told_apart"):
         items.append(("own driver", str(evaluation["told_apart"])))
     return items
@@ -146,13 +163,14 @@ def _evaluation_items(evaluation: Mapping[str, Any]) -> list[tuple[str, str]]:
 def _habit_lines(profile: DriverProfile, habits: Habits) -> list[str]:
     side = "left" if habits.mean_offset > 0 else "right"
     return [
-        f"  keeps      {abs(habits.mean_offset):.2f} m to the {side} of the lane centre on average",
+        f"  mean       {abs(habits.mean_offset):.2f} m to the {side} of the lane centre",
         f"  spread     {_spread(profile, habits)}; 90 % within {habits.low:+.2f} to {habits.high:+.2f} m",
-        f"  moves      {habits.lateral_speed:.3f} m/s sideways (rms)",
+        f"  speed      {habits.lateral_speed:.3f} m/s lateral (rms)",
     ]
 
 
-def _amount(profile: DriverProfile) -> str:
+def amount(profile: DriverProfile) -> str:
+    """What a profile was fitted on: time, vehicles, runs."""
     known = profile.provenance
     vehicles = "1 vehicle" if known.drives == 1 else f"{known.drives} vehicles"
     return (
@@ -165,11 +183,18 @@ def _amount(profile: DriverProfile) -> str:
 def _spread(profile: DriverProfile, habits: Habits) -> str:
     if profile.provenance.drives == 1:
         return f"{habits.spread:.2f} m"
-    return f"{habits.spread:.2f} m over all drivers, {habits.spread_within:.2f} m within one over 5 min"
+    return f"{habits.spread:.2f} m over all drivers, {habits.spread_within:.2f} m within one driver over 5 min"
 
 
-def _effect_line(values: Mapping[str, Any]) -> str:
-    return ", ".join(f"{name} {value}" for name, value in values.items() if not isinstance(value, list | dict))
+def effect_line(values: Mapping[str, Any]) -> str:
+    """An effect's plain values in one line."""
+    plain = {name: value for name, value in values.items() if not isinstance(value, list | dict)}
+    return ", ".join(f"{name} {format_value(value)}" for name, value in plain.items())
+
+
+def _effects(profile: DriverProfile) -> str:
+    count = len(profile.effects)
+    return "1 effect" if count == 1 else f"{count or 'no'} effects"
 
 
 def _indented(label: str, text: str) -> list[str]:

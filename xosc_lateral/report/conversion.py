@@ -1,21 +1,18 @@
-"""A conversion as text, JSON and HTML."""
+"""A conversion as text and plain values."""
 
 from __future__ import annotations
 
-import json
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from xosc_lateral.formats.atomic import write_atomically
-
-if TYPE_CHECKING:
-    from xosc_lateral.pipeline.convert import Conversion
+from xosc_lateral.enrich.conversion import Conversion, ConversionProvenance
+from xosc_lateral.motion.gaps import Gap
 
 
 def as_text(conversion: Conversion, report: Path | None = None) -> str:
     """What was done, what was not, what to know."""
-    lines = [f"{conversion.output}"]
+    lines = [f"{conversion.source if conversion.data else conversion.output}"]
     for entity in conversion.enriched.entities:
         if entity.is_enriched and entity.profile is not None:
             lines.append(
@@ -31,42 +28,42 @@ def as_text(conversion: Conversion, report: Path | None = None) -> str:
     return "\n".join(lines)
 
 
-def to_json(conversion: Conversion, report: Path | None = None) -> str:
-    """The same as one JSON object on one line."""
-    return json.dumps(facts(conversion) | ({"report": str(report)} if report is not None else {}))
-
-
-def facts(conversion: Conversion) -> dict[str, Any]:
-    """Plain values about a conversion."""
+def facts(conversion: Conversion, report: Path | None = None) -> dict[str, Any]:
+    """Plain values about a conversion, rounded to what they are read for: a micrometre, a microsecond."""
     enriched = conversion.enriched
     return {
         "source": str(conversion.source),
-        "output": str(conversion.output),
-        "sha256": conversion.output_hash,
-        "end_time": enriched.motion.end_time,
+        "output": None if conversion.data else str(conversion.output),
+        "report": None if report is None else str(report),
+        "sha256": conversion.output_sha256,
+        "end_time": round(enriched.motion.end_time, 6),
         "ended_by": enriched.motion.ended_by,
         "entities": [
             {
                 "name": entity.name,
                 "profile": entity.profile.name if entity.is_enriched and entity.profile is not None else None,
                 "why_not": entity.why,
-                "segments": [[segment.stretch.start, segment.stretch.end] for segment in entity.segments],
-                "offset_spread": entity.offset_spread,
+                "segments": [
+                    [round(segment.stretch.start, 6), round(segment.stretch.end, 6)] for segment in entity.segments
+                ],
+                "offset_spread": round(entity.offset_spread, 6),
                 "neutral_context": list(entity.neutral),
             }
             for entity in enriched.entities
         ],
-        "smallest_gap_before": min((gap.distance for gap in enriched.gaps_before), default=None),
-        "smallest_gap_after": min((gap.distance for gap in enriched.gaps_after), default=None),
+        "gap_before": _smallest(enriched.gaps_before),
+        "gap_after": _smallest(enriched.gaps_after),
         "notes": [asdict(note) for note in enriched.motion.notes],
         "warnings": list(conversion.warnings),
-        "provenance": asdict(conversion.provenance),
+        "provenance": provenance_record(conversion.provenance),
     }
 
 
-def write_report(conversion: Conversion, path: Path, *, variants: int = 1) -> Path:
-    """Write the HTML page; of several variants each gets its own."""
-    from xosc_lateral.pipeline.convert import numbered
-    from xosc_lateral.report.scenario import conversion_page
+def provenance_record(provenance: ConversionProvenance) -> dict[str, Any]:
+    """Provenance of a conversion as plain values."""
+    profiles = {name: {"name": profile, "sha256": sha} for name, (profile, sha) in provenance.profiles.items()}
+    return asdict(provenance) | {"profiles": profiles}
 
-    return write_atomically(numbered(path, conversion.provenance.variant, variants), conversion_page(conversion))
+
+def _smallest(gaps: tuple[Gap, ...]) -> float | None:
+    return min((round(gap.distance, 6) for gap in gaps), default=None)

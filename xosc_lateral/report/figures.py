@@ -9,17 +9,25 @@ from __future__ import annotations
 import base64
 import io
 import re
+import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from html import escape
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from xosc_lateral.report.interactive import describe_axes, name_parts
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-# Okabe and Ito, "Color universal design" (2008): told apart with any common colour blindness.
+# Okabe and Ito, "Color universal design" (2008), and six more. Each of these was chosen as the colour farthest from all
+# before it (CIEDE2000, the smallest over normal vision and the three kinds of colour blindness as simulated by Machado,
+# Oliveira and Fernandes, IEEE TVCG 15(6), 2009). `tests/report/test_palette.py` measures all twelve, in both themes.
 BLUE, VERMILLION, GREEN, PURPLE, ORANGE, SKY = "#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9"
-PALETTE = (BLUE, VERMILLION, GREEN, PURPLE, ORANGE, SKY)
+PALETTE = (
+    *(BLUE, VERMILLION, GREEN, PURPLE, ORANGE, SKY),
+    *("#781e4b", "#a50000", "#2d1ec3", "#5a694b", "#846078", "#b4b4a8"),
+)
 INK, MUTED, GRID, SHADE, PAPER = "#1b2126", "#6a737b", "#dde1e4", "#eef1f3", "#ffffff"
 
 # The same thing has the same colour in every report.
@@ -152,8 +160,17 @@ def new_panels(
     return figure, axes
 
 
-def figure_markup(figure: Figure, alt: str, *, key: str) -> str:
-    """Figure as an inline ``<svg>`` (or a PNG in an ``<img>`` where the SVG would be larger than `LARGEST_SVG`).
+class FigureMarkup(NamedTuple):
+    """A figure for a page."""
+
+    markup: str
+    """An inline ``<svg>``, or a PNG in an ``<img>`` where the SVG would be larger than `LARGEST_SVG`."""
+    plot: dict[str, Any] | None
+    """What ``static/plots.js`` has to know to zoom it and to read values from it; None for a PNG."""
+
+
+def figure_markup(figure: Figure, alt: str, *, key: str, over_time: bool = False) -> FigureMarkup:
+    """Turn a figure into markup.
 
     Parameters
     ----------
@@ -163,9 +180,19 @@ def figure_markup(figure: Figure, alt: str, *, key: str) -> str:
         What the figure shows, for those who can't see it.
     key : str
         Unique in the page; element ids start with it.
+    over_time : bool
+        Every x axis is the scenario's time: zoomed together with the others, with a cursor at the player's time.
     """
+    name_parts(figure)
     svg = _svg(figure, key)
-    return _inline(svg, alt, key) if len(svg) <= LARGEST_SVG else _picture(figure, alt)
+    if len(svg) > LARGEST_SVG:
+        return FigureMarkup(_picture(figure, alt), None)
+    return FigureMarkup(_inline(svg, alt, key), describe_axes(figure, key, _variable) | {"time": over_time})
+
+
+def _variable(color: str) -> str:
+    """A colour as the page's variable, where there is one."""
+    return f"var({CSS_VARIABLES[color]})" if color in CSS_VARIABLES else color
 
 
 def _svg(figure: Figure, key: str) -> str:
@@ -173,9 +200,29 @@ def _svg(figure: Figure, key: str) -> str:
 
     buffer = io.StringIO()
     # Ids in the SVG are salted hashes and its metadata hold the date: both are fixed, for the same bytes each time.
-    with mpl.rc_context({**_STYLE, "svg.hashsalt": key}):
+    with mpl.rc_context({**_STYLE, "svg.hashsalt": key}), _names_as_they_are(figure):
         figure.savefig(buffer, format="svg", metadata={"Date": None, "Creator": None}, dpi=_RASTER_DPI)
     return buffer.getvalue()
+
+
+@contextmanager
+def _names_as_they_are(figure: Figure) -> Iterator[None]:
+    """Names of entities and columns are text: a ``$`` in them begins no formula, and any script may be used.
+
+    Only what matplotlib itself writes as a formula, powers of ten at logarithmic axes, is one.
+    """
+    from matplotlib.text import Text
+
+    for axes in figure.axes:
+        for axis in (axes.xaxis, axes.yaxis):
+            axis.get_ticklabels(which="both")  # gives the labels their text
+    for text in figure.findobj(Text):
+        assert isinstance(text, Text)
+        if text.get_text() and not text.get_text().startswith("$\\mathdefault"):
+            text.set_parse_math(False)
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", "Glyph .* missing")  # the browser has fonts for it, and the size is a guess
+        yield
 
 
 def _inline(svg: str, alt: str, key: str) -> str:
@@ -203,7 +250,7 @@ def _picture(figure: Figure, alt: str) -> str:
     import matplotlib as mpl
 
     buffer = io.BytesIO()
-    with mpl.rc_context(_STYLE):
+    with mpl.rc_context(_STYLE), _names_as_they_are(figure):
         figure.savefig(buffer, format="png", dpi=_RASTER_DPI, facecolor=PAPER, metadata={"Software": None})
     data = base64.b64encode(buffer.getvalue()).decode("ascii")
     return f'<img alt="{escape(alt)}" src="data:image/png;base64,{data}">'

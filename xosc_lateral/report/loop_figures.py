@@ -9,12 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.driver.effects import Acts, ColumnEffect, Product
-from xosc_lateral.loop.close import LoopResult, hold_out_blocks
-from xosc_lateral.loop.findings import Finding
-from xosc_lateral.loop.leftover import Leftover
-from xosc_lateral.loop.metrics import METRICS
-from xosc_lateral.loop.partial import curve_of
-from xosc_lateral.report.evaluation import LABELS, density_over
+from xosc_lateral.evaluation.metrics import METRICS
+from xosc_lateral.identification.blocks import hold_out_blocks
+from xosc_lateral.identification.close import LoopResult
+from xosc_lateral.identification.findings import Finding
+from xosc_lateral.identification.leftover import Leftover
+from xosc_lateral.identification.partial import curve_of
+from xosc_lateral.report.evaluation_figures import LABELS, density_over
 from xosc_lateral.report.figures import BLUE, GRID, MUTED, VERMILLION, figure_style, new_figure, new_panels
 from xosc_lateral.report.loop_words import column_label, product_label
 
@@ -111,7 +112,7 @@ def spectrum_figure(result: LoopResult) -> Figure:
 
 def draw_spectra(axis: Axes, result: LoopResult, segment: int, *, within_blocks: bool = True) -> None:
     """Measured spectrum with its uncertainty, and the mean of either profile's runs; `segment` in samples."""
-    timeline = result.trace.coarse.timeline
+    timeline = result.coarse.timeline
     seams = hold_out_blocks(timeline) if within_blocks else timeline.drive
     frequency, density, number = spectrum(timeline.offset[None], timeline.valid, seams, timeline.step, segment)
     # the mean of so many independent periodograms, which overlap by half

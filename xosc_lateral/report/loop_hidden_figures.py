@@ -10,9 +10,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.driver.effects import Drift, GrowingSpread, Regimes, Step, Weave
-from xosc_lateral.loop.close import LoopResult
-from xosc_lateral.loop.course import Course, by_drive, hidden_mean, mean_course, regime_probability, spread_course
-from xosc_lateral.loop.findings import Finding
+from xosc_lateral.identification.close import LoopResult
+from xosc_lateral.identification.course import (
+    Course,
+    by_drive,
+    hidden_mean,
+    mean_course,
+    regime_probability,
+    spread_course,
+)
+from xosc_lateral.identification.findings import Finding
 from xosc_lateral.report.figures import MUTED, ORANGE, figure_style, new_figure
 from xosc_lateral.report.loop_figures import AFTER, BEFORE, CHANCE, DRIVES, draw_spectra
 

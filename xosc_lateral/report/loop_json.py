@@ -7,15 +7,16 @@ from math import isfinite
 from pathlib import Path
 from typing import Any
 
-from xosc_lateral import __version__
 from xosc_lateral.driver.profile import DriverProfile
-from xosc_lateral.formats.hashes import file_hash
+from xosc_lateral.evaluation.distances import Distances
+from xosc_lateral.formats.hashes import parsed_hash
 from xosc_lateral.formats.profiles import canonical_json, profile_hash
-from xosc_lateral.loop.close import LoopResult
-from xosc_lateral.loop.distance import Distances
-from xosc_lateral.loop.findings import Finding
-from xosc_lateral.loop.leftover import Leftover
-from xosc_lateral.report.loop_words import leftover_words, meaning
+from xosc_lateral.identification.close import LoopResult
+from xosc_lateral.identification.findings import Finding
+from xosc_lateral.identification.leftover import Leftover
+from xosc_lateral.identification.nested import Gain
+from xosc_lateral.report.loop_words import feedback_words, leftover_words, meaning
+from xosc_lateral.version import __version__
 
 MEASURE = (
     "root mean square of measured minus expected over cells (mean and spread by fifths of every column, spread by "
@@ -38,13 +39,24 @@ def loop_record(result: LoopResult, leftover: Leftover, tables: Sequence[Path]) 
         "refined_profile": _profile(result.refined),
         "held_out": result.held_out,
         "findings": [finding_record(finding) | {"meaning": meaning(finding, result)} for finding in result.findings],
-        "consequences": [{"column": item.column, "why": item.why} for item in result.trace.consequences],
-        "rejected": [
-            {"columns": list(item.columns), "look": item.look, "p_value": item.p_value, "why": item.why}
-            for item in result.trace.tried
+        "consequences": [
+            {
+                "column": item.column,
+                "why": feedback_words(item),
+                "doubtful": item.doubtful,
+                "coherence": item.coherence,
+                "foretold": item.foretold,
+            }
+            for item in result.feedback
         ],
-        "unused": [{"column": column, "why": why} for column, why in result.trace.unused.items()],
+        "rejected": [
+            {"columns": list(item.columns), "look": item.component, "p_value": item.p_value, "why": item.why}
+            for item in result.rejected
+        ],
+        "unused": [{"column": column, "why": why} for column, why in result.unused.items()],
         "error": {"measure": MEASURE, **error},
+        "held_out_gain": _gain(result.gain),
+        "returned_base": result.returned_base or None,
         "unexplained": {
             "measure": "root of error after squared minus floor squared, m",
             "size_m": leftover.unexplained,
@@ -65,7 +77,7 @@ def loop_record(result: LoopResult, leftover: Leftover, tables: Sequence[Path]) 
         "provenance": {
             "package_version": __version__,
             "seed": result.seed,
-            "inputs": {table.name: file_hash(table) for table in tables},
+            "inputs": {table.name: parsed_hash(table) for table in tables},
         },
     }
 
@@ -86,6 +98,8 @@ def finding_record(finding: Finding) -> dict[str, Any]:
         "error_after": finding.error_after,
         "measure": f"{finding.measure}, m",
         "alike": list(finding.alike),
+        "interval": [finding.size_m - 1.96 * finding.size_error, finding.size_m + 1.96 * finding.size_error],
+        "held_out_gain": _gain(finding.gain),
         "added": [effect.to_dict() for effect in finding.effects],
     }
 
@@ -102,11 +116,17 @@ def finite(value: Any) -> Any:
     return number if isfinite(number) else None
 
 
+def _gain(gain: Gain | None) -> dict[str, Any] | None:
+    if gain is None:
+        return None
+    return {"mean_nat_per_block": gain.mean, "interval": list(gain.interval), "chosen_in_folds": gain.folds}
+
+
 def _profile(profile: DriverProfile) -> dict[str, Any]:
     return {
         "name": profile.name,
         "model": profile.model.kind,
-        "hash": profile_hash(profile),
+        "sha256": profile_hash(profile),
         "effects": len(profile.effects),
     }
 

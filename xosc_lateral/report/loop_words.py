@@ -8,9 +8,10 @@ from types import MappingProxyType
 import numpy as np
 
 from xosc_lateral.driver.effects import Acts, Angular, ColumnEffect, Levels, Magnitude, Product
-from xosc_lateral.loop.close import LoopResult
-from xosc_lateral.loop.findings import Finding
-from xosc_lateral.loop.leftover import GroupError, Leftover
+from xosc_lateral.identification.close import LoopResult
+from xosc_lateral.identification.feedback import Feedback
+from xosc_lateral.identification.findings import Finding
+from xosc_lateral.identification.leftover import GroupError, Leftover
 from xosc_lateral.segment import CONTEXT_UNITS
 
 CERTAIN = 1e-4
@@ -32,49 +33,51 @@ HINTS: Mapping[str, str] = MappingProxyType(
 
 LOOKS: Mapping[str, str] = MappingProxyType(
     {
-        "location": "a column that moves the mean",
+        "mean": "a column that moves the mean",
         "between": "a column that goes with the place that different drives keep",
-        "scale": "a column that changes the spread",
-        "slow": "a column that changes the spread of slow movement",
-        "fine": "a column that changes the fine noise",
-        "dynamics": "a column that changes how fast the driver corrects",
-        "growth": "spread that grows or shrinks with time",
-        "regime": "on/off regimes",
-        "periodic": "a weave",
-        "wander": "a slow drift or a step of the mean",
+        "spread": "a column that changes the spread",
+        "slow_spread": "a column that changes the spread of slow movement",
+        "fine_noise": "a column that changes the fine noise",
+        "restoring": "a column that changes how fast the driver corrects",
+        "variance_trend": "spread that grows or shrinks with time",
+        "regimes": "on/off regimes",
+        "cycle": "a periodic movement",
+        "low_frequency": "a slow drift or a step of the mean",
     }
 )
-"""What each look of the trace asks."""
+"""What is asked of each component."""
 
 _CELLS: Mapping[str, str] = MappingProxyType(
     {
         "movement by band": "size of the movement by frequency band",
         "spread by time": "spread by sixths of the drive",
-        "mean by effect: step": "mean before and after it",
+        "mean by effect: step 0": "mean before and after it",
     }
 )
 """Groups of cells whose own name is not plain."""
 
 _HIDDEN: Mapping[str, str] = MappingProxyType(
     {
-        "periodic": "The car sways to and fro at a steady pace, whatever the road and the traffic do.",
+        "periodic": "The car oscillates at a steady frequency, whatever the road and the traffic do.",
         "drift": (
             "The mean position moves slowly over minutes, without any column that goes along: a driver's mood, or a "
             "camera whose calibration drifts with temperature."
         ),
         "step": (
-            "From one moment on the car keeps another place in the lane, without any column that changes there: a "
-            "camera that was calibrated anew, or a driver who changed."
+            "From one moment on the car keeps to another position in the lane, and no column changes there: a "
+            "camera that was recalibrated, for example, or a change of driver."
         ),
-        "scale": "How tightly the driver holds his place changes steadily as time goes on: fatigue, say.",
-        "regime": "There are loud and quiet stretches, and no column tells which is on: a phone, a conversation.",
+        "scale": "The spread about the driver's mean position changes steadily over time, as with fatigue.",
+        "regime": (
+            "The movement switches between two levels of spread, and no column tells when: distraction, for example."
+        ),
         "memory": (
             "How the car moves now depends on more than where it was one step ago. The core model is replaced by "
-            "`best`, which remembers."
+            "`autoregressive`, which has memory."
         ),
         "population": (
-            "The drives are of drivers who keep different places and move differently much. The refined profile draws "
-            "a driver for every vehicle."
+            "The drives are of drivers who keep to different positions and move by different amounts. The refined "
+            "profile draws a driver for every vehicle."
         ),
     }
 )
@@ -132,17 +135,29 @@ def meaning(finding: Finding, result: LoopResult) -> str:
     ]
     if finding.alike:
         names = ", ".join(f"`{name}`" for name in finding.alike)
-        words.append(f"{names} would explain it as well: these drives can't tell which of them it is.")
+        words.append(f"{names} would explain it equally well; these drives do not tell which of them it is.")
     measure = _CELLS.get(finding.cell, finding.measure)
     change = f"{_cm(finding.error_before)} before, {_cm(finding.error_after)} now"
     words.append(f"Error of the {measure} on held-out blocks: {change}.")
     return " ".join(word for word in words if word)
 
 
+def feedback_words(item: Feedback) -> str:
+    """Why a column is no cause, in a sentence."""
+    shares = (
+        f"above 0.2{GAP}Hz, too fast for a driver's answer, it shares {100 * item.coherence:.0f}{GAP}% of its variance"
+    )
+    told = f"the movement predicts {100 * item.foretold:.0f}{GAP}% of its changes"
+    verdict = "it may follow from the car's own movement" if item.doubtful else "it follows from the car's own movement"
+    return f"{shares} with the {item.of}, and {told}: {verdict}"
+
+
 def outcome(result: LoopResult) -> str:
     """What was found, in a sentence."""
+    if result.returned_base:
+        return f"The base profile is returned: {result.returned_base}."
     if not result.findings:
-        return "Nothing was found that chance would not give: no effect was added."
+        return "No effect was found beyond what chance produces, and none was added."
     several = len(result.findings) > 1
     names = "; ".join(f"{finding.effect} ({size_words(finding)})" for finding in result.findings)
     return f"{len(result.findings)} effect{'s' * several} found and added to the profile: {names}."
@@ -151,11 +166,11 @@ def outcome(result: LoopResult) -> str:
 def leftover_words(result: LoopResult, leftover: Leftover) -> str:
     """What is left unexplained, in a sentence."""
     if leftover.unexplained == 0.0:
-        return "No residual is left above the floor: what the profile still misses is less than the drives can tell."
+        return "No residual is left above the floor: what the profile still misses cannot be measured on these drives."
     if not leftover.clear:
         return (
-            "No residual is left that stands out: the error after is above the floor, but in "
-            f"{100 * leftover.p_value:.0f}{GAP}% of random splits these drives differ as much from themselves."
+            "The remaining residual is not significant: the error after is above the floor, but in "
+            f"{100 * leftover.p_value:.0f}{GAP}% of random splits the two halves of these drives differ as much."
         )
     where = ", ".join(
         f"{group_words(group.name, result)} ({_mm(group.after)}, floor {_mm(group.floor)})" for group in most(leftover)
@@ -197,14 +212,14 @@ def _column_sentence(finding: Finding, effect: ColumnEffect, result: LoopResult)
         subject = {
             Acts.SPREAD: "the movement about the mean",
             Acts.FINE: "the fine noise",
-            Acts.RATE: "the driver's pull back to his place",
+            Acts.RATE: "the rate of mean reversion",
         }[effect.acts]
         does = f"changes by a {size}"
     return f"{_between(effect, result)}, {subject} {does}."
 
 
 def _between(effect: ColumnEffect, result: LoopResult) -> str:
-    coarse = result.trace.coarse
+    coarse = result.coarse
     inside = coarse.timeline.valid
     if isinstance(effect, Levels):
         return f"Where `{effect.column}` is {' or '.join(f'{level:g}' for level in effect.levels)}, beside elsewhere"

@@ -20,3 +20,9 @@ def shown_progress(title: str) -> Iterator[Callable[[float, str], None]]:
     with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
         task = bar.add_task(title, total=1.0, what="")
         yield lambda share, what: bar.update(task, completed=share, what=what)
+
+
+@contextmanager
+def no_progress() -> Iterator[Callable[[float, str], None]]:
+    """The same for who does not want to see any."""
+    yield lambda share, what: None

@@ -80,14 +80,9 @@ def paths_from_above(enriched: Enriched) -> Figure | None:
     extent = _draw_paths(ax, enriched, view)
     ax.set_aspect("equal", adjustable="datalim")
     figure.set_figheight(float(np.clip(9.2 * extent + 0.9, 1.8, 8.0)))
-    ax.set_xlabel(f"along the drive [m]{_turned(view)}")
-    ax.set_ylabel("[m]")
+    ax.set_xlabel("along the drive [m]")
+    ax.set_ylabel("across [m]")
     return figure
-
-
-def _turned(view: View) -> str:
-    degrees = round(float(np.degrees(view.angle)))
-    return f"; world x points {abs(degrees)}° {'down' if degrees > 0 else 'up'} from here" if degrees else ""
 
 
 def _draw_paths(ax: Any, enriched: Enriched, view: View) -> float:
@@ -97,10 +92,16 @@ def _draw_paths(ax: Any, enriched: Enriched, view: View) -> float:
         rows = _rows(entity.motion)
         breaks = _pieces(entity.motion, rows)
         x, y = view.turn(entity.motion.x[rows], entity.motion.y[rows])
-        ax.plot(_broken(x, breaks), _broken(y, breaks), color=NOMINAL, linewidth=0.8, dashes=(3, 2), zorder=3)
+        label = f"{entity.name}, nominal"
+        ax.plot(
+            _broken(x, breaks), _broken(y, breaks), color=NOMINAL, linewidth=0.8, dashes=(3, 2), zorder=3, label=label
+        )
         if entity.is_enriched:
             x, y = view.turn(entity.trajectory.x[rows], entity.trajectory.y[rows])
-            ax.plot(_broken(x, breaks), _broken(y, breaks), color=color_of(number), linewidth=1.3, zorder=4)
+            color = color_of(number)
+            ax.plot(
+                _broken(x, breaks), _broken(y, breaks), color=color, linewidth=1.3, zorder=4, label=f"{entity.name}"
+            )
         ax.plot(x[0], y[0], "o", color=color_of(number), markersize=3.5, zorder=5)
         seen_x += [x.min(), x.max()]
         seen_y += [y.min(), y.max()]
@@ -159,12 +160,14 @@ def _draw_on_road(
     breaks = _pieces(motion, rows)[here] | (np.diff(kept, prepend=kept[0] - 1) > 2 * (rows[-1] - rows[0]) / len(rows))
     breaks[0] = False
     nominal = enriched.network.offset_to_t(road, motion.lane[kept], motion.s[kept], motion.offset[kept])
-    ax.plot(motion.s[kept], _broken(nominal, breaks), color=NOMINAL, linewidth=0.9, dashes=(3, 2), zorder=3)
+    label = f"{entity.name}, nominal"
+    style = {"color": NOMINAL, "linewidth": 0.9, "dashes": (3, 2), "zorder": 3, "label": label}
+    ax.plot(motion.s[kept], _broken(nominal, breaks), **style)
     sign = np.where(np.cos(motion.heading_relative[kept]) >= 0.0, 1.0, -1.0)
     offset = motion.offset[kept] + sign * entity.deviation[kept]
     shifted = enriched.network.offset_to_t(road, motion.lane[kept], motion.s[kept], offset)
     color = color_of(number) if entity.is_enriched else INK
-    ax.plot(motion.s[kept], _broken(shifted, breaks), color=color, linewidth=1.4, zorder=4)
+    ax.plot(motion.s[kept], _broken(shifted, breaks), color=color, linewidth=1.4, zorder=4, label=entity.name)
     ax.plot(motion.s[kept[0]], shifted[0], "o", color=color, markersize=4, zorder=5)
     is_first_road = road == motion.road[np.argmax(motion.road >= 0)]
     return (float(motion.s[kept[0]]), float(shifted[0]), motion.name, color) if is_first_road else None
@@ -215,7 +218,7 @@ def offsets_over_time(enriched: Enriched, entities: Sequence[EntityResult]) -> F
                 ax.axvspan(stretch.start, stretch.end, color=SHADE, linewidth=0, zorder=0)
         ax.axhline(0.0, color=NOMINAL, linewidth=0.9, dashes=(3, 2))
         number = [each.name for each in enriched.entities].index(entity.name)
-        ax.plot(entity.motion.time[rows], entity.deviation[rows], color=color_of(number))
+        ax.plot(entity.motion.time[rows], entity.deviation[rows], color=color_of(number), label=entity.name)
         ax.set_title(entity.name)
     reach = max(0.5, 1.1 * max(float(np.abs(entity.deviation).max()) for entity in entities))
     axes[0, 0].set_ylim(-reach, reach)
@@ -229,18 +232,21 @@ def speeds_over_time(enriched: Enriched) -> Figure:
     """Nominal and enriched speed."""
     figure, axes = new_figure(1, 1, height=3.0)
     ax = axes[0, 0]
+    shown: list[Any] = []
     for number, entity in enumerate(enriched.entities):
         rows = _rows(entity.motion)
         absent = (entity.motion.activity[rows] & Activity.ACTIVE) == 0
         time = entity.motion.time[rows]
         speed = _broken(entity.trajectory.speed[rows], absent)
-        ax.plot(time, speed, color=color_of(number), label=entity.name)
-        ax.plot(time, _broken(entity.motion.speed[rows], absent), color=NOMINAL, linewidth=0.9, dashes=(3, 2))
+        nominal = _broken(entity.motion.speed[rows], absent)
+        shown += ax.plot(time, speed, color=color_of(number), label=entity.name)
+        label = f"{entity.name}, nominal"
+        ax.plot(time, nominal, color=NOMINAL, linewidth=0.9, dashes=(3, 2), label=label)
     ax.set_ylim(bottom=min(0.0, ax.get_ylim()[0]))
     ax.set_xlabel("time [s]")
     ax.set_ylabel("speed [m/s]")
     if len(enriched.entities) <= 12:
-        figure.legend(ncols=min(6, len(enriched.entities)), loc="outside upper right")
+        figure.legend(handles=shown, ncols=min(6, len(enriched.entities)), loc="outside upper right")
     return figure
 
 
@@ -254,13 +260,13 @@ def dynamics_over_time(entities: Sequence[EntityResult]) -> Figure:
         low, high = nominal.acceleration - COMFORTABLE, nominal.acceleration + COMFORTABLE
         row[0].fill_between(nominal.time, low, high, color=SHADE, linewidth=0)
         for edge in (low, high):
-            row[0].plot(nominal.time, edge, color=GRID, linewidth=0.8)
+            row[0].plot(nominal.time, edge, color=GRID, linewidth=0.8, label=f"{COMFORTABLE} m/s² from nominal")
         for ax, before, after in (
             (row[0], nominal.acceleration, made.acceleration),
             (row[1], nominal.jerk, made.jerk),
         ):
-            ax.plot(made.time, after, color=ENRICHED, linewidth=1.0)
-            ax.plot(nominal.time, before, color=NOMINAL, linewidth=1.0, dashes=(3, 2))
+            ax.plot(made.time, after, color=ENRICHED, linewidth=1.0, label="enriched")
+            ax.plot(nominal.time, before, color=NOMINAL, linewidth=1.0, dashes=(3, 2), label="nominal")
         row[0].set_title(f"{entity.name}: lateral acceleration [m/s²]")
         row[1].set_title("lateral jerk [m/s³]")
     for ax in axes[-1]:
@@ -287,6 +293,7 @@ def timeline(enriched: Enriched) -> Figure:
                 color=color_of(number) if stretch.is_road_following else GRID,
                 linewidth=9,
                 solid_capstyle="butt",
+                label=stretch.kind.value,
             )
             if not stretch.is_road_following and stretch.end - stretch.start > 0.08 * enriched.motion.end_time:
                 middle = 0.5 * (stretch.start + stretch.end)
@@ -304,6 +311,7 @@ def gaps_before_and_after(pairs: Sequence[tuple[Gap | None, Gap | None]]) -> Fig
     figure, axes = new_figure(1, 1, height=0.9 + 0.3 * len(pairs))
     ax = axes[0, 0]
     names = []
+    drawn: dict[str, Any] = {}
     for number, (before, after) in enumerate(pairs):
         names.append(" and ".join((before or after).names))  # type: ignore[union-attr]
         ends = [gap.distance for gap in (before, after) if gap is not None]
@@ -311,10 +319,11 @@ def gaps_before_and_after(pairs: Sequence[tuple[Gap | None, Gap | None]]) -> Fig
             ax.plot([a, b], [number, number], color=GRID, linewidth=3, zorder=1)
         for gap, color, label in ((before, BEFORE, "nominal"), (after, AFTER, "enriched")):
             if gap is not None:
-                ax.plot(gap.distance, number, "o", color=color, label=label if number == 0 else None, zorder=2)
+                said = f"{label} {gap.distance:.2f} m at {gap.time:.1f} s"
+                (drawn[label],) = ax.plot(gap.distance, number, "o", color=color, label=said, zorder=2)
     ax.set_yticks(range(len(pairs)), names)
     ax.set_ylim(len(pairs) - 0.4, -0.6)
     ax.set_xlim(left=min(0.0, ax.get_xlim()[0]))
     ax.set_xlabel("smallest free space [m]")
-    figure.legend(ncols=2, loc="outside upper right")
+    figure.legend(drawn.values(), drawn.keys(), ncols=2, loc="outside upper right")
     return figure

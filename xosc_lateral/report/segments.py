@@ -1,14 +1,10 @@
-"""Segments as text and JSON."""
+"""Segments as text."""
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
-from dataclasses import asdict
-from typing import TYPE_CHECKING
 
-if TYPE_CHECKING:  # results point up to reports, never the other way round at run time
-    from xosc_lateral.pipeline.segments import SegmentRow
+from xosc_lateral.motion.segments import SegmentRow
 
 
 def as_text(rows: Sequence[SegmentRow]) -> str:
@@ -19,8 +15,3 @@ def as_text(rows: Sequence[SegmentRow]) -> str:
         + (f"road {row.road} lane {row.lane}: road-following" if row.road_following else f"no: {row.why}")
         for row in rows
     )
-
-
-def to_json(rows: Sequence[SegmentRow]) -> str:
-    """A list of objects."""
-    return json.dumps([asdict(row) for row in rows], indent=1)

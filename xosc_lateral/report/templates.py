@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from typing import Any
 
-from xosc_lateral.templates import Template
-from xosc_lateral.templates.parameter import Number, Parameter
+from xosc_lateral.templates import AnyTemplate
+from xosc_lateral.templates.parameter import Choice, Number, Parameter
 
 
-def as_text(templates: Sequence[Template], *, with_settings: bool) -> str:
+def as_text(templates: Sequence[AnyTemplate], *, with_settings: bool) -> str:
     """One line per template, and on request one per setting."""
     width = max(len(template.name) for template in templates)
     lines = []
@@ -21,19 +20,16 @@ def as_text(templates: Sequence[Template], *, with_settings: bool) -> str:
     return "\n".join(lines)
 
 
-def to_json(templates: Sequence[Template]) -> str:
-    """Templates with all settings."""
-    return json.dumps(
-        [
-            {
-                "name": template.name,
-                "summary": template.summary,
-                "settings": [_setting(parameter) for parameter in template.parameters],
-            }
-            for template in templates
-        ],
-        indent=2,
-    )
+def templates_record(templates: Sequence[AnyTemplate]) -> list[dict[str, Any]]:
+    """Templates with all settings, as plain values."""
+    return [
+        {
+            "name": template.name,
+            "summary": template.summary,
+            "settings": [_setting(parameter) for parameter in template.parameters],
+        }
+        for template in templates
+    ]
 
 
 def _settings(parameters: Sequence[Parameter]) -> list[str]:
@@ -52,4 +48,6 @@ def _setting(parameter: Parameter) -> dict[str, Any]:
     common = {"name": parameter.name, "default": parameter.default, "what": parameter.what}
     if isinstance(parameter, Number):
         return common | {"unit": parameter.unit, "low": parameter.low, "high": parameter.high}
-    return common | {"options": list(parameter.options)}
+    if isinstance(parameter, Choice):
+        return common | {"options": list(parameter.options)}
+    return common | {"type": parameter.kind}

@@ -37,8 +37,11 @@ class Links:
         if link is None or found is None or lane == 0:
             return
         if link.element_type == "junction":
-            yield from self._through_junction(here, found, link)
-            yield from self._back_through_direct_junction(here, found, link, direction)
+            onward = [
+                *self._through_junction(here, found, link),
+                *self._back_through_direct_junction(here, found, link, direction),
+            ]
+            yield from onward or self._against_traffic(here, found, link, direction)
             return
         other = self._index.get(link.element_id)
         if other is None:
@@ -57,6 +60,19 @@ class Links:
             for target in self._connected_ids(connection, lane, self.roads[other], contact):
                 if target in _end_section(self.roads[other], contact).by_id:
                     yield self._enter(other, target, contact)
+
+    def _against_traffic(self, here: Road, lane: Lane, link: RoadLink, direction: int) -> Iterator[LaneLink]:
+        """Into a junction on a lane that leads out of it: connections tell the other way, lanes name their links."""
+        touches = "end" if direction > 0 else "start"
+        for index, other in enumerate(self.roads):
+            if other.junction != link.element_id:
+                continue
+            for back, contact in ((other.predecessor, "start"), (other.successor, "end")):
+                if back is None or back.element_type != "road" or back.element_id != here.id or back.contact != touches:
+                    continue
+                for candidate in _end_section(other, contact).lanes:
+                    if lane.id in (candidate.predecessors if contact == "start" else candidate.successors):
+                        yield self._enter(index, candidate.id, contact)
 
     def _back_through_direct_junction(
         self, here: Road, lane: Lane, link: RoadLink, direction: int

@@ -17,6 +17,7 @@ from functools import cached_property
 from numpy.typing import ArrayLike
 
 from xosc_lateral.errors import PlaybackError
+from xosc_lateral.road.header_offset import HeaderOffset
 from xosc_lateral.road.index import SurfaceIndex
 from xosc_lateral.road.lanes import DRIVING
 from xosc_lateral.road.links import Links
@@ -35,10 +36,11 @@ from xosc_lateral.road.positions import (
     Pose,
     Poses,
     RoadMark,
+    RoadPath,
     RouteStep,
 )
 from xosc_lateral.road.road import Junction, Road
-from xosc_lateral.road.routes import path_distance, route
+from xosc_lateral.road.routes import path_between, route
 from xosc_lateral.road.tables import NetworkTables
 
 
@@ -52,10 +54,14 @@ class RoadNetwork:
     junctions : tuple of Junction
     path : str
         The file.
+    sha256 : str
+        Of the bytes that were parsed; empty for a network that was not read from a file.
     notes : tuple of str
         What was repaired, ignored or degenerate on reading: never silent.
     geo_reference : str or None
-        Projection of x, y (PROJ string).
+        Projection of inertial x, y (PROJ string).
+    header_offset : HeaderOffset
+        From the coordinates of the file, which all answers are in, to inertial ones.
     road_ids : tuple of str
         ``road/@id`` in file order.
     """
@@ -65,6 +71,8 @@ class RoadNetwork:
     path: str = ""
     notes: tuple[str, ...] = ()
     geo_reference: str | None = None
+    sha256: str = ""
+    header_offset: HeaderOffset = field(default_factory=HeaderOffset)
     road_ids: tuple[str, ...] = field(init=False)
     _indices: dict[str, int] = field(init=False, repr=False)
 
@@ -278,20 +286,20 @@ class RoadNetwork:
         """The link whose road turns least from entry to exit; of equals the first."""
         return straightest(self.roads, options)
 
-    def path_distance(
+    def path_between(
         self,
         start: tuple[int, float],
         end: tuple[int, float],
         *,
         direction: int = 1,
         limit: float = float("inf"),
-    ) -> float | None:
-        """Shortest signed distance along the reference lines of linked roads between two (road, s).
+    ) -> RoadPath | None:
+        """Shortest way along the reference lines of linked roads between two (road, s).
 
-        Positive when the path leaves `start` in `direction` (+1 along s, -1 against s), negative when it leaves the
-        other way. None: no path within `limit` metres.
+        Its length is positive when it leaves `start` in `direction` (+1 along s, -1 against s), negative when it leaves
+        the other way. None: no path within `limit` metres.
         """
-        return path_distance(self._links, start, end, direction=direction, limit=limit)
+        return path_between(self._links, start, end, direction=direction, limit=limit)
 
     def route(
         self, start: tuple[int, int, float], end: tuple[int, int, float], *, via: Sequence[tuple[int, int, float]] = ()

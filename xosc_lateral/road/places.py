@@ -55,8 +55,10 @@ def surface_pose(
     from_line = t
     forward = heading
     if not road.is_flat:
-        z, pitch, roll, shrink, drift = road.surface.at(s, t)
+        z, pitch, roll, shrink, drift, lead = road.surface.at(s, t)
         from_line = t * shrink
+        if lead != 0.0:
+            x, y = x + lead * cos(heading), y + lead * sin(heading)
         if drift != 0.0:
             forward += atan(drift)
         if lane is not None and lane.heights:

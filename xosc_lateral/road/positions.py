@@ -104,6 +104,23 @@ class Advance(NamedTuple):
     remaining: float
 
 
+class RoadPath(NamedTuple):
+    """A way along the reference lines of linked roads, in whatever direction they are driven.
+
+    `ds` [m] is its signed length; `way` the direction along s in which the first road is left (+1, -1); `entered` the
+    roads on the way after it, each with the direction along s (+1: entered at its start).
+    """
+
+    ds: float
+    way: int
+    entered: tuple[tuple[int, int], ...]
+
+    @property
+    def is_turned(self) -> bool:
+        """Whether s runs the other way on the last road: +t is on the other side there."""
+        return bool(self.entered) and self.entered[-1][1] != self.way
+
+
 class RouteStep(NamedTuple):
     """One road of a route, driven from `s_start` to `s_end` (s_end < s_start: against s)."""
 

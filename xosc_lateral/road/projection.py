@@ -55,6 +55,8 @@ def _project(tables: NetworkTables, road: IntArray, x: FloatArray, y: FloatArray
         dx, dy = x[active] - frame.x, y[active] - frame.y
         ahead = dx * frame.cos + dy * frame.sin
         across = dy * frame.cos - dx * frame.sin
+        lead = tables.lead(road[active], at, across)
+        ahead = ahead if lead is None else ahead - lead
         # The foot lies where `ahead` is 0; its derivative is -(1 - k t) |dC/ds|, held off 0 near the evolute.
         lo, hi = np.where(ahead >= 0.0, at, low[active]), np.where(ahead <= 0.0, at, high[active])
         rate = np.maximum(1.0 - frame.curvature * across, 0.2) * np.maximum(frame.speed, 1e-3)
@@ -75,6 +77,8 @@ def _feet(tables: NetworkTables, road: IntArray, x: FloatArray, y: FloatArray, s
     dx, dy = x - frame.x, y - frame.y
     t = (dy * frame.cos - dx * frame.sin) / tables.shrink(road, s)
     ahead = dx * frame.cos + dy * frame.sin
+    lead = tables.lead(road, s, dy * frame.cos - dx * frame.sin)
+    ahead = ahead if lead is None else ahead - lead
     return Feet(s, t, np.where(np.abs(ahead) < 1e-9, 0.0, ahead), frame.heading)
 
 
@@ -83,10 +87,13 @@ def project_at(road: Road, x: float, y: float, guess: float) -> tuple[float, flo
     length = road.length
     s = min(max(guess, 0.0), length)
     low, high = -1.0, length + 1.0
+    leans = not road.surface.superelevation.is_zero and not road.surface.elevation.is_zero
     for _ in range(ITERATIONS):
         line_x, line_y, heading = road.reference_at(s)
         dx, dy, c, d = x - line_x, y - line_y, cos(heading), sin(heading)
         ahead, across = dx * c + dy * d, dy * c - dx * d
+        if leans:
+            ahead -= road.surface.lead_at(s, across)
         if ahead >= 0.0:
             low = s
         if ahead <= 0.0:
@@ -104,6 +111,8 @@ def project_at(road: Road, x: float, y: float, guess: float) -> tuple[float, flo
     dx, dy, c, d = x - line_x, y - line_y, cos(heading), sin(heading)
     ahead = dx * c + dy * d
     t = dy * c - dx * d
+    if leans:
+        ahead -= road.surface.lead_at(s, t)
     if not road.surface.is_level:
         t /= cos(road.surface.superelevation.at(s))
     return s, t, 0.0 if abs(ahead) < 1e-9 else ahead

@@ -9,35 +9,37 @@ from math import inf
 
 from xosc_lateral.road.lanes import DRIVING
 from xosc_lateral.road.links import End, Links
-from xosc_lateral.road.positions import RouteStep
+from xosc_lateral.road.positions import RoadPath, RouteStep
 
 
-def path_distance(
+def path_between(
     links: Links, start: tuple[int, float], end: tuple[int, float], *, direction: int = 1, limit: float = inf
-) -> float | None:
-    """Shortest signed distance along reference lines (see `RoadNetwork.path_distance`)."""
-    best: float | None = None
+) -> RoadPath | None:
+    """Shortest way along reference lines (see `RoadNetwork.path_between`)."""
+    best: RoadPath | None = None
     (road, s), (target, target_s) = start, end
     if road == target:
-        best = (target_s - s) * direction
+        best = RoadPath((target_s - s) * direction, 1 if target_s >= s else -1, ())
     for way in (1, -1):
         room = links.roads[road].length - s if way > 0 else s
-        reach = min(limit, abs(best) if best is not None else inf)
+        reach = min(limit, abs(best.ds) if best is not None else inf)
         found = _search(links, road, way, room, target, target_s, reach)
-        if found is not None and (best is None or found < abs(best)):
-            best = found * way * direction
-    return best if best is not None and abs(best) <= limit else None
+        if found is not None and (best is None or found[0] < abs(best.ds)):
+            best = RoadPath(found[0] * way * direction, way, found[1])
+    return best if best is not None and abs(best.ds) <= limit else None
 
 
-def _search(links: Links, road: int, way: int, room: float, target: int, target_s: float, limit: float) -> float | None:
-    """Dijkstra over road ends: length to `target_s` on `target` when leaving `road` in direction `way`."""
-    queue = [(room, end) for end in links.next_roads(road, way)]
+def _search(
+    links: Links, road: int, way: int, room: float, target: int, target_s: float, limit: float
+) -> tuple[float, tuple[End, ...]] | None:
+    """Dijkstra over road ends: length to `target_s` on `target` when leaving `road` in direction `way`, and the way."""
+    queue: list[tuple[float, End, tuple[End, ...]]] = [(room, end, (end,)) for end in links.next_roads(road, way)]
     done: set[End] = set()
     queue.sort()
-    best: float | None = None
+    best: tuple[float, tuple[End, ...]] | None = None
     while queue:
-        length, end = heappop(queue)
-        if length > limit or (best is not None and length >= best):
+        length, end, path = heappop(queue)
+        if length > limit or (best is not None and length >= best[0]):
             break
         if end in done:
             continue
@@ -45,10 +47,11 @@ def _search(links: Links, road: int, way: int, room: float, target: int, target_
         index, entry = end
         if index == target:
             arrival = length + (target_s if entry > 0 else links.roads[index].length - target_s)
-            best = arrival if best is None else min(best, arrival)
+            if best is None or arrival < best[0]:
+                best = arrival, path
         for following in links.next_roads(index, entry):
             if following not in done:
-                heappush(queue, (length + links.roads[index].length, following))
+                heappush(queue, (length + links.roads[index].length, following, (*path, following)))
     return best
 
 

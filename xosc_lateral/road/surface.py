@@ -4,9 +4,12 @@ from __future__ import annotations
 
 from bisect import bisect_right
 from dataclasses import dataclass
-from math import asin, atan, cos, sin, sqrt
+from math import asin, atan, cos, sin, sqrt, tan
 
-from xosc_lateral.road.piecewise import Cubic, Piecewise
+from xosc_lateral.road.piecewise import Piecewise
+
+BEND_STEP = 1e-3
+"""Step of differences of the grade. [m]"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,29 +74,47 @@ class Surface:
         """Whether the road leans nowhere."""
         return self.superelevation.is_zero and self.crossfall is None and self.shape is None
 
-    def at(self, s: float, t: float) -> tuple[float, float, float, float, float]:
-        """Height, pitch, roll, the factor by which t shrinks seen from above, and how far +s at this t turns aside.
+    def at(self, s: float, t: float) -> tuple[float, float, float, float, float, float]:
+        """Height, pitch, roll, how t shrinks seen from above, how far +s at this t turns aside, and how far t leads.
 
-        `t` is measured in the leaning surface (OpenDRIVE 8.3), so that x, y lie t * cos(superelevation) off. Where the
-        lean changes along s, the line of constant t climbs and drifts: its tangent is (1, drift, climb).
+        `t` is measured in the leaning surface (OpenDRIVE 8.3), so that x, y lie t * cos(superelevation) off. On a
+        grade, the surface leans about the climbing line: t then leads along s, too (`lead_at`). Where the lean changes
+        along s, the line of constant t climbs and drifts: its tangent is (1, drift, climb).
         """
         height, grade = self.elevation.with_slope_at(s)
         angle, twist = self.superelevation.with_slope_at(s)
-        climb, drift, shrink = grade, 0.0, 1.0
+        climb, drift, shrink, lead, onward = grade, 0.0, 1.0, 0.0, 1.0
         if angle != 0.0 or twist != 0.0:
             shrink, rise = cos(angle), sin(angle)
-            height += t * rise
-            climb += t * shrink * twist
-            drift = -t * rise * twist
+            level = 1.0 / sqrt(1.0 + grade * grade)
+            steep, bend = grade * level, self._bend_at(s) * level * level
+            height += t * rise * level
+            lead = -t * rise * steep
+            climb += t * (shrink * twist * level - rise * steep * bend)
+            onward -= t * (shrink * twist * steep + rise * level * bend)
+            drift = -t * rise * twist / onward
         if self.crossfall is not None or self.shape is not None:
             lift, lift_along, lean = self.profile_at(s, t)
             height, climb, angle = height + lift, climb + lift_along, angle + atan(lean)
+        climb /= onward
         pitch = -atan(climb / sqrt(1.0 + drift * drift)) if drift else -atan(climb)
         roll = angle
         if climb != grade and angle:
             # the lateral axis stays (0, cos, sin) of the lean while the forward axis pitches by more than the grade
             roll = asin(min(max(sin(angle) * cos(atan(grade)) / cos(pitch), -1.0), 1.0))
-        return height, pitch, roll, shrink, drift
+        return height, pitch, roll, shrink, drift, lead
+
+    def _bend_at(self, s: float) -> float:
+        """Change of the grade along s: the slope is a parabola, whose central difference is exact. [1/m]"""
+        if self.elevation.is_zero:
+            return 0.0
+        ahead, behind = (self.elevation.with_slope_at(s + ds)[1] for ds in (BEND_STEP, -BEND_STEP))
+        return (ahead - behind) / (2.0 * BEND_STEP)
+
+    def lead_at(self, s: float, across: float) -> float:
+        """How far along s a place lies from the foot of its s, `across` the line seen from above. [m]"""
+        angle, grade = self.superelevation.at(s), self.elevation.with_slope_at(s)[1]
+        return -across * tan(angle) * grade / sqrt(1.0 + grade * grade) if angle and grade else 0.0
 
     def slopes_at(self, s: float, t: float) -> tuple[float, float]:
         """Climb along +s and angle about s (positive falling to the right)."""
@@ -114,9 +135,3 @@ class Surface:
             lift, lift_along, lift_across = self.shape.at(s, t)
             height, along, lean = height + lift, along + lift_along, lean + lift_across
         return height, along, lean
-
-
-def no_records(begin: float = 0.0) -> Piecewise:
-    """A profile that is zero everywhere."""
-    zero: Cubic = (0.0, 0.0, 0.0, 0.0)
-    return Piecewise((begin,), (zero,))

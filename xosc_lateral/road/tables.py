@@ -16,6 +16,7 @@ from xosc_lateral.road.positions import FloatArray, IntArray, Poses, RoadMark
 from xosc_lateral.road.profiles import Cubics, HeightTable
 from xosc_lateral.road.reference_line import Frame, ReferenceLines
 from xosc_lateral.road.road import Road
+from xosc_lateral.road.surface import BEND_STEP
 
 CHUNK = 8192
 """Places evaluated together: the two dozen temporary arrays of a chunk then stay in the processor's cache."""
@@ -202,10 +203,12 @@ class NetworkTables:
         self, road: IndexLike, s: FloatArray, t: FloatArray, profile: LaneProfile | None
     ) -> tuple[FloatArray, ...]:
         frame = self.lines.at(road, s)
-        z, pitch, roll, shrink, drift = self._surface(road, s, t)
+        z, pitch, roll, shrink, drift, lead = self._surface(road, s, t)
         heading = frame.heading if drift is None else frame.heading + np.arctan(drift)
         sideways = t if shrink is None else t * shrink
         x, y = frame.x - sideways * frame.sin, frame.y + sideways * frame.cos
+        if lead is not None:
+            x, y = x + lead * frame.cos, y + lead * frame.sin
         if profile is not None:
             if profile.slope.any():
                 turn = np.arctan(profile.slope)
@@ -224,23 +227,38 @@ class NetworkTables:
 
     def _surface(
         self, road: IndexLike, s: FloatArray, t: FloatArray
-    ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray | None, FloatArray | None]:
-        """What `Surface.at` answers; no shrinking and no drift where nothing leans."""
+    ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray | None, FloatArray | None, FloatArray | None]:
+        """What `Surface.at` answers; no shrinking, drift and lead where nothing leans."""
         nothing = np.zeros(len(s))
         if self._flat:
-            return nothing, nothing, nothing, None, None
+            return nothing, nothing, nothing, None, None, None
         height, grade = self._elevation.at(road, s)
         if self._level:
-            return height, -np.arctan(grade), nothing, None, None
+            return height, -np.arctan(grade), nothing, None, None, None
         angle, twist = self._superelevation.at(road, s)
         shrink, rise = np.cos(angle), np.sin(angle)
-        height, climb, drift = height + t * rise, grade + t * shrink * twist, -t * rise * twist
+        level = 1.0 / np.sqrt(1.0 + grade * grade)
+        steep = grade * level
+        ahead, behind = (self._elevation.at(road, s + ds)[1] for ds in (BEND_STEP, -BEND_STEP))
+        bend = (ahead - behind) / (2.0 * BEND_STEP) * level * level
+        lead = -t * rise * steep
+        onward = 1.0 - t * (shrink * twist * steep + rise * level * bend)
+        height = height + t * rise * level
+        climb = grade + t * (shrink * twist * level - rise * steep * bend)
+        drift = -t * rise * twist / onward
         lift, lift_along, lean = self._shaped(road, s, t)
-        height, climb, angle = height + lift, climb + lift_along, angle + np.arctan(lean)
+        height, climb, angle = height + lift, (climb + lift_along) / onward, angle + np.arctan(lean)
         pitch = -np.arctan(climb / np.sqrt(1.0 + drift * drift))
         leaning = np.clip(np.sin(angle) * np.cos(np.arctan(grade)) / np.cos(pitch), -1.0, 1.0)
         roll = np.where(climb == grade, angle, np.arcsin(leaning))
-        return height, pitch, roll, shrink, drift
+        return height, pitch, roll, shrink, drift, lead
+
+    def lead(self, road: IndexLike, s: FloatArray, across: FloatArray) -> FloatArray | None:
+        """How far along s places lie from the feet of their s, `across` the line; None: nothing leans on a grade."""
+        if self._superelevation.is_zero or self._elevation.is_zero:
+            return None
+        angle, grade = self._superelevation.at(road, s)[0], self._elevation.at(road, s)[1]
+        return np.asarray(-across * np.tan(angle) * grade / np.sqrt(1.0 + grade * grade))
 
     def shrink(self, road: IndexLike, s: FloatArray) -> FloatArray:
         """How t shrinks seen from above: cos(superelevation)."""

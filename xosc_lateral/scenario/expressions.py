@@ -13,10 +13,10 @@ import math
 import re
 from collections.abc import Callable
 
+from xosc_lateral.limits import EXPRESSION, VALUE
+
 Value = float | bool | str
 
-MAX_LENGTH = 10_000
-"""Characters in one expression, parameters filled in not counted. Field files stay under 200."""
 MAX_DEPTH = 30
 """Nested parentheses and signs. Bounds the recursion."""
 
@@ -84,8 +84,8 @@ def evaluate(expression: str, resolve: Callable[[str], str]) -> str:
     ExpressionError
         Syntax, domain (``sqrt(-1)``, division by zero) or overflow.
     """
-    if len(expression) > MAX_LENGTH:
-        raise ExpressionError(f"expression of {len(expression)} characters, at most {MAX_LENGTH} are allowed")
+    if len(expression) > EXPRESSION.value:
+        raise ExpressionError(EXPRESSION.refusal(len(expression)))
     try:
         tokens = _tokens(expression)
         if _joins_words(tokens):
@@ -164,7 +164,16 @@ def _joined(expression: str, resolve: Callable[[str], str]) -> str:
             joined.append(part)
         else:
             raise ExpressionError(f"unknown name or operator in '{part}'")
+        if (length := sum(map(len, joined))) > VALUE.value:
+            raise ExpressionError(VALUE.refusal(length))
     return "".join(joined)
+
+
+def _joinable(left: str, right: str) -> str:
+    """Both, if the result may be that long: parameters that refer to each other twice double with every step."""
+    if len(left) + len(right) > VALUE.value:
+        raise ExpressionError(VALUE.refusal(len(left) + len(right)))
+    return left + right
 
 
 class _Parser:
@@ -222,7 +231,7 @@ class _Parser:
         while operator := self._accept("+", "-"):
             right = self._product()
             if operator == "+" and isinstance(value, str) and isinstance(right, str):
-                value = value + right
+                value = _joinable(value, right)
             else:
                 value = _number(value) + (_number(right) if operator == "+" else -_number(right))
         return value
@@ -282,7 +291,7 @@ class _Parser:
 
 def _number(value: Value) -> float:
     if isinstance(value, str):
-        raise ExpressionError(f"'{value}' is no number")
+        raise ExpressionError(f"'{value}' is not a number")
     return float(value)
 
 

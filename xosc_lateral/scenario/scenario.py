@@ -27,6 +27,11 @@ class FileHeader:
         """(1, 0) to (1, 3)."""
         return self.major, self.minor
 
+    @property
+    def is_left_handed(self) -> bool:
+        """Written for CARLA, which says so at the start of the description: y points to the right."""
+        return self.description.lstrip().startswith("CARLA:")
+
 
 @dataclass(frozen=True, slots=True)
 class Parameter:
@@ -81,8 +86,8 @@ class Scenario:
     storyboard : Storyboard
     remarks : tuple of Unsupported
         What was read over because motion does not depend on it, or is replaced (a controller whose catalog is missing).
-    input_files : tuple of Path
-        Every file that went in, the scenario first (for hashes).
+    input_hashes : mapping of Path to str
+        Every file that was parsed, the scenario first, and the SHA-256 of the bytes that were.
     source : bytes
         The scenario file's bytes: the writer parses them again.
     """
@@ -99,8 +104,13 @@ class Scenario:
     storyboard: Storyboard
     road_place: Place | None = None
     remarks: tuple[Unsupported, ...] = ()
-    input_files: tuple[Path, ...] = ()
+    input_hashes: Mapping[Path, str] = field(default_factory=dict)
     source: bytes = field(default=b"", repr=False)
+
+    @property
+    def input_files(self) -> tuple[Path, ...]:
+        """Every file that was parsed, the scenario first."""
+        return tuple(self.input_hashes)
 
     def entity(self, name: str) -> Entity:
         """The entity of that name; `KeyError` if there is none (the reader has checked every reference)."""

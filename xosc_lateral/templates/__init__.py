@@ -1,29 +1,58 @@
-"""Maneuver-based motorway scenarios to start from, one per file, with their roads."""
+"""Maneuver-based motorway scenarios to start from, with their roads.
+
+They lie as plain files in the top-level folder ``templates``, where anybody can add to them. Here is a builder for
+those whose road depends on their settings (length, lane width, side of traffic): what lies there is what it makes of
+the defaults.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import Path
 
 from xosc_lateral.errors import XoscLateralError
+from xosc_lateral.plugins import plugins
+from xosc_lateral.shipped import shipped_folder
 from xosc_lateral.templates.braking_leader import BRAKING_LEADER
 from xosc_lateral.templates.curves import CURVES
 from xosc_lateral.templates.cut_in import CUT_IN
 from xosc_lateral.templates.dense_traffic import DENSE_TRAFFIC
 from xosc_lateral.templates.jam_end import JAM_END
 from xosc_lateral.templates.overtake_truck import OVERTAKE_TRUCK
+from xosc_lateral.templates.plain import PlainTemplate, plain_templates
 from xosc_lateral.templates.template import Template
 
-__all__ = ["TEMPLATES", "Template", "find_template", "read_settings"]
+__all__ = ["TEMPLATES", "AnyTemplate", "PlainTemplate", "Template", "all_templates", "find_template", "read_settings"]
+
+GROUP = "xosc_lateral.templates"
+"""Entry points of further templates."""
 
 TEMPLATES = (CUT_IN, BRAKING_LEADER, OVERTAKE_TRUCK, CURVES, JAM_END, DENSE_TRAFFIC)
 
 
-def find_template(name: str) -> Template:
+AnyTemplate = Template | PlainTemplate
+
+
+def all_templates() -> tuple[AnyTemplate, ...]:
+    """Templates with a builder, plain ones, and those of plug-ins (templates, or folders of plain ones)."""
+    found: dict[str, AnyTemplate] = {template.name: template for template in TEMPLATES}
+    for plain in plain_templates(shipped_folder("templates")):
+        found.setdefault(plain.name, plain)
+    for offered in plugins(GROUP).values():
+        for one in plain_templates(Path(offered)) if isinstance(offered, str | Path) else [offered]:
+            found.setdefault(one.name, one)
+    return tuple(found.values())
+
+
+def find_template(name: str) -> AnyTemplate:
     """The template of that name; `XoscLateralError` if there is none."""
     for template in TEMPLATES:
         if template.name == name:
             return template
-    raise XoscLateralError(f"unknown template {name!r}; there are {', '.join(each.name for each in TEMPLATES)}")
+    for one in all_templates():
+        if one.name == name:
+            return one
+    raise XoscLateralError(f"unknown template {name!r}; there are {', '.join(each.name for each in all_templates())}")
 
 
 def read_settings(texts: Sequence[str]) -> dict[str, str]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 
 from xosc_lateral.errors import XoscLateralError
@@ -35,15 +35,15 @@ class Number:
     whole: bool = False
 
     def read(self, text: str) -> float:
-        """Value of ``--set NAME=text``; `XoscLateralError` when it is no number or out of range."""
+        """Value of ``--set NAME=text``; `XoscLateralError` when it is not a number or out of range."""
         try:
             value = float(text)
         except ValueError:
-            raise XoscLateralError(f"{self.name}: {text!r} is no number ({self.allowed})") from None
+            raise XoscLateralError(f"{self.name}: {text!r} is not a number ({self.allowed})") from None
         if not (math.isfinite(value) and self.low <= value <= self.high):
             raise XoscLateralError(f"{self.name}: {text} is out of range ({self.allowed})")
         if self.whole and value != round(value):
-            raise XoscLateralError(f"{self.name}: {text} is no whole number ({self.allowed})")
+            raise XoscLateralError(f"{self.name}: {text} is not a whole number ({self.allowed})")
         return value
 
     @property
@@ -94,7 +94,59 @@ class Choice:
         return self.default
 
 
-Parameter = Number | Choice
+@dataclass(frozen=True, slots=True)
+class Declared:
+    """A parameter that a plain scenario declares.
+
+    Parameters
+    ----------
+    name, default : str
+    kind : str
+        OpenSCENARIO's parameter type.
+    """
+
+    name: str
+    default: str
+    kind: str
+    what: str = "Parameter of the scenario."
+    unit: str = "-"
+
+    def read(self, text: str) -> str:
+        """Value of ``--set NAME=text``; `XoscLateralError` when it is not of the type."""
+        if self.kind in _TYPES and not _TYPES[self.kind](text):
+            raise XoscLateralError(f"{self.name}: {text!r} is no {self.kind}")
+        return text
+
+    @property
+    def allowed(self) -> str:
+        """What it may be, in words."""
+        return self.kind
+
+    @property
+    def shown_default(self) -> str:
+        """Default as text."""
+        return self.default
+
+
+Parameter = Number | Choice | Declared
+
+
+def _is_double(text: str) -> bool:
+    try:
+        return math.isfinite(float(text))
+    except ValueError:
+        return False
+
+
+_TYPES: dict[str, Callable[[str], bool]] = {
+    "double": _is_double,
+    "integer": lambda text: text.removeprefix("-").isdecimal(),
+    "int": lambda text: text.removeprefix("-").isdecimal(),
+    "unsignedInt": str.isdecimal,
+    "unsignedShort": str.isdecimal,
+    "boolean": lambda text: text in ("true", "false", "1", "0"),
+}
+"""OpenSCENARIO's parameter types that not every text is a value of."""
 
 
 class Settings:
@@ -127,7 +179,7 @@ class Settings:
     def number(self, name: str) -> float:
         """Value of a `Number`."""
         value = self._values[name]
-        assert isinstance(value, float | int), f"{name} is no number"
+        assert isinstance(value, float | int), f"{name} is not a number"
         return float(value)
 
     def text(self, name: str) -> str:

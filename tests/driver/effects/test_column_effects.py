@@ -21,6 +21,7 @@ from xosc_lateral.driver.effects import (
     Piecewise,
     Population,
     Product,
+    Proximity,
     Regimes,
     Saturating,
     Step,
@@ -45,6 +46,7 @@ EXAMPLES = (
     ),
     Levels(acts=Acts.LOCATION, column="x", levels=(1.0,), **ONE),
     Nearness(acts=Acts.FINE, column="x", scale=10.0, **ONE),
+    Proximity(acts=Acts.LOCATION, column="x", scale=10.0, **ONE),
     Angular(
         acts=Acts.LOCATION, column="x", period=360.0, coefficients=(0.3, 0.1), errors=(0.1, 0.1), reference=(0.0, 0.0)
     ),
@@ -217,3 +219,14 @@ def test_terms_are_finite_and_repeatable(effect: ColumnEffect) -> None:
 def test_what_is_no_effect_is_refused_with_its_name(data: dict, message: str) -> None:
     with pytest.raises(DriverProfileError, match=message):
         effect_from_dict(data)
+
+
+def test_a_neighbour_counts_in_full_alongside_less_afar_and_not_at_all_when_there_is_none() -> None:
+    effect = Proximity(acts=Acts.LOCATION, column="x", scale=20.0, **ONE)
+    felt = effect.quantity({"x": np.array([0.0, 20.0, -20.0, 400.0, np.nan])})[:, 0]
+    assert felt == pytest.approx([1.0, np.exp(-1), np.exp(-1), 0.0, 0.0], abs=1e-8)
+
+
+def test_a_proximity_without_a_scale_is_refused() -> None:
+    with pytest.raises(DriverProfileError, match="must be above 0"):
+        Proximity(acts=Acts.LOCATION, column="x", scale=0.0, **ONE)

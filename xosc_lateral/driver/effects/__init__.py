@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from functools import cache, reduce
+from importlib.metadata import entry_points
+from operator import or_
 from typing import Any
 
 from xosc_lateral.driver.effects.acts import Acts
@@ -11,6 +14,7 @@ from xosc_lateral.driver.effects.base import Effect, EffectTerms
 from xosc_lateral.driver.effects.column import ColumnEffect
 from xosc_lateral.driver.effects.drift import Drift
 from xosc_lateral.driver.effects.growing_spread import GrowingSpread
+from xosc_lateral.driver.effects.hidden import HiddenEffect
 from xosc_lateral.driver.effects.levels import Levels
 from xosc_lateral.driver.effects.linear import Linear
 from xosc_lateral.driver.effects.magnitude import Magnitude
@@ -18,14 +22,16 @@ from xosc_lateral.driver.effects.nearness import Nearness
 from xosc_lateral.driver.effects.piecewise import Piecewise
 from xosc_lateral.driver.effects.population import Population
 from xosc_lateral.driver.effects.product import Factor, Form, Product
+from xosc_lateral.driver.effects.proximity import Proximity
 from xosc_lateral.driver.effects.regimes import Regimes
 from xosc_lateral.driver.effects.saturating import Saturating
 from xosc_lateral.driver.effects.step import Step
 from xosc_lateral.driver.effects.threshold import Threshold
 from xosc_lateral.driver.effects.weave import Weave
+from xosc_lateral.driver.records import read_as
 from xosc_lateral.errors import DriverProfileError
 
-EFFECTS = (
+EFFECTS: tuple[type[Effect], ...] = (
     Linear,
     Magnitude,
     Threshold,
@@ -33,6 +39,7 @@ EFFECTS = (
     Piecewise,
     Levels,
     Nearness,
+    Proximity,
     Angular,
     Product,
     Drift,
@@ -42,10 +49,43 @@ EFFECTS = (
     Regimes,
     Population,
 )
-"""Every effect that a profile file may name, by its `kind`."""
+"""The effects of this package; a profile file names them by their `kind`."""
 
 
-def effect_from_dict(data: Mapping[str, Any]) -> Effect:
+ENTRY_POINTS = "xosc_lateral.effects"
+"""Group of entry points under which other packages offer effects: each names a subclass of `Effect`."""
+
+
+@cache
+def known_effects() -> tuple[type[Effect], ...]:
+    """Every effect that a profile may hold: those here, then those of installed plug-ins.
+
+    Raises
+    ------
+    DriverProfileError
+        If a plug-in offers something else than an effect, or one of a kind that is taken.
+    """
+    found = list(EFFECTS)
+    for entry in entry_points(group=ENTRY_POINTS):
+        effect = entry.load()
+        if not (isinstance(effect, type) and issubclass(effect, Effect)):
+            raise DriverProfileError(f"plug-in {entry.name}: {entry.value} is no effect")
+        if effect.kind in {known.kind for known in found}:
+            raise DriverProfileError(f"plug-in {entry.name}: there is an effect of the kind {effect.kind!r} already")
+        found.append(effect)
+    return tuple(found)
+
+
+def any_effect(kinds: Iterable[str] | None = None) -> Any:
+    """The union of all effects: what an effect of a profile file is read as.
+
+    Plug-ins are looked for when a kind is not among the effects here, or no kinds are given.
+    """
+    here = {effect.kind for effect in EFFECTS}
+    return reduce(or_, EFFECTS if kinds is not None and here.issuperset(kinds) else known_effects())
+
+
+def effect_from_dict(values: Mapping[str, Any]) -> Effect:
     """Read one effect of a profile file.
 
     Raises
@@ -53,13 +93,8 @@ def effect_from_dict(data: Mapping[str, Any]) -> Effect:
     DriverProfileError
         If its kind is unknown, a field is missing, unknown or out of range.
     """
-    kind = data.get("kind")
-    for effect in EFFECTS:
-        if effect.kind == kind:
-            return effect.from_dict(data)
-    raise DriverProfileError(
-        f"effect kind {kind!r} is unknown; known are {', '.join(effect.kind for effect in EFFECTS)}"
-    )
+    effect: Effect = read_as(any_effect((str(values.get("kind")),)), values)
+    return effect
 
 
 def missing_columns(effects: Iterable[Effect], context: Mapping[str, object]) -> tuple[str, ...]:
@@ -78,6 +113,7 @@ __all__ = [
     "Factor",
     "Form",
     "GrowingSpread",
+    "HiddenEffect",
     "Levels",
     "Linear",
     "Magnitude",
@@ -85,11 +121,14 @@ __all__ = [
     "Piecewise",
     "Population",
     "Product",
+    "Proximity",
     "Regimes",
     "Saturating",
     "Step",
     "Threshold",
     "Weave",
+    "any_effect",
     "effect_from_dict",
+    "known_effects",
     "missing_columns",
 ]

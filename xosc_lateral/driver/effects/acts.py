@@ -12,8 +12,11 @@ from xosc_lateral.driver.effects.base import EffectTerms
 FloatArray = NDArray[np.float64]
 
 FACTOR_LIMIT = 5.0
-"""A factor on spread, pace or fine noise stays within 1/5..5: beyond the fitted range of its column a
-log-linear effect would run away. [-]"""
+"""A factor on spread, rate of mean reversion or fine noise stays within 1/5..5: beyond the fitted range of its column
+a log-linear effect would run away. [-]"""
+
+LOG_LIMIT = float(np.log(FACTOR_LIMIT))
+"""[-]"""
 
 
 class Acts(StrEnum):
@@ -26,11 +29,10 @@ class Acts(StrEnum):
 
 
 def terms_of(acts: Acts, strength: FloatArray) -> EffectTerms:
-    """Terms of an effect of the given strength, shape (n,): added for location, the exponential of it for factors."""
+    """Terms of an effect of the given strength, shape (n,): added [m] for location, its exponential [-] for factors."""
     if acts is Acts.LOCATION:
         return EffectTerms(location=strength)
-    limit = np.log(FACTOR_LIMIT)
-    factor = np.exp(np.clip(strength, -limit, limit))
+    factor = np.exp(np.minimum(np.maximum(strength, -LOG_LIMIT), LOG_LIMIT))  # np.clip takes five times as long
     if acts is Acts.SPREAD:
         return EffectTerms(spread=factor)
     return EffectTerms(rate=factor) if acts is Acts.RATE else EffectTerms(fine=factor)

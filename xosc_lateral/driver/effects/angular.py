@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,8 +12,7 @@ from xosc_lateral.driver.effects.column import ColumnEffect
 FloatArray = NDArray[np.float64]
 
 
-@dataclass(frozen=True, kw_only=True)
-class Angular(ColumnEffect):
+class Angular(ColumnEffect, frozen=True, kw_only=True):
     """Sine and cosine of an angle, a coefficient each.
 
     Parameters
@@ -26,7 +23,6 @@ class Angular(ColumnEffect):
         Full circle in the column's unit: 360 deg or 2 pi rad.
     """
 
-    kind: ClassVar[str] = "angular"
     column: str
     period: float = 360.0
 
@@ -41,6 +37,6 @@ class Angular(ColumnEffect):
         return "angular"
 
     def quantity(self, context: Mapping[str, FloatArray]) -> FloatArray:
-        """Sine and cosine, shape (n, 2)."""
+        """Sine and cosine, shape (n, 2), within -1..1. [-]"""
         angle = 2.0 * np.pi / self.period * context[self.column]
         return np.stack([np.sin(angle), np.cos(angle)], axis=1)

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, ClassVar, Protocol
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
+
+from xosc_lateral.driver.records import Record, kebab, plain
 
 FloatArray = NDArray[np.float64]
 
@@ -27,7 +29,7 @@ class EffectTerms:
     spread : array, shape (n,), optional
         Factor on the coarse movement about its mean, > 0. [-]
     rate : array, shape (n,), optional
-        Pace of the coarse movement, > 0: 2 means that it restores twice as fast. [-]
+        Rate of the coarse movement's mean reversion, > 0: 2 means that it restores twice as fast. [-]
     fine : array, shape (n,), optional
         Factor on the fine movement, > 0. [-]
     """
@@ -37,22 +39,50 @@ class EffectTerms:
     rate: FloatArray | None = None
     fine: FloatArray | None = None
 
+    def rows(self, rows: slice | NDArray[np.int64]) -> EffectTerms:
+        """The same at some rows."""
+        values = (self.location, self.spread, self.rate, self.fine)
+        return EffectTerms(*(None if value is None else value[rows] for value in values))
 
-class Effect(Protocol):
-    """One effect. Frozen, small, one file each; parameters and their uncertainty are its fields."""
+
+class Effect(Record, frozen=True, kw_only=True, tag_field="kind", tag=kebab):
+    """One effect. Frozen, small, one file each; parameters and their uncertainty are its fields.
+
+    `ColumnEffect` and `HiddenEffect` are what effects are made from.
+    """
 
     kind: ClassVar[str]
-    """Name in the profile file, and key in the tuple of known effects."""
+    """Name in the profile file: the class's, in lower case with hyphens."""
+
+    def __init_subclass__(cls, **settings: Any) -> None:
+        super().__init_subclass__(**settings)
+        cls.kind = kebab(cls.__name__)
 
     @property
     def columns(self) -> tuple[str, ...]:
         """Context columns that it reads; empty for a hidden effect."""
-        ...
+        raise NotImplementedError
 
     def terms(self, time: FloatArray, context: Mapping[str, FloatArray], rng: np.random.Generator) -> EffectTerms:
-        """Evaluate on a uniform time grid. `rng` is for hidden effects only; a column effect leaves it untouched."""
-        ...
+        """Evaluate on a whole drive.
+
+        Parameters
+        ----------
+        time : array, shape (n,)
+            Even grid. [s]
+        context : mapping of str to array, shape (n,)
+            Each column in its own unit; NaN: there is none.
+        rng : numpy.random.Generator
+            For hidden effects only.
+        """
+        raise NotImplementedError
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain JSON values; `from_dict` of the class reads them back."""
-        ...
+        """Plain JSON values."""
+        values: dict[str, Any] = plain(self)
+        return values
+
+
+def step_of(time: FloatArray) -> float:
+    """Step [s] of an even time grid [s], shape (n,); of a single row 1 s."""
+    return float(time[1] - time[0]) if len(time) > 1 else 1.0

@@ -2,25 +2,29 @@
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
-from collections.abc import Mapping
-from dataclasses import asdict, dataclass, fields
-from typing import Any, ClassVar, Self
+from abc import abstractmethod
+from collections.abc import Iterable, Mapping
+from functools import reduce
+from operator import add
+from typing import Any, Self
 
 import numpy as np
+from msgspec.structs import replace
 from numpy.typing import NDArray
 
 from xosc_lateral.driver.effects.acts import Acts, terms_of
-from xosc_lateral.driver.effects.base import EffectTerms
-from xosc_lateral.driver.effects.response import respond
+from xosc_lateral.driver.effects.base import Effect, EffectTerms, step_of
+from xosc_lateral.driver.effects.response import Response, ResponseState, respond
+from xosc_lateral.driver.records import plain, set_once
 from xosc_lateral.errors import DriverProfileError
 
 FloatArray = NDArray[np.float64]
 
 
-@dataclass(frozen=True, kw_only=True)
-class ColumnEffect(ABC):
+class ColumnEffect(Effect, frozen=True, kw_only=True):
     """A dependence on context columns: strength = coefficients . (respond(quantity) - reference).
+
+    A new one names its columns, its `shape` and its `quantity`, and is listed in `EFFECTS`.
 
     Parameters
     ----------
@@ -34,30 +38,31 @@ class ColumnEffect(ABC):
         Delay (negative: looks ahead) and first-order lag of the answer. [s]
     reference : tuple of float
         Value of the quantity at which nothing changes: its mean over the drives it was fitted on.
+    between_drivers : tuple of float
+        Standard deviations of the coefficients between drivers (random slopes); empty: all drivers answer alike.
 
     Raises
     ------
     DriverProfileError
-        If the lengths disagree, a number is not finite, or the response time is negative.
+        If the lengths disagree, a number is not finite, or the response time or a deviation is negative.
 
     Notes
     -----
     A table without one of the columns leaves the movement unchanged; `EffectTerms` is then empty.
     """
 
-    kind: ClassVar[str]
     acts: Acts
     coefficients: tuple[float, ...] = ()
     errors: tuple[float, ...] = ()
     lag_s: float = 0.0
     response_s: float = 0.0
     reference: tuple[float, ...] = ()
+    between_drivers: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
         """Coerce and validate once."""
-        object.__setattr__(self, "acts", Acts(self.acts))
-        for name in ("coefficients", "errors", "reference"):
-            object.__setattr__(self, name, tuple(float(value) for value in getattr(self, name)))
+        tuples = ("coefficients", "errors", "reference", "between_drivers")
+        set_once(self, acts=Acts(self.acts), **{name: tuple(map(float, getattr(self, name))) for name in tuples})
         numbers = (*self.coefficients, *self.errors, *self.reference, self.lag_s, self.response_s)
         if not np.isfinite(numbers).all() or self.response_s < 0:
             raise DriverProfileError(
@@ -65,11 +70,14 @@ class ColumnEffect(ABC):
             )
         if len({len(self.coefficients), len(self.errors), len(self.reference)}) != 1:
             raise DriverProfileError(f"effect {self.kind}: as many coefficients as errors and references are needed")
-
-    @property
-    @abstractmethod
-    def columns(self) -> tuple[str, ...]:
-        """Context columns that it reads."""
+        if self.between_drivers and (
+            len(self.between_drivers) != len(self.coefficients)
+            or not all(0.0 <= value < np.inf for value in self.between_drivers)
+        ):
+            raise DriverProfileError(
+                f"effect {self.kind}: between_drivers {self.between_drivers}, expected none or a number >= 0 for each "
+                "coefficient"
+            )
 
     @property
     @abstractmethod
@@ -78,16 +86,43 @@ class ColumnEffect(ABC):
 
     @abstractmethod
     def quantity(self, context: Mapping[str, FloatArray]) -> FloatArray:
-        """Driving quantity before the response, shape (n, k); NaN where "there is none" and that is neutral."""
+        """Driving quantity before the response.
+
+        Parameters
+        ----------
+        context : mapping of str to array, shape (n,)
+            Each column in its own unit; NaN: there is none.
+
+        Returns
+        -------
+        array, shape (n, k)
+            In the unit that the coefficients are per; NaN where "there is none" and that is neutral.
+        """
+
+    @classmethod
+    def proposals(cls, column: str, values: FloatArray) -> Iterable[Self]:
+        """Effects without coefficients that `close-loop` tries on a column with these values, shape (n,); none.
+
+        The effects of this package are proposed by the loop itself; those of plug-ins say here what is worth a try.
+        """
+        return ()
+
+    def known(self, context: Mapping[str, FloatArray]) -> FloatArray:
+        """The quantity with what is neutral in place of NaN, shape (n, k). [unit of the quantity]"""
+        values = self.quantity(context)
+        missing = np.isnan(values)
+        if not missing.any():
+            return values
+        stand_in = self.reference if self.reference else tuple(_finite_mean(column) for column in values.T)
+        return np.where(missing, np.asarray(stand_in), values)
 
     def answer(self, step: float, context: Mapping[str, FloatArray]) -> FloatArray:
         """Driving quantity as the driver answers to it, shape (n, k), on a grid of the given step [s]."""
-        values = self.quantity(context)
-        missing = np.isnan(values)
-        if missing.any():
-            stand_in = self.reference if self.reference else tuple(_finite_mean(column) for column in values.T)
-            values = np.where(missing, np.asarray(stand_in), values)
-        return respond(values, step, self.lag_s, self.response_s)
+        return respond(self.known(context), step, self.lag_s, self.response_s)
+
+    def response(self, step: float, state: ResponseState | None = None) -> Response:
+        """The answer block by block, shape (n, k) each, from the start of a drive or from a state; `step` in [s]."""
+        return Response(step, self.lag_s, self.response_s, state)
 
     def strength(self, step: float, context: Mapping[str, FloatArray]) -> FloatArray | None:
         """[m] or natural logarithm of a factor, shape (n,); None when a column is missing."""
@@ -96,43 +131,37 @@ class ColumnEffect(ABC):
         return self.weighed(self.answer(step, context))
 
     def weighed(self, answer: FloatArray) -> FloatArray:
-        """Strength of answers, shape (n, k): coefficients . (answer - reference), shape (n,)."""
-        if answer.shape[1] == len(self.coefficients) == 1:  # most effects; a matrix product takes five times as long
-            return np.asarray((answer[:, 0] - self.reference[0]) * self.coefficients[0])
-        return np.asarray((answer - np.asarray(self.reference)) @ np.asarray(self.coefficients))
+        """Strength of answers, shape (n, k): coefficients . (answer - reference), shape (n,). [m] or [-]"""
+        # Component by component: a matrix product adds in another order for one row than for many.
+        parts = [
+            (answer[:, k] - reference) * coefficient
+            for k, (coefficient, reference) in enumerate(zip(self.coefficients, self.reference, strict=True))
+        ]
+        return np.asarray(reduce(add, parts) if parts else np.zeros(len(answer)))
+
+    def acting(self, answer: FloatArray) -> EffectTerms:
+        """Terms [m], [-] of answers, shape (n, k), in the unit of the quantity."""
+        return terms_of(self.acts, self.weighed(answer))
 
     def terms(self, time: FloatArray, context: Mapping[str, FloatArray], rng: np.random.Generator) -> EffectTerms:
-        """Evaluate on a uniform time grid; `rng` is left untouched."""
-        strength = self.strength(_step(time), context)
+        """Evaluate on an even time grid [s], shape (n,); `rng` is left untouched. See `Effect.terms`."""
+        strength = self.strength(step_of(time), context)
         return EffectTerms() if strength is None else terms_of(self.acts, strength)
+
+    def of_one_driver(self, rng: np.random.Generator) -> ColumnEffect:
+        """The effect with one driver's coefficients, drawn from the population."""
+        if not any(self.between_drivers):
+            return self
+        normal = rng.standard_normal(len(self.coefficients))
+        drawn = np.asarray(self.coefficients) + np.asarray(self.between_drivers) * normal
+        return replace(self, coefficients=tuple(drawn.tolist()), between_drivers=())
 
     def to_dict(self) -> dict[str, Any]:
         """Plain JSON values."""
-        plain = {name: list(value) if isinstance(value, tuple) else value for name, value in asdict(self).items()}
-        return {"kind": self.kind, **plain, "acts": self.acts.value}
-
-    @classmethod
-    def from_dict(cls, data: Mapping[str, Any]) -> Self:
-        """Read back what `to_dict` gave."""
-        known = {item.name for item in fields(cls)}
-        values: dict[str, Any] = {name: value for name, value in data.items() if name != "kind"}
-        if unknown := sorted(set(values) - known):
-            raise DriverProfileError(f"effect {cls.kind}: unknown field {unknown[0]!r}")
-        try:
-            plain: dict[str, Any] = {
-                key: tuple(value) if isinstance(value, list) else value for key, value in values.items()
-            }
-            return cls(**plain)
-        except (TypeError, ValueError) as error:
-            raise DriverProfileError(f"effect {cls.kind}: {error}") from error
-
-
-def _step(time: FloatArray) -> float:
-    return float(time[1] - time[0]) if len(time) > 1 else 1.0
-
-
-def _tupled(value: Any) -> Any:
-    return tuple(value) if isinstance(value, list) else value
+        values: dict[str, Any] = plain(self)
+        if not self.between_drivers:
+            del values["between_drivers"]
+        return values
 
 
 def _finite_mean(values: FloatArray) -> float:

@@ -2,21 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.driver.effects.base import EffectTerms
-from xosc_lateral.driver.effects.hidden import HiddenEffect
+from xosc_lateral.driver.effects.hidden import HiddenEffect, NoState
 
 FloatArray = NDArray[np.float64]
 
 
-@dataclass(frozen=True, kw_only=True)
-class GrowingSpread(HiddenEffect):
+class GrowingSpread(HiddenEffect, frozen=True, kw_only=True):
     """Spread and fine noise change steadily with time on the road; outside the fitted time the outermost value holds.
 
     Parameters
@@ -31,7 +28,6 @@ class GrowingSpread(HiddenEffect):
         Time that it was fitted on, in the drive's clock. [s]
     """
 
-    kind: ClassVar[str] = "growing-spread"
     positive: ClassVar[tuple[str, ...]] = ("factor", "fine_factor")
     factor: float
     factor_error: float = 0.0
@@ -39,7 +35,7 @@ class GrowingSpread(HiddenEffect):
     from_s: float = 0.0
     to_s: float = 3600.0
 
-    def terms(self, time: FloatArray, context: Mapping[str, FloatArray], rng: np.random.Generator) -> EffectTerms:
-        """1 in the middle of the fitted time; nothing is random."""
+    def advance(self, state: NoState, time: FloatArray, step: float) -> EffectTerms:
+        """1 in the middle of the fitted time, shape (n,) [-]; nothing is random."""
         share = np.clip((time - self.from_s) / max(self.to_s - self.from_s, 1e-9), 0.0, 1.0) - 0.5
         return EffectTerms(spread=self.factor**share, fine=self.fine_factor**share)

@@ -1,25 +1,31 @@
-"""What all effects without a column share: numbers in, numbers out, and their check."""
+"""What all effects without a column share: numbers in, numbers out, and a state that goes on block by block."""
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, fields
-from typing import Any, ClassVar, Self
+from typing import Any, ClassVar
 
+import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.driver.effects.base import EffectTerms
-from xosc_lateral.driver.effects.running import RunningTerms
+from xosc_lateral.driver.effects.base import Effect, EffectTerms, step_of
+from xosc_lateral.driver.records import set_once
 from xosc_lateral.errors import DriverProfileError
 
 FloatArray = NDArray[np.float64]
 
 
-@dataclass(frozen=True, kw_only=True)
-class HiddenEffect(ABC):
+class NoState(msgspec.Struct):
+    """Of an effect that is a plain function of time."""
+
+
+class HiddenEffect(Effect, frozen=True, kw_only=True):
     """An effect of time or of chance alone; its fields are finite numbers.
+
+    A new one says how its state begins and goes on, and is listed in `EFFECTS`; a plain function of time needs
+    nothing but `advance`.
 
     Raises
     ------
@@ -27,48 +33,46 @@ class HiddenEffect(ABC):
         If a field is not finite, or one in `positive` is not above 0.
     """
 
-    kind: ClassVar[str]
     positive: ClassVar[tuple[str, ...]] = ()
+    """Fields that must be above 0."""
+
+    State: ClassVar[type[msgspec.Struct]] = NoState
+    """Type of the state: a msgspec struct of numbers, arrays and generators."""
 
     def __post_init__(self) -> None:
         """Validate once."""
-        for item in fields(self):
-            value = float(getattr(self, item.name))
-            object.__setattr__(self, item.name, value)
-            if not np.isfinite(value) or (item.name in self.positive and value <= 0):
-                raise DriverProfileError(f"effect {self.kind}: {item.name} = {value}")
+        for name in self.__struct_fields__:
+            value = float(getattr(self, name))
+            set_once(self, **{name: value})
+            if not np.isfinite(value) or (name in self.positive and value <= 0):
+                raise DriverProfileError(f"effect {self.kind}: {name} = {value}")
 
     @property
     def columns(self) -> tuple[str, ...]:
         """None: hidden."""
         return ()
 
+    def begin(self, rng: np.random.Generator, step: float) -> Any:
+        """State at the start of a drive of the given step [s]; the effect's terms will have shape (n,)."""
+        return NoState()
+
     @abstractmethod
+    def advance(self, state: Any, time: FloatArray, step: float) -> EffectTerms:
+        """Terms at the next rows of an even grid, which go on where those of the last call ended.
+
+        Parameters
+        ----------
+        state : State
+            Goes on.
+        time : array, shape (n,), n >= 1
+            In the drive's clock. [s]
+        step : float
+            Of the grid. [s]
+        """
+
     def terms(self, time: FloatArray, context: Mapping[str, FloatArray], rng: np.random.Generator) -> EffectTerms:
-        """Evaluate on a uniform time grid; see `Effect.terms`."""
-
-    def running(self, rng: np.random.Generator) -> RunningTerms:
-        """Begin a drive of unknown length. This one is for effects that depend on nothing but the time."""
-        return _ByTime(self, rng)
-
-    def to_dict(self) -> dict[str, Any]:
-        """Plain JSON values."""
-        return {"kind": self.kind, **asdict(self)}
-
-    @classmethod
-    def from_dict(cls, data: Mapping[str, Any]) -> Self:
-        """Read back what `to_dict` gave."""
-        try:
-            return cls(**{name: value for name, value in data.items() if name != "kind"})
-        except (TypeError, ValueError) as error:
-            raise DriverProfileError(f"effect {cls.kind}: {error}") from error
-
-
-class _ByTime:
-    """Terms of an effect that is a plain function of time."""
-
-    def __init__(self, effect: HiddenEffect, rng: np.random.Generator) -> None:
-        self._effect, self._rng = effect, rng
-
-    def take(self, time: FloatArray) -> EffectTerms:
-        return self._effect.terms(time, {}, self._rng)
+        """Evaluate on a whole drive, even grid [s] of shape (n,); see `Effect.terms`."""
+        if not len(time):
+            return EffectTerms()
+        step = step_of(time)
+        return self.advance(self.begin(rng, step), time, step)

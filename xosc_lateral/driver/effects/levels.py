@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,8 +12,7 @@ from xosc_lateral.driver.effects.column import ColumnEffect
 FloatArray = NDArray[np.float64]
 
 
-@dataclass(frozen=True, kw_only=True)
-class Levels(ColumnEffect):
+class Levels(ColumnEffect, frozen=True, kw_only=True):
     """One coefficient for each named level; every other level is the base.
 
     Parameters
@@ -26,7 +23,6 @@ class Levels(ColumnEffect):
         Those that differ from the rest.
     """
 
-    kind: ClassVar[str] = "levels"
     column: str
     levels: tuple[float, ...]
 
@@ -41,6 +37,6 @@ class Levels(ColumnEffect):
         return f"levels ({', '.join(f'{level:g}' for level in self.levels)})"
 
     def quantity(self, context: Mapping[str, FloatArray]) -> FloatArray:
-        """1 where the column is at the level, shape (n, number of levels)."""
+        """1 where the column is at the level, else 0, shape (n, number of levels). [-]"""
         values = np.rint(context[self.column])
         return np.stack([(values == level).astype(np.float64) for level in self.levels], axis=1)

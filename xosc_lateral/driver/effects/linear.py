@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,11 +12,9 @@ from xosc_lateral.driver.effects.column import ColumnEffect
 FloatArray = NDArray[np.float64]
 
 
-@dataclass(frozen=True, kw_only=True)
-class Linear(ColumnEffect):
+class Linear(ColumnEffect, frozen=True, kw_only=True):
     """As much as the column says; where it is NaN ("there is none"), nothing changes."""
 
-    kind: ClassVar[str] = "linear"
     column: str
 
     @property
@@ -32,5 +28,5 @@ class Linear(ColumnEffect):
         return "linear"
 
     def quantity(self, context: Mapping[str, FloatArray]) -> FloatArray:
-        """The column, shape (n, 1)."""
+        """The column, shape (n, 1). [its own unit]"""
         return np.asarray(context[self.column], dtype=np.float64)[:, None]

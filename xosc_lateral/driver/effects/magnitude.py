@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,11 +12,9 @@ from xosc_lateral.driver.effects.column import ColumnEffect
 FloatArray = NDArray[np.float64]
 
 
-@dataclass(frozen=True, kw_only=True)
-class Magnitude(ColumnEffect):
+class Magnitude(ColumnEffect, frozen=True, kw_only=True):
     """|column|: to the left as to the right; where it is NaN ("there is none"), nothing changes."""
 
-    kind: ClassVar[str] = "magnitude"
     column: str
 
     @property
@@ -32,5 +28,5 @@ class Magnitude(ColumnEffect):
         return "linear in its size, to either side alike"
 
     def quantity(self, context: Mapping[str, FloatArray]) -> FloatArray:
-        """Size of the column, shape (n, 1)."""
+        """Size of the column, shape (n, 1), >= 0. [its own unit]"""
         return np.abs(np.asarray(context[self.column], dtype=np.float64))[:, None]

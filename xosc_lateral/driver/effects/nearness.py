@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,8 +12,7 @@ from xosc_lateral.driver.effects.column import ColumnEffect
 FloatArray = NDArray[np.float64]
 
 
-@dataclass(frozen=True, kw_only=True)
-class Nearness(ColumnEffect):
+class Nearness(ColumnEffect, frozen=True, kw_only=True):
     """scale / max(|distance|, scale): 1 from touching up to `scale`, fading beyond, 0 where there is none (NaN).
 
     Parameters
@@ -28,7 +25,6 @@ class Nearness(ColumnEffect):
         True: 1 wherever there is one, at whatever distance.
     """
 
-    kind: ClassVar[str] = "nearness"
     column: str
     scale: float = 1.0
     presence: bool = False
@@ -44,7 +40,7 @@ class Nearness(ColumnEffect):
         return "presence" if self.presence else "nearness (1 / distance)"
 
     def quantity(self, context: Mapping[str, FloatArray]) -> FloatArray:
-        """From 0 (none) to 1, shape (n, 1)."""
+        """From 0 (none) to 1, shape (n, 1). [-]"""
         distance = np.abs(context[self.column])
         there = np.isfinite(distance)
         if self.presence:

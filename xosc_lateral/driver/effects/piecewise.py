@@ -3,21 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from itertools import pairwise
-from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.driver.effects.column import ColumnEffect
+from xosc_lateral.driver.records import set_once
 from xosc_lateral.errors import DriverProfileError
 
 FloatArray = NDArray[np.float64]
 
 
-@dataclass(frozen=True, kw_only=True)
-class Piecewise(ColumnEffect):
+class Piecewise(ColumnEffect, frozen=True, kw_only=True):
     """The first coefficient is the slope up to the first knot, each further one the change of slope at a knot.
 
     Parameters
@@ -28,14 +26,13 @@ class Piecewise(ColumnEffect):
         Increasing, in the column's unit.
     """
 
-    kind: ClassVar[str] = "piecewise"
     column: str
     knots: tuple[float, ...]
 
     def __post_init__(self) -> None:
         """Refuse knots that don't increase."""
         super().__post_init__()
-        object.__setattr__(self, "knots", tuple(float(knot) for knot in self.knots))
+        set_once(self, knots=tuple(float(knot) for knot in self.knots))
         if not self.knots or not all(low < high for low, high in pairwise(self.knots)):
             raise DriverProfileError(f"effect piecewise of {self.column}: knots {self.knots} must increase")
 
@@ -50,7 +47,7 @@ class Piecewise(ColumnEffect):
         return f"curve (bends at {', '.join(f'{knot:.4g}' for knot in self.knots)})"
 
     def quantity(self, context: Mapping[str, FloatArray]) -> FloatArray:
-        """The column, and how far it is beyond each knot; shape (n, number of knots + 1)."""
+        """The column, and how far it is beyond each knot, shape (n, number of knots + 1). [the column's unit]"""
         values = np.asarray(context[self.column], dtype=np.float64)
         return np.stack(
             [values, *(np.where(values > knot, values - knot, 0.0 * values) for knot in self.knots)], axis=1

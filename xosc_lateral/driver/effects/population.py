@@ -2,22 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import ClassVar
 
+import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.driver.effects.base import EffectTerms
 from xosc_lateral.driver.effects.hidden import HiddenEffect
-from xosc_lateral.driver.effects.running import RunningTerms
 
 FloatArray = NDArray[np.float64]
 
 
-@dataclass(frozen=True, kw_only=True)
-class Population(HiddenEffect):
+class PopulationState(msgspec.Struct):
+    """One driver: shift [m], factor on the spread and on the fine noise [-]."""
+
+    shift: float
+    spread: float
+    fine: float
+
+
+class Population(HiddenEffect, frozen=True, kw_only=True):
     """A driver is drawn for every run: a shift, normal, and a factor on the spread, log-normal.
 
     Parameters
@@ -32,34 +37,19 @@ class Population(HiddenEffect):
         The same of the fine noise. [-]
     """
 
-    kind: ClassVar[str] = "population"
     shift: float
     shift_error: float = 0.0
     log_spread: float = 0.0
     log_fine: float = 0.0
 
-    def terms(self, time: FloatArray, context: Mapping[str, FloatArray], rng: np.random.Generator) -> EffectTerms:
-        """One driver for the whole run."""
-        return self.terms_of(self.driver(rng), len(time))
+    State: ClassVar[type[msgspec.Struct]] = PopulationState
 
-    def driver(self, rng: np.random.Generator) -> tuple[float, float, float]:
-        """Draw one: shift [m], factor on the spread, factor on the fine noise."""
+    def begin(self, rng: np.random.Generator, step: float) -> PopulationState:
+        """Draw a driver; terms have shape (n,). `step` in [s]."""
         shift, spread, fine = rng.normal(size=3) * (self.shift, self.log_spread, self.log_fine)
-        return float(shift), float(np.exp(spread)), float(np.exp(fine))
+        return PopulationState(float(shift), float(np.exp(spread)), float(np.exp(fine)))
 
-    def terms_of(self, driver: tuple[float, float, float], n: int) -> EffectTerms:
-        """The driver's terms for n rows."""
-        shift, spread, fine = driver
-        return EffectTerms(location=np.full(n, shift), spread=np.full(n, spread), fine=np.full(n, fine))
-
-    def running(self, rng: np.random.Generator) -> RunningTerms:
-        """See `HiddenEffect.running`."""
-        return _RunningDriver(self, rng)
-
-
-class _RunningDriver:
-    def __init__(self, effect: Population, rng: np.random.Generator) -> None:
-        self._effect, self._driver = effect, effect.driver(rng)
-
-    def take(self, time: FloatArray) -> EffectTerms:
-        return self._effect.terms_of(self._driver, len(time))
+    def advance(self, state: PopulationState, time: FloatArray, step: float) -> EffectTerms:
+        """One driver for the whole drive: shift [m], factors [-], shape (n,)."""
+        n = len(time)
+        return EffectTerms(np.full(n, state.shift), np.full(n, state.spread), None, np.full(n, state.fine))

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
 from enum import StrEnum
-from typing import Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.driver.effects.column import ColumnEffect
-from xosc_lateral.errors import DriverProfileError
+from xosc_lateral.driver.records import Record
 
 FloatArray = NDArray[np.float64]
 
@@ -25,10 +23,10 @@ class Form(StrEnum):
     EQUALS = "equals"
     NEARNESS = "nearness"
     PRESENCE = "presence"
+    PROXIMITY = "proximity"
 
 
-@dataclass(frozen=True, kw_only=True)
-class Factor:
+class Factor(Record, frozen=True, kw_only=True):
     """One of the two.
 
     Parameters
@@ -38,7 +36,8 @@ class Factor:
     form : Form
         How it enters.
     at : float
-        Full circle for sine and cosine, the level for equals, the scale for nearness; unused otherwise.
+        Full circle for sine and cosine, the level for equals, the scale for nearness and proximity, the centre (where
+        the other column does nothing) for value; unused otherwise.
     """
 
     column: str
@@ -46,7 +45,7 @@ class Factor:
     at: float = 0.0
 
     def values(self, context: Mapping[str, FloatArray]) -> FloatArray:
-        """Shape (n,); NaN only where a value is NaN ("there is none")."""
+        """Shape (n,), [-] or in the column's unit; NaN only where a value is NaN ("there is none")."""
         column = context[self.column]
         if self.form is Form.SINE:
             return np.asarray(np.sin(2.0 * np.pi / self.at * column))
@@ -59,18 +58,20 @@ class Factor:
         if self.form is Form.NEARNESS:
             near = self.at / np.maximum(np.abs(column), self.at)
             return np.nan_to_num(near, nan=0.0)
-        return np.asarray(column, dtype=np.float64)
+        if self.form is Form.PROXIMITY:
+            return np.nan_to_num(np.exp(-np.abs(column) / self.at), nan=0.0)
+        return np.asarray(column, dtype=np.float64) - self.at
 
     def __str__(self) -> str:
         words = {Form.VALUE: "{c}", Form.SINE: "sin({c})", Form.COSINE: "cos({c})", Form.EQUALS: "[{c} = {a:g}]"}
+        if self.form is Form.VALUE and self.at:
+            return f"({self.column} - {self.at:.4g})"
         return words.get(self.form, "{f}({c})").format(c=self.column, a=self.at, f=self.form.value)
 
 
-@dataclass(frozen=True, kw_only=True)
-class Product(ColumnEffect):
+class Product(ColumnEffect, frozen=True, kw_only=True):
     """The product of two factors; where either is NaN ("there is none"), nothing changes."""
 
-    kind: ClassVar[str] = "product"
     factors: tuple[Factor, Factor]
 
     @property
@@ -84,24 +85,6 @@ class Product(ColumnEffect):
         return f"product ({self.factors[0]} x {self.factors[1]})"
 
     def quantity(self, context: Mapping[str, FloatArray]) -> FloatArray:
-        """Shape (n, 1)."""
+        """Product of both, shape (n, 1). [product of the factors' units]"""
         first, second = (factor.values(context) for factor in self.factors)
         return (first * second)[:, None]
-
-    def to_dict(self) -> dict[str, Any]:
-        """Plain JSON values."""
-        data = super().to_dict()
-        return data | {"factors": [asdict(factor) | {"form": factor.form.value} for factor in self.factors]}
-
-    @classmethod
-    def from_dict(cls, data: Mapping[str, Any]) -> Self:
-        """Read back what `to_dict` gave."""
-        try:
-            factors = tuple(
-                Factor(column=f["column"], form=Form(f["form"]), at=float(f["at"])) for f in data["factors"]
-            )
-        except (KeyError, TypeError, ValueError) as error:
-            raise DriverProfileError(f"effect product: factors {data.get('factors')!r} can't be read") from error
-        if len(factors) != 2:
-            raise DriverProfileError(f"effect product: {len(factors)} factors, 2 are needed")
-        return super().from_dict(dict(data) | {"factors": factors})

@@ -1,42 +1,154 @@
-"""How a driver answers to a quantity: when, and how slowly."""
+"""How a driver answers to a quantity: when, and how slowly. Block by block; a whole drive is one long block."""
 
 from __future__ import annotations
 
 import math
 
+import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.driver.autoregression import recur
+from xosc_lateral.driver.kernels import recur
 
 FloatArray = NDArray[np.float64]
 
 
+class ResponseState(msgspec.Struct):
+    """Where an answer is.
+
+    Parameters
+    ----------
+    held : array, shape (m, k), optional
+        Last rows of the quantity, as far back as they are still needed.
+    taken, given : int
+        Rows of the quantity seen, and of the answer given.
+    settled : array, shape (k,), optional
+        Last answer of the first-order lag.
+    """
+
+    held: FloatArray | None = None
+    taken: int = 0
+    given: int = 0
+    settled: FloatArray | None = None
+
+
+class Response:
+    """A shift in time, then a first-order lag of gain 1, of a quantity given block by block.
+
+    Row i of the answer is due once all rows that it looks ahead to were given; before the first row and, at the end,
+    beyond the last one, the outermost row holds. The lag starts settled.
+
+    Parameters
+    ----------
+    step : float
+        Of the even time grid. [s]
+    lag_s : float
+        Delay; negative: the driver looks ahead. [s]
+    response_s : float
+        Time constant of the first-order lag; 0 for none. [s]
+    state : ResponseState, optional
+        To go on from.
+    """
+
+    def __init__(self, step: float, lag_s: float, response_s: float, state: ResponseState | None = None) -> None:
+        self.state = ResponseState() if state is None else state
+        self._whole, self._share = split_shift(lag_s / step)
+        self._keep = float(np.exp(-step / response_s)) if response_s > 0 else None
+        self.ahead = max(0, self._whole + (1 if self._share else 0))
+        """Rows that it looks ahead."""
+
+    def take(self, values: FloatArray) -> FloatArray:
+        """Answers that are due after more rows, shape (n, k), of the quantity; shape (m, k). [unit of the quantity]"""
+        self._add(values)
+        return self._answer(max(self.state.given, self.state.taken - self.ahead))
+
+    def finish(self, values: FloatArray) -> FloatArray:
+        """All answers that are left once the last rows are given, shape (m, k). [unit of the quantity]"""
+        self._add(values)
+        return self._answer(self.state.taken)
+
+    def _add(self, values: FloatArray) -> None:
+        state = self.state
+        state.held = values if state.held is None else np.concatenate([state.held, values])
+        state.taken += len(values)
+
+    def _answer(self, until: int) -> FloatArray:
+        """Rows of the answer from the first that wasn't given."""
+        state = self.state
+        assert state.held is not None
+        if until == state.given + 1:
+            answer = self._single(state.held, state.given)
+        else:
+            answer = self._lagged(self._shifted(state.held, state.given, until))
+        state.given = until
+        done = min(until + self._whole, state.taken - 1) - (state.taken - len(state.held))
+        if done > 0:
+            state.held = state.held[done:]
+        return answer
+
+    def _single(self, held: FloatArray, row: int) -> FloatArray:
+        """One row of the answer, by the operations of many, without their cost; shape (1, k)."""
+        at = row + self._whole
+        if at < 0:
+            value = held[0]
+        elif at >= self.state.taken - 1:
+            value = held[-1]
+        else:
+            at -= self.state.taken - len(held)
+            value = held[at] if not self._share else held[at] * (1.0 - self._share) + self._share * held[at + 1]
+        if self._keep is not None:
+            settled = value if self.state.settled is None else self.state.settled
+            self.state.settled = value = (1.0 - self._keep) * value + self._keep * settled
+        return np.asarray(value[None, :])
+
+    def _shifted(self, held: FloatArray, first: int, until: int) -> FloatArray:
+        """Rows `first` to `until` of the shifted quantity, as an array of its own."""
+        last = self.state.taken - 1
+        begin, end = first + self._whole, until + self._whole  # rows of the quantity, apart from the share
+        at = last + 1 - len(held)
+        result = np.empty((until - first, held.shape[1]))
+        before, behind = min(max(-begin, 0), len(result)), min(max(end - last, 0), len(result))
+        inside = slice(before, len(result) - behind)
+        low = slice(begin + before - at, end - behind - at)
+        if inside.start < inside.stop:
+            result[inside] = held[low]
+            if self._share:
+                result[inside] *= 1.0 - self._share
+                result[inside] += self._share * held[low.start + 1 : low.stop + 1]
+        result[:before], result[len(result) - behind :] = held[:1], held[-1:]
+        return result
+
+    def _lagged(self, values: FloatArray) -> FloatArray:
+        """First-order lag, in place."""
+        if self._keep is None or not len(values):
+            return values
+        settled = values[0].copy() if self.state.settled is None else self.state.settled
+        keep = np.array([self._keep])
+        for k in range(values.shape[1]):
+            values[:, k] = recur(settled[k : k + 1], (1.0 - self._keep) * values[:, k], keep)[1:]
+        self.state.settled = values[-1].copy()
+        return values
+
+
 def respond(values: FloatArray, step: float, lag_s: float, response_s: float) -> FloatArray:
-    """Shift a quantity in time, then pass it through a first-order lag of gain 1.
+    """Answer to a whole drive; see `Response`.
 
     Parameters
     ----------
     values : array, shape (n,) or (n, k)
-        Finite, on a uniform time grid.
-    step : float
-        Of the grid. [s]
-    lag_s : float
-        Delay; negative: the driver looks ahead. Beyond either border the outermost value holds. [s]
-    response_s : float
-        Time constant of the first-order lag; 0 for none. It starts settled. [s]
+        Finite, on an even time grid. [any unit]
+    step, lag_s, response_s : float
+        [s]
 
     Returns
     -------
     array, shape of `values`
+        In the same unit.
     """
-    answer = _shifted(values, lag_s / step)
-    if response_s <= 0 or len(answer) == 0:
-        return answer
-    keep = float(np.exp(-step / response_s))
-    for column in answer.reshape(len(answer), -1).T:  # views: answered in place
-        column[:] = recur(column[:1], (1.0 - keep) * column, np.array([keep]))[1:]
-    return answer
+    values = np.asarray(values, dtype=np.float64)
+    if not len(values):
+        return values.copy()
+    return Response(step, lag_s, response_s).finish(values.reshape(len(values), -1)).reshape(values.shape)
 
 
 def split_shift(steps: float) -> tuple[int, float]:
@@ -46,24 +158,7 @@ def split_shift(steps: float) -> tuple[int, float]:
     -------
     whole : int
     share : float
-        In [0, 1], the same for every row: rounding does not grow along the drive.
+        In [0, 1), the same for every row: rounding does not grow along the drive.
     """
     whole = math.floor(-steps)
     return whole, -steps - whole
-
-
-def _shifted(values: FloatArray, steps: float) -> FloatArray:
-    """`values[i - steps]`, linear between samples, as an array of its own."""
-    n = len(values)
-    whole, share = split_shift(steps)
-    if n == 0 or whole == share == 0:
-        return np.array(values, dtype=np.float64)
-    result = np.empty(values.shape)
-    first, last = min(max(-whole, 0), n), max(min(n - 1 - whole, n), 0)
-    if first < last:
-        result[first:last] = values[first + whole : last + whole]
-        if share:
-            result[first:last] *= 1.0 - share
-            result[first:last] += share * values[first + whole + 1 : last + whole + 1]
-    result[:first], result[max(last, first) :] = values[0], values[-1]
-    return result

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,8 +13,7 @@ from xosc_lateral.errors import DriverProfileError
 FloatArray = NDArray[np.float64]
 
 
-@dataclass(frozen=True, kw_only=True)
-class Saturating(ColumnEffect):
+class Saturating(ColumnEffect, frozen=True, kw_only=True):
     """tanh((column - middle) / scale).
 
     Parameters
@@ -27,7 +24,6 @@ class Saturating(ColumnEffect):
         In the column's unit; scale > 0.
     """
 
-    kind: ClassVar[str] = "saturating"
     column: str
     middle: float
     scale: float
@@ -49,5 +45,5 @@ class Saturating(ColumnEffect):
         return f"saturating (beyond {self.middle:.4g} +- {self.scale:.3g})"
 
     def quantity(self, context: Mapping[str, FloatArray]) -> FloatArray:
-        """Between -1 and 1, shape (n, 1)."""
+        """Between -1 and 1, shape (n, 1). [-]"""
         return np.asarray(np.tanh((context[self.column] - self.middle) / self.scale))[:, None]

@@ -2,21 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import ClassVar
-
 import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.driver.effects.base import EffectTerms
-from xosc_lateral.driver.effects.hidden import HiddenEffect
+from xosc_lateral.driver.effects.hidden import HiddenEffect, NoState
 
 FloatArray = NDArray[np.float64]
 
 
-@dataclass(frozen=True, kw_only=True)
-class Step(HiddenEffect):
+class Step(HiddenEffect, frozen=True, kw_only=True):
     """The mean offset jumps once.
 
     Parameters
@@ -31,13 +26,12 @@ class Step(HiddenEffect):
         Share of the fitted drive before the jump: the mean over the drive stays unchanged. [-]
     """
 
-    kind: ClassVar[str] = "step"
     size: float
     size_error: float = 0.0
     at_s: float = 0.0
     share_before: float = 0.5
 
-    def terms(self, time: FloatArray, context: Mapping[str, FloatArray], rng: np.random.Generator) -> EffectTerms:
-        """Below the mean before, above after; nothing is random."""
+    def advance(self, state: NoState, time: FloatArray, step: float) -> EffectTerms:
+        """Below the mean before, above after, shape (n,) [m]; nothing is random."""
         after = (time >= self.at_s).astype(np.float64)
         return EffectTerms(location=self.size * (after - (1.0 - self.share_before)))

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,8 +12,7 @@ from xosc_lateral.driver.effects.column import ColumnEffect
 FloatArray = NDArray[np.float64]
 
 
-@dataclass(frozen=True, kw_only=True)
-class Threshold(ColumnEffect):
+class Threshold(ColumnEffect, frozen=True, kw_only=True):
     """Acts beyond a limit only.
 
     Parameters
@@ -30,7 +27,6 @@ class Threshold(ColumnEffect):
         True: as a whole at once; False: in proportion to the distance from the limit.
     """
 
-    kind: ClassVar[str] = "threshold"
     column: str
     at: float
     above: bool = True
@@ -47,6 +43,6 @@ class Threshold(ColumnEffect):
         return f"threshold ({'step' if self.jump else 'hinge'} {'above' if self.above else 'below'} {self.at:.4g})"
 
     def quantity(self, context: Mapping[str, FloatArray]) -> FloatArray:
-        """0 on the quiet side, 1 or the distance from the limit on the other; shape (n, 1)."""
+        """0 on the quiet side, 1 [-] or the distance from the limit [column's unit] on the other; shape (n, 1)."""
         beyond = np.nan_to_num((context[self.column] - self.at) * (1.0 if self.above else -1.0), nan=0.0)
         return np.where(beyond > 0, 1.0 if self.jump else beyond, 0.0)[:, None]

@@ -2,22 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import ClassVar
 
+import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.driver.effects.base import EffectTerms
 from xosc_lateral.driver.effects.hidden import HiddenEffect
-from xosc_lateral.driver.effects.running import RunningTerms
 
 FloatArray = NDArray[np.float64]
 
 
-@dataclass(frozen=True, kw_only=True)
-class Weave(HiddenEffect):
+class WeaveState(msgspec.Struct):
+    """Generator, first phase [turns], sum of the normal kicks so far [-], when the drive began [s]."""
+
+    rng: np.random.Generator
+    phase: float
+    kicks: float = 0.0
+    begun_at: float | None = None
+
+
+class Weave(HiddenEffect, frozen=True, kw_only=True):
     """A swing of constant amplitude whose phase starts anywhere and wanders.
 
     Parameters
@@ -32,39 +38,24 @@ class Weave(HiddenEffect):
         Time after which the phase has drifted by one radian (standard deviation). [s]
     """
 
-    kind: ClassVar[str] = "weave"
     positive: ClassVar[tuple[str, ...]] = ("amplitude", "period_s", "coherence_s")
     amplitude: float
     amplitude_error: float = 0.0
     period_s: float
     coherence_s: float = 1e6
 
-    def terms(self, time: FloatArray, context: Mapping[str, FloatArray], rng: np.random.Generator) -> EffectTerms:
-        """A swing with a random phase."""
-        step = float(time[1] - time[0]) if len(time) > 1 else 1.0
-        start = rng.random()  # before the wander: a longer drive has to begin like a shorter one
-        wander = np.cumsum(rng.normal(size=len(time))) * np.sqrt(step / self.coherence_s)
-        phase = 2.0 * np.pi * (start + (time - time[:1]) / self.period_s) + wander
+    State: ClassVar[type[msgspec.Struct]] = WeaveState
+
+    def begin(self, rng: np.random.Generator, step: float) -> WeaveState:
+        """Any phase; terms have shape (n,). `step` in [s]."""
+        return WeaveState(rng, float(rng.random()))
+
+    def advance(self, state: WeaveState, time: FloatArray, step: float) -> EffectTerms:
+        """A swing [m], shape (n,), whose phase wanders as Brownian motion does."""
+        if state.begun_at is None:
+            state.begun_at = float(time[0])
+        kicks = np.cumsum(np.concatenate([[state.kicks], state.rng.normal(size=len(time))]))[1:]
+        state.kicks = float(kicks[-1])
+        wander = kicks * np.sqrt(step / self.coherence_s)
+        phase = 2.0 * np.pi * (state.phase + (time - state.begun_at) / self.period_s) + wander
         return EffectTerms(location=self.amplitude * np.sin(phase))
-
-    def running(self, rng: np.random.Generator) -> RunningTerms:
-        """See `HiddenEffect.running`."""
-        return _RunningWeave(self, rng)
-
-
-class _RunningWeave:
-    def __init__(self, effect: Weave, rng: np.random.Generator) -> None:
-        self._effect, self._rng = effect, rng
-        self._start = rng.random()
-        self._begin: float | None = None
-        self._kicks = 0.0
-        self._scale = 0.0
-
-    def take(self, time: FloatArray) -> EffectTerms:
-        if self._begin is None:
-            self._begin = float(time[0])
-            self._scale = float(np.sqrt((time[1] - time[0]) / self._effect.coherence_s))
-        kicks = np.cumsum(np.concatenate([[self._kicks], self._rng.normal(size=len(time))]))[1:]
-        self._kicks = float(kicks[-1])
-        phase = 2.0 * np.pi * (self._start + (time - self._begin) / self._effect.period_s) + kicks * self._scale
-        return EffectTerms(location=self._effect.amplitude * np.sin(phase))

@@ -3,3 +3,49 @@
 Every reader returns an `Imported`: the table, and a record of where it came from, what was cut out and how sure the
 lane centres are. `write_imported` puts both into one Parquet or CSV file.
 """
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from importlib import import_module
+from typing import TYPE_CHECKING, Any, TypeAlias, cast
+
+from xosc_lateral.errors import FormatError
+from xosc_lateral.plugins import plugins
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from xosc_lateral.formats.importers.table import Imported
+
+Importer: TypeAlias = "Callable[..., Imported | pd.DataFrame]"
+"""A source's path, and options by name, into a drive table, or into an `Imported` with a record of its own."""
+
+IMPORTERS = {
+    "dlr-ht": "xosc_lateral.formats.importers.dlr_ht:import_dlr_ht",
+    "levelx": "xosc_lateral.formats.importers.levelx:import_levelx",
+    "mf4": "xosc_lateral.formats.importers.mf4:import_mf4",
+    "tracks": "xosc_lateral.formats.importers.tracks:import_tracks",
+    "commonroad": "xosc_lateral.formats.importers.commonroad:import_commonroad",
+}
+"""Format -> its reader, loaded when it is wanted."""
+
+GROUP = "xosc_lateral.importers"
+"""Entry points of further readers."""
+
+
+def find_importer(name: str) -> Importer:
+    """The reader of a format.
+
+    Raises
+    ------
+    FormatError
+        If there is none.
+    """
+    if name in IMPORTERS:
+        module, _, function = IMPORTERS[name].partition(":")
+        return cast("Importer", getattr(import_module(module), function))
+    found: dict[str, Any] = plugins(GROUP)
+    if name not in found:
+        raise FormatError(f"no importer {name!r}; there are {', '.join([*IMPORTERS, *found])}")
+    return cast("Importer", found[name])

@@ -25,12 +25,21 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from xosc_lateral.drives.cleaning import RUN
 from xosc_lateral.errors import FormatError, NotEnoughDataError
-from xosc_lateral.formats.importers.cuts import DEFAULT_CUTS, CutSettings, lane_changes, long_gaps, name_states
+from xosc_lateral.formats.importers.cuts import (
+    DEFAULT_CUTS,
+    CutSettings,
+    lane_changes,
+    long_gaps,
+    name_states,
+    number_runs,
+)
 from xosc_lateral.formats.importers.lanes_from_tracks import LaneCentre, fit_lane_centre
 from xosc_lateral.formats.importers.neighbours import find_neighbours
 from xosc_lateral.formats.importers.road_from_tracks import fit_reference_line
-from xosc_lateral.formats.importers.table import Imported, drop_cut, make_provenance
+from xosc_lateral.formats.importers.table import Imported, drop_cut, guarded, make_provenance
+from xosc_lateral.formats.source import Source, open_source
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -53,6 +62,7 @@ LICENCE = (
 )
 
 
+@guarded
 def import_dlr_ht(source: Path, settings: CutSettings = DEFAULT_CUTS, *, keep_cut: bool = False) -> Imported:
     """Read the trajectory CSV, the data set's zip or the wheel of `tasi` that holds it.
 
@@ -85,7 +95,8 @@ def import_dlr_ht(source: Path, settings: CutSettings = DEFAULT_CUTS, *, keep_cu
     table = table.round({"curvature": 7, **dict.fromkeys(table.columns.drop(["curvature", "drive", "time"]), 4)})
     reasons = {"no lane": placed.lane < 0, "lane change": placed.changing, "gap": gap}
     frame = np.round(tracks["time"].to_numpy() / STEP).astype(np.int64)
-    table["state"] = name_states(reasons, placed.lane, vehicle, frame, STEP, settings.shortest)
+    table["state"] = name_states(reasons, placed.lane, vehicle, frame, STEP, settings)
+    table[RUN] = number_runs(table["state"].to_numpy(), placed.lane, vehicle, frame)
     record = make_provenance(
         table,
         format="dlr-ht",
@@ -118,13 +129,23 @@ def read_tracks(source: Path) -> pd.DataFrame:
 
 def _trajectory_files(source: Path) -> list[io.BufferedIOBase]:
     """The trajectory CSV files in a CSV, a zip, or a zip in a wheel."""
-    if not zipfile.is_zipfile(source):
-        return [source.open("rb")]
+    with open_source(source) as opened:
+        is_packed = zipfile.is_zipfile(opened.file)
+        opened.file.seek(0)
+        if not is_packed:
+            return [io.BytesIO(opened.file.read())]
+        return _packed_files(opened)
+
+
+def _packed_files(opened: Source) -> list[io.BufferedIOBase]:
+    source = opened.path
     try:
-        archive = zipfile.ZipFile(source)
+        archive = zipfile.ZipFile(opened.file)
+        opened.unpacked(sum(item.file_size for item in archive.infolist()))
         inner = [name for name in archive.namelist() if "DLR-Highway-Traffic" in name and name.endswith(".zip")]
         if inner:
             archive = zipfile.ZipFile(io.BytesIO(archive.read(sorted(inner)[-1])))
+            opened.unpacked(sum(item.file_size for item in archive.infolist()))
         names = sorted(name for name in archive.namelist() if "/trajectories" in name and name.endswith(".csv"))
         files: list[io.BufferedIOBase] = [io.BytesIO(archive.read(name)) for name in names]
     except zipfile.BadZipFile as error:

@@ -26,10 +26,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from xosc_lateral.drives.cleaning import RUN
 from xosc_lateral.errors import FormatError, NotEnoughDataError
-from xosc_lateral.formats.importers.cuts import DEFAULT_CUTS, CutSettings, lane_changes, name_states
+from xosc_lateral.formats.importers.cuts import DEFAULT_CUTS, CutSettings, lane_changes, name_states, number_runs
 from xosc_lateral.formats.importers.neighbours import REACH, find_neighbours
-from xosc_lateral.formats.importers.table import Imported, drop_cut, make_provenance
+from xosc_lateral.formats.importers.table import Imported, drop_cut, guarded, make_provenance
+from xosc_lateral.formats.tables import read_table
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -51,6 +53,7 @@ TRUCKS = ("truck", "bus")
 VEHICLES = ("car", "van", "truck", "bus", "motorcycle", "trailer")
 
 
+@guarded
 def import_levelx(source: Path, settings: CutSettings = DEFAULT_CUTS, *, keep_cut: bool = False) -> Imported:
     """Read one recording (its ``XX_tracks.csv``) or a folder of them; highD and exiD are told apart by their columns.
 
@@ -90,28 +93,26 @@ def _read_recording(path: Path, settings: CutSettings) -> tuple[pd.DataFrame, st
         for ending in ("_tracks.csv", "_tracksMeta.csv", "_recordingMeta.csv")
     )
     number = path.name.split("_")[0]
-    step = 1.0 / float(_cell(recording, "frameRate", path))
+    rate = _cell(recording, "frameRate", path)
+    if not (rate.replace(".", "", 1).isdigit() and 1.0 <= float(rate) <= 1000.0):
+        raise FormatError(f"frameRate={rate!r}, expected 1 to 1000 per second", path=path)
+    step = 1.0 / float(rate)
     if "latLaneCenterOffset" in tracks.columns:
         return _from_exid(tracks, tracks_meta, number, step, path, settings), "exiD", step
     return _from_highd(tracks, tracks_meta, recording, number, step, path, settings), "highD", step
 
 
 def _read(path: Path) -> pd.DataFrame:
-    import pandas as pd
-
-    if not path.is_file():
+    if not path.exists():
         raise FormatError(
             "missing; a recording is XX_tracks.csv, XX_tracksMeta.csv and XX_recordingMeta.csv", path=path
         )
-    try:
-        return pd.read_csv(path, low_memory=False)
-    except ValueError as error:  # also pandas' parser errors and what is no UTF-8
-        raise FormatError(f"can't be read as CSV: {error}", path=path) from error
+    return read_table(path)[0]
 
 
 def _cell(frame: pd.DataFrame, column: str, path: Path) -> str:
     if column not in frame.columns or frame.empty:
-        raise FormatError(f"no column {column} in the recording's meta file", path=path)
+        raise FormatError(f"no value of {column} in the recording's meta file", path=path)
     return str(frame[column].iloc[0])
 
 
@@ -157,6 +158,7 @@ def _from_highd(
         "no lane": lane_number < 0,
         "lane change": lane_changes(left, offset, lane_number, vehicle, step, settings),
     }
+    state = name_states(reasons, lane_number, vehicle, frame, step, settings)
     return pd.DataFrame(
         {
             "drive": f"highd-{number}-" + tracks["id"].astype(str),
@@ -169,7 +171,8 @@ def _from_highd(
             "lane_count": count.astype(np.int64),
             **asdict(near),
             "vehicle_class": kind,
-            "state": name_states(reasons, lane_number, vehicle, frame, step, settings.shortest),
+            RUN: number_runs(state, lane_number, vehicle, frame),
+            "state": state,
         }
     )
 
@@ -199,6 +202,7 @@ def _from_exid(
         "no lane": ~known,
         "lane change": lane_changes(lateral, offset, lane, vehicle, step, settings),
     }
+    state = name_states(reasons, lane, vehicle, frame, step, settings)
     return pd.DataFrame(
         {
             "drive": f"exid-{number}-" + tracks["trackId"].astype(str),
@@ -209,7 +213,8 @@ def _from_exid(
             "acceleration": tracks["lonAcceleration"].to_numpy(),
             **near,
             "vehicle_class": kind,
-            "state": name_states(reasons, lane, vehicle, frame, step, settings.shortest),
+            RUN: number_runs(state, lane, vehicle, frame),
+            "state": state,
         }
     )
 

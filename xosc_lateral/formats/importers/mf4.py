@@ -2,13 +2,23 @@
 
 No two cars name their signals alike, so the reader asks for a channel map: ``NAME=CHANNEL[:UNIT]``, such as
 ``offset=Lane_LatOffset``, ``distance_left=LnMrkLeft_Dist``, ``speed=VehSpd:km/h``. Needed are `offset` and
-`lane_width`, or `distance_left` and `distance_right`; every other name becomes a context column.
+`lane_width`, or `distance_left` and `distance_right`; every other name becomes a context column. A unit in the map
+counts; else the one that the file gives with the channel does.
+
+Quantities are interpolated linearly between a channel's own stamps. Whole numbers and booleans without a physical unit
+(lane indices, flags) and words (``WET``, ``DRY``) take the nearest sample; words become categories.
 """
 
 from __future__ import annotations
 
+import gc
+import io
+import sys
+import traceback
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
+from difflib import get_close_matches
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -18,7 +28,12 @@ from numpy.typing import NDArray
 from xosc_lateral.errors import FormatError
 from xosc_lateral.formats.drives import ColumnSource, parse_map
 from xosc_lateral.formats.importers.cuts import KEPT
-from xosc_lateral.formats.importers.table import Imported, drop_cut, make_provenance
+from xosc_lateral.formats.importers.table import Imported, drop_cut, guarded, make_provenance
+from xosc_lateral.formats.source import open_source
+from xosc_lateral.formats.tables import LONGEST_MESSAGE, foreign_errors
+from xosc_lateral.formats.units import factor, is_measured, spelled
+from xosc_lateral.limits import CLOCK_ROWS, TIME
+from xosc_lateral.segment import CONTEXT_UNITS
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -28,37 +43,83 @@ FloatArray = NDArray[np.float64]
 POSITIONS = (("offset", "lane_width"), ("distance_left", "distance_right"))
 LICENCE = "your own recording"
 
+_NO_MDF = "not an MDF file that asammdf can read"
+
 LISTED = 40
 """Channel names in a message, at most."""
 
+STAYS_AWAY = 1.0
+"""Messages of the position that are further apart leave a gap. [s]"""
 
-def import_mf4(source: Path, channels: Sequence[str], *, step: float = 0.04) -> Imported:
-    """Read mapped channels of a bus log at an even step, over the time that all position channels cover.
+
+@dataclass(frozen=True, eq=False)
+class Channel:
+    """A mapped channel.
 
     Parameters
     ----------
+    time : array, shape (n,)
+        Stamps. [s]
+    values : array, shape (n,)
+        Numbers in the unit of the standard table, or words.
+    unit : str
+        That they were read in; empty where neither map nor file names one.
+    is_stepwise : bool
+        Whether the nearest sample counts.
+    """
+
+    time: FloatArray
+    values: NDArray[Any]
+    unit: str
+    is_stepwise: bool
+
+    def at(self, time: FloatArray) -> NDArray[Any]:
+        """Values at these times. [s]"""
+        if not self.is_stepwise:
+            return np.asarray(np.interp(time, self.time, self.values))
+        after = np.clip(np.searchsorted(self.time, time), 1, len(self.time) - 1)
+        before = after - 1
+        return np.asarray(self.values[np.where(time - self.time[before] <= self.time[after] - time, before, after)])
+
+
+@guarded
+def import_mf4(sources: Path | Sequence[Path], channels: Sequence[str], *, step: float = 0.04) -> Imported:
+    """Read mapped channels of bus logs at an even step, over the time that all position channels of a log cover.
+
+    Parameters
+    ----------
+    sources : path or sequence of paths
+        Each log is a drive of its own, called after its file.
     channels : sequence of str
         Words ``NAME=CHANNEL[:UNIT]``.
     step : float
-        Of the table; each channel is interpolated linearly between its own stamps. Messages that stay away for longer
-        than a second leave a gap. [s]
+        Of the table. Messages that stay away for longer than a second leave a gap. [s]
 
     Raises
     ------
     FormatError
-        If the map lacks the position, asammdf is not installed, the log can't be read, or a channel is not in it.
+        If the map lacks the position, asammdf is not installed, a log can't be read, a channel is not in it, or the
+        unit in the file measures something else.
     """
+    import pandas as pd
+
+    files = [sources] if isinstance(sources, Path) else list(sources)
     mapping = parse_map(channels)
     if not any(set(pair) <= mapping.keys() for pair in POSITIONS):
-        raise FormatError(f"{channels_wanted(source)}; mapped: {', '.join(mapping) or 'nothing'}", path=source)
-    table = _table(_read_channels(source, mapping), mapping, source, step)
+        raise FormatError(f"{channels_wanted(files[0])}; mapped: {', '.join(mapping) or 'nothing'}", path=files[0])
+    read = {file: _read_channels(file, mapping) for file in files}
+    tables = [
+        _table(signals, file, name, step)
+        for (file, signals), name in zip(read.items(), _drive_names(files), strict=True)
+    ]
+    table = pd.concat(tables, ignore_index=True)
     record = make_provenance(
         table,
         format="mf4",
-        sources=[source],
+        sources=files,
         version="unknown",
         licence=LICENCE,
-        settings={"step": step, "channels": list(channels)},
+        settings={"step": step, "channels": list(channels), "units": _units(read)},
         step=step,
     )
     return Imported(drop_cut(table, keep_cut=False), record)
@@ -73,9 +134,7 @@ def channels_wanted(source: Path) -> str:
         When it can't be read as MDF.
     """
     with _opened(source) as log:
-        # Every group's time base is a channel as well; names such as CAN1.Speed repeat others with their bus.
-        masters = {log.groups[group].channels[index].name for group, index in log.masters_db.items()}
-        names = sorted(set(log.channels_db) - masters)
+        names = _names(log)
     listed = ", ".join(names[:LISTED]) + (", ..." if len(names) > LISTED else "")
     return (
         "the channel map needs --map offset=CHANNEL[:UNIT] and --map lane_width=CHANNEL[:UNIT], or "
@@ -84,8 +143,28 @@ def channels_wanted(source: Path) -> str:
     )
 
 
-def _read_channels(source: Path, mapping: dict[str, ColumnSource]) -> dict[str, tuple[FloatArray, FloatArray]]:
-    """Stamps and values of every mapped channel, unit applied."""
+def _names(log: Any) -> list[str]:
+    # Every group's time base is a channel as well; names such as CAN1.Speed repeat others with their bus.
+    masters = {log.groups[group].channels[index].name for group, index in log.masters_db.items()}
+    return sorted(set(log.channels_db) - masters)
+
+
+def _drive_names(files: Sequence[Path]) -> list[str]:
+    """Stems, with the folder's name before those that occur twice."""
+    stems = [file.stem for file in files]
+    if len(set(map(str, files))) < len(files):
+        twice = next(str(file) for file in files if [str(one) for one in files].count(str(file)) > 1)
+        raise FormatError("the log is named twice", path=twice)
+    return [file.stem if stems.count(file.stem) == 1 else str(file.with_suffix("")) for file in files]
+
+
+def _units(read: dict[Path, dict[str, Channel]]) -> dict[str, str]:
+    """Column -> unit that it was read in; several where logs differ."""
+    columns = next(iter(read.values()))
+    return {name: " | ".join(sorted({signals[name].unit for signals in read.values()})) for name in columns}
+
+
+def _read_channels(source: Path, mapping: dict[str, ColumnSource]) -> dict[str, Channel]:
     with _opened(source) as log:
         return {name: _read_channel(log, name, wanted, source) for name, wanted in mapping.items()}
 
@@ -95,56 +174,131 @@ def _opened(source: Path) -> Iterator[Any]:
     """The log; `FormatError` when asammdf is not there or can't read it."""
     try:
         from asammdf import MDF
-        from asammdf.blocks.utils import MdfException
     except ImportError as error:
         raise FormatError("reading MDF needs asammdf: pip install 'xosc-lateral[mdf]'", path=source) from error
-    if not source.is_file():
-        raise FileNotFoundError(f"{source}: no such file")
-    try:
-        with MDF(source) as log:
+    with open_source(source) as opened, foreign_errors(source, _NO_MDF):
+        try:
+            log = MDF(opened.file if isinstance(opened.file, io.BytesIO) else source)
+        except Exception as error:
+            raise FormatError(f"{_NO_MDF}: {_said(error)}", path=source) from None
+        with log:
             yield log
-    except MdfException as error:
-        raise FormatError(f"not an MDF file that asammdf can read: {error}", path=source) from error
 
 
-def _read_channel(log: Any, name: str, wanted: ColumnSource, source: Path) -> tuple[FloatArray, FloatArray]:
+def _said(error: Exception) -> str:
+    """Words of an error, after which nothing is left of what it broke off.
+
+    asammdf's half-made objects complain on standard error when they are disposed of: here, and unheard.
+    """
+    said = " ".join(str(error).split())[:LONGEST_MESSAGE] or type(error).__name__
+    hook, sys.unraisablehook = sys.unraisablehook, lambda _: None
+    try:
+        traceback.clear_frames(error.__traceback__)
+        error.__traceback__ = error.__context__ = error.__cause__ = None
+        gc.collect()
+    finally:
+        sys.unraisablehook = hook
+    return said
+
+
+def _read_channel(log: Any, name: str, wanted: ColumnSource, source: Path) -> Channel:
     places = log.channels_db.get(wanted.column)
     if not places:
-        raise FormatError(f"no channel {wanted.column}", path=source, element=name)
+        raise FormatError(f"no channel {wanted.column}{_alike(log, wanted.column)}", path=source, element=name)
     # The same channel may lie in several groups (one per bus): the one with the most samples counts.
     signals = [log.get(group=group, index=index) for group, index in places]
     signal = max(signals, key=lambda one: len(one.samples))
-    if signal.samples.dtype.kind not in "fiub":
+    kind = signal.samples.dtype.kind
+    if kind in "SU":
+        return _words(signal, name, wanted, source)
+    if kind not in "fiub" or signal.samples.ndim != 1:
         raise FormatError(
-            f"channel {wanted.column} holds {signal.samples.dtype}, not numbers", path=source, element=name
+            f"channel {wanted.column} holds {signal.samples.dtype}, neither numbers nor words",
+            path=source,
+            element=name,
         )
-    values = np.asarray(signal.samples, dtype=np.float64) * wanted.factor
-    finite = np.isfinite(values)
-    if finite.sum() < 2:
+    unit, by = _unit(signal, name, wanted, source)
+    values = np.asarray(signal.samples, dtype=np.float64) * by
+    stamps = np.asarray(signal.timestamps, dtype=np.float64)
+    if len(stamps) != len(values) or np.abs(stamps).max(initial=0.0) > TIME.value or (np.diff(stamps) < 0).any():
         raise FormatError(
-            f"channel {wanted.column} has {int(finite.sum())} values; two are needed", path=source, element=name
+            f"channel {wanted.column}: times that do not increase, or are beyond {TIME}",
+            path=source,
+            element=name,
         )
-    return np.asarray(signal.timestamps, dtype=np.float64)[finite], values[finite]
+    finite = np.isfinite(values) & np.isfinite(stamps)
+    _require_two(int(finite.sum()), name, wanted, source)
+    stepwise = kind in "iub" and not _is_quantity(name, unit)
+    return Channel(stamps[finite], values[finite], unit, stepwise)
 
 
-def _table(
-    signals: dict[str, tuple[FloatArray, FloatArray]], mapping: dict[str, ColumnSource], source: Path, step: float
-) -> pd.DataFrame:
+def _words(signal: Any, name: str, wanted: ColumnSource, source: Path) -> Channel:
+    if _is_quantity(name, ""):
+        raise FormatError(f"channel {wanted.column} holds words, not numbers", path=source, element=name)
+    _require_two(len(signal.samples), name, wanted, source)
+    words = [
+        (word.decode("utf-8", "replace") if isinstance(word, bytes) else str(word)).strip("\x00 ")
+        for word in signal.samples.tolist()
+    ]
+    return Channel(np.asarray(signal.timestamps, dtype=np.float64), np.array(words, dtype=object), "", True)
+
+
+def _alike(log: Any, wanted: str) -> str:
+    """What it may have been meant for."""
+    names = _names(log)
+    by_lower = {name.lower(): name for name in reversed(names)}
+    close = [by_lower[lower] for lower in get_close_matches(wanted.lower(), by_lower, n=5, cutoff=0.6)]
+    close += [name for name in names if wanted.lower() in name.lower() and name not in close]
+    return f"; like it are {', '.join(close[:8])}" if close else f"; the log has {len(names)} others, none alike"
+
+
+def _unit(signal: Any, name: str, wanted: ColumnSource, source: Path) -> tuple[str, float]:
+    """Unit that counts, and the factor from it to the standard table's."""
+    if wanted.unit:
+        return wanted.unit, wanted.factor
+    given = str(signal.unit or "")
+    unit = spelled(given)
+    if unit == "" or (unit is None and not _is_quantity(name, "")):
+        return given, 1.0
+    try:
+        return given, factor(name, given if unit is None else unit)
+    except ValueError as error:
+        raise FormatError(
+            f"channel {wanted.column} is in {given!r}: {error}; name the unit with --map {name}={wanted.column}:UNIT",
+            path=source,
+            element=name,
+        ) from error
+
+
+def _is_quantity(name: str, unit: str) -> bool:
+    """Whether a column holds a physical quantity: by the standard table, or by its unit."""
+    known = (*POSITIONS[0], *POSITIONS[1], "time")
+    return name in known or CONTEXT_UNITS.get(name, "-") != "-" or is_measured(spelled(unit.lstrip("-")) or "")
+
+
+def _require_two(count: int, name: str, wanted: ColumnSource, source: Path) -> None:
+    if count < 2:
+        raise FormatError(f"channel {wanted.column} has {count} values; two are needed", path=source, element=name)
+
+
+def _table(signals: dict[str, Channel], source: Path, drive: str, step: float) -> pd.DataFrame:
     import pandas as pd
 
-    position = [name for pair in POSITIONS for name in pair if name in mapping]
-    start = max(float(signals[name][0][0]) for name in position)
-    end = min(float(signals[name][0][-1]) for name in position)
+    position = [name for pair in POSITIONS for name in pair if name in signals]
+    start = max(float(signals[name].time[0]) for name in position)
+    end = min(float(signals[name].time[-1]) for name in position)
     if not end > start:
         raise FormatError(f"channels {', '.join(position)} have no time in common", path=source)
+    if (rows := (end - start) / step) > CLOCK_ROWS.value:
+        raise FormatError(CLOCK_ROWS.refusal(rows), path=source)
     time = np.asarray(start + step * np.arange(int((end - start) / step) + 1), dtype=np.float64)
-    columns = {name: np.interp(time, *signals[name]) for name in mapping}
-    missing = np.any([_stays_away(time, signals[name][0]) for name in position], axis=0)
+    columns = {name: channel.at(time) for name, channel in signals.items()}
+    missing = np.any([_stays_away(time, signals[name].time) for name in position], axis=0)
     state = np.where(missing, "gap", KEPT)
-    return pd.DataFrame({"drive": source.stem, "time": np.round(time - start, 6), **columns, "state": state})
+    return pd.DataFrame({"drive": drive, "time": np.round(time - start, 6), **columns, "state": state})
 
 
-def _stays_away(time: FloatArray, stamps: FloatArray, longest: float = 1.0) -> NDArray[np.bool_]:
-    """Instants between two messages that are more than `longest` apart. [s]"""
+def _stays_away(time: FloatArray, stamps: FloatArray) -> NDArray[np.bool_]:
+    """Instants between two messages that are too far apart."""
     after = np.clip(np.searchsorted(stamps, time), 1, len(stamps) - 1)
-    return np.asarray(stamps[after] - stamps[after - 1] > longest)
+    return np.asarray(stamps[after] - stamps[after - 1] > STAYS_AWAY)

@@ -2,24 +2,26 @@
 
 from __future__ import annotations
 
-import gzip
 import hashlib
-import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
+from functools import wraps
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, TypeVar, cast
 
-from xosc_lateral import __version__
+import numpy as np
+
+from xosc_lateral.drives.cleaning import LANE_WIDTHS, MAX_OUTSIDE
 from xosc_lateral.errors import FormatError
-from xosc_lateral.formats.atomic import replace_atomically, write_atomically
-from xosc_lateral.formats.hashes import file_hash
+from xosc_lateral.formats.hashes import parsed_hash
 from xosc_lateral.formats.importers.cuts import KEPT
+from xosc_lateral.formats.output_tables import write_csv, write_frame
+from xosc_lateral.formats.tables import foreign_errors
+from xosc_lateral.limits import TIME, Range, context_range
+from xosc_lateral.version import __version__
 
 if TYPE_CHECKING:
     import pandas as pd
-
-METADATA_KEY = b"xosc_lateral.provenance"
 
 
 @dataclass(frozen=True)
@@ -37,10 +39,6 @@ class Provenance:
     hours: float
     lanes: Sequence[Mapping[str, object]] = ()
     package_version: str = field(default=__version__)
-
-    def line(self) -> str:
-        """The record as one line of JSON."""
-        return json.dumps(asdict(self), sort_keys=True, ensure_ascii=False)
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,6 +75,85 @@ def make_provenance(
     )
 
 
+Importer = TypeVar("Importer", bound=Callable[..., Imported])
+
+
+def guarded(read: Importer) -> Importer:
+    """An importer whose source, damaged in whatever way, ends in one line, and never in a table of nonsense.
+
+    Raises
+    ------
+    FormatError
+        Whatever else breaks in the source; offsets and lane widths that are none; a column beyond `limits`.
+    """
+
+    @wraps(read)
+    def within(source: Path | Sequence[Path], *args: Any, **settings: Any) -> Imported:
+        path = source if isinstance(source, Path) else source[0]
+        with foreign_errors(path, "can't be imported"), np.errstate(all="ignore"):
+            imported = read(source, *args, **settings)
+            _refuse_nonsense(imported.table, path)
+        return imported
+
+    return cast(Importer, within)
+
+
+def _refuse_nonsense(table: pd.DataFrame, path: Path) -> None:
+    """Single glitches of a context column become missing values; more than that is no such column."""
+    kept = (table["state"] == KEPT).to_numpy() if "state" in table else np.ones(len(table), dtype=np.bool_)
+    if not kept.any():
+        return
+    for name in table.columns:
+        if table[name].dtype.kind not in "fiu":
+            continue
+        values = table[name].to_numpy(dtype=np.float64)
+        believed = {"time": Range(-TIME.value, TIME.value, TIME.reason), **_POSITIONS}.get(name, context_range(name))
+        wrong = kept & ((values < believed.low) | (values > believed.high))
+        if name in _POSITIONS or name == "time":
+            wrong |= kept & np.isnan(values)
+        allowed = 0.0 if name == "time" else MAX_OUTSIDE
+        if wrong.sum() > allowed * kept.sum():
+            row = int(np.argmax(wrong))
+            what = f"{values[row]:.6g} is not within [{believed.low:g}, {believed.high:g}] ({believed.reason})"
+            share = f"{100 * wrong.sum() / kept.sum():.0f} % of the rows"
+            raise FormatError(f"{what}, {share}", path=path, element=f"column {name!r}")
+        if wrong.any():
+            table[name] = np.where(wrong, np.nan, values)
+    if "lane_width" in table:
+        median = float(np.nanmedian(table["lane_width"].to_numpy(dtype=np.float64)[kept]))
+        if not LANE_WIDTHS[0] <= median <= LANE_WIDTHS[1]:
+            what = f"lanes are {median:.4g} m wide (median), expected {LANE_WIDTHS[0]:g} to {LANE_WIDTHS[1]:g} m"
+            raise FormatError(what, path=path, element="column 'lane_width'")
+
+
+_WITHIN_A_LANE = Range(-2 * LANE_WIDTHS[1], 2 * LANE_WIDTHS[1], "two lanes; further away it is another lane's offset")
+_POSITIONS = dict.fromkeys(("offset", "lane_width", "distance_left", "distance_right"), _WITHIN_A_LANE)
+
+
+def as_imported(
+    made: Imported | pd.DataFrame,
+    format: str,  # noqa: A002 (the record's own word)
+    sources: Sequence[Path],
+    options: Mapping[str, object],
+) -> Imported:
+    """What an importer gave: all of it, or a drive table alone, which gets its record here."""
+    if isinstance(made, Imported):
+        return made
+    table = made if "drive" in made.columns else made.assign(drive=sources[0].name.split(".")[0])
+    step = float(table.groupby("drive", sort=False)["time"].diff().median())
+    licence = str(options.get("licence", "your own recording"))
+    record = make_provenance(
+        table.assign(state=KEPT),
+        format=format,
+        sources=[source for source in sources if source.is_file()],
+        version="unknown",
+        licence=licence,
+        settings=options,
+        step=step,
+    )
+    return Imported(table, record)
+
+
 def drop_cut(table: pd.DataFrame, keep_cut: bool) -> pd.DataFrame:
     """Without the rows that are cut and without `state`, unless they are wanted."""
     if keep_cut:
@@ -86,36 +163,22 @@ def drop_cut(table: pd.DataFrame, keep_cut: bool) -> pd.DataFrame:
 
 def write_imported(imported: Imported, path: Path) -> None:
     """Write Parquet (provenance in its metadata) or CSV (provenance in a file beside it), whole or not at all."""
-    if path.suffix == ".parquet":
-        replace_atomically(path, lambda temporary: _write_parquet(imported, temporary))
-    elif path.name.endswith((".csv", ".csv.gz")):
-        text = imported.table.to_csv(index=False, lineterminator="\n").encode()
-        write_atomically(path, gzip.compress(text, mtime=0) if path.suffix == ".gz" else text)
-        write_atomically(path.with_name(path.name + ".provenance.json"), imported.provenance.line() + "\n")
+    if path.name.lower().endswith(".parquet"):
+        write_frame(imported.table, path, asdict(imported.provenance))
     else:
-        raise FormatError("a drive table is written as .parquet, .csv or .csv.gz", path=path)
-
-
-def _write_parquet(imported: Imported, path: Path) -> None:
-    import pyarrow as pa
-    import pyarrow.parquet as pq
-
-    table = pa.Table.from_pandas(imported.table, preserve_index=False)
-    metadata = {**(table.schema.metadata or {}), METADATA_KEY: imported.provenance.line().encode()}
-    pq.write_table(table.replace_schema_metadata(metadata), path, compression="zstd")
+        text = imported.table.to_csv(index=False, lineterminator="\n")
+        write_csv(text, path, asdict(imported.provenance))
 
 
 def hash_files(paths: Sequence[Path]) -> str:
     """SHA-256 of one file's bytes; of several, that of their hashes one after the other."""
     if len(paths) == 1:
-        return file_hash(paths[0])
-    return hashlib.sha256("".join(map(file_hash, paths)).encode()).hexdigest()
+        return parsed_hash(paths[0])
+    return hashlib.sha256("".join(map(parsed_hash, paths)).encode()).hexdigest()
 
 
-def describe(provenance: Provenance, *, as_json: bool) -> str:
-    """What was imported, for a person or a machine."""
-    if as_json:
-        return provenance.line()
+def describe(provenance: Provenance) -> str:
+    """What was imported, for a person."""
     rows = ", ".join(f"{count} {state}" for state, count in provenance.rows.items())
     head = f"{provenance.source}: {provenance.vehicles} vehicles, {provenance.hours:g} h kept (rows: {rows})"
     lanes = ["  " + ", ".join(f"{name} {value}" for name, value in lane.items()) for lane in provenance.lanes]

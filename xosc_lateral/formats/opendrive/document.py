@@ -12,7 +12,7 @@ from pathlib import Path
 from lxml import etree
 
 from xosc_lateral.errors import FormatError
-from xosc_lateral.formats.xml import read_xml
+from xosc_lateral.formats.xml import read_document
 from xosc_lateral.road.piecewise import Cubic
 
 XmlElement = etree._Element
@@ -23,9 +23,10 @@ LARGEST = 1e12
 
 @dataclass(slots=True)
 class Source:
-    """One file being read: its path, and what was noted on the way."""
+    """One file being read: its path, the SHA-256 of its bytes, and what was noted on the way."""
 
     path: str
+    sha256: str = ""
     _notes: Counter[str] = field(default_factory=Counter)
     _first_line: dict[str, int] = field(default_factory=dict)
 
@@ -56,7 +57,7 @@ class Source:
         try:
             value = float(text)
         except ValueError:
-            raise self.error(f"{name}={text!r} is no number", element) from None
+            raise self.error(f"{name}={text!r} is not a number", element) from None
         if not isfinite(value):
             raise self.error(f"{name}={text!r} is not finite", element)
         if abs(value) > LARGEST:
@@ -84,14 +85,14 @@ class Source:
         """A whole number."""
         value = self.number(element, name)
         if value != int(value):
-            raise self.error(f"{name}={element.get(name)!r} is no whole number", element)
+            raise self.error(f"{name}={element.get(name)!r} is not a whole number", element)
         return int(value)
 
 
 def open_document(path: str | PathLike[str]) -> tuple[XmlElement, Source]:
     """Parse a file (no entities, no network, see `read_xml`); namespaces are dropped."""
-    source = Source(fspath(path))
-    root, _ = read_xml(Path(source.path))
+    document = read_document(Path(path))
+    source, root = Source(fspath(path), document.sha256), document.root
     if root.tag.startswith("{"):
         root = deepcopy(root)  # the tree is shared between callers
         for element in root.iter(etree.Element):

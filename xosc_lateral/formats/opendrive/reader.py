@@ -9,6 +9,7 @@ from xosc_lateral.formats.opendrive.document import Source, XmlElement, open_doc
 from xosc_lateral.formats.opendrive.lane_sections import read_sections, speed_limit
 from xosc_lateral.formats.opendrive.plan_view import Record, finish_elements, read_plan_view
 from xosc_lateral.road.geometry import ReferenceElement
+from xosc_lateral.road.header_offset import HeaderOffset
 from xosc_lateral.road.network import RoadNetwork
 from xosc_lateral.road.piecewise import Piecewise
 from xosc_lateral.road.road import Connection, Junction, Road, RoadLink
@@ -58,9 +59,18 @@ def read_opendrive(path: str | PathLike[str]) -> RoadNetwork:
         roads=roads,
         junctions=junctions,
         path=source.path,
+        sha256=source.sha256,
         notes=source.notes,
         geo_reference=reference.strip() if reference and reference.strip() else None,
+        header_offset=_read_header_offset(root, source),
     )
+
+
+def _read_header_offset(root: XmlElement, source: Source) -> HeaderOffset:
+    element = root.find("header/offset")
+    if element is None:
+        return HeaderOffset()
+    return HeaderOffset(*(source.number(element, name, 0.0) for name in ("x", "y", "z", "hdg")))
 
 
 def _check_ids(elements: Sequence[XmlElement], source: Source) -> None:

@@ -4,15 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
+from glob import escape
 from pathlib import Path
 
 from lxml import etree
 
-from xosc_lateral.errors import FormatError
+from xosc_lateral.errors import FormatError, MissingFileError
 from xosc_lateral.formats.openscenario.declarations import entry_scope
 from xosc_lateral.formats.openscenario.element import Element, local_name
 from xosc_lateral.formats.openscenario.references import Boundary
-from xosc_lateral.formats.xml import read_xml
+from xosc_lateral.formats.xml import read_document, read_xml
 from xosc_lateral.scenario.parameters import Scope
 from xosc_lateral.scenario.place import Place, Unsupported
 
@@ -32,12 +33,14 @@ class Catalogs:
         Where references may lead.
     remarks : list of Unsupported
         Gets a line for a catalog that was not where the scenario says.
+    used : dict of Path to str
+        Files that entries were taken from so far, and their SHA-256.
     """
 
     locations: Mapping[str, tuple[str, Place]]
     boundary: Boundary
     remarks: list[Unsupported]
-    used: list[Path] = field(default_factory=list)
+    used: dict[Path, str] = field(default_factory=dict)
     _files: dict[tuple[str, str], Path] = field(default_factory=dict)
 
     def entry(self, reference: Element) -> Element:
@@ -46,13 +49,14 @@ class Catalogs:
         Raises
         ------
         FormatError
-            No such catalog or entry, or a catalog folder outside the allowed ones.
+            No such entry, or a catalog folder outside the allowed ones; a `MissingFileError` without the catalog.
         """
         catalog, name = reference.text("catalogName"), reference.text("entryName")
         path = self._file(catalog, reference)
-        root, _ = read_xml(path)
-        if path not in self.used:
-            self.used.append(path)
+        document = read_document(path)
+        if self.used.setdefault(path, document.sha256) != document.sha256:
+            reference.fail(f"catalog {path} changed while the scenario was being read")
+        root = document.root
         # Names of entries are plain text: no scope is needed to find them.
         found = next((Element(xml, path, Scope({})) for xml in _entries(root) if xml.get("name") == name), None)
         if found is None:
@@ -90,12 +94,14 @@ class Catalogs:
                     return path
         if refused is not None:
             raise refused
-        near = _near_by(self.boundary.folder, f"{catalog}.xosc")
+        near = _near_by(self.boundary, f"{catalog}.xosc")
         if near is not None:
             self.remarks.append(Unsupported("CatalogReference", reference.place(), f"catalog taken from {near}"))
             return near
         searched = ", ".join(str(folder) for folder in dict.fromkeys(folders)) or "no folder is named"
-        reference.fail(f"catalog '{catalog}' not found ({searched})")
+        place = reference.place()
+        what = f"catalog '{catalog}' not found ({searched})"
+        raise MissingFileError(what, path=place.path, line=place.line, element=place.element)
 
 
 def _entries(root: etree._Element) -> Iterator[etree._Element]:
@@ -104,10 +110,11 @@ def _entries(root: etree._Element) -> Iterator[etree._Element]:
             yield from (entry for entry in catalog if isinstance(entry.tag, str))
 
 
-def _near_by(folder: Path, name: str) -> Path | None:
+def _near_by(boundary: Boundary, name: str) -> Path | None:
     """The only file of that name at most three levels below the scenario: some field files name stale folders."""
-    found = [path for pattern in ("", "*/", "*/*/", "*/*/*/") for path in folder.glob(pattern + name)]
-    return found[0] if len(found) == 1 else None
+    patterns = (f"{levels}{escape(name)}" for levels in ("", "*/", "*/*/", "*/*/*/"))
+    found = [path for pattern in patterns for path in boundary.folder.glob(pattern) if path.is_file()]
+    return found[0] if len(found) == 1 and boundary.holds(found[0]) else None
 
 
 def _calls_itself(path: Path, name: str) -> bool:

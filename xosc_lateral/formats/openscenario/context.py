@@ -29,6 +29,10 @@ class Context:
         Names of scenario objects; filled before the storyboard is read.
     selections : mapping of str to tuple of str
         Entity selections and their members.
+    strict : bool
+        Refuse what could be replaced by something usual (a vehicle whose catalog is missing).
+    left_handed : bool
+        Written for CARLA; see `left_handed`.
     """
 
     version: tuple[int, int]
@@ -36,6 +40,8 @@ class Context:
     remarks: list[Unsupported]
     entities: set[str] = field(default_factory=set)
     selections: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    strict: bool = False
+    left_handed: bool = False
     _depth: int = 0
 
     def entity(self, element: Element, name: str = "entityRef") -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import time
 import zlib
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
@@ -17,6 +18,7 @@ from xosc_lateral.formats.openscenario.element import Element
 from xosc_lateral.formats.openscenario.read import open_scenario, read_header
 from xosc_lateral.formats.openscenario.references import Boundary, allowed_roots
 from xosc_lateral.formats.xml import read_xml
+from xosc_lateral.limits import COMBINATIONS, DECIMAL_EXPONENT, DISTRIBUTION_TIME, PARAMETER_SETS
 from xosc_lateral.scenario.distribution import (
     Deterministic,
     DistributionError,
@@ -38,8 +40,6 @@ from xosc_lateral.scenario.place import Place
 
 MAX_REDRAWS = 1000
 """Stochastic sets in a row that violate the scenario's constraints until reading gives up."""
-MAX_RANGE = 1_000_000
-"""Values in one stepped range."""
 
 
 @dataclass(slots=True)
@@ -65,6 +65,15 @@ class LogicalScenario:
     place: Place
     _scenario: Element = field(repr=False)
     discarded: int = 0
+    _declared: dict[str, str] = field(init=False, repr=False)
+    _constrained: list[Element] = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        """Find what the scenario declares, and which of it is constrained."""
+        self._declared = declared_values(self._scenario)
+        declarations = self._scenario.child("ParameterDeclarations")
+        found = declarations.children("ParameterDeclaration") if declarations else ()
+        self._constrained = [item for item in found if item.child("ConstraintGroup") is not None]
 
     def parameter_sets(self, seed: int = 0) -> Iterator[ParameterSet]:
         """Parameter sets that satisfy the scenario's constraint groups, in order, made when asked for.
@@ -81,15 +90,32 @@ class LogicalScenario:
         FormatError
             A parameter that the scenario does not declare, or constraints that nothing satisfies.
         """
-        self.discarded = 0
+        self.discarded, begin = 0, time.monotonic()
+        limit = PARAMETER_SETS if isinstance(self.distribution, Stochastic) else COMBINATIONS
+        if self.count > limit.value:
+            raise self._error(limit.refusal(self.count))
         if isinstance(self.distribution, Deterministic):
             for values in self.distribution:
                 if self._accepts(values):
                     yield values
+                self._check_time(begin)
             return
         rng = np.random.default_rng(seed if self.distribution.seed is None else self.distribution.seed)
         for _ in range(self.distribution.number_of_test_runs):
             yield self._draw(self.distribution, rng)
+            self._check_time(begin)
+
+    def _check_time(self, begin: float) -> None:
+        took = time.monotonic() - begin
+        if took > DISTRIBUTION_TIME.value:
+            raise self._error(f"{DISTRIBUTION_TIME.refusal(took)}; constraints or limits leave out nearly all")
+
+    @property
+    def count(self) -> int:
+        """Parameter sets before the scenario's constraints; for a stochastic distribution the runs."""
+        if isinstance(self.distribution, Deterministic):
+            return math.prod(map(len, self.distribution.parts))
+        return self.distribution.number_of_test_runs
 
     def _draw(self, distribution: Stochastic, rng: np.random.Generator) -> ParameterSet:
         for _ in range(MAX_REDRAWS):
@@ -102,13 +128,13 @@ class LogicalScenario:
         raise self._error(f"{MAX_REDRAWS} draws in a row violate the constraints of {self.scenario_file}")
 
     def _accepts(self, values: ParameterSet) -> bool:
-        declared = declared_values(self._scenario)
         for name in values:
-            if name not in declared:
+            if name not in self._declared:
                 raise self._error(f"parameter '{name}' is not declared in {self.scenario_file}")
-        scope = Scope({**declared, **values})
-        declarations = self._scenario.child("ParameterDeclarations")
-        for declaration in declarations.children("ParameterDeclaration") if declarations else ():
+        if not self._constrained:
+            return True
+        scope = Scope({**self._declared, **values})
+        for declaration in self._constrained:
             name = parameter_name(declaration.raw("name") or "")
             try:
                 broken = broken_constraint(declaration.within(scope), scope.value(name))
@@ -198,17 +224,22 @@ def _single(item: Element) -> ValueSets | SteppedRange:
         content.fail(f"stepWidth of {step} is not positive")
     if upper < lower:
         limits.fail(f"upperLimit {upper} is below lowerLimit {lower}")
-    if (upper - lower) / step > MAX_RANGE:
-        content.fail(f"more than {MAX_RANGE} values")
+    if (values := (upper - lower) / step + 1) > COMBINATIONS.value:
+        content.fail(COMBINATIONS.refusal(float(values)))
     return SteppedRange(name, lower, upper, step, item.place())
 
 
 def _decimal(element: Element, name: str) -> Decimal:
     element.number(name)  # refuses what is no finite number, with its place
+    text = element.text(name).strip()
     try:
-        return Decimal(element.text(name).strip())
+        value = Decimal(text)
     except InvalidOperation:
-        element.fail(f"{name}='{element.text(name)[:60]}' is no number")
+        element.fail(f"{name}='{text[:60]}' is not a number")
+    exponent = value.as_tuple().exponent
+    if not isinstance(exponent, int) or max(abs(exponent), len(text)) > DECIMAL_EXPONENT.value:
+        element.fail(f"{name}='{text[:60]}': {DECIMAL_EXPONENT.what}, and digits, at most {DECIMAL_EXPONENT}")
+    return value
 
 
 def _stochastic(owner: Element) -> Stochastic:

@@ -96,7 +96,7 @@ class Element:
         try:
             value = float(text)
         except ValueError:
-            self.fail(f"{name}='{text[:60]}' is no number")
+            self.fail(f"{name}='{text[:60]}' is not a number")
         if math.isnan(value) or (finite and math.isinf(value)):
             self.fail(f"{name}='{text[:60]}' is not finite")
         if finite and abs(value) > LARGEST:
@@ -118,7 +118,7 @@ class Element:
         if value is None:
             return None
         if value != round(value) or abs(value) > 2**53:
-            self.fail(f"{name}='{self.text(name)}' is no whole number")
+            self.fail(f"{name}='{self.text(name)}' is not a whole number")
         return round(value)
 
     def integer(self, name: str, default: int | None = None) -> int:

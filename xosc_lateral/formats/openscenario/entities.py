@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from xosc_lateral.errors import MissingFileError
 from xosc_lateral.formats.openscenario.context import Context
 from xosc_lateral.formats.openscenario.declarations import local_scope
 from xosc_lateral.formats.openscenario.element import Element
@@ -63,7 +64,12 @@ def _read_object(item: Element, context: Context, name: str | None = None) -> li
     if content is None:
         item.fail("holds neither Vehicle, Pedestrian, MiscObject nor CatalogReference")
     if content.tag == "CatalogReference":
-        content = context.catalogs.entry(content)
+        try:
+            content = context.catalogs.entry(content)
+        except MissingFileError as error:
+            if context.strict:
+                raise
+            return [_stand_in(content, name, context, error)]
     else:
         content = content.within(local_scope(content))
     category = CATEGORIES.get(content.tag)
@@ -90,6 +96,19 @@ def _read_object(item: Element, context: Context, name: str | None = None) -> li
         properties=read_properties(content),
     )
     return [entity, *inner]
+
+
+def _stand_in(reference: Element, name: str, context: Context, error: MissingFileError) -> Entity:
+    """A car like others, for one whose catalog is missing."""
+    context.remark(reference, f"{error.what}: '{name}' is played as a car of usual size without limits")
+    return Entity(
+        name=name,
+        category=EntityCategory.VEHICLE,
+        place=reference.place(),
+        bounding_box=DEFAULT_BOX,
+        vehicle_category=VehicleCategory.CAR,
+        object_name=reference.text("entryName"),
+    )
 
 
 def _vehicle_category(vehicle: Element) -> VehicleCategory:

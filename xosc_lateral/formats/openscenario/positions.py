@@ -9,37 +9,37 @@ from itertools import pairwise
 from xosc_lateral.formats.openscenario.context import Context
 from xosc_lateral.formats.openscenario.declarations import local_scope
 from xosc_lateral.formats.openscenario.element import Element
+from xosc_lateral.formats.openscenario.left_handed import mirrored, mirrored_shape
 from xosc_lateral.scenario.enums import ReferenceContext, RouteStrategy
 from xosc_lateral.scenario.place import Unsupported
 from xosc_lateral.scenario.position import (
+    Clothoid,
+    ClothoidSpline,
+    ClothoidSplineSegment,
+    ControlPoint,
     FromCurrentEntity,
     FromLaneCoordinates,
     FromRoadCoordinates,
     GeoPosition,
     InRoutePosition,
     LanePosition,
+    Nurbs,
     Orientation,
+    Polyline,
     Position,
     RelativeLanePosition,
     RelativeObjectPosition,
     RelativeRoadPosition,
     RelativeWorldPosition,
     RoadPosition,
+    Route,
     RoutePosition,
-    TrajectoryPosition,
-    WorldPosition,
-)
-from xosc_lateral.scenario.route import Route, Waypoint
-from xosc_lateral.scenario.trajectory import (
-    Clothoid,
-    ClothoidSpline,
-    ClothoidSplineSegment,
-    ControlPoint,
-    Nurbs,
-    Polyline,
     Shape,
     Trajectory,
+    TrajectoryPosition,
     Vertex,
+    Waypoint,
+    WorldPosition,
 )
 
 
@@ -54,7 +54,7 @@ def read_position(owner: Element, context: Context) -> Position:
     context.enter(content)
     position = reader(content, context)
     context.leave()
-    return position
+    return mirrored(position) if context.left_handed else position
 
 
 def read_position_in(owner: Element, context: Context) -> Position:
@@ -65,25 +65,23 @@ def read_position_in(owner: Element, context: Context) -> Position:
 def read_route(owner: Element, context: Context) -> Route:
     """Route, given inline or from a catalog, inside `owner`."""
     route = _inline_or_entry(owner, "Route", context)
-    scoped = route.within(local_scope(route))
     waypoints = tuple(
         Waypoint(
             read_position_in(waypoint, context),
             waypoint.choice("routeStrategy", RouteStrategy, RouteStrategy.SHORTEST),
         )
-        for waypoint in scoped.children("Waypoint")
+        for waypoint in route.children("Waypoint")
     )
     if len(waypoints) < 2:
         route.fail(f"a route needs at least 2 waypoints, this one has {len(waypoints)}")
-    return Route(scoped.text("name", ""), waypoints, scoped.boolean("closed", False), route.place())
+    return Route(route.text("name", ""), waypoints, route.boolean("closed", False), route.place())
 
 
 def read_trajectory(owner: Element, context: Context) -> Trajectory:
     """Trajectory, given inline, in a TrajectoryRef (1.1) or from a catalog, inside `owner`."""
     reference = owner.child("TrajectoryRef")
     trajectory = _inline_or_entry(reference or owner, "Trajectory", context)
-    scoped = trajectory.within(local_scope(trajectory))
-    shape_owner = scoped.required("Shape")
+    shape_owner = trajectory.required("Shape")
     content = shape_owner.child()
     if content is None:
         shape_owner.fail("holds no shape")
@@ -91,13 +89,16 @@ def read_trajectory(owner: Element, context: Context) -> Trajectory:
     context.enter(content)
     shape = Unsupported(content.tag, content.place()) if reader is None else reader(content, context)
     context.leave()
-    return Trajectory(scoped.text("name", ""), shape, scoped.boolean("closed", False), trajectory.place())
+    if context.left_handed:
+        shape = mirrored_shape(shape)
+    return Trajectory(trajectory.text("name", ""), shape, trajectory.boolean("closed", False), trajectory.place())
 
 
 def _inline_or_entry(owner: Element, tag: str, context: Context) -> Element:
+    """In the scope of its own parameters; in a catalog, what the reference assigns comes before what is declared."""
     inline = owner.child(tag)
     if inline is not None:
-        return inline
+        return inline.within(local_scope(inline))
     entry = context.catalogs.entry(owner.required("CatalogReference"))
     if entry.tag != tag:
         owner.fail(f"catalog entry '{entry.raw('name')}' is a {entry.tag}, not a {tag}")
@@ -129,12 +130,12 @@ def _world(e: Element, _: Context) -> Position:
 
 
 def _relative_world(e: Element, context: Context) -> Position:
-    x, y, z = e.number("dx"), e.number("dy"), e.number("dz", 0.0)
+    x, y, z = e.number("dx", 0.0), e.number("dy", 0.0), e.optional_number("dz")
     return RelativeWorldPosition(context.entity(e), x, y, e.place(), z, _orientation(e))
 
 
 def _relative_object(e: Element, context: Context) -> Position:
-    x, y, z = e.number("dx"), e.number("dy"), e.number("dz", 0.0)
+    x, y, z = e.number("dx", 0.0), e.number("dy", 0.0), e.optional_number("dz")
     return RelativeObjectPosition(context.entity(e), x, y, e.place(), z, _orientation(e))
 
 

@@ -56,7 +56,7 @@ from xosc_lateral.scenario.enums import (
     ReferenceContext,
     SpeedTargetValueType,
 )
-from xosc_lateral.scenario.trajectory import Timing
+from xosc_lateral.scenario.position import Timing
 
 
 def _teleport(e: Element, context: Context) -> ActionContent:
@@ -127,10 +127,11 @@ def _lane_change(e: Element, context: Context) -> ActionContent:
 def _lane_offset(e: Element, context: Context) -> ActionContent:
     target = e.required("LaneOffsetTarget").required("AbsoluteTargetLaneOffset", "RelativeTargetLaneOffset")
     offset: AbsoluteTargetLaneOffset | RelativeTargetLaneOffset
+    value = -target.number("value") if context.left_handed else target.number("value")
     if target.tag == "AbsoluteTargetLaneOffset":
-        offset = AbsoluteTargetLaneOffset(target.number("value"))
+        offset = AbsoluteTargetLaneOffset(value)
     else:
-        offset = RelativeTargetLaneOffset(context.entity(target), target.number("value"))
+        offset = RelativeTargetLaneOffset(context.entity(target), value)
     dynamics = e.required("LaneOffsetActionDynamics")
     return LaneOffsetAction(
         offset,
@@ -184,7 +185,7 @@ def _follow_trajectory(e: Element, context: Context) -> ActionContent:
     return FollowTrajectoryAction(
         read_trajectory(e, context),
         _timing(e),
-        FollowingMode.POSITION if mode is None else mode.choice("followingMode", FollowingMode, FollowingMode.POSITION),
+        FollowingMode.FOLLOW if mode is None else mode.choice("followingMode", FollowingMode, FollowingMode.FOLLOW),
         e.place(),
         e.number("initialDistanceOffset", 0.0),
     )

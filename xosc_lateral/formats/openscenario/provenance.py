@@ -1,4 +1,7 @@
-"""The mark that a file of ours carries: what made it, and from what."""
+"""The mark that a file of ours carries: what made it, and from what.
+
+It is for people and for the check that nothing is converted twice. Anybody can write one: no permission hangs on it.
+"""
 
 from __future__ import annotations
 
@@ -34,21 +37,11 @@ def provenance_of(root: etree._Element) -> Mapping[str, Any] | None:
         if text.startswith(MARK):
             try:
                 found = json.loads(text[len(MARK) :])
-            except json.JSONDecodeError:
+            except (ValueError, RecursionError):
                 return {}
             return found if isinstance(found, dict) else {}
     header = root.find("{*}FileHeader")
     return {} if header is not None and HEADER_MARK in (header.get("description") or "") else None
-
-
-def trusted_hashes(root: etree._Element) -> frozenset[str]:
-    """SHA-256 of the inputs that a file of ours states; empty for anybody else's."""
-    inputs = (provenance_of(root) or {}).get("inputs")
-    return (
-        frozenset(value for value in inputs.values() if isinstance(value, str))
-        if isinstance(inputs, dict)
-        else frozenset()
-    )
 
 
 def refuse_converted(root: etree._Element, path: object) -> None:

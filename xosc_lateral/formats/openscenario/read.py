@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
 from pathlib import Path, PureWindowsPath
 
 from lxml import etree
@@ -13,10 +14,9 @@ from xosc_lateral.formats.openscenario.context import Context
 from xosc_lateral.formats.openscenario.declarations import read_declarations, read_variables
 from xosc_lateral.formats.openscenario.element import Element, local_name
 from xosc_lateral.formats.openscenario.entities import read_entities
-from xosc_lateral.formats.openscenario.provenance import trusted_hashes
 from xosc_lateral.formats.openscenario.references import Boundary, allowed_roots
 from xosc_lateral.formats.openscenario.storyboard import read_storyboard
-from xosc_lateral.formats.xml import read_xml
+from xosc_lateral.formats.xml import read_document
 from xosc_lateral.scenario import (
     FileHeader,
     Scenario,
@@ -29,12 +29,35 @@ from xosc_lateral.scenario.place import Place
 
 NEWEST = (1, 3)
 
+LEFT_HANDED = "written for CARLA: its left-handed coordinates are mirrored, its offsets count to the right"
+
+
+@dataclass(frozen=True, slots=True)
+class RoadSearch:
+    """Where a road may lie besides where the scenario says: what the user names is allowed.
+
+    Parameters
+    ----------
+    file : Path or None
+        The road, whatever the scenario says.
+    folders : tuple of Path
+        Looked through for a file of the road's name.
+    """
+
+    file: Path | None = None
+    folders: tuple[Path, ...] = ()
+
+
+NO_ROADS = RoadSearch()
+
 
 def read_scenario(
     path: Path | str,
     parameters: Mapping[str, str] | None = None,
     *,
     allowed: Iterable[Path] = (),
+    strict: bool = False,
+    roads: RoadSearch = NO_ROADS,
 ) -> Scenario:
     """Read a scenario with all that it takes from catalogs.
 
@@ -46,6 +69,10 @@ def read_scenario(
         Values that override those of the file's parameter declarations.
     allowed : iterable of path
         Folders, besides the scenario's own and the two above it, that roads and catalogs may lie in.
+    strict : bool
+        Refuse a scenario whose vehicle catalog is missing, instead of playing a usual car and remarking it.
+    roads : RoadSearch
+        Where else its road may lie.
 
     Returns
     -------
@@ -58,8 +85,8 @@ def read_scenario(
         catalog or parameter, a reference that leads outside, a missing road file.
     """
     path = Path(path)
-    document, source = read_xml(path)
-    root = open_scenario(document, path)
+    document = read_document(path)
+    root = open_scenario(document.root, path)
     if root.child("ParameterValueDistribution") is not None:
         root.fail("is a parameter value distribution, not a scenario: read the scenarios that it stands for")
     if root.child("Storyboard") is None and root.child("Catalog") is not None:
@@ -70,11 +97,13 @@ def read_scenario(
         remarks.append(Unsupported("FileHeader", root.place(), f"version 1.{header.minor} is read as 1.{NEWEST[1]}"))
     scope, values = read_declarations(root, dict(parameters or {}), remarks)
     root = root.within(scope)
-    boundary = Boundary(path.parent, allowed_roots(path, allowed), trusted_hashes(document))
+    boundary = Boundary(path.parent, allowed_roots(path, allowed))
     locations = _catalog_locations(root)
     catalogs = Catalogs(locations, boundary, remarks)
-    context = Context(header.version, catalogs, remarks)
-    road_file, road_place, scene_graph, signals = _road_network(root, boundary, remarks)
+    context = Context(header.version, catalogs, remarks, strict=strict, left_handed=header.is_left_handed)
+    if header.is_left_handed:
+        remarks.append(Unsupported("FileHeader", root.place(), LEFT_HANDED))
+    road_file, road_place, scene_graph, signals = _road_network(root, boundary, remarks, roads)
     entities = read_entities(root, context)
     storyboard = read_storyboard(root, context)
     return Scenario(
@@ -90,8 +119,8 @@ def read_scenario(
         entities=entities,
         storyboard=storyboard,
         remarks=tuple(remarks),
-        input_files=(path, *catalogs.used),
-        source=source,
+        input_hashes={path: document.sha256, **catalogs.used},
+        source=document.data,
     )
 
 
@@ -125,7 +154,7 @@ def _catalog_locations(root: Element) -> dict[str, tuple[str, Place]]:
 
 
 def _road_network(
-    root: Element, boundary: Boundary, remarks: list[Unsupported]
+    root: Element, boundary: Boundary, remarks: list[Unsupported], roads: RoadSearch
 ) -> tuple[Path | None, Place | None, str | None, tuple[TrafficSignalController, ...]]:
     network = root.child("RoadNetwork")
     if network is None:
@@ -133,16 +162,23 @@ def _road_network(
     logic = network.child("LogicFile", "Logics")
     road: Path | None = None
     if logic is not None and logic.text("filepath", "").strip():
-        road = _road_file(logic, boundary, remarks)
+        road = _road_file(logic, boundary, remarks, roads)
+    elif roads.file is not None:
+        road = roads.file
     graph = network.child("SceneGraphFile")
     signals = network.child("TrafficSignals")
     controllers = () if signals is None else tuple(map(_signal_controller, signals.children("TrafficSignalController")))
     return road, logic.place() if logic else None, graph.text("filepath", "") if graph else None, controllers
 
 
-def _road_file(logic: Element, boundary: Boundary, remarks: list[Unsupported]) -> Path:
-    """The road where the scenario says, or else, like the reference player, a file of that name near the scenario."""
+def _road_file(logic: Element, boundary: Boundary, remarks: list[Unsupported], roads: RoadSearch) -> Path:
+    """The road where the scenario says, or else, like the reference player, a file of that name near the scenario.
+
+    Scenarios for CARLA name a town, without a suffix.
+    """
     written = logic.text("filepath")
+    if roads.file is not None:
+        return roads.file
     try:
         road = boundary.inside(written, logic.place())
         if road.is_file():
@@ -157,11 +193,25 @@ def _road_file(logic: Element, boundary: Boundary, remarks: list[Unsupported]) -
         missing = error
     folder = boundary.folder
     name = PureWindowsPath(written.strip()).name
-    for near in (folder / name, folder / "xodr" / name, folder.parent / "xodr" / name):
-        if name and near.is_file() and boundary.holds(near):
-            remarks.append(Unsupported("LogicFile", logic.place(), f"'{written}' is taken from {near}"))
-            return near
+    if is_town(written):
+        name += ".xodr"
+        missing = FormatError(
+            f"road '{written}' is not beside the scenario; name its folder by --road-path or the file by --road",
+            path=logic.path,
+            line=logic.place().line,
+            element=logic.label(),
+        )
+    beside = [near for near in (folder, folder / "xodr", folder.parent / "xodr") if boundary.holds(near / name)]
+    for near in (*beside, *roads.folders):
+        if name and (near / name).is_file():
+            remarks.append(Unsupported("LogicFile", logic.place(), f"'{written}' is taken from {near / name}"))
+            return near / name
     raise missing
+
+
+def is_town(reference: str) -> bool:
+    """A road by its name in CARLA ("Town04"), not by its file."""
+    return bool(reference.strip()) and not any(sign in reference for sign in "./\\")
 
 
 def _signal_controller(element: Element) -> TrafficSignalController:

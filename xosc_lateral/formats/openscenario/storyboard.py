@@ -103,7 +103,7 @@ def _read_event(element: Element, context: Context) -> Event:
     actions = []
     for item in element.children("Action"):
         contents = list(item.children("PrivateAction", "GlobalAction", "UserDefinedAction"))
-        if not contents:
+        if not contents and item.child() is not None:
             item.fail("holds neither PrivateAction, GlobalAction nor UserDefinedAction")
         for content in contents:
             actions.extend(read_actions(content, item.text("name", ""), context))

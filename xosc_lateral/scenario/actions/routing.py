@@ -6,9 +6,7 @@ from dataclasses import dataclass
 
 from xosc_lateral.scenario.enums import FollowingMode
 from xosc_lateral.scenario.place import Place
-from xosc_lateral.scenario.position import Position
-from xosc_lateral.scenario.route import Route
-from xosc_lateral.scenario.trajectory import Timing, Trajectory
+from xosc_lateral.scenario.position import Position, Route, Timing, Trajectory
 
 
 @dataclass(frozen=True, slots=True)

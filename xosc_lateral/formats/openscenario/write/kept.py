@@ -8,10 +8,11 @@ from pathlib import Path
 
 from lxml import etree
 
+from xosc_lateral.errors import FormatError
 from xosc_lateral.formats.openscenario.element import at_node, local_name
 from xosc_lateral.formats.openscenario.write import build
 from xosc_lateral.formats.openscenario.write.parameters import final
-from xosc_lateral.formats.xml import read_xml
+from xosc_lateral.formats.xml import read_document
 from xosc_lateral.motion.nominal import PlayedAction
 from xosc_lateral.scenario import Action, Scenario
 from xosc_lateral.scenario.actions import (
@@ -119,7 +120,11 @@ def is_placing(action: Action) -> bool:
 def _source(action: Action, scenario: Scenario, root: etree._Element) -> etree._Element:
     if action.place.path == str(scenario.path):
         return at_node(root, action.place.node)
-    catalog, _ = read_xml(Path(action.place.path))
+    path = Path(action.place.path)
+    document = read_document(path)
+    if scenario.input_hashes.get(path, document.sha256) != document.sha256:
+        raise FormatError("changed during the conversion", path=path)
+    catalog = document.root
     return at_node(catalog, action.place.node)
 
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Mapping, Sequence
+from math import pi
 from pathlib import Path
 from typing import Any
 
@@ -48,6 +49,7 @@ def write_lane_offset_scenario(
     *,
     provenance: Mapping[str, Any],
     summary: str,
+    save: bool = True,
 ) -> WrittenScenario:
     """Write the scenario with its maneuvers as they are and lane offset actions added.
 
@@ -64,6 +66,8 @@ def write_lane_offset_scenario(
         JSON values: goes into the file as it is.
     summary : str
         A few words of it for the file header's description.
+    save : bool
+        Write it; else the bytes are only handed back.
 
     Raises
     ------
@@ -92,9 +96,10 @@ def write_lane_offset_scenario(
     relocate(root, scenario, output, global_scope(scenario))
     mark(root, provenance, summary)
     data = build.document(root)
-    write_atomically(output, data)
+    if save:
+        write_atomically(output, data)
     names = tuple(dict.fromkeys(chain.entity for chain in chains))
-    return WrittenScenario(output, hashlib.sha256(data).hexdigest(), names, ())
+    return WrittenScenario(output, hashlib.sha256(data).hexdigest(), names, (), data)
 
 
 def _add_act(
@@ -132,16 +137,17 @@ def _add_act(
 def _add_action(event: etree._Element, name: str, ramp: Ramp) -> None:
     """A ramp as an action.
 
-    The reference player makes the duration from the change b and the acceleration A: sqrt(6 |b| / A), linear and cubic.
+    The reference player makes the duration from the change b and the acceleration A: pi sqrt(|b| / (2 A)).
     """
     change = max(abs(ramp.target - ramp.origin), LEAST_CHANGE)
+    acceleration = 0.5 * pi**2 * change / (ramp.end - ramp.start) ** 2
     lateral = build.sub(build.private_action(event, name), "LateralAction")
     action = build.sub(lateral, "LaneOffsetAction", continuous="false")
     build.sub(
         action,
         "LaneOffsetActionDynamics",
-        dynamicsShape="cubic" if ramp.settles else "linear",
-        maxLateralAcc=build.decimal(6.0 * change / (ramp.end - ramp.start) ** 2, 6),
+        dynamicsShape="sinusoidal",
+        maxLateralAcc=build.decimal(acceleration, 6),
     )
     target = build.sub(action, "LaneOffsetTarget")
     build.sub(target, "AbsoluteTargetLaneOffset", value=build.decimal(ramp.target, 4))

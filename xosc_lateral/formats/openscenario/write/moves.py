@@ -100,7 +100,26 @@ def vertex_times(time: FloatArray, x: FloatArray, y: FloatArray) -> FloatArray:
         refined = _refined(times, time, way, error, replace=attempt >= REFINEMENTS)
         if _error(refined, time, x, y).max() < error.max():
             times = refined
-    return times
+    return _apart(times, np.interp(times, time, x), np.interp(times, time, y))
+
+
+def _apart(times: FloatArray, x: FloatArray, y: FloatArray) -> FloatArray:
+    """Without vertices that lie closer to their neighbours in the plane than along the way; the ends stay.
+
+    Where even the ends are that close (the entity came back to where it began), the first alone: no path to follow.
+    """
+    kept = [0]
+    for k in range(1, len(times)):
+        if np.hypot(x[k] - x[kept[-1]], y[k] - y[kept[-1]]) >= LEAST_SPACING:
+            kept.append(k)
+    last = len(times) - 1
+    if kept[-1] != last:
+        # The end takes the place of what is too close before it.
+        while len(kept) > 1 and np.hypot(x[last] - x[kept[-1]], y[last] - y[kept[-1]]) < LEAST_SPACING:
+            kept.pop()
+        if np.hypot(x[last] - x[kept[-1]], y[last] - y[kept[-1]]) >= LEAST_SPACING:
+            kept.append(last)
+    return times[kept]
 
 
 def _error(times: FloatArray, time: FloatArray, x: FloatArray, y: FloatArray) -> FloatArray:

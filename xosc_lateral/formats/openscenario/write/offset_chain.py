@@ -1,9 +1,16 @@
-"""Offsets of one stretch of road-following as a few ramps between lane offsets."""
+"""Offsets of one stretch of road-following as a few smooth transitions between lane offsets.
+
+A lane offset action begins and ends with no lateral speed, whatever its shape, but for the linear one, which begins and
+ends with a kink. So the offsets are followed by half cosines from one place to the next, chosen such that as few as
+possible stay within the tolerance and none turns the car faster than it may. The turn of an action's first frame is its
+lateral acceleration, pi^2 b / (2 T^2) for a change b over the time T, over the speed.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import pairwise
+from math import inf
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,15 +21,25 @@ from xosc_lateral.road import RoadNetwork
 FloatArray = NDArray[np.float64]
 
 SETTLING_TIME = 2.0
-"""From the nominal offset at a stretch's start to the sampled one: 0.3 m take 0.45 m/s2 at most. [s]"""
-TOLERANCE = 0.01
-"""How far straight ramps between two targets may be from the sampled offset. [m]"""
-LEAST_STEP = 0.2
-"""Time between two targets: the step of the sampled offsets. [s]"""
+"""From the nominal offset at a stretch's start to the sampled one, where the turn allows it. [s]"""
+TOLERANCE = 0.013
+"""How far the transitions may be from the sampled offset; a player's frames cost the rest of 2 cm. [m]"""
+MOST_TURNING = 0.028
+"""Of the heading, within a transition: 0.28 mrad in a frame of 0.01 s. [rad/s]"""
+GRID = 0.1
+"""Time between places where a transition may begin or end. [s]"""
+LONGEST = 4.0
+"""Of a transition, once it has settled. [s]"""
+SLACK = 0.03
+"""A transition is over that long before the next begins: a frame of the player and one more, to come to rest. [s]"""
 LEAST_CHANGE = 1e-3
 """A smaller change of the target is left to the next one. [m]"""
 FLIP_MARGIN = 0.3
 """Before and after a flip of +t in which nothing is commanded: the run may be a little early or late there. [s]"""
+_TOO_FAST = 1e6
+"""What turning faster than allowed costs: more than any number of transitions or centimetres. [-]"""
+_SLOW = 3.0
+"""A car that is slower is treated as this fast: it hardly turns by a lateral speed. [m/s]"""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -40,6 +57,8 @@ class OffsetChain:
         Where the entity is when the chain begins, along +t: the first ramp leads from there. [m]
     flips : tuple of float
         Times from which +t is on the vehicle's other side: it comes to a road that runs the other way. [s]
+    speed : array, shape (n,)
+        Of the entity: how fast it may move sideways. Empty: 30 m/s. [m/s]
     """
 
     entity: str
@@ -47,17 +66,17 @@ class OffsetChain:
     offset_t: FloatArray
     start_t: float = 0.0
     flips: tuple[float, ...] = ()
+    speed: FloatArray = field(default_factory=lambda: np.empty(0))
 
 
 @dataclass(frozen=True, slots=True)
 class Ramp:
-    """One lane offset action: from `origin` to `target` between two times. [s], [m]"""
+    """One lane offset action: from `origin` to `target` between two times, along half a cosine. [s], [m]"""
 
     start: float
     end: float
     origin: float
     target: float
-    settles: bool
 
 
 def offset_chain(
@@ -70,53 +89,78 @@ def offset_chain(
     direction = network.travel_directions(motion.road[rows], motion.lane[rows])
     flips = motion.time[rows][1:][np.diff(direction) != 0]
     start_t = float(direction[0] * motion.offset[first])
-    return OffsetChain(motion.name, motion.time[rows], direction * offset, start_t, tuple(flips.tolist()))
+    speed = np.abs(motion.speed[rows])
+    return OffsetChain(motion.name, motion.time[rows], direction * offset, start_t, tuple(flips.tolist()), speed)
 
 
 def ramps(chain: OffsetChain) -> list[Ramp]:
-    """As few ramps as the tolerance allows: one to settle at the start, then straight ones.
+    """As few transitions as the tolerance allows; the first leads from where the entity is.
 
     Around a flip of +t nothing is commanded: a target set on one side of it would be followed on the other.
     """
     found: list[Ramp] = []
     borders = [float(chain.time[0]), *chain.flips, float(chain.time[-1]) + FLIP_MARGIN]
+    speed = chain.speed if len(chain.speed) else np.full(len(chain.time), 30.0)
     for number, (begin, end) in enumerate(pairwise(borders)):
-        first = begin if number == 0 else begin + FLIP_MARGIN
-        settled = first + (LEAST_STEP if found else SETTLING_TIME)
-        rows = np.flatnonzero((chain.time >= settled - 1e-9) & (chain.time <= end - FLIP_MARGIN + 1e-9))
-        if len(rows) == 0:
+        first, last = begin if number == 0 else begin + FLIP_MARGIN, end - FLIP_MARGIN
+        if last - first < GRID:
             continue
-        time, offset = chain.time[rows], chain.offset_t[rows]
-        origin = float(np.interp(first, chain.time, chain.offset_t)) if found else chain.start_t * (-1) ** number
-        found.append(Ramp(first, float(time[0]), origin, float(offset[0]), settles=not found))
-        found.extend(_straight_ramps(time, offset))
+        grid = np.linspace(first, last, int((last - first) / GRID + 1e-6) + 1)
+        offset = np.interp(grid, chain.time, chain.offset_t)
+        if not found:
+            offset[0] = chain.start_t * (-1) ** number
+        limit = MOST_TURNING * np.maximum(np.interp(grid, chain.time, speed), _SLOW)
+        found.extend(_transitions(grid, offset, limit, settles=not found))
     return found
 
 
-def _straight_ramps(time: FloatArray, offset: FloatArray) -> list[Ramp]:
-    found: list[Ramp] = []
-    start, last = 0, float(offset[0])
-    while start < len(time) - 1:
-        end = _farthest(time, offset, start)
-        # A ramp to where it is already would only cost an event, but for the last one.
-        if abs(float(offset[end]) - last) >= LEAST_CHANGE or end == len(time) - 1:
-            found.append(Ramp(float(time[start]), float(time[end]), last, float(offset[end]), settles=False))
-            last = float(offset[end])
-        start = end
-    return found
+def _transitions(time: FloatArray, offset: FloatArray, limit: FloatArray, *, settles: bool) -> list[Ramp]:
+    """The cheapest way over the grid: each transition costs 1, each squared excess over the tolerance as much again.
 
-
-def _farthest(time: FloatArray, offset: FloatArray, start: int) -> int:
-    """Last row that a straight ramp from `start` reaches within the tolerance; at least one step away.
-
-    Cone of slopes that pass every row between within the tolerance: the ramp may end where its slope is inside.
+    Worked out from the end backwards (dynamic programming), for the first transition alone without a tolerance.
     """
-    ahead = time[start + 1 :] - time[start]
-    change = offset[start + 1 :] - offset[start]
-    lower = np.maximum.accumulate((change - TOLERANCE) / ahead)
-    upper = np.minimum.accumulate((change + TOLERANCE) / ahead)
-    slope = change / ahead
-    # Past the first row at which the cone is empty it stays empty.
-    inside = np.flatnonzero((slope >= lower) & (slope <= upper) & (lower <= upper))
-    at_least = min(int(np.searchsorted(ahead, LEAST_STEP - 1e-9)), len(ahead) - 1)
-    return start + 1 + max(int(inside[-1]) if len(inside) else 0, at_least)
+    step, n = float(time[1] - time[0]), len(time)
+    cost, following = np.full(n, inf), np.zeros(n, dtype=np.intp)
+    cost[-1] = 0.0
+    reach = round(LONGEST / step)
+    for i in range(n - 2, -1, -1):
+        far = n - 1 if settles and i == 0 else min(i + reach, n - 1)
+        ends = np.arange(i + 1, far + 1)
+        price = cost[ends] + 1.0 + _turning(offset, limit, step, i, ends)
+        price += _settling(step, ends) if settles and i == 0 else _excess(offset, i, ends)
+        best = int(np.argmin(price))
+        cost[i], following[i] = price[best], ends[best]
+    found: list[Ramp] = []
+    i, at = 0, float(offset[0])
+    if cost[0] >= _TOO_FAST:
+        return found  # too short a stretch to get anywhere
+    while i < n - 1:
+        k = int(following[i])
+        # A transition to where it is already would only cost an event.
+        if abs(float(offset[k]) - at) >= LEAST_CHANGE:
+            found.append(Ramp(float(time[i]), float(time[k]) - SLACK, at, float(offset[k])))
+            at = float(offset[k])
+        i = k
+    return found
+
+
+def _turning(offset: FloatArray, limit: FloatArray, step: float, i: int, ends: NDArray[np.intp]) -> FloatArray:
+    """What turning too fast costs."""
+    acceleration = 0.5 * np.pi**2 * np.abs(offset[ends] - offset[i]) / ((ends - i) * step - SLACK) ** 2
+    slowest = np.minimum.accumulate(limit[i : ends[-1] + 1])[1:]
+    return np.where(acceleration > slowest, _TOO_FAST * (acceleration / slowest), 0.0)
+
+
+def _settling(step: float, ends: NDArray[np.intp]) -> FloatArray:
+    """What being settled earlier or later than usual costs."""
+    late = ends * step - SETTLING_TIME
+    return np.asarray(2.0 * np.abs(late) + 1e3 * np.maximum(late - 0.5, 0.0))
+
+
+def _excess(offset: FloatArray, i: int, ends: NDArray[np.intp]) -> FloatArray:
+    """Largest distance from the sampled offset over the tolerance, squared, where it is above 1."""
+    span = int(ends[-1]) - i
+    share = np.arange(1, span + 1)[None, :] / (ends - i)[:, None]
+    curve = offset[i] + 0.5 * (1.0 - np.cos(np.pi * np.minimum(share, 1.0))) * (offset[ends] - offset[i])[:, None]
+    error = np.where(share <= 1.0, np.abs(curve - offset[None, i + 1 : i + span + 1]), 0.0).max(axis=1) / TOLERANCE
+    return np.where(error > 1.0, 10.0 * (error**2 - 1.0), 0.0)

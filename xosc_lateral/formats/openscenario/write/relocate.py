@@ -8,6 +8,7 @@ from pathlib import Path
 from lxml import etree
 
 from xosc_lateral.formats.openscenario.element import local_name
+from xosc_lateral.formats.openscenario.read import is_town
 from xosc_lateral.scenario import Scenario
 from xosc_lateral.scenario.expressions import ExpressionError
 from xosc_lateral.scenario.parameters import Scope
@@ -31,6 +32,8 @@ def relocate(root: etree._Element, scenario: Scenario, output: Path, scope: Scop
     found_elsewhere = _catalogs_found_elsewhere(scenario)
     for element in root.iter("{*}*"):  # no comments
         tag = local_name(element)
+        if tag == "LogicFile" and scenario.road_file is not None and _names_a_town(element, scope):
+            continue
         if tag == "LogicFile" and scenario.road_file is not None:
             _redirect(element, "filepath", _absolute(scenario.road_file), old, new, scope)
         elif tag == "Directory" and len(found_elsewhere) == 1 and not _leads_somewhere(element, old, scope):
@@ -54,6 +57,14 @@ def _leads_somewhere(element: etree._Element, folder: Path, scope: Scope) -> boo
         return (folder / scope.fill(element.get("path") or "").replace("\\", "/")).exists()
     except ExpressionError:
         return True
+
+
+def _names_a_town(element: etree._Element, scope: Scope) -> bool:
+    """A road by its name in CARLA ("Town04") stays one."""
+    try:
+        return is_town(scope.fill(element.get("filepath") or ""))
+    except ExpressionError:
+        return False
 
 
 def _absolute(path: Path) -> Path:

@@ -21,9 +21,12 @@ class WrittenScenario:
         Entities that move otherwise than in the input.
     removed : tuple of Unsupported
         Controllers and actions that are no longer in the file although they are no motion, with reasons.
+    data : bytes
+        The file's bytes.
     """
 
     path: Path
     sha256: str
     converted: tuple[str, ...]
     removed: tuple[Unsupported, ...]
+    data: bytes

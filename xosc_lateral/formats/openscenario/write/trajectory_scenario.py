@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -54,6 +55,7 @@ def write_trajectory_scenario(
     *,
     provenance: Mapping[str, Any],
     summary: str,
+    save: bool = True,
 ) -> WrittenScenario:
     """Write a scenario in which entities follow trajectories; all else happens when it happened in the run.
 
@@ -71,6 +73,8 @@ def write_trajectory_scenario(
         JSON values: goes into the file as it is.
     summary : str
         A few words of it for the file header's description.
+    save : bool
+        Write it; else the bytes are only handed back.
 
     Raises
     ------
@@ -87,6 +91,8 @@ def write_trajectory_scenario(
     check_convertible(root, scenario, motion)
     scope = global_scope(scenario)
     pulled = _trailers(scenario, motion)
+    if scenario.header.is_left_handed:
+        trajectories = {name: _mirrored(path) for name, path in trajectories.items()}
     moving = {
         entity.name: _Moving(entity, trajectories[entity.name], motion)
         for entity in motion.entities
@@ -102,8 +108,9 @@ def write_trajectory_scenario(
     relocate(root, scenario, output, scope)
     mark(root, provenance, summary)
     data = build.document(root)
-    write_atomically(output, data)
-    return WrittenScenario(output, hashlib.sha256(data).hexdigest(), tuple(moving), tuple(removed))
+    if save:
+        write_atomically(output, data)
+    return WrittenScenario(output, hashlib.sha256(data).hexdigest(), tuple(moving), tuple(removed), data)
 
 
 class _Moving:
@@ -309,6 +316,11 @@ def _dropped(scenario: Scenario, motion: NominalMotion, moving: Mapping[str, _Mo
 
 def _child(parent: etree._Element, tag: str) -> etree._Element:
     return next(element for element in parent if isinstance(element.tag, str) and local_name(element) == tag)
+
+
+def _mirrored(path: Trajectory) -> Trajectory:
+    """In the left-handed coordinates of a scenario written for CARLA."""
+    return replace(path, y=-path.y, heading=-path.heading, pitch=-path.pitch)
 
 
 def _wrapped(angle: FloatArray) -> FloatArray:

@@ -1,0 +1,54 @@
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pandas as pd
+import pytest
+
+from tests.baselines.made_runs import smooth_runs
+from xosc_lateral.cli import main
+
+
+@pytest.fixture(scope="module")
+def table(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("board") / "drives.parquet"
+    runs = smooth_runs(24, 45.0)
+    frames = [
+        pd.DataFrame({"drive": run.drive, "time": run.time, "offset": run.offset, "lane_width": 3.75, "speed": 30.0})
+        for run in runs
+    ]
+    pd.concat(frames).to_parquet(path)
+    return path
+
+
+def test_a_board_is_written_for_machines_documents_and_people(
+    table: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    words = ["benchmark", "realism", str(table), "-o", str(tmp_path / "out"), "--no-classify", "--resamples", "10"]
+    assert main([*words, "--model", "lane-centre", "--model", "gaussian-process", "-p", "motorway", "--json"]) == 0
+    said = json.loads(capsys.readouterr().out)
+    written = json.loads((tmp_path / "out" / "board.json").read_text())
+    assert said == written
+    assert [one["name"] for one in written["models"]] == ["gaussian-process", "profile motorway", "lane-centre"]
+    assert "not fitted on these drives" in written["models"][1]["departures"]
+    numbers = written["models"][0]["numbers"]
+    assert sum(one["ranked"] for one in numbers.values()) == 5
+    assert all(one["floor"] is not None for one in numbers.values())
+    document = (tmp_path / "out" / "board.md").read_text()
+    assert "| 1 | Gaussian process |" in document and "Rasmussen" in document
+    page = (tmp_path / "out" / "board.html").read_text()
+    assert page.count("<svg") == 3 and "Board of in-lane realism" in page
+
+
+def test_an_unknown_model_is_wrong_usage(table: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["benchmark", "realism", str(table), "--model", "magic"]) == 2
+    assert "magic" in capsys.readouterr().err
+
+
+def test_a_table_with_too_little_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    run = smooth_runs(1, 30.0)[0]
+    path = tmp_path / "short.csv"
+    pd.DataFrame({"time": run.time, "offset": run.offset, "lane_width": 3.75, "speed": 30.0}).to_csv(path, index=False)
+    assert main(["benchmark", "realism", str(path)]) == 1
+    assert "are needed to fit on one half" in capsys.readouterr().err

@@ -1,0 +1,94 @@
+"""Every `--json` is what its schema in the docs says."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+from jsonschema import Draft202012Validator
+
+from xosc_lateral.cli import main
+from xosc_lateral.datasets import simulate_population
+
+SCHEMAS = Path(__file__).resolve().parents[2] / "docs" / "schemas"
+LISTED = (SCHEMAS.parent / "json.md").read_text(encoding="utf-8")
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("json")
+    assert main(["template", "write", "cut-in", "-o", str(folder / "in"), "-q"]) == 0
+    (folder / "in" / "broken.xosc").write_text("<a")
+    simulate_population(3, duration=300.0, seed=2).to_csv(folder / "drives.csv", index=False)
+    return folder
+
+
+def objects(capsys: pytest.CaptureFixture[str], code: int, *words: str) -> list[dict[str, Any]]:
+    capsys.readouterr()
+    assert main([*words, "--json"]) == code
+    return [json.loads(line) for line in capsys.readouterr().out.splitlines()]
+
+
+def holds(value: dict[str, Any], name: str) -> None:
+    Draft202012Validator(json.loads((SCHEMAS / f"{name}.json").read_text(encoding="utf-8"))).validate(value)
+
+
+def test_every_schema_is_one_and_is_listed():
+    found = sorted(SCHEMAS.glob("*.json"))
+    assert len(found) >= 20
+    for path in found:
+        Draft202012Validator.check_schema(json.loads(path.read_text(encoding="utf-8")))
+        assert f"schemas/{path.name}" in LISTED
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("convert", "convert in/cut-in.xosc -o one.xosc --report one.html --time-limit 5"),
+        ("convert", "convert in/cut-in.xosc -o two.xosc --only Ego --profile motorway-refined --time-limit 5"),
+        ("play", "play in/cut-in.xosc -o states.csv --time-limit 1"),
+        ("segments", "segments in/cut-in.xosc"),
+        ("sample", "sample -p motorway-car --duration 20 -o offsets.csv"),
+        ("sample", "sample -p motorway-car --like drives.csv -o snippets.parquet"),
+        ("fit", "fit drives.csv -o fitted.json"),
+        ("evaluate", "evaluate drives.csv -p motorway-car --no-classify"),
+        ("template-list", "template list"),
+        ("template-write", "template write curves -o written --set radius=800"),
+        ("profiles-list", "profiles list"),
+        ("profiles-show", "profiles show motorway-refined"),
+        ("profiles-compare", "profiles compare motorway-car motorway-truck"),
+        ("profiles-add", "profiles add motorway-car --library lib --name mine"),
+        ("profiles-list", "profiles list --library lib"),
+        ("profiles-tag", "profiles tag mine --library lib --tag night --set country=DE"),
+        ("profiles-export", "profiles export mine motorway --library lib -o exported/"),
+        ("profiles-check", "profiles check --library lib"),
+    ],
+    ids=lambda value: value.replace(" ", "_")[:40],
+)
+def test_output_is_what_its_schema_says(name, words, folder, monkeypatch, capsys):
+    monkeypatch.chdir(folder)
+    (value,) = objects(capsys, 0, *words.split())
+    holds(value, name)
+
+
+def test_a_batch_is_json_lines(folder, monkeypatch, capsys):
+    monkeypatch.chdir(folder)
+    *outputs, summary = objects(capsys, 1, "convert", "in", "-o", "batch", "--time-limit", "5")
+    assert len(outputs) == 2
+    for value in outputs:
+        holds(value, "batch-output")
+    holds(summary, "batch-summary")
+    assert (summary["failed"], summary["written"]) == (1, 1)
+
+
+@pytest.mark.parametrize(
+    "words",
+    ["segments in/broken.xosc", "segments nowhere.xosc", "profiles show nobody", "fit in/cut-in.xosc -o x.json"],
+    ids=["broken", "missing", "unknown", "no_table"],
+)
+def test_errors_are_objects(words, folder, monkeypatch, capsys):
+    monkeypatch.chdir(folder)
+    (value,) = objects(capsys, 1, *words.split())
+    holds(value, "error")

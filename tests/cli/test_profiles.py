@@ -1,0 +1,146 @@
+"""A team's library: forty profiles, three broken files, every verb."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+import xosc_lateral as xl
+from xosc_lateral.api.profiles import add_profile
+from xosc_lateral.cli import main
+
+BASES = ("motorway-car", "motorway-truck", "motorway-vehicle-1", "motorway-vehicle-2")
+
+
+@pytest.fixture(scope="module")
+def team(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("team")
+    for number in range(40):
+        base = BASES[number % len(BASES)]
+        country = "FR" if number % 10 == 0 else "DE"
+        metadata = {"driver": f"d{number:02d}", "country": country, "version": "3"}
+        add_profile(base, folder, name=f"driver-{number:02d}", tags=["night"] if number < 5 else [], metadata=metadata)
+    (folder / "half.json").write_text((folder / "driver-00.json").read_text()[:200])
+    (folder / "settings.json").write_text('{"editor": "not ours"}')
+    newer = json.loads((folder / "driver-01.json").read_text()) | {"version": 99}
+    (folder / "newer.json").write_text(json.dumps(newer))
+    return folder
+
+
+def run(capsys: pytest.CaptureFixture[str], *words: object) -> tuple[int, str, str]:
+    code = main([str(word) for word in words])
+    said = capsys.readouterr()
+    return code, said.out, said.err
+
+
+def test_a_listing_survives_broken_files(team, capsys):
+    code, out, _ = run(capsys, "profiles", "list", "--library", team)
+    assert code == 0
+    broken = [line for line in out.splitlines() if line.startswith("!")]
+    assert len(broken) == 3
+    assert [next(name for name in ("half", "newer", "settings") if name in line) for line in broken] == [
+        "half",
+        "newer",
+        "settings",
+    ]
+    assert "newer version" in broken[1]
+    assert len(out.splitlines()) == 40 + 3 + len(xl.list_profiles())
+
+
+@pytest.mark.parametrize(
+    ("options", "count"),
+    [
+        (["--where", "country=fr"], 4),
+        (["--tag", "night"], 5),
+        (["--tag", "night", "--where", "country=FR"], 1),
+        (["--where", "driver=d07"], 1),
+        (["--where", "driver=nobody"], 0),
+    ],
+    ids=["country", "tag", "both", "driver", "nobody"],
+)
+def test_profiles_are_found_by_tag_and_metadata(team, capsys, options, count):
+    code, out, _ = run(capsys, "profiles", "list", "--library", team, "--json", *options)
+    assert code == 0
+    assert len(json.loads(out)["profiles"]) == count
+
+
+def test_an_unknown_field_is_refused_by_name(team, capsys):
+    code, _, err = run(capsys, "profiles", "list", "--library", team, "--where", "colour=red")
+    assert code == 1 and "colour" in err and "country" in err
+    code, _, err = run(capsys, "profiles", "tag", "driver-02", "--library", team, "--set", "colour=red")
+    assert code == 1 and "colour" in err
+
+
+def test_check_names_what_is_broken(team, capsys):
+    code, out, _ = run(capsys, "profiles", "check", "--library", team, "--json")
+    assert code == 1
+    assert {Path(one["path"]).stem for one in json.loads(out)["problems"]} == {"half", "settings", "newer"}
+    assert run(capsys, "profiles", "check")[0] == 0
+
+
+def test_a_profile_goes_by_its_id_everywhere(team, capsys):
+    shown = json.loads(run(capsys, "profiles", "show", "driver-07", "--library", team, "--json")[1])
+    listed = json.loads(run(capsys, "profiles", "list", "--library", team, "--where", "id=driver-07", "--json")[1])
+    (entry,) = listed["profiles"]
+    stored = json.loads((team / "driver-07.json").read_text())
+    assert shown["id"] == entry["id"] == stored["id"] == Path(entry["path"]).stem == "driver-07"
+    assert shown["metadata"]["driver"] == entry["metadata"]["driver"] == stored["metadata"]["driver"] == "d07"
+
+
+def test_tags_and_metadata_change_in_the_file(team, capsys):
+    words = ["--tag", "rain", "--remove", "population", "--set", "vehicle=bus"]
+    assert run(capsys, "profiles", "tag", "driver-20", "--library", team, *words)[0] == 0
+    metadata = xl.read_profile("driver-20", team).metadata
+    assert "rain" in metadata.tags and "population" not in metadata.tags
+    assert (metadata.vehicle, metadata.driver) == ("bus", "d20")
+    code, _, err = run(capsys, "profiles", "tag", "motorway-car", "--tag", "mine")
+    assert code == 1 and "comes with the package" in err
+
+
+def test_a_name_that_hides_a_shipped_one_is_said(tmp_path, capsys):
+    add_profile("motorway-truck", tmp_path, name="motorway-car")
+    code, out, _ = run(capsys, "profiles", "list", "--library", tmp_path)
+    assert code == 0
+    assert "motorway-car.json hides the shipped profile 'motorway-car'" in out
+
+
+def test_adding_does_not_replace_and_export_writes_what_was_there(team, tmp_path, capsys):
+    code, _, err = run(capsys, "profiles", "add", "motorway-car", "--library", team, "--name", "driver-03")
+    assert code == 1 and "there is a profile of this id" in err
+    code, _, _ = run(capsys, "profiles", "export", "driver-03", "driver-04", "--library", team, "-o", f"{tmp_path}/")
+    assert code == 0
+    assert (tmp_path / "driver-03.json").read_bytes() == (team / "driver-03.json").read_bytes()
+
+
+def test_comparing_shows_which_are_alike(team, tmp_path, capsys):
+    names = ["driver-00", "driver-04", "driver-01", "driver-02"]  # the first two are the same driver under two names
+    page = tmp_path / "compared.html"
+    code, out, _ = run(capsys, "profiles", "compare", *names, "--library", team, "--json", "--report", page)
+    assert code == 0
+    compared = json.loads(out)
+    (alike,) = [group for group in compared["alike"] if len(group) > 1]
+    assert set(alike) == {"driver-00", "driver-04"}
+    assert "driver-02" in page.read_text(encoding="utf-8")
+
+
+def test_folders_come_from_the_environment_and_a_configuration_file(team, tmp_path, monkeypatch, capsys):
+    monkeypatch.setenv("XOSC_LATERAL_LIBRARY", str(team))
+    assert xl.read_profile("driver-11").metadata.driver == "d11"
+    monkeypatch.delenv("XOSC_LATERAL_LIBRARY")
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path))
+    settings = tmp_path / "xosc-lateral" / "config.toml"
+    settings.parent.mkdir()
+    settings.write_text(f'library = ["{team.as_posix()}"]\n')
+    assert xl.read_profile("driver-11").metadata.driver == "d11"
+    settings.write_text('libary = ["x"]\n')
+    code, _, err = run(capsys, "profiles", "list")
+    assert code == 1 and "unknown key 'libary'" in err
+
+
+def test_an_unknown_field_in_a_profile_is_refused_by_its_name(team, tmp_path):
+    values = json.loads((team / "driver-00.json").read_text())
+    (tmp_path / "odd.json").write_text(json.dumps(values | {"colour": "red"}))
+    with pytest.raises(xl.FormatError, match="colour"):
+        xl.read_profile(tmp_path / "odd.json")

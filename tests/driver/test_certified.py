@@ -1,0 +1,69 @@
+"""What version 0.1 wrote stays readable and gives the offsets that it gave then."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+import numpy as np
+import pytest
+
+from tests.driver.certified import (
+    FOLDER,
+    KINDS,
+    MODELS,
+    RATE,
+    SEED,
+    START,
+    STEPS_BEFORE_STATE,
+    contexts,
+    rows,
+    segments,
+)
+from xosc_lateral.driver.profile import DriverProfile
+from xosc_lateral.driver.sampling import OffsetSampler
+from xosc_lateral.driver.stream import OffsetStream
+from xosc_lateral.formats.profiles import read_profile
+
+TOLERANCE = 1e-10
+"""Another processor rounds otherwise; an atom is this wide. [m]"""
+
+NAMES = [f"{model}-{kind}" for model in MODELS for kind in KINDS]
+
+
+def load(name: str, what: str) -> dict[str, Any]:
+    content: dict[str, Any] = json.loads((FOLDER / f"{name}.{what}.json").read_text())
+    return content
+
+
+def profile_of(name: str) -> DriverProfile:
+    return read_profile(FOLDER / f"{name}.json")
+
+
+@pytest.mark.parametrize("start", ["free", "started"])
+@pytest.mark.parametrize("name", NAMES)
+def test_profiles_of_0_1_give_the_same_offsets(name: str, start: str) -> None:
+    sampler = OffsetSampler(profile_of(name), SEED)
+    first, second = segments()
+    pieces = [sampler.sample(first, start=START if start == "started" else None), sampler.sample(second)]
+    for piece, expected in zip(pieces, load(name, "offsets")[start], strict=True):
+        np.testing.assert_allclose(piece, expected, rtol=0, atol=TOLERANCE)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_streams_give_the_same_offsets_as_in_0_1(name: str) -> None:
+    stream = OffsetStream(profile_of(name), SEED, rate=RATE, start=START, time=3.0)
+    columns, ahead = rows(contexts(1000, 1.0 / RATE)), stream.preview_steps
+    for context in columns[:ahead]:
+        stream.look(context)
+    offsets = [stream.step(context) for context in columns[ahead:]]
+    expected = load(name, "offsets")
+    np.testing.assert_allclose(offsets, [*expected["stream_before"], *expected["stream_after"]], rtol=0, atol=TOLERANCE)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_streams_saved_by_0_1_go_on_where_they_were(name: str) -> None:
+    stream = OffsetStream.from_dict(profile_of(name), load(name, "state"))
+    columns = rows(contexts(1000, 1.0 / RATE))[stream.preview_steps + STEPS_BEFORE_STATE :]
+    offsets = [stream.step(context) for context in columns]
+    np.testing.assert_allclose(offsets, load(name, "offsets")["stream_after"], rtol=0, atol=TOLERANCE)

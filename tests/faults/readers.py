@@ -1,0 +1,284 @@
+"""Every reader, with a small good file to begin from and the use that is made of what it reads.
+
+A use returns normally only when what came out makes sense; it raises `NonsenseError` when nonsense was let in.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import shutil
+import warnings
+import zipfile
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from tests.formats.made_scenario import ROAD, declarations, entity, parameter, scenario_text, vehicle
+from tests.profiles import simulated_profile
+from xosc_lateral.datasets import simulate_drive
+from xosc_lateral.driver.snippets import sample_free
+from xosc_lateral.drives.cuts import all_runs
+from xosc_lateral.errors import XoscLateralError
+from xosc_lateral.formats.context_table import read_context
+from xosc_lateral.formats.drives import read_drives
+from xosc_lateral.formats.openscenario import read_scenario
+from xosc_lateral.formats.openscenario.distribution import read_distribution
+from xosc_lateral.formats.profiles import list_profiles, profile_bytes, read_profile
+from xosc_lateral.limits import context_range
+from xosc_lateral.pipeline.convert import convert_scenario
+from xosc_lateral.pipeline.jobs import plan_batch
+from xosc_lateral.pipeline.journal import Journal
+from xosc_lateral.pipeline.manifest import MANIFEST, ManifestRow, write_manifest
+from xosc_lateral.pipeline.settings import ConvertSettings
+
+
+class NonsenseError(AssertionError):
+    """Accepted, and it should not have been."""
+
+
+@dataclass(frozen=True)
+class Reader:
+    """A reader under attack.
+
+    Parameters
+    ----------
+    name : str
+    seeds : callable
+        Folder -> good files that are made there; each of them is mutated.
+    use : callable
+        Reads a file and does with it what a user would.
+    share : float
+        Of the mutants that the others get: one that takes long gets fewer.
+    """
+
+    name: str
+    seeds: Callable[[Path], Iterable[Path]]
+    use: Callable[[Path], object]
+    share: float = 1.0
+
+
+def sane(values: object, low: float, high: float, what: str) -> None:
+    """Raise `NonsenseError` for what is not within the limits, or not finite."""
+    array = np.asarray(values, dtype=np.float64)
+    if array.size and not (np.isfinite(array).all() and array.min() >= low and array.max() <= high):
+        raise NonsenseError(f"{what}: {array.min()} to {array.max()}")
+
+
+# ---- tables ----------------------------------------------------------------------------------------------------------
+def _drive_files(folder: Path) -> Iterable[Path]:
+    table = simulate_drive(40.0, 3).table.iloc[::2].round(4)
+    for name, write in (("d.csv", table.to_csv), ("d.csv.gz", table.to_csv)):
+        write(folder / name, index=False)
+        yield folder / name
+    table.to_parquet(folder / "d.parquet")
+    yield folder / "d.parquet"
+
+
+def _use_drives(path: Path) -> None:
+    drives = read_drives(path)
+    runs = all_runs(drives)
+    for run in runs:
+        sane(run.offset, -12.0, 12.0, "offset")
+        sane(run.lane_width, 0.5, 13.0, "lane width")
+        for name, values in run.context.items():
+            believed = context_range(name)
+            known = values[~np.isnan(values)]
+            sane(known, believed.low, believed.high, name)
+
+
+def _context_files(folder: Path) -> Iterable[Path]:
+    rows = ["time,wind_speed,rain,curvature", *(f"{k / 5:.1f},{3 + k % 4},{k % 2},0.00{k % 9}" for k in range(50))]
+    (folder / "c.csv").write_text("\n".join(rows) + "\n")
+    yield folder / "c.csv"
+
+
+def _use_context(path: Path) -> None:
+    for name, (time, values) in read_context(path).items():
+        believed = context_range(name)
+        sane(time, -1e10, 1e10, "time")
+        sane(values, believed.low, believed.high, name)
+
+
+def _request_files(folder: Path) -> Iterable[Path]:
+    _scenario(folder)
+    rows = [
+        "scenario,profile,profile:Ego,seed,variants,parameter:Twice,parameters,tag",
+        'a.xosc,motorway-car,motorway-truck,7,2,31.5,"{""Speed"": ""20""}",x',
+        "a.xosc,,,1,,,,",
+    ]
+    (folder / "r.csv").write_text("\n".join(rows) + "\n")
+    yield folder / "r.csv"
+
+
+def _use_requests(path: Path) -> None:
+    if len(plan_batch([path], path.parent / "out", ConvertSettings())) > 1_000_000:
+        raise NonsenseError("a million jobs")
+
+
+# ---- recordings ------------------------------------------------------------------------------------------------------
+def _levelx_files(folder: Path) -> Iterable[Path]:
+    from tests.formats.test_importers import _exid, _highd
+
+    _highd(folder, 0.4, -0.3)
+    _exid(folder, True)
+    return sorted(folder.glob("*.csv"))
+
+
+def _use_levelx(path: Path) -> None:
+    from xosc_lateral.formats.importers.levelx import import_levelx
+
+    _sane_table(import_levelx(path.with_name(f"{path.name.split('_')[0]}_tracks.csv")).table)
+
+
+def _dlr_files(folder: Path) -> Iterable[Path]:
+    from tests.formats.test_importers import _dlr_recording
+
+    tracks, _ = _dlr_recording(11, per_lane=14)
+    tracks.to_csv(folder / "trajectories_1.csv", index=False, float_format="%.3f")
+    with zipfile.ZipFile(folder / "t.zip", "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.write(folder / "trajectories_1.csv", "x/trajectories/trajectories_1.csv")
+    return [folder / "trajectories_1.csv", folder / "t.zip"]
+
+
+def _use_dlr(path: Path) -> None:
+    from xosc_lateral.formats.importers.dlr_ht import import_dlr_ht
+
+    _sane_table(import_dlr_ht(path).table)
+
+
+MF4_MAP = ("distance_left=LnLeft:cm", "distance_right=LnRight:cm", "speed=VehSpd:km/h")
+
+
+def _mf4_files(folder: Path) -> Iterable[Path]:
+    import asammdf
+
+    fast = np.arange(0, 30, 0.04)
+    sway = 0.3 * np.sin(2 * np.pi * fast / 10)
+    for compression in (0, 2):
+        with asammdf.MDF(version="4.10") as mdf:
+            left, right = 100 * (1.8 - sway), 100 * (1.8 + sway)
+            mdf.append([asammdf.Signal(left, fast, name="LnLeft"), asammdf.Signal(right, fast, name="LnRight")])
+            mdf.append([asammdf.Signal(np.full(len(fast), 108.0), fast, name="VehSpd")])
+            yield Path(mdf.save(folder / f"d{compression}.mf4", overwrite=True, compression=compression))
+
+
+def _use_mf4(path: Path) -> None:
+    from xosc_lateral.formats.importers.mf4 import import_mf4
+
+    _sane_table(import_mf4(path, MF4_MAP).table)
+
+
+def _sane_table(table: object) -> None:
+    for name in table.columns:  # type: ignore[attr-defined]
+        column = table[name]  # type: ignore[index]
+        if column.dtype.kind in "fiu":
+            believed = context_range(name)
+            low, high = (-1e10, 1e10) if name == "time" else (believed.low, believed.high)
+            values = column.to_numpy(dtype=np.float64)
+            sane(values[~np.isnan(values)], low, high, str(name))
+
+
+# ---- profiles --------------------------------------------------------------------------------------------------------
+def _profile_files(folder: Path) -> Iterable[Path]:
+    for number, source in enumerate([*list_profiles()[:3], None]):
+        path = folder / f"p{number}.json"
+        path.write_bytes(profile_bytes(simulated_profile()) if source is None else source.read_bytes())
+        yield path
+
+
+def _use_profile(path: Path) -> None:
+    profile = read_profile(path)
+    for sampled in sample_free(profile, 60.0, 5):
+        sane(sampled.offset, -15.0, 15.0, "offset")
+
+
+# ---- scenarios -------------------------------------------------------------------------------------------------------
+def _scenario(folder: Path) -> Path:
+    shutil.copy(ROAD, folder / "road.xodr")
+    declared = declarations(parameter("Speed", "30"), parameter("Twice", "${$Speed * 2}"))
+    text = scenario_text(parameters=declared, entities=entity("Ego", vehicle(speed="$Twice")))
+    (folder / "a.xosc").write_text(text.replace('value="33"', 'value="$Speed"'))
+    return folder / "a.xosc"
+
+
+def _scenario_files(folder: Path) -> Iterable[Path]:
+    return [_scenario(folder), folder / "road.xodr"]
+
+
+def _use_scenario(path: Path) -> None:
+    settings = ConvertSettings(profile="motorway-car", time_limit=5.0, step=0.05)
+    convert_scenario(path.with_name("a.xosc"), path.with_name("out.xosc"), settings)
+    read_scenario(path.with_name("out.xosc"))
+
+
+def _distribution_files(folder: Path) -> Iterable[Path]:
+    _scenario(folder)
+    bounds = '<Range lowerLimit="20" upperLimit="30"/>'
+    parts = {
+        "Deterministic": '<DeterministicSingleParameterDistribution parameterName="Speed">'
+        f'<DistributionRange stepWidth="2.5">{bounds}</DistributionRange></DeterministicSingleParameterDistribution>',
+        'Stochastic numberOfTestRuns="9" randomSeed="3"': '<StochasticDistribution parameterName="Speed">'
+        f'<NormalDistribution expectedValue="25" variance="4">{bounds}</NormalDistribution></StochasticDistribution>',
+    }
+    for name, content in parts.items():
+        path = folder / f"{name[:3]}.xosc"
+        path.write_text(
+            '<?xml version="1.0"?><OpenSCENARIO><FileHeader revMajor="1" revMinor="1" date="2024-01-01T00:00:00" '
+            'author="a" description="d"/><ParameterValueDistribution><ScenarioFile filepath="a.xosc"/>'
+            f"<{name}>{content}</{name.split()[0]}></ParameterValueDistribution></OpenSCENARIO>"
+        )
+        yield path
+
+
+def _use_distribution(path: Path) -> None:
+    count = sum(1 for _ in read_distribution(path).parameter_sets(1))
+    if count > 1_000_000:
+        raise NonsenseError(f"{count} parameter sets")
+
+
+# ---- what a batch leaves ---------------------------------------------------------------------------------------------
+def _row(number: int) -> ManifestRow:
+    return ManifestRow(f"{number}.xosc", "a.xosc", "ab" * 32, number, 1, "auto", {"p": "1"}, "cd" * 32, "0.1.0")
+
+
+def _state_files(folder: Path) -> Iterable[Path]:
+    write_manifest((_row(number) for number in range(20)), folder / MANIFEST)
+    lines = [json.dumps({"row": _row(number).to_dict(), "seconds": 0.5}) for number in range(20)]
+    (folder / "journal.jsonl").write_text("\n".join(lines) + "\n")
+    return [folder / MANIFEST, folder / "journal.jsonl"]
+
+
+def _use_state(path: Path) -> None:
+    said: list[str] = []
+    with Journal(path.parent, path.with_name("journal.jsonl"), said.append) as journal:
+        for output in journal:
+            if not math.isfinite(journal.seconds(output)) or not isinstance(journal.row(output), ManifestRow):
+                raise NonsenseError(output)
+
+
+READERS = (
+    Reader("drives", _drive_files, _use_drives),
+    Reader("context", _context_files, _use_context),
+    Reader("requests", _request_files, _use_requests),
+    Reader("levelx", _levelx_files, _use_levelx),
+    Reader("dlr", _dlr_files, _use_dlr, 0.1),
+    Reader("mf4", _mf4_files, _use_mf4),
+    Reader("profile", _profile_files, _use_profile),
+    Reader("scenario", _scenario_files, _use_scenario),
+    Reader("distribution", _distribution_files, _use_distribution),
+    Reader("state", _state_files, _use_state),
+)
+
+
+def refusal_of(use: Callable[[Path], object], path: Path) -> str:
+    """The line that a reader refuses a file with; empty if it takes it. Anything else comes through."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        try:
+            use(path)
+        except XoscLateralError as error:
+            return str(error)
+    return ""

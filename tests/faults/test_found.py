@@ -1,0 +1,120 @@
+"""What was found once: through the command line, as a user meets it."""
+
+from __future__ import annotations
+
+import gzip
+import json
+import os
+import re
+from pathlib import Path
+
+import pytest
+
+from tests.formats.made_scenario import scenario_text, write_scenario
+from tests.profiles import simulated_profile
+from xosc_lateral.cli import main
+from xosc_lateral.datasets import simulate_drive
+from xosc_lateral.driver.stream import OffsetStream
+from xosc_lateral.formats.profiles import profile_bytes
+
+
+@pytest.fixture
+def drive(tmp_path: Path) -> Path:
+    simulate_drive(60.0, 3).table.to_csv(tmp_path / "drive.csv", index=False)
+    return tmp_path / "drive.csv"
+
+
+@pytest.fixture
+def profile(tmp_path: Path) -> Path:
+    (tmp_path / "mine.json").write_bytes(profile_bytes(simulated_profile()))
+    return tmp_path / "mine.json"
+
+
+def refused(arguments: list[object], capsys: pytest.CaptureFixture[str]) -> str:
+    """The one line that a command is refused with."""
+    assert main([str(argument) for argument in arguments]) == 1
+    line = capsys.readouterr().err
+    assert line.startswith("xosc-lateral: ") and line.count("\n") == 1
+    return line
+
+
+def test_a_profile_that_leaves_the_lane_by_kilometres_is_refused(profile, tmp_path, capsys):
+    values = json.loads(profile.read_text())
+    text = json.dumps(values)
+    damping = re.search(r'"damping": \[([^]]*)\]', text)
+    assert damping is not None
+    wild = ", ".join(str(1e6 * float(value)) for value in damping[1].split(","))
+    profile.write_text(text.replace(damping[1], wild))
+    line = refused(["sample", "-p", profile, "--duration", 60, "--seed", 1, "-o", tmp_path / "o.csv"], capsys)
+    assert "mine.json" in line and "at most 1.5" in line
+    assert not (tmp_path / "o.csv").exists()
+
+
+@pytest.mark.parametrize("option", ["--profile", "--like", "--context"])
+def test_a_device_is_no_input(option, profile, tmp_path, capsys):
+    given = ["-p", profile, option, "/dev/zero"] if option != "--profile" else ["-p", "/dev/zero", "--duration", 10]
+    line = refused(["sample", *given, "--seed", 1, "-o", tmp_path / "o.csv"], capsys)
+    assert "/dev/zero" in line
+
+
+def test_a_fifo_is_no_input(profile, tmp_path, capsys):
+    os.mkfifo(tmp_path / "f.csv")
+    line = refused(
+        ["sample", "-p", profile, "--like", tmp_path / "f.csv", "--seed", 1, "-o", tmp_path / "o.csv"], capsys
+    )
+    assert "is a fifo, not a file" in line
+
+
+def test_a_gzip_bomb_is_refused_before_it_fills_memory(tmp_path, capsys):
+    bomb = tmp_path / "bomb.csv.gz"
+    bomb.write_bytes(gzip.compress(b"time,offset,lane_width\n" + b"0" * 150_000_000))
+    assert "bomb" in refused(["fit", bomb, "-o", tmp_path / "p.json"], capsys)
+
+
+@pytest.mark.parametrize("link", [os.symlink, os.link], ids=["symbolic link", "hard link"])
+def test_no_output_replaces_the_profile_that_it_was_made_with(link, profile, tmp_path, capsys):
+    scenario = write_scenario(tmp_path / "s", scenario_text())
+    output = tmp_path / "out.xosc"
+    link(profile, output)
+    before = profile.read_bytes()
+    line = refused(["convert", scenario, "-o", output, "--profile", profile, "--force"], capsys)
+    assert "is an input" in line
+    assert profile.read_bytes() == output.read_bytes() == before
+
+
+@pytest.mark.parametrize(("column", "value"), [("lane_width", -3), ("lane_width", 500), ("curvature", "inf")])
+def test_a_context_that_no_road_has_is_refused(column, value, profile, tmp_path, capsys):
+    scenario = write_scenario(tmp_path / "s", scenario_text())
+    (tmp_path / "c.csv").write_text(f"time,{column}\n0,0.001\n1,{value}\n")
+    line = refused(
+        ["convert", scenario, "-o", tmp_path / "o.xosc", "--profile", profile, "--context", tmp_path / "c.csv"], capsys
+    )
+    assert "c.csv" in line and column in line
+
+
+def test_a_stream_refuses_a_bad_sample_and_goes_on_as_if_it_had_not_come():
+    streams = [OffsetStream(simulated_profile(), 3) for _ in range(2)]
+    good = {"speed": 30.0, "lane_width": 3.5}
+    for number in range(20):
+        if number in (0, 7):
+            for bad in ({"speed": 1e9, "lane_width": 3.5}, {"speed": 30.0, "lane_width": float("nan")}):
+                with pytest.raises(ValueError, match="context: "):
+                    streams[0].step(bad)
+        assert streams[0].step(good) == streams[1].step(good)
+
+
+def test_parameters_that_double_each_other_end_in_a_line(tmp_path, capsys):
+    declared = "".join(
+        f'<ParameterDeclaration name="p{k}" parameterType="string" value="${{$p{k - 1}+$p{k - 1}}}"/>'
+        for k in range(1, 25)
+    )
+    first = '<ParameterDeclaration name="p0" parameterType="string" value="abcdefgh"/>'
+    text = scenario_text(parameters=f"<ParameterDeclarations>{first}{declared}</ParameterDeclarations>")
+    line = refused(["segments", write_scenario(tmp_path, text)], capsys)
+    assert "characters of a parameter's value" in line
+
+
+def test_too_little_data_names_the_file(drive, tmp_path, capsys):
+    lines = drive.read_text().splitlines()
+    drive.write_text("\n".join(lines[:60]) + "\n")
+    assert "drive.csv" in refused(["fit", drive, "-o", tmp_path / "p.json"], capsys)

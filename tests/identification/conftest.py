@@ -1,0 +1,31 @@
+"""Simulated drives as the loop gets them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import pytest
+
+from xosc_lateral.datasets.driver_simulator import Driver, simulate_drive
+from xosc_lateral.datasets.plants import Plant
+from xosc_lateral.drives.drive import Drive
+from xosc_lateral.formats.drives import read_drives
+
+
+@pytest.fixture
+def driven(tmp_path: Path) -> Callable[..., list[Drive]]:
+    """Drives as the loop gets them: simulated, written, and read back."""
+
+    def drive(
+        seed: int,
+        effects: Sequence[Plant] = (),
+        duration: float = 3000.0,
+        drop: Sequence[str] = (),
+        driver: Driver | None = None,
+    ) -> list[Drive]:
+        path = tmp_path / f"drive-{seed}.parquet"
+        simulate_drive(duration, seed, effects=effects, drop=drop, driver=driver).table.to_parquet(path)
+        return read_drives([path])
+
+    return drive

@@ -1,0 +1,24 @@
+"""Terms that are selected on some drives, without held-out scores: what most tests ask about."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from xosc_lateral.drives.drive import Drive
+from xosc_lateral.identification.identify import usable_columns
+from xosc_lateral.identification.regression import Coarse
+from xosc_lateral.identification.search import Search
+from xosc_lateral.identification.selection import Selection, select
+from xosc_lateral.identification.timeline import join_drives
+
+
+def selected(drives: Sequence[Drive], excluded: Sequence[str] = ()) -> Selection:
+    coarse = Coarse.of(join_drives(drives))
+    columns, _, _ = usable_columns(coarse.timeline, excluded)
+    return select(Search.over(coarse, columns, np.random.SeedSequence(1)))
+
+
+def named(selection: Selection) -> set[tuple[str, tuple[str, ...]]]:
+    return {(one.term.kind, tuple(sorted(one.term.columns))) for one in selection.accepted}

@@ -1,0 +1,61 @@
+"""The index of a batch: what needs attention comes first, and nothing is said of outputs that there are none of."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from xml.etree import ElementTree
+
+import pytest
+
+from tests.report.made_enriched import made_enriched
+from xosc_lateral.report.batch import BatchEntry, batch_page
+from xosc_lateral.report.thumbnail import thumbnail
+
+CALM = BatchEntry("calm.xosc", "calm.xosc", "calm.html", "calm.svg", 2, 3, 40.0, 0.2, 2.0, 1.9, (), "")
+
+
+@pytest.fixture
+def page() -> str:
+    entries = [
+        CALM,
+        replace(CALM, output="warned.xosc", page="warned.html", warnings=("one", "two <b>")),
+        replace(CALM, output="broken.xosc", page="", thumbnail="", error="broken.xosc:3: no road"),
+        replace(CALM, output="touching.xosc", page="touching.html", gap_after=0.0),
+        replace(CALM, output="touching_before.xosc", page="tb.html", gap_before=0.0, gap_after=0.0),
+    ]
+    return batch_page(entries, "out")
+
+
+def test_failures_come_first_then_contacts_then_warnings(page):
+    outputs = re.findall(r"[a-z_]+\.xosc(?=<)", page)
+    assert outputs[:5] == ["broken.xosc", "touching.xosc", "warned.xosc", "calm.xosc", "touching_before.xosc"]
+
+
+def test_only_what_needs_attention_is_marked(page):
+    assert page.count('<tr class="bad">') == 2
+
+
+def test_a_failed_output_has_its_reason_and_no_link_or_picture(page):
+    row = page.split("broken.xosc", 1)[1].split("</tr>")[0]
+    assert "failed: broken.xosc:3: no road" in row
+    assert "<img" not in page.split('<tr class="bad">')[1].split("</tr>")[0]
+
+
+def test_warnings_are_escaped(page):
+    assert "two &lt;b&gt;" in page
+
+
+def test_a_thumbnail_is_a_picture_of_every_path(tmp_path):
+    enriched = made_enriched(tmp_path)
+    drawn = ElementTree.fromstring(thumbnail(enriched))
+    lines = [each for each in drawn if each.tag.endswith("polyline")]
+    assert len(lines) == 3
+    points = [tuple(map(float, point.split(","))) for line in lines for point in line.get("points").split()]
+    assert all(0 <= x <= 200 and 0 <= y <= 64 for x, y in points)
+    assert thumbnail(enriched) == thumbnail(enriched)
+
+
+def test_a_thumbnail_of_nothing_is_empty(tmp_path):
+    enriched = made_enriched(tmp_path)
+    assert len(ElementTree.fromstring(thumbnail(replace(enriched, entities=())))) == 0

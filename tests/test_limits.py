@@ -1,0 +1,25 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from xosc_lateral.limits import CONTEXT_RANGES, FILE_SIZE, limits_table
+from xosc_lateral.segment import CONTEXT_UNITS
+
+DOCS = Path(__file__).resolve().parents[1] / "docs"
+
+
+def test_the_page_of_limits_is_the_table_of_the_module() -> None:
+    assert limits_table() in (DOCS / "limits.md").read_text(encoding="utf-8")
+
+
+def test_every_standard_context_has_a_range() -> None:
+    assert set(CONTEXT_RANGES) == set(CONTEXT_UNITS)
+
+
+@pytest.mark.parametrize(
+    ("value", "words"), [(4000.5, "4000.5 MB, at most 4000 MB"), (1e12, "1000000000000 MB, at most 4000 MB")]
+)
+def test_a_refusal_names_value_and_limit(value: float, words: str) -> None:
+    assert FILE_SIZE.refusal(value) == f"size of an input file: {words}"

@@ -1,0 +1,205 @@
+"""`convert_many`: folders, globs, tables and frames of scenarios; parallel, resumable."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+from xosc_lateral.api.convert import convert_settings
+from xosc_lateral.api.inputs import PathLike, Paths, ProfileLike
+from xosc_lateral.api.result import Result
+from xosc_lateral.errors import FormatError
+from xosc_lateral.formats.targets import claim, folder_target
+from xosc_lateral.limits import JOB_MEMORY, JOB_TIMEOUT
+from xosc_lateral.pipeline.batch import Outcome
+from xosc_lateral.pipeline.batch import convert_many as outcomes_of
+from xosc_lateral.pipeline.guard import JobLimits
+from xosc_lateral.pipeline.jobs import Batch, plan_batch
+from xosc_lateral.pipeline.progress import Display, Summary, follow
+from xosc_lateral.pipeline.reports import write_batch_index
+from xosc_lateral.pipeline.request import frame_requests
+from xosc_lateral.pipeline.settings import AUTO, TIME_LIMIT
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    ScenariosLike = PathLike | pd.DataFrame | Sequence[PathLike]
+
+
+def convert_many(
+    scenarios: ScenariosLike,
+    output: PathLike,
+    *,
+    profile: ProfileLike = AUTO,
+    entity: Mapping[str, ProfileLike] | None = None,
+    only: Collection[str] | None = None,
+    seed: int = 0,
+    variants: int = 1,
+    report: PathLike | None = None,
+    context: PathLike | None = None,
+    parameters: Mapping[str, object] | None = None,
+    mode: Literal["trajectory", "lane-offset"] = "trajectory",
+    library: Paths = (),
+    allow: Paths = (),
+    road: PathLike | None = None,
+    road_path: Paths = (),
+    attempts: int = 1,
+    time_limit: float = TIME_LIMIT,
+    strict: bool = False,
+    workers: int = 1,
+    cluster: str | None = None,
+    job_timeout: float = JOB_TIMEOUT.value,
+    job_memory: float = JOB_MEMORY.value,
+    force: bool = False,
+    show: Literal["auto", "quiet", "json", "nothing"] = "nothing",
+    on_outcome: Callable[[Mapping[str, Any]], None] | None = None,
+) -> BatchResult:
+    """Convert many scenarios into a folder; what is up to date there already is left alone.
+
+    Parameters
+    ----------
+    scenarios : str, Path, DataFrame, or sequence of paths
+        A file, a folder (searched to the bottom), a glob, a table (CSV, Parquet) or frame with a column `scenario` and
+        if wanted `profile`, `profile:ENTITY`, `seed`, `variants`, `only`, `parameter:NAME`; or several of them.
+    output : str or Path
+        Folder; it mirrors the inputs, and holds `manifest.parquet` at the end.
+    profile, entity, only, seed, context, parameters, mode, library, allow, road, road_path, attempts, time_limit
+        See `convert`.
+    strict : bool
+        A missing vehicle catalog fails a scenario, instead of a note and a usual car.
+    variants : int
+        Outputs per scenario, each with offsets of its own.
+    report : str or Path, optional
+        Folder for a page per output, and an ``index.html`` that lists what needs attention first.
+    workers : int
+        Processes; -1: one per core.
+    cluster : str, optional
+        Address of a dask.distributed scheduler to work on.
+    job_timeout, job_memory : float
+        What one scenario may take; one that takes more fails. [s], [MB]
+    force : bool
+        Replace files that this package did not write.
+    show : {"auto", "quiet", "json", "nothing"}
+        What is said on standard error meanwhile.
+    on_outcome : callable, optional
+        Told each output's row of the manifest as it comes, with `state` and `seconds`.
+
+    Raises
+    ------
+    FormatError
+        An input that is not there or holds no scenario; two inputs with one output.
+    """
+    settings = convert_settings(
+        profile=profile,
+        entity=entity,
+        only=only,
+        seed=seed,
+        context=context,
+        parameters=parameters,
+        mode=mode,
+        library=library,
+        allow=allow,
+        road=road,
+        road_path=road_path,
+        attempts=attempts,
+        time_limit=time_limit,
+        strict=strict,
+    )
+    if isinstance(scenarios, str | Path):
+        inputs: list[Any] = [scenarios]
+    elif isinstance(scenarios, Sequence):
+        inputs = list(scenarios)
+    else:
+        inputs = list(frame_requests(scenarios, settings, variants=variants))
+    batch = plan_batch(inputs, folder_target(output), settings, variants=variants, report=report)
+    if not len(batch):
+        raise FormatError(f"no scenario to convert{_left_out(batch)}", path=", ".join(map(str, inputs[:3])) or output)
+    # A folder in an output's place is that output's failure alone.
+    claim((job.output for job in batch.jobs if not job.output.is_dir()), force=force)
+    limits = JobLimits(job_timeout, job_memory)
+    outcomes = outcomes_of(batch, workers=workers, cluster=cluster, limits=limits, notify=_notifier(show))
+    rows: list[dict[str, Any]] = []
+    summary = follow(_noted(outcomes, rows, on_outcome), len(batch), Display(show))
+    index = None if report is None else write_batch_index(batch, Path(report))
+    return BatchResult(batch, summary, sorted(rows, key=lambda row: str(row["output"])), index)
+
+
+def _noted(
+    outcomes: Iterator[Outcome], rows: list[dict[str, Any]], tell: Callable[[Mapping[str, Any]], None] | None
+) -> Iterator[Outcome]:
+    for outcome in outcomes:
+        row = {"state": outcome.state.value, "seconds": round(outcome.seconds, 4), **outcome.row.to_dict()}
+        rows.append(row)
+        if tell is not None:
+            tell(row)
+        yield outcome
+
+
+def _notifier(show: str) -> Callable[[str], None] | None:
+    import sys
+
+    return None if show == "nothing" else lambda line: print(f"xosc-lateral: {line}", file=sys.stderr, flush=True)
+
+
+class BatchResult(Result):
+    """What became of a batch."""
+
+    __slots__ = ("_batch", "_rows", "_summary", "report")
+
+    def __init__(self, batch: Batch, summary: Summary, rows: list[dict[str, Any]], report: Path | None) -> None:
+        self._batch, self._summary, self._rows = batch, summary, rows
+        self.report = report
+        """Index of the pages, if there are any."""
+
+    @property
+    def folder(self) -> Path:
+        """Of the outputs."""
+        return self._batch.folder
+
+    @property
+    def failed(self) -> int:
+        """Scenarios that could not be converted; `to_frame` says why, in its column `error`."""
+        return self._summary.failed
+
+    @property
+    def with_warnings(self) -> int:
+        """Outputs with at least one warning."""
+        return self._summary.with_warnings
+
+    @property
+    def nobody_enriched(self) -> int:
+        """Outputs in which no entity got offsets."""
+        return sum(self._summary.nobody_enriched.values())
+
+    def headline(self) -> str:
+        """One line."""
+        return f"{self.folder}: {self._summary.text()}"
+
+    def __str__(self) -> str:
+        report = [] if self.report is None else [f"report: {self.report}"]
+        return "\n".join([self.headline() + _left_out(self._batch), *self._summary.remarks(), *report])
+
+    def to_frame(self) -> pd.DataFrame:
+        """One row per output: the manifest's columns, with `state` and `seconds`."""
+        import pandas as pd
+
+        return pd.DataFrame(self._rows)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain values, as ``--json`` prints them."""
+        return {
+            "folder": str(self.folder),
+            "left_out": len(self._batch.left_out),
+            **self._summary.to_dict(),
+            **({} if self.report is None else {"report": str(self.report)}),
+            "outputs": self._rows,
+        }
+
+
+def _left_out(batch: Batch) -> str:
+    from collections import Counter
+
+    kinds = Counter(kind.value for _, kind in batch.left_out)
+    listed = ", ".join(f"{count} {kind}{'s' if count > 1 else ''}" for kind, count in kinds.items())
+    return f"; left out: {listed}" if listed else ""

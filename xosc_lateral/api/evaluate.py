@@ -1,0 +1,134 @@
+"""`evaluate`: how true a profile is to measured drives."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from xosc_lateral.api.convert import REPORT_SUFFIXES
+from xosc_lateral.api.inputs import (
+    DrivesLike,
+    GivenDrives,
+    PathLike,
+    Paths,
+    ProfileLike,
+    given_drives,
+    given_profile,
+    naming,
+)
+from xosc_lateral.api.result import Result
+from xosc_lateral.formats.targets import claim, file_target
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.figure import Figure
+
+    from xosc_lateral.driver.profile import DriverProfile
+    from xosc_lateral.evaluation.scores import ProfileScores
+
+
+def evaluate(
+    profile: ProfileLike,
+    drives: DrivesLike,
+    *,
+    seed: int = 0,
+    classify: bool = True,
+    columns: Mapping[str, str] | None = None,
+    library: Paths = (),
+) -> Evaluation:
+    """Score a profile: the ten metrics, the paper's four evaluations, distances and floors, spectrum, classifier.
+
+    Parameters
+    ----------
+    profile : DriverProfile, path or name
+    drives, columns
+        See `read_drives`.
+    seed : int
+        Same inputs and seed: same numbers.
+    classify : bool
+        Train a classifier to tell sampled from measured (extra `classifier`; a few seconds).
+    library : path or paths
+        Folders with further profiles.
+
+    Raises
+    ------
+    NotEnoughDataError
+        Too little is left after cutting to compare.
+    """
+    from xosc_lateral.drives.cuts import all_runs
+    from xosc_lateral.evaluation.scores import score_profile
+
+    driver = given_profile(profile, library)
+    given = given_drives(drives, columns)
+    with naming(given):
+        scores = score_profile(driver, all_runs(given.drives), seed=seed, classify=classify)
+    return Evaluation(scores, driver, given)
+
+
+class Evaluation(Result):
+    """Scores of a profile on measured drives."""
+
+    __slots__ = ("_given", "_scores", "profile")
+
+    def __init__(self, scores: ProfileScores, profile: DriverProfile, given: GivenDrives) -> None:
+        self._scores, self._given = scores, given
+        self.profile = profile
+
+    @property
+    def ratio(self) -> float:
+        """Mean distance of the ten metrics over the mean floor; 1: as close as real data is to itself. [-]"""
+        return self._scores.snippets.ratio
+
+    @property
+    def worst(self) -> tuple[str, float]:
+        """The block that does worst, and its ratio to the floor; see `to_frame`. [-]"""
+        from xosc_lateral.report.evaluation import worst_block
+
+        return worst_block(self._scores)
+
+    def headline(self) -> str:
+        """One line."""
+        block, ratio = self.worst
+        hours = f"{self._scores.hours:.2f} h of {self._scores.drives} drives"
+        return f"{self.profile.name} on {hours}: worst {block}, {ratio:.2f} times the floor"
+
+    def __str__(self) -> str:
+        from xosc_lateral.report.evaluation import evaluation_text
+
+        return evaluation_text(self._scores, self.profile, self._given.inputs)
+
+    def to_frame(self) -> pd.DataFrame:
+        """One row per metric and snippet length: `seconds`, `metric`, `distance`, `floor`, `ratio`."""
+        import pandas as pd
+
+        rows = [
+            {"seconds": one.seconds, "metric": name, "distance": distance, "floor": one.floor.by_metric[name]}
+            for one in (self._scores.snippets, self._scores.long_snippets)
+            if one is not None
+            for name, distance in one.distances.by_metric.items()
+        ]
+        frame = pd.DataFrame(rows)
+        return frame.assign(ratio=frame["distance"] / frame["floor"])
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain values, as ``--json`` prints them."""
+        from xosc_lateral.report.evaluation import evaluation_record
+
+        return evaluation_record(self._scores, self.profile, self._given.inputs)
+
+    def plot(self) -> Figure:
+        """Violins of the ten metrics, measured beside sampled."""
+        from xosc_lateral.report.evaluation_figures import violin_figure
+
+        return violin_figure(self._scores.evaluations[3])
+
+    def write_report(self, path: PathLike, *, force: bool = False) -> Path:
+        """Write the HTML page."""
+        from xosc_lateral.formats.atomic import write_atomically
+        from xosc_lateral.report.evaluation import evaluation_page
+
+        target = file_target(path, f"{self.profile.name}_evaluation.html", REPORT_SUFFIXES)
+        claim([target], self._given.files, force=force)
+        write_atomically(target, evaluation_page(self._scores, self.profile, self._given.inputs))
+        return target

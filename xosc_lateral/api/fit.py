@@ -1,0 +1,71 @@
+"""`fit`: measured drives into a driver profile; `read_drives`: the drives themselves."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+from xosc_lateral.api.inputs import DrivesLike, given_drives, naming
+
+if TYPE_CHECKING:
+    from xosc_lateral.driver.profile import DriverProfile
+    from xosc_lateral.drives.drive import Drive
+
+
+def read_drives(drives: DrivesLike, columns: Mapping[str, str] | None = None) -> list[Drive]:
+    """Read and clean drive tables.
+
+    Parameters
+    ----------
+    drives : path, DataFrame, Drive, or sequence of them
+        `time` [s]; `distance_left` and `distance_right` [m], or `offset` and `lane_width` [m]; `speed` [m/s] if known;
+        `drive` when there are several; every other numeric column is context.
+    columns : mapping of str to str, optional
+        Standard name -> foreign header, with a unit if need be: ``{"speed": "v_kmh:km/h"}``.
+
+    Raises
+    ------
+    FormatError
+        A column is missing, or its values can't be in the unit meant.
+    NotEnoughDataError
+        No drive of 10 s.
+    """
+    return given_drives(drives, columns).drives
+
+
+def fit(
+    drives: DrivesLike,
+    *,
+    name: str,
+    model: str = "autoregressive",
+    columns: Mapping[str, str] | None = None,
+    source: str = "",
+    licence: str = "",
+    sensor_noise: float | None = None,
+) -> DriverProfile:
+    """Fit a driver profile.
+
+    Parameters
+    ----------
+    drives, columns
+        See `read_drives`.
+    name : str
+        Of the profile.
+    model : str
+        "two-level": the paper's model to the letter; "autoregressive" (or "best"): ours.
+    source, licence : str
+        Of the drives, for the provenance.
+    sensor_noise : float, optional
+        Standard deviation of the sensor's error on the offset, where it is known; else found from the drives. [m]
+
+    Raises
+    ------
+    FormatError, NotEnoughDataError
+    """
+    from xosc_lateral.driver.fitting import fit_profile
+    from xosc_lateral.driver.profile import Provenance
+
+    given = given_drives(drives, columns)
+    known = Provenance(source=source or ", ".join(given.inputs), licence=licence, inputs=dict(given.inputs))
+    with naming(given):
+        return fit_profile(given.drives, name=name, model=model, provenance=known, sensor_noise=sensor_noise)

@@ -1,0 +1,169 @@
+"""`close_loop`: what a profile lacks, found, added and scored held out."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from xosc_lateral.api.inputs import (
+    DrivesLike,
+    GivenDrives,
+    PathLike,
+    Paths,
+    ProfileLike,
+    given_drives,
+    given_profile,
+    naming,
+)
+from xosc_lateral.api.result import Result
+from xosc_lateral.formats.targets import claim, folder_target
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.figure import Figure
+
+    from xosc_lateral.driver.profile import DriverProfile
+    from xosc_lateral.identification.close import LoopResult
+    from xosc_lateral.identification.leftover import Leftover
+
+
+def close_loop(
+    drives: DrivesLike,
+    profile: ProfileLike | None = None,
+    *,
+    seed: int = 0,
+    name: str = "refined",
+    leave_out: Collection[str] = (),
+    columns: Mapping[str, str] | None = None,
+    library: Paths = (),
+    progress: Callable[[float, str], None] | None = None,
+) -> ClosedLoop:
+    """Find what measured drives do and a profile doesn't, trace it to an effect, add it, score it held out.
+
+    Parameters
+    ----------
+    drives, columns
+        See `read_drives`.
+    profile : DriverProfile, path or name, optional
+        To start from; without, one is fitted first.
+    seed : int
+        Same inputs and seed: same result.
+    name : str
+        Of the refined profile.
+    leave_out : collection of str
+        Columns not to look at.
+    library : path or paths
+        Folders with further profiles.
+    progress : callable, optional
+        Told the share that is done, 0 to 1, and what is being done.
+
+    Raises
+    ------
+    NotEnoughDataError
+        Too little road-following is left after cutting.
+    """
+    from xosc_lateral.driver.profile import Provenance
+    from xosc_lateral.identification import close
+    from xosc_lateral.identification.leftover import leftover_of
+
+    base = None if profile is None else given_profile(profile, library)
+    given = given_drives(drives, columns)
+    with naming(given):
+        result = close.close_loop(
+            given.drives,
+            base,
+            seed=seed,
+            name=name,
+            provenance=Provenance(source=", ".join(given.inputs), inputs=dict(given.inputs)),
+            excluded=list(leave_out),
+            progress=progress or (lambda share, what: None),
+        )
+    return ClosedLoop(result, leftover_of(result), given)
+
+
+class ClosedLoop(Result):
+    """What was missing, how sure and how big; the refined profile; the error before and after."""
+
+    __slots__ = ("_given", "_leftover", "_result")
+
+    def __init__(self, result: LoopResult, leftover: Leftover, given: GivenDrives) -> None:
+        self._result, self._leftover, self._given = result, leftover, given
+
+    @property
+    def profile(self) -> DriverProfile:
+        """The refined profile."""
+        return self._result.refined
+
+    @property
+    def base(self) -> DriverProfile:
+        """The profile before."""
+        return self._result.base
+
+    @property
+    def findings(self) -> tuple[str, ...]:
+        """Names of the effects that were found."""
+        return tuple(finding.effect for finding in self._result.findings)
+
+    @property
+    def error_before(self) -> float:
+        """On held-out stretches. [m]"""
+        return self._result.error_before
+
+    @property
+    def error_after(self) -> float:
+        """On held-out stretches. [m]"""
+        return self._result.error_after
+
+    @property
+    def floor(self) -> float:
+        """What the measured drives differ from themselves by. [m]"""
+        return self._result.floor
+
+    def headline(self) -> str:
+        """One line."""
+        found = ", ".join(self.findings) or "nothing found"
+        return f"{found}; error {self.error_before:.4f} -> {self.error_after:.4f} m (floor {self.floor:.4f} m)"
+
+    def __str__(self) -> str:
+        from xosc_lateral.report.loop import loop_text
+
+        return loop_text(self._result, self._leftover)
+
+    def to_frame(self) -> pd.DataFrame:
+        """One row per finding: `effect`, `kind`, `columns`, `lag_s`, `response_s`, `shape`, `size_m`, `p_value`, ..."""
+        import pandas as pd
+
+        names = ["effect", "kind", "columns", "lag_s", "response_s", "shape", "size_m", "p_value"]
+        return pd.DataFrame(self.to_dict()["findings"], columns=[*names, "error_before", "error_after"])
+
+    def to_dict(self) -> dict[str, Any]:
+        """`report.json`: plain values, as ``--json`` prints them."""
+        from xosc_lateral.report.loop_json import finite, loop_record
+
+        record: dict[str, Any] = finite(loop_record(self._result, self._leftover, self._given.files))
+        record["provenance"]["inputs"] = dict(self._given.inputs)
+        return record
+
+    def plot(self) -> Figure:
+        """Residual by context, before and after."""
+        from xosc_lateral.report.loop_figures import residual_figure
+
+        return residual_figure(self._result, self._leftover, "mean")
+
+    def write_report(self, folder: PathLike, *, force: bool = False) -> Path:
+        """Write `report.html` and `report.json` into a folder."""
+        from xosc_lateral.formats.atomic import write_atomically
+        from xosc_lateral.formats.profiles import canonical_json
+        from xosc_lateral.report.loop import loop_page
+
+        target = folder_target(folder)
+        claim(self.report_files(target), self._given.files, force=force)
+        write_atomically(target / "report.json", canonical_json(self.to_dict()) + "\n")
+        write_atomically(target / "report.html", loop_page(self._result, self._leftover, self._given.files))
+        return target
+
+    @staticmethod
+    def report_files(folder: Path) -> tuple[Path, Path]:
+        """Files that `write_report` writes."""
+        return folder / "report.json", folder / "report.html"

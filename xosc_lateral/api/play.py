@@ -1,0 +1,250 @@
+"""`play` and `segments`: a scenario's nominal motion, and where offsets will be sampled."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from xosc_lateral.api.inputs import PathLike, Paths, as_paths, road_search
+from xosc_lateral.api.result import Result
+from xosc_lateral.formats.hashes import parsed_hash
+from xosc_lateral.formats.tables import TABLE_SUFFIXES
+from xosc_lateral.formats.targets import claim, file_target
+from xosc_lateral.motion.segments import SegmentRow
+from xosc_lateral.pipeline.load import Played, play_scenario
+from xosc_lateral.pipeline.segments import scenario_segments
+from xosc_lateral.pipeline.settings import STEP, TIME_LIMIT
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.figure import Figure
+
+PAGE_SUFFIXES = (".html", ".htm")
+RECORDING_SUFFIX = ".mcap"
+
+
+def play(
+    scenario: PathLike,
+    *,
+    step: float = STEP,
+    time_limit: float = TIME_LIMIT,
+    parameters: Mapping[str, object] | None = None,
+    allow: Paths = (),
+    road: PathLike | None = None,
+    road_path: Paths = (),
+    strict: bool = False,
+) -> Playback:
+    """Play a scenario's maneuvers, without offsets.
+
+    Parameters
+    ----------
+    scenario : str or Path
+        Maneuver-based OpenSCENARIO file.
+    step : float
+        Length of a frame. [s]
+    time_limit : float
+        End of a scenario that does not end by itself. [s]
+    parameters : mapping, optional
+        Scenario parameters that replace those declared.
+    allow : path or paths
+        Folders, besides those around the scenario, that its road and catalogs may lie in.
+    road : str or Path, optional
+        The road, whatever the scenario says.
+    road_path : path or paths
+        Folders to look for a road by its name ("Town04").
+    strict : bool
+        A missing vehicle catalog is an error, instead of a note and a usual car.
+
+    Raises
+    ------
+    FormatError, PlaybackError
+        With file, line and element.
+    """
+    values = {name: str(value) for name, value in (parameters or {}).items()}
+    return Playback(
+        play_scenario(
+            Path(scenario),
+            parameters=values,
+            step=step,
+            time_limit=time_limit,
+            allowed=as_paths(allow),
+            roads=road_search(road, road_path),
+            strict=strict,
+        )
+    )
+
+
+def segments(
+    scenario: PathLike | Playback,
+    *,
+    step: float = STEP,
+    time_limit: float = TIME_LIMIT,
+    parameters: Mapping[str, object] | None = None,
+    allow: Paths = (),
+) -> Segments:
+    """Road-following stretches of every entity, and why the rest is none; see `play`."""
+    played = (
+        scenario
+        if isinstance(scenario, Playback)
+        else play(scenario, step=step, time_limit=time_limit, parameters=parameters, allow=allow)
+    )
+    return Segments(scenario_segments(played._played))
+
+
+class Playback(Result):
+    """Nominal motion: what the maneuvers alone give."""
+
+    __slots__ = ("_played",)
+
+    def __init__(self, played: Played) -> None:
+        self._played = played
+
+    @property
+    def scenario(self) -> Path:
+        """The file."""
+        return self._played.scenario.path
+
+    @property
+    def entities(self) -> tuple[str, ...]:
+        """In the scenario's order."""
+        return tuple(entity.name for entity in self._played.motion.entities)
+
+    @property
+    def end_time(self) -> float:
+        """[s]"""
+        return self._played.motion.end_time
+
+    @property
+    def ended_by(self) -> str:
+        """What ended the run: its stop trigger, the time limit, ..."""
+        return self._played.motion.ended_by
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What was not played, or not as written: a line each, with file and line."""
+        return tuple(map(str, self._played.motion.notes))
+
+    def headline(self) -> str:
+        """One line."""
+        noted = f", {len(self.notes)} notes" if self.notes else ""
+        ended = f"ended by: {self.ended_by}"
+        return f"{self.scenario.name}: {len(self.entities)} entities, {self.end_time:.2f} s ({ended}){noted}"
+
+    def __str__(self) -> str:
+        return "\n".join([self.headline(), *(f"  note: {note}" for note in self.notes)])
+
+    def to_frame(self) -> pd.DataFrame:
+        """One row per entity and step: `time,name,x,y,z,h,speed,road,lane,offset_t,s`, SI units."""
+        from xosc_lateral.formats.states import states_frame
+
+        return states_frame(self._played.motion, self._played.network)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain values, as ``--json`` prints them."""
+        return {
+            "scenario": str(self.scenario),
+            "end_time": round(self.end_time, 6),
+            "ended_by": self.ended_by,
+            "step": self._played.motion.step,
+            "entities": list(self.entities),
+            "notes": list(self.notes),
+            "provenance": self._provenance(),
+        }
+
+    def plot(self) -> Figure | None:
+        """Paths across the road over along it; None when no entity is on a road."""
+        from xosc_lateral.enrich.enrich import enrich
+        from xosc_lateral.report.scenario_figures import paths_stretched
+
+        return paths_stretched(enrich(self._played.motion, self._played.network, {}, seed=0))
+
+    def csv(self) -> str:
+        """The table as text."""
+        from xosc_lateral.formats.states import states_csv
+
+        return states_csv(self._played.motion, self._played.network)
+
+    def write(self, path: PathLike, *, force: bool = False) -> Path:
+        """Write the table: ``.csv``, ``.csv.gz`` or ``.parquet``."""
+        from xosc_lateral.formats.output_tables import write_csv, write_frame
+
+        target = file_target(path, f"{self.scenario.stem}.csv", TABLE_SUFFIXES)
+        claim([target], self._inputs(), force=force)
+        if target.name.lower().endswith(".parquet"):
+            write_frame(self.to_frame(), target, self._provenance())
+        else:
+            write_csv(self.csv(), target, self._provenance())
+        return target
+
+    def page(self) -> str:
+        """A self-contained HTML page that plays the scenario."""
+        from xosc_lateral.report.view import view_page
+
+        motion, network = self._played.motion, self._played.network
+        return view_page(motion, network, source=self.scenario.name, provenance=self._provenance())
+
+    def write_page(self, path: PathLike, *, force: bool = False) -> Path:
+        """Write the page that plays the scenario, or a recording of it for Foxglove and others.
+
+        Parameters
+        ----------
+        path : str or Path
+            ``.html``: the page; ``.mcap``: the recording (extra `mcap`). Into a folder as ``NAME_view.html``.
+        force : bool
+            Replace a file that this package did not write.
+        """
+        from xosc_lateral.formats.atomic import write_atomically
+
+        target = file_target(path, f"{self.scenario.stem}_view.html", (*PAGE_SUFFIXES, RECORDING_SUFFIX))
+        claim([target], self._inputs(), force=force)
+        if target.name.lower().endswith(RECORDING_SUFFIX):
+            from xosc_lateral.report.recording import scene_recording
+
+            return write_atomically(target, scene_recording(self._played.motion, self._played.network))
+        return write_atomically(target, self.page())
+
+    def _inputs(self) -> list[Path]:
+        scenario = self._played.scenario
+        return [*scenario.input_files, *([scenario.road_file] if scenario.road_file else [])]
+
+    def _provenance(self) -> dict[str, Any]:
+        return {"inputs": {path.name: parsed_hash(path) for path in self._inputs()}}
+
+
+class Segments(Result):
+    """Stretches of all entities, road-following or not."""
+
+    __slots__ = ("_rows",)
+
+    def __init__(self, rows: tuple[SegmentRow, ...]) -> None:
+        self._rows = rows
+
+    def __len__(self) -> int:
+        return len(self._rows)
+
+    def headline(self) -> str:
+        """One line."""
+        following = [row for row in self._rows if row.road_following]
+        seconds = sum(row.end - row.start for row in following)
+        entities = len({row.entity for row in self._rows})
+        return f"{len(following)} road-following segments of {entities} entities, {seconds:.1f} s"
+
+    def __str__(self) -> str:
+        from xosc_lateral.report.segments import as_text
+
+        return as_text(self._rows)
+
+    def to_frame(self) -> pd.DataFrame:
+        """One row per stretch: `entity`, `start`, `end` [s], `road_following`, `why`, `road`, `lane`."""
+        import pandas as pd
+
+        names = ("entity", "start", "end", "road_following", "why", "road", "lane")
+        return pd.DataFrame([[getattr(row, name) for name in names] for row in self._rows], columns=list(names))
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain values, as ``--json`` prints them."""
+        from dataclasses import asdict
+
+        rows = [asdict(row) for row in self._rows]
+        return {"segments": [row | {"start": round(row["start"], 6), "end": round(row["end"], 6)} for row in rows]}

@@ -1,0 +1,266 @@
+"""`read_profile`, `write_profile`, `list_profiles`, `compare_profiles`: the library of drivers."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from xosc_lateral.api.inputs import PathLike, Paths, ProfileLike, as_paths, given_profile
+from xosc_lateral.api.result import Result
+from xosc_lateral.errors import FormatError
+from xosc_lateral.formats.targets import claim, file_target, folder_target
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.figure import Figure
+
+    from xosc_lateral.driver.profile import DriverProfile
+    from xosc_lateral.formats.library import Entry
+    from xosc_lateral.report.comparison import Compared
+
+PROFILE_SUFFIXES = (".json",)
+
+
+def read_profile(profile: PathLike, library: Paths = ()) -> DriverProfile:
+    """Read a profile by its path or its name.
+
+    Parameters
+    ----------
+    profile : str or Path
+        ``motorway-car`` or ``somewhere/mine.json``. A name is looked up in `library`, in the folders of
+        ``XOSC_LATERAL_LIBRARY`` and of the configuration file, among those of plug-ins and those shipped.
+    library : path or paths
+        Folders with further profiles.
+
+    Raises
+    ------
+    DriverProfileError
+        No profile of that name; lists those that are there.
+    FormatError
+        The file is not there, or no valid profile.
+    """
+    return given_profile(profile, library)
+
+
+def write_profile(profile: DriverProfile, path: PathLike, *, force: bool = False) -> Path:
+    """Write a profile file; in a folder it is called after the profile. Same profile, same bytes.
+
+    Raises
+    ------
+    FormatError
+        The file is there and no profile that this package wrote.
+    """
+    from xosc_lateral.formats import profiles
+
+    target = file_target(path, f"{profile.name}.json", PROFILE_SUFFIXES)
+    claim([target], force=force)
+    profiles.write_profile(profile, target)
+    return target
+
+
+def write_card(profile: DriverProfile, path: PathLike, *, force: bool = False) -> Path:
+    """Write a profile's card as a page: what it does, where it comes from, how true it is."""
+    from xosc_lateral.formats.atomic import write_atomically
+    from xosc_lateral.report.card_page import card_page
+
+    target = file_target(path, f"{profile.name}.html", (".html", ".htm"))
+    claim([target], force=force)
+    return write_atomically(target, card_page(profile))
+
+
+def list_profiles(
+    library: Paths = (), *, tags: Collection[str] = (), where: Mapping[str, str] | None = None
+) -> ProfileList:
+    """Everything in the library: `library`, the environment's and the configuration's folders, shipped, plug-ins'.
+
+    A file that is no valid profile is listed with what is wrong with it.
+
+    Parameters
+    ----------
+    library : path or paths
+        Folders with further profiles.
+    tags : collection of str
+        List only profiles that carry all of them.
+    where : mapping of str to str, optional
+        List only profiles with this metadata: ``{"country": "DE"}``.
+    """
+    from xosc_lateral.formats.library import matching, read_library
+
+    entries = read_library(as_paths(library))
+    return ProfileList(matching(entries, tags, where or {}) if tags or where else entries)
+
+
+def add_profile(
+    profile: ProfileLike,
+    library: PathLike,
+    *,
+    name: str | None = None,
+    tags: Collection[str] = (),
+    metadata: Mapping[str, str] | None = None,
+    force: bool = False,
+) -> Path:
+    """Put a profile into a library's folder, under its id, with tags and metadata.
+
+    Parameters
+    ----------
+    profile : DriverProfile, path or name
+    library : str or Path
+        Folder; made if it is missing.
+    name : str, optional
+        Its id there; else the one that it has.
+    tags : collection of str
+        Added to those that it has.
+    metadata : mapping of str to str, optional
+        `version`, `driver`, `vehicle`, `road`, `country`, `date`, `licence`.
+    force : bool
+        Replace a profile of that id.
+
+    Raises
+    ------
+    FormatError
+        There is a profile of that id.
+    """
+    from xosc_lateral.formats import profiles
+    from xosc_lateral.formats.library import described
+
+    folders = [library] if Path(library).is_dir() else []
+    added = described(given_profile(profile, folders), name=name, add_tags=tags, fields=metadata)
+    target = folder_target(library) / f"{added.name}.json"
+    if target.exists() and not force:
+        raise FormatError("there is a profile of this id; --name gives it another, --force replaces it", path=target)
+    profiles.write_profile(added, target)
+    return target
+
+
+def tag_profile(
+    name: PathLike,
+    library: Paths = (),
+    *,
+    add: Collection[str] = (),
+    remove: Collection[str] = (),
+    metadata: Mapping[str, str] | None = None,
+) -> DriverProfile:
+    """Change tags and metadata of a profile in its file.
+
+    Raises
+    ------
+    FormatError
+        It comes with the package, or can't be read.
+    """
+    from xosc_lateral.formats import profiles
+    from xosc_lateral.formats.library import described, own_path
+    from xosc_lateral.formats.source import edit_in_place
+
+    path = own_path(str(name), as_paths(library))
+    changed = described(profiles.read_profile(path), add_tags=add, remove_tags=remove, fields=metadata)
+    edit_in_place(path)
+    profiles.write_profile(changed, path)
+    return changed
+
+
+def compare_profiles(*profiles: ProfileLike, seed: int = 0, library: Paths = ()) -> ProfileComparison:
+    """How profiles differ in even traffic: a summary of each, and the distance of each from each.
+
+    Parameters
+    ----------
+    profiles : DriverProfile, path or name
+        Two or more.
+    seed : int
+        Of the free runs that are compared.
+    library : path or paths
+        Folders with further profiles.
+    """
+    from xosc_lateral.report.comparison import compare
+
+    if len(profiles) < 2:
+        raise ValueError(f"{len(profiles)} profile to compare, two are needed")
+    return ProfileComparison(compare([given_profile(profile, library) for profile in profiles], seed))
+
+
+class ProfileList(Result):
+    """Profiles of a library; those that can't be read among them, with the reason."""
+
+    __slots__ = ("entries",)
+
+    def __init__(self, entries: Sequence[Entry]) -> None:
+        self.entries = tuple(entries)
+
+    def __iter__(self) -> Iterator[Entry]:
+        return iter(self.entries)
+
+    def __len__(self) -> int:
+        return len(self.entries)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Of those that can be read, each once."""
+        return tuple(dict.fromkeys(entry.name for entry in self.entries if entry.profile is not None))
+
+    def headline(self) -> str:
+        """One line."""
+        broken = sum(entry.profile is None for entry in self.entries)
+        return f"{len(self.names)} profiles{f', {broken} that can not be read' if broken else ''}"
+
+    def __str__(self) -> str:
+        from xosc_lateral.report.cards import list_text
+
+        return list_text(self.entries)
+
+    def to_frame(self) -> pd.DataFrame:
+        """One row per file."""
+        import pandas as pd
+
+        return pd.DataFrame(self.to_dict()["profiles"])
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain values, as ``--json`` prints them."""
+        from xosc_lateral.report.cards import list_record
+
+        return {"profiles": list_record(self.entries)}
+
+
+class ProfileComparison(Result):
+    """Profiles side by side."""
+
+    __slots__ = ("_compared",)
+
+    def __init__(self, compared: Compared) -> None:
+        self._compared = compared
+
+    def headline(self) -> str:
+        """One line."""
+        return ", ".join(profile.name for profile in self._compared.profiles)
+
+    def __str__(self) -> str:
+        from xosc_lateral.report.comparison import comparison_text
+
+        return comparison_text(self._compared)
+
+    def to_frame(self) -> pd.DataFrame:
+        """Mean distance of the ten metrics of each profile (row) from each (column), in standard deviations."""
+        import pandas as pd
+
+        names = [profile.name for profile in self._compared.profiles]
+        return pd.DataFrame(self._compared.distance, index=names, columns=names)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain values, as ``--json`` prints them."""
+        from xosc_lateral.report.comparison import comparison_record
+
+        return comparison_record(self._compared)
+
+    def plot(self) -> Figure:
+        """Spread, spectrum and sample paths side by side."""
+        from xosc_lateral.report.comparison import comparison_figure
+
+        return comparison_figure(self._compared)
+
+    def write_report(self, path: PathLike, *, force: bool = False) -> Path:
+        """Write the HTML page."""
+        from xosc_lateral.formats.atomic import write_atomically
+        from xosc_lateral.report.comparison import comparison_page
+
+        target = file_target(path, "profiles.html", (".html", ".htm"))
+        claim([target], force=force)
+        return write_atomically(target, comparison_page(self._compared))

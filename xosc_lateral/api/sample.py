@@ -1,0 +1,173 @@
+"""`sample`: offsets alone, from a profile."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from xosc_lateral.api.inputs import (
+    DrivesLike,
+    GivenDrives,
+    PathLike,
+    Paths,
+    ProfileLike,
+    given_drives,
+    given_profile,
+    naming,
+)
+from xosc_lateral.api.result import Result
+from xosc_lateral.formats.tables import TABLE_SUFFIXES
+from xosc_lateral.formats.targets import claim, file_target
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.figure import Figure
+
+    from xosc_lateral.driver.profile import DriverProfile
+    from xosc_lateral.driver.snippets import Sampled
+
+
+def sample(
+    profile: ProfileLike,
+    *,
+    like: DrivesLike | None = None,
+    context: DrivesLike | None = None,
+    duration: float | None = None,
+    seed: int = 0,
+    snippet: float = 10.0,
+    speed: float = 30.0,
+    lane_width: float | None = None,
+    with_sensor: bool = False,
+    columns: Mapping[str, str] | None = None,
+    library: Paths = (),
+) -> Offsets:
+    """Sample offsets; one of `like`, `context` and `duration` says for what.
+
+    Parameters
+    ----------
+    profile : DriverProfile, path or name
+    like : drives, optional
+        For each measured snippet of `snippet` seconds one of the same length, start and context.
+    context : drives, optional
+        One free run per drive, under its context.
+    duration : float, optional
+        One free run of this length, at constant `speed` [m/s] in lanes of `lane_width` (the profile's). [s]
+    with_sensor : bool
+        Add what the sensor added to the drives that the profile was fitted on, for tests of a perception chain.
+    seed : int
+        Same inputs and seed: same offsets.
+    columns : mapping of str to str, optional
+        See `read_drives`.
+    library : path or paths
+        Folders with further profiles.
+    """
+    from xosc_lateral.driver.snippets import sample_context, sample_free, sample_like
+
+    if sum(choice is not None for choice in (like, context, duration)) != 1:
+        raise ValueError("one of like, context and duration is needed")
+    driver = given_profile(profile, library)
+    if duration is not None:
+        made = list(sample_free(driver, duration, seed, speed=speed, lane_width=lane_width, with_sensor=with_sensor))
+        settings: dict[str, Any] = {"duration_s": duration, "speed": speed}
+        return Offsets(driver, made, seed, None, settings, _neutral(driver, {"speed", "lane_width"}, "a free run"))
+    given = given_drives(like if like is not None else context, columns)  # type: ignore[arg-type]
+    warnings = [
+        line
+        for drive in given.drives
+        for line in _neutral(driver, {"lane_width", *drive.context}, f"drive {drive.name}")
+    ]
+    if like is not None:
+        with naming(given):
+            made = list(sample_like(driver, given.drives, snippet, seed, with_sensor=with_sensor))
+        return Offsets(driver, made, seed, given, {"snippet_s": snippet}, warnings)
+    return Offsets(
+        driver, list(sample_context(driver, given.drives, seed, with_sensor=with_sensor)), seed, given, {}, warnings
+    )
+
+
+def _neutral(profile: DriverProfile, known: Collection[str], where: str) -> list[str]:
+    """Columns that the profile's effects read and that are not there: those effects stay neutral, which is said."""
+    missing = [column for column in profile.columns if column not in known]
+    return [f"{where}: {', '.join(missing)} not known, taken as neutral"] if missing else []
+
+
+class Offsets(Result):
+    """Sampled offsets."""
+
+    __slots__ = ("_given", "_made", "_settings", "profile", "seed", "warnings")
+
+    def __init__(
+        self,
+        profile: DriverProfile,
+        made: Sequence[Sampled],
+        seed: int,
+        given: GivenDrives | None,
+        settings: dict[str, Any],
+        warnings: Sequence[str],
+    ) -> None:
+        self._made, self._given, self._settings = made, given, settings
+        self.profile = profile
+        self.seed = seed
+        self.warnings = tuple(warnings)
+        """What a user has to know, a line each."""
+
+    def __len__(self) -> int:
+        return sum(len(one.time) for one in self._made)
+
+    def headline(self) -> str:
+        """One line."""
+        runs = "snippets" if "snippet_s" in self._settings else "runs"
+        return f"{len(self)} offsets of {self.profile.name}, {len(self._made)} {runs}, seed {self.seed}"
+
+    def __str__(self) -> str:
+        return "\n".join([self.headline(), *(f"  warning: {warning}" for warning in self.warnings)])
+
+    def to_frame(self) -> pd.DataFrame:
+        """Columns `drive`, `time` [s], `offset` [m]; of snippets also `snippet` and `offset_real` [m]."""
+        import pandas as pd
+
+        from xosc_lateral.formats.offsets import offset_columns
+
+        return pd.DataFrame(offset_columns(self._made, snippets="snippet_s" in self._settings))
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain values, as ``--json`` prints them: what was sampled, without the offsets themselves."""
+        return {
+            "rows": len(self),
+            "runs": len(self._made),
+            "warnings": list(self.warnings),
+            "provenance": self._provenance(),
+        }
+
+    def plot(self, *, most: int = 6) -> Figure:
+        """Offset over time of the first runs; measured ones beside them where there are any."""
+        from xosc_lateral.report.frames import offsets_figure
+
+        return offsets_figure(self._made[:most])
+
+    def csv(self) -> str:
+        """The table as text."""
+        from xosc_lateral.formats.output_tables import csv_text
+
+        return csv_text(self.to_frame())
+
+    def write(self, path: PathLike, *, force: bool = False) -> Path:
+        """Write the table: ``.csv``, ``.csv.gz`` or ``.parquet``, with its provenance."""
+        from xosc_lateral.formats.output_tables import write_frame
+
+        target = file_target(path, f"{self.profile.name}.csv", TABLE_SUFFIXES)
+        claim([target], () if self._given is None else self._given.files, force=force)
+        write_frame(self.to_frame(), target, self._provenance())
+        return target
+
+    def _provenance(self) -> dict[str, Any]:
+        from xosc_lateral.formats.profiles import profile_hash
+
+        return {
+            "seed": self.seed,
+            "profile": self.profile.name,
+            "profile_sha256": profile_hash(self.profile),
+            "inputs": {} if self._given is None else dict(self._given.inputs),
+            **self._settings,
+        }

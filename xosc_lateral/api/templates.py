@@ -1,0 +1,112 @@
+"""`list_templates` and `write_template`: maneuver-based scenarios to start from."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from xosc_lateral.api.inputs import PathLike
+from xosc_lateral.api.result import Result
+from xosc_lateral.formats.targets import claim, folder_target, template_mark
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    import pandas as pd
+
+    from xosc_lateral.templates import AnyTemplate
+
+
+def list_templates(name: str | None = None) -> TemplateList:
+    """All templates, or one with its settings.
+
+    Raises
+    ------
+    XoscLateralError
+        If there is none of that name.
+    """
+    from xosc_lateral.templates import all_templates, find_template
+
+    return TemplateList(all_templates() if name is None else (find_template(name),), detailed=name is not None)
+
+
+def write_template(name: str, folder: PathLike, *, force: bool = False, **settings: object) -> tuple[Path, ...]:
+    """Write a template's scenario and its road.
+
+    Parameters
+    ----------
+    name : str
+        `list_templates` has them.
+    folder : str or Path
+        To write to; made if it is missing.
+    force : bool
+        Replace files that this package did not write, or that were edited since.
+    settings
+        Values that differ from the defaults; ``list_templates(name)`` has them with units and ranges.
+
+    Returns
+    -------
+    tuple of Path
+        The scenario, and its road.
+
+    Raises
+    ------
+    XoscLateralError
+        An unknown template or setting, or a value out of range.
+    """
+    from xosc_lateral.formats.atomic import write_atomically
+    from xosc_lateral.templates import find_template
+
+    files = find_template(name).files({key: str(value) for key, value in settings.items()})
+    target = folder_target(folder)
+    paths = {target / file: text for file, text in files.items()}
+    claim(paths, force=force)
+    for path, text in paths.items():
+        write_atomically(path, text.rstrip() + "\n" + template_mark(text))
+    return tuple(paths)
+
+
+class TemplateList(Result):
+    """Templates with their settings."""
+
+    __slots__ = ("_detailed", "_templates")
+
+    def __init__(self, templates: tuple[AnyTemplate, ...], *, detailed: bool) -> None:
+        self._templates, self._detailed = templates, detailed
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """As `write_template` takes them."""
+        return tuple(template.name for template in self._templates)
+
+    def headline(self) -> str:
+        """One line."""
+        return ", ".join(self.names)
+
+    def __str__(self) -> str:
+        from xosc_lateral.report.templates import as_text
+
+        return as_text(self._templates, with_settings=self._detailed)
+
+    def to_frame(self) -> pd.DataFrame:
+        """One row per template and setting: `template`, `name`, `default`, `unit`, `allowed`, `what`."""
+        import pandas as pd
+
+        rows = [
+            {
+                "template": template.name,
+                "name": one.name,
+                "default": one.shown_default,
+                "unit": one.unit,
+                "allowed": one.allowed,
+                "what": one.what,
+            }
+            for template in self._templates
+            for one in template.parameters
+        ]
+        return pd.DataFrame(rows)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain values, as ``--json`` prints them."""
+        from xosc_lateral.report.templates import templates_record
+
+        return {"templates": templates_record(self._templates)}

@@ -1,0 +1,108 @@
+"""The package's own models on the board: the paper's two levels, the same refined by the loop, and ours."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import ClassVar, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from xosc_lateral.driver.fitting import fit_runs
+from xosc_lateral.driver.models.kinds import ModelKind
+from xosc_lateral.driver.profile import DriverProfile
+from xosc_lateral.driver.sampling import sample_offsets
+from xosc_lateral.driver.seeds import child
+from xosc_lateral.drives.drive import Drive, Run
+from xosc_lateral.segment import Segment
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class ProfileModel:
+    """A driver profile in the board's protocol."""
+
+    profile: DriverProfile
+
+    def sample(
+        self, segments: Sequence[Segment], starts: FloatArray | None, rng: np.random.Generator
+    ) -> list[FloatArray]:
+        """See `LateralModel.sample`."""
+        root = np.random.SeedSequence(int(rng.integers(2**32)))
+        first = [None] * len(segments) if starts is None else starts.tolist()
+        return [
+            sample_offsets(self.profile, segment, child(root, number), start=start)
+            for number, (segment, start) in enumerate(zip(segments, first, strict=True))
+        ]
+
+    @property
+    def settings(self) -> Mapping[str, float]:
+        """Counts of what the profile holds; its file has the numbers."""
+        return {"effects": float(len(self.profile.effects))}
+
+
+class TwoLevel(ProfileModel):
+    """The paper's Markov chain with filtered noise on top."""
+
+    title: ClassVar[str] = "two levels (Neis and Beyerer)"
+    source: ClassVar[str] = (
+        "N. Neis, J. Beyerer, A Two-Level Stochastic Model for the Lateral Movement of Vehicles Within Their Lane, "
+        "IEEE Intelligent Vehicles Symposium 2023, arXiv:2405.17080"
+    )
+    departures: ClassVar[str] = "docs/model.md says how each gap in the paper's description is filled"
+
+    @classmethod
+    def fit(cls, runs: Sequence[Run]) -> Self:
+        """See `xosc_lateral.driver.fitting.fit_runs`."""
+        return cls(fit_runs(runs, name="two-level", model=ModelKind.TWO_LEVEL))
+
+
+class TwoLevelRefined(ProfileModel):
+    """The paper's model, repaired by the loop: what it lacks on the training drives is found and added."""
+
+    title: ClassVar[str] = "two levels, refined by the loop"
+    source: ClassVar[str] = "this project: `close-loop --profile two-level.json`, docs/closing_the_loop.md"
+    departures: ClassVar[str] = ""
+
+    @classmethod
+    def fit(cls, runs: Sequence[Run]) -> Self:
+        """Fit the paper's model and close the loop on the same runs."""
+        from xosc_lateral.identification.close import close_loop
+
+        base = fit_runs(runs, name="two-level", model=ModelKind.TWO_LEVEL)
+        return cls(close_loop(drives_of(runs), base, seed=0, name="two-level-refined").refined)
+
+
+class Autoregressive(ProfileModel):
+    """Ours."""
+
+    title: ClassVar[str] = "autoregression with drivers (ours)"
+    source: ClassVar[str] = "this project: `fit`, docs/model.md"
+    departures: ClassVar[str] = ""
+
+    @classmethod
+    def fit(cls, runs: Sequence[Run]) -> Self:
+        """See `xosc_lateral.driver.fitting.fit_runs`."""
+        return cls(fit_runs(runs, name="autoregressive", model=ModelKind.AUTOREGRESSIVE))
+
+
+def drives_of(runs: Sequence[Run]) -> list[Drive]:
+    """Runs back as drives that are cut already."""
+    drives = []
+    for name in sorted({run.drive for run in runs}):
+        own = sorted((run for run in runs if run.drive == name), key=lambda run: float(run.time[0]))
+        context = {key: np.concatenate([run.context[key] for run in own]) for key in own[0].context}
+        drives.append(
+            Drive(
+                name=name,
+                time=np.concatenate([run.time for run in own]),
+                offset=np.concatenate([run.offset for run in own]),
+                lane_width=np.concatenate([run.lane_width for run in own]),
+                context=context,
+                levels=own[0].levels,
+                run=np.concatenate([np.full(len(run), number, dtype=np.int64) for number, run in enumerate(own)]),
+            )
+        )
+    return drives

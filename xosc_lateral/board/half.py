@@ -1,0 +1,184 @@
+"""One half of the board: models fitted on some vehicles, sampled under the context of the others."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from xosc_lateral.baselines.base import LateralModel
+from xosc_lateral.board.measures import Features, differences, features_of
+from xosc_lateral.board.windows import Windows, windows_of
+from xosc_lateral.driver.snippets import segment_of
+from xosc_lateral.drives.drive import Run
+from xosc_lateral.drives.resampling import STEP
+from xosc_lateral.evaluation.lane_keeping import VarianceParts, variance_parts
+from xosc_lateral.evaluation.same_start import windows_with_the_same_start
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+
+LEAST_WINDOWS = 20
+"""Fewer of a length, in either half: the condition is left out."""
+
+ENSEMBLE = 8
+"""Sampled windows for each real one of 10 s: proper scores need several."""
+
+FLOOR_DRAWS = 4
+"""Sets of stand-ins with the same start that the floor is averaged over."""
+
+
+@dataclass(frozen=True)
+class Condition:
+    """Under what windows are compared."""
+
+    seconds: float
+    same_start: bool
+
+    @property
+    def name(self) -> str:
+        """In words."""
+        return f"{self.seconds:g} s, {'same start' if self.same_start else 'free'}"
+
+
+CONDITIONS = tuple(Condition(seconds, same_start) for seconds in (10.0, 30.0, 60.0) for same_start in (True, False))
+
+
+@dataclass(frozen=True, eq=False)
+class Half:
+    """Vehicles to be scored on, with what the other vehicles do as the floor.
+
+    Parameters
+    ----------
+    train, test : list of Run
+    windows : mapping of float to Windows
+        Of the scored vehicles, by length. [s]
+    donors : mapping of float to Windows
+        Of the others.
+    features : mapping of float to Features
+        Of the scored windows.
+    stand_ins : mapping of float to array, shape (n, k)
+        Rows of the donors with the same start.
+    """
+
+    train: list[Run]
+    test: list[Run]
+    windows: Mapping[float, Windows]
+    donors: Mapping[float, Windows]
+    features: Mapping[float, Features]
+    donor_features: Mapping[float, Features]
+    stand_ins: Mapping[float, IntArray]
+
+    @property
+    def conditions(self) -> tuple[Condition, ...]:
+        """Those with enough windows."""
+        return tuple(one for one in CONDITIONS if one.seconds in self.windows)
+
+
+def make_half(train: list[Run], test: list[Run], rng: np.random.Generator) -> Half:
+    """Cut windows and choose the floor's stand-ins."""
+    windows, donors = {}, {}
+    for seconds in sorted({condition.seconds for condition in CONDITIONS}):
+        own, others = windows_of(test, seconds), windows_of(train, seconds)
+        if own is not None and others is not None and min(len(own), len(others)) >= LEAST_WINDOWS:
+            windows[seconds], donors[seconds] = own, others
+    stand_ins = {
+        seconds: windows_with_the_same_start(
+            own.offset[:, 0],
+            own.unit,
+            donors[seconds].offset[:, 0],
+            donors[seconds].unit,
+            rng,
+            count=ENSEMBLE,
+        )
+        for seconds, own in windows.items()
+    }
+    return Half(
+        train,
+        test,
+        windows,
+        donors,
+        {seconds: features_of(own.offset, own.lane_width, STEP) for seconds, own in windows.items()},
+        {seconds: features_of(own.offset, own.lane_width, STEP) for seconds, own in donors.items()},
+        stand_ins,
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class Sampled:
+    """What a model did in one half.
+
+    Parameters
+    ----------
+    settings : mapping
+    paths : list of array
+        A free run for each of the half's runs. [m]
+    ensemble : array, shape (n, 8, 51), or None
+        Windows of 10 s with the real starts. [m]
+    windows : mapping of Condition to array, shape (n, m)
+        [m]
+    features : mapping of Condition to Features
+    variance : VarianceParts
+    """
+
+    settings: Mapping[str, float]
+    paths: list[FloatArray]
+    ensemble: FloatArray
+    windows: Mapping[Condition, FloatArray]
+    features: Mapping[Condition, Features]
+    variance: VarianceParts
+
+
+def sample_half(model: LateralModel, half: Half, rng: np.random.Generator) -> Sampled:
+    """Free runs over the half's runs, and windows with the real starts."""
+    paths = model.sample([segment_of(run) for run in half.test], None, rng)
+    shortest = min(half.windows)
+    ensemble = sample_same_start(model, half.windows[shortest], rng, ENSEMBLE)
+    cut: dict[Condition, FloatArray] = {}
+    for condition in half.conditions:
+        own = half.windows[condition.seconds]
+        if not condition.same_start:
+            cut[condition] = own.cut_from(paths)
+        elif condition.seconds == shortest:
+            cut[condition] = ensemble[:, 0]
+        else:
+            cut[condition] = sample_same_start(model, own, rng, 1)[:, 0]
+    features = {
+        condition: features_of(rows, half.windows[condition.seconds].lane_width, STEP)
+        for condition, rows in cut.items()
+    }
+    free = half.windows[shortest].cut_from(paths)
+    return Sampled(model.settings, paths, ensemble, cut, features, variance_parts(free, run_names(half)))
+
+
+def run_names(half: Half) -> NDArray[np.str_]:
+    """Run of each of the shortest windows: a free run is one driver."""
+    return np.array([str(number) for number, _ in half.windows[min(half.windows)].place])
+
+
+def sample_same_start(model: LateralModel, windows: Windows, rng: np.random.Generator, members: int) -> FloatArray:
+    """Shape (n, members, m). [m]"""
+    segments = [segment for segment in windows.segments for _ in range(members)]
+    starts = np.repeat(windows.offset[:, 0], members)
+    rows = np.array(model.sample(segments, starts, rng))
+    return rows.reshape(len(windows), members, -1)
+
+
+def floors(half: Half, condition: Condition) -> Mapping[str, float]:
+    """Real against real under a condition, by family."""
+    real, donors = half.features[condition.seconds], half.donor_features[condition.seconds]
+    everything = np.arange(len(real))
+    if not condition.same_start:
+        return differences(real, donors, everything, np.arange(len(donors)))
+    draws = [
+        differences(real, donors, everything, half.stand_ins[condition.seconds][:, draw]) for draw in range(FLOOR_DRAWS)
+    ]
+    return {name: float(np.mean([draw[name] for draw in draws])) for name in draws[0]}
+
+
+def pooled(values: Sequence[Mapping[str, float]]) -> dict[str, float]:
+    """Mean over the halves, of what all of them have."""
+    common = [name for name in values[0] if all(name in other for other in values)]
+    return {name: float(np.mean([other[name] for other in values])) for name in common}

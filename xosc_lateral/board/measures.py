@@ -1,0 +1,143 @@
+"""What is compared in a set of windows, computed once and then for any choice of rows."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from xosc_lateral.evaluation.distances import wasserstein
+from xosc_lateral.evaluation.lane_keeping import INDICATORS, lane_keeping_indicators
+from xosc_lateral.evaluation.metrics import METRICS, snippet_metrics
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+
+LAGS = (1.0, 2.0, 5.0, 10.0, 20.0, 30.0)
+"""Of the autocorrelation; those that fit into half a window are used. [s]"""
+
+BANDS = np.geomspace(0.03, 1.0, 13)
+"""Edges of the spectrum's bands, eight a decade. [Hz]"""
+
+SILENCE = 1e-9
+"""Added to power densities, so that no movement is a number too: 0.03 mm in 1 Hz. [m2/Hz]"""
+
+FAMILIES = ("metrics", "lane_keeping", "spectrum", "memory")
+"""Kinds of difference."""
+
+UNITS = {"metrics": "sd", "lane_keeping": "sd", "spectrum": "dB", "memory": "-"}
+
+
+@dataclass(frozen=True, eq=False)
+class Features:
+    """Of n windows.
+
+    Parameters
+    ----------
+    metrics : array, shape (n, 10)
+    indicators : array, shape (n, 7)
+    power : array, shape (n, bands)
+        Power density in bands. [m2/Hz]
+    products : array, shape (n, lags)
+        Mean product of offsets that far apart. [m2]
+    moments : array, shape (n, 2)
+        Mean offset and mean square. [m], [m2]
+    """
+
+    metrics: FloatArray
+    indicators: FloatArray
+    power: FloatArray
+    products: FloatArray
+    moments: FloatArray
+
+    def __len__(self) -> int:
+        return len(self.metrics)
+
+    def take(self, rows: IntArray) -> Features:
+        """Of some of the windows."""
+        return Features(
+            self.metrics[rows], self.indicators[rows], self.power[rows], self.products[rows], self.moments[rows]
+        )
+
+
+def features_of(offset: FloatArray, lane_width: FloatArray, step: float) -> Features:
+    """Everything that `differences` needs of windows, shape (n, m)."""
+    m = offset.shape[1]
+    lags = [round(lag / step) for lag in LAGS if round(lag / step) <= m // 2]
+    products = [(offset[:, lag:] * offset[:, : m - lag]).mean(axis=1) for lag in lags]
+    return Features(
+        snippet_metrics(offset),
+        lane_keeping_indicators(offset, lane_width, step),
+        band_power(offset, step),
+        np.array(products).reshape(len(lags), len(offset)).T,
+        np.column_stack([offset.mean(axis=1), (offset**2).mean(axis=1)]),
+    )
+
+
+def band_power(offset: FloatArray, step: float) -> FloatArray:
+    """Power density of each window in the bands that it can resolve (straight line removed, Hann window). [m2/Hz]"""
+    m = offset.shape[1]
+    line = np.linspace(0.0, 1.0, m)
+    ramp = offset[:, :1] + line * (offset[:, -1:] - offset[:, :1])
+    window = np.hanning(m)
+    power = np.abs(np.fft.rfft((offset - ramp) * window, n=4 * m, axis=1)) ** 2 * 2.0 * step / (window**2).sum()
+    frequency = np.fft.rfftfreq(4 * m, step)
+    bands = [(frequency >= low) & (frequency < high) for low, high in resolved_bands(m * step)]
+    return np.column_stack([power[:, inside].mean(axis=1) for inside in bands])
+
+
+def resolved_bands(seconds: float) -> list[tuple[float, float]]:
+    """Bands whose lower edge a window of that length goes through at least once. [Hz]"""
+    return [(float(low), float(high)) for low, high in pairwise(BANDS) if low * seconds >= 1.0]
+
+
+def differences(real: Features, other: Features, rows: IntArray, other_rows: IntArray) -> dict[str, float]:
+    """How far apart two sets of windows are, by family.
+
+    Parameters
+    ----------
+    real, other : Features
+    rows, other_rows : array of int
+        Windows that count, and how often (a bootstrap repeats them).
+
+    Returns
+    -------
+    dict
+        `metrics`, `lane_keeping`: mean Wasserstein distance in standard deviations of the real ones [sd]; `spectrum`:
+        rms difference over the bands [dB]; `memory`: rms difference of the autocorrelation [-].
+    """
+    found = {
+        "metrics": float(np.mean(list(column_distances(real.metrics[rows], other.metrics[other_rows])))),
+        "lane_keeping": float(np.mean(list(column_distances(real.indicators[rows], other.indicators[other_rows])))),
+    }
+    level, beside = real.power[rows].mean(axis=0) + SILENCE, other.power[other_rows].mean(axis=0) + SILENCE
+    found["spectrum"] = float(np.sqrt(np.mean((10.0 * np.log10(beside / level)) ** 2)))
+    own, others = autocorrelation_of(real, rows), autocorrelation_of(other, other_rows)
+    found["memory"] = float(np.sqrt(np.mean((own - others) ** 2)))
+    return found
+
+
+def column_distances(real: FloatArray, other: FloatArray) -> list[float]:
+    """Wasserstein distance of each column, in standard deviations of the real one. [sd]"""
+    spread = real.std(axis=0)
+    spread = np.where(spread > 0.0, spread, 1.0)
+    return [wasserstein(real[:, k], other[:, k]) / float(spread[k]) for k in range(real.shape[1])]
+
+
+def autocorrelation_of(features: Features, rows: IntArray) -> FloatArray:
+    """About the mean of all windows; no movement at all: 1, it stays as it is."""
+    mean, square = features.moments[rows].mean(axis=0)
+    variance = square - mean**2
+    if variance < 1e-12:
+        return np.ones(features.products.shape[1])
+    return np.asarray((features.products[rows].mean(axis=0) - mean**2) / variance)
+
+
+def named_distances(real: Features, other: Features) -> Mapping[str, float]:
+    """Distance of each metric and indicator by its name. [sd]"""
+    names = (*METRICS, *INDICATORS)
+    values = [*column_distances(real.metrics, other.metrics), *column_distances(real.indicators, other.indicators)]
+    return dict(zip(names, values, strict=True))

@@ -1,0 +1,51 @@
+"""`xosc-lateral view`: look at a scenario."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from xosc_lateral.cli.words import Force, Quiet, TimeLimit, examples, pairs
+
+EXAMPLES = examples("view cut-in.xosc", "view cut-in_lifelike.xosc -o pages/", "view cut-in.xosc -o cut-in.mcap")
+
+
+def register(app: typer.Typer) -> None:
+    """Add the verb to the command line."""
+    app.command("view", short_help="A scenario in the browser.", epilog=EXAMPLES)(view)
+
+
+def view(
+    scenario: Annotated[Path, typer.Argument(help="Any scenario (.xosc), converted or not.", show_default=False)],
+    output: Annotated[
+        str | None,
+        typer.Option("--output", "-o", help="Page (.html) or recording (.mcap); else NAME_view.html beside it."),
+    ] = None,
+    parameter: Annotated[
+        list[str] | None,
+        typer.Option("--set", metavar="NAME=VALUE", help="Value of a scenario parameter; may be repeated."),
+    ] = None,
+    allow: Annotated[
+        list[Path] | None, typer.Option(help="Folder that roads and catalogs may be read from; may be repeated.")
+    ] = None,
+    time_limit: TimeLimit = 60.0,
+    open_page: Annotated[
+        bool | None, typer.Option("--open/--no-open", help="Open the page in the browser. Default: from a terminal.")
+    ] = None,
+    force: Force = False,
+    quiet: Quiet = False,
+) -> None:
+    """Play a scenario in the browser: one self-contained page, without any lateral movement added."""
+    from xosc_lateral import play
+
+    played = play(scenario, time_limit=time_limit, parameters=pairs(parameter, "--set"), allow=allow or ())
+    page = played.write_page(output or scenario.with_name(f"{scenario.stem}_view.html"), force=force)
+    if not quiet:
+        typer.echo(str(page))
+    if page.suffix == ".mcap":
+        return
+    if open_page or (open_page is None and sys.stdout.isatty()):
+        typer.launch(page.absolute().as_uri())

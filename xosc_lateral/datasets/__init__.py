@@ -1,0 +1,61 @@
+"""A driver simulator that is no relative of the package's model, for docs, examples, tests and benchmarks.
+
+`simulate_drive` gives a drive table with the truth behind it. Effects are planted by arguments and act through the
+simulated driver; see `plants` for what there is.
+"""
+
+from xosc_lateral.datasets.driver_simulator import (
+    Drive,
+    Driver,
+    Truth,
+    draw_driver,
+    simulate_drive,
+    simulate_population,
+)
+from xosc_lateral.datasets.plants import (
+    CameraStep,
+    Companion,
+    Distraction,
+    Fatigue,
+    LaneHabit,
+    Plant,
+    Response,
+    RestoringBy,
+    SensorDrift,
+    ShakyCamera,
+    Shape,
+    ShiftBy,
+    SideWind,
+    SpreadBy,
+    TargetWander,
+    Weave,
+    curve_cutting,
+    truck_avoidance,
+)
+
+__all__ = [
+    "CameraStep",
+    "Companion",
+    "Distraction",
+    "Drive",
+    "Driver",
+    "Fatigue",
+    "LaneHabit",
+    "Plant",
+    "Response",
+    "RestoringBy",
+    "SensorDrift",
+    "ShakyCamera",
+    "Shape",
+    "ShiftBy",
+    "SideWind",
+    "SpreadBy",
+    "TargetWander",
+    "Truth",
+    "Weave",
+    "curve_cutting",
+    "draw_driver",
+    "simulate_drive",
+    "simulate_population",
+    "truck_avoidance",
+]

@@ -1,0 +1,150 @@
+"""Movements that no driver model made: what the loop must stay silent on, whatever moves the car.
+
+Each movement knows nothing of the context columns that its table is given; so whatever a trace names there is chance.
+They differ in what a test of significance may wrongly take for granted: short memory, normal innovations, fine
+resolution, a linear pull to the middle, a steady loudness.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pandas as pd
+from scipy.signal import lfilter
+
+from xosc_lateral.datasets.driver_simulator import measure, sample_times
+from xosc_lateral.datasets.motorway import N_LANES, STEP, draw_motorway
+
+PACE = 0.1
+"""Step of the movements [s]; the table interpolates between."""
+
+Movement = Callable[..., np.ndarray]
+"""Offset from the lane centre [m] at `n` steps of `PACE`, from `n` and a generator; and a column that it is told of."""
+
+
+def record_movement(
+    movement: Movement, duration: float, seed: int, *, resolution: float | None = None, told_of: str | None = None
+) -> pd.DataFrame:
+    """Record a movement, with the context of a motorway drive that it has nothing to do with.
+
+    Parameters
+    ----------
+    movement : callable
+    duration : float
+        [s]
+    seed : int
+    resolution : float, optional
+        Distances to the lane markings are multiples of it. [m]
+    told_of : str, optional
+        Column that `movement` is told after all, between 0 and 1, as its third argument.
+    """
+    streams = np.random.default_rng([20262, seed]).spawn(3)
+    context = draw_motorway(duration, streams[0])
+    n = len(context["speed"])
+    grid = np.arange(0.0, n * STEP + PACE, PACE)
+    told = []
+    if told_of is not None:
+        column = context[told_of]
+        told = [np.interp(grid, STEP * np.arange(n), (column - column.min()) / np.ptp(column))]
+    moved = np.interp(STEP * np.arange(n), grid, movement(len(grid), streams[1], *told))
+    way, width = context.pop("lane_change"), context["lane_width"].mean()
+    place = width * way + moved
+    context["lane_index"] = np.clip(np.rint(place / width), 0, N_LANES - 1)
+    time = sample_times(n * STEP, None, streams[2])
+    table = measure(time, place - width * context["lane_index"], context, streams[2])
+    if resolution is not None:
+        sides = ["distance_left", "distance_right"]
+        table[sides] = (np.rint(table[sides] / resolution) * resolution).round(3)
+    return table
+
+
+def wandering(n: int, rng: np.random.Generator) -> np.ndarray:
+    """Ornstein-Uhlenbeck wander of seconds about a mood of a minute."""
+    return 0.15 * _smooth(_wander(n, rng, 4.0)) + 0.12 * _wander(n, rng, 60.0)
+
+
+def heavy_tailed(n: int, rng: np.random.Generator) -> np.ndarray:
+    """Pushed by Student's t with three degrees of freedom: now and then by a lot."""
+    return 0.2 * _scaled(_smooth(_filtered(rng.standard_t(3.0, size=n), 5.0)))
+
+
+def reflected(n: int, rng: np.random.Generator) -> np.ndarray:
+    """Diffuses within a tolerance; having left it, the car is brought back to somewhere inside in two seconds."""
+    tolerance, length = 0.35, round(2.0 / PACE)
+    done = np.arange(1, length + 1) / length
+    ease = done**3 * (10.0 - 15.0 * done + 6.0 * done**2)
+    steps = 0.09 * np.sqrt(PACE) * rng.normal(size=n)
+    out = np.empty(n)
+    place, at = 0.0, 0
+    while at < n:
+        place += steps[at]
+        out[at] = place
+        at += 1
+        if abs(place) > tolerance:
+            goal = rng.uniform(-0.6, 0.6) * tolerance
+            part = out[at : at + length]
+            part[:] = place + (goal - place) * ease[: len(part)]
+            at, place = at + length, goal
+    return _smooth(out)
+
+
+def delayed_control(n: int, rng: np.random.Generator) -> np.ndarray:
+    """A mass that is pulled to the middle and damped, both 0.4 s late, and pushed by coloured noise."""
+    late = round(0.4 / PACE)
+    push = 0.1 * _wander(n, rng, 1.0)
+    place, speed = np.zeros(n), np.zeros(n)
+    for t in range(1, n):
+        seen = max(t - 1 - late, 0)
+        pull = -0.22 * place[seen] - 1.0 * speed[seen] + push[t]
+        speed[t] = speed[t - 1] + PACE * pull
+        place[t] = place[t - 1] + PACE * speed[t]
+    return place
+
+
+def clustered(n: int, rng: np.random.Generator) -> np.ndarray:
+    """Loud and quiet by turns of seconds: how people correct, and no regime."""
+    loudness = np.exp(0.6 * _wander(n, rng, rng.uniform(2.0, 6.0)))
+    return 0.2 * _scaled(_smooth(_filtered(loudness * rng.normal(size=n), 5.0)))
+
+
+def in_regimes(n: int, rng: np.random.Generator) -> np.ndarray:
+    """For a minute at a time, pushed 2.5 times as hard; and then quiet for two."""
+    loud = np.ones(n)
+    start, on = 0, False
+    while start < n:
+        stop = start + max(1, round(rng.exponential(60.0 if on else 120.0) / PACE))
+        loud[start:stop] = 2.5 if on else 1.0
+        start, on = stop, not on
+    return 0.2 * _scaled(_smooth(_filtered(loud * rng.normal(size=n), 5.0)))
+
+
+def held(n: int, rng: np.random.Generator, strength: np.ndarray) -> np.ndarray:
+    """Drawn back to the middle the faster the more of `strength` there is, shape (n,), 0..1; the pushes stay the same.
+
+    The rate is 0.05 1/s where there is none, and thirty times that where there is all of it.
+    """
+    rate = 0.05 * 30.0**strength
+    pushes = 0.12 * np.sqrt(PACE) * rng.normal(size=n)
+    place = np.zeros(n)
+    for t in range(1, n):
+        place[t] = place[t - 1] * (1.0 - PACE * rate[t]) + pushes[t]
+    return _smooth(place)
+
+
+def _wander(n: int, rng: np.random.Generator, time_constant: float) -> np.ndarray:
+    return _scaled(_filtered(rng.normal(size=n), time_constant))
+
+
+def _filtered(values: np.ndarray, time_constant: float) -> np.ndarray:
+    return np.asarray(lfilter([1.0], [1.0, -np.exp(-PACE / time_constant)], values))
+
+
+def _smooth(values: np.ndarray) -> np.ndarray:
+    """Through two lags of 0.4 s: cars have mass."""
+    keep = np.exp(-PACE / 0.4)
+    return np.asarray(lfilter([(1.0 - keep) ** 2], np.convolve([1.0, -keep], [1.0, -keep]), values))
+
+
+def _scaled(values: np.ndarray) -> np.ndarray:
+    return np.asarray((values - values.mean()) / values.std())

@@ -1,0 +1,163 @@
+"""What can be driven: bounds on the lateral acceleration and jerk of lane keeping, by speed.
+
+Comfort: the side friction at which drivers begin to feel discomfort, by speed [1]_; nobody keeps a lane beyond it for
+more than an instant. Limit: what lane keeping by a machine is allowed in Europe, 3 m/s2 and, over half a second,
+5 m/s3 [2]_ (the same figures as for lane keeping assistance in ISO 11270:2014). Real motorway traffic stays far below
+either: 0.3 m/s2 in 99.9 % of the time (docs/real_data.md).
+
+References
+----------
+.. [1] AASHTO, "A Policy on Geometric Design of Highways and Streets", 2018, chapter 3: limiting values of the side
+   friction factor, from 0.32 at 15 mph to 0.08 at 80 mph.
+.. [2] UN Regulation No. 79, revision 4, paragraph 5.6.2.1.3: lateral acceleration and jerk of lane keeping, M1.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from xosc_lateral.driver.profile import DriverProfile
+from xosc_lateral.driver.sampling import sample_offsets
+from xosc_lateral.segment import Segment
+
+FloatArray = NDArray[np.float64]
+
+GRAVITY = 9.80665
+MPH = 0.44704
+_SPEED = MPH * np.arange(15.0, 81.0, 5.0)
+_FRICTION = np.array([0.32, 0.27, 0.23, 0.20, 0.18, 0.16, 0.15, 0.14, 0.13, 0.12, 0.11, 0.10, 0.09, 0.08])
+
+LIMIT, JERK_LIMIT = 3.0, 5.0
+"""[m/s2], [m/s3]"""
+
+JERK_WINDOW = 0.5
+"""Jerk is averaged over this. [s]"""
+
+SELDOM = 1e-3
+"""Share of the time that lane keeping may be uncomfortable. [-]"""
+
+TRAFFIC = 0.6
+"""Twice what 99.9 % of real motorway traffic stays below: beyond, a profile probably holds a sensor's noise. [m/s2]"""
+
+ROUGHEST, WIDEST = 0.1, 3.0
+"""Standard deviations of the kernel by which paths are smoothed: from, to. [s]"""
+
+FREE_RUN = 1200.0
+"""Sampled to see what a profile writes. [s]"""
+
+
+@dataclass(frozen=True, slots=True)
+class Strain:
+    """How hard a path is to drive.
+
+    Parameters
+    ----------
+    seldom : float
+        Lateral acceleration exceeded in 0.1 % of the time. [m/s2]
+    largest, jerk : float
+        Largest acceleration [m/s2] and jerk over half a second [m/s3].
+    excess : float
+        Largest of these over their bounds: above 1 it could not be driven. [-]
+    """
+
+    seldom: float
+    largest: float
+    jerk: float
+    excess: float
+
+
+@dataclass(frozen=True, slots=True)
+class Bound:
+    """That a path was smoothed, and why: strain before and after, width of the kernel [s]."""
+
+    before: Strain
+    after: Strain
+    width: float
+
+    def __str__(self) -> str:
+        """For a remark."""
+        return (
+            f"sampled movement could not be driven ({self.before.seldom:.2f} m/s2 to the side in 0.1 % of the time, "
+            f"{self.before.largest:.2f} m/s2 and {self.before.jerk:.1f} m/s3 at most): smoothed over "
+            f"{self.width:.1f} s, now {self.after.seldom:.2f}, {self.after.largest:.2f} m/s2 and "
+            f"{self.after.jerk:.1f} m/s3"
+        )
+
+
+def comfort(speed: FloatArray) -> FloatArray:
+    """Lateral acceleration at which drivers begin to feel discomfort. [m/s2]"""
+    return np.asarray(GRAVITY * np.interp(np.abs(speed), _SPEED, _FRICTION))
+
+
+def strain(offset: FloatArray, step: float, speed: FloatArray) -> Strain:
+    """Strain of a path, from its offsets at an even step and the speed there."""
+    if len(offset) < 4:
+        return Strain(0.0, 0.0, 0.0, 0.0)
+    acceleration = np.abs(np.diff(offset, 2)) / step**2
+    span = max(1, round(JERK_WINDOW / step))
+    signed = np.diff(offset, 2) / step**2
+    jerk = np.abs(signed[span:] - signed[:-span]) / (span * step) if len(signed) > span else np.zeros(1)
+    bound = comfort(speed)[1:-1]
+    uncomfortable = float(np.quantile(acceleration / bound, 1.0 - SELDOM))
+    largest, hardest = float(acceleration.max()), float(jerk.max())
+    return Strain(
+        float(np.quantile(acceleration, 1.0 - SELDOM)),
+        largest,
+        hardest,
+        max(uncomfortable, largest / LIMIT, hardest / JERK_LIMIT),
+    )
+
+
+def drivable(offset: FloatArray, step: float, speed: FloatArray) -> tuple[FloatArray, Bound | None]:
+    """The path, smoothed as little as it takes to be drivable; with the reason where it had to be.
+
+    Parameters
+    ----------
+    offset : array, shape (n,)
+        Positive left. [m]
+    step : float
+        [s]
+    speed : array, shape (n,)
+        [m/s]
+    """
+    before = strain(offset, step, speed)
+    if before.excess <= 1.0:
+        return offset, None
+    width, smooth, after = ROUGHEST, offset, before
+    while after.excess > 1.0 and width <= WIDEST:
+        smooth = _smoothed(offset, width / step)
+        after = strain(smooth, step, speed)
+        width *= 1.3
+    return smooth, Bound(before, after, width / 1.3)
+
+
+def fit_warnings(profile: DriverProfile) -> list[str]:
+    """What to know about a profile's drivability, in lines."""
+    n = round(FREE_RUN / profile.model.step) + 1
+    time: FloatArray = profile.model.step * np.arange(n, dtype=np.float64)
+    speed = np.full(n, 30.0)
+    segment = Segment(time=time, lane_width=np.full(n, profile.lane_width), speed=speed)
+    found = strain(sample_offsets(profile, segment, 1), profile.model.step, speed)
+    if found.excess > 1.0:
+        return [
+            f"what {profile.name} writes could not be driven at 30 m/s: {found.seldom:.2f} m/s2 to the side in 0.1 % "
+            f"of the time (comfort ends at {float(comfort(speed[:1])[0]):.2f}), {found.largest:.1f} m/s2 and "
+            f"{found.jerk:.1f} m/s3 at most (limits {LIMIT:g} and {JERK_LIMIT:g}, UN R79); convert will smooth it"
+        ]
+    if found.seldom > TRAFFIC:
+        return [
+            f"{profile.name} moves to the side with {found.seldom:.2f} m/s2 in 0.1 % of the time; real motorway "
+            "traffic stays below 0.3: look at the sensor that the drives were measured by"
+        ]
+    return []
+
+
+def _smoothed(values: FloatArray, width: float) -> FloatArray:
+    """Gaussian smoothing, continued point-symmetrically past both ends, which stay where they are."""
+    half = min(int(np.ceil(4.0 * width)), len(values) - 1)
+    kernel = np.exp(-0.5 * (np.arange(-half, half + 1) / width) ** 2)
+    before, after = 2 * values[0] - values[half:0:-1], 2 * values[-1] - values[-2 : -half - 2 : -1]
+    return np.convolve(np.concatenate([before, values, after]), kernel / kernel.sum(), "valid")

@@ -1,0 +1,131 @@
+"""Fitting our model. First what can be read off the data, then a few rounds of simulating and comparing.
+
+1. Mean, and the variance between drivers: the covariance that is left between moments far apart in a run.
+2. Coarse movement: autoregression on the low-passed offset, all moments of a driver counting the same, drivers' means
+   a random effect.
+3. Fine noise: what the coarse movement lacks of the offset's power spectrum, geometric mean over windows.
+4. Volatility: how much more, and for how long, the power in short windows varies than it would in steady movement.
+5. Rounds of simulating: snippets of the model from the measured snippets' starts must show the same moments of log
+   standard deviation, of the offset and of its differences. What differs corrects the scales, the volatilities and
+   their correlation (indirect inference: Gourieroux, Monfort, Renault 1993).
+
+Everything is deterministic: the simulations draw from a fixed seed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from msgspec.structs import replace
+from numpy.typing import NDArray
+
+from xosc_lateral.driver.models.autoregressive.autoregression import Autoregression, fit_autoregression
+from xosc_lateral.driver.models.autoregressive.filters import COARSE_EVERY, split_bands
+from xosc_lateral.driver.models.autoregressive.fit_matching import matched, with_volatility
+from xosc_lateral.driver.models.autoregressive.fit_settings import DEFAULT_SETTINGS, FitSettings
+from xosc_lateral.driver.models.autoregressive.fit_spectrum import fit_spectrum
+from xosc_lateral.driver.models.autoregressive.model import AutoregressiveModel
+from xosc_lateral.driver.models.autoregressive.volatility import (
+    Volatility,
+)
+from xosc_lateral.errors import NotEnoughDataError
+
+FloatArray = NDArray[np.float64]
+
+
+def fit_autoregressive(
+    rel_offsets: Sequence[FloatArray], drives: Sequence[str], settings: FitSettings = DEFAULT_SETTINGS
+) -> AutoregressiveModel:
+    """Fit to relative offsets [-], one array of shape (n_i,) per run at 5 Hz; runs of one drive are of one driver.
+
+    Raises
+    ------
+    NotEnoughDataError
+        When no run lasts one snippet, or the offset never moves.
+    """
+    runs = [np.asarray(run, dtype=np.float64) for run in rel_offsets]
+    longest = max(map(len, runs), default=0)
+    if longest < round(settings.snippet / settings.step) + 1:
+        raise NotEnoughDataError(
+            f"the longest run lasts {longest * settings.step:.1f} s, the fit needs {settings.snippet:g} s"
+        )
+    everything = np.concatenate(runs)
+    if everything.std() < 1e-7:
+        raise NotEnoughDataError(f"the offset never moves: standard deviation {everything.std():.2g} lane widths")
+    mean, between = _drivers(runs, drives, settings)
+    bands = [split_bands(run, settings.step) for run in runs]
+    coarse = _fit_coarse([slow - mean for slow, _ in bands], drives, between, settings)
+    coarse, fine = fit_spectrum(runs, coarse, settings)
+    low, high = max(-0.5, float(everything.min())), min(0.5, float(everything.max()))
+    model = AutoregressiveModel(
+        mean=mean,
+        between_drivers=float(np.sqrt(between)),
+        coarse=coarse,
+        fine=fine,
+        coarse_volatility=Volatility(),
+        fine_volatility=Volatility(),
+        correlation=0.0,
+        limits=(min(low, mean - 1e-3), max(high, mean + 1e-3)),
+        step=settings.step,
+    )
+    model = with_volatility(model, bands, len(set(drives)) > 1, settings)
+    return _rounded(matched(model, runs, settings))
+
+
+def _drivers(runs: Sequence[FloatArray], drives: Sequence[str], settings: FitSettings) -> tuple[float, float]:
+    """Mean of all, and variance of the drivers' means: covariance of moments far apart in one run. [-]"""
+    lengths = np.array([len(run) for run in runs])
+    mean = float(np.concatenate(runs).mean())
+    count = len(set(drives))
+    if count < 2:
+        return mean, 0.0
+    order = np.argsort(lengths)
+    typical = lengths[order][np.searchsorted(np.cumsum(lengths[order]), 0.5 * lengths.sum())]
+    reach = min(float(typical), settings.farthest / settings.step)
+    lags = range(int(settings.far[0] * reach), int(settings.far[1] * reach), COARSE_EVERY)
+    total, pairs = 0.0, 0
+    for run in runs:
+        about = run - mean
+        for lag in lags:
+            if len(about) > lag:
+                total += float(about[lag:] @ about[: len(about) - lag])
+                pairs += len(about) - lag
+    variance = float(np.concatenate(runs).var())
+    # The common mean was taken out, and with it a part of the differences between a few drivers.
+    return mean, float(np.clip(total / max(pairs, 1) * count / (count - 1), 0.0, 0.9 * variance))
+
+
+def _fit_coarse(
+    slow: Sequence[FloatArray], drives: Sequence[str], between: float, settings: FitSettings
+) -> Autoregression:
+    longest = max(map(len, slow)) * settings.step
+    order = max(2, min(settings.order, int(0.4 * longest * settings.step * COARSE_EVERY)))
+    return fit_autoregression(slow, order, every=COARSE_EVERY, drivers=drives, between=between)
+
+
+DIGITS = 9
+"""Significant digits kept of a fitted number: what differs beyond is the processor's rounding. [-]"""
+
+
+def _rounded(model: AutoregressiveModel) -> AutoregressiveModel:
+    def tidy(value: float) -> float:
+        return float(f"{value:.{DIGITS}g}")
+
+    def tidy_all(values: FloatArray) -> FloatArray:
+        return np.array([tidy(value) for value in values])
+
+    def tidy_part(part: Volatility) -> Volatility:
+        return Volatility(tidy(part.between), tidy(part.within), tidy(part.memory), tidy(part.slow))
+
+    return AutoregressiveModel(
+        mean=tidy(model.mean),
+        between_drivers=tidy(model.between_drivers),
+        coarse=Autoregression(tidy_all(model.coarse.coefficients), tidy(model.coarse.scale)),
+        fine=replace(model.fine, damping=tidy_all(model.fine.damping)),
+        coarse_volatility=tidy_part(model.coarse_volatility),
+        fine_volatility=tidy_part(model.fine_volatility),
+        correlation=tidy(model.correlation),
+        limits=(tidy(model.limits[0]), tidy(model.limits[1])),
+        step=model.step,
+    )

@@ -1,0 +1,69 @@
+"""Constants of the fit of the autoregressive model."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from xosc_lateral.drives.resampling import STEP
+
+
+@dataclass(frozen=True, slots=True)
+class FitSettings:
+    """Constants of the fit.
+
+    Parameters
+    ----------
+    order : int
+        Memory of the coarse movement. [s]
+    n_knots : int
+        Knots of the fine noise's damping.
+    n_taps, taper : int, float
+        Of its kernel: measured noise falls by five decades between 0.3 and 2.5 Hz, so nothing may leak.
+    scale_band : tuple of float
+        Frequencies at which all power is taken to be coarse. [Hz]
+    fine_from : tuple of float
+        The fine noise has nothing below the first frequency, all that the coarse movement lacks above the second. [Hz]
+    spectrum_windows : tuple of float
+        Lengths of spectral windows, the first that enough runs are as long as. [s]
+    fine_window, coarse_window : float
+        Windows that volatility is seen by. [s]
+    far : tuple of float
+        Two moments are far apart when this share of the typical run (by time) is between them, up to `farthest`.
+    farthest : float
+        [s]
+    snippet : float
+        Length of the simulated snippets. [s]
+    n_snippets : int
+        Simulated at least, in each round.
+    speed_weight : float
+        The coarse scale is corrected by what snippets lack in lateral speed with this weight, in spread with the rest.
+    rounds : int
+    coarse_gain, fine_gain : float
+        How far a round corrects the variance of a volatility, per missing variance of what is compared: the fine
+        part's volatility varies within less than a snippet, which shows a fraction of their variance.
+    seed : int
+        Of the simulations.
+    """
+
+    order: int = 16
+    n_knots: int = 51
+    n_taps: int = 71
+    taper: float = 5.0
+    scale_band: tuple[float, float] = (0.1, 0.3)
+    fine_from: tuple[float, float] = (0.2, 0.33)
+    spectrum_windows: tuple[float, ...] = (20.0, 10.0, 5.0)
+    fine_window: float = 2.0
+    coarse_window: float = 5.0
+    far: tuple[float, float] = (0.5, 1.0)
+    farthest: float = 120.0
+    snippet: float = 10.0
+    n_snippets: int = 2000
+    speed_weight: float = 0.7
+    rounds: int = 8
+    coarse_gain: float = 1.0
+    fine_gain: float = 3.0
+    seed: int = 20240517
+    step: float = STEP
+
+
+DEFAULT_SETTINGS = FitSettings()

@@ -1,0 +1,77 @@
+"""Spectrum of the autoregressive model: the coarse movement's scale, and fine noise that has what it lacks."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from msgspec.structs import replace
+from numpy.typing import NDArray
+
+from xosc_lateral.driver.models.autoregressive.autoregression import Autoregression
+from xosc_lateral.driver.models.autoregressive.filters import COARSE_EVERY, building_low_pass
+from xosc_lateral.driver.models.autoregressive.fit_settings import FitSettings
+from xosc_lateral.driver.models.noise import NOISE_VARIANCE, ShapedNoise
+from xosc_lateral.drives.periodogram import Detrend, periodograms
+
+FloatArray = NDArray[np.float64]
+
+GAIN_ROUNDS = 20
+"""Rounds in which the damping is corrected for what the kernel's window does to it. [-]"""
+
+
+def fit_spectrum(
+    runs: Sequence[FloatArray], coarse: Autoregression, settings: FitSettings
+) -> tuple[Autoregression, ShapedNoise]:
+    """Scale of the coarse movement, and fine noise that has what the coarse lacks of the measured power.
+
+    From runs of shape (n_i,), evenly sampled. [lane widths]
+    """
+    frequency, power = _typical_power(runs, settings)
+    knots = np.linspace(0.0, 0.5, settings.n_knots)  # in cycles per sample
+    kernel = building_low_pass()
+    gain = np.abs(np.exp(-2j * np.pi * np.outer(knots, np.arange(len(kernel)))) @ kernel)
+    coarse_power = coarse.power(knots * COARSE_EVERY) * gain**2 / COARSE_EVERY
+    measured = np.exp(np.interp(knots, frequency, np.log(power)))
+    hertz = knots / settings.step
+    shared = (hertz >= settings.scale_band[0]) & (hertz <= settings.scale_band[1])
+    scale = float(np.exp(np.log(measured[shared] / coarse_power[shared]).mean()))
+    lacking = np.maximum(measured - scale * coarse_power, 0.0)
+    low, high = settings.fine_from
+    rise = np.sin(0.5 * np.pi * np.clip((hertz - low) / (high - low), 0.0, 1.0)) ** 2
+    noise = _shaped(np.sqrt(lacking / NOISE_VARIANCE) * rise, settings)
+    return replace(coarse, scale=coarse.scale * np.sqrt(scale)), noise
+
+
+def _shaped(wanted: FloatArray, settings: FitSettings) -> ShapedNoise:
+    """Noise whose kernel has the wanted gain at the knots, although it is short and faded out."""
+    half = settings.n_taps // 2
+    knots = np.linspace(0.0, 0.5, len(wanted))
+    waves = np.cos(2.0 * np.pi * np.outer(knots, np.arange(-half, half + 1)))
+    noise = ShapedNoise(wanted, settings.n_taps, settings.taper)
+    for _ in range(GAIN_ROUNDS):
+        gain = np.abs(waves @ noise.kernel)
+        ratio = np.where(wanted > 0.0, wanted / np.maximum(gain, 1e-30), 1.0)
+        noise = replace(noise, damping=noise.damping * np.clip(ratio, 0.5, 2.0))
+    return noise
+
+
+def _typical_power(runs: Sequence[FloatArray], settings: FitSettings) -> tuple[FloatArray, FloatArray]:
+    """Power spectrum of steady movement: geometric means over windows, so that volatile ones don't outweigh the others.
+
+    (A periodogram's logarithm lies on average Euler's constant below that of the power.)
+
+    Returns
+    -------
+    frequency, power : array
+        In cycles per sample, and with white noise of variance 1 at 1 everywhere.
+    """
+    for seconds in settings.spectrum_windows:
+        size = round(seconds / settings.step)
+        if sum(len(run) // size for run in runs) >= 20:
+            break
+    size = min(size, max(map(len, runs)))
+    power = np.concatenate([periodograms(run, size, detrend=Detrend.ENDS) for run in runs])
+    frequency = np.fft.rfftfreq(size)
+    typical = np.exp(np.log(power + 1e-30).mean(axis=0) + np.euler_gamma)
+    return np.asarray(frequency, dtype=np.float64), np.asarray(typical)

@@ -1,0 +1,105 @@
+"""Parameters of the autoregressive model, and what follows from them."""
+
+from __future__ import annotations
+
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from xosc_lateral.driver.models.autoregressive.autoregression import Autoregression
+from xosc_lateral.driver.models.autoregressive.filters import COARSE_EVERY, building_low_pass
+from xosc_lateral.driver.models.autoregressive.volatility import Volatility
+from xosc_lateral.driver.models.base import CoreModel
+from xosc_lateral.driver.models.noise import NOISE_VARIANCE, ShapedNoise
+from xosc_lateral.drives.resampling import STEP
+from xosc_lateral.errors import DriverProfileError
+
+FloatArray = NDArray[np.float64]
+
+MEMORY_OF_START = 300
+"""Steps after which a drive has forgotten the offset that it was made to start at: 60 s. [-]"""
+
+
+class AutoregressiveParameters(CoreModel, frozen=True, eq=False, dict=True):
+    """Parameters of the model.
+
+    Parameters
+    ----------
+    mean : float
+        Mean offset of all drivers. [lane widths]
+    between_drivers : float
+        Standard deviation of the drivers' means. [lane widths]
+    limits : tuple of float
+        Coarse movement bends back before these: the range of the data, the markings at most. [lane widths]
+    coarse : Autoregression
+        Of the coarse movement about the driver's mean, one step a second. [lane widths]
+    fine : ShapedNoise
+        Damping of the fine noise. [lane widths]
+    coarse_volatility, fine_volatility : Volatility
+    correlation : float
+        Between the logarithms of the two factors. [-]
+    step : float
+        [s]
+
+    Raises
+    ------
+    DriverProfileError
+        If a number is out of its range.
+    """
+
+    mean: float
+    between_drivers: float
+    limits: tuple[float, float]
+    coarse: Autoregression
+    fine: ShapedNoise
+    coarse_volatility: Volatility
+    fine_volatility: Volatility
+    correlation: float
+    step: float = STEP
+
+    def __post_init__(self) -> None:
+        """Check."""
+        low, high = self.limits
+        if not -1.0 <= low < self.mean < high <= 1.0:
+            raise DriverProfileError(f"mean {self.mean} outside the limits {low} and {high}, or these beyond -1 and 1")
+        if not (0.0 <= self.between_drivers < 1.0 and -1.0 <= self.correlation <= 1.0):
+            raise DriverProfileError(f"between drivers {self.between_drivers}, correlation {self.correlation}")
+
+    @cached_property
+    def kernel(self) -> FloatArray:
+        """Kernel of the fine noise, shape (n_taps,). [lane widths]"""
+        return self.fine.kernel
+
+    @cached_property
+    def coarse_covariance(self) -> FloatArray:
+        """Of the coarse movement about the driver's mean at lags of 0.2 s, mean over the phases of a coarse step.
+
+        Shape (MEMORY_OF_START,). [lane widths squared]
+        """
+        n_ticks = MEMORY_OF_START // COARSE_EVERY + 20
+        ticks = self.coarse.covariance(n_ticks)
+        spread = np.zeros(2 * n_ticks * COARSE_EVERY - 1)
+        middle = n_ticks * COARSE_EVERY - 1
+        spread[middle::COARSE_EVERY][:n_ticks] = ticks
+        spread[middle::-COARSE_EVERY][:n_ticks] = ticks
+        kernel = building_low_pass()
+        both = np.convolve(kernel, kernel) / COARSE_EVERY
+        return np.asarray(np.convolve(spread, both, "same")[middle : middle + MEMORY_OF_START])
+
+    @cached_property
+    def fine_covariance(self) -> FloatArray:
+        """Of the fine movement at lags of 0.2 s, shape (MEMORY_OF_START,). [lane widths squared]"""
+        kernel = self.kernel
+        full = np.convolve(kernel, kernel)[len(kernel) - 1 :] * NOISE_VARIANCE
+        result = np.zeros(MEMORY_OF_START)
+        result[: len(full)] = full[:MEMORY_OF_START]
+        return result
+
+    @cached_property
+    def start_factor(self) -> FloatArray:
+        """Lower triangle that turns white noise into a stationary past, shape (order, order). [lane widths]"""
+        order = self.coarse.order
+        covariance = self.coarse.covariance(order)
+        matrix = covariance[np.abs(np.subtract.outer(np.arange(order), np.arange(order)))]
+        return np.asarray(np.linalg.cholesky(matrix + 1e-9 * covariance[0] * np.eye(order)))

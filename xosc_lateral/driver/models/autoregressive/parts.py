@@ -1,0 +1,154 @@
+"""The two parts of the movement, made in blocks of one coarse step and taken in any number."""
+
+from __future__ import annotations
+
+from typing import Self
+
+import msgspec
+import numpy as np
+from numpy.typing import NDArray
+
+from xosc_lateral.driver.kernels import convolve, recur
+from xosc_lateral.driver.models.autoregressive.driver import DriverState
+from xosc_lateral.driver.models.autoregressive.filters import COARSE_EVERY, TICKS, interpolate
+from xosc_lateral.driver.models.autoregressive.parameters import AutoregressiveParameters
+from xosc_lateral.driver.models.autoregressive.volatility_stream import COARSE, FINE, Factors, FactorState
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+
+
+class QueueState(msgspec.Struct):
+    """Values at 5 Hz that were made and not yet taken.
+
+    Parameters
+    ----------
+    made : array, shape (k, drivers)
+        [lane widths]
+    skip : array of int, shape (drivers,)
+        Rows of it that each driver leaves out before his next.
+    bridge : array, shape (k, drivers)
+        What is still added to meet a start, step by step. [lane widths]
+    """
+
+    made: FloatArray
+    skip: IntArray
+    bridge: FloatArray
+
+
+class CoarseState(QueueState):
+    """Coarse part: its generator, last coarse steps (order, drivers), those held for the low-pass (k, drivers)."""
+
+    rng: np.random.Generator
+    past: FloatArray
+    held: FloatArray
+
+    @classmethod
+    def begin(cls, rng: np.random.Generator, past: FloatArray, skip: IntArray) -> Self:
+        """Nothing made yet."""
+        nothing = np.empty((0, past.shape[1]))
+        return cls(made=nothing, skip=skip, bridge=nothing, rng=rng, past=past, held=nothing)
+
+
+class FineState(QueueState):
+    """Fine part: its generator, the last factor (1, drivers) once there is one, and noise before shaping."""
+
+    rng: np.random.Generator
+    last_factor: FloatArray
+    noise: FloatArray
+
+    @classmethod
+    def begin(cls, rng: np.random.Generator, skip: IntArray) -> Self:
+        """Nothing made yet."""
+        nothing = np.empty((0, len(skip)))
+        return cls(made=nothing, skip=skip, bridge=nothing, rng=rng, last_factor=nothing, noise=nothing)
+
+
+class _Part:
+    state: QueueState
+
+    def take(self, n: int) -> FloatArray:
+        """Next n values, shape (n, drivers). [lane widths]"""
+        state = self.state
+        self._fill(n)
+        if state.skip.any():  # drivers who began at different phases of the coarse step
+            columns = np.arange(state.made.shape[1])
+            values = np.asarray(state.made[state.skip + np.arange(n)[:, None], columns])
+        else:
+            values = state.made[:n].copy()
+        state.made = state.made[n:]
+        bridged = min(n, len(state.bridge))
+        if bridged:
+            values[:bridged] += state.bridge[:bridged]
+            state.bridge = state.bridge[bridged:]
+        return values
+
+    def first(self) -> FloatArray:
+        """The next values, which stay where they are, shape (drivers,). [lane widths]"""
+        self._fill(1)
+        return np.asarray(self.state.made[self.state.skip, np.arange(self.state.made.shape[1])])
+
+    def _fill(self, n: int) -> None:
+        state = self.state
+        missing = n + int(state.skip.max()) - len(state.made)
+        if missing > 0:
+            state.made = np.concatenate([state.made, self._make(-(-missing // COARSE_EVERY))])
+        common = int(state.skip.min())
+        if common:
+            state.made, state.skip = state.made[common:], state.skip - common
+
+    def _make(self, blocks: int) -> FloatArray:
+        raise NotImplementedError
+
+
+class CoarsePart(_Part):
+    """Coarse movement about the driver's mean; its first block belongs to coarse step `TICKS`."""
+
+    def __init__(
+        self, model: AutoregressiveParameters, driver: DriverState, state: CoarseState, factors: FactorState
+    ) -> None:
+        self.state: CoarseState = state
+        self._model, self._driver, self._factors = model, driver, Factors(model, factors)
+        if not len(state.held):
+            state.held = self._steps(2 * TICKS + 1)
+
+    def _steps(self, n: int) -> FloatArray:
+        state, drivers = self.state, len(self._driver.mean)
+        factors = self._factors.take(COARSE, n)
+        noise = state.rng.standard_normal((n, drivers)) * (self._model.coarse.scale * factors)
+        series = recur(state.past, noise, self._model.coarse.coefficients)
+        state.past = series[n:]
+        return series[len(series) - n :]
+
+    def _make(self, blocks: int) -> FloatArray:
+        steps = np.concatenate([self.state.held, self._steps(blocks)])
+        self.state.held = steps[blocks:]
+        return interpolate(steps) * self._driver.coarse
+
+
+class FinePart(_Part):
+    """Fine movement; its first value is centred half a kernel after step 0."""
+
+    def __init__(
+        self, model: AutoregressiveParameters, driver: DriverState, state: FineState, factors: FactorState
+    ) -> None:
+        self.state: FineState = state
+        self._kernel, self._driver, self._factors = model.kernel, driver, Factors(model, factors)
+        if not len(state.last_factor):
+            state.last_factor = self._factors.take(FINE, 1)
+
+    def _volatile_noise(self, blocks: int) -> FloatArray:
+        state, drivers = self.state, len(self._driver.mean)
+        factors = np.concatenate([state.last_factor, self._factors.take(FINE, blocks)])
+        state.last_factor = factors[-1:]
+        share = (np.arange(COARSE_EVERY) / COARSE_EVERY)[:, None]
+        between = factors[:-1, None] * (1.0 - share) + factors[1:, None] * share
+        return (state.rng.random((blocks * COARSE_EVERY, drivers)) - 0.5) * between.reshape(-1, drivers)
+
+    def _make(self, blocks: int) -> FloatArray:
+        state = self.state
+        n = blocks * COARSE_EVERY
+        lacks = n + len(self._kernel) - 1 - len(state.noise)
+        noise = np.concatenate([state.noise, self._volatile_noise(-(-lacks // COARSE_EVERY))])
+        state.noise = noise[n:]
+        return convolve(noise[: n + len(self._kernel) - 1], self._kernel) * self._driver.fine

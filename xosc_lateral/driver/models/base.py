@@ -1,0 +1,106 @@
+"""What every core model can do: two independent parts, coarse and fine, sampled apart and in pieces of any length."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from dataclasses import dataclass
+from typing import Any, ClassVar, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from xosc_lateral.driver.records import Record, kebab
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class Start:
+    """Where sampled drives begin.
+
+    Parameters
+    ----------
+    rel_offset : float or array, shape (drivers,)
+        First value of ``mean + spread * (coarse - mean) + fine * fine part``, in lane widths, positive left. [-]
+    spread, fine : float
+        The effects' factors on both parts at that moment. [-]
+    """
+
+    rel_offset: float | FloatArray
+    spread: float = 1.0
+    fine: float = 1.0
+
+
+class CoreStream(Protocol):
+    """One driver on one drive, or several at once. Two calls for n and m steps give what one call for n + m gives.
+
+    A stream can be copied (`copy.deepcopy`) to come back to a state.
+    """
+
+    state: Any
+    """All that changes while driving, a msgspec struct; `CoreModel.resume` goes on from it."""
+
+    @property
+    def mean(self) -> FloatArray | float:
+        """What each driver's coarse part moves about, shape (drivers,), or a number for a single one. [-]"""
+        ...
+
+    def take(self, n: int, rate: FloatArray | None = None) -> tuple[FloatArray, FloatArray]:
+        """Next n values of the coarse and of the fine part.
+
+        Parameters
+        ----------
+        n : int
+            Steps to take.
+        rate : array, shape (n,), optional
+            Rate of mean reversion of the coarse part at each step, > 0; 1 where absent. [-]
+
+        Returns
+        -------
+        coarse, fine : array, shape (n, drivers), or (n,) for a single driver
+            In lane widths, positive left. [-]
+        """
+        ...
+
+
+class CoreModel(Record, frozen=True, tag_field="kind", tag=kebab, eq=False):
+    """Parameters of a core model: frozen, numbers only. A new one subclasses this and is listed in `registry`."""
+
+    kind: ClassVar[str]
+    """Name in the profile file: the class's without `Model`, in lower case with hyphens."""
+
+    State: ClassVar[type]
+    """Type of its streams' state."""
+
+    def __init_subclass__(cls, **settings: Any) -> None:
+        super().__init_subclass__(**settings)
+        cls.kind = kebab(cls.__name__)
+
+    @property
+    def step(self) -> float:
+        """Between two samples. [s]"""
+        raise NotImplementedError
+
+    @property
+    def mean(self) -> float:
+        """Mean offset over all drivers that the model stands for. [-]"""
+        raise NotImplementedError
+
+    @abstractmethod
+    def stream(
+        self, seed: np.random.SeedSequence, start: Start | None = None, *, drivers: int | None = None
+    ) -> CoreStream:
+        """Begin a drive; without `start` as chance has it.
+
+        Parameters
+        ----------
+        seed : numpy.random.SeedSequence
+        start : Start, optional
+        drivers : int, optional
+            So many drives of as many drivers at once: arrays then have an axis of drivers. One driver gives the
+            numbers that a drive by itself gives; of several, each has others, from the same sources of chance.
+        """
+
+    @abstractmethod
+    def resume(self, state: Any) -> CoreStream:
+        """Go on from a stream's state (which is not copied)."""

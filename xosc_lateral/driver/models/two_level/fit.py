@@ -1,0 +1,54 @@
+"""Fitting of the two-level model: count transitions, shape the noise like what is left."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from xosc_lateral.driver.kernels import convolve
+from xosc_lateral.driver.models.noise import fit_shaped_noise
+from xosc_lateral.driver.models.two_level.markov import bin_of, fit_markov_chain
+from xosc_lateral.driver.models.two_level.model import TwoLevelModel
+from xosc_lateral.driver.models.two_level.parameters import PAPER_SETTINGS, TwoLevelSettings
+
+FloatArray = NDArray[np.float64]
+
+
+def split_levels(rel_offset: FloatArray, settings: TwoLevelSettings = PAPER_SETTINGS) -> tuple[FloatArray, FloatArray]:
+    """Split a measured run into its coarse part and its capped fine part.
+
+    Parameters
+    ----------
+    rel_offset : array, shape (n,)
+        One run at the model's step. [-]
+
+    Returns
+    -------
+    coarse, fine : array, shape (n,)
+        Bin centres smoothed (at the run's ends with the kernel's part that lies inside), and what is left, capped. [-]
+    """
+    rel_offset = np.asarray(rel_offset, dtype=np.float64)
+    levels = (bin_of(rel_offset, settings.n_bins) + 0.5) / settings.n_bins - 0.5
+    kernel = settings.smoothing_kernel
+    half = len(kernel) // 2
+    weight = convolve(np.pad(np.ones(len(levels)), half), kernel)
+    coarse = convolve(np.pad(levels, half), kernel) / weight
+    return coarse, np.clip(rel_offset - coarse, -settings.fine_cap, settings.fine_cap)
+
+
+def fit_two_level(rel_offsets: Sequence[FloatArray], settings: TwoLevelSettings = PAPER_SETTINGS) -> TwoLevelModel:
+    """Fit to relative offsets [-], one array of shape (n_i,) per run, evenly sampled at the model's step.
+
+    Reference: arXiv:2405.17080, section III.
+
+    Raises
+    ------
+    NotEnoughDataError
+        When there is no transition, or no run of 5 s.
+    """
+    chain = fit_markov_chain(rel_offsets, n_bins=settings.n_bins)
+    fine = [split_levels(run, settings)[1] for run in rel_offsets]
+    noise = fit_shaped_noise(fine, n_knots=settings.n_knots, n_taps=settings.n_taps)
+    return TwoLevelModel(settings, chain.counts, noise.damping)

@@ -1,0 +1,235 @@
+"""One driver on one drive: what chance and the effects make of the core model's movement, block by block.
+
+This is the one place where offsets come from. A batch is one long block, a stream many short ones; the numbers are the
+same however a drive is cut into blocks.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import msgspec
+import numpy as np
+from numpy.typing import NDArray
+
+from xosc_lateral.driver.effects import ColumnEffect, EffectTerms, HiddenEffect
+from xosc_lateral.driver.models.base import CoreStream, Start
+from xosc_lateral.driver.profile import DriverProfile
+from xosc_lateral.driver.records import read_as
+from xosc_lateral.driver.seeds import DriveSeed, child, generator
+
+FloatArray = NDArray[np.float64]
+
+
+class DriveState(msgspec.Struct, kw_only=True):
+    """Where a drive is.
+
+    Parameters
+    ----------
+    begun_at : float, optional
+        Time of row 0 in the drive's clock; None before it is known. [s]
+    core : CoreModel.State, optional
+        None before the first offset.
+    hidden : list of HiddenEffect.State
+    terms : list of array or None
+        What the hidden effects do together at rows that were drawn and may still be asked for: location [m], spread,
+        rate and fine [-].
+    first, drawn : int
+        Rows of the drive that `terms` begins and ends at.
+    coarse, fine : array, shape (k,)
+        Core movement drawn ahead. [lane widths]
+    """
+
+    begun_at: float | None = None
+    core: Any = None
+    hidden: list[Any]
+    terms: list[FloatArray | None] = msgspec.field(default_factory=lambda: [None] * 4)
+    first: int = 0
+    drawn: int = 0
+    coarse: FloatArray
+    fine: FloatArray
+
+
+class DriveProcess:
+    """One drive.
+
+    Parameters
+    ----------
+    profile : DriverProfile
+    seed : numpy.random.SeedSequence
+    ahead : int
+        Rows that what is random is drawn ahead by, to be quick with blocks of a single row; 0: none.
+    """
+
+    def __init__(self, profile: DriverProfile, seed: np.random.SeedSequence, *, ahead: int = 0) -> None:
+        self._model, self._seed = profile.model, seed
+        self._ahead = self._core_ahead = ahead
+        for effect in profile.effects:
+            if not isinstance(effect, HiddenEffect | ColumnEffect):
+                raise TypeError(f"effect {effect!r} is made neither from HiddenEffect nor from ColumnEffect")
+        self._hidden = tuple(effect for effect in profile.effects if isinstance(effect, HiddenEffect))
+        columned = [effect for effect in profile.effects if isinstance(effect, ColumnEffect)]
+        self.columned = tuple(
+            effect.of_one_driver(generator(seed, DriveSeed.SLOPES, index)) for index, effect in enumerate(columned)
+        )
+        """The effects of columns, with this driver's own coefficients; their terms are given from outside."""
+        self.state = DriveState(
+            hidden=[
+                effect.begin(generator(seed, DriveSeed.HIDDEN, index), profile.model.step)
+                for index, effect in enumerate(self._hidden)
+            ],
+            coarse=np.empty(0),
+            fine=np.empty(0),
+        )
+        self._core: CoreStream | None = None
+
+    @property
+    def has_begun(self) -> bool:
+        """Whether offsets were taken."""
+        return self._core is not None
+
+    def begin_at(self, time: float) -> None:
+        """Time of row 0 in the drive's clock; once. [s]"""
+        if self.state.begun_at is None:
+            self.state.begun_at = time
+
+    def draw_nothing_ahead(self) -> None:
+        """An effect on the rate of mean reversion is known to come: what it acts on must not be drawn yet."""
+        self._core_ahead = 0
+
+    def hidden_terms(self, time: FloatArray) -> EffectTerms:
+        """What the hidden effects do together at times of the drive, which begins at the first one ever asked for.
+
+        Parameters
+        ----------
+        time : array, shape (n,), n >= 1
+            At about the model's step, none earlier than the last one of an earlier call. [s]
+        """
+        if not self._hidden:
+            return EffectTerms()
+        self.begin_at(float(time[0]))
+        rows = np.round((time - (self.state.begun_at or 0.0)) / self._model.step).astype(np.int64)
+        return self.hidden_terms_at(rows)
+
+    def hidden_terms_at(self, rows: NDArray[np.int64]) -> EffectTerms:
+        """The same at rows, counted in model steps from the drive's start; shape (n,), n >= 1."""
+        if not self._hidden:
+            return EffectTerms()
+        state, low, high = self.state, int(rows[0]), int(rows[-1]) + 1
+        if low < state.first:
+            raise ValueError(f"row {low} of a drive that has gone on to row {state.first}")
+        if high > state.drawn:
+            self._draw_hidden(max(high, state.drawn + self._ahead))
+        terms = EffectTerms(*state.terms)
+        if high - low == len(rows):
+            taken = terms.rows(slice(low - state.first, high - state.first))
+        else:  # a segment whose step is a little off the model's
+            taken = terms.rows(rows - state.first)
+        done = high - 1 - state.first  # the last row stays: the next segment may begin with it
+        if done >= max(self._ahead, 1):
+            state.terms = [None if values is None else values[done:] for values in state.terms]
+            state.first += done
+        return taken
+
+    def _draw_hidden(self, until: int) -> None:
+        state, step = self.state, self._model.step
+        assert state.begun_at is not None
+        time = state.begun_at + step * np.arange(state.drawn, until, dtype=np.float64)
+        new = combine([effect.advance(own, time, step) for effect, own in zip(self._hidden, state.hidden, strict=True)])
+        fresh = (new.location, new.spread, new.rate, new.fine)
+        state.terms = [
+            more if kept is None or more is None else np.concatenate([kept, more])
+            for kept, more in zip(state.terms, fresh, strict=True)
+        ]
+        state.drawn = until
+
+    def take(self, terms: EffectTerms, width: FloatArray, start: float | None = None) -> FloatArray:
+        """Next offsets.
+
+        Parameters
+        ----------
+        terms : EffectTerms
+            What all effects do together at these rows.
+        width : array, shape (n,)
+            Of the lane. [m]
+        start : float, optional
+            First offset [m]; of a drive that begins only.
+
+        Returns
+        -------
+        array, shape (n,)
+            [m]
+
+        Raises
+        ------
+        ValueError
+            If `start` is given in the middle of a drive.
+        """
+        if self._core is None:
+            self._core = self._model.stream(child(self._seed, DriveSeed.CORE), _start(start, width, terms))
+            self.state.core = self._core.state
+        elif start is not None:
+            raise ValueError("a drive that goes on can't start anew")
+        coarse, fine = self._take_core(self._core, len(width), terms.rate)
+        mean = self._core.mean
+        moved = coarse if terms.spread is None else mean + terms.spread * (coarse - mean)
+        moved = moved + (fine if terms.fine is None else terms.fine * fine)
+        offset = moved * width
+        return np.asarray(offset if terms.location is None else offset + terms.location)
+
+    def _take_core(self, core: CoreStream, n: int, rate: FloatArray | None) -> tuple[FloatArray, FloatArray]:
+        state = self.state
+        if rate is not None or not (self._core_ahead or len(state.coarse)):
+            return core.take(n, rate)
+        missing = n - len(state.coarse)
+        if missing > 0:
+            coarse, fine = core.take(max(missing, self._core_ahead))
+            state.coarse, state.fine = np.concatenate([state.coarse, coarse]), np.concatenate([state.fine, fine])
+        taken = state.coarse[:n], state.fine[:n]
+        state.coarse, state.fine = state.coarse[n:], state.fine[n:]
+        return taken
+
+    def restore(self, values: Any, where: str) -> None:
+        """Go on from a state as plain JSON values.
+
+        Raises
+        ------
+        DriverProfileError
+            If it is none, or of a profile with other effects.
+        """
+        state = read_as(DriveState, values, where)
+        state.hidden = [
+            read_as(effect.State, own, f"{where}.hidden[{index}]")
+            for index, (effect, own) in enumerate(zip(self._hidden, state.hidden, strict=True))
+        ]
+        if state.core is not None:
+            self._core = self._model.resume(read_as(self._model.State, state.core, f"{where}.core"))
+            state.core = self._core.state
+        self.state = state
+
+
+def combine(terms: Sequence[EffectTerms]) -> EffectTerms:
+    """What several effects do together: locations add up, factors multiply."""
+    location = spread = rate = fine = None
+    for term in terms:
+        if term.location is not None:
+            location = term.location if location is None else location + term.location
+        if term.spread is not None:
+            spread = term.spread if spread is None else spread * term.spread
+        if term.rate is not None:
+            rate = term.rate if rate is None else rate * term.rate
+        if term.fine is not None:
+            fine = term.fine if fine is None else fine * term.fine
+    return EffectTerms(location, spread, rate, fine)
+
+
+def _start(offset: float | None, width: FloatArray, terms: EffectTerms) -> Start | None:
+    if offset is None:
+        return None
+    location = 0.0 if terms.location is None else float(terms.location[0])
+    return Start(
+        rel_offset=(offset - location) / float(width[0]),
+        spread=1.0 if terms.spread is None else float(terms.spread[0]),
+        fine=1.0 if terms.fine is None else float(terms.fine[0]),
+    )

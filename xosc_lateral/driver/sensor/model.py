@@ -1,0 +1,92 @@
+"""What a sensor adds to the offset: white noise, low-passed noise, rounding, as a profile keeps it."""
+
+from __future__ import annotations
+
+from math import isfinite
+
+import numpy as np
+from numpy.typing import NDArray
+
+from xosc_lateral.driver.records import Record
+from xosc_lateral.driver.sensor.likelihood import Colour
+from xosc_lateral.errors import DriverProfileError
+
+FloatArray = NDArray[np.float64]
+
+HIGHEST = 1.5
+"""Runs are low-passed here on being resampled to 5 Hz, and so is what is sampled. [Hz]"""
+
+
+class SensorModel(Record, frozen=True):
+    """The sensor's part of what was measured.
+
+    Parameters
+    ----------
+    white : float
+        One-sided power density of the white part. [m2/Hz]
+    coloured : float
+        That of the low-passed part at frequency 0. [m2/Hz]
+    corner : float
+        Of the low-passed part. [Hz]
+    order : int
+        Of its Butterworth shape; 0 where there is none.
+    rounding : float
+        Step that values come in; 0 where none was found. [m]
+    driver_variance, sensor_variance : float
+        Of the measured rows, whose sum is the measured variance. [m2]
+    driver_share : tuple of float
+        Share of the driver: 95 % interval. [-]
+
+    Raises
+    ------
+    DriverProfileError
+        If a number is negative or no number.
+    """
+
+    white: float
+    coloured: float = 0.0
+    corner: float = 1.0
+    order: int = 0
+    rounding: float = 0.0
+    driver_variance: float = 0.0
+    sensor_variance: float = 0.0
+    driver_share: tuple[float, float] = (0.0, 1.0)
+
+    def __post_init__(self) -> None:
+        """Check."""
+        numbers = (self.white, self.coloured, self.rounding, self.driver_variance, self.sensor_variance)
+        if not all(map(isfinite, numbers)) or min(numbers) < 0 or self.order < 0 or not self.corner > 0:
+            raise DriverProfileError(f"sensor: {self}")
+
+    @property
+    def share(self) -> float:
+        """Of the driver in the measured variance. [-]"""
+        total = self.driver_variance + self.sensor_variance
+        return self.driver_variance / total if total > 0 else 1.0
+
+    def in_words(self) -> str:
+        """How the measured variance is split, in a sentence."""
+        low, high = self.driver_share
+        return (
+            f"of the measured variance {100 * self.share:.1f} % is the driver's (95 %: {100 * low:.1f} to "
+            f"{100 * high:.1f} %), the rest the sensor's ({np.sqrt(self.sensor_variance):.3f} m rms)"
+        )
+
+    def density(self, frequency: FloatArray) -> FloatArray:
+        """One-sided power density of the noise, without rounding. [m2/Hz]"""
+        total: FloatArray = np.full(np.shape(frequency), self.white)
+        if self.order:
+            total = total + self.coloured * Colour(self.order, self.corner).shape(frequency)
+        return total
+
+    def sample(self, n: int, step: float, rng: np.random.Generator) -> FloatArray:
+        """Noise as it is in measured runs at this step, shape (n,). [m]
+
+        What rounding adds is left out: runs are low-passed, and no longer lie on its lattice.
+        """
+        if not n:
+            return np.empty(0)
+        padded = n + round(30.0 / step)  # a low-passed part must not come round to its own beginning
+        frequency: FloatArray = np.asarray(np.fft.rfftfreq(padded, step), dtype=np.float64)
+        gain = np.sqrt(self.density(frequency) / (2.0 * step)) * (frequency <= HIGHEST)
+        return np.fft.irfft(np.fft.rfft(rng.normal(size=padded)) * gain, padded)[:n]

@@ -1,0 +1,97 @@
+"""Power density of runs as a Whittle likelihood wants it: mean periodograms in bins, and what they weigh."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from xosc_lateral.drives.periodogram import Detrend, periodograms
+from xosc_lateral.errors import NotEnoughDataError
+
+FloatArray = NDArray[np.float64]
+
+WINDOWS = (102.4, 51.2, 25.6, 12.8)
+"""Lengths of window, the first of which there are at least `ENOUGH`; a longer one sees slower movement. [s]"""
+
+ENOUGH = 16
+
+INDEPENDENT = 0.53
+"""Independent windows per Hann window at half overlap (Welch 1967, eq. for the variance at 50 % overlap). [-]"""
+
+FAINTEST = 1e-12
+"""Added everywhere, so that values that stand still have a density. [m2/Hz]"""
+
+PASSED = 1.5
+"""Resampling to 5 Hz keeps what is slower than this. [Hz]"""
+
+BINS_FROM, BIN = 0.12, 0.05
+"""Above the first frequency [Hz], neighbouring ones within this share are averaged. [-]"""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Periodogram:
+    """Mean power density and its weight.
+
+    Parameters
+    ----------
+    frequency : array, shape (n,)
+        Mean of each bin. [Hz]
+    density : array, shape (n,)
+        One-sided: integrates to the variance. [m2/Hz]
+    weight : array, shape (n,)
+        Independent ordinates in each bin. [-]
+    window : float
+        Length. [s]
+    """
+
+    frequency: FloatArray
+    density: FloatArray
+    weight: FloatArray
+    window: float
+
+    @property
+    def count(self) -> float:
+        """Independent ordinates in all. [-]"""
+        return float(self.weight.sum())
+
+
+def windows_of(runs: Sequence[FloatArray], step: float) -> tuple[FloatArray, FloatArray]:
+    """Frequencies, shape (m,), and densities of all windows, shape (k, m), of evenly sampled runs.
+
+    Raises
+    ------
+    NotEnoughDataError
+        If no run holds the shortest window.
+    """
+    size = 0
+    for seconds in WINDOWS:
+        size = round(seconds / step)
+        if sum((len(run) - size) // (size // 2) + 1 for run in runs if len(run) >= size) >= ENOUGH:
+            break
+    longest = max(map(len, runs), default=0)
+    if longest < size:
+        raise NotEnoughDataError(f"no run of {size * step:g} s; the longest lasts {longest * step:g} s")
+    powers = np.concatenate([periodograms(run, size, detrend=Detrend.MEAN) for run in runs])
+    density = 2.0 * step * powers + FAINTEST
+    return np.asarray(np.fft.rfftfreq(size, step), dtype=np.float64), density
+
+
+def periodogram(frequency: FloatArray, windows: FloatArray) -> Periodogram:
+    """Mean over windows, binned, from the second frequency (Hann smears the mean into the first) to `PASSED`."""
+    use = (frequency > 1.5 * frequency[1]) & (frequency <= PASSED)
+    known, density = frequency[use], windows[:, use].mean(axis=0)
+    edges = [int(k) for k in np.flatnonzero(known < BINS_FROM)]
+    at = len(edges)
+    while at < len(known):
+        edges.append(at)
+        at = max(at + 1, int(np.searchsorted(known, known[at] * (1.0 + BIN))))
+    count = np.diff([*edges, len(known)])
+    return Periodogram(
+        np.add.reduceat(known, edges) / count,
+        np.add.reduceat(density, edges) / count,
+        (INDEPENDENT * len(windows) + 0.5) * count,
+        1.0 / float(frequency[1]),
+    )

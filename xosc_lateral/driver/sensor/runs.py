@@ -1,0 +1,57 @@
+"""The driver's part of measured runs."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from xosc_lateral.driver.sensor.model import SensorModel
+from xosc_lateral.driver.sensor.periodogram import WINDOWS
+from xosc_lateral.driver.sensor.separation import separate
+from xosc_lateral.drives.drive import Drive, Run
+from xosc_lateral.drives.resampling import STEP
+
+FloatArray = NDArray[np.float64]
+
+
+def driver_runs(
+    runs: Sequence[Run], drives: Sequence[Drive] = (), *, sensor_noise: float | None = None
+) -> tuple[list[Run], SensorModel | None]:
+    """Runs with the sensor's part taken out, and what it was.
+
+    Parameters
+    ----------
+    runs : sequence of Run
+    drives : sequence of Drive, optional
+        That they were cut from: variances are then those of the rows as recorded, of which the runs are a low-passed
+        version.
+    sensor_noise : float, optional
+        See `separate`.
+
+    Returns
+    -------
+    list of Run, SensorModel or None
+        The runs as they are, and None, where the longest is too short for a spectrum.
+    """
+    if max(map(len, runs), default=0) * STEP < WINDOWS[-1]:
+        return list(runs), None
+    rows, rate = _rows(runs, drives)
+    found = separate([run.offset for run in runs], STEP, rows=rows, rate=rate, sensor_noise=sensor_noise)
+    return [replace(run, offset=found.driver_part(run.offset, STEP)) for run in runs], found.sensor
+
+
+def _rows(runs: Sequence[Run], drives: Sequence[Drive]) -> tuple[list[FloatArray] | None, float | None]:
+    """The runs as recorded, and rows per second."""
+    known = {drive.name: drive for drive in drives}
+    if not all(run.drive in known for run in runs):
+        return None, None
+    rows, steps = [], []
+    for run in runs:
+        drive = known[run.drive]
+        first, last = np.searchsorted(drive.time, (run.time[0] - 1e-6, run.time[-1] + 1e-6))
+        rows.append(drive.offset[first:last])
+        steps.append(np.diff(drive.time[first:last]))
+    return rows, 1.0 / float(np.median(np.concatenate(steps)))

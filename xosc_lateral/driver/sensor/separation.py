@@ -1,0 +1,202 @@
+"""Driver and sensor, told apart in measured runs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from xosc_lateral.driver.sensor.likelihood import Colour, Known, Solution, solve
+from xosc_lateral.driver.sensor.model import SensorModel
+from xosc_lateral.driver.sensor.periodogram import Periodogram, periodogram, windows_of
+from xosc_lateral.driver.sensor.quantisation import COARSEST, quantisation_step, rounding_density
+from xosc_lateral.driver.sensor.vehicle_bound import density
+
+FloatArray = NDArray[np.float64]
+
+ORDERS = (1, 2, 4)
+CORNERS = (0.12, 0.17, 0.22, 0.29, 0.38, 0.5, 0.65, 0.85, 1.1, 1.4)
+"""Of the sensor's low-passed part, that are tried: a step of 30 %. [Hz]"""
+
+LEAST_CORNER = {1: 0.0, 2: 0.38, 4: 0.38}
+"""By order. A steep fall from a lower corner can't be told from a driver's own. [Hz]"""
+
+PLAUSIBLE = 6.0
+"""Explanations whose information criterion is within this of the best count for the interval: e^-3 as likely. [-]"""
+
+BLOCKS = 8
+"""Of windows, of which each is left out in turn for the interval. [-]"""
+
+ROUNDING_ROUNDS = 3
+
+
+@dataclass(frozen=True, eq=False)
+class Separation:
+    """Densities of driver and sensor.
+
+    Parameters
+    ----------
+    knots : array
+        Of the driver's density, see `vehicle_bound`.
+    sensor : SensorModel
+    rounding : callable
+        Density of what rounding adds. [m2/Hz]
+    is_too_coarse : bool
+        Whether values come in steps too coarse for the split to mean anything.
+    """
+
+    knots: FloatArray
+    sensor: SensorModel
+    rounding: Callable[[FloatArray], FloatArray]
+    is_too_coarse: bool = False
+
+    def driver_part(self, offset: FloatArray, step: float) -> FloatArray:
+        """The offset with every frequency scaled down to the driver's share of the power, about its own mean.
+
+        Keeps the driver's spectrum (Wiener's filter would not: it leaves less than the driver's power), and the path
+        itself wherever the sensor is good.
+        """
+        n = len(offset)
+        if n < 2:
+            return offset
+        mean = float(offset.mean())
+        about = offset - mean
+        extended = np.concatenate([2.0 * about[0] - about[:0:-1], about, 2.0 * about[-1] - about[-2::-1]])
+        frequency: FloatArray = np.asarray(np.fft.rfftfreq(len(extended), step), dtype=np.float64)
+        driver = density(self.knots, frequency)
+        share = driver / (driver + self.sensor.density(frequency) + self.rounding(frequency))
+        share[0] = 1.0
+        filtered = np.fft.irfft(np.fft.rfft(extended) * np.sqrt(share), len(extended))
+        return np.asarray(mean + filtered[n - 1 : 2 * n - 1])
+
+
+def separate(
+    runs: Sequence[FloatArray],
+    step: float,
+    *,
+    rows: Sequence[FloatArray] | None = None,
+    rate: float | None = None,
+    sensor_noise: float | None = None,
+) -> Separation:
+    """Tell driver and sensor apart.
+
+    Parameters
+    ----------
+    runs : sequence of array
+        Offsets at an even step. [m]
+    step : float
+        [s]
+    rows : sequence of array, optional
+        The offsets of the same runs as recorded; variances are counted, and rounding is looked for, in these. [m]
+    rate : float, optional
+        Rows per second; needed with `sensor_noise`. [Hz]
+    sensor_noise : float, optional
+        Standard deviation of the sensor's error on the rows, where it is known. [m]
+
+    Raises
+    ------
+    NotEnoughDataError
+        If no run lasts 12.8 s.
+    """
+    measured = list(rows) if rows is not None else list(runs)
+    variance = float(np.concatenate(measured).var())
+    frequency, windows = windows_of(runs, step)
+    data = periodogram(frequency, windows)
+    known = None if sensor_noise is None else Known(sensor_noise, rate or 1.0 / step)
+    grain = quantisation_step(np.concatenate(measured))
+    coarse = grain > COARSEST * np.sqrt(max(variance - grain**2 / 12.0, 1e-12))
+    rounding: Callable[[FloatArray], FloatArray] = _no_density
+    colours = [Colour(), *_colours()]
+    if grain and not coarse:
+        rounding = _rounding(data, grain, variance)
+        colours = colours[:1]
+    base = rounding(data.frequency)
+    found = [(solve(data, colour, base, known), colour) for colour in colours]
+    criteria = np.array([2.0 * one.loss + 2.0 * np.log(data.count) * bool(colour.order) for one, colour in found])
+    best, colour = found[int(np.argmin(criteria))]
+    result = Separation(best.knots, _sensor(best, colour, grain), rounding, bool(coarse))
+    driver = float(np.concatenate([result.driver_part(run, step) for run in runs]).var())
+    share = min(driver / variance, 1.0)
+    plausible = [one for one, good in zip(found, criteria < criteria.min() + PLAUSIBLE, strict=True) if good]
+    interval = _interval(frequency, windows, best, colour, base, known, plausible, share, data)
+    sensor = _sensor(best, colour, grain, share * variance, (1.0 - share) * variance, interval)
+    return Separation(best.knots, sensor, rounding, bool(coarse))
+
+
+def _colours() -> list[Colour]:
+    return [Colour(order, corner) for order in ORDERS for corner in CORNERS if corner >= LEAST_CORNER[order]]
+
+
+def _sensor(
+    found: Solution,
+    colour: Colour,
+    grain: float,
+    driver: float = 0.0,
+    rest: float = 0.0,
+    interval: tuple[float, float] = (0.0, 1.0),
+) -> SensorModel:
+    return SensorModel(
+        float(np.exp(found.white)),
+        float(np.exp(found.colour)),
+        colour.corner,
+        colour.order,
+        grain,
+        driver,
+        rest,
+        interval,
+    )
+
+
+def _no_density(frequency: FloatArray) -> FloatArray:
+    return np.zeros(np.shape(frequency))
+
+
+def _rounding(data: Periodogram, grain: float, variance: float) -> Callable[[FloatArray], FloatArray]:
+    """Density of rounding, which hangs on the driver's, which hangs on it: a few rounds."""
+    level = grain**2 / 12.0 / 10.0  # white over 10 Hz, to begin with
+    shape: Callable[[FloatArray], FloatArray] = lambda frequency: np.full(np.shape(frequency), level)  # noqa: E731
+    for _ in range(ROUNDING_ROUNDS):
+        found = solve(data, Colour(), shape(data.frequency))
+        shape = rounding_density(grain, lambda frequency: density(found.knots, frequency), variance - grain**2 / 12.0)  # noqa: B023
+    return shape
+
+
+def _in_band(found: Solution, colour: Colour, data: Periodogram) -> float:
+    """Sensor's power among what was seen. [m2]"""
+    from scipy.integrate import trapezoid
+
+    frequency = np.linspace(0.0, float(data.frequency[-1]), 400)
+    total = np.full(len(frequency), np.exp(found.white))
+    if colour.order:
+        total += np.exp(found.colour) * colour.shape(frequency)
+    return float(trapezoid(total, frequency))
+
+
+def _interval(
+    frequency: FloatArray,
+    windows: FloatArray,
+    best: Solution,
+    colour: Colour,
+    base: FloatArray,
+    known: Known | None,
+    plausible: Sequence[tuple[Solution, Colour]],
+    share: float,
+    data: Periodogram,
+) -> tuple[float, float]:
+    """95 % interval of the driver's share: over what else would explain the data, and over blocks left out."""
+    seen = float((data.density[:-1] * np.diff(data.frequency)).sum())
+    levels = np.array([_in_band(one, shape, data) for one, shape in plausible]) - _in_band(best, colour, data)
+    blocks = np.array_split(np.arange(len(windows)), min(BLOCKS, len(windows)))
+    left_out = []
+    for block in blocks:
+        others = np.setdiff1d(np.arange(len(windows)), block)
+        if len(others):
+            part = periodogram(frequency, windows[others])
+            left_out.append(_in_band(solve(part, colour, base, known, best), colour, part))
+    error = np.sqrt((len(blocks) - 1) * np.var(left_out)) if len(left_out) > 1 else seen
+    span = share / max(seen, 1e-30)
+    low = share - span * (float(levels.max()) + 1.96 * float(error))
+    high = share - span * (float(levels.min()) - 1.96 * float(error))
+    return float(np.clip(low, 0.0, share)), float(np.clip(high, share, 1.0))

@@ -1,0 +1,97 @@
+"""The state of an offset stream as plain values, and older states as the present version has them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from xosc_lateral.driver.effects.response import ResponseState
+from xosc_lateral.driver.profile import DriverProfile
+from xosc_lateral.driver.records import Record
+from xosc_lateral.errors import DriverProfileError
+
+FORMAT = "xosc-lateral offset stream"
+
+VERSION = 2
+"""Of the state's format: 1 had no number, it is that of package version 0.1."""
+
+
+class SeedState(Record, frozen=True):
+    """A seed sequence."""
+
+    entropy: int | Sequence[int] | None
+    spawn_key: tuple[int, ...]
+
+
+class AnswerState(Record, frozen=True):
+    """The answer to one effect's columns: its response, answers that are ready, and how many of these are dropped."""
+
+    response: ResponseState
+    ready: tuple[tuple[float, ...], ...]
+    drop: int
+
+
+class StreamState(Record, frozen=True, kw_only=True):
+    """Where an `OffsetStream` is.
+
+    Parameters
+    ----------
+    profile : str
+        Hash of what its offsets depend on.
+    seed : SeedState
+    factor : int
+        Steps per model step.
+    start : float, optional
+        [m]
+    time : float
+        [s]
+    known : tuple of str, optional
+        Context columns that count; None before the first context.
+    widths : tuple of float
+        Lane widths of rows that were looked at. [m]
+    recalled, looked, row, phase : int
+        Rows before the drive, steps looked ahead, next model step, step within it.
+    samples, curve : tuple of float
+        Model samples about the present piece, and its coefficients. [m]
+    answers : tuple of AnswerState
+        Of the effects whose columns are known.
+    process : DriveState as plain values
+    """
+
+    profile: str
+    seed: SeedState
+    factor: int
+    start: float | None
+    time: float
+    known: tuple[str, ...] | None
+    widths: tuple[float, ...]
+    recalled: int
+    looked: int
+    row: int
+    phase: int
+    samples: tuple[float, ...]
+    curve: tuple[float, ...]
+    answers: tuple[AnswerState, ...]
+    process: Any
+
+
+def upgraded(state: Mapping[str, Any], profile: DriverProfile) -> dict[str, Any]:
+    """A state's values as the present version writes them, without format and version.
+
+    Raises
+    ------
+    DriverProfileError
+        If it is no state of a stream, or of a newer version.
+    """
+    if not isinstance(state, Mapping) or state.get("format") != FORMAT:
+        raise DriverProfileError(f'no state of an offset stream: "format" is not "{FORMAT}"')
+    version = state.get("version", 1)
+    if not isinstance(version, int) or version > VERSION:
+        raise DriverProfileError(
+            f"a state written by a newer version of xosc-lateral (format {version}; this one reads up to {VERSION})"
+        )
+    if version == 1:
+        from xosc_lateral.driver.stream_state_1 import from_version_1
+
+        return from_version_1(state, profile)
+    return {name: value for name, value in state.items() if name not in ("format", "version")}

@@ -1,0 +1,168 @@
+"""Raw rows of one drive into clean ones: the same for every source, be it a file, a DataFrame or an import."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from xosc_lateral.drives.drive import Drive
+from xosc_lateral.errors import FormatError
+from xosc_lateral.limits import DRIVE_SPAN, TIME
+
+FloatArray = NDArray[np.float64]
+
+MAX_STEP = 0.25
+"""Median step of a table that can give 5 Hz. [s]"""
+
+LANE_WIDTHS = (2.0, 6.0)
+"""What a lane's median width is believed to be. [m]"""
+
+MAX_MEDIAN_SPEED = 60.0
+"""A drive faster than this in the median has its speed in km/h. [m/s]"""
+
+MAX_OUTSIDE = 0.01
+"""Share of rows farther than one lane width from the lane centre that is still taken for glitches. [-]"""
+
+CONTRADICTION = 0.05
+"""Two rows of one time further apart than this contradict each other [m] ..."""
+
+MAX_CONTRADICTIONS = 0.01
+"""... and more than this share of them means several drives in one. [-]"""
+
+RUN = "following_run"
+"""Column of tables that an import has cut: number of the road-following stretch. What it has cut is not cut again."""
+
+OWN = frozenset({"time", "drive", "offset", "lane_width", "distance_left", "distance_right", RUN})
+"""Columns that are no context."""
+
+
+def clean_drive(name: str, columns: dict[str, FloatArray], levels: frozenset[str], path: Path) -> Drive | None:
+    """Rows of one drive, from whatever source, as a `Drive`.
+
+    Parameters
+    ----------
+    name : str
+    columns : mapping of str to array, shape (n,)
+        `time` [s], and `offset` and `lane_width` or `distance_left` and `distance_right` [m]; `speed` [m/s] if known;
+        `RUN` where an import has cut the drive; all others are context. NaN: missing, or "there is none".
+    levels : frozenset of str
+        Columns that hold levels.
+    path : Path
+        What messages call the source.
+
+    Returns
+    -------
+    Drive or None
+        Sorted by time, repeated times and rows without a place in the lane left out; None when nothing is left.
+
+    Raises
+    ------
+    FormatError
+        If a column can't be in the unit meant, or the rows are too far apart.
+    """
+    columns = _in_order(columns, name, path)
+    offset, lane_width = _position(columns)
+    _check_units(name, columns, offset, lane_width, path)
+    narrow = (lane_width < LANE_WIDTHS[0] / 2) | (lane_width > 2 * LANE_WIDTHS[1])
+    good = np.isfinite(offset) & np.isfinite(lane_width) & ~narrow
+    good[good] = np.abs(offset[good]) <= lane_width[good]
+    if RUN in columns:
+        good &= columns[RUN] >= 0  # also NaN is none
+    speed = columns.get("speed")
+    if speed is not None and np.isfinite(speed).any():
+        good &= np.isfinite(speed)
+    if good.sum() < 2:
+        return None
+    context = {key: values[good] for key, values in columns.items() if key not in OWN}
+    context = {key: values for key, values in context.items() if not np.isnan(values).all()}
+    context["lane_width"] = lane_width[good]
+    held = frozenset(levels & context.keys())
+    run = columns[RUN][good].astype(np.int64) if RUN in columns else None
+    return Drive(name, columns["time"][good], offset[good], lane_width[good], context, held, str(path), run)
+
+
+def _in_order(columns: dict[str, FloatArray], name: str, path: Path) -> dict[str, FloatArray]:
+    """Rows sorted by time, the first of each time kept."""
+    known = np.flatnonzero(np.isfinite(columns["time"]))
+    order = known[np.argsort(columns["time"][known], kind="stable")]
+    columns = {key: values[order] for key, values in columns.items()}
+    time = columns["time"]
+    if len(time) < 2:
+        return columns
+    _check_time(time, name, path)
+    repeated = np.concatenate([[False], np.diff(time) <= 0])
+    _check_repeats(columns, repeated, name, path)
+    columns = {key: values[~repeated] for key, values in columns.items()}
+    steps = np.diff(columns["time"])
+    if len(steps) and np.median(steps) > MAX_STEP:
+        raise FormatError(
+            f"drive {name}: rows are {np.median(steps):.4g} s apart (median), at most {MAX_STEP} s can give 5 Hz; "
+            "if the clock is in milliseconds: --map time=COLUMN:ms",
+            path=path,
+            element="column 'time'",
+        )
+    return columns
+
+
+def _check_time(time: FloatArray, name: str, path: Path) -> None:
+    latest, span = float(np.abs(time[[0, -1]]).max()), float(time[-1] - time[0])
+    for limit, found in ((TIME, latest), (DRIVE_SPAN, span)):
+        if found > limit.value:
+            what = f"drive {name}: {limit.refusal(found)}; if the clock is in milliseconds: --map time=COLUMN:ms"
+            raise FormatError(what, path=path, element="column 'time'")
+
+
+def _check_repeats(columns: Mapping[str, FloatArray], repeated: NDArray[np.bool_], name: str, path: Path) -> None:
+    offset, _ = _position(columns)
+    later = np.flatnonzero(repeated)
+    apart = np.abs(offset[later] - offset[later - 1]) > CONTRADICTION
+    if apart.sum() > max(5, MAX_CONTRADICTIONS * len(repeated)):
+        raise FormatError(
+            f"drive {name}: {int(apart.sum())} of {len(repeated)} rows repeat a time with another offset; if the table "
+            "holds several drives it needs a column 'drive'",
+            path=path,
+            element="column 'time'",
+        )
+
+
+def _position(columns: Mapping[str, FloatArray]) -> tuple[FloatArray, FloatArray]:
+    """Offset, positive to the left (far from the right marking), and lane width. [m]"""
+    if {"offset", "lane_width"} <= columns.keys():
+        return columns["offset"], columns["lane_width"]
+    left, right = columns["distance_left"], columns["distance_right"]
+    return (right - left) / 2, right + left
+
+
+def _check_units(
+    name: str, columns: Mapping[str, FloatArray], offset: FloatArray, width: FloatArray, path: Path
+) -> None:
+    known = np.isfinite(offset) & np.isfinite(width)
+    if not known.any():
+        return
+    median_width = float(np.median(width[known]))
+    if not LANE_WIDTHS[0] <= median_width <= LANE_WIDTHS[1]:
+        raise FormatError(
+            f"drive {name}: the lane is {median_width:.4g} m wide (median), expected {LANE_WIDTHS[0]:g} to "
+            f"{LANE_WIDTHS[1]:g} m; name the unit with --map, as in lane_width=COLUMN:cm",
+            path=path,
+        )
+    outside = np.abs(offset[known]) > np.maximum(width[known], LANE_WIDTHS[0])
+    if outside.mean() > MAX_OUTSIDE:
+        worst = float(np.max(np.abs(offset[known])))
+        raise FormatError(
+            f"drive {name}: offsets of up to {worst:.4g} m in a lane of {median_width:.3g} m, "
+            f"{100 * outside.mean():.0f} % of the rows beyond a whole lane width; name the unit with --map, "
+            "as in offset=COLUMN:cm",
+            path=path,
+        )
+    speed = columns.get("speed")
+    if speed is not None and np.isfinite(speed).any() and float(np.nanmedian(speed)) > MAX_MEDIAN_SPEED:
+        raise FormatError(
+            f"drive {name}: speed is {float(np.nanmedian(speed)):.4g} m/s (median), more than {MAX_MEDIAN_SPEED:g}; "
+            "if it is in km/h: --map speed=COLUMN:km/h",
+            path=path,
+            element="column 'speed'",
+        )

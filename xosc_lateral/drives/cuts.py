@@ -1,0 +1,160 @@
+"""What is cut out of a drive, and the separate runs at an even step that are left."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from xosc_lateral.drives.drive import Drive, Run
+from xosc_lateral.drives.resampling import STEP, average, nearest, resample
+from xosc_lateral.errors import NotEnoughDataError
+
+BoolArray = NDArray[np.bool_]
+
+MIN_SPEED = 40.0 / 3.6
+"""Slower driving is cut out (arXiv:2405.17080, section III). [m/s]"""
+
+LANE_CHANGE_MARGIN = 4.0
+"""Cut on each side of the moment in which the marking is crossed: a lane change takes 4-6 s, half of it before. [s]"""
+
+JUMP = 0.5
+"""A change of the relative offset between two rows that means another lane. [-]"""
+
+MAX_GAP = 0.5
+"""Missing rows up to this long are bridged; longer ones end a run. [s]"""
+
+MIN_RUN = 10.0
+"""Shorter runs are left out: they hold no whole snippet. [s]"""
+
+
+@dataclass(frozen=True, slots=True)
+class CutRules:
+    """What is cut out of a drive; the defaults are the paper's where it gives one.
+
+    Parameters
+    ----------
+    min_speed : float
+        [m/s]
+    lane_change_margin : float
+        Cut on each side of a lane change. [s]
+    max_gap : float
+        Longest gap that is bridged. [s]
+    min_run : float
+        Shortest run that is kept. [s]
+    step : float
+        Of the runs. [s]
+    """
+
+    min_speed: float = MIN_SPEED
+    lane_change_margin: float = LANE_CHANGE_MARGIN
+    max_gap: float = MAX_GAP
+    min_run: float = MIN_RUN
+    step: float = STEP
+
+
+PAPER_RULES = CutRules()
+
+
+def cut_runs(drive: Drive, rules: CutRules = PAPER_RULES) -> list[Run]:
+    """Road-following runs of one drive at an even step; empty when nothing is left."""
+    keep = ~(lane_change_rows(drive, rules) | slow_rows(drive, rules))
+    stretches = [rows for rows in _stretches(drive, keep, rules.max_gap) if _lasts(drive, rows, rules)]
+    return [_run(drive, index, rows, rules.step) for index, rows in enumerate(stretches)]
+
+
+def all_runs(drives: Sequence[Drive], rules: CutRules = PAPER_RULES) -> list[Run]:
+    """Runs of several drives.
+
+    Raises
+    ------
+    NotEnoughDataError
+        When no run is left in any drive; says what was cut and why.
+    """
+    runs = [run for drive in drives for run in cut_runs(drive, rules)]
+    if not runs:
+        raise NotEnoughDataError(_why_nothing(drives, rules))
+    return runs
+
+
+def whole_run(drive: Drive, step: float = STEP) -> Run:
+    """The drive from its first row to its last at an even step, nothing cut out, gaps bridged: for its context. [s]"""
+    return _run(drive, 0, slice(0, len(drive)), step)
+
+
+def lane_change_rows(drive: Drive, rules: CutRules = PAPER_RULES) -> BoolArray:
+    """Rows within the margin of a lane change: `lane_index` changes, or the offset jumps by about a lane width.
+
+    None where an import has cut them already.
+
+    Returns
+    -------
+    array of bool, shape (n,)
+    """
+    if drive.run is not None:
+        return np.zeros(len(drive), dtype=np.bool_)
+    step = np.abs(np.diff(drive.offset)) > JUMP * np.minimum(drive.lane_width[1:], drive.lane_width[:-1])
+    lane = drive.context.get("lane_index")
+    if lane is not None:
+        known = np.flatnonzero(np.isfinite(lane))
+        moved = known[:-1][np.diff(lane[known]) != 0]
+        step[moved] = True
+    at = np.flatnonzero(step)
+    change = np.zeros(len(drive), dtype=np.bool_)
+    first = np.searchsorted(drive.time, drive.time[at] - rules.lane_change_margin)
+    last = np.searchsorted(drive.time, drive.time[at + 1] + rules.lane_change_margin, side="right")
+    for begin, end in zip(first, last, strict=True):
+        change[begin:end] = True
+    return change
+
+
+def slow_rows(drive: Drive, rules: CutRules = PAPER_RULES) -> BoolArray:
+    """Rows below the least speed; none when no speed was recorded. Shape (n,)."""
+    if drive.speed is None:
+        return np.zeros(len(drive), dtype=np.bool_)
+    return np.asarray(drive.speed < rules.min_speed)
+
+
+def _run(drive: Drive, index: int, rows: slice, step: float) -> Run:
+    time = drive.time[rows]
+    grid = time[0] + step * np.arange(int((time[-1] - time[0]) / step + 1e-6) + 1)
+    context = {
+        name: (nearest if name in drive.levels else average)(time, values[rows], grid)
+        for name, values in drive.context.items()
+    }
+    lane_width = average(time, drive.lane_width[rows], grid)
+    offset = resample(time, drive.offset[rows], grid)
+    return Run(drive.name, index, grid, offset, lane_width, context, drive.levels)
+
+
+def _stretches(drive: Drive, keep: BoolArray, max_gap: float) -> list[slice]:
+    """Runs of kept rows without a gap."""
+    if not keep.any():
+        return []
+    rows = np.flatnonzero(keep)
+    new = (np.diff(rows) > 1) | (np.diff(drive.time[rows]) > max_gap)
+    if drive.run is not None:
+        new |= np.diff(drive.run[rows]) != 0
+    ends = np.flatnonzero(new)
+    firsts = np.concatenate([[0], ends + 1])
+    lasts = np.concatenate([ends, [len(rows) - 1]])
+    return [slice(int(rows[first]), int(rows[last]) + 1) for first, last in zip(firsts, lasts, strict=True)]
+
+
+def _lasts(drive: Drive, rows: slice, rules: CutRules) -> bool:
+    time = drive.time[rows]
+    return bool(time[-1] - time[0] >= rules.min_run - 0.5 * rules.step and len(time) > 1)
+
+
+def _why_nothing(drives: Sequence[Drive], rules: CutRules) -> str:
+    driven = sum(float(drive.time[-1] - drive.time[0]) for drive in drives if len(drive))
+    rows = max(1, sum(map(len, drives)))
+    slow = sum(float(slow_rows(drive, rules).sum()) for drive in drives) / rows
+    changes = sum(float(lane_change_rows(drive, rules).sum()) for drive in drives) / rows
+    return (
+        f"no run of {rules.min_run:g} s is left in {driven:.1f} s of driving: {100 * slow:.0f} % of the rows are "
+        f"below {3.6 * rules.min_speed:.0f} km/h, {100 * changes:.0f} % within "
+        f"{rules.lane_change_margin:g} s of a lane change"
+    )

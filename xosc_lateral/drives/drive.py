@@ -1,0 +1,141 @@
+"""Measured drives as numbers: rows as recorded, and the separate runs on an even grid that a cut leaves."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from types import MappingProxyType
+
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Drive:
+    """One drive as recorded, in clean units: finite, sorted, each time once.
+
+    Parameters
+    ----------
+    name : str
+        Drive in the table, else the file's stem.
+    time : array, shape (n,)
+        Strictly increasing, steps may vary. [s]
+    offset : array, shape (n,)
+        From the lane centre, positive to the LEFT of travel. [m]
+    lane_width : array, shape (n,)
+        [m]
+    context : mapping of str to array, shape (n,)
+        Every other numeric column, and `speed` and `lane_width` under these names. NaN: there is none.
+    levels : frozenset of str
+        Context columns that hold a few whole numbers (lane index, flags): never averaged.
+    source : str
+        Where it was read. For messages.
+    run : array of int, shape (n,), optional
+        Number of the road-following stretch of each row, where an import has cut the drive already: lane changes and
+        their margins are gone, and none are looked for again. None: nothing has been cut.
+    """
+
+    name: str
+    time: FloatArray
+    offset: FloatArray
+    lane_width: FloatArray
+    context: Mapping[str, FloatArray] = field(default_factory=dict)
+    levels: frozenset[str] = frozenset()
+    source: str = ""
+    run: NDArray[np.int64] | None = None
+
+    def __post_init__(self) -> None:
+        """Copy and freeze; refuse unequal lengths and what readers must have taken out."""
+        _freeze(self)
+        if np.any(np.diff(self.time) <= 0):
+            raise ValueError(f"drive {self.name}: time does not increase")
+
+    def __len__(self) -> int:
+        """Count of rows."""
+        return len(self.time)
+
+    @property
+    def speed(self) -> FloatArray | None:
+        """Shape (n,) [m/s], None when not recorded."""
+        return self.context.get("speed")
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Run:
+    """A stretch of road-following driving on an even grid; nothing may be counted across two runs.
+
+    Parameters
+    ----------
+    drive : str
+        Name of the drive that it comes from.
+    index : int
+        Number of the run in its drive, from 0.
+    time : array, shape (n,)
+        Even, in the drive's own clock. [s]
+    offset : array, shape (n,)
+        Positive to the LEFT of travel. [m]
+    lane_width : array, shape (n,)
+        [m]
+    context : mapping of str to array, shape (n,)
+        As in `Drive`.
+    levels : frozenset of str
+        As in `Drive`.
+    """
+
+    drive: str
+    index: int
+    time: FloatArray
+    offset: FloatArray
+    lane_width: FloatArray
+    context: Mapping[str, FloatArray] = field(default_factory=dict)
+    levels: frozenset[str] = frozenset()
+
+    def __post_init__(self) -> None:
+        """Copy and freeze; refuse unequal lengths and missing values."""
+        _freeze(self)
+
+    def __len__(self) -> int:
+        """Count of rows."""
+        return len(self.time)
+
+    @property
+    def rel_offset(self) -> FloatArray:
+        """Offset / lane width, shape (n,). [-]"""
+        return self.offset / self.lane_width
+
+    @property
+    def speed(self) -> FloatArray | None:
+        """Shape (n,) [m/s], None when not recorded."""
+        return self.context.get("speed")
+
+
+def _freeze(series: Drive | Run) -> None:
+    if isinstance(series, Drive) and series.run is not None:
+        object.__setattr__(series, "run", _frozen_numbers(series.run, len(series.time), f"drive {series.name}: run"))
+    name = series.name if isinstance(series, Drive) else series.drive
+    n = len(series.time)
+    for label in ("time", "offset", "lane_width"):
+        values = _frozen(getattr(series, label), n, f"drive {name}: {label}")
+        if not np.isfinite(values).all():
+            raise ValueError(f"drive {name}: {label} is not finite")
+        object.__setattr__(series, label, values)
+    context = {key: _frozen(values, n, f"drive {name}: {key}") for key, values in series.context.items()}
+    object.__setattr__(series, "context", MappingProxyType(context))
+
+
+def _frozen_numbers(values: NDArray[np.int64], n: int, what: str) -> NDArray[np.int64]:
+    array = np.array(values, dtype=np.int64)
+    if array.shape != (n,):
+        raise ValueError(f"{what}: shape {array.shape}, expected ({n},)")
+    array.flags.writeable = False
+    return array
+
+
+def _frozen(values: FloatArray, n: int, what: str) -> FloatArray:
+    array = np.array(values, dtype=np.float64)
+    if array.shape != (n,):
+        raise ValueError(f"{what}: shape {array.shape}, expected ({n},)")
+    array.flags.writeable = False
+    return array

@@ -1,0 +1,81 @@
+"""Low-pass filters: windowed sinc with a Kaiser window, the one design used everywhere.
+
+(What `scipy.signal.firwin` gives too, to rounding; importing that takes 0.4 s, which a conversion hasn't got.)
+
+References
+----------
+J. F. Kaiser, "Nonrecursive digital filter design using the I0-sinh window function", Proc. IEEE Int. Symp. Circuits and
+Systems, 1974, pp. 20-23: how long a window must be, and of what shape, for an attenuation and a transition width.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+
+LEAST_ATTENUATION = 21.0
+"""Of a rectangular window, shape 0: Kaiser's formulas begin there, and change at `GREAT_ATTENUATION`. [dB]"""
+
+GREAT_ATTENUATION = 50.0
+"""[dB]"""
+
+LENGTH_OFFSET = 7.95
+LENGTH_SLOPE = 2.285
+"""Attenuation = offset + slope * transition width [rad per sample] * (taps - 1). [dB]"""
+
+SHAPE_POWER_FACTOR, SHAPE_POWER, SHAPE_SLOPE = 0.5842, 0.4, 0.07886
+"""Shape between both attenuations: factor * excess ** power + slope * excess, with the excess over the least. [-]"""
+
+
+def kaiser_design(attenuation: float, width: float) -> tuple[int, float]:
+    """Size and shape of a Kaiser window.
+
+    Parameters
+    ----------
+    attenuation : float
+        In the stop band, 21 to 50 dB.
+    width : float
+        From the end of the pass band to the beginning of the stop band, as a share of half the sampling rate, > 0. [-]
+
+    Returns
+    -------
+    half : int
+        Taps to each side of the middle one.
+    beta : float
+        Shape of the window. [-]
+
+    Raises
+    ------
+    ValueError
+        If the attenuation is outside the range of the formula.
+    """
+    if not LEAST_ATTENUATION <= attenuation <= GREAT_ATTENUATION:
+        raise ValueError(f"attenuation {attenuation} dB, expected {LEAST_ATTENUATION:g} to {GREAT_ATTENUATION:g}")
+    steps = (attenuation - LENGTH_OFFSET) / (LENGTH_SLOPE * math.pi * width)
+    excess = attenuation - LEAST_ATTENUATION
+    return math.ceil(steps / 2), SHAPE_POWER_FACTOR * excess**SHAPE_POWER + SHAPE_SLOPE * excess
+
+
+def low_pass(half: int, cutoff: float, beta: float) -> FloatArray:
+    """Symmetric kernel of gain 1.
+
+    Parameters
+    ----------
+    half : int
+        Taps to each side of the middle one.
+    cutoff : float
+        Where the gain is one half, as a share of half the sampling rate, 0 to 1. [-]
+    beta : float
+        Shape of the Kaiser window, >= 0. [-]
+
+    Returns
+    -------
+    array, shape (2 * half + 1,)
+        [-]
+    """
+    kernel = np.sinc(cutoff * np.arange(-half, half + 1)) * np.kaiser(2 * half + 1, beta)
+    return np.asarray(kernel / kernel.sum())

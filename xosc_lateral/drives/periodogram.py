@@ -1,0 +1,62 @@
+"""Power spectra by Welch's method, window by window; how windows are put together is their user's choice.
+
+(`scipy.signal.welch` averages them; medians and geometric means over windows are wanted here, over many runs, and half
+a second of import is not.)
+
+References
+----------
+P. D. Welch, "The use of fast Fourier transform for the estimation of power spectra", IEEE Trans. Audio and
+Electroacoustics 15 (1967), pp. 70-73.
+"""
+
+from __future__ import annotations
+
+from enum import Enum
+
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+
+
+class Detrend(Enum):
+    """What is taken out of a window before it is transformed."""
+
+    NOTHING = "nothing"
+    MEAN = "mean"
+    ENDS = "ends"
+    """The straight line through its first and its last value: what wanders slowly then leaks into no frequency."""
+
+
+def hann(size: int) -> FloatArray:
+    """Hann window without its zeros, scaled so that white noise of variance 1 has a power of 1. Shape (size,). [-]"""
+    taper = np.hanning(size + 2)[1:-1]
+    return np.asarray(taper / np.sqrt((taper**2).sum()))
+
+
+def periodograms(values: FloatArray, size: int, *, detrend: Detrend = Detrend.NOTHING) -> FloatArray:
+    """Power of half-overlapping Hann windows of one run.
+
+    Parameters
+    ----------
+    values : array, shape (n,)
+        Evenly sampled.
+    size : int
+        Samples of a window, >= 2.
+    detrend : Detrend
+
+    Returns
+    -------
+    array, shape (k, size // 2 + 1)
+        At `numpy.fft.rfftfreq(size)` cycles per sample; white noise of variance 1 gives 1 everywhere. No rows where the
+        run is shorter than a window. [square of the values' unit]
+    """
+    if len(values) < size:
+        return np.empty((0, size // 2 + 1))
+    pieces = np.lib.stride_tricks.sliding_window_view(values, size)[:: max(1, size // 2)]
+    if detrend is Detrend.MEAN:
+        pieces = pieces - pieces.mean(axis=1, keepdims=True)
+    elif detrend is Detrend.ENDS:
+        slope = np.linspace(0.0, 1.0, size) * (pieces[:, -1:] - pieces[:, :1])
+        pieces = pieces - pieces[:, :1] - slope
+    return np.asarray(np.abs(np.fft.rfft(pieces * hann(size), axis=1)) ** 2)

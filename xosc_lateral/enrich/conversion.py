@@ -1,0 +1,60 @@
+"""A conversion as data: what was made of a scenario, and what went into it. The report and the manifest read it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from xosc_lateral.enrich.result import Enriched
+
+
+@dataclass(frozen=True, slots=True)
+class ConversionProvenance:
+    """What went into an output: enough to make the same bytes again.
+
+    Parameters
+    ----------
+    package_version : str
+    inputs : mapping of str to str
+        File name -> SHA-256 of every file that was read (scenario, road, catalogs, context table).
+    profiles : mapping of str to (str, str)
+        Enriched entity -> name and SHA-256 of its profile.
+    seed, variant : int
+    parameters : mapping of str to str
+        Scenario parameters that were replaced.
+    """
+
+    package_version: str
+    inputs: Mapping[str, str]
+    profiles: Mapping[str, tuple[str, str]]
+    seed: int
+    variant: int
+    parameters: Mapping[str, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Conversion:
+    """One converted scenario.
+
+    Parameters
+    ----------
+    source, output : Path
+    output_sha256 : str
+        SHA-256 of the output's bytes.
+    enriched : Enriched
+        Nominal and enriched motion, segments, gaps.
+    provenance : ConversionProvenance
+    warnings : tuple of str
+        What a user has to know, a line each.
+    data : bytes
+        The converted scenario, if it was not to be written.
+    """
+
+    source: Path
+    output: Path
+    output_sha256: str
+    enriched: Enriched
+    provenance: ConversionProvenance
+    warnings: tuple[str, ...]
+    data: bytes = b""

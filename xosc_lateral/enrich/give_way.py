@@ -1,0 +1,188 @@
+"""Vehicles side by side give way to each other: sampled paths, moved apart as real neighbours are.
+
+Every vehicle's path is sampled by itself first. Where two drive side by side, the lateral gap that this leaves between
+them is mapped to the gap that real neighbours leave at the same quantile: gaps between vehicles side by side beside
+those between any two vehicles of the two lanes (`GAPS`). The narrower the gap would be, the more it is widened; both
+vehicles take their part, the one in the overtaking lane the larger one, as measured. The mapping fades with the free
+space lengthwise. All displacements follow from the paths as first sampled, so nobody's depends on the order of
+entities, and a vehicle far away changes nobody's.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from xosc_lateral.motion.nominal import Activity, EntityMotion, NominalMotion
+from xosc_lateral.road.network import RoadNetwork
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+
+GAPS = (
+    np.array([-0.79, -0.12, 0.36, 0.74, 1.28, 1.65, 3.0]),
+    np.array([0.41, 0.75, 0.99, 1.27, 1.59, 1.86, 3.0]),
+)
+"""Lateral gap between any vehicles of neighbouring lanes, and between those side by side, at the same quantiles (the
+least, 0.1, 1, 5, 25 and 50 %): DLR Highway Traffic, 749 encounters (`benchmarks/give_way.py`). From 3 m on nobody gives
+way, which is assumed. [m]"""
+
+OVERTAKING_SHARE = 0.75
+"""Part of the one in the overtaking lane: it moves 0.24 m, the other 0.08 m (same recording, full proximity). [-]"""
+
+FADES = 60.0
+"""Free space lengthwise within which neighbours matter less and less (same recording). [m]"""
+
+ENTERING = 0.5
+"""Nominal lateral gap over which a vehicle that crosses into a lane becomes its neighbour. [m]"""
+
+ANSWER = 1.0
+"""Standard deviation of the kernel by which drivers answer: steering takes a second or two. [s]"""
+
+
+@dataclass(frozen=True, eq=False)
+class Sampled:
+    """A vehicle and its sampled path.
+
+    Parameters
+    ----------
+    motion : EntityMotion
+        Nominal.
+    deviation : array, shape (rows,)
+        From it, positive left. [m]
+    can_move : array of bool, shape (rows,)
+        Where its path is sampled and may be moved.
+    heeds : bool
+        Whether its profile answers to neighbours by itself: then only gaps that hardly ever occur are widened.
+    """
+
+    motion: EntityMotion
+    deviation: FloatArray
+    can_move: NDArray[np.bool_]
+    heeds: bool = False
+
+
+def give_way(
+    motion: NominalMotion, network: RoadNetwork, sampled: Sequence[Sampled], rows: IntArray
+) -> list[FloatArray | None]:
+    """By how much each vehicle moves aside, on every row of the motion, positive left; None: not at all. [m]
+
+    Parameters
+    ----------
+    motion : NominalMotion
+    network : RoadNetwork
+    sampled : sequence of Sampled
+        All entities, in the motion's order.
+    rows : array of int, shape (n,)
+        Rows that are looked at, evenly spaced.
+    """
+    count, n = len(sampled), len(rows)
+    left, right = np.zeros((count, n)), np.zeros((count, n))
+    frames = [_Frame.of(one, rows) for one in sampled]
+    left_hand = _left_hand(network, sampled, rows)
+    for i in range(count):
+        for j in range(i + 1, count):
+            if not (sampled[i].can_move.any() or sampled[j].can_move.any()):
+                continue
+            for own, other in ((i, j), (j, i)):
+                wider = _widening(frames[own], frames[other], sampled[own].heeds)
+                if wider is None:
+                    continue
+                aside, is_left = wider  # of `own`, by where `other` is
+                share = np.where(is_left == left_hand[own], OVERTAKING_SHARE, 1.0 - OVERTAKING_SHARE)
+                share = np.where(frames[other].can_move, share, 1.0) * frames[own].can_move
+                right[own] = np.maximum(right[own], np.where(is_left, share * aside, 0.0))
+                left[own] = np.maximum(left[own], np.where(is_left, 0.0, share * aside))
+    every = max(1, int(rows[1] - rows[0])) if n > 1 else 1
+    width = ANSWER / (motion.step * every)
+    all_rows = np.arange(len(motion.entities[0].time)) if count else np.empty(0)
+    result: list[FloatArray | None] = []
+    for k in range(count):
+        aside = left[k] - right[k]
+        result.append(np.interp(all_rows, rows, _answered(aside, width)) if aside.any() else None)
+    return result
+
+
+@dataclass(frozen=True, eq=False)
+class _Frame:
+    """A vehicle on the rows that are looked at: middle, heading, size, and where it is present and may move."""
+
+    x: FloatArray
+    y: FloatArray
+    heading: FloatArray
+    deviation: FloatArray
+    can_move: NDArray[np.bool_]
+    present: NDArray[np.bool_]
+    length: float
+    width: float
+
+    @classmethod
+    def of(cls, sampled: Sampled, rows: IntArray) -> _Frame:
+        motion = sampled.motion
+        box = motion.entity.bounding_box
+        heading = motion.heading[rows]
+        present = ((motion.activity[rows] & Activity.ACTIVE) != 0) & motion.entity.is_vehicle
+        return cls(
+            motion.x[rows] + box.center_x * np.cos(heading),
+            motion.y[rows] + box.center_x * np.sin(heading),
+            heading,
+            sampled.deviation[rows],
+            sampled.can_move[rows],
+            present,
+            box.length,
+            box.width,
+        )
+
+
+def _widening(own: _Frame, other: _Frame, heeds: bool) -> tuple[FloatArray, NDArray[np.bool_]] | None:
+    """By how much the gap to the other is widened, and whether the other is to the left; None if it never is near."""
+    ahead_x, ahead_y = other.x - own.x, other.y - own.y
+    reach = FADES + 0.5 * (own.length + other.length)
+    near = own.present & other.present & (ahead_x**2 + ahead_y**2 < (reach + 10.0) ** 2)
+    if not near.any():
+        return None
+    cos, sin = np.cos(own.heading), np.sin(own.heading)
+    along, aside = ahead_x * cos + ahead_y * sin, ahead_y * cos - ahead_x * sin
+    same_way = np.cos(other.heading - own.heading) > 0.9
+    half = 0.5 * (own.width + other.width)
+    is_left = aside > 0
+    nominal = np.abs(aside) - half
+    gap = nominal + np.where(is_left, 1.0, -1.0) * (other.deviation - own.deviation)
+    free = np.maximum(np.abs(along) - 0.5 * (own.length + other.length), 0.0)
+    weight = _fading(free / FADES) * (1.0 - _fading(nominal / ENTERING)) * (near & same_way)
+    return weight * _wider(gap, heeds), is_left
+
+
+def _wider(gap: FloatArray, heeds: bool) -> FloatArray:
+    """What a gap is widened by. [m]"""
+    free, side_by_side = GAPS
+    if heeds:
+        side_by_side = np.maximum(free, np.minimum(side_by_side, side_by_side[2]))
+    wanted = np.interp(gap, free, side_by_side)
+    wanted = np.where(gap < free[0], side_by_side[0], wanted)
+    return np.asarray(np.maximum(wanted - gap, 0.0) * (gap < free[-1]))
+
+
+def _fading(share: FloatArray) -> FloatArray:
+    """1 at 0 and below, 0 at 1 and above, smooth between."""
+    u = np.clip(share, 0.0, 1.0)
+    return np.asarray(1.0 - u**2 * (3.0 - 2.0 * u))
+
+
+def _answered(values: FloatArray, width: float) -> FloatArray:
+    half = min(int(np.ceil(4.0 * width)), max(len(values) - 1, 0))
+    kernel = np.exp(-0.5 * (np.arange(-half, half + 1) / width) ** 2)
+    return np.asarray(np.convolve(np.pad(values, half, mode="edge"), kernel / kernel.sum(), "valid"))
+
+
+def _left_hand(network: RoadNetwork, sampled: Sequence[Sampled], rows: IntArray) -> list[bool]:
+    """Whether each vehicle drives where one keeps left: the first road that it is on says so."""
+    found = []
+    for one in sampled:
+        road = one.motion.road[rows]
+        on = np.flatnonzero(road >= 0)
+        found.append(bool(len(on)) and network.roads[int(road[on[0]])].rule == "LHT")
+    return found

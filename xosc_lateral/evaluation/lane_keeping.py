@@ -1,0 +1,150 @@
+"""What traffic psychology, lane keeping assistance and UN R157 read in a stretch of driving, window by window."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from xosc_lateral.evaluation.spectra import NEAR_MARKING
+
+FloatArray = NDArray[np.float64]
+
+INDICATORS = (
+    "sdlp",
+    "tlc_min",
+    "tlc_median",
+    "beyond_wandering_zone",
+    "near_marking",
+    "lateral_acceleration",
+    "lateral_jerk",
+)
+"""Columns of `lane_keeping_indicators`."""
+
+UNITS = ("m", "s", "s", "-", "-", "m/s2", "m/s3")
+
+HALF_WIDTH = 0.9
+"""Half of a car's width: 1.8 m, as in `NEAR_MARKING`. [m]"""
+
+WANDERING_ZONE = 0.375
+"""UN R157, guidance on performance models: a neighbour this far from its lane's centre is no longer wandering. [m]"""
+
+LONGEST_TLC = 20.0
+"""Times to line crossing beyond it count as it: far above the 2 s that warning systems look at. [s]"""
+
+
+def lane_keeping_indicators(
+    offset: FloatArray, lane_width: FloatArray, step: float, *, half_width: float = HALF_WIDTH
+) -> FloatArray:
+    """Indicators of each window.
+
+    Parameters
+    ----------
+    offset, lane_width : array, shape (n, m)
+        One window a row, m >= 4. [m]
+    step : float
+        [s]
+    half_width : float
+        Of the vehicles. [m]
+
+    Returns
+    -------
+    array, shape (n, 7)
+        Columns as in `INDICATORS`, units as in `UNITS`: standard deviation of lateral position [1]_; smallest and
+        median time to line crossing [2]_; shares of time beyond the wandering zone of UN R157 [3]_ and near a marking;
+        root mean square of lateral acceleration and jerk, from differences of the offset (no steering in them).
+
+    References
+    ----------
+    .. [1] J. F. O'Hanlon et al., "Diazepam impairs lateral position control in highway driving", Science 217, 1982.
+    .. [2] W. van Winsum, K. A. Brookhuis, D. de Waard, "A comparison of different ways to approximate time-to-line
+       crossing (TLC) during car driving", Accident Analysis & Prevention 32, 2000: here distance over lateral speed.
+    .. [3] UN Regulation No. 157, guidance on performance models, cut-in scenario.
+    """
+    crossing = time_to_line_crossing(offset, lane_width, step, half_width=half_width)
+    acceleration = np.diff(offset, 2, axis=1) / step**2
+    jerk = np.diff(offset, 3, axis=1) / step**3
+    near = np.abs(offset) > 0.5 * lane_width - NEAR_MARKING
+    return np.column_stack(
+        [
+            offset.std(axis=1),
+            crossing.min(axis=1),
+            np.median(crossing, axis=1),
+            (np.abs(offset) > WANDERING_ZONE).mean(axis=1),
+            near.mean(axis=1),
+            np.sqrt((acceleration**2).mean(axis=1)),
+            np.sqrt((jerk**2).mean(axis=1)),
+        ]
+    )
+
+
+def time_to_line_crossing(
+    offset: FloatArray, lane_width: FloatArray, step: float, *, half_width: float = HALF_WIDTH
+) -> FloatArray:
+    """Time until the side that the vehicle moves towards reaches its marking, at constant lateral speed.
+
+    Parameters
+    ----------
+    offset, lane_width : array, shape (..., m)
+        [m]
+
+    Returns
+    -------
+    array, shape (..., m - 1)
+        0 where the side is beyond the marking already, at most `LONGEST_TLC`. [s]
+    """
+    speed = np.diff(offset, axis=-1) / step
+    towards = np.sign(speed) * offset[..., 1:]
+    room = np.maximum(0.5 * lane_width[..., 1:] - half_width - towards, 0.0)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        time = np.where(speed == 0.0, np.inf, room / np.abs(speed))
+    return np.minimum(time, LONGEST_TLC)
+
+
+@dataclass(frozen=True)
+class VarianceParts:
+    """Where the variance of the offset lies.
+
+    Parameters
+    ----------
+    between : float
+        Of the drivers' own means. [m²]
+    within : float
+        Of a driver's windows about that mean. [m²]
+    inside : float
+        About a window's own mean. [m²]
+    """
+
+    between: float
+    within: float
+    inside: float
+
+
+def variance_parts(windows: FloatArray, drivers: NDArray[np.generic]) -> VarianceParts:
+    """Variance between drivers, within drivers, and inside windows.
+
+    One-way random effects on the windows' means, by the method of moments for unequal counts [1]_. Neighbouring
+    windows of a driver are alike, so `between` holds what changes more slowly than a drive is long.
+
+    Parameters
+    ----------
+    windows : array, shape (n, m)
+        [m]
+    drivers : array, shape (n,)
+
+    References
+    ----------
+    .. [1] S. R. Searle, G. Casella, C. E. McCulloch, "Variance Components", Wiley 1992, section 3.6.
+    """
+    means = windows.mean(axis=1)
+    names, member, counts = np.unique(drivers, return_inverse=True, return_counts=True)
+    own = np.bincount(member, means) / counts
+    inside = float(windows.var(axis=1).mean())
+    n, k = len(means), len(names)
+    if k < 2 or n == k:
+        return VarianceParts(float(means.var()), 0.0, inside)
+    within = float(((means - own[member]) ** 2).sum() / (n - k))
+    among = float((counts * (own - means.mean()) ** 2).sum() / (k - 1))
+    effective = (n - (counts**2).sum() / n) / (k - 1)
+    return VarianceParts(max((among - within) / float(effective), 0.0), within, inside)

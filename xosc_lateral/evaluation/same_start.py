@@ -1,0 +1,66 @@
+"""The fair floor: real windows of other drivers that begin where the real ones begin.
+
+A sampled window that starts where its real one starts knows something that a random real window does not: comparing
+both with the real windows would let every model with a good start look better than real driving. So the floor for such
+windows is made of real windows of *other* drivers whose start is the same; where sampled windows know no start, the
+floor is made of any windows of other drivers.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from xosc_lateral.errors import NotEnoughDataError
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+
+NEAREST = 20
+"""A stand-in is drawn among so many windows of other drivers whose starts are nearest."""
+
+
+def windows_with_the_same_start(
+    starts: FloatArray,
+    drivers: NDArray[np.generic],
+    donor_starts: FloatArray,
+    donor_drivers: NDArray[np.generic],
+    rng: np.random.Generator,
+    *,
+    count: int = 1,
+    nearest: int = NEAREST,
+) -> IntArray:
+    """For each window `count` others by other drivers that start at nearly the same offset.
+
+    Parameters
+    ----------
+    starts : array, shape (n,)
+        First offset of each real window. [m]
+    drivers : array, shape (n,)
+        Whose it is: a driver's own windows are never taken.
+    donor_starts, donor_drivers : array, shape (k,)
+        Of the windows to choose from. [m]
+    count : int
+        Different windows for each, at most `nearest`.
+    nearest : int
+        Pool to draw from.
+
+    Returns
+    -------
+    array of int, shape (n, count)
+        Rows of the donors. The donor should then be shifted by the few millimetres that its start differs, or not.
+
+    Raises
+    ------
+    NotEnoughDataError
+        When other drivers have fewer than `count` windows.
+    """
+    chosen = np.empty((len(starts), count), dtype=np.int64)
+    for row, (start, driver) in enumerate(zip(starts.tolist(), drivers.tolist(), strict=True)):
+        others = np.flatnonzero(donor_drivers != driver)
+        if len(others) < count:
+            raise NotEnoughDataError(f"{len(others)} windows of other drivers than {driver}; {count} are needed")
+        gaps = np.abs(donor_starts[others] - start)
+        pool = others[np.argpartition(gaps, min(nearest, len(others)) - 1)[:nearest]]
+        chosen[row] = rng.permutation(pool)[:count]
+    return chosen

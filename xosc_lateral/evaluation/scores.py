@@ -1,0 +1,355 @@
+"""How true a profile is to measured drives: distances with their floors, the paper's four evaluations, and beyond.
+
+The paper (arXiv:2405.17080, section IV) compares ten metrics of 10 s snippets in four evaluations. Beside them stand
+what it does not look at: 60 s snippets, spectrum, autocorrelation, the lane's margins, and a classifier.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from xosc_lateral.driver.models.two_level.fit import split_levels
+from xosc_lateral.driver.models.two_level.parameters import PAPER_SETTINGS
+from xosc_lateral.driver.profile import DriverProfile
+from xosc_lateral.drives.drive import Run
+from xosc_lateral.errors import NotEnoughDataError
+from xosc_lateral.evaluation.classifier import told_apart
+from xosc_lateral.evaluation.distances import Distances, mean_distances, metric_distances, split_groups
+from xosc_lateral.evaluation.metrics import METRICS, snippet_metrics
+from xosc_lateral.evaluation.snippets import Snippets, sample_parts, sample_runs, sample_snippets, snippets_of
+from xosc_lateral.evaluation.spectra import Margins, Spectrum, autocorrelation, margins, spectrum
+
+FloatArray = NDArray[np.float64]
+
+SNIPPET = 10.0
+"""The paper's. [s]"""
+LONG_SNIPPET = 60.0
+"""[s]"""
+FINE_SHIFT = 5.0
+"""Real fine parts are shifted round by this, to part them from their coarse parts. [s]"""
+SPLITS = 8
+"""Random halves of the drives that distances and floors are averaged over."""
+LAGS = (0.2, 0.4, 0.6, 1.0, 1.4, 2.0, 3.0, 4.0, 6.0, 8.0, 12.0, 16.0, 24.0, 32.0)
+"""Of the autocorrelation. [s]"""
+TRACES, TRACE = 6, 120.0
+"""Drives of which a trace is kept for the eye, and its length. [s]"""
+MIN_SNIPPETS = 20
+"""Fewer say nothing about a distribution."""
+
+
+@dataclass(frozen=True, eq=False)
+class PartEvaluation:
+    """One of the paper's four evaluations.
+
+    Parameters
+    ----------
+    number : int
+        1 real coarse + shifted real fine, 2 sampled coarse + real fine, 3 real coarse + sampled fine, 4 both sampled.
+    coarse, fine : str
+        Where each part comes from.
+    real, artificial : array, shape (n, 10)
+        Metrics of the snippets. [m]
+    distances : Distances
+        Between the two, all snippets.
+    """
+
+    number: int
+    coarse: str
+    fine: str
+    real: FloatArray
+    artificial: FloatArray
+    distances: Distances
+
+
+@dataclass(frozen=True, eq=False)
+class SnippetScores:
+    """Distances for snippets of one length.
+
+    Parameters
+    ----------
+    seconds : float
+        Length. [s]
+    count : int
+    distances, floor : Distances
+        Real to sampled and real to real, averaged over the same random halves of the drives.
+    """
+
+    seconds: float
+    count: int
+    distances: Distances
+    floor: Distances
+
+    @property
+    def ratio(self) -> float:
+        """Mean distance over mean floor. 1: as close as real data is to itself. [-]"""
+        return self.distances.mean / self.floor.mean
+
+    @property
+    def worst_ratio(self) -> tuple[str, float]:
+        """Metric with the largest ratio, and that."""
+        ratios = {name: self.distances.by_metric[name] / self.floor.by_metric[name] for name in METRICS}
+        worst = max(ratios, key=ratios.__getitem__)
+        return worst, ratios[worst]
+
+
+@dataclass(frozen=True, eq=False)
+class Trace:
+    """A measured stretch of one drive, and what the profile does from the same start under the same context.
+
+    Parameters
+    ----------
+    drive : str
+    step : float
+        [s]
+    real, sampled : array, shape (n,)
+        Offsets. [m]
+    """
+
+    drive: str
+    step: float
+    real: FloatArray
+    sampled: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class ProfileScores:
+    """Everything that `evaluate` finds.
+
+    Parameters
+    ----------
+    profile : str
+        Its name.
+    drives, runs, hours : int, int, float
+        What was measured.
+    snippets : SnippetScores
+        10 s.
+    long_snippets : SnippetScores or None
+        60 s; None with fewer than `MIN_SNIPPETS`.
+    evaluations : tuple of four PartEvaluation
+    spectrum_real, spectrum_sampled : Spectrum
+    lags, autocorrelation_real, autocorrelation_sampled : array, shape (k,)
+        [s], [-], [-]
+    margins_real, margins_sampled : Margins
+    classifier_auc : float or None
+        Area under the ROC curve between real and sampled; None without scikit-learn or with too few drives.
+    traces : tuple of Trace
+        The longest run of each of the first `TRACES` drives, for the eye.
+    seed : int
+    """
+
+    profile: str
+    drives: int
+    runs: int
+    hours: float
+    snippets: SnippetScores
+    long_snippets: SnippetScores | None
+    evaluations: tuple[PartEvaluation, ...]
+    spectrum_real: Spectrum
+    spectrum_sampled: Spectrum
+    lags: FloatArray
+    autocorrelation_real: FloatArray
+    autocorrelation_sampled: FloatArray
+    margins_real: Margins
+    margins_sampled: Margins
+    classifier_auc: float | None
+    traces: tuple[Trace, ...]
+    seed: int
+
+    @property
+    def spectrum_error(self) -> float:
+        """Root mean square of the spectra's difference over the bands. [dB]"""
+        common = len(self.spectrum_real.density)
+        ratio = self.spectrum_sampled.density[:common] / self.spectrum_real.density
+        return float(np.sqrt(np.mean((10.0 * np.log10(ratio)) ** 2)))
+
+
+def score_profile(profile: DriverProfile, runs: Sequence[Run], *, seed: int, classify: bool = True) -> ProfileScores:
+    """Evaluate a profile on measured runs.
+
+    Parameters
+    ----------
+    runs : sequence of Run
+        At the profile's step.
+    classify : bool
+        Whether to train the classifier (a few seconds).
+
+    Raises
+    ------
+    NotEnoughDataError
+        With fewer than `MIN_SNIPPETS` snippets of 10 s.
+    """
+    step = profile.model.step
+    short = _enough(snippets_of(runs, SNIPPET, step))
+    long = snippets_of(runs, LONG_SNIPPET, step)
+    sampled = sample_snippets(profile, short, seed)
+    free = sample_runs(profile, runs, seed + 1)
+    widths = [run.lane_width for run in runs]
+    offsets = [run.offset for run in runs]
+    lags = [round(lag / step) for lag in LAGS]
+    long_scores = None
+    if len(long) >= MIN_SNIPPETS and len(np.unique(long.group)) >= 2:
+        long_sampled = sample_snippets(profile, long, seed + 2)
+        long_scores = score_snippets(long.offset, long_sampled, long.group, seed=seed, seconds=LONG_SNIPPET)
+    return ProfileScores(
+        profile=profile.name,
+        drives=len({run.drive for run in runs}),
+        runs=len(runs),
+        hours=sum(map(len, runs)) * step / 3600.0,
+        snippets=score_snippets(short.offset, sampled, short.group, seed=seed, seconds=SNIPPET),
+        long_snippets=long_scores,
+        evaluations=evaluate_parts(profile, short, sampled, seed=seed + 3),
+        spectrum_real=spectrum(offsets, step),
+        spectrum_sampled=spectrum(free, step),
+        lags=np.array(LAGS),
+        autocorrelation_real=autocorrelation(offsets, lags),
+        autocorrelation_sampled=autocorrelation(free, lags),
+        margins_real=margins(offsets, widths, step),
+        margins_sampled=margins(free, widths, step),
+        classifier_auc=told_apart(short.offset, sampled, short.group, short.group) if classify else None,
+        traces=_traces(runs, free, step),
+        seed=seed,
+    )
+
+
+def _traces(runs: Sequence[Run], sampled: Sequence[FloatArray], step: float) -> tuple[Trace, ...]:
+    longest: dict[str, int] = {}
+    for k, run in enumerate(runs):
+        if run.drive not in longest or len(run) > len(runs[longest[run.drive]]):
+            longest[run.drive] = k
+    rows = slice(0, round(TRACE / step) + 1)
+    return tuple(
+        Trace(drive, step, np.array(runs[k].offset[rows]), np.array(sampled[k][rows]))
+        for drive, k in list(longest.items())[:TRACES]
+    )
+
+
+def score_snippets(
+    real: FloatArray, sampled: FloatArray, group: NDArray[np.str_], *, seed: int, seconds: float = SNIPPET
+) -> SnippetScores:
+    """Distances of sampled snippets, and the floor, over random halves of the groups.
+
+    A half of real snippets is compared with its own sampled ones, and with the other real half: both distances rest on
+    as many snippets, so that their ratio is fair.
+
+    Parameters
+    ----------
+    real, sampled : array, shape (n, m)
+        Row k of both starts at the same offset under the same context. [m]
+    group : array, shape (n,)
+        Never split between halves.
+    """
+    rng = np.random.default_rng(seed)
+    metrics, artificial = snippet_metrics(real), snippet_metrics(sampled)
+    model, floor = [], []
+    for _ in range(SPLITS):
+        half = split_groups(group, rng)
+        model.append(metric_distances(metrics[half], artificial[half]))
+        floor.append(metric_distances(metrics[half], metrics[~half]))
+    return SnippetScores(seconds, len(real), mean_distances(model), mean_distances(floor))
+
+
+def evaluate_parts(
+    profile: DriverProfile, snippets: Snippets, sampled: FloatArray, *, seed: int
+) -> tuple[PartEvaluation, ...]:
+    """Run the paper's four evaluations; (4) takes `sampled`, effects included."""
+    coarse_real, fine_real = _real_parts(snippets)
+    coarse, fine = sample_parts(profile, snippets, seed)
+    shifted = np.roll(fine_real, round(FINE_SHIFT / profile.model.step), axis=1)
+    width = snippets.lane_width
+    combinations = (
+        ("measured", "measured, shifted", (coarse_real + shifted) * width),
+        ("sampled", "measured", (coarse + fine_real) * width),
+        ("measured", "sampled", (coarse_real + fine) * width),
+        ("sampled", "sampled", sampled),
+    )
+    real = snippet_metrics(snippets.offset)
+    results = []
+    for number, (coarse_from, fine_from, rows) in enumerate(combinations, start=1):
+        artificial = snippet_metrics(rows)
+        distances = metric_distances(real, artificial)
+        results.append(PartEvaluation(number, coarse_from, fine_from, real, artificial, distances))
+    return tuple(results)
+
+
+def _real_parts(snippets: Snippets) -> tuple[FloatArray, FloatArray]:
+    """The paper's split of the measured snippets, made on whole runs so that only a run's ends are ends."""
+    runs = {id(one.run): one.run for one in snippets.items}
+    split = {key: split_levels(run.rel_offset, PAPER_SETTINGS) for key, run in runs.items()}
+    coarse = np.array([split[id(one.run)][0][one.rows] for one in snippets.items])
+    fine = np.array([split[id(one.run)][1][one.rows] for one in snippets.items])
+    return coarse, fine
+
+
+def _enough(snippets: Snippets) -> Snippets:
+    if len(snippets) < MIN_SNIPPETS:
+        raise NotEnoughDataError(
+            f"{len(snippets)} snippets of {SNIPPET:g} s are left after cutting; {MIN_SNIPPETS} are needed to compare"
+        )
+    return snippets
+
+
+def scores_to_dict(scores: ProfileScores) -> dict[str, Any]:
+    """Plain JSON values, for `--json` and for a profile's provenance (without the single snippets)."""
+    return {
+        "profile": scores.profile,
+        "seed": scores.seed,
+        "drives": scores.drives,
+        "runs": scores.runs,
+        "hours": round(scores.hours, 4),
+        "snippets": _snippets_to_dict(scores.snippets),
+        "long_snippets": None if scores.long_snippets is None else _snippets_to_dict(scores.long_snippets),
+        "evaluations": [
+            {
+                "number": one.number,
+                "coarse": one.coarse,
+                "fine": one.fine,
+                "distances": _rounded(one.distances.by_metric),
+            }
+            for one in scores.evaluations
+        ],
+        "spectrum": {
+            "frequency_hz": [round(float(f), 5) for f in scores.spectrum_real.frequency],
+            "real_m2_per_hz": [float(f"{v:.4g}") for v in scores.spectrum_real.density],
+            "sampled_m2_per_hz": [float(f"{v:.4g}") for v in scores.spectrum_sampled.density],
+            "error_db": round(scores.spectrum_error, 3),
+        },
+        "autocorrelation": {
+            "lag_s": list(LAGS),
+            "real": [round(float(v), 4) for v in scores.autocorrelation_real],
+            "sampled": [round(float(v), 4) for v in scores.autocorrelation_sampled],
+        },
+        "margins": {"real": _margins_to_dict(scores.margins_real), "sampled": _margins_to_dict(scores.margins_sampled)},
+        "classifier_auc": None if scores.classifier_auc is None else round(scores.classifier_auc, 4),
+    }
+
+
+def _snippets_to_dict(scores: SnippetScores) -> dict[str, Any]:
+    worst, ratio = scores.worst_ratio
+    return {
+        "seconds": scores.seconds,
+        "count": scores.count,
+        "distance": _rounded(scores.distances.by_metric),
+        "floor": _rounded(scores.floor.by_metric),
+        "mean_distance": round(scores.distances.mean, 4),
+        "mean_floor": round(scores.floor.mean, 4),
+        "mean_ratio": round(scores.ratio, 3),
+        "worst_metric": worst,
+        "worst_ratio": round(ratio, 3),
+    }
+
+
+def _margins_to_dict(one: Margins) -> dict[str, float]:
+    return {
+        "share_near_marking": round(one.share_near, 5),
+        "excursions_per_hour": round(one.excursions_per_hour, 2),
+        "largest_offset_m": round(one.largest, 3),
+    }
+
+
+def _rounded(values: Mapping[str, float]) -> dict[str, float]:
+    return {name: round(value, 4) for name, value in values.items()}

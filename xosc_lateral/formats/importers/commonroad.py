@@ -1,0 +1,245 @@
+"""CommonRoad scenarios [1]_ into the standard drive table, through commonroad-io (extra `commonroad`).
+
+Recorded obstacles are placed between the bounds of their lanelets: the offset counts from the middle of the two bounds,
+the lane width is their distance.
+
+References
+----------
+.. [1] M. Althoff, M. Koschi, S. Manzinger, "CommonRoad: composable benchmarks for motion planning on roads", IV 2017.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from xosc_lateral.errors import FormatError, NotEnoughDataError
+from xosc_lateral.formats.importers.cuts import DEFAULT_CUTS, CutSettings
+from xosc_lateral.formats.importers.lane_graph import LaneGraph
+from xosc_lateral.formats.importers.placed import PlacedTracks, ground_speed, import_placed, travel_heading
+from xosc_lateral.formats.importers.table import Imported, guarded
+from xosc_lateral.formats.xml import read_xml
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+
+LICENCE = "that of the CommonRoad scenario and of the recording that it was made from"
+
+LEAST_AGREEMENT = 0.7
+"""Cosine between a vehicle's heading and the lanelet's that is taken to be driven along. [-]"""
+
+SMOOTHED = 20.0
+"""Way over which a lanelet's turning is averaged into a curvature: bounds are polygons. [m]"""
+
+
+@guarded
+def import_commonroad(
+    sources: Path | Sequence[Path], settings: CutSettings = DEFAULT_CUTS, *, keep_cut: bool = False
+) -> Imported:
+    """Read one or several scenarios.
+
+    Raises
+    ------
+    FormatError
+        If commonroad-io is not installed, or a file is no CommonRoad scenario.
+    NotEnoughDataError
+        If nothing is left once lane changes are cut.
+    """
+    import pandas as pd
+
+    files = [sources] if isinstance(sources, Path) else list(sources)
+    parts = [_read(file, settings) for file in files]
+    record = parts[0].provenance
+    if len(parts) > 1:
+        from dataclasses import replace
+
+        from xosc_lateral.formats.importers.table import hash_files
+
+        rows: dict[str, int] = {}
+        for part in parts:
+            for state, count in part.provenance.rows.items():
+                rows[state] = rows.get(state, 0) + count
+        record = replace(
+            record,
+            source=", ".join(file.name for file in files),
+            sha256=hash_files(files),
+            rows=rows,
+            vehicles=sum(part.provenance.vehicles for part in parts),
+            hours=round(sum(part.provenance.hours for part in parts), 3),
+        )
+    table = pd.concat([part.table for part in parts], ignore_index=True)
+    if not keep_cut:
+        table = table[table["state"] == "kept"].drop(columns="state").reset_index(drop=True)
+    if table.empty:
+        raise NotEnoughDataError(
+            f"{files[0]}: nothing is left of {sum(record.rows.values())} rows ({dict(record.rows)})"
+        )
+    return Imported(table, record)
+
+
+def _read(path: Path, settings: CutSettings) -> Imported:
+    scenario = _opened(path)
+    lanelets = {lanelet.lanelet_id: lanelet for lanelet in scenario.lanelet_network.lanelets}
+    numbers = {name: k for k, name in enumerate(lanelets)}
+    shapes = [_Shape(lanelet) for lanelet in lanelets.values()]
+    left = np.array(
+        [numbers.get(one.adj_left, -1) if one.adj_left_same_direction else -1 for one in lanelets.values()], dtype=int
+    )
+    following = [[numbers[name] for name in one.successor if name in numbers] for one in lanelets.values()]
+    graph = LaneGraph(np.array([shape.length for shape in shapes]), left, following)
+    tracks = _placed(scenario, shapes, left, path)
+    return import_placed(
+        tracks,
+        graph,
+        settings,
+        keep_cut=True,
+        format="commonroad",
+        sources=[path],
+        version=str(getattr(scenario, "scenario_id", "unknown")),
+        licence=LICENCE,
+    )
+
+
+def _opened(path: Path) -> Any:
+    try:
+        from commonroad.common.file_reader import CommonRoadFileReader
+    except ImportError as error:
+        raise FormatError(
+            "reading CommonRoad needs commonroad-io: pip install 'xosc-lateral[commonroad]'", path=path
+        ) from error
+    read_xml(path)  # no entities, and no larger than ours may be
+    try:
+        scenario, _ = CommonRoadFileReader(str(path)).open()
+    except Exception as error:  # whatever its parser meets in a foreign file
+        said = " ".join(str(error).split())[:200]
+        raise FormatError(f"not a CommonRoad scenario that commonroad-io can read: {said}", path=path) from error
+    return scenario
+
+
+def _placed(scenario: Any, shapes: list[_Shape], left: IntArray, path: Path) -> PlacedTracks:
+    """Rows of all obstacles that move along a recorded trajectory."""
+    names: list[str] = []
+    rows: list[tuple[float, ...]] = []
+    lengths: list[float] = []
+    kinds: list[str] = []
+    for obstacle in scenario.dynamic_obstacles:
+        trajectory = getattr(obstacle.prediction, "trajectory", None)
+        if trajectory is None:
+            continue
+        for state in [obstacle.initial_state, *trajectory.state_list]:
+            position = np.asarray(getattr(state, "position", np.nan), dtype=object)
+            if position.shape == (2,):
+                speed = getattr(state, "velocity", np.nan)
+                rows.append((len(names), state.time_step, *position, getattr(state, "orientation", np.nan), speed))
+        names.append(f"{path.stem}:{obstacle.obstacle_id}")
+        lengths.append(float(getattr(obstacle.obstacle_shape, "length", 4.6)))
+        kinds.append(str(obstacle.obstacle_type.value).lower())
+    if len(rows) < 2:
+        raise NotEnoughDataError(f"{path}: no obstacle with a recorded trajectory")
+    values = np.array(rows, dtype=np.float64)
+    values = values[np.lexsort((values[:, 1], values[:, 0]))]
+    values = values[np.r_[True, (np.diff(values[:, :2], axis=0) != 0).any(axis=1)]]
+    vehicle, step = values[:, 0].astype(np.int64), float(scenario.dt)
+    x, y = values[:, 2], values[:, 3]
+    heading = np.where(np.isfinite(values[:, 4]), values[:, 4], travel_heading(x, y, vehicle, step))
+    speed = np.where(np.isfinite(values[:, 5]), values[:, 5], ground_speed(x, y, vehicle, step))
+    piece, along, offset, width, curvature = _find(shapes, x, y, heading)
+    index, count = _lanes_beside(left)
+    inside = piece >= 0
+    road = {
+        "curvature": curvature,
+        "lane_index": np.where(inside, index[piece], np.nan),
+        "lane_count": np.where(inside, count[piece], np.nan),
+    }
+    length, kind = np.array(lengths)[vehicle], np.array(kinds)[vehicle]
+    return PlacedTracks(
+        names, vehicle, step * values[:, 1], step, piece, along, offset, width, np.abs(speed), length, kind, road
+    )
+
+
+def _find(
+    shapes: list[_Shape], x: FloatArray, y: FloatArray, heading: FloatArray
+) -> tuple[IntArray, FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Lanelet that every row drives along (-1: none), way in it, offset, width and curvature: the one it is amid."""
+    n = len(x)
+    piece = np.full(n, -1)
+    along, offset, width, curvature = (np.full(n, np.nan) for _ in range(4))
+    nearest = np.full(n, np.inf)
+    for number, shape in enumerate(shapes):
+        near = np.flatnonzero(shape.may_hold(x, y))
+        if not len(near):
+            continue
+        way, aside, wide, course, bend = shape.place(x[near], y[near])
+        inside = (np.abs(aside) <= 0.5 * wide) & np.isfinite(way) & (np.cos(heading[near] - course) > LEAST_AGREEMENT)
+        better = inside & (np.abs(aside) < nearest[near])
+        rows = near[better]
+        piece[rows], nearest[rows] = number, np.abs(aside[better])
+        along[rows], offset[rows], width[rows], curvature[rows] = way[better], aside[better], wide[better], bend[better]
+    return piece, np.nan_to_num(along), offset, width, curvature
+
+
+def _lanes_beside(left: IntArray) -> tuple[IntArray, IntArray]:
+    """Lanes to the right of each lanelet that are driven the same way, and all of them, itself included."""
+    right = np.full(len(left), -1)
+    right[left[left >= 0]] = np.flatnonzero(left >= 0)
+    counts = []
+    for beside in (right, left):
+        steps = np.zeros(len(left), dtype=np.int64)
+        for start in range(len(left)):
+            here = start
+            while beside[here] >= 0 and steps[start] < len(left):
+                here = int(beside[here])
+                steps[start] += 1
+        counts.append(steps)
+    return counts[0], counts[0] + counts[1] + 1
+
+
+class _Shape:
+    """A lanelet's bounds, and where a point lies between them."""
+
+    def __init__(self, lanelet: Any) -> None:
+        self.left = np.asarray(lanelet.left_vertices, dtype=np.float64)[:, :2]
+        self.right = np.asarray(lanelet.right_vertices, dtype=np.float64)[:, :2]
+        centre = 0.5 * (self.left + self.right)
+        self.centre, self.step = centre, np.diff(centre, axis=0)
+        self.size = np.hypot(*self.step.T)
+        self.start = np.concatenate([[0.0], np.cumsum(self.size)])
+        self.length = float(self.start[-1])
+        self.course = np.unwrap(np.arctan2(self.step[:, 1], self.step[:, 0]))
+        both = np.concatenate([self.left, self.right])
+        self.low, self.high = both.min(axis=0), both.max(axis=0)
+
+    def may_hold(self, x: FloatArray, y: FloatArray) -> NDArray[np.bool_]:
+        """Points in the box about it."""
+        return np.asarray((x >= self.low[0]) & (x <= self.high[0]) & (y >= self.low[1]) & (y <= self.high[1]))
+
+    def place(self, x: FloatArray, y: FloatArray) -> tuple[FloatArray, ...]:
+        """Way along the middle (NaN beyond its ends), offset and width across it, its course and curvature there."""
+        about = np.stack([x, y], axis=1)[:, None] - self.centre[None, :-1]
+        size2 = np.maximum(self.size**2, 1e-12)
+        share = np.clip((about * self.step).sum(axis=2) / size2, 0.0, 1.0)
+        away = ((about - share[:, :, None] * self.step) ** 2).sum(axis=2)
+        k = away.argmin(axis=1)
+        rows = np.arange(len(x))
+        u = share[rows, k][:, None]
+        left = self.left[k] + u * (self.left[k + 1] - self.left[k])
+        right = self.right[k] + u * (self.right[k + 1] - self.right[k])
+        course = self.course[k]
+        normal = np.stack([-np.sin(course), np.cos(course)], axis=1)
+        middle = 0.5 * (left + right)
+        offset = ((np.stack([x, y], axis=1) - middle) * normal).sum(axis=1)
+        width = ((left - right) * normal).sum(axis=1)
+        way = self.start[k] + u[:, 0] * self.size[k]
+        at_start = (k == 0) & (((np.stack([x, y], axis=1) - self.centre[0]) @ self.step[0]) < 0)
+        at_end = (k == len(self.size) - 1) & (((np.stack([x, y], axis=1) - self.centre[-1]) @ self.step[-1]) > 0)
+        middles = 0.5 * (self.start[1:] + self.start[:-1])
+        bend = np.interp(way + 0.5 * SMOOTHED, middles, self.course) - np.interp(
+            way - 0.5 * SMOOTHED, middles, self.course
+        )
+        span = np.minimum(way + 0.5 * SMOOTHED, middles[-1]) - np.maximum(way - 0.5 * SMOOTHED, middles[0])
+        curvature = np.where(span > 1.0, bend / np.maximum(span, 1.0), 0.0)
+        return np.where(at_start | at_end, np.nan, way), offset, width, course, curvature

@@ -1,0 +1,173 @@
+"""Tracks that have found their lanes, made into the standard drive table."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from xosc_lateral.drives.cleaning import RUN
+from xosc_lateral.errors import NotEnoughDataError
+from xosc_lateral.formats.importers.cuts import CutSettings, lane_changes, name_states, number_runs
+from xosc_lateral.formats.importers.lane_graph import LaneGraph
+from xosc_lateral.formats.importers.neighbours import find_neighbours
+from xosc_lateral.formats.importers.table import Imported, drop_cut, make_provenance
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+
+TRUCKS = ("truck", "bus", "trailer", "semitrailer", "lorry", "van_trailer", "truck_trailer")
+
+SPEED_WINDOW = 0.4
+"""Positions are differenced over this where no speed was recorded. [s]"""
+
+
+@dataclass(frozen=True, eq=False)
+class PlacedTracks:
+    """Rows of all vehicles, sorted by vehicle and time.
+
+    Parameters
+    ----------
+    names : sequence of str
+        Of the vehicles.
+    vehicle : array of int, shape (n,)
+        Index into `names`.
+    time : array, shape (n,)
+        [s]
+    step : float
+        Between two rows. [s]
+    piece : array of int, shape (n,)
+        Of the lane graph; -1: in no lane.
+    along : array, shape (n,)
+        Way from the piece's start, in the direction of travel. [m]
+    offset, lane_width : array, shape (n,)
+        NaN in no lane. [m]
+    speed : array, shape (n,)
+        [m/s]
+    length : array, shape (n,)
+        Of the vehicle. [m]
+    kind : array of str, shape (n,)
+        Class of the vehicle in lower case; empty where not known.
+    road : mapping of str to array, shape (n,)
+        What the road is like there: curvature, lane_index ...
+    """
+
+    names: Sequence[str]
+    vehicle: IntArray
+    time: FloatArray
+    step: float
+    piece: IntArray
+    along: FloatArray
+    offset: FloatArray
+    lane_width: FloatArray
+    speed: FloatArray
+    length: FloatArray
+    kind: NDArray[np.str_]
+    road: Mapping[str, FloatArray] = field(default_factory=dict)
+
+
+def import_placed(
+    tracks: PlacedTracks,
+    graph: LaneGraph,
+    settings: CutSettings,
+    *,
+    keep_cut: bool,
+    format: str,  # noqa: A002 (the record's own word)
+    sources: Sequence[Path],
+    version: str,
+    licence: str,
+) -> Imported:
+    """Neighbours, cuts and the record of the import.
+
+    Raises
+    ------
+    NotEnoughDataError
+        If nothing is left.
+    """
+    table = placed_table(tracks, graph, settings)
+    record = make_provenance(
+        table,
+        format=format,
+        sources=sources,
+        version=version,
+        licence=licence,
+        settings=asdict(settings),
+        step=tracks.step,
+    )
+    kept = drop_cut(table, keep_cut)
+    if kept.empty:
+        raise NotEnoughDataError(f"{sources[0]}: nothing is left of {len(table)} rows ({dict(record.rows)})")
+    return Imported(kept, record)
+
+
+def placed_table(tracks: PlacedTracks, graph: LaneGraph, settings: CutSettings) -> pd.DataFrame:
+    """The drive table with its column `state`."""
+    import pandas as pd
+
+    part, station, rank = graph.layout()
+    piece, inside = np.maximum(tracks.piece, 0), tracks.piece >= 0
+    s = station[piece] + tracks.along
+    level = rank[piece] - int(rank.min())
+    instant = np.round(tracks.time / tracks.step).astype(np.int64)
+    is_truck = np.isin(tracks.kind, TRUCKS)
+    group = instant * (int(part.max()) + 1) + part[piece]
+    near = find_neighbours(group, np.where(inside, level, -1), s, tracks.length, is_truck)
+    lane, sideways = _own_lanes(tracks, inside)
+    reasons = {
+        "no lane": ~inside,
+        "lane change": lane_changes(sideways, tracks.offset, lane, tracks.vehicle, tracks.step, settings),
+    }
+    state = name_states(reasons, lane, tracks.vehicle, instant, tracks.step, settings)
+    return pd.DataFrame(
+        {
+            "drive": np.array(tracks.names, dtype=object)[tracks.vehicle],
+            "time": np.round(tracks.time, 4),
+            "offset": tracks.offset,
+            "lane_width": tracks.lane_width,
+            "speed": tracks.speed,
+            "acceleration": _rate(tracks.speed, tracks.vehicle, tracks.step, 1.0),
+            **tracks.road,
+            **asdict(near),
+            "vehicle_class": tracks.kind,
+            RUN: number_runs(state, lane, tracks.vehicle, instant),
+            "state": state,
+        }
+    )
+
+
+def _own_lanes(tracks: PlacedTracks, inside: NDArray[np.bool_]) -> tuple[IntArray, FloatArray]:
+    """A number that changes with the lane, and lateral position without the jumps: a new piece ahead is no new lane."""
+    step = np.diff(tracks.offset, prepend=tracks.offset[:1])
+    same = np.r_[False, tracks.vehicle[1:] == tracks.vehicle[:-1]]
+    entered = np.r_[False, inside[1:] != inside[:-1]] & same
+    jump = same & (np.abs(step) > 0.5 * tracks.lane_width)
+    lane = np.cumsum(jump | entered | ~same)
+    sideways = np.cumsum(np.where(jump | ~same | ~np.isfinite(step), 0.0, step))
+    return lane.astype(np.int64), sideways
+
+
+def ground_speed(x: FloatArray, y: FloatArray, vehicle: IntArray, step: float) -> FloatArray:
+    """Speed from positions, shape (n,). [m/s]"""
+    return np.hypot(_rate(x, vehicle, step, SPEED_WINDOW), _rate(y, vehicle, step, SPEED_WINDOW))
+
+
+def travel_heading(x: FloatArray, y: FloatArray, vehicle: IntArray, step: float) -> FloatArray:
+    """Heading from positions, shape (n,). [rad]"""
+    return np.arctan2(_rate(y, vehicle, step, SPEED_WINDOW), _rate(x, vehicle, step, SPEED_WINDOW))
+
+
+def _rate(values: FloatArray, vehicle: IntArray, step: float, window: float) -> FloatArray:
+    """Difference over a window about each row, within a vehicle's rows."""
+    first = np.searchsorted(vehicle, vehicle, side="left")
+    last = np.searchsorted(vehicle, vehicle, side="right") - 1
+    half = max(1, round(0.5 * window / step))
+    rows = np.arange(len(values))
+    low, high = np.maximum(rows - half, first), np.minimum(rows + half, last)
+    return np.asarray((values[high] - values[low]) / (np.maximum(high - low, 1) * step))

@@ -1,0 +1,157 @@
+"""Tables of tracks, whatever their headers: vehicle, time, x, y, and what else there is."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from xosc_lateral.errors import FormatError, NotEnoughDataError
+from xosc_lateral.formats.drives import parse_map
+from xosc_lateral.formats.importers.placed import ground_speed, travel_heading
+from xosc_lateral.formats.tables import read_table
+from xosc_lateral.formats.text_columns import comma_numbers, seconds_of_text
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+
+HEADERS: Mapping[str, tuple[str, ...]] = {
+    "vehicle": ("vehicle", "id", "track_id", "trackid", "vehicle_id", "object_id", "track", "drive"),
+    "time": ("time", "timestamp", "t"),
+    "x": ("x", "x_center", "center_x", "xcenter", "easting", "center_easting", "pos_x"),
+    "y": ("y", "y_center", "center_y", "ycenter", "northing", "center_northing", "pos_y"),
+    "heading": ("heading", "yaw", "psi", "psi_rad", "orientation"),
+    "speed": ("speed", "velocity", "v"),
+    "length": ("length", "vehicle_length", "dimension_length"),
+    "vehicle_class": ("vehicle_class", "class", "type", "agent_type", "object_type"),
+}
+"""Name -> headers that are understood, in lower case, the first that is there; others by the map."""
+
+USUAL_LENGTH = {"truck": 16.5, "bus": 12.0, "trailer": 12.0, "motorcycle": 2.2, "motorbike": 2.2}
+"""Where no length is given; 4.6 m for the rest (EU new cars, 2023: mean 4.4 m). [m]"""
+
+
+@dataclass(frozen=True, eq=False)
+class Tracks:
+    """Rows sorted by vehicle and time; each array of shape (n,), in m, s, rad, m/s."""
+
+    names: tuple[str, ...]
+    vehicle: IntArray
+    time: FloatArray
+    step: float
+    x: FloatArray
+    y: FloatArray
+    heading: FloatArray
+    speed: FloatArray
+    length: FloatArray
+    kind: NDArray[np.str_]
+
+
+def read_tracks(path: Path, columns: Sequence[str] = ()) -> Tracks:
+    """Read a table of tracks.
+
+    Parameters
+    ----------
+    columns : sequence of str
+        ``NAME=COLUMN[:UNIT]`` for headers that aren't understood, and for units other than m, s, rad, m/s.
+
+    Raises
+    ------
+    FormatError
+        A missing column, no number where one is needed.
+    NotEnoughDataError
+        No vehicle with two rows.
+    """
+    table, _ = read_table(path)
+    found = _columns(table, path, columns)
+    order = found.sort_values(["vehicle", "time"], kind="stable", ignore_index=True)
+    order = order.drop_duplicates(["vehicle", "time"], ignore_index=True)
+    codes, names = order["vehicle"].factorize()
+    time = order["time"].to_numpy(dtype=np.float64)
+    same = codes[1:] == codes[:-1]
+    if not same.any():
+        raise NotEnoughDataError(f"{path}: no vehicle has two rows")
+    step = float(np.median(np.diff(time)[same]))
+    vehicle = codes.astype(np.int64)
+    x, y = order["x"].to_numpy(dtype=np.float64), order["y"].to_numpy(dtype=np.float64)
+    kind = order["vehicle_class"].astype(str).str.lower().to_numpy(dtype=str) if "vehicle_class" in order else None
+    kinds = np.full(len(order), "") if kind is None else kind
+    usual = np.array([USUAL_LENGTH.get(one, 4.6) for one in kinds])
+    return Tracks(
+        tuple(f"{name}" for name in names),
+        vehicle,
+        time - float(time.min()),
+        step,
+        x,
+        y,
+        _given(order, "heading", travel_heading(x, y, vehicle, step)),
+        np.abs(_given(order, "speed", ground_speed(x, y, vehicle, step))),
+        _given(order, "length", usual),
+        kinds,
+    )
+
+
+def _given(table: pd.DataFrame, name: str, otherwise: FloatArray) -> FloatArray:
+    if name not in table:
+        return otherwise
+    values = table[name].to_numpy(dtype=np.float64)
+    return np.where(np.isfinite(values), values, otherwise)
+
+
+def _columns(table: pd.DataFrame, path: Path, words: Sequence[str]) -> pd.DataFrame:
+    """The columns that are needed, under their own names, in our units."""
+    import pandas as pd
+
+    mapping = parse_map(words)
+    if unknown := mapping.keys() - HEADERS.keys():
+        raise FormatError(f"--map {min(unknown)}: tracks have {', '.join(HEADERS)}", path=path)
+    by_lower = {str(name).strip().lower(): name for name in reversed(list(table.columns))}
+    found = {}
+    for name, headers in HEADERS.items():
+        source = mapping.get(name)
+        header = next((by_lower[one] for one in headers if one in by_lower), None) if source is None else source.column
+        if header is None or header not in table.columns:
+            if source is not None or name in ("vehicle", "time", "x", "y"):
+                raise FormatError(
+                    f"no column {header or name!r}; there are {', '.join(map(str, table.columns[:20]))} "
+                    f"(translate with --map {name}=COLUMN)",
+                    path=path,
+                    line=1,
+                )
+            continue
+        column = table[header]
+        if name in ("vehicle", "vehicle_class"):
+            found[name] = column
+        else:
+            found[name] = _numbers(column, name, path) * (1.0 if source is None else source.factor)
+    made = pd.DataFrame(found)
+    return made.dropna(subset=["vehicle", "time", "x", "y"])
+
+
+def _numbers(column: pd.Series, name: str, path: Path) -> pd.Series:
+    import pandas as pd
+    from pandas.api import types
+
+    if types.is_numeric_dtype(column):
+        return column.astype(np.float64)
+    if name == "time":
+        seconds = seconds_of_text(column.astype(str))
+        if seconds is not None:
+            return pd.Series(seconds, index=column.index)
+    numbers = comma_numbers(column)
+    if numbers is None:
+        numbers = pd.to_numeric(column, errors="coerce")
+    strange = numbers.isna() & column.notna()
+    if strange.any():
+        row = int(np.flatnonzero(strange)[0])
+        raise FormatError(
+            f"{column.iloc[row]!r} is not a number", path=path, line=row + 2, element=f"column {column.name!r}"
+        )
+    return numbers

@@ -1,0 +1,165 @@
+"""Tables from strangers: CSV, CSV.gz and Parquet as data frames, within `limits`; whatever breaks names the file."""
+
+from __future__ import annotations
+
+import gzip
+import io
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import IO, TYPE_CHECKING
+
+from xosc_lateral.errors import FormatError, XoscLateralError
+from xosc_lateral.formats.hashes import parsed_hash
+from xosc_lateral.formats.source import Source, open_source
+from xosc_lateral.limits import TABLE_CELLS, TABLE_COLUMNS
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+TABLE_SUFFIXES = (".csv", ".csv.gz", ".parquet")
+
+LONGEST_MESSAGE = 300
+"""Of what a library says about a file; some quote half of it."""
+
+_CHUNK = 1 << 20
+_DOUBLE = 8
+
+
+def read_table(path: Path) -> tuple[pd.DataFrame, str]:
+    """Read a CSV, CSV.gz or Parquet file as it is.
+
+    Returns
+    -------
+    DataFrame, str
+        The table, and the SHA-256 of the bytes that it was parsed from.
+
+    Raises
+    ------
+    FormatError
+        When it isn't one, or is beyond the limits.
+    """
+    import pandas as pd
+
+    name = path.name.lower()
+    if not name.endswith(TABLE_SUFFIXES):
+        raise FormatError(f"not a drive table: expected a name ending in {', '.join(TABLE_SUFFIXES)}", path=path)
+    with open_source(path) as source, foreign_errors(path, "can't be read as a table"):
+        if name.endswith(".parquet"):
+            table = _read_parquet(source)
+        else:
+            text = unpacked_text(source)
+            separator = _separator(text, path)
+            table = pd.read_csv(text, sep=separator, encoding="utf-8-sig", low_memory=False, index_col=False)
+    return table, parsed_hash(path)
+
+
+def read_text_table(path: Path) -> pd.DataFrame:
+    """A table with all cells as text, missing ones empty.
+
+    Raises
+    ------
+    FormatError
+        See `read_table`.
+    """
+    import pandas as pd
+
+    with open_source(path) as source, foreign_errors(path, "can't be read as a table"):
+        if path.name.lower().endswith(".parquet"):
+            return as_text(_read_parquet(source))
+        text = unpacked_text(source)
+        separator = _separator(text, path)
+        return pd.read_csv(text, dtype=str, keep_default_na=False, encoding="utf-8-sig", sep=separator, index_col=False)
+
+
+def as_text(table: pd.DataFrame) -> pd.DataFrame:
+    """The table with all cells as text, missing ones empty."""
+    import pandas as pd
+
+    return pd.DataFrame({str(name): [_as_text(value) for value in table[name]] for name in table.columns})
+
+
+@contextmanager
+def foreign_errors(path: Path, what: str) -> Iterator[None]:
+    """Whatever a library raises about a file becomes one line that names the file.
+
+    Raises
+    ------
+    FormatError
+        In place of anything that is no error of ours.
+    """
+    try:
+        yield
+    except XoscLateralError:
+        raise
+    except MemoryError as error:
+        raise FormatError(f"{what}: it takes more memory than there is", path=path) from error
+    except Exception as error:  # readers of binary formats raise anything, damaged bytes being what they are
+        said = " ".join(str(error).split())[:LONGEST_MESSAGE]
+        raise FormatError(f"{what}: {said or type(error).__name__}", path=path) from error
+
+
+def unpacked_text(source: Source) -> IO[bytes]:
+    """The file, unpacked if it is gzip (by its first bytes, whatever its name).
+
+    Raises
+    ------
+    FormatError
+        It unpacks to more than `limits` allow.
+    """
+    packed = source.file.read(2) == b"\x1f\x8b"
+    source.file.seek(0)
+    if not packed:
+        return source.file
+    unpacked = io.BytesIO()
+    with gzip.GzipFile(fileobj=source.file) as file:
+        while chunk := file.read(_CHUNK):
+            unpacked.write(chunk)
+            source.unpacked(unpacked.tell())
+    unpacked.seek(0)
+    return unpacked
+
+
+def _read_parquet(source: Source) -> pd.DataFrame:
+    import pyarrow.parquet as pq
+
+    with pq.ParquetFile(source.file) as file:
+        about = file.metadata
+        groups = range(about.num_row_groups)
+        source.unpacked(max(0, sum(about.row_group(group).total_byte_size for group in groups)))
+        _check_size(about.num_rows, about.num_columns, source)
+        table: pd.DataFrame = file.read().to_pandas()
+        return table
+
+
+def _check_size(rows: int, columns: int, source: Source) -> None:
+    if columns > TABLE_COLUMNS.value:
+        raise FormatError(TABLE_COLUMNS.refusal(columns), path=source.path)
+    if rows * columns > TABLE_CELLS.value:
+        raise FormatError(TABLE_CELLS.refusal(rows * columns), path=source.path)
+    source.unpacked(rows * columns * _DOUBLE)  # a thousand million equal values take a few bytes in the file
+
+
+def _separator(text: IO[bytes], path: Path) -> str:
+    """Comma, semicolon or tab: the commonest in the header."""
+    header, first = (text.readline(_CHUNK).decode("utf-8", errors="replace").rstrip("\r\n") for _ in range(2))
+    text.seek(0)
+    separator = max(",;\t", key=header.count)
+    if header.count(separator) >= TABLE_COLUMNS.value:
+        raise FormatError(TABLE_COLUMNS.refusal(header.count(separator) + 1), path=path, line=1)
+    if separator == "," and '"' not in first and first.rstrip(",").count(",") > header.count(","):
+        raise FormatError(
+            f"{first.count(',') + 1} values under {header.count(',') + 1} headers; if numbers have a decimal comma, "
+            "separate them by semicolons or tabs",
+            path=path,
+            line=2,
+        )
+    return separator
+
+
+def _as_text(value: object) -> str:
+    import json
+
+    if value is None or type(value).__name__ in ("NAType", "NaTType") or (isinstance(value, float) and value != value):
+        return ""
+    return json.dumps(value) if isinstance(value, dict | list) else str(value)

@@ -1,0 +1,249 @@
+"""The movement that no effect explains as an autoregression, and whitening by it, for generalised least squares.
+
+A heterogeneous autoregression [1]_: the last seconds one by one, and the means of longer and longer stretches before
+them. It knows the wander of a minute with few parameters. Whitening is exact within each run: the first rows use the
+lower-order predictors of the same process (the Levinson recursion stepped down [2]_), and runs are independent.
+
+References
+----------
+.. [1] F. Corsi, "A simple approximate long-memory model of realized volatility", J. Financial Econometrics 7, 2009.
+.. [2] P. Brockwell, R. Davis, "Time Series: Theory and Methods", 1991, section 5.2.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
+IntArray = NDArray[np.intp]
+
+MAX_REFLECTION = 0.999
+"""Reflection coefficients are kept inside the unit circle: the process is stationary. [-]"""
+
+ENOUGH_ROWS = 0.5
+"""The memory is the longest for which this share of the rows has so much past in its own run. [-]"""
+
+ROWS_PER_COEFFICIENT = 20
+"""Fewer rows than this per coefficient shorten the memory. [-]"""
+
+
+@dataclass(frozen=True, eq=False)
+class Autoregression:
+    """x_t = sum_k a_k x_{t-k} + sd * white.
+
+    Parameters
+    ----------
+    lags : tuple of array
+        Coefficients of the best predictors from 0, 1, ... p past values; the last one is the process itself.
+    deviations : array, shape (p + 1,)
+        Standard deviation of each predictor's error.
+    """
+
+    lags: tuple[FloatArray, ...]
+    deviations: FloatArray
+
+    @property
+    def order(self) -> int:
+        """Number of past values, p."""
+        return len(self.lags) - 1
+
+    @property
+    def polynomial(self) -> FloatArray:
+        """(1, -a_1, ..., -a_p) / sd: turns the process into white noise of variance 1."""
+        return np.asarray(np.concatenate([[1.0], -self.lags[-1]]) / self.deviations[-1], dtype=np.float64)
+
+    @cached_property
+    def start(self) -> FloatArray:
+        """Whitening of the first p rows of a run, lower triangular, shape (p, p)."""
+        matrix = np.zeros((self.order, self.order))
+        for row in range(self.order):
+            matrix[row, row] = 1.0
+            matrix[row, :row] = -self.lags[row][::-1]
+            matrix[row] /= self.deviations[row]
+        return matrix
+
+    def simulate(self, n: int, rng: np.random.Generator, *, runs: int = 1) -> FloatArray:
+        """Stationary sample paths, shape (runs, n)."""
+        from scipy.signal import lfilter
+
+        warm = 20 * self.order + 200
+        noise = rng.normal(size=(runs, n + warm))
+        return np.asarray(lfilter([1.0], self.polynomial, noise, axis=1)[:, warm:])
+
+
+def positions_in_run(valid: BoolArray) -> IntArray:
+    """How many valid rows in a row came before each row; -1 where invalid."""
+    rows = np.arange(len(valid))
+    start = np.where(valid & ~np.concatenate([[False], valid[:-1]]), rows, 0)
+    return np.where(valid, rows - np.maximum.accumulate(start), -1)
+
+
+def moving_sum(weights: FloatArray, values: FloatArray) -> FloatArray:
+    """sum_k weights[k] values[t - k], zeros before the start; shape of `values`, (n,) or (n, k)."""
+    from scipy.signal import oaconvolve
+
+    if values.ndim == 2 and values.shape[1] == 0:
+        return np.zeros(values.shape)
+    if len(weights) > 16 and len(values) > len(weights):
+        series = np.ascontiguousarray(np.atleast_2d(values.T))
+        return np.asarray(oaconvolve(series, weights[None], axes=1)[:, : len(values)].T.reshape(values.shape))
+    result = weights[0] * values
+    for lag, weight in enumerate(weights[1:], start=1):
+        result[lag:] += weight * values[:-lag]
+    return np.asarray(result, dtype=np.float64)
+
+
+def fit_autoregression(
+    values: FloatArray, valid: BoolArray, order: int, *, longest: int | None = None
+) -> Autoregression:
+    """Least squares over all rows that have the whole memory in their own run.
+
+    Parameters
+    ----------
+    values : array, shape (n,)
+        Mean about zero.
+    valid : bool array, shape (n,)
+    order : int
+        Past values that have a coefficient each; lowered when the runs are too short for it.
+    longest : int, optional
+        Past values that are seen as means of stretches that double in length; `order` without.
+    """
+    position = positions_in_run(valid)
+    rows_in_all = max(1, int((position >= 0).sum()))
+    order = max(1, order)
+    while order > 1 and (position >= order).sum() < max(ROWS_PER_COEFFICIENT * order, 0.25 * rows_in_all):
+        order -= 1
+    edges = [order]
+    while longest is not None and 2 * edges[-1] <= longest:
+        if (position >= 2 * edges[-1]).sum() < ENOUGH_ROWS * rows_in_all:
+            break
+        edges.append(2 * edges[-1])
+    rows = np.flatnonzero(position >= edges[-1])
+    if len(rows) < 2 * order:
+        return Autoregression((np.zeros(0),), np.array([max(float(np.std(values[valid])), 1e-150)]))
+    sums = np.concatenate([[0.0], np.cumsum(np.where(valid, values, 0.0))])
+    past = [values[rows - lag] for lag in range(1, order + 1)]
+    past += [(sums[rows - low] - sums[rows - high]) / (high - low) for low, high in pairwise(edges)]
+    design, now = np.stack(past, axis=1), values[rows]
+    gram = design.T @ design
+    gram[np.diag_indices(len(gram))] *= 1.0 + 1e-9
+    sizes = np.linalg.lstsq(gram, design.T @ now, rcond=None)[0]
+    variance = float(np.mean((now - design @ sizes) ** 2)) * len(rows) / max(1, len(rows) - len(sizes))
+    lags = [sizes[:order]]
+    lags += [
+        np.full(high - low, size / (high - low))
+        for size, (low, high) in zip(sizes[order:], pairwise(edges), strict=True)
+    ]
+    return _stepped_down(np.concatenate(lags), max(variance, 1e-300))
+
+
+def _stepped_down(lags: FloatArray, variance: float) -> Autoregression:
+    """All lower-order predictors, by the Levinson recursion backwards, then forwards from safe reflections."""
+    reflections = []
+    current = lags.copy()
+    for order in range(len(lags), 0, -1):
+        last = float(np.clip(current[order - 1], -MAX_REFLECTION, MAX_REFLECTION))
+        reflections.append(last)
+        current = (current[: order - 1] + last * current[order - 2 :: -1][: order - 1]) / (1.0 - last**2)
+    predictors: list[FloatArray] = [np.zeros(0)]
+    shares = [1.0]
+    for last in reversed(reflections):
+        before = predictors[-1]
+        predictors.append(np.concatenate([before - last * before[::-1], [last]]))
+        shares.append(shares[-1] * (1.0 - last**2))
+    deviations = np.sqrt(variance * np.asarray(shares) / shares[-1])
+    return Autoregression(tuple(predictors), deviations)
+
+
+@dataclass(frozen=True, eq=False)
+class Whitener:
+    """Turns series on the grid into independent rows of variance 1, the drives' own levels taken out.
+
+    Parameters
+    ----------
+    process : Autoregression
+        Of the movement divided by `scale`.
+    valid : bool array, shape (n,)
+    drive : int array, shape (n,)
+        Which level a row has; increasing.
+    scale : array, shape (n,)
+        Factor on the movement at each row.
+    runs : tuple of slice, optional
+        Rows of each run, where they stand side by side without anything invalid in between.
+    """
+
+    process: Autoregression
+    valid: BoolArray
+    drive: IntArray
+    scale: FloatArray
+    runs: tuple[slice, ...] = ()
+
+    @cached_property
+    def compact(self) -> Whitener:
+        """The same for the valid rows alone, put side by side: half the work where drives are short."""
+        ends = np.cumsum([run.stop - run.start for run in self._runs])
+        runs = tuple(
+            slice(int(end) - (run.stop - run.start), int(end)) for run, end in zip(self._runs, ends, strict=True)
+        )
+        _, drive = np.unique(self.drive[self.valid], return_inverse=True)
+        valid = np.ones(int(self.valid.sum()), dtype=np.bool_)
+        return Whitener(self.process, valid, drive.astype(np.intp), self.scale[self.valid], runs)
+
+    @cached_property
+    def _runs(self) -> list[slice]:
+        if self.runs:
+            return list(self.runs)
+        edges = np.flatnonzero(np.diff(np.concatenate([[0], self.valid.astype(np.int8), [0]])))
+        return [slice(int(first), int(last)) for first, last in zip(edges[::2], edges[1::2], strict=True)]
+
+    @cached_property
+    def _edges(self) -> IntArray:
+        return np.searchsorted(self.drive, np.arange(int(self.drive.max()) + 1)).astype(np.intp)
+
+    @cached_property
+    def ones(self) -> FloatArray:
+        """A level of 1, whitened, shape (n,)."""
+        return self.white(np.ones(len(self.valid)))
+
+    @cached_property
+    def power(self) -> FloatArray:
+        """What every drive tells of its level, in 1 / variance, shape (drives,)."""
+        return np.add.reduceat(self.ones**2, self._edges)
+
+    def white(self, values: FloatArray) -> FloatArray:
+        """Whitened, levels still in; 0 at invalid rows; shape of `values`, (n,) or (n, k)."""
+        columns = values[:, None] if values.ndim == 1 else values
+        scaled = columns / self.scale[:, None]
+        if not self.runs:
+            scaled = np.where(self.valid[:, None], scaled, 0.0)
+        result = moving_sum(self.process.polynomial, scaled)
+        for run in self._runs:
+            stop = min(run.stop, run.start + self.process.order)
+            known = stop - run.start
+            result[run.start : stop] = self.process.start[:known, :known] @ scaled[run.start : stop]
+        if not self.runs:
+            result[~self.valid] = 0.0
+        return np.asarray(result[:, 0] if values.ndim == 1 else result)
+
+    def without_levels(self, white: FloatArray) -> FloatArray:
+        """Take the drives' levels out of whitened rows."""
+        columns = white[:, None] if white.ndim == 1 else white
+        sums = np.add.reduceat(self.ones[:, None] * columns, self._edges, axis=0)
+        mean = sums / np.maximum(self.power, 1e-300)[:, None]
+        result = columns - self.ones[:, None] * mean[self.drive]
+        return np.asarray(result[:, 0] if white.ndim == 1 else result)
+
+    def levels(self, values: FloatArray) -> FloatArray:
+        """Level of every drive by generalised least squares, shape (drives,)."""
+        sums = np.add.reduceat(self.ones * self.white(values), self._edges)
+        return np.asarray(sums / np.maximum(self.power, 1e-300))
+
+    def rows(self, values: FloatArray) -> FloatArray:
+        """Whitened, levels out; shape of `values`."""
+        return self.without_levels(self.white(values))

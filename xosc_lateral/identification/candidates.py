@@ -1,0 +1,200 @@
+"""The dictionary: every column in every shape, and products of two columns, before lag and response.
+
+Families have equal prior weight and their members share it evenly: a member of a family of m costs 2 log m, in the
+unit of a squared score (the extended information criterion [1]_). Nothing else tells candidates apart beforehand.
+
+References
+----------
+.. [1] J. Chen, Z. Chen, "Extended Bayesian information criteria for model selection with large model spaces",
+   Biometrika 95, 2008.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from xosc_lateral.driver.effects import (
+    Acts,
+    Angular,
+    ColumnEffect,
+    Factor,
+    Form,
+    Levels,
+    Linear,
+    Magnitude,
+    Nearness,
+    Product,
+    Proximity,
+    Saturating,
+    Threshold,
+)
+from xosc_lateral.identification.columns import Column, Role
+from xosc_lateral.identification.offered import offered_effects
+
+FloatArray = NDArray[np.float64]
+
+LIMITS = (0.1, 0.25, 0.5, 0.75, 0.9)
+"""Quantiles at which limits are tried first; refined later. [-]"""
+
+SCALES = (0.25, 0.5, 0.75)
+"""Quantiles of a distance that are tried as scale of its influence. [-]"""
+
+PHASES = np.pi * np.arange(4) / 4.0
+"""Directions that an angle is projected on: at most 8 % of a score is lost between two of them. [rad]"""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Candidate:
+    """A quantity with one degree of freedom, not yet sized.
+
+    Parameters
+    ----------
+    effect : ColumnEffect
+        Without coefficients.
+    cost : float
+        What its family's size takes from its score. [squared score]
+    contrast : tuple of float
+        Weights of the effect's components, where it has several.
+    """
+
+    effect: ColumnEffect
+    cost: float
+    contrast: tuple[float, ...] = (1.0,)
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """Columns that it reads."""
+        return self.effect.columns
+
+    def values(self, context: Mapping[str, FloatArray]) -> FloatArray:
+        """Quantity before lag and response, shape (n,); NaN: neutral."""
+        return np.asarray(self.effect.quantity(context) @ np.asarray(self.contrast))
+
+
+def candidates_of(columns: Sequence[Column], context: Mapping[str, FloatArray], *, most: int) -> list[Candidate]:
+    """All candidates; `context` holds the road-following rows alone.
+
+    Beyond `most` columns, products are those of levels and switches with all others.
+    """
+    plain = [shape for column in columns for shape in _plain(column, context[column.name])]
+    bent = [shape for column in columns for shape in _bent(column, context[column.name])]
+    factors = {column.name: _factors(column, context[column.name]) for column in columns}
+    pairs: list[tuple[ColumnEffect, tuple[float, ...]]] = [
+        (Product(acts=Acts.LOCATION, factors=pair), (1.0,))
+        for first, second in combinations(columns, 2)
+        if len(columns) <= most or {first.role, second.role} & {Role.LEVELS, Role.SWITCH}
+        for pair in _pairs(first, second, factors)
+    ]
+    return [
+        Candidate(effect, 2.0 * float(np.log(max(1, len(family)))), contrast)
+        for family in (plain, bent, pairs)
+        for effect, contrast in family
+    ]
+
+
+def shapes_of(column: Column, values: FloatArray) -> list[Candidate]:
+    """Every shape of one column, with a fine choice of limits, for refinement; costs as if each were the only one."""
+    many = tuple(np.linspace(0.05, 0.95, 19))
+    effects = [effect for effect, _ in (*_plain(column, values), *_bent(column, values, many))]
+    unique = {repr(effect): effect for effect in effects}
+    return [
+        Candidate(effect, 0.0, (1.0,) * len(effect.quantity({column.name: values[:2]})[0]))
+        for effect in unique.values()
+    ]
+
+
+def _plain(column: Column, values: FloatArray) -> Iterator[tuple[ColumnEffect, tuple[float, ...]]]:
+    name = column.name
+    if column.role is Role.ANGLE:
+        angular = Angular(acts=Acts.LOCATION, column=name, period=column.period)
+        yield from ((angular, (float(np.sin(phase)), float(np.cos(phase)))) for phase in PHASES)
+        return
+    if _varies(values):
+        yield Linear(acts=Acts.LOCATION, column=name), (1.0,)
+    if column.gaps:
+        yield Nearness(acts=Acts.LOCATION, column=name, presence=True), (1.0,)
+        if column.role is Role.NUMBER and (scale := _scale(values, 0.5)) > 0.0:
+            yield Proximity(acts=Acts.LOCATION, column=name, scale=scale), (1.0,)
+
+
+def _bent(
+    column: Column, values: FloatArray, limits: Sequence[float] = LIMITS
+) -> Iterator[tuple[ColumnEffect, tuple[float, ...]]]:
+    name, seen = column.name, values[np.isfinite(values)]
+    for effect in offered_effects(name, values):
+        yield effect, (1.0,) * effect.quantity({name: values[:1]}).shape[1]
+    if column.role is Role.LEVELS:
+        for level in column.levels:
+            yield Levels(acts=Acts.LOCATION, column=name, levels=(level,)), (1.0,)
+    if column.role is not Role.NUMBER or not _varies(values):
+        return
+    for at in np.unique(np.quantile(seen, limits)):
+        if seen.min() < at < seen.max():
+            yield Threshold(acts=Acts.LOCATION, column=name, at=float(at)), (1.0,)
+            yield Threshold(acts=Acts.LOCATION, column=name, at=float(at), jump=False), (1.0,)
+    low, middle, high = np.quantile(seen, [0.1, 0.5, 0.9])
+    if high > low:
+        for width in (0.2, 0.5):
+            yield (
+                Saturating(acts=Acts.LOCATION, column=name, middle=float(middle), scale=float(width * (high - low))),
+                (1.0,),
+            )
+    if seen.min() < 0.0 < seen.max():
+        yield Magnitude(acts=Acts.LOCATION, column=name), (1.0,)
+    if column.gaps:
+        for share in SCALES:
+            if (scale := _scale(values, share)) > 0.0:
+                yield Proximity(acts=Acts.LOCATION, column=name, scale=0.5 * scale), (1.0,)
+                yield Proximity(acts=Acts.LOCATION, column=name, scale=scale), (1.0,)
+
+
+def _factors(column: Column, values: FloatArray) -> list[Factor]:
+    """How a column enters products: a number about its natural zero, else about its median."""
+    name = column.name
+    if column.role is Role.ANGLE:
+        return [Factor(column=name, form=form, at=column.period) for form in (Form.SINE, Form.COSINE)]
+    if column.role is Role.LEVELS:
+        return [Factor(column=name, form=Form.EQUALS, at=level) for level in column.levels]
+    found = []
+    if column.role is Role.SWITCH:
+        high = max(column.levels)
+        return [
+            Factor(column=name, form=Form.EQUALS, at=high)
+            if high != 1.0 or min(column.levels) != 0.0
+            else Factor(column=name)
+        ]
+    if column.gaps:
+        found.append(Factor(column=name, form=Form.PRESENCE))
+        if (scale := _scale(values, 0.5)) > 0.0:
+            found.append(Factor(column=name, form=Form.PROXIMITY, at=scale))
+    elif _varies(values):
+        low, middle, high = np.quantile(values[np.isfinite(values)], [0.1, 0.5, 0.9])
+        found.append(Factor(column=name, at=0.0 if low < 0.0 < high else float(middle)))
+    return found
+
+
+def _pairs(first: Column, second: Column, factors: Mapping[str, list[Factor]]) -> Iterator[tuple[Factor, Factor]]:
+    for one in factors[first.name]:
+        for other in factors[second.name]:
+            if Role.ANGLE in (first.role, second.role):  # a vector's component: speed counts from its own zero
+                one_, other_ = (Factor(column=f.column) if f.form is Form.VALUE else f for f in (one, other))
+                yield one_, other_
+            else:
+                yield one, other
+
+
+def _scale(values: FloatArray, share: float) -> float:
+    """Quantile of the size of what is there and not zero: overlapping vehicles have distance 0 and tell no scale."""
+    size = np.abs(values[np.isfinite(values)])
+    size = size[size > 0.0]
+    return float(np.quantile(size, share)) if len(size) else 0.0
+
+
+def _varies(values: FloatArray) -> bool:
+    seen = values[np.isfinite(values)]
+    return len(seen) > 1 and bool(np.ptp(seen) > 0.0)

@@ -1,0 +1,108 @@
+"""Hidden effects as they most likely were on the measured drives: the courses that figures show beside the data."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from xosc_lateral.identification.close import LoopResult
+from xosc_lateral.identification.terms import Cycle, DriftTerm, RegimesTerm, StepTerm
+from xosc_lateral.identification.terms.cycle import course
+from xosc_lateral.identification.timeline import LOCAL_S, coarse_mean, coarse_middle, local_mean
+
+FloatArray = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Course:
+    """A quantity of the longest drive over time, at 1 Hz, shape (n,) each; road-following seconds only.
+
+    Parameters
+    ----------
+    time : array
+        The drive's own clock. [s]
+    measured, before, after : array
+        Of the measured drive, and the mean over the profiles' runs. [m]
+    """
+
+    time: FloatArray
+    measured: FloatArray
+    before: FloatArray
+    after: FloatArray
+
+
+def mean_course(result: LoopResult, seconds: float) -> Course:
+    """Moving mean of the offset over so many seconds."""
+    timeline = result.cells.timeline
+
+    def mean(offset: FloatArray) -> FloatArray:
+        return coarse_mean(local_mean(offset, timeline.valid, seconds, timeline.step))
+
+    return _course(result, mean(timeline.offset), *(mean(runs.mean(axis=0)) for runs in _runs(result)))
+
+
+def spread_course(result: LoopResult, seconds: float) -> Course:
+    """Root mean square of the movement faster than 20 s, over so many seconds."""
+    timeline = result.cells.timeline
+
+    def squares(offset: FloatArray) -> FloatArray:
+        fast = offset - local_mean(offset, timeline.valid, LOCAL_S, timeline.step)
+        return local_mean(fast**2, timeline.valid, seconds, timeline.step)
+
+    def spread(runs: FloatArray) -> FloatArray:
+        return coarse_mean(np.sqrt(np.mean([squares(run) for run in runs], axis=0)))
+
+    return _course(result, spread(timeline.offset[None]), *(spread(runs) for runs in _runs(result)))
+
+
+def hidden_mean(result: LoopResult) -> FloatArray:
+    """Step, drift and weave as fitted, about their mean, on the seconds of a `Course`; 0 where none was. [m]"""
+    coarse, fitted = result.coarse, result.final
+    own = [term for term in fitted.terms if isinstance(term, Cycle | StepTerm | DriftTerm)]
+    hidden = np.sum([np.zeros(len(coarse)), *(course(term, fitted) for term in own)], axis=0)
+    return np.asarray((hidden - hidden[coarse.valid].mean())[_longest(result)])
+
+
+def regime_probability(result: LoopResult) -> FloatArray:
+    """Probability that the loud regime is on, given all of the drive, on the seconds of a `Course`; 0: no regimes."""
+    fits = [term.fit.on for term in result.final.terms if isinstance(term, RegimesTerm)]
+    on = fits[0] if fits else np.zeros(len(result.coarse))
+    return np.asarray(on[_longest(result)])
+
+
+def by_drive(result: LoopResult, least_s: float) -> tuple[dict[str, FloatArray], dict[str, FloatArray]]:
+    """Mean offset, and spread about it, of every drive with so many road-following seconds.
+
+    Returns
+    -------
+    means, spreads : mapping of "measured", "before", "after" to array
+        Shape (drives,) or (runs * drives,). [m]
+    """
+    timeline = result.cells.timeline
+    rows = [np.flatnonzero(timeline.valid & (timeline.drive == index)) for index in range(len(timeline.names))]
+    rows = [own for own in rows if len(own) * timeline.step >= least_s]
+    series = {"measured": timeline.offset[None], "before": result.runs_before, "after": result.runs_after}
+    means = {name: np.concatenate([runs[:, own].mean(axis=1) for own in rows]) for name, runs in series.items()}
+    spreads = {name: np.concatenate([runs[:, own].std(axis=1) for own in rows]) for name, runs in series.items()}
+    return means, spreads
+
+
+def _runs(result: LoopResult) -> tuple[FloatArray, FloatArray]:
+    return result.runs_before, result.runs_after
+
+
+def _longest(result: LoopResult) -> BoolArray:
+    """Valid seconds of the drive that has most of them."""
+    coarse = result.coarse
+    seconds = np.bincount(coarse.drive, coarse.valid.astype(np.float64))
+    return np.asarray(coarse.valid & (coarse.drive == int(np.argmax(seconds))))
+
+
+def _course(result: LoopResult, measured: FloatArray, before: FloatArray, after: FloatArray) -> Course:
+    shown = _longest(result)
+    n = len(result.coarse)
+    time = coarse_middle(result.cells.timeline.time)[:n]
+    return Course(time[shown], measured[shown], before[shown], after[shown])

@@ -1,0 +1,255 @@
+"""All candidates as whitened rows of length one, their scores, and what chance gives: rotations of the residuals."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from msgspec import structs
+from numpy.typing import NDArray
+
+from xosc_lateral.driver.effects import ColumnEffect
+from xosc_lateral.identification.autocorrelation import Whitener
+from xosc_lateral.identification.candidates import Candidate
+from xosc_lateral.identification.timeline import COARSE, Timeline, coarse_mean
+
+FloatArray = NDArray[np.float64]
+SingleArray = NDArray[np.float32]
+BoolArray = NDArray[np.bool_]
+IntArray = NDArray[np.intp]
+
+RESPONSES = (1.0, 4.0)
+"""Time constants looked at first, refined later; sensitivity: docs/closing_the_loop.md. [s]"""
+
+LAGS = (-4, -2, 0, 2)
+"""Lags looked at first, refined later. [s]"""
+
+PRODUCT_LAGS = (-2, 0)
+PRODUCT_RESPONSES = (2.0,)
+"""The same for products, of which there are many more."""
+
+ROTATIONS = 400
+"""Rotations of the residuals that the null is taken from."""
+
+LEAST_SHIFT_S = 60
+"""No rotation is shorter: a driver's answer must be out of reach. [s]"""
+
+MIN_SUPPORT_S = 45.0
+"""A quantity that rests on fewer seconds than this is not looked at: anything may have happened just then. [s]"""
+
+LEFT_OVER = 0.05
+"""A candidate of which less than this share is left beside what is known is not looked at. [-]"""
+
+CHUNK = 192
+"""Candidates that are whitened at once."""
+
+
+@dataclass(frozen=True, eq=False)
+class Quantities:
+    """Candidates on the 1 Hz grid before lag and response, standardised, in single precision.
+
+    Parameters
+    ----------
+    candidates : list of Candidate
+    values : array, shape (candidates, n)
+    """
+
+    candidates: list[Candidate]
+    values: SingleArray
+
+    @classmethod
+    def of(
+        cls, candidates: Sequence[Candidate], timeline: Timeline, context: Mapping[str, FloatArray], valid: BoolArray
+    ) -> Quantities:
+        """Evaluate all; those that never vary on valid seconds are left out."""
+        kept, rows = [], []
+        for candidate in candidates:
+            values = candidate.values(context)
+            seen = values[timeline.valid]
+            missing = np.isnan(values)
+            if missing.any():
+                there = seen[np.isfinite(seen)]
+                values = np.where(missing, there.mean() if len(there) else 0.0, values)
+            second = coarse_mean(values)
+            deviation = float(second[valid].std())
+            if deviation > 1e-9 * max(float(np.abs(second[valid]).max()), 1e-300):
+                kept.append(candidate)
+                rows.append(((second - second[valid].mean()) / deviation).astype(np.float32))
+        return cls(kept, np.stack(rows) if rows else np.zeros((0, len(valid)), dtype=np.float32))
+
+
+@dataclass(frozen=True, eq=False)
+class Dictionary:
+    """Whitened candidates at every lag and response.
+
+    Parameters
+    ----------
+    candidates : list of Candidate
+        One per entry.
+    lag, response : array, shape (entries,)
+        [s]
+    rows : array, shape (entries, seconds)
+        Length one each; valid seconds only.
+    """
+
+    candidates: list[Candidate]
+    lag: FloatArray
+    response: FloatArray
+    rows: SingleArray
+    costs: FloatArray = field(init=False)
+
+    def __post_init__(self) -> None:
+        """Costs as an array."""
+        object.__setattr__(self, "costs", np.array([candidate.cost for candidate in self.candidates]))
+
+    def __len__(self) -> int:
+        return len(self.candidates)
+
+    def timed(self, index: int) -> ColumnEffect:
+        """An entry's effect with its lag and response."""
+        effect = self.candidates[index].effect
+        return structs.replace(effect, lag_s=float(self.lag[index]), response_s=float(self.response[index]))
+
+
+def build_dictionary(quantities: Quantities, whitener: Whitener) -> Dictionary:
+    """Pass every candidate through every response and lag, and whiten it.
+
+    Parameters
+    ----------
+    quantities : Quantities
+    whitener : Whitener
+    """
+    seconds, compact = np.flatnonzero(whitener.valid), whitener.compact
+    entries: list[tuple[Candidate, float, float]] = []
+    blocks: list[SingleArray] = []
+    families = (
+        ([i for i, c in enumerate(quantities.candidates) if len(c.columns) == 1], LAGS, RESPONSES),
+        ([i for i, c in enumerate(quantities.candidates) if len(c.columns) > 1], PRODUCT_LAGS, PRODUCT_RESPONSES),
+    )
+    for members, lags, responses in families:
+        for first in range(0, len(members), CHUNK):
+            chunk = members[first : first + CHUNK]
+            own = quantities.values[chunk].astype(np.float64).T
+            for response in responses:
+                answer = respond_by_second(own, response)
+                for lag in lags:
+                    # drives are padded by more than any lag
+                    moved = answer[np.clip(seconds - lag, 0, len(answer) - 1)]
+                    rows, support, kept = _unit_rows(compact.rows(moved))
+                    kept &= support >= MIN_SUPPORT_S
+                    blocks.append(rows[:, kept].T.astype(np.float32))
+                    entries += [(quantities.candidates[chunk[i]], float(lag), response) for i in np.flatnonzero(kept)]
+    stacked = np.concatenate(blocks) if blocks else np.zeros((0, len(seconds)), dtype=np.float32)
+    return Dictionary(
+        [entry[0] for entry in entries],
+        np.array([entry[1] for entry in entries]),
+        np.array([entry[2] for entry in entries]),
+        stacked,
+    )
+
+
+def respond_by_second(values: FloatArray, response: float) -> FloatArray:
+    """Means over each second of a first-order lag of gain 1, settled at the start; shape of `values`, (n, k).
+
+    Exact for values that stay the same for the second.
+    """
+    from scipy.signal import lfilter
+
+    keep = float(np.exp(-1.0 / response))
+    late = response * (1.0 - keep)
+    return np.asarray(lfilter([1.0 - late, late - keep], [1.0, -keep], values, axis=0, zi=late * values[:1])[0])
+
+
+def _unit_rows(rows: FloatArray) -> tuple[FloatArray, FloatArray, BoolArray]:
+    """Rows of length one, the seconds that each rests on, and which of them vary at all."""
+    squares = np.square(rows)
+    power = squares.sum(axis=0)
+    kept = power > 1e-9 * max(float(power.max(initial=0.0)), 1e-300)
+    support = power**2 / np.maximum(np.square(squares).sum(axis=0), 1e-300)
+    return rows / np.sqrt(np.maximum(power, 1e-300)), support, kept
+
+
+@dataclass(frozen=True, eq=False)
+class Scores:
+    """Scores of all entries, and the largest ones that rotations give.
+
+    Parameters
+    ----------
+    scores : array, shape (entries,)
+        Squared score less cost; -inf: barred.
+    maxima : array, shape (rotations,)
+    """
+
+    scores: FloatArray
+    maxima: FloatArray
+
+    @property
+    def best(self) -> int:
+        """Entry with the largest score."""
+        return int(np.argmax(self.scores))
+
+
+def score_entries(
+    dictionary: Dictionary, residual: FloatArray, known: FloatArray, barred: BoolArray, shifts: IntArray
+) -> Scores:
+    """Score every entry, and all of them against rotated residuals.
+
+    Parameters
+    ----------
+    residual : array, shape (seconds,)
+        Whitened, valid seconds only.
+    known : array, shape (seconds, k)
+        Orthonormal; partialled out of residual and entries.
+    barred : bool array, shape (entries,)
+    shifts : int array, shape (rotations,)
+    """
+    left = residual - known @ (known.T @ residual)
+    left = left / max(float(np.sqrt(np.mean(left**2))), 1e-300)
+    if len(dictionary) == 0 or barred.all():
+        return Scores(np.full(len(dictionary), -np.inf), np.zeros(0))
+    doubled = np.concatenate([left, left])
+    rotated = np.stack([doubled[shift : shift + len(left)] for shift in (0, *shifts)], axis=1)
+    rotated = (rotated - known @ (known.T @ rotated)).astype(np.float32)
+    basis = known.astype(np.float32)
+    squared = np.empty((len(dictionary), rotated.shape[1]), dtype=np.float32)
+    rest = np.empty(len(dictionary))
+    for first in range(0, len(dictionary), 2048):
+        part = slice(first, first + 2048)
+        rows = dictionary.rows[part]
+        squared[part] = np.square(rows @ rotated)
+        rest[part] = 1.0 - np.square(rows @ basis).sum(axis=1) if basis.shape[1] else 1.0
+    usable = ~barred & (rest > LEFT_OVER)
+    squared = squared / np.maximum(rest, LEFT_OVER).astype(np.float32)[:, None]
+    squared -= dictionary.costs.astype(np.float32)[:, None]
+    squared[~usable] = -np.inf
+    largest = squared.max(axis=0).astype(np.float64)
+    return Scores(squared[:, 0].astype(np.float64), largest[1:] if np.isfinite(largest).all() else np.zeros(0))
+
+
+def draw_shifts(seconds: int, rng: np.random.Generator) -> IntArray:
+    """Rotations of the valid seconds, none shorter than `LEAST_SHIFT_S` either way round."""
+    low = min(LEAST_SHIFT_S, seconds // 4)
+    return rng.integers(low, max(low + 1, seconds - low), size=ROTATIONS).astype(np.intp)
+
+
+def orthonormal(columns: FloatArray, share: float = 1e-6) -> FloatArray:
+    """Orthonormal basis of what holds all but a share of the columns' largest variance, shape (n, rank)."""
+    if columns.shape[1] == 0:
+        return columns
+    # by the Gram matrix: few columns of many rows, for which a singular value decomposition takes ten times as long
+    powers, directions = np.linalg.eigh(columns.T @ columns)
+    kept = powers > share * max(float(powers[-1]), 1e-300)
+    return np.asarray(columns @ (directions[:, kept] / np.sqrt(powers[kept])))
+
+
+__all__ = [
+    "COARSE",
+    "Dictionary",
+    "Quantities",
+    "Scores",
+    "build_dictionary",
+    "draw_shifts",
+    "orthonormal",
+    "score_entries",
+]

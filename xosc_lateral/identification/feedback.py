@@ -1,0 +1,176 @@
+"""Feedback: columns that the car's own movement brings about are no cause, whatever they correlate with.
+
+Two marks, either of them enough.
+
+*Coherence.* A driver answers to a cause within seconds, as through a low-pass: above 0.2 Hz an offset shares next to
+nothing with its causes. A steering angle or a yaw rate is the movement's own derivative, and shares nearly all.
+
+*Direction of time.* Given its own past, a cause owes nothing to what the car did just before; a column that a system
+computes from the offset (a torque that keeps the lane, a filtered copy) is foretold by it [1]_.
+
+Both are asked of the offset, its size, how far it is beyond its usual size, and its speed: what follows may follow in
+any of these ways.
+
+References
+----------
+.. [1] C. W. J. Granger, "Investigating causal relations by econometric models and cross-spectral methods",
+   Econometrica 37, 1969.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from xosc_lateral.identification.columns import Column, Role
+from xosc_lateral.identification.timeline import Timeline
+
+FloatArray = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
+IntArray = NDArray[np.intp]
+ComplexArray = NDArray[np.complex128]
+
+SEGMENT = 128
+"""Samples per segment of the spectral estimate: 25.6 s."""
+
+BAND = (0.2, 0.3, 0.4, 0.6, 0.8)
+"""Edges of the parts of the band where a driver no longer answers, and sensors still see the car move. [Hz]"""
+
+CLEAR = 0.2
+"""Squared coherence from which a column is feedback. Numbers that are causes stay below 0.06, also where
+they move the car by 0.9 m; consequences are above 0.5. [-]"""
+
+FORETOLD, PERHAPS, HARDLY = 0.05, 0.02, 0.01
+"""Share of a column's innovations that the movement foretells: from the first on it is feedback, from the second on
+doubtful; below the last, coherence alone is doubtful too (a switch that moves a car by half a metre: 0.13). [-]"""
+
+OWN_PAST, MOVED_PAST = 10, 5
+"""Past samples of the column, and of the movement, in the test of time's direction: 2 s and 1 s."""
+
+MIN_SEGMENTS = 12
+"""Fewer segments than this say nothing."""
+
+
+@dataclass(frozen=True, slots=True)
+class Feedback:
+    """A column that the movement itself brings about.
+
+    Parameters
+    ----------
+    column : str
+    coherence : float
+        Squared, above 0.2 Hz, with what it follows most. [-]
+    foretold : float
+        Share of its innovations that the movement foretells. [-]
+    of : str
+        What it follows: "offset", "size of the offset", ...
+    doubtful : bool
+        Neither mark is clear.
+    """
+
+    column: str
+    coherence: float
+    foretold: float
+    of: str
+    doubtful: bool
+
+
+def find_feedback(timeline: Timeline, columns: Iterable[Column]) -> list[Feedback]:
+    """Columns that follow from the movement, doubtful ones included."""
+    starts = _segments(timeline.valid)
+    if len(starts) < MIN_SEGMENTS:
+        return []
+    moved = _movement(timeline)
+    spectra = {name: _spectra(values, starts) for name, values in moved.items()}
+    rows = _rows_with_past(timeline.valid, max(OWN_PAST, MOVED_PAST))
+    found = []
+    for column in columns:
+        if column.role is Role.ANGLE:
+            continue
+        values = timeline.context.get(column.name, timeline.lane_width)
+        seen = values[timeline.valid]
+        values = np.where(np.isfinite(values), values, np.nanmedian(seen))
+        shared = {name: _coherence(_spectra(values, starts), own) for name, own in spectra.items()}
+        size = _spectra(np.abs(values - np.median(values[timeline.valid])), starts)
+        for name in ("size of the offset", "excess of the offset"):
+            shared[name] = max(shared[name], _coherence(size, spectra[name]))
+        of = max(shared, key=lambda name: shared[name])
+        # a switch has hardly any changes that could be foretold
+        foretold = _foretold(values, moved, rows) if column.role is Role.NUMBER else 0.0
+        floor = 6.0 / len(starts)
+        coherent = shared[of] >= max(CLEAR, floor)
+        clear = foretold >= FORETOLD or (coherent and foretold >= HARDLY)
+        if clear or coherent or foretold >= PERHAPS:
+            found.append(Feedback(column.name, shared[of], foretold, of, not clear))
+    return found
+
+
+def _movement(timeline: Timeline) -> Mapping[str, FloatArray]:
+    inside = timeline.valid
+    offset = np.where(inside, timeline.offset - np.median(timeline.offset[inside]), 0.0)
+    size = np.abs(offset)
+    usual = float(np.quantile(size[inside], 0.75))
+    return {
+        "offset": offset,
+        "size of the offset": size,
+        "excess of the offset": np.sign(offset) * np.maximum(size - usual, 0.0),
+        "lateral speed": np.gradient(offset, timeline.step),
+    }
+
+
+def _foretold(values: FloatArray, moved: Mapping[str, FloatArray], rows: IntArray) -> float:
+    """Partial R squared of the recent movement, the present included, given the column's own past."""
+    now = values[rows]
+    own = [np.ones(len(rows)), *(values[rows - lag] for lag in range(1, OWN_PAST + 1))]
+    other = [series[rows - lag] for series in moved.values() for lag in range(0, MOVED_PAST + 1, 2)]
+    alone, together = (_left(now, np.stack(design, axis=1)) for design in (own, own + other))
+    freedom = len(rows) / max(1, len(rows) - len(own) - len(other))
+    return max(0.0, 1.0 - freedom * together / max(alone, 1e-300)) if alone > 1e-12 * float(np.var(now)) else 0.0
+
+
+def _left(values: FloatArray, design: FloatArray) -> float:
+    scaled = design / np.maximum(np.sqrt(np.mean(design**2, axis=0)), 1e-300)
+    gram = scaled.T @ scaled
+    gram[np.diag_indices(len(gram))] *= 1.0 + 1e-10
+    sizes = np.linalg.lstsq(gram, scaled.T @ values, rcond=None)[0]
+    return float(np.mean((values - scaled @ sizes) ** 2))
+
+
+def _rows_with_past(valid: BoolArray, past: int) -> IntArray:
+    sums = np.concatenate([[0], np.cumsum(valid)])
+    rows = np.arange(past, len(valid))
+    return np.asarray(rows[sums[rows + 1] - sums[rows - past] == past + 1], dtype=np.intp)
+
+
+def _segments(valid: BoolArray) -> IntArray:
+    starts, at, n = [], 0, len(valid)
+    sums = np.concatenate([[0], np.cumsum(valid)])
+    while at + SEGMENT <= n:
+        if sums[at + SEGMENT] - sums[at] == SEGMENT:
+            starts.append(at)
+            at += SEGMENT // 2
+        else:
+            at += SEGMENT // 16
+    return np.asarray(starts, dtype=np.intp)
+
+
+def _spectra(values: FloatArray, starts: IntArray) -> ComplexArray:
+    """Transforms of the first difference in the band, shape (segments, frequencies)."""
+    change = np.diff(values, prepend=values[:1])
+    pieces = change[starts[:, None] + np.arange(SEGMENT)] * np.hanning(SEGMENT)
+    frequency = np.fft.rfftfreq(SEGMENT, 0.2)
+    return np.asarray(np.fft.rfft(pieces, axis=1)[:, (frequency >= BAND[0]) & (frequency <= BAND[-1])])
+
+
+def _coherence(first: ComplexArray, second: ComplexArray) -> float:
+    """Squared, in the part of the band where most is shared: a shaky sensor hides the faster parts."""
+    cross = np.abs(np.sum(first * np.conj(second), axis=0)) ** 2
+    power = np.sum(np.abs(first) ** 2, axis=0) * np.sum(np.abs(second) ** 2, axis=0)
+    coherence = cross / np.maximum(power, 1e-300)
+    frequency = np.fft.rfftfreq(SEGMENT, 0.2)
+    inside = frequency[(frequency >= BAND[0]) & (frequency <= BAND[-1])]
+    part = np.searchsorted(BAND[1:-1], inside, side="right")
+    return float(max(coherence[part == index].mean() for index in np.unique(part)))

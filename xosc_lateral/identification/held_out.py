@@ -1,0 +1,148 @@
+"""Runs of both profiles on held-out rows, and what they look like in summary statistics."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from msgspec import structs
+from numpy.typing import NDArray
+
+from xosc_lateral.driver.effects import ColumnEffect, Effect
+from xosc_lateral.driver.fitting import fit_runs
+from xosc_lateral.driver.models.kinds import ModelKind
+from xosc_lateral.driver.profile import DriverProfile, Provenance
+from xosc_lateral.errors import NotEnoughDataError
+from xosc_lateral.identification.blocks import folds_of
+from xosc_lateral.identification.columns import Column
+from xosc_lateral.identification.nested import Nested
+from xosc_lateral.identification.regression import Coarse, Fitted, fit_model
+from xosc_lateral.identification.removal import Estimates, bare_runs, estimate_all, removal_of
+from xosc_lateral.identification.residual import Cells, cells_of, error_between, expected, own_runs
+from xosc_lateral.identification.selection import Selection
+from xosc_lateral.identification.terms import Cycle, StepTerm
+from xosc_lateral.identification.terms.base import Term
+from xosc_lateral.identification.timeline import COARSE
+
+FloatArray = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
+
+Progress = Callable[[float, str], None]
+
+
+@dataclass(frozen=True, eq=False)
+class Setting:
+    """What stays the same when findings are scored."""
+
+    coarse: Coarse
+    blocks: NDArray[np.intp]
+    fixed: DriverProfile | None
+    kind: ModelKind
+    refined_kind: ModelKind
+    root: np.random.SeedSequence
+
+
+@dataclass(frozen=True, eq=False)
+class HeldOut:
+    """Summary statistics on held-out blocks."""
+
+    cells: Cells
+    real: dict[str, FloatArray]
+    before: dict[str, FloatArray]
+    after: dict[str, FloatArray]
+    runs_before: FloatArray
+    runs_after: FloatArray
+
+    @property
+    def errors(self) -> tuple[float, float]:
+        """Errors before and after. [m]"""
+        return error_between(self.real, self.before), error_between(self.real, self.after)
+
+
+def score_held_out(
+    setting: Setting, selection: Selection, nested: Nested | None, columns: list[Column], progress: Progress
+) -> HeldOut:
+    """Describe measured offsets and both profiles' runs; `nested` None: nothing is kept."""
+    timeline = setting.coarse.timeline
+    cells = cells_of(timeline, _quantities(selection, columns), _frequency(selection.final))
+    kept = tuple(one.term for one in selection.accepted)
+    runs_before, runs_after = _held_out_runs(setting, nested, kept, selection.start, progress)
+    real = cells.describe(timeline.offset, timeline.valid)
+    before = expected(cells, runs_before, timeline.valid)
+    after = before if runs_after is runs_before else expected(cells, runs_after, timeline.valid)
+    return HeldOut(cells, real, before, after, runs_before, runs_after)
+
+
+def _held_out_runs(
+    setting: Setting, nested: Nested | None, kept: tuple[Term, ...], start: Fitted, progress: Progress
+) -> tuple[FloatArray, FloatArray]:
+    """Runs of base and refined profile over all rows, each row's by profiles chosen and fitted without its fold."""
+    blocks, coarse = setting.blocks, setting.coarse
+    folds = folds_of(blocks)
+    same = setting.kind is setting.refined_kind and not kept
+    sides: list[FloatArray | None] = [None, None]
+    for fold in range(folds):
+        progress(0.6 + 0.3 * fold / folds, f"held-out fold {fold + 1} of {folds}")
+        held = blocks % folds == fold
+        used = ~held if folds > 1 else np.ones(len(held), dtype=np.bool_)
+        part = coarse.only(used[COARSE // 2 :: COARSE][: len(coarse)])
+        bare = fit_model(part, start.terms)
+        before = setting.fixed or fit_without(bare, estimate_all(bare), used, setting.kind, "before", None)
+        profiles = [before]
+        if not same:
+            fitted = bare if nested is None else _as_kept(nested.selections[fold], kept)
+            profiles.append(fit_without(fitted, estimate_all(fitted), used, setting.refined_kind, "after", None))
+        for side, profile in enumerate(profiles):
+            # the same luck for both sides and all folds: what differs is the profile, and runs go on from fold to fold
+            seed = np.random.SeedSequence(setting.root.entropy, spawn_key=(5,))
+            runs = own_runs(profile, coarse.timeline, seed, held=held)
+            whole = sides[side]
+            if whole is None:
+                whole = sides[side] = np.zeros_like(runs)
+            whole[:, held] = runs[:, held]
+    before_runs, after_runs = sides
+    assert before_runs is not None
+    return before_runs, before_runs if after_runs is None else after_runs
+
+
+def _as_kept(selection: Selection, kept: tuple[Term, ...]) -> Fitted:
+    """A fold's own fit, less what was not kept in the end."""
+    extra = [one.term for one in selection.accepted if not any(one.term.matches(term) for term in kept)]
+    return selection.without(extra, "").final if extra else selection.final
+
+
+def fit_without(
+    fitted: Fitted, estimates: Estimates, used: BoolArray, kind: ModelKind, name: str, provenance: Provenance | None
+) -> DriverProfile:
+    """Base model of what is left without the effects, and the effects."""
+    runs = bare_runs(fitted.coarse.timeline, removal_of(fitted, estimates), used)
+    if not runs:
+        raise NotEnoughDataError("closing the loop: no run of 10 s is left to fit the base model on")
+    profile = fit_runs(runs, name=name, model=kind, provenance=provenance)
+    effects: tuple[Effect, ...] = tuple(effect for _, own in estimates.values() for effect in own)
+    return structs.replace(profile, effects=effects)
+
+
+def _quantities(selection: Selection, columns: list[Column]) -> dict[str, FloatArray]:
+    """What the residual is binned by: every column that may act, and every found effect's own quantity."""
+    fitted = selection.final
+    coarse = fitted.coarse
+    quantities = {column.name: coarse.context[column.name] for column in columns}
+    for column in columns:
+        if column.period:
+            angle = 2.0 * np.pi / column.period * quantities.pop(column.name)
+            quantities |= {f"sin({column.name})": np.sin(angle), f"cos({column.name})": np.cos(angle)}
+    for key, (term, effects) in estimate_all(fitted).items():
+        effect = effects[0] if effects else None
+        if isinstance(effect, ColumnEffect):
+            strength = effect.strength(coarse.timeline.step, coarse.context)
+            if strength is not None:
+                quantities[f"effect: {key}"] = strength
+        elif isinstance(term, StepTerm):
+            quantities[f"effect: {key}"] = (np.arange(len(coarse.timeline)) >= term.at * COARSE).astype(float)
+    return quantities
+
+
+def _frequency(fitted: Fitted) -> float | None:
+    return next((term.frequency for term in fitted.terms if isinstance(term, Cycle)), None)

@@ -1,0 +1,155 @@
+"""Which terms a table of drives calls for: columns that may act, forward selection, and the nested judgement of it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from msgspec import structs
+from numpy.typing import NDArray
+
+from xosc_lateral.driver.effects import Acts, ColumnEffect, Drift, GrowingSpread
+from xosc_lateral.driver.profile import DriverProfile
+from xosc_lateral.identification.blocks import hold_out_blocks
+from xosc_lateral.identification.columns import Column, known_columns
+from xosc_lateral.identification.feedback import Feedback, find_feedback
+from xosc_lateral.identification.nested import Gain, Nested, nest
+from xosc_lateral.identification.regression import Coarse
+from xosc_lateral.identification.search import Search
+from xosc_lateral.identification.selection import Selection, select
+from xosc_lateral.identification.terms import BetweenTerm, DriftTerm, MeanTerm, SpreadTerm, StepTerm, VarianceTrend
+from xosc_lateral.identification.terms.base import Term
+from xosc_lateral.identification.terms.between import is_between
+from xosc_lateral.identification.timeline import Timeline
+
+Progress = Callable[[float, str], None]
+"""Told the share that is done and what is being done."""
+
+
+@dataclass(frozen=True, eq=False)
+class Identified:
+    """What a table of drives calls for.
+
+    Parameters
+    ----------
+    selection : Selection
+        Terms that are kept, and everything rejected.
+    nested : Nested or None
+        Selections of all folds; None: nothing was found.
+    gains : mapping of int to Gain
+        By identity of the term.
+    returned_base : str
+        Why nothing is kept although something was found; empty otherwise.
+    columns : list of Column
+        That may act.
+    feedback : list of Feedback
+        Columns that follow from the movement.
+    unused : mapping of str to str
+        Columns that tell nothing, and why.
+    """
+
+    selection: Selection
+    nested: Nested | None
+    gains: Mapping[int, Gain]
+    returned_base: str
+    columns: list[Column]
+    feedback: list[Feedback]
+    unused: Mapping[str, str]
+
+    def least(self, component: str) -> float | None:
+        """Smallest p-value that a component was given; None: it was not looked at."""
+        seen = [one.p_value for one in self.selection.accepted if one.term.component == component]
+        seen += [one.p_value for one in self.selection.rejected if one.component == component]
+        return min(seen) if seen else None
+
+    def emptied(self, why: str) -> Identified:
+        """Everything that was found is taken back."""
+        out = self.selection.without([one.term for one in self.selection.accepted], why)
+        return replace(self, selection=out, gains={}, returned_base=why)
+
+
+def identify(
+    coarse: Coarse,
+    seed: np.random.SeedSequence,
+    *,
+    initial: Sequence[Term] = (),
+    excluded: Sequence[str] = (),
+    progress: Progress = lambda share, what: None,
+) -> Identified:
+    """Select terms, and keep those that foretell blocks on which they were neither selected nor sized.
+
+    Parameters
+    ----------
+    coarse : Coarse
+    seed : SeedSequence
+        Of the rotations and other nulls.
+    initial : sequence of Term
+        In the model already.
+    excluded : sequence of str
+        Columns that are not to be looked at.
+    progress : callable
+    """
+    columns, feedback, unused = usable_columns(coarse.timeline, excluded)
+    search = Search.over(coarse, columns, seed, lambda what: progress(0.1, what))
+    selection = select(search, initial)
+    kept, nested, gains, reason = _judged(search, selection, hold_out_blocks(coarse.timeline), initial, progress)
+    return Identified(kept, nested, gains, reason, columns, feedback, unused)
+
+
+def usable_columns(
+    timeline: Timeline, excluded: Sequence[str] = ()
+) -> tuple[list[Column], list[Feedback], dict[str, str]]:
+    """Columns that may act, those that follow from the movement, and those that tell nothing with the reason."""
+    columns, unused = known_columns(timeline)
+    unused |= dict.fromkeys(excluded, "left out on request")
+    feedback = find_feedback(timeline, columns)
+    barred = {one.column for one in feedback} | set(excluded)
+    return [column for column in columns if column.name not in barred], feedback, unused
+
+
+def initial_terms(base: DriverProfile, timeline: Timeline) -> tuple[Term, ...]:
+    """The base's own effects as far as the table has their columns: they are refitted, not found anew."""
+    there = {"lane_width", *timeline.context}
+    terms: list[Term] = []
+    for effect in base.effects:
+        if isinstance(effect, ColumnEffect) and set(effect.columns) <= there:
+            bare = structs.replace(effect, coefficients=(), errors=(), reference=(), between_drivers=())
+            if effect.acts is Acts.LOCATION:
+                terms.append(BetweenTerm.of(bare) if is_between(effect) else MeanTerm.of(bare))
+            elif effect.acts is Acts.SPREAD:
+                terms.append(SpreadTerm.of(bare))
+        elif isinstance(effect, GrowingSpread):
+            terms.append(VarianceTrend())
+        elif isinstance(effect, Drift):
+            terms.append(DriftTerm())
+    return tuple(terms)
+
+
+def _judged(
+    search: Search, selection: Selection, blocks: NDArray[np.intp], initial: Sequence[Term], progress: Progress
+) -> tuple[Selection, Nested | None, dict[int, Gain], str]:
+    """What gains nothing on blocks that it was not chosen on goes, and all of it if nothing is gained."""
+    if not selection.accepted:
+        return selection, None, {}, ""
+    # what happened once, and when, can't be found without the block in which it happened: folds size it, and know of it
+    once = tuple(one.term for one in selection.accepted if one.term.component == StepTerm.component)
+    components = frozenset(one.term.component for one in selection.accepted) - {StepTerm.component}
+    nested = nest(
+        search,
+        blocks,
+        (*initial, *once),
+        components,
+        lambda share: progress(0.3 + 0.3 * share, "selecting without a fold"),
+    )
+    gains = {id(one.term): nested.of(one.term) for one in selection.accepted if one.term.predictable}
+    useless = [one.term for one in selection.accepted if id(one.term) in gains and gains[id(one.term)].mean <= 0.0]
+    if useless:
+        why = "chance does not explain it, but chosen and sized on other blocks it does not foretell the held-out ones"
+        selection = selection.without(useless, why)
+    reason = ""
+    if any(one.term.predictable for one in selection.accepted) and nested.total.mean <= 0.0:
+        low, high = nested.total.interval
+        reason = f"the effects found gain {nested.total.mean:.2f} nat a held-out block ({low:.2f} to {high:.2f})"
+        selection = selection.without([one.term for one in selection.accepted], reason)
+    return selection, nested, gains, reason

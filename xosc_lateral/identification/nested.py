@@ -1,0 +1,113 @@
+"""Held-out gain of everything that was accepted: each fold's terms are selected and sized without it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from xosc_lateral.identification.blocks import folds_of
+from xosc_lateral.identification.regression import Coarse, fit_model, held_out_likelihood
+from xosc_lateral.identification.search import Search
+from xosc_lateral.identification.selection import Selection, select
+from xosc_lateral.identification.terms.base import Term
+from xosc_lateral.identification.timeline import coarse_middle
+
+FloatArray = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
+IntArray = NDArray[np.intp]
+
+
+@dataclass(frozen=True, slots=True)
+class Gain:
+    """Gain in log-likelihood on rows that nothing was chosen or fitted on.
+
+    Parameters
+    ----------
+    mean, error : float
+        Over blocks, per block, with the standard error of the mean. [nat]
+    folds : int
+        In how many folds the term was chosen again.
+    """
+
+    mean: float
+    error: float
+    folds: int
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """95 % interval of the mean gain."""
+        return self.mean - 1.96 * self.error, self.mean + 1.96 * self.error
+
+
+@dataclass(frozen=True, eq=False)
+class Nested:
+    """Selections of all folds, and what they gain.
+
+    Parameters
+    ----------
+    selections : tuple of Selection
+        One per fold.
+    total : Gain
+        Of all terms together over the start.
+    """
+
+    selections: tuple[Selection, ...]
+    total: Gain
+    _by_row: tuple[tuple[BoolArray, Coarse], ...]
+    _blocks: IntArray
+
+    def of(self, term: Term) -> Gain:
+        """What one accepted term gains: each fold's own version of it, in or out; nothing where it was not chosen."""
+        rows = np.zeros(len(self._blocks))
+        chosen = 0
+        for selection, (held, coarse) in zip(self.selections, self._by_row, strict=True):
+            own = [one for one in selection.final.terms if isinstance(one, Term) and one.matches(term)]
+            if not own:
+                continue
+            chosen += 1
+            rest = fit_model(selection.final.coarse, tuple(one for one in selection.final.terms if one is not own[0]))
+            rows += held_out_likelihood(selection.final, coarse, held) - held_out_likelihood(rest, coarse, held)
+        return _over_blocks(rows, self._blocks, self._by_row, chosen)
+
+
+def nest(
+    search: Search,
+    blocks: IntArray,
+    initial: Sequence[Term],
+    components: frozenset[str],
+    progress: Callable[[float], None] = lambda _: None,
+) -> Nested:
+    """Select anew without each fold.
+
+    Parameters
+    ----------
+    blocks : int array, shape (n,)
+        On the 0.2 s grid.
+    components : frozenset of str
+        Those in which anything was accepted; where nothing was, nothing is to be judged.
+    """
+    coarse = search.coarse
+    seconds = coarse_middle(blocks)[: len(coarse)]
+    folds = folds_of(blocks)
+    selections, by_row, rows = [], [], np.zeros(len(coarse))
+    for fold in range(folds):
+        progress(fold / folds)
+        held = seconds % folds == fold
+        part = coarse.only(~held) if folds > 1 else coarse
+        selection = select(replace(search, coarse=part, _built=[]), initial, only=components)
+        selections.append(selection)
+        by_row.append((held, coarse))
+        rows += held_out_likelihood(selection.final, coarse, held) - held_out_likelihood(selection.start, coarse, held)
+    where = tuple(by_row)
+    return Nested(tuple(selections), _over_blocks(rows, seconds, where, folds), where, seconds)
+
+
+def _over_blocks(rows: FloatArray, blocks: IntArray, where: Sequence[tuple[BoolArray, Coarse]], folds: int) -> Gain:
+    valid = where[0][1].valid
+    used = np.unique(blocks[valid])
+    sums = np.bincount(blocks, rows, minlength=int(blocks.max()) + 1)[used]
+    error = float(np.std(sums, ddof=1) / np.sqrt(len(sums))) if len(sums) > 1 else 0.0
+    return Gain(float(sums.mean()), error, folds)

@@ -1,0 +1,73 @@
+"""One linear regression on white rows: what every test of a column comes down to."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from xosc_lateral.identification.autocorrelation import Autoregression, Whitener, fit_autoregression
+from xosc_lateral.identification.regression import LONGEST, ORDER, Coarse
+
+FloatArray = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
+
+
+@dataclass(frozen=True, eq=False)
+class Problem:
+    """One linear regression.
+
+    Parameters
+    ----------
+    whitener : Whitener
+        For series and columns.
+    series : array, shape (n,)
+        With what the model has of this component still in.
+    columns : array, shape (n, k)
+        What the model has already.
+    """
+
+    whitener: Whitener
+    series: FloatArray
+    columns: FloatArray
+
+    @property
+    def valid(self) -> BoolArray:
+        """Rows that count, shape (n,)."""
+        return self.whitener.valid
+
+    @cached_property
+    def response(self) -> FloatArray:
+        """White series, levels out, shape (seconds,), valid ones only."""
+        return self.rows(self.series)
+
+    @cached_property
+    def known(self) -> FloatArray:
+        """White columns, shape (seconds, k)."""
+        return self.rows(self.columns)
+
+    def rows(self, values: FloatArray) -> FloatArray:
+        """White rows of series or columns, valid ones only."""
+        return self.whitener.compact.rows(values[self.valid])
+
+
+def of_squares(coarse: Coarse, squares: FloatArray, valid: BoolArray, columns: FloatArray) -> Problem:
+    """Regression of squares on what may make them larger; they come in clusters, as far as no column explains them."""
+    left = squares
+    if columns.shape[1]:
+        design = columns - columns[valid].mean(axis=0)
+        left = squares - design @ np.linalg.lstsq(design[valid], squares[valid], rcond=None)[0]
+    process = fit_autoregression(np.where(valid, left, 0.0), valid, ORDER, longest=LONGEST)
+    return Problem(Whitener(process, valid, coarse.drive, np.ones(len(coarse))), squares, columns)
+
+
+def of_products(coarse: Coarse, rows: FloatArray, columns: FloatArray, factor: FloatArray) -> Problem:
+    """Regression of white rows times a factor on columns, about one level for all drives.
+
+    The products themselves are rotated in the null: a few loud seconds, in which both are large, stay what they are.
+    """
+    nothing = Autoregression((np.zeros(0),), np.ones(1))
+    whitener = Whitener(nothing, coarse.valid, np.zeros(len(coarse), dtype=np.intp), np.ones(len(coarse)))
+    return Problem(whitener, rows * factor, columns)

@@ -1,0 +1,46 @@
+"""How much drivers differ in their answer to a column: the variance of the slopes between drives.
+
+Method of moments [1]_: slopes of single drives scatter by more than their standard errors explain, or they do not.
+
+References
+----------
+.. [1] R. DerSimonian, N. Laird, "Meta-analysis in clinical trials", Controlled Clinical Trials 7, 1986.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from xosc_lateral.identification.regression import Fitted, ModelTerm
+
+FloatArray = NDArray[np.float64]
+
+MIN_DRIVES = 20
+"""Fewer drives say nothing about how drivers differ."""
+
+LEVEL = 0.01
+"""Probability of taking noise for drivers that differ; drivers that are alike are the simpler profile. [-]"""
+
+
+def slope_deviation(fitted: Fitted, term: ModelTerm) -> float:
+    """Standard deviation between drives of the only coefficient of a term of the mean; 0: none is seen. [m per unit]"""
+    from scipy.stats import chi2
+
+    part = fitted.mean_part(term)
+    coarse = fitted.coarse
+    if part.stop - part.start != 1 or coarse.drives < MIN_DRIVES:
+        return 0.0
+    column = fitted.whitener.rows(fitted.columns[:, part])[:, 0]
+    power = np.bincount(coarse.drive, column**2, minlength=coarse.drives)
+    told = power > 1e-3 * float(power.mean())
+    if told.sum() < MIN_DRIVES:
+        return 0.0
+    weight = power[told]
+    off = np.bincount(coarse.drive, column * fitted.rows, minlength=coarse.drives)[told] / weight
+    off = off - float(weight @ off) / float(weight.sum())
+    scatter, freedom = float(weight @ off**2), int(told.sum()) - 1
+    if chi2.sf(scatter, freedom) > LEVEL:
+        return 0.0
+    spread = (scatter - freedom) / (weight.sum() - float(weight @ weight) / weight.sum())
+    return float(np.sqrt(max(spread, 0.0)))

@@ -1,0 +1,329 @@
+"""The one model of a drive, and the fit of all its terms together.
+
+offset = level of the drive + mean terms + scale * movement, the movement an autoregression at 1 Hz, log scale = level
+of the drive + scale terms. Mean terms are fitted jointly by generalised least squares, scale terms by iterated
+regression of squared innovations [1]_: adding a term corrects the ones found before.
+
+References
+----------
+.. [1] M. Aitkin, "Modelling variance heterogeneity in normal regression using GLIM", Applied Statistics 36, 1987.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Protocol
+
+import numpy as np
+from msgspec import structs
+from numpy.typing import NDArray
+
+from xosc_lateral.driver.effects import Acts, ColumnEffect
+from xosc_lateral.identification.autocorrelation import Whitener, fit_autoregression
+from xosc_lateral.identification.timeline import Timeline, coarse_all, coarse_mean, coarse_middle
+
+FloatArray = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
+IntArray = NDArray[np.intp]
+
+ORDER = 12
+"""Past seconds that have a coefficient each in the movement's autoregression. [s]"""
+
+LONGEST = 96
+"""Past seconds that it sees as means of doubling stretches: the wander of a minute and a half. [s]"""
+
+ROUNDS = 4
+"""Turns of sizes, autoregression and scale; they settle in three."""
+
+CLIP = 9.0
+"""Squared innovations (variance 1) beyond this count as this: three standard deviations. [-]"""
+
+OWN_LEVEL_S = 30.0
+"""A drive's level of the scale is its own as far as it lasts longer than this. [s]"""
+
+MIN_DRIFT_S = 600.0
+"""A shorter drive tells nothing about drift or a trend of the variance. [s]"""
+
+
+@dataclass(frozen=True, eq=False)
+class Coarse:
+    """The timeline at 1 Hz, and every column effect's answer on it.
+
+    Parameters
+    ----------
+    timeline : Timeline
+    offset : array, shape (n,)
+        Mean of each second. [m]
+    valid : bool array, shape (n,)
+    drive : int array, shape (n,)
+    time : array, shape (n,)
+        [s]
+    context : mapping of str to array
+        Columns on the fine grid, lane width included, clipped to what occurs while road-following: a traffic jam that
+        is cut out must not stretch a column's range.
+    """
+
+    timeline: Timeline
+    offset: FloatArray
+    valid: BoolArray
+    drive: IntArray
+    time: FloatArray
+    context: Mapping[str, FloatArray]
+    _answers: dict[ColumnEffect, FloatArray] = field(default_factory=dict, repr=False)
+
+    @classmethod
+    def of(cls, timeline: Timeline) -> Coarse:
+        """Average to 1 Hz."""
+        columns = {"lane_width": timeline.lane_width, **timeline.context}
+        return cls(
+            timeline,
+            coarse_mean(timeline.offset),
+            coarse_all(timeline.valid),
+            coarse_middle(timeline.drive),
+            coarse_mean(timeline.time),
+            {name: _within(values, timeline.valid) for name, values in columns.items()},
+        )
+
+    def __len__(self) -> int:
+        return len(self.offset)
+
+    def only(self, rows: BoolArray) -> Coarse:
+        """The same with fewer valid rows; `rows`: shape (n,)."""
+        return replace(self, valid=self.valid & rows, _answers={})
+
+    @property
+    def drives(self) -> int:
+        """Number of drives."""
+        return int(self.drive.max()) + 1
+
+    @property
+    def lasts(self) -> bool:
+        """Whether a drive is long enough to change with time: minutes, not the minute of a passing vehicle."""
+        return bool(np.bincount(self.drive, self.valid.astype(float)).max() >= MIN_DRIFT_S)
+
+    def answer(self, effect: ColumnEffect, *, keep: bool = False) -> FloatArray:
+        """The effect's quantity as the driver answers to it, less its mean where valid; shape (n, k)."""
+        key = structs.replace(effect, acts=Acts.LOCATION, coefficients=(), errors=(), reference=(), between_drivers=())
+        if key in self._answers:
+            return self._answers[key]
+        answer = coarse_mean(key.answer(self.timeline.step, self.context))
+        answer = answer - answer[self.valid].mean(axis=0)
+        if keep:
+            self._answers[key] = answer
+        return np.asarray(answer, dtype=np.float64)
+
+    def by_drive(self, values: FloatArray) -> FloatArray:
+        """Mean over the valid rows of each drive, shape (drives,); 0 where there are none."""
+        count = np.bincount(self.drive, self.valid.astype(float), minlength=self.drives)
+        sums = np.bincount(self.drive, np.where(self.valid, values, 0.0), minlength=self.drives)
+        return np.asarray(sums / np.maximum(count, 1.0))
+
+
+class ModelTerm(Protocol):
+    """What the regression asks of a term: its columns; see `terms.base.Term` for all that a term can do."""
+
+    def mean_columns(self, coarse: Coarse) -> FloatArray:
+        """Columns of the mean, shape (n, k)."""
+        ...
+
+    def scale_columns(self, coarse: Coarse) -> FloatArray:
+        """Columns of the log scale, shape (n, j)."""
+        ...
+
+    def known_scale(self, coarse: Coarse) -> FloatArray | None:
+        """Log scale that is known as a whole, shape (n,)."""
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class Fitted:
+    """Terms with sizes, and what is left.
+
+    Parameters
+    ----------
+    coarse : Coarse
+    terms : tuple of ModelTerm
+    whitener : Whitener
+    columns : array, shape (n, k)
+        Of the mean, term by term.
+    sizes, covariance : array, shape (k,), (k, k)
+        [m] per unit.
+    levels : array, shape (drives,)
+        Mean offset of every drive where all mean terms are at their mean. [m]
+    scales : array, shape (n, j)
+        Columns of the log scale, term by term.
+    log_sizes, log_covariance : array, shape (j,), (j, j)
+        Natural logarithm per unit.
+    rows : array, shape (n,)
+        Whitened residual, variance 1, 0 where invalid.
+    movement : array, shape (n,)
+        Offset less level and mean terms, over the scale; 0 where invalid. [m]
+    log_likelihood : float
+        Gaussian, of the valid rows.
+    """
+
+    coarse: Coarse
+    terms: tuple[ModelTerm, ...]
+    whitener: Whitener
+    columns: FloatArray
+    sizes: FloatArray
+    covariance: FloatArray
+    levels: FloatArray
+    scales: FloatArray
+    log_sizes: FloatArray
+    log_covariance: FloatArray
+    rows: FloatArray
+    movement: FloatArray
+    log_likelihood: float
+
+    @property
+    def scale(self) -> FloatArray:
+        """Factor on the movement, shape (n,)."""
+        return self.whitener.scale
+
+    def mean_part(self, term: ModelTerm) -> slice:
+        """Where a term's coefficients of the mean are."""
+        return self._part(term, [other.mean_columns(self.coarse).shape[1] for other in self.terms])
+
+    def scale_part(self, term: ModelTerm) -> slice:
+        """Where a term's coefficients of the log scale are."""
+        return self._part(term, [other.scale_columns(self.coarse).shape[1] for other in self.terms])
+
+    def _part(self, term: ModelTerm, widths: Sequence[int]) -> slice:
+        index = next(i for i, other in enumerate(self.terms) if other is term)
+        first = sum(widths[:index])
+        return slice(first, first + widths[index])
+
+
+def fit_model(coarse: Coarse, terms: Sequence[ModelTerm]) -> Fitted:
+    """Fit all terms jointly: generalised least squares and the autoregression by turns."""
+    columns = _joined([term.mean_columns(coarse) for term in terms], len(coarse))
+    scales = _joined([term.scale_columns(coarse) for term in terms], len(coarse))
+    known = _known_scale(coarse, terms)
+    sizes, log_sizes = np.zeros(columns.shape[1]), np.zeros(scales.shape[1])
+    covariance = np.zeros((len(sizes), len(sizes)))
+    levels, spread = coarse.by_drive(coarse.offset), np.ones(coarse.drives)
+    for _ in range(ROUNDS):
+        scale = np.exp(scales @ log_sizes + known) * spread[coarse.drive]
+        left = coarse.offset - columns @ sizes - levels[coarse.drive]
+        movement = np.where(coarse.valid, left / scale, 0.0)
+        process = fit_autoregression(movement, coarse.valid, ORDER, longest=LONGEST)
+        whitener = Whitener(process, coarse.valid, coarse.drive, scale)
+        response, design = whitener.rows(coarse.offset), whitener.rows(columns)
+        sizes, covariance = _least_squares(design, response)
+        rows = response - design @ sizes
+        levels = whitener.levels(coarse.offset - columns @ sizes)
+        if scales.shape[1]:
+            log_sizes = log_sizes + _log_scale_step(scales, rows, coarse)
+        spread = spread * np.sqrt(own_levels(_clipped_squares(rows, coarse.valid), coarse.valid, coarse.drive))
+    n = int(coarse.valid.sum())
+    variance = float(rows @ rows) / max(1, n - len(sizes))
+    left = np.where(coarse.valid, coarse.offset - columns @ sizes - levels[coarse.drive], 0.0)
+    return Fitted(
+        coarse, tuple(terms), whitener, columns, sizes, covariance * variance, levels, scales, log_sizes,
+        _scale_covariance(scales, coarse), rows / np.sqrt(variance), left / scale, _log_likelihood(rows, whitener),
+    )  # fmt: skip
+
+
+def held_out_likelihood(fitted: Fitted, coarse: Coarse, held: BoolArray) -> FloatArray:
+    """Gaussian log-likelihood of every valid row in `held`, shape (n,), under a model fitted without them; 0 elsewhere.
+
+    The held-out rows' own levels of place and spread are taken from themselves, for every model alike.
+
+    Parameters
+    ----------
+    coarse : Coarse
+        With the held-out rows valid.
+    """
+    rows = coarse.valid & held
+    columns = _joined([term.mean_columns(fitted.coarse) for term in fitted.terms], len(coarse))
+    scales = _joined([term.scale_columns(fitted.coarse) for term in fitted.terms], len(coarse))
+    scale = np.exp(scales @ fitted.log_sizes + _known_scale(coarse, fitted.terms))
+    bare = Whitener(fitted.whitener.process, rows, coarse.drive, scale)
+    squares = np.square(bare.rows(np.where(rows, coarse.offset - columns @ fitted.sizes, 0.0)))
+    typical = max(float(squares[rows].mean()), 1e-300) if rows.any() else 1.0
+    level = own_levels(np.minimum(squares, CLIP * typical), rows, coarse.drive) * typical
+    own = level[coarse.drive]
+    variance = own * np.square(scale * fitted.whitener.process.deviations[-1])
+    return np.where(rows, -0.5 * (np.minimum(squares / own, CLIP) + np.log(variance)), 0.0)
+
+
+def elapsed(coarse: Coarse) -> FloatArray:
+    """Time on the road, -0.5 at the start and 0.5 at the end of each drive's valid part; shape (n,)."""
+    share = np.zeros(len(coarse))
+    for index in range(coarse.drives):
+        rows = np.flatnonzero(coarse.drive == index)
+        inside = rows[coarse.valid[rows]]
+        if len(inside):
+            share[rows] = np.clip((rows - inside[0]) / max(1, inside[-1] - inside[0]), 0.0, 1.0) - 0.5
+    return share
+
+
+def squared_innovations(rows: FloatArray, valid: BoolArray) -> FloatArray:
+    """Clipped squares, standardised over the valid rows; 0 elsewhere."""
+    squares = np.minimum(rows**2, CLIP)
+    mean, deviation = squares[valid].mean(), squares[valid].std()
+    return np.where(valid, (squares - mean) / max(deviation, 1e-12), 0.0)
+
+
+def own_levels(squares: FloatArray, valid: BoolArray, drive: IntArray) -> FloatArray:
+    """Mean square of every drive over that of all, shape (drives,); 1 for a single drive, near 1 for short ones."""
+    groups = int(drive.max()) + 1
+    if groups == 1 or not valid.any():
+        return np.ones(groups)
+    relative = squares / max(float(squares[valid].mean()), 1e-300)
+    seconds = np.bincount(drive, valid.astype(float), minlength=groups)
+    sums = np.bincount(drive, np.where(valid, relative, 0.0), minlength=groups)
+    return np.asarray((sums + OWN_LEVEL_S) / (seconds + OWN_LEVEL_S))
+
+
+def _within(values: FloatArray, valid: BoolArray) -> FloatArray:
+    seen = values[valid & np.isfinite(values)]
+    return np.clip(values, seen.min(), seen.max()) if len(seen) else values
+
+
+def _joined(blocks: Sequence[FloatArray], n: int) -> FloatArray:
+    return np.concatenate(blocks, axis=1) if blocks else np.zeros((n, 0))
+
+
+def _known_scale(coarse: Coarse, terms: Sequence[ModelTerm]) -> FloatArray:
+    known = [scale for term in terms if (scale := term.known_scale(coarse)) is not None]
+    return np.sum(known, axis=0) if known else np.zeros(len(coarse))
+
+
+def _log_likelihood(rows: FloatArray, whitener: Whitener) -> float:
+    valid = whitener.valid
+    volume = valid.sum() * np.log(whitener.process.deviations[-1]) + np.log(whitener.scale[valid]).sum()
+    return float(-0.5 * rows @ rows - volume)
+
+
+def _least_squares(design: FloatArray, response: FloatArray) -> tuple[FloatArray, FloatArray]:
+    if design.shape[1] == 0:
+        return np.zeros(0), np.zeros((0, 0))
+    inverse = np.linalg.pinv(design.T @ design)
+    return inverse @ (design.T @ response), np.asarray(inverse, dtype=np.float64)
+
+
+def _clipped_squares(rows: FloatArray, valid: BoolArray) -> FloatArray:
+    return np.asarray(np.minimum(np.square(rows) / np.mean(rows[valid] ** 2), CLIP))
+
+
+def _within_drives(scales: FloatArray, coarse: Coarse) -> FloatArray:
+    """Valid rows of the scale's columns about their drive's mean."""
+    means = np.stack([coarse.by_drive(column) for column in scales.T], axis=1)
+    return np.asarray((scales - means[coarse.drive])[coarse.valid])
+
+
+def _log_scale_step(scales: FloatArray, rows: FloatArray, coarse: Coarse) -> FloatArray:
+    """One Fisher-scoring step for log sd = scales . sizes (variance of a squared normal is 2)."""
+    variance = np.minimum(rows[coarse.valid] ** 2, CLIP * float(np.mean(rows[coarse.valid] ** 2)))
+    design = _within_drives(scales, coarse)
+    return np.asarray(np.linalg.pinv(2.0 * design.T @ design) @ (design.T @ (variance / variance.mean() - 1.0)))
+
+
+def _scale_covariance(scales: FloatArray, coarse: Coarse) -> FloatArray:
+    if scales.shape[1] == 0:
+        return np.zeros((0, 0))
+    design = _within_drives(scales, coarse)
+    return np.asarray(np.linalg.pinv(2.0 * design.T @ design))

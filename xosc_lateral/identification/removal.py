@@ -1,0 +1,88 @@
+"""Measured movement with the effects taken out: what the base model is fitted on."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from xosc_lateral.driver.effects import Effect
+from xosc_lateral.drives.cuts import MIN_RUN
+from xosc_lateral.drives.drive import Run
+from xosc_lateral.drives.resampling import STEP
+from xosc_lateral.identification.regression import Fitted
+from xosc_lateral.identification.terms.base import Removal, Term
+from xosc_lateral.identification.timeline import Timeline
+
+FloatArray = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
+
+FINE_S = 1.0
+"""Movement within this time counts as fine when a spread is taken out. [s]"""
+
+Estimates = Mapping[str, tuple[Term, tuple[Effect, ...]]]
+"""By key ("mean 0", "step 0"): a term and what the profile gets for it."""
+
+
+def estimate_all(fitted: Fitted) -> Estimates:
+    """Sizes of everything in the model; the key counts terms of one component."""
+    found: dict[str, tuple[Term, tuple[Effect, ...]]] = {}
+    for term in fitted.terms:
+        assert isinstance(term, Term)
+        number = sum(1 for key in found if key.rpartition(" ")[0] == term.kind_key)
+        found[f"{term.kind_key} {number}"] = (term, term.estimate(fitted))
+    return found
+
+
+def removal_of(fitted: Fitted, estimates: Estimates) -> Removal:
+    """What all terms did to the measured offsets."""
+    removal = Removal(np.zeros(len(fitted.coarse.timeline)))
+    for term, effects in estimates.values():
+        term.remove(fitted, effects, removal)
+    return removal
+
+
+def bare_runs(timeline: Timeline, removal: Removal, used: BoolArray) -> list[Run]:
+    """Runs of the movement without effects, from the valid rows in `used`."""
+    runs: list[Run] = []
+    for index, name in enumerate(timeline.names):
+        for rows in uninterrupted(timeline.valid & used & (timeline.drive == index)):
+            if (rows.stop - rows.start) * STEP >= MIN_RUN:
+                runs.append(_run(timeline, removal, rows, name, len(runs)))
+    return runs
+
+
+def bare_movement(timeline: Timeline, removal: Removal, rows: slice, mean: float | None = None) -> FloatArray:
+    """Offsets of one uninterrupted stretch without the effects, about their own mean or the given one [m]."""
+    left = timeline.offset[rows] - removal.location[rows]
+    mean = float(left.mean()) if mean is None else mean
+    slow = _smooth(left)
+    spread, fine = np.exp(-removal.spread[rows]), np.exp(-removal.fine[rows])
+    return np.asarray(mean + (slow - mean) * spread + (left - slow) * fine)
+
+
+def uninterrupted(mask: BoolArray) -> list[slice]:
+    """Stretches of rows in a row, in order."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], mask.astype(np.int8), [0]])))
+    return [slice(int(first), int(last)) for first, last in zip(edges[::2], edges[1::2], strict=True)]
+
+
+def _run(timeline: Timeline, removal: Removal, rows: slice, name: str, index: int) -> Run:
+    movement = bare_movement(timeline, removal, rows)
+    width = timeline.lane_width[rows]
+    rate = np.exp(removal.rate[rows])
+    if np.any(rate != 1.0):
+        # the base's own clock runs at the effect's pace: read the movement at even ticks of that clock
+        ticks = np.concatenate([[0.0], np.cumsum(0.5 * (rate[1:] + rate[:-1]))])
+        even = np.arange(int(ticks[-1]) + 1, dtype=np.float64)
+        movement, width = np.interp(even, ticks, movement), np.interp(even, ticks, width)
+    time = timeline.time[rows.start] + STEP * np.arange(len(movement))
+    return Run(name, index, time, movement, width, {}, frozenset())
+
+
+def _smooth(values: FloatArray) -> FloatArray:
+    width = 2 * round(0.5 * FINE_S / STEP) + 1
+    half = width // 2
+    padded = np.concatenate([2 * values[0] - values[half:0:-1], values, 2 * values[-1] - values[-2 : -half - 2 : -1]])
+    return np.convolve(padded, np.ones(width) / width, mode="valid")

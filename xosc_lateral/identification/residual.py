@@ -1,0 +1,267 @@
+"""The residual: where measured drives and a profile's own runs under the same context differ, in metres.
+
+Both are described by the same set of cells: the mean offset and the spread of the faster movement in each fifth of
+every context column, the spread in each sixth of the drive, the movement's size in bands of frequency, and quantiles of
+the local spread. The error is the root mean square over the cells of measured minus expected, with the expectation
+taken over several runs of the profile. If no cell differs by more than the floor (what measured data differs from
+itself), no test of means, spreads, spectra or their dependence on context can tell the profile from the driver.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from xosc_lateral.driver.effects.response import respond
+from xosc_lateral.driver.profile import DriverProfile
+from xosc_lateral.driver.sampling import OffsetSampler
+from xosc_lateral.driver.seeds import child
+from xosc_lateral.identification.timeline import LOCAL_S, PAD, Timeline, local_mean
+from xosc_lateral.segment import Segment
+
+FloatArray = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
+IntArray = NDArray[np.intp]
+
+N_BINS = 5
+"""Bins of a column, equally filled."""
+
+ANSWER_S = 2.0
+"""Columns are smoothed as a driver answers before they are binned. [s]"""
+
+BANDS_S = (1.0, 3.0, 8.0, 20.0, 60.0, 200.0)
+"""Averaging times between which the bands of the movement lie. [s]"""
+
+SWING, SWING_WIDTH = "movement at the weave's period", 2
+"""Name of that group, and frequencies to each side that belong to it. [-]"""
+
+LOCAL_QUANTILES = (0.1, 0.3, 0.5, 0.7, 0.9)
+
+N_RUNS = 24
+"""Runs of the profile that its expectation is taken over ..."""
+
+FEW_RUNS, MANY_DRIVES = 6, 50
+"""... and how many with so many drives, each of which is another sample already."""
+
+SPARE_ROWS = 75
+"""A bin with fewer rows (15 s) than this is left out. [-]"""
+
+
+@dataclass(frozen=True, eq=False)
+class Cells:
+    """What is compared, once for measured and sampled offsets alike.
+
+    Parameters
+    ----------
+    names : tuple of str
+        Groups: a column's name, "time", ...
+    labels : mapping of str to int array, shape (n,)
+        Bin of every row in each group, -1: none.
+    middles : mapping of str to array
+        Mean of the quantity per bin, for curves.
+    swing : float, optional
+        Frequency of a weave that was found. [1/s]
+    """
+
+    timeline: Timeline
+    labels: Mapping[str, IntArray]
+    middles: Mapping[str, FloatArray]
+    swing: float | None = None
+
+    def describe(self, offset: FloatArray, used: BoolArray) -> dict[str, FloatArray]:
+        """Cells of one series of offsets on the grid, by group. [m]"""
+        timeline = self.timeline
+        used = used & timeline.valid
+        slow = local_mean(offset, timeline.valid, LOCAL_S, timeline.step)
+        fast = offset - slow
+        found: dict[str, FloatArray] = {}
+        for name, label in self.labels.items():
+            mean, spread = _by_bin(offset, label, used), np.sqrt(_by_bin(fast**2, label, used))
+            if name != "time":
+                found[f"mean by {name}"] = mean
+            found[f"spread by {name}"] = spread
+        found["movement by band"] = _bands(offset, used, timeline)
+        if self.swing is not None:
+            found[SWING] = np.array([_amplitude(offset, used, timeline, self.swing)])
+        local = np.sqrt(local_mean(fast**2, timeline.valid, LOCAL_S, timeline.step))
+        inside = local[used]
+        found["quantiles of local spread"] = (
+            np.quantile(inside, LOCAL_QUANTILES) if len(inside) else np.full(len(LOCAL_QUANTILES), np.nan)
+        )
+        return found
+
+    def balance(self, half: BoolArray) -> dict[str, FloatArray]:
+        """Square root of the product of both parts' shares of the rows, by cell: 1/2 for equal halves."""
+        valid = self.timeline.valid
+        overall = float(np.sqrt(np.mean(half[valid]) * np.mean(~half[valid])))
+        found: dict[str, FloatArray] = {}
+        for name, label in self.labels.items():
+            size = int(label.max()) + 1
+            inside = valid & (label >= 0)
+            total = np.maximum(np.bincount(label[inside], minlength=size), 1)
+            share = np.bincount(label[inside & half], minlength=size) / total
+            found[f"mean by {name}"] = found[f"spread by {name}"] = np.sqrt(share * (1.0 - share))
+        found["movement by band"] = np.full(len(BANDS_S) + 1, overall)
+        if self.swing is not None:
+            found[SWING] = np.array([overall])
+        found["quantiles of local spread"] = np.full(len(LOCAL_QUANTILES), overall)
+        return found
+
+
+def cells_of(timeline: Timeline, quantities: Mapping[str, FloatArray], swing: float | None = None) -> Cells:
+    """Bins for every quantity, shape (n,) each on the grid, and for time; a weave's frequency [1/s] if there is one."""
+    labels, middles = {}, {}
+    for name, values in quantities.items():
+        smooth = respond(_filled(values, timeline.valid), timeline.step, 0.0, ANSWER_S)
+        label, middle = _binned(smooth, timeline.valid)
+        if len(middle) > 1:
+            labels[name], middles[name] = label, middle
+    labels["time"], middles["time"] = _time_bins(timeline)
+    return Cells(timeline, labels, middles, swing)
+
+
+def own_runs(
+    profile: DriverProfile,
+    timeline: Timeline,
+    seed: np.random.SeedSequence,
+    *,
+    runs: int | None = None,
+    held: BoolArray | None = None,
+) -> FloatArray:
+    """Free runs of a profile under the drives' context, shape (runs, n); 0 outside the drives.
+
+    With `held`, shape (n,), drives that have no such row are left out.
+    """
+    if runs is None:
+        runs = FEW_RUNS if len(timeline.names) >= MANY_DRIVES else N_RUNS
+    result = np.zeros((runs, len(timeline)))
+    context = {"lane_width": timeline.lane_width, **timeline.context}
+    for index, span in enumerate(timeline.spans):
+        rows = slice(span.start, span.stop)
+        if held is not None and not held[rows].any():
+            continue
+        n = span.stop - span.start
+        segment = Segment(
+            time=timeline.time[span.start] + timeline.step * np.arange(n),
+            lane_width=timeline.lane_width[rows],
+            speed=context["speed"][rows] if "speed" in context else np.full(n, np.nan),
+            context={name: values[rows] for name, values in context.items()},
+            before=PAD,
+            after=PAD,
+        )
+        for run in range(runs):
+            offset = OffsetSampler(profile, child(seed, run, index)).sample(segment)
+            result[run, span.start + PAD : span.stop - PAD] = offset
+    return result
+
+
+def expected(cells: Cells, runs: FloatArray, used: BoolArray) -> dict[str, FloatArray]:
+    """Mean of the cells over a profile's runs."""
+    several = [cells.describe(run, used) for run in runs]
+    return {name: np.mean([one[name] for one in several], axis=0) for name in several[0]}
+
+
+def error_between(first: Mapping[str, FloatArray], second: Mapping[str, FloatArray]) -> float:
+    """Size of the difference of two descriptions, as `size_of` has it. [m]"""
+    return size_of({name: values - second[name] for name, values in first.items()})
+
+
+def split_differences(
+    cells: Cells, offset: FloatArray, blocks: IntArray, rng: np.random.Generator, splits: int
+) -> list[dict[str, FloatArray]]:
+    """What measured data differs from itself: cells of random halves of the blocks against each other; NaN: no rows.
+
+    Two parts of a and b rows differ by a standard deviation of sigma sqrt(1/a + 1/b); all n = a + b rows against an
+    exact expectation have sigma / sqrt(n). So every cell's difference is scaled by sqrt(a b) / n: 1/2 for halves.
+
+    Parameters
+    ----------
+    offset : array, shape (n,)
+        Measured, less the effects on the mean that are known: where the car should be is no chance.
+    blocks : int array, shape (n,)
+        What is dealt out.
+    """
+    numbers = np.unique(blocks[cells.timeline.valid])
+    found = []
+    for _ in range(splits):
+        half = np.isin(blocks, rng.permutation(numbers)[: len(numbers) // 2])
+        first, second, balance = cells.describe(offset, half), cells.describe(offset, ~half), cells.balance(half)
+        found.append({name: balance[name] * (values - second[name]) for name, values in first.items()})
+    return found
+
+
+def size_of(differences: Mapping[str, FloatArray]) -> float:
+    """Root mean square over groups of cells, each group's mean square counting the same. [m]"""
+    squares = [float(np.mean(seen**2)) for values in differences.values() if len(seen := values[np.isfinite(values)])]
+    return float(np.sqrt(np.mean(squares))) if squares else 0.0
+
+
+def floor_of(cells: Cells, offset: FloatArray, blocks: IntArray, rng: np.random.Generator, splits: int = 8) -> float:
+    """Mean size of `split_differences`. [m]"""
+    return float(np.mean([size_of(split) for split in split_differences(cells, offset, blocks, rng, splits)]))
+
+
+def _by_bin(values: FloatArray, label: IntArray, used: BoolArray) -> FloatArray:
+    inside = used & (label >= 0)
+    size = int(label.max()) + 1
+    count = np.bincount(label[inside], minlength=size)
+    sums = np.bincount(label[inside], values[inside], minlength=size)
+    return np.where(count >= SPARE_ROWS, sums / np.maximum(count, 1), np.nan)
+
+
+def _bands(offset: FloatArray, used: BoolArray, timeline: Timeline) -> FloatArray:
+    levels = [offset, *(local_mean(offset, timeline.valid, seconds, timeline.step) for seconds in BANDS_S)]
+    inside = [level[used] for level in levels]
+    bands = [np.std(finer - coarser) for finer, coarser in pairwise(inside)]
+    return np.array([*bands, np.std(inside[-1])])
+
+
+def _amplitude(offset: FloatArray, used: BoolArray, timeline: Timeline, frequency: float) -> float:
+    """Amplitude of a swing of about that frequency: root mean square over drives of that of the lines around it."""
+    squares, rows = 0.0, 0
+    for span in timeline.spans:
+        inside = span.start + np.flatnonzero(used[span])
+        if len(inside) == 0:
+            continue
+        at = (inside - span.start) * timeline.step
+        around = frequency + np.arange(-SWING_WIDTH, SWING_WIDTH + 1) / ((span.stop - span.start) * timeline.step)
+        lines = np.exp(-2j * np.pi * np.outer(around, at)) @ (offset[inside] - offset[inside].mean())
+        squares += float(np.sum(np.abs(2.0 * lines / len(inside)) ** 2)) * len(inside)
+        rows += len(inside)
+    return float(np.sqrt(squares / max(rows, 1)))
+
+
+def _binned(values: FloatArray, valid: BoolArray) -> tuple[IntArray, FloatArray]:
+    seen = values[valid]
+    edges = np.unique(np.quantile(seen, np.linspace(0.0, 1.0, N_BINS + 1)[1:-1]))
+    label = np.searchsorted(edges, values, side="right")
+    if len(edges) and float(np.mean(seen >= edges[-1])) < 0.01:
+        label = np.minimum(label, len(edges) - 1)
+    used, label = np.unique(label, return_inverse=True)
+    middle = np.array(
+        [
+            values[valid & (label == index)].mean() if np.any(valid & (label == index)) else np.nan
+            for index in range(len(used))
+        ]
+    )
+    return label.astype(np.intp), middle
+
+
+def _time_bins(timeline: Timeline, parts: int = 6) -> tuple[IntArray, FloatArray]:
+    label = np.full(len(timeline), -1, dtype=np.intp)
+    for span in timeline.spans:
+        rows = np.arange(span.start, span.stop)
+        inside = rows[timeline.valid[rows]]
+        if len(inside):
+            share = (rows - inside[0]) / max(1, inside[-1] - inside[0] + 1)
+            label[rows] = np.clip((share * parts).astype(np.intp), 0, parts - 1)
+    return label, (np.arange(parts) + 0.5) / parts
+
+
+def _filled(values: FloatArray, valid: BoolArray) -> FloatArray:
+    seen = values[valid & np.isfinite(values)]
+    return np.where(np.isfinite(values), values, seen.mean() if len(seen) else 0.0)

@@ -1,0 +1,73 @@
+"""What stays the same while terms are looked for: columns, candidates before whitening, random streams."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from xosc_lateral.identification.candidates import candidates_of
+from xosc_lateral.identification.columns import Column
+from xosc_lateral.identification.dictionary import Dictionary, Quantities, build_dictionary
+from xosc_lateral.identification.problem import Problem
+from xosc_lateral.identification.regression import Coarse
+
+BoolArray = NDArray[np.bool_]
+
+MAX_PRODUCT_COLUMNS = 24
+"""Products are tried among all columns up to this number; beyond, of levels and switches with every column: sixty more
+columns must not cost twenty times as much."""
+
+
+@dataclass(frozen=True, eq=False)
+class Search:
+    """What stays the same.
+
+    Parameters
+    ----------
+    coarse : Coarse
+    columns : mapping of str to Column
+        That may act.
+    quantities : Quantities
+    seed : SeedSequence
+    progress : callable
+        Told what is being done, in a few words.
+    """
+
+    coarse: Coarse
+    columns: Mapping[str, Column]
+    quantities: Quantities
+    seed: np.random.SeedSequence
+    progress: Callable[[str], None]
+    _built: list[tuple[object, object, Dictionary]] = field(default_factory=list, repr=False)
+
+    @classmethod
+    def over(
+        cls,
+        coarse: Coarse,
+        columns: list[Column],
+        seed: np.random.SeedSequence,
+        progress: Callable[[str], None] = lambda _: None,
+    ) -> Search:
+        """Evaluate all candidates once."""
+        inside = coarse.timeline.valid
+        seen = {column.name: coarse.context[column.name][inside] for column in columns}
+        candidates = candidates_of(columns, seen, most=MAX_PRODUCT_COLUMNS)
+        quantities = Quantities.of(candidates, coarse.timeline, coarse.context, coarse.valid)
+        return cls(coarse, {column.name: column for column in columns}, quantities, seed, progress)
+
+    def dictionary(self, kind: object, fitted: object, problem: Problem) -> Dictionary:
+        """Whitened candidates of one kind of term beside one fit; the last two are kept."""
+        for known_kind, known_fit, dictionary in self._built:
+            if known_kind is kind and known_fit is fitted:
+                return dictionary
+        dictionary = build_dictionary(self.quantities, problem.whitener)
+        del self._built[:-1]
+        self._built.append((kind, fitted, dictionary))
+        return dictionary
+
+    def rng(self, *key: int) -> np.random.Generator:
+        """Independent stream by purpose."""
+        return np.random.default_rng(np.random.SeedSequence(self.seed.entropy, spawn_key=key))

@@ -1,0 +1,125 @@
+"""Forward selection of terms: look, prove, add, look again, until nothing is left that chance would not produce."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from xosc_lateral.identification.regression import Fitted, fit_model
+from xosc_lateral.identification.search import Search
+from xosc_lateral.identification.significance import level_of
+from xosc_lateral.identification.terms import STAGES
+from xosc_lateral.identification.terms.base import Outcome, Term
+
+MAX_TERMS = 8
+"""More terms than this in one table are not looked for."""
+
+
+@dataclass(frozen=True, eq=False)
+class Accepted:
+    """A term that chance does not explain."""
+
+    term: Term
+    p_value: float
+
+    @property
+    def alike(self) -> tuple[str, ...]:
+        """Columns that explain as much."""
+        alike: tuple[str, ...] = getattr(self.term, "alike", ())
+        return alike
+
+
+@dataclass(frozen=True, slots=True)
+class Rejected:
+    """A candidate that did not pass.
+
+    Parameters
+    ----------
+    component : str
+    columns : tuple of str
+    p_value : float
+    why : str
+    """
+
+    component: str
+    columns: tuple[str, ...]
+    p_value: float
+    why: str
+
+
+@dataclass(frozen=True, eq=False)
+class Selection:
+    """Everything accepted, and what was not.
+
+    Parameters
+    ----------
+    accepted : tuple of Accepted
+        In the order of finding.
+    rejected : tuple of Rejected
+        Best of each component that did not pass.
+    start, final : Fitted
+        Before and after all.
+    """
+
+    accepted: tuple[Accepted, ...]
+    rejected: tuple[Rejected, ...]
+    start: Fitted
+    final: Fitted
+
+    def without(self, terms: Sequence[Term], why: str) -> Selection:
+        """Less some accepted terms, fitted again."""
+        out = [one for one in self.accepted if any(one.term is term for term in terms)]
+        kept = tuple(one for one in self.accepted if one not in out)
+        left = tuple(term for term in self.final.terms if not any(term is other for other in terms))
+        rejected = tuple(Rejected(one.term.component, one.term.columns, one.p_value, why) for one in out)
+        return replace(
+            self, accepted=kept, rejected=(*self.rejected, *rejected), final=fit_model(self.final.coarse, left)
+        )
+
+
+def select(search: Search, initial: Sequence[Term] = (), *, only: frozenset[str] | None = None) -> Selection:
+    """Add terms stage by stage.
+
+    Parameters
+    ----------
+    search : Search
+    initial : sequence of Term
+        In the model already.
+    only : frozenset of str, optional
+        Components to look at; all without.
+    """
+    start = fitted = fit_model(search.coarse, initial)
+    accepted: list[Accepted] = []
+    rejected: dict[str, Rejected] = {}
+    seen_at: dict[str, int] = {}
+    for stage in STAGES:
+        kinds = [kind for kind in stage if only is None or kind.component in only]
+        while len(accepted) < MAX_TERMS:
+            # a kind that found nothing is not asked again before something else was added
+            asked = [kind for kind in kinds if seen_at.get(kind.component) != len(accepted)]
+            tests = [(kind, test) for kind in asked if (test := _asked(search, kind, fitted)) is not None]
+            passed = []
+            for kind, test in tests:
+                if test.term is not None and test.p_value <= level_of(kind.component):
+                    passed.append(test)
+                else:
+                    seen_at[kind.component] = len(accepted)
+                    rejected[kind.component] = _rejected(kind.component, test)
+            if not passed:
+                break
+            best = min(passed, key=lambda test: test.p_value)
+            assert best.term is not None
+            accepted.append(Accepted(best.term, best.p_value))
+            fitted = best.after or fit_model(search.coarse, (*fitted.terms, best.term))
+    return Selection(tuple(accepted), tuple(rejected.values()), start, fitted)
+
+
+def _asked(search: Search, kind: type[Term], fitted: Fitted) -> Outcome | None:
+    search.progress(f"looking at {kind.component.replace('_', ' ')}")
+    return kind.test(search, fitted)
+
+
+def _rejected(component: str, test: Outcome) -> Rejected:
+    allowed = 100 * level_of(component)
+    why = f"chance gives as much in {100 * test.p_value:.3g} % of tables; {allowed:.2g} % is allowed"
+    return Rejected(component, test.columns, test.p_value, why)

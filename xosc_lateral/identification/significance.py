@@ -1,0 +1,69 @@
+"""From the largest scores under the null to a family-wise p-value.
+
+The maximum over many candidates converges to a Gumbel law; fitted to the maxima of a few hundred rotations it gives
+p-values far below one over their number [1]_. The larger of that and of an exponential tail is taken.
+
+References
+----------
+.. [1] A. M. Winkler et al., "Faster permutation inference in brain imaging", NeuroImage 141, 2016.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+
+LEAST = 1e-300
+"""p-values stay above: their logarithm is taken. [-]"""
+
+BUDGET = 0.05
+"""Probability that anything is named on drives without an effect; source: the contract, 1 table in 20. [-]"""
+
+TAIL_SHARE = 0.25
+"""Share of a null sample that an exponential tail is fitted on. [-]"""
+
+WEIGHTS = {
+    "mean": 10.0,
+    "spread": 5.0,
+    "slow_spread": 1.0,
+    "fine_noise": 1.0,
+    "restoring": 0.5,
+    "between": 1.0,
+    "low_frequency": 1.0,
+    "cycle": 1.0,
+    "variance_trend": 1.0,
+    "regimes": 0.5,
+}
+"""Shares of the budget: half for the mean, a quarter for the spread, and about equal parts for the rest."""
+
+
+def level_of(component: str) -> float:
+    """Family-wise level that a component may spend."""
+    return BUDGET * WEIGHTS[component] / sum(WEIGHTS.values())
+
+
+def upper_tail(score: float, maxima: FloatArray) -> float:
+    """Probability that chance gives a maximum of `score` or more.
+
+    Parameters
+    ----------
+    score : float
+    maxima : array, shape (n,)
+        Largest scores under the null.
+    """
+    from scipy.stats import gumbel_r
+
+    if len(maxima) == 0:
+        return 1.0
+    share = float(np.mean(maxima >= score))
+    if share > 0.1:  # where the sample itself is known well
+        return share
+    # a score that is no maximum of many may have a heavier tail: an exponential one with the upper quarter's excess
+    knee = float(np.quantile(maxima, 1.0 - TAIL_SHARE))
+    excess = max(float(np.mean(maxima[maxima > knee] - knee)) if np.any(maxima > knee) else 0.0, 2.0)
+    exponential = TAIL_SHARE * float(np.exp(-max(score - knee, 0.0) / excess))
+    scale = max(float(np.std(maxima, ddof=1)) * np.sqrt(6.0) / np.pi, 1e-12)
+    place = float(np.mean(maxima)) - np.euler_gamma * scale
+    return max(float(gumbel_r.sf(score, place, scale)), exponential, LEAST)

@@ -1,0 +1,89 @@
+"""Squares of innovations, slower and finer than a second: what tells how large the movement is just now."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from xosc_lateral.identification.autocorrelation import fit_autoregression, moving_sum
+from xosc_lateral.identification.regression import CLIP, Fitted, own_levels
+from xosc_lateral.identification.timeline import COARSE, coarse_all, coarse_mean
+
+FloatArray = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
+
+FINE_ORDER = 15
+"""Past samples (3 s) that the fine movement's autoregression sees."""
+
+SLOW_S = 8
+"""Whitened seconds that are averaged for the slower movement: below 1/16 Hz. [s]"""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Squares:
+    """Clipped mean squares per second, about 1.
+
+    Parameters
+    ----------
+    values : array, shape (n,)
+        0 where invalid.
+    valid : bool array, shape (n,)
+    """
+
+    values: FloatArray
+    valid: BoolArray
+
+    @property
+    def standardised(self) -> FloatArray:
+        """Mean 0 and variance 1 over the valid rows, 0 elsewhere."""
+        if not self.valid.any():
+            return np.zeros(len(self.values))
+        inside = self.values[self.valid]
+        return np.where(self.valid, (self.values - inside.mean()) / max(float(inside.std()), 1e-12), 0.0)
+
+
+def fine_squares(fitted: Fitted) -> Squares:
+    """Squared innovations of the 0.2 s grid, averaged to 1 Hz; drives are each compared with themselves."""
+    coarse, timeline = fitted.coarse, fitted.coarse.timeline
+    explained = fitted.columns @ fitted.sizes + fitted.levels[coarse.drive]
+    n = len(timeline)
+    on_grid = np.interp(np.arange(n), np.arange(len(coarse)) * COARSE + 0.5 * (COARSE - 1), explained)
+    valid = timeline.valid & np.repeat(coarse.valid, COARSE)[:n] if len(coarse) * COARSE >= n else timeline.valid
+    moved = np.where(valid, timeline.offset - on_grid, 0.0)
+    process = fit_autoregression(moved, valid, FINE_ORDER)
+    innovations = moving_sum(process.polynomial, moved)
+    settled = moving_sum(np.ones(process.order + 1), valid.astype(np.float64)) > process.order + 0.5
+    squares = coarse_mean(np.where(settled, np.minimum(innovations**2, CLIP), 0.0))
+    whole = coarse_all(settled)
+    return Squares(squares / own_levels(squares, whole, coarse.drive)[coarse.drive], whole)
+
+
+def slow_squares(fitted: Fitted) -> Squares:
+    """Squares of the whitened movement's running sums: more is let pass, but what is done is done as always."""
+    valid = fitted.coarse.valid
+    sums = moving_sum(np.ones(SLOW_S), fitted.rows)
+    whole = valid & (moving_sum(np.ones(SLOW_S), valid.astype(np.float64)) >= SLOW_S - 0.5)
+    deviation = float(sums[whole].std()) if whole.any() else 1.0
+    return Squares(np.where(whole, np.minimum((sums / max(deviation, 1e-12)) ** 2, CLIP), 0.0), whole)
+
+
+def log_sizes(squares: Squares, columns: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Log-linear regression of a standard deviation on columns, shape (n, k), from mean squares per second.
+
+    Returns
+    -------
+    sizes, errors : array, shape (k,)
+        Natural logarithm per unit.
+    """
+    design = columns[squares.valid] - columns[squares.valid].mean(axis=0)
+    inverse = np.linalg.pinv(2.0 * design.T @ design)
+    sizes = np.zeros(columns.shape[1])
+    left = squares.values[squares.valid]
+    relative = left
+    for _ in range(8):
+        relative = left / np.exp(np.clip(2.0 * design @ sizes, -6.0, 6.0))
+        relative = relative / max(float(relative.mean()), 1e-300)
+        sizes = sizes + inverse @ (design.T @ (relative - 1.0))
+    return sizes, np.sqrt(np.diag(inverse)) * float(np.std(relative)) / np.sqrt(2.0)

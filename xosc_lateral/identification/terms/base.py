@@ -1,0 +1,164 @@
+"""What a term of the model can do: columns, test, estimate, remove, describe."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, ClassVar, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from xosc_lateral.driver.effects import Effect
+from xosc_lateral.identification.regression import Coarse, Fitted
+
+if TYPE_CHECKING:
+    from xosc_lateral.identification.search import Search
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class Description:
+    """A term in numbers that a report can put into words.
+
+    Parameters
+    ----------
+    name : str
+        Short name of the effect.
+    shape : str
+    size : float
+        [m], or a factor.
+    error : float
+        Standard error of the size.
+    cell : str
+        Group of summary statistics that shows it best.
+    measure : str
+        What the errors before and after compare.
+    lag_s, response_s : float or None
+    """
+
+    name: str
+    shape: str
+    size: float
+    error: float
+    cell: str
+    measure: str
+    lag_s: float | None = None
+    response_s: float | None = None
+
+
+@dataclass(eq=False)
+class Removal:
+    """What all terms together did to the measured offsets, on the 0.2 s grid, shape (n,) each.
+
+    Parameters
+    ----------
+    location : array
+        [m]
+    spread, fine, rate : array
+        Natural logarithm of a factor.
+    """
+
+    location: FloatArray
+    spread: FloatArray = field(init=False)
+    fine: FloatArray = field(init=False)
+    rate: FloatArray = field(init=False)
+
+    def __post_init__(self) -> None:
+        """Nothing but the location so far."""
+        self.spread, self.fine, self.rate = (np.zeros(len(self.location)) for _ in range(3))
+
+
+@dataclass(frozen=True, eq=False)
+class Outcome:
+    """What a test says.
+
+    Parameters
+    ----------
+    term : Term or None
+        To be added, or None: nothing that could be.
+    columns : tuple of str
+        What was looked at.
+    p_value : float
+        Family-wise over everything that the test tried.
+    after : Fitted, optional
+        Fit with the term, where the test has made it.
+    """
+
+    term: Term | None
+    columns: tuple[str, ...]
+    p_value: float
+    after: Fitted | None = None
+
+
+class Term(ABC):
+    """One term. Frozen and small; sizes are in the fit, not in the term."""
+
+    component: ClassVar[str]
+    """Key of its share of the error budget."""
+    kind: ClassVar[str]
+    """As in the report's schema."""
+
+    predictable: ClassVar[bool] = True
+    """Whether it says anything about rows that it was not fitted on; the latent path of a cycle or a drift does not."""
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """Context columns that it reads; empty: hidden."""
+        return ()
+
+    @property
+    def kind_key(self) -> str:
+        """Component, or kind where two kinds share one: names its groups of summary statistics."""
+        return self.kind if self.component == "low_frequency" else self.component
+
+    def mean_columns(self, coarse: Coarse) -> FloatArray:
+        """Columns of the mean, shape (n, k)."""
+        return np.zeros((len(coarse), 0))
+
+    def scale_columns(self, coarse: Coarse) -> FloatArray:
+        """Columns of the log scale, shape (n, j)."""
+        return np.zeros((len(coarse), 0))
+
+    def known_scale(self, coarse: Coarse) -> FloatArray | None:
+        """Log scale that is known as a whole, shape (n,)."""
+        return None
+
+    @classmethod
+    @abstractmethod
+    def test(cls, search: Search, fitted: Fitted) -> Outcome | None:
+        """Look for one more term of this kind beside those fitted; None: there is nothing to look at."""
+
+    @abstractmethod
+    def estimate(self, fitted: Fitted) -> tuple[Effect, ...]:
+        """What the profile gets: the effect proper first, then what goes with it."""
+
+    @abstractmethod
+    def remove(self, fitted: Fitted, effects: tuple[Effect, ...], removal: Removal) -> None:
+        """Add what the term did to the measured offsets; hidden ones as they most likely were."""
+
+    @abstractmethod
+    def describe(self, fitted: Fitted, effects: tuple[Effect, ...], key: str) -> Description:
+        """Size and words; `key` names its group of summary statistics."""
+
+    def retested(self, search: Search, fitted: Fitted) -> float:
+        """Probability of the term beside all others, once everything is known; 0: not looked at again."""
+        return 0.0
+
+    def matches(self, other: Self) -> bool:
+        """Whether another fit's term is the same finding."""
+        return type(self) is type(other) and self.columns == other.columns
+
+
+def on_fine_grid(values: FloatArray, coarse: Coarse) -> FloatArray:
+    """From the middles of the seconds to the 0.2 s grid: steps of a second would look like fine movement."""
+    from xosc_lateral.identification.timeline import COARSE
+
+    n = len(coarse.timeline)
+    return np.interp(np.arange(n), np.arange(len(values)) * COARSE + 0.5 * (COARSE - 1), values)
+
+
+def centred(values: FloatArray, coarse: Coarse) -> FloatArray:
+    """About its mean over valid seconds."""
+    return np.asarray(values - values[coarse.valid].mean()) if coarse.valid.any() else values

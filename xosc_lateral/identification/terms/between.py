@@ -1,0 +1,166 @@
+"""A column whose usual value in a drive goes with the place that the drive keeps: slow vehicles keep right, say.
+
+Every drive has a level of its own, so what hardly changes within drives can't act on the mean there. Here the levels
+themselves are regressed on what each drive usually meets, weighted by how well each is known beside how much drives
+differ anyway. The null deals the drives anew, which is exact: drives know nothing of one another.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, ClassVar
+
+import numpy as np
+from msgspec import structs
+from numpy.typing import NDArray
+
+from xosc_lateral.driver.effects import Acts, ColumnEffect, Effect
+from xosc_lateral.identification.dictionary import ROTATIONS
+from xosc_lateral.identification.problem import Problem
+from xosc_lateral.identification.regression import Fitted
+from xosc_lateral.identification.significance import upper_tail
+from xosc_lateral.identification.terms.base import Description, Outcome
+from xosc_lateral.identification.terms.column import ColumnTerm, of_kind
+
+if TYPE_CHECKING:
+    from xosc_lateral.identification.search import Search
+
+FloatArray = NDArray[np.float64]
+
+USUAL_S = 60.0
+"""Response time of an effect between drives: what a drive usually meets, as far as a run can know it. [s]"""
+
+MIN_DRIVES = 20
+"""Fewer drives say nothing about what goes with what between them."""
+
+MIN_SECONDS = 10
+"""Of road-following in a drive that is counted. [s]"""
+
+MIN_SUPPORT = 8.0
+"""A quantity that rests on fewer drives than this is not looked at."""
+
+
+@dataclass(frozen=True, eq=False)
+class BetweenTerm(ColumnTerm):
+    """Between-driver regression of the drives' levels."""
+
+    component: ClassVar[str] = "between"
+    kind: ClassVar[str] = "location"
+    predictable: ClassVar[bool] = False
+    acts: ClassVar[Acts] = Acts.LOCATION
+    what: ClassVar[str] = "place that a drive keeps"
+    group: ClassVar[str] = "mean"
+
+    @classmethod
+    def problem(cls, fitted: Fitted) -> Problem:
+        """Levels of drives are no rows of the grid; see `test`."""
+        raise NotImplementedError
+
+    @classmethod
+    def test(cls, search: Search, fitted: Fitted) -> Outcome | None:
+        """Best candidate over all columns and shapes, against drives dealt anew."""
+        coarse, places = fitted.coarse, _Places.of(fitted)
+        if np.count_nonzero(places.weight) < MIN_DRIVES:
+            return None
+        present = {name for term in of_kind(fitted, cls) for name in term.columns}
+        candidates, usual = [], []
+        for candidate, values in zip(search.quantities.candidates, search.quantities.values, strict=True):
+            if len(candidate.columns) > 1 or len(candidate.contrast) > 1 or present & set(candidate.columns):
+                continue
+            mean = places.left(coarse.by_drive(values.astype(np.float64)))
+            power = float(mean @ mean)
+            if power > 1e-12 and power**2 / max(float(np.sum(mean**4)), 1e-300) >= MIN_SUPPORT:
+                candidates.append(candidate)
+                usual.append(mean / np.sqrt(power))
+        if not candidates:
+            return None
+        quantities, costs = np.stack(usual, axis=1), np.array([candidate.cost for candidate in candidates])
+        response, rng = places.left(places.place), search.rng(5)
+        scores = np.square(response @ quantities) - costs
+        rows, null = np.flatnonzero(places.weight), np.empty(ROTATIONS)
+        for index in range(ROTATIONS):
+            dealt = np.zeros_like(response)
+            dealt[rows] = response[rng.permutation(rows)]
+            null[index] = float((np.square(dealt @ quantities) - costs).max())
+        best = int(np.argmax(scores))
+        effect = structs.replace(candidates[best].effect, lag_s=0.0, response_s=USUAL_S)
+        return Outcome(cls.of(effect), effect.columns, upper_tail(float(scores[best]), null))
+
+    def estimate(self, fitted: Fitted) -> tuple[Effect, ...]:
+        """Weighted least squares over drives, all such terms jointly."""
+        terms = of_kind(fitted, BetweenTerm)
+        sizes, errors = _Places.of(fitted).sizes()
+        at = next(index for index, term in enumerate(terms) if term is self)
+        own = slice(at, at + 1)
+        return (self.sized(fitted.coarse, Acts.LOCATION, sizes[own], errors[own]),)
+
+    def describe(self, fitted: Fitted, effects: tuple[Effect, ...], key: str) -> Description:
+        """Change between drives; it has no lag."""
+        told = super().describe(fitted, effects, key)
+        return replace(told, shape=f"{told.shape}, between drives", lag_s=None, response_s=None)
+
+
+def is_between(effect: ColumnEffect) -> bool:
+    """Whether an effect acts by what a drive usually meets."""
+    return effect.response_s >= USUAL_S
+
+
+def between_shift(fitted: Fitted) -> FloatArray:
+    """What the effects between drives do to every drive's place, shape (drives,). [m]"""
+    places = _Places.of(fitted)
+    return np.asarray(places.known[:, 1:] @ places.sizes()[0])
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class _Places:
+    """Places that drives keep.
+
+    Parameters
+    ----------
+    place : array, shape (drives,)
+        Levels. [m]
+    weight : array, shape (drives,)
+        One over the variance of a place about what is known; 0: the drive is too short. [1/m^2]
+    known : array, shape (drives, k)
+        A one and the effects between drives that are in the model.
+    """
+
+    place: FloatArray
+    weight: FloatArray
+    known: FloatArray
+
+    @classmethod
+    def of(cls, fitted: Fitted) -> _Places:
+        """Weights at which the weighed squares add up to their degrees of freedom (DerSimonian and Laird)."""
+        coarse, groups = fitted.coarse, fitted.coarse.drives
+        seconds = np.bincount(coarse.drive, coarse.valid.astype(float), minlength=groups)
+        power = fitted.whitener.power
+        counted = (seconds >= MIN_SECONDS) & (power > 0.0)
+        noise = np.where(counted, 1.0 / np.maximum(power, 1e-300), np.inf)
+        usual = [coarse.by_drive(coarse.answer(_at_once(term.effect))[:, 0]) for term in of_kind(fitted, BetweenTerm)]
+        known = np.column_stack([np.ones(groups), *usual])
+        scatter = 0.0
+        for _ in range(20):
+            places = cls(fitted.levels, np.where(counted, 1.0 / (scatter + noise), 0.0), known)
+            left = places.left(fitted.levels)
+            excess = float(left @ left) / max(int(counted.sum()) - known.shape[1], 1) - 1.0
+            typical = float(places.weight[counted].mean()) if counted.any() else 1.0
+            scatter = max(scatter + excess / max(typical, 1e-30), 0.0)
+        return places
+
+    def left(self, values: FloatArray) -> FloatArray:
+        """Times the weight's root, free of what is known; shape (drives,)."""
+        root = np.sqrt(self.weight)
+        basis = np.linalg.qr(self.known * root[:, None])[0]
+        weighed = values * root
+        return np.asarray(weighed - basis @ (basis.T @ weighed))
+
+    def sizes(self) -> tuple[FloatArray, FloatArray]:
+        """Sizes of the known effects and their standard errors, shape (k,) each. [m] per unit"""
+        weighed = self.known * self.weight[:, None]
+        inverse = np.linalg.pinv(weighed.T @ self.known)
+        return (inverse @ (weighed.T @ self.place))[1:], np.sqrt(np.diag(inverse))[1:]
+
+
+def _at_once(effect: ColumnEffect) -> ColumnEffect:
+    return structs.replace(effect, lag_s=0.0, response_s=0.0)

@@ -1,0 +1,148 @@
+"""What all terms of a context column share: one search for mean, spread, slow spread, fine noise and restoring."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, ClassVar, Self
+
+import numpy as np
+from msgspec import structs
+from numpy.typing import NDArray
+
+from xosc_lateral.driver.effects import Acts, ColumnEffect, Effect
+from xosc_lateral.identification.column_search import find_column
+from xosc_lateral.identification.problem import Problem
+from xosc_lateral.identification.ranges import span
+from xosc_lateral.identification.regression import Coarse, Fitted
+from xosc_lateral.identification.terms.base import Description, Outcome, Removal, Term
+
+if TYPE_CHECKING:
+    from xosc_lateral.identification.search import Search
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class ColumnTerm(Term):
+    """An effect of one or two columns.
+
+    Parameters
+    ----------
+    effect : ColumnEffect
+        Without coefficients.
+    alike : tuple of str
+        Columns that explain as much.
+    """
+
+    acts: ClassVar[Acts]
+    what: ClassVar[str]
+    """What it acts on, in words."""
+    group: ClassVar[str] = "spread"
+    """Mean or spread: which cells show it."""
+    single: ClassVar[bool] = False
+    """Only effects with one coefficient will do."""
+    effect: ColumnEffect
+    alike: tuple[str, ...] = ()
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """Columns that the effect reads."""
+        return self.effect.columns
+
+    @classmethod
+    def of(cls, effect: ColumnEffect, alike: tuple[str, ...] = ()) -> Self:
+        """A term of an effect that may act on something else."""
+        return cls(structs.replace(effect, acts=cls.acts), alike)
+
+    @classmethod
+    @abstractmethod
+    def problem(cls, fitted: Fitted) -> Problem:
+        """Regression in which a column of this kind is looked for, with the terms fitted already."""
+
+    @classmethod
+    def barred(cls, fitted: Fitted) -> frozenset[str]:
+        """Columns that this kind may not take up beside the terms fitted."""
+        return frozenset()
+
+    @classmethod
+    def test(cls, search: Search, fitted: Fitted) -> Outcome | None:
+        """The best candidate of the whole dictionary against rotations."""
+        return find_column(search, cls, fitted)
+
+    def remove(self, fitted: Fitted, effects: tuple[Effect, ...], removal: Removal) -> None:
+        """Evaluate the sized effects."""
+        coarse = fitted.coarse
+        for effect in effects:
+            assert isinstance(effect, ColumnEffect)
+            strength = effect.strength(coarse.timeline.step, coarse.context)
+            if strength is None:
+                continue
+            if effect.acts is Acts.LOCATION:
+                removal.location += strength
+            elif effect.acts is Acts.SPREAD:
+                removal.spread += strength
+            elif effect.acts is Acts.FINE:
+                removal.fine += strength
+            else:
+                removal.rate += strength
+
+    def describe(self, fitted: Fitted, effects: tuple[Effect, ...], key: str) -> Description:
+        """Change between the 5 % and 95 % quantile of what drives it."""
+        effect = effects[0]
+        assert isinstance(effect, ColumnEffect)
+        strength = span(fitted.coarse, effect)
+        sizes, errors = np.asarray(effect.coefficients), np.asarray(effect.errors)
+        relative = float(np.linalg.norm(errors)) / max(float(np.linalg.norm(sizes)), 1e-12)
+        on_mean = effect.acts is Acts.LOCATION
+        size = strength if on_mean else float(np.exp(strength))
+        return Description(
+            name=f"{self.what} by {' and '.join(effect.columns)}",
+            shape=effect.shape,
+            size=size,
+            error=abs(strength) * relative * (1.0 if on_mean else size),
+            cell=f"{self.group} by effect: {key}",
+            measure=f"{'mean offset' if on_mean else 'spread'} by fifths of the effect's own quantity",
+            lag_s=effect.lag_s,
+            response_s=effect.response_s,
+        )
+
+    def sized(self, coarse: Coarse, acts: Acts, sizes: FloatArray, errors: FloatArray) -> ColumnEffect:
+        """The effect with its sizes, shrunk by how sure they are, neutral at its mean."""
+        raw = self.effect.answer(coarse.timeline.step, coarse.context)[coarse.timeline.valid]
+        return structs.replace(
+            self.effect,
+            acts=acts,
+            coefficients=tuple(shrunk(sizes, errors)),
+            errors=tuple(errors),
+            reference=tuple(raw.mean(axis=0)),
+        )
+
+
+def shrunk(sizes: FloatArray, errors: FloatArray) -> FloatArray:
+    """Positive-part James-Stein: a size with a z of 2 keeps three quarters, one with a z of 5 all but 4 %."""
+    squares = float(np.sum(np.square(sizes / np.maximum(errors, 1e-300))))
+    return np.asarray(sizes * max(0.0, 1.0 - len(sizes) / max(squares, 1e-300)))
+
+
+def of_kind(fitted: Fitted, kind: type[ColumnTerm]) -> list[ColumnTerm]:
+    """Terms of one kind in a fit."""
+    return [term for term in fitted.terms if isinstance(term, kind)]
+
+
+def answers(fitted: Fitted, kind: type[ColumnTerm]) -> FloatArray:
+    """Answers of all terms of one kind, side by side, shape (n, k)."""
+    own = [fitted.coarse.answer(term.effect, keep=True) for term in of_kind(fitted, kind)]
+    return np.concatenate(own, axis=1) if own else np.zeros((len(fitted.coarse), 0))
+
+
+def columns_on_size(fitted: Fitted) -> frozenset[str]:
+    """Columns that act on the movement's size in any way: spread, slow spread, fine noise, restoring."""
+    terms = [term for term in fitted.terms if isinstance(term, ColumnTerm) and term.group == "spread"]
+    return frozenset(name for term in terms for name in term.columns)
+
+
+def columns_acting(fitted: Fitted) -> frozenset[str]:
+    """Columns of all terms within drives: what a shape leaves of itself looks like noise and restoring."""
+    terms = [term for term in fitted.terms if isinstance(term, ColumnTerm) and term.component != "between"]
+    return frozenset(name for term in terms for name in term.columns)

@@ -1,0 +1,126 @@
+"""A periodic weave of the mean that no column explains."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, ClassVar, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from xosc_lateral.driver.effects import Effect, Weave
+from xosc_lateral.identification.regression import MIN_DRIFT_S, Coarse, Fitted
+from xosc_lateral.identification.significance import LEAST
+from xosc_lateral.identification.terms.base import Description, Outcome, Removal, Term, centred, on_fine_grid
+
+if TYPE_CHECKING:
+    from xosc_lateral.identification.search import Search
+
+FloatArray = NDArray[np.float64]
+
+PERIODS_S = (4.0, 60.0)
+"""Cycles that are looked for. [s]"""
+
+WIDTHS = (1, 3, 7)
+"""Neighbouring frequencies taken together: a cycle keeps its phase for the whole drive, or for a part. [-]"""
+
+SURROUNDINGS = 60
+"""Frequencies to each side that say how high the spectrum is without a cycle. [-]"""
+
+CELL = "movement at the weave's period"
+
+
+@dataclass(frozen=True, eq=False)
+class Cycle(Term):
+    """Sines and cosines of neighbouring frequencies.
+
+    Parameters
+    ----------
+    frequency : float
+        [1/s]
+    width : int
+        Number of neighbouring frequencies: its phase wanders.
+    """
+
+    component: ClassVar[str] = "cycle"
+    kind: ClassVar[str] = "periodic"
+    predictable: ClassVar[bool] = False
+    frequency: float
+    width: int = 1
+
+    def mean_columns(self, coarse: Coarse) -> FloatArray:
+        """Cosines and sines for each drive, shape (n, 2 * width * drives)."""
+        columns = []
+        for index in range(coarse.drives):
+            rows = coarse.drive == index
+            n = int(rows.sum())
+            for offset in range(self.width):
+                angle = 2.0 * np.pi * np.arange(n) * (self.frequency + (offset - self.width // 2) / n)
+                for wave in (np.cos(angle), np.sin(angle)):
+                    column = np.zeros(len(coarse))
+                    column[rows] = wave
+                    columns.append(column)
+        return np.stack(columns, axis=1)
+
+    @classmethod
+    def test(cls, search: Search, fitted: Fitted) -> Outcome | None:
+        """Highest spectral line of the whitened residual over its surroundings (F test), per long enough drive."""
+        coarse = fitted.coarse
+        if any(isinstance(term, cls) for term in fitted.terms):
+            return None
+        outcomes = []
+        for index in range(coarse.drives):
+            rows = coarse.drive == index
+            if coarse.valid[rows].sum() >= MIN_DRIFT_S:
+                outcomes += [_line(fitted.rows[rows], width) for width in WIDTHS]
+        if not outcomes:
+            return None
+        p_value, frequency, width = min(outcomes)
+        return Outcome(cls(frequency, width), (), min(1.0, p_value * len(outcomes)))
+
+    def matches(self, other: Self) -> bool:
+        """About the same period."""
+        return isinstance(other, Cycle) and bool(abs(np.log(self.frequency / other.frequency)) < 0.1)
+
+    def estimate(self, fitted: Fitted) -> tuple[Effect, ...]:
+        """Amplitude from the power of all its sines, noise taken out."""
+        coarse, part = fitted.coarse, fitted.mean_part(self)
+        sizes, errors = fitted.sizes[part], np.sqrt(np.maximum(np.diag(fitted.covariance)[part], 0.0))
+        power = max(float(np.sum(sizes**2) - np.sum(errors**2)) / coarse.drives, 1e-8)
+        seconds = float(coarse.valid.sum()) / coarse.drives
+        coherence = 1e6 if self.width == 1 else seconds / (np.pi * self.width)
+        amplitude, error = float(np.sqrt(power)), float(np.sqrt(np.mean(errors**2)))
+        period = 1.0 / self.frequency
+        return (Weave(amplitude=amplitude, amplitude_error=error, period_s=period, coherence_s=float(coherence)),)
+
+    def remove(self, fitted: Fitted, effects: tuple[Effect, ...], removal: Removal) -> None:
+        """As fitted."""
+        removal.location += on_fine_grid(centred(course(self, fitted), fitted.coarse), fitted.coarse)
+
+    def describe(self, fitted: Fitted, effects: tuple[Effect, ...], key: str) -> Description:
+        """Amplitude and period."""
+        effect = effects[0]
+        assert isinstance(effect, Weave)
+        shape = f"period {effect.period_s:.1f} s"
+        return Description("weave", shape, effect.amplitude, effect.amplitude_error, CELL, CELL)
+
+
+def course(term: Term, fitted: Fitted) -> FloatArray:
+    """A term's part of the mean as fitted, shape (n,). [m]"""
+    return np.asarray(term.mean_columns(fitted.coarse) @ fitted.sizes[fitted.mean_part(term)])
+
+
+def _line(rows: FloatArray, width: int) -> tuple[float, float, int]:
+    """p-value over all frequencies, the best frequency, the width."""
+    from scipy.stats import f
+
+    power = np.abs(np.fft.rfft(rows)) ** 2 / max(float(rows @ rows), 1e-12)
+    frequency = np.fft.rfftfreq(len(rows))
+    band = (frequency >= 1.0 / PERIODS_S[1]) & (frequency <= 1.0 / PERIODS_S[0])
+    own, gap = np.ones(width), 2 * width + 11
+    around = np.convolve(power, np.ones(2 * SURROUNDINGS + 1), "same") - np.convolve(power, np.ones(gap), "same")
+    others = 2 * SURROUNDINGS + 1 - gap
+    ratio = np.where(band, np.convolve(power, own, "same") / np.maximum(around / others, 1e-12), 0.0)
+    at = int(np.argmax(ratio))
+    single = float(f.sf(ratio[at] / width, 2 * width, 2 * others))
+    return max(single * int(band.sum()), LEAST), float(frequency[at]), width

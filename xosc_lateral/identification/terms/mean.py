@@ -1,0 +1,46 @@
+"""A column that moves the mean."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+from msgspec import structs
+from numpy.typing import NDArray
+
+from xosc_lateral.driver.effects import Acts, Effect
+from xosc_lateral.identification.problem import Problem
+from xosc_lateral.identification.random_slopes import slope_deviation
+from xosc_lateral.identification.regression import Coarse, Fitted
+from xosc_lateral.identification.terms.column import ColumnTerm
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class MeanTerm(ColumnTerm):
+    """Mean offset by a column: generalised least squares on whitened offsets."""
+
+    component: ClassVar[str] = "mean"
+    kind: ClassVar[str] = "location"
+    acts: ClassVar[Acts] = Acts.LOCATION
+    what: ClassVar[str] = "mean offset"
+    group: ClassVar[str] = "mean"
+
+    def mean_columns(self, coarse: Coarse) -> FloatArray:
+        """The answer."""
+        return coarse.answer(self.effect, keep=True)
+
+    @classmethod
+    def problem(cls, fitted: Fitted) -> Problem:
+        """Whitened offsets."""
+        return Problem(fitted.whitener, fitted.coarse.offset, fitted.columns)
+
+    def estimate(self, fitted: Fitted) -> tuple[Effect, ...]:
+        """From the joint fit."""
+        part = fitted.mean_part(self)
+        errors = np.sqrt(np.maximum(np.diag(fitted.covariance)[part], 0.0))
+        effect = self.sized(fitted.coarse, Acts.LOCATION, fitted.sizes[part], errors)
+        deviation = slope_deviation(fitted, self)
+        return (structs.replace(effect, between_drivers=(deviation,)) if deviation else effect,)

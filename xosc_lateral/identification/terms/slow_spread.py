@@ -1,0 +1,43 @@
+"""A column that changes the spread of the slower movement only: more is let pass, but corrected as always."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from xosc_lateral.driver.effects import Acts, Effect
+from xosc_lateral.identification.problem import Problem, of_squares
+from xosc_lateral.identification.regression import Fitted
+from xosc_lateral.identification.squares import SLOW_S, log_sizes, slow_squares
+from xosc_lateral.identification.terms.column import ColumnTerm, answers, columns_on_size
+from xosc_lateral.identification.terms.spread import known_log_scale
+
+
+@dataclass(frozen=True, eq=False)
+class SlowSpreadTerm(ColumnTerm):
+    """Log standard deviation of eight-second sums of the innovations by a column."""
+
+    component: ClassVar[str] = "slow_spread"
+    kind: ClassVar[str] = "scale"
+    predictable: ClassVar[bool] = False
+    acts: ClassVar[Acts] = Acts.SPREAD
+    what: ClassVar[str] = "spread"
+
+    @classmethod
+    def problem(cls, fitted: Fitted) -> Problem:
+        """Squares of running sums."""
+        squares = slow_squares(fitted)
+        known = np.concatenate([known_log_scale(fitted), answers(fitted, cls)], axis=1)
+        return of_squares(fitted.coarse, squares.standardised, squares.valid, known)
+
+    @classmethod
+    def barred(cls, fitted: Fitted) -> frozenset[str]:
+        """Columns that act on the movement's size already."""
+        return columns_on_size(fitted)
+
+    def estimate(self, fitted: Fitted) -> tuple[Effect, ...]:
+        """Neighbouring sums overlap, so errors are wider."""
+        sizes, errors = log_sizes(slow_squares(fitted), fitted.coarse.answer(self.effect))
+        return (self.sized(fitted.coarse, Acts.SPREAD, sizes, errors * np.sqrt(SLOW_S)),)

@@ -1,0 +1,66 @@
+"""A column that changes the spread of all movement about the mean."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from xosc_lateral.driver.effects import Acts, ColumnEffect, Effect
+from xosc_lateral.identification.problem import Problem, of_squares
+from xosc_lateral.identification.regression import Coarse, Fitted, squared_innovations
+from xosc_lateral.identification.squares import fine_squares, log_sizes
+from xosc_lateral.identification.terms.column import ColumnTerm, columns_on_size
+
+FloatArray = NDArray[np.float64]
+
+FINE_TWIN_Z = 2.0
+"""The fine noise follows an effect on the spread when it is that many standard errors from not doing so. [-]"""
+
+
+@dataclass(frozen=True, eq=False)
+class SpreadTerm(ColumnTerm):
+    """Log standard deviation of the innovations by a column: regression of their squares."""
+
+    component: ClassVar[str] = "spread"
+    kind: ClassVar[str] = "scale"
+    acts: ClassVar[Acts] = Acts.SPREAD
+    what: ClassVar[str] = "spread"
+
+    def scale_columns(self, coarse: Coarse) -> FloatArray:
+        """The answer."""
+        return coarse.answer(self.effect, keep=True)
+
+    @classmethod
+    def problem(cls, fitted: Fitted) -> Problem:
+        """Squared innovations."""
+        coarse = fitted.coarse
+        return of_squares(coarse, squared_innovations(fitted.rows, coarse.valid), coarse.valid, known_log_scale(fitted))
+
+    @classmethod
+    def barred(cls, fitted: Fitted) -> frozenset[str]:
+        """Columns that act on the movement's size already."""
+        return columns_on_size(fitted)
+
+    def estimate(self, fitted: Fitted) -> tuple[Effect, ...]:
+        """From the joint fit; the fine noise goes along where it does so clearly."""
+        part = fitted.scale_part(self)
+        errors = np.sqrt(np.maximum(np.diag(fitted.log_covariance)[part], 0.0))
+        spread = self.sized(fitted.coarse, Acts.SPREAD, fitted.log_sizes[part], errors)
+        twin = fine_twin(self, fitted)
+        clear = np.max(np.abs(twin.coefficients) / np.maximum(twin.errors, 1e-12)) >= FINE_TWIN_Z
+        return (spread, twin) if clear else (spread,)
+
+
+def fine_twin(term: ColumnTerm, fitted: Fitted) -> ColumnEffect:
+    """The same quantity's effect on the fine noise."""
+    sizes, errors = log_sizes(fine_squares(fitted), fitted.coarse.answer(term.effect))
+    return term.sized(fitted.coarse, Acts.FINE, sizes, errors)
+
+
+def known_log_scale(fitted: Fitted) -> FloatArray:
+    """What is known of the log scale, shape (n, k)."""
+    known = [term.known_scale(fitted.coarse) for term in fitted.terms]
+    return np.column_stack([fitted.scales, *(scale for scale in known if scale is not None)])

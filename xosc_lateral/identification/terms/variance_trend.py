@@ -1,0 +1,117 @@
+"""A spread that grows or shrinks steadily with time on the road: fatigue, say."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, ClassVar, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from xosc_lateral.driver.effects import Effect, GrowingSpread
+from xosc_lateral.identification.regression import Coarse, Fitted, elapsed, squared_innovations
+from xosc_lateral.identification.significance import LEAST
+from xosc_lateral.identification.squares import SLOW_S, fine_squares, log_sizes, slow_squares
+from xosc_lateral.identification.terms.base import Description, Outcome, Removal, Term
+
+if TYPE_CHECKING:
+    from xosc_lateral.identification.search import Search
+
+FloatArray = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
+
+CLUSTER_S = 120
+"""Squares that are so close count as clustered (Newey-West). [s]"""
+
+
+@dataclass(frozen=True, eq=False)
+class VarianceTrend(Term):
+    """Log scale linear in time.
+
+    Parameters
+    ----------
+    slow : bool
+        Of the slower movement only.
+    """
+
+    component: ClassVar[str] = "variance_trend"
+    kind: ClassVar[str] = "scale"
+    slow: bool = False
+
+    def scale_columns(self, coarse: Coarse) -> FloatArray:
+        """Time."""
+        return np.zeros((len(coarse), 0)) if self.slow else elapsed(coarse)[:, None]
+
+    @classmethod
+    def test(cls, search: Search, fitted: Fitted) -> Outcome | None:
+        """Regress squares on time; clustered seconds count for less."""
+        if not fitted.coarse.lasts or any(isinstance(term, cls) for term in fitted.terms):
+            return None
+        fast, slow = (_probability(fitted, own) for own in (False, True))
+        term = cls(slow=slow < fast)
+        p_value = min(1.0, 2.0 * min(fast, slow))
+        return Outcome(term, (), p_value)
+
+    def retested(self, search: Search, fitted: Fitted) -> float:
+        """The same test beside everything else."""
+        return min(1.0, 2.0 * min(_probability(fitted, False), _probability(fitted, True)))
+
+    def matches(self, other: Self) -> bool:
+        """Either of the two."""
+        return isinstance(other, VarianceTrend)
+
+    def estimate(self, fitted: Fitted) -> tuple[Effect, ...]:
+        """Factor from the first to the last second."""
+        coarse = fitted.coarse
+        time, seen = elapsed(coarse), coarse.time[coarse.valid]
+        if self.slow:
+            sizes, errors = log_sizes(slow_squares(fitted), time[:, None])
+            size, error, fine = float(sizes[0]), float(errors[0]) * np.sqrt(SLOW_S), 0.0
+        else:
+            part = fitted.scale_part(self)
+            size = float(fitted.log_sizes[part][0])
+            error = float(np.sqrt(fitted.log_covariance[part, part][0, 0]))
+            fine = float(log_sizes(fine_squares(fitted), time[:, None])[0][0])
+        factor = float(np.exp(size))
+        ends = {"from_s": float(seen.min()), "to_s": float(seen.max())}
+        return (GrowingSpread(factor=factor, factor_error=factor * error, fine_factor=float(np.exp(fine)), **ends),)
+
+    def remove(self, fitted: Fitted, effects: tuple[Effect, ...], removal: Removal) -> None:
+        """A plain function of time."""
+        terms = effects[0].terms(fitted.coarse.timeline.time, {}, np.random.default_rng(0))
+        removal.spread += np.log(terms.spread) if terms.spread is not None else 0.0
+        removal.fine += np.log(terms.fine) if terms.fine is not None else 0.0
+
+    def describe(self, fitted: Fitted, effects: tuple[Effect, ...], key: str) -> Description:
+        """Factor over the drive."""
+        effect = effects[0]
+        assert isinstance(effect, GrowingSpread)
+        name = f"{'growing' if effect.factor > 1 else 'shrinking'} spread"
+        cell = "spread by time"
+        return Description(name, "log-linear in time", effect.factor, effect.factor_error, cell, cell)
+
+
+def _probability(fitted: Fitted, slow: bool) -> float:
+    from scipy.stats import norm
+
+    coarse = fitted.coarse
+    if slow:
+        own = slow_squares(fitted)
+        squares, valid = own.standardised, own.valid
+    else:
+        squares, valid = squared_innovations(fitted.rows, coarse.valid), coarse.valid
+    time = np.where(valid, elapsed(coarse), 0.0)
+    time = time - np.where(valid, time[valid].mean(), 0.0)
+    slope = float(time @ squares) / max(float(time @ time), 1e-300)
+    left = np.where(valid, squares - slope * time, 0.0)
+    weights = 1.0 - np.arange(1, CLUSTER_S + 1) / (CLUSTER_S + 1.0)
+    correlations = [_correlation(left, valid, lag) for lag in range(1, CLUSTER_S + 1)]
+    inflation = 1.0 + 2.0 * float(weights @ correlations)
+    z = slope * np.sqrt(float(time @ time)) / np.sqrt(max(inflation, 1.0))
+    return max(2.0 * float(norm.sf(abs(z))), LEAST)
+
+
+def _correlation(values: FloatArray, valid: BoolArray, lag: int) -> float:
+    both = float(np.sum(valid[:-lag] & valid[lag:]))
+    power = float(values @ values) / max(float(valid.sum()), 1.0)
+    return float(values[:-lag] @ values[lag:]) / max(both, 1.0) / max(power, 1e-12)

@@ -1,0 +1,214 @@
+"""Measured drives on one uniform grid, context throughout, offsets where road-following: what the loop computes on.
+
+Drives stand one after the other with a pad between them that is longer than any lag, so that shifting a column by a few
+seconds never brings in another drive's values.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from itertools import pairwise
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from xosc_lateral.drives.cuts import CutRules, cut_runs
+from xosc_lateral.drives.drive import Drive
+from xosc_lateral.drives.resampling import STEP, average, nearest, resample
+from xosc_lateral.errors import NotEnoughDataError
+from xosc_lateral.identification.circular import circular_period
+
+FloatArray = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
+IntArray = NDArray[np.intp]
+
+COARSE = 5
+"""Samples of the 0.2 s grid per sample of the coarse one: effects take seconds, so they are looked for at 1 Hz. [-]"""
+
+PAD = 75
+"""Samples before and after each drive in which the context holds its outermost value: 15 s. [-]"""
+
+TRACE_RULES = CutRules(lane_change_margin=6.0)
+"""What is cut for tracing: a little more around lane changes than for fitting, or their last second looks like an
+effect of the lane."""
+
+LOCAL_S = 20.0
+"""Movement slower than this counts as mean, faster as spread. [s]"""
+
+MIN_VALID_S = 120.0
+"""Road-following time below which nothing can be said. [s]"""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Timeline:
+    """All drives on the 0.2 s grid.
+
+    Parameters
+    ----------
+    names : tuple of str
+        Drives.
+    drive : int array, shape (n,)
+        Index into `names`.
+    time : array, shape (n,)
+        The drive's own clock. [s]
+    offset : array, shape (n,)
+        0 outside `valid`. [m]
+    valid : bool array, shape (n,)
+        Road-following, not cut out.
+    lane_width : array, shape (n,)
+        [m]
+    context : mapping of str to array, shape (n,)
+        NaN: there is none.
+    levels : frozenset of str
+        Columns of whole numbers.
+    periods : mapping of str to float
+        Full circle of the columns that wrap around.
+    """
+
+    names: tuple[str, ...]
+    drive: IntArray
+    time: FloatArray
+    offset: FloatArray
+    valid: BoolArray
+    lane_width: FloatArray
+    context: Mapping[str, FloatArray]
+    levels: frozenset[str]
+    periods: Mapping[str, float] = field(default_factory=dict)
+
+    def __len__(self) -> int:
+        return len(self.time)
+
+    @property
+    def step(self) -> float:
+        """Of the grid. [s]"""
+        return STEP
+
+    @property
+    def spans(self) -> list[slice]:
+        """Rows of each drive, pads included."""
+        edges = np.searchsorted(self.drive, np.arange(len(self.names) + 1))
+        return [slice(int(first), int(last)) for first, last in pairwise(edges)]
+
+
+def join_drives(drives: Sequence[Drive], rules: CutRules = TRACE_RULES) -> Timeline:
+    """Put drives on one grid.
+
+    Raises
+    ------
+    NotEnoughDataError
+        When less than two minutes of road-following are left.
+    """
+    periods = _periods(drives)
+    kept = [part for drive in drives if (part := _gridded(drive, rules, periods)) is not None]
+    if kept:
+        kept[-1] = _lengthened(kept[-1], sum(len(part) for part in kept))
+    valid_s = STEP * sum(float(part.valid.sum()) for part in kept)
+    if valid_s < MIN_VALID_S:
+        raise NotEnoughDataError(
+            f"{valid_s:.0f} s of road-following in {len(drives)} drives; closing the loop needs {MIN_VALID_S:.0f} s"
+        )
+    names = sorted({name for part in kept for name in part.context})
+    return Timeline(
+        names=tuple(part.names[0] for part in kept),
+        drive=np.repeat(np.arange(len(kept)), [len(part) for part in kept]),
+        time=np.concatenate([part.time for part in kept]),
+        offset=np.concatenate([part.offset for part in kept]),
+        valid=np.concatenate([part.valid for part in kept]),
+        lane_width=np.concatenate([part.lane_width for part in kept]),
+        context=MappingProxyType({name: np.concatenate([_column(part, name) for part in kept]) for name in names}),
+        levels=frozenset.intersection(*(part.levels for part in kept)),
+        periods=periods,
+    )
+
+
+def _column(part: Timeline, name: str) -> FloatArray:
+    """A drive that never met one has no such column: there is none, all along."""
+    return part.context[name] if name in part.context else np.full(len(part), np.nan)
+
+
+def coarse_mean(values: FloatArray) -> FloatArray:
+    """Mean over each second, shape (n // 5, ...)."""
+    n = len(values) // COARSE
+    return np.asarray(values[: n * COARSE].reshape(n, COARSE, *values.shape[1:]).mean(axis=1))
+
+
+def coarse_middle(values: NDArray[Any]) -> NDArray[Any]:
+    """Value in the middle of each second, shape (n // 5,): for what can't be averaged."""
+    return values[COARSE // 2 :: COARSE][: len(values) // COARSE]
+
+
+def coarse_all(mask: BoolArray) -> BoolArray:
+    """Whether the whole second is valid, shape (n // 5,)."""
+    n = len(mask) // COARSE
+    return np.asarray(mask[: n * COARSE].reshape(n, COARSE).all(axis=1))
+
+
+def local_mean(values: FloatArray, valid: BoolArray, seconds: float, step: float) -> FloatArray:
+    """Moving average over the valid rows within `seconds`, shape (n,); 0 where there are none."""
+    half = max(1, round(0.5 * seconds / step))
+    sums = np.concatenate([[0.0], np.cumsum(np.where(valid, values, 0.0))])
+    counts = np.concatenate([[0.0], np.cumsum(valid.astype(np.float64))])
+    index = np.arange(len(values))
+    low, high = np.maximum(index - half, 0), np.minimum(index + half + 1, len(values))
+    count = counts[high] - counts[low]
+    return np.asarray((sums[high] - sums[low]) / np.maximum(count, 1.0))
+
+
+def _gridded(drive: Drive, rules: CutRules, periods: Mapping[str, float]) -> Timeline | None:
+    runs = cut_runs(drive, rules)
+    if not runs:
+        return None
+    inner = int((drive.time[-1] - drive.time[0]) / STEP) + 1
+    total = -(-(inner + 2 * PAD) // COARSE) * COARSE
+    grid = drive.time[0] + STEP * np.arange(inner)
+    offset, valid = np.zeros(inner), np.zeros(inner, dtype=np.bool_)
+    for run in runs:
+        first, last = np.searchsorted(grid, [run.time[0] - 1e-9, run.time[-1] + 1e-9])
+        rows = slice(*np.searchsorted(drive.time, [run.time[0] - 1e-9, run.time[-1] + STEP]))
+        offset[first:last] = resample(drive.time[rows], drive.offset[rows], grid[first:last])
+        valid[first:last] = True
+    pads = (PAD, total - inner - PAD)
+    context = {name: np.pad(_on_grid(drive, name, grid, periods), pads, mode="edge") for name in drive.context}
+    return Timeline(
+        names=(drive.name,),
+        drive=np.zeros(total, dtype=np.intp),
+        time=drive.time[0] + STEP * (np.arange(total) - PAD),
+        offset=np.pad(offset, pads),
+        valid=np.pad(valid, pads),
+        lane_width=np.pad(average(drive.time, drive.lane_width, grid), pads, mode="edge"),
+        context=context,
+        levels=drive.levels,
+    )
+
+
+def _lengthened(part: Timeline, total: int) -> Timeline:
+    """Pad the last drive until the coarse grid has a length whose Fourier transform is quick."""
+    from scipy.fft import next_fast_len
+
+    more = COARSE * next_fast_len(total // COARSE, real=True) - total
+    return replace(
+        part,
+        drive=np.pad(part.drive, (0, more), mode="edge"),
+        time=np.concatenate([part.time, part.time[-1] + STEP * np.arange(1, more + 1)]),
+        offset=np.pad(part.offset, (0, more)),
+        valid=np.pad(part.valid, (0, more)),
+        lane_width=np.pad(part.lane_width, (0, more), mode="edge"),
+        context={name: np.pad(values, (0, more), mode="edge") for name, values in part.context.items()},
+    )
+
+
+def _on_grid(drive: Drive, name: str, grid: FloatArray, periods: Mapping[str, float]) -> FloatArray:
+    values = drive.context[name]
+    held = name in drive.levels or name in periods
+    return (nearest if held else average)(drive.time, values, grid)
+
+
+def _periods(drives: Sequence[Drive]) -> dict[str, float]:
+    """Full circle of every column that all drives have and that wraps around."""
+    names = set(drives[0].context).intersection(*(drive.context for drive in drives))
+    numbers = [name for name in sorted(names) if not any(name in drive.levels for drive in drives)]
+    periods = {name: circular_period([drive.context[name] for drive in drives]) for name in numbers}
+    return {name: period for name, period in periods.items() if period > 0.0}

@@ -1,0 +1,23 @@
+"""Compiled loops with their cache on disk, where there is a folder for it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, TypeVar, cast
+
+Body = TypeVar("Body", bound=Callable[..., Any])
+
+
+def njit(body: Body) -> Body:
+    """Compile with numba, without its lock.
+
+    The compiled code is kept beside the module or in the user's cache. Who has neither (a read-only installation, a
+    service without a home) compiles once per process: numba itself would refuse.
+    """
+    import numba
+
+    try:
+        compiled = numba.njit(cache=True, nogil=True)(body)
+    except RuntimeError:
+        compiled = numba.njit(nogil=True)(body)
+    return cast(Body, compiled)

@@ -1,1 +1,0 @@
-"""Scores, residual, tracing, closing the loop."""

@@ -1,0 +1,66 @@
+"""Which vehicles come near each other at all: the index that spares looking at every pair of them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+
+BLOCK = 64
+"""Rows that one box around a vehicle's path covers: 1.3 s at 50 Hz, 40 m on a motorway. [-]"""
+
+
+def pairs_within(x: Sequence[FloatArray], y: Sequence[FloatArray], reach: float) -> list[tuple[int, int]]:
+    """Pairs of points that may come within `reach` of each other at some row; none that do is missing.
+
+    The boxes around both paths, in blocks of rows, are swept along the longer side of the traffic: the work grows with
+    the pairs that are near, not with all there are.
+
+    Parameters
+    ----------
+    x, y : sequences of array, shape (n,)
+        One pair of arrays per point, on one time grid; NaN where it is absent. [m]
+    reach : float
+        [m]
+
+    Returns
+    -------
+    list of (int, int)
+        Indices, the smaller one first, in lexical order.
+    """
+    if len(x) < 2 or not len(x[0]):
+        return []
+    lows, highs = zip(*(_bounds(np.stack(axis)) for axis in (x, y)), strict=True)
+    found: set[tuple[int, int]] = set()
+    for block in range(lows[0].shape[1]):
+        low = np.stack([lows[0][:, block], lows[1][:, block]])
+        high = np.stack([highs[0][:, block], highs[1][:, block]])
+        there = np.flatnonzero(np.isfinite(low).all(axis=0))
+        if len(there) > 1:
+            found.update(_overlapping(low[:, there], high[:, there], there, reach))
+    return sorted(found)
+
+
+def _bounds(values: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Smallest and largest of each block of rows, shape (points, blocks); NaN where a point is absent throughout."""
+    starts = np.arange(0, values.shape[1], BLOCK)
+    low, high = (ufunc.reduceat(values, starts, axis=1) for ufunc in (np.fmin, np.fmax))  # they pass over NaN
+    return np.asarray(low), np.asarray(high)
+
+
+def _overlapping(low: FloatArray, high: FloatArray, names: IntArray, reach: float) -> set[tuple[int, int]]:
+    axis = int(np.argmax(high.max(axis=1) - low.min(axis=1)))
+    order = np.argsort(low[axis], kind="stable")
+    low, high, names = low[:, order], high[:, order], names[order]
+    ends = np.searchsorted(low[axis], high[axis] + reach, side="right")
+    counts = np.maximum(ends - np.arange(len(order)) - 1, 0)
+    first = np.repeat(np.arange(len(order)), counts)
+    second = first + 1 + np.arange(len(first)) - np.repeat(np.cumsum(counts) - counts, counts)
+    other = 1 - axis
+    near = (low[other, second] <= high[other, first] + reach) & (low[other, first] <= high[other, second] + reach)
+    pairs = np.sort(np.stack([names[first[near]], names[second[near]]], axis=1), axis=1)
+    return {(int(a), int(b)) for a, b in pairs}

@@ -1,0 +1,156 @@
+"""LaneChangeAction."""
+
+from __future__ import annotations
+
+from math import atan, atan2, copysign, inf, pi, sqrt
+
+from xosc_lateral.motion.nominal import Activity
+from xosc_lateral.playback.actions.base import Domain, RunningAction
+from xosc_lateral.playback.drive import along_reference, travel
+from xosc_lateral.playback.placement import NOWHERE, Placement
+from xosc_lateral.playback.positions.relative_lane import beside
+from xosc_lateral.playback.state import EntityState
+from xosc_lateral.playback.transition import EPSILON, Transition
+from xosc_lateral.scenario.actions import AbsoluteTargetLane, LaneChangeAction
+from xosc_lateral.scenario.enums import DynamicsDimension, DynamicsShape
+
+
+class RunningLaneChange(RunningAction):
+    """From the present lateral position to the target lane, while moving on.
+
+    The lateral position is measured from the centre of the target lane: its width and course are thereby followed. The
+    way of one frame on the entity's track is `speed * step`; what goes sideways is missing ahead. The heading follows
+    the movement of the frame and is 0 again at the end.
+    """
+
+    domains = Domain.LATERAL
+    content: LaneChangeAction
+
+    def prepare(self) -> None:
+        """Find the entity that the lane is relative to."""
+        target = self.content.target
+        self._reference = (
+            None if isinstance(target, AbsoluteTargetLane) else self.run.entity(target.entity_ref, self.content.place)
+        )
+        self._transition = Transition.of(self.content.dynamics)
+        self._guide: EntityState | None = None
+
+    def start(self) -> None:
+        """Align with the road; measure the way to the target lane."""
+        state = self.state
+        state.locate()
+        self._guide = None
+        if state.road == NOWHERE:
+            self.note(f"'{state.name}' is on no road: the lane change is not played")
+            return
+        lane = self._target_lane()
+        if not self.run.network.has_lane_at(state.road, lane, state.s):
+            there = ", ".join(str(info.id) for info in self.run.network.lanes_at(state.road, state.s))
+            road = self.run.network.road_ids[state.road]
+            self.note(
+                f"road '{road}' has no lane {lane} at s = {state.s:.1f} m (lanes: {there}): lane change not played"
+            )
+            return
+        state.turn(0.0 if state.is_forward else pi)
+        centre = self.run.network.lane_state_at(state.road, lane, state.s).centre_t
+        guide = EntityState(state.entity, state.network)
+        guide.put(Placement(state.road, lane, state.s, state.t - centre, state.relative_heading))
+        guide.route = state.route
+        self._guide = guide
+        self._transition = Transition.of(self.content.dynamics)
+        self._transition.begin(guide.offset_t, self.content.target_lane_offset)
+
+    def step(self, time: float, step: float) -> None:
+        """Move ahead and sideways."""
+        state, guide, transition = self.state, self._guide, self._transition
+        if guide is None:
+            self.end()
+            return
+        state.take_control(Activity.LATERAL)
+        way = abs(state.speed) * step
+        if abs(state.speed) < EPSILON:
+            return
+        side = copysign(1.0, transition.target - transition.start)
+        flipped = guide.road, guide.lane
+        ahead, offset, turn = self._move_of_frame(way, step)
+        guide.offset_t = offset
+        if transition.is_step:
+            ahead = way
+        distance = copysign(ahead, state.speed)
+        on_line = along_reference(guide.network, guide.road, guide.lane, guide.s, guide.offset_t, distance)
+        travel(guide, 1 if guide.is_forward else -1, on_line)
+        self._follow_flip(flipped, offset)
+        self._place(guide, turn)
+        if transition.is_step:
+            self.jumped(transition.target - transition.start)
+        state.speed_taken = True
+        if transition.is_done or self._is_there(offset, side):
+            state.turn(0.0 if guide.is_forward else pi)
+            self.end()
+        elif guide.at_road_end:
+            self.end()
+
+    def finish(self) -> None:
+        """Nothing leads any more."""
+        self._guide = None
+
+    # ---- in detail ---------------------------------------------------------------------------------------------------
+    def _target_lane(self) -> int:
+        target = self.content.target
+        if isinstance(target, AbsoluteTargetLane):
+            return target.lane_id
+        assert self._reference is not None
+        self._reference.locate()
+        return beside(self._reference.lane, target.value if self._reference.is_forward else -target.value)
+
+    def _move_of_frame(self, way: float, step: float) -> tuple[float, float, float]:
+        """Way ahead [m], new offset [m], and heading relative to the direction of driving, positive to +t [rad]."""
+        transition = self._transition
+        rate = transition.slope() / transition.scale
+        if transition.dimension is DynamicsDimension.DISTANCE:
+            if transition.is_step:
+                return way, transition.value(), 0.0
+            ahead = way / sqrt(1.0 + rate * rate)
+            transition.advance(ahead)
+            return ahead, transition.value(), atan(rate)
+        sideways = step * abs(rate)
+        ahead = sqrt(max(way * way - min(sideways, way) ** 2, 0.0))
+        if sideways < way + EPSILON:
+            transition.advance(step)
+            return ahead, transition.value(), atan2(copysign(sideways, rate), ahead)
+        if transition.is_step:
+            transition.advance(inf)
+            return ahead, transition.target, 0.0
+        # Slower than the change asks for: all movement goes sideways, evenly.
+        change = max(abs(transition.target - transition.start), EPSILON)
+        transition.advance(way * transition.range / change)
+        return 0.0, transition.value(DynamicsShape.LINEAR), copysign(0.5 * pi - EPSILON, rate)
+
+    def _follow_flip(self, before: tuple[int, int], offset: float) -> None:
+        """On a road whose s runs the other way, +t is the other side: the rest of the transition is mirrored."""
+        guide, transition = self._guide, self._transition
+        assert guide is not None
+        if guide.offset_t != offset and (guide.road, guide.lane) != before and guide.offset_t == -offset:
+            transition.start, transition.target = -transition.start, -transition.target
+
+    def _place(self, guide: EntityState, turn: float) -> None:
+        """Put the actor where its guide is, on the lane that is under it."""
+        network, state = self.run.network, self.state
+        t = guide.t
+        found = network.lane_at(guide.road, guide.s, t)
+        lane = found.lane or guide.lane
+        under = network.lane_state_at(guide.road, lane, guide.s)
+        state.move_to(guide.road, lane, guide.s, t - under.centre_t)
+        # The course is relative to the target lane; lanes side by side are not parallel where one widens.
+        aside = atan(network.lane_state_at(guide.road, guide.lane, guide.s).slope) - atan(under.slope)
+        state.section = (0.0, -1.0)
+        state.at_road_end = guide.at_road_end
+        if guide.is_forward:
+            state.turn(copysign(1.0, state.speed) * turn + aside)
+        else:
+            state.turn(pi - copysign(1.0, state.speed) * turn + aside)
+
+    def _is_there(self, offset: float, side: float) -> bool:
+        transition = self._transition
+        rest = (transition.target - offset) * side
+        return abs(rest) < EPSILON or (transition.parameter > 0.0 and rest < 0.0)

@@ -1,0 +1,107 @@
+"""LongitudinalDistanceAction: keep a distance, or a time gap, to another entity."""
+
+from __future__ import annotations
+
+from math import inf, sqrt
+
+from xosc_lateral.playback.actions.base import Domain, RunningAction
+from xosc_lateral.playback.actions.constraints import limits_of
+from xosc_lateral.playback.distances import ahead_and_left, entity_distance
+from xosc_lateral.playback.drive import drive
+from xosc_lateral.scenario.actions import LongitudinalDistanceAction
+from xosc_lateral.scenario.enums import CoordinateSystem, LongitudinalDisplacement, RelativeDistanceType
+
+CLOSE_ENOUGH = 0.1
+"""A distance that is not kept continuously counts as reached. [m]"""
+
+STIFFNESS = 0.4
+"""Of the spring that pulls towards the distance, per acceleration available. [1/m]"""
+
+
+class RunningLongitudinalDistance(RunningAction):
+    """At once without dynamic constraints, else a critically damped spring within them."""
+
+    domains = Domain.LONGITUDINAL
+    content: LongitudinalDistanceAction
+
+    def prepare(self) -> None:
+        """Find the entity to keep the distance to."""
+        self._other = self.run.entity(self.content.entity_ref, self.content.place)
+        self._acceleration = 0.0
+        self._ahead = True
+        self._kept: float | None = None
+
+    def start(self) -> None:
+        """Decide on which side of the other entity to stay."""
+        self._acceleration = 0.0
+        displacement = self.content.displacement
+        if displacement is LongitudinalDisplacement.ANY:
+            self._ahead = ahead_and_left(self.state, self._other.pose.x, self._other.pose.y)[0] >= 0.0
+        else:
+            # None given: behind the other (the reference player's default; version 1.0 knows nothing else).
+            self._ahead = displacement is not LongitudinalDisplacement.LEADING
+        self._kept = None
+        if self.content.distance is None and self.content.time_gap is None:
+            self._kept = self._distance()
+
+    def step(self, time: float, step: float) -> None:
+        """Accelerate towards the wanted distance."""
+        state, other = self.state, self._other
+        distance = self._distance()
+        if distance is None:
+            self.note(f"no way from '{state.name}' to '{other.name}': the distance is not kept")
+            self.end()
+            return
+        rest = distance - self._wanted()
+        if not self.content.continuous and abs(rest) < CLOSE_ENOUGH:
+            self.end()
+        limits = limits_of(self.content.constraints, state.entity.performance)
+        if limits.acceleration == inf and limits.deceleration == inf:
+            drive(state, rest)
+            state.set_speed(other.speed)
+            return
+        self._acceleration = self._pull(rest, step)
+        speed = state.speed + self._acceleration * step
+        state.set_speed(min(max(speed, -limits.speed), limits.speed))
+
+    # ---- in detail ---------------------------------------------------------------------------------------------------
+    def _distance(self) -> float | None:
+        system = self.content.coordinate_system or CoordinateSystem.ENTITY
+        # With free space, the reference player measures between the boxes in the own frame, whatever is asked for.
+        if self.content.freespace:
+            system = CoordinateSystem.ENTITY
+        return entity_distance(
+            self.run.network,
+            self.state,
+            self._other,
+            system,
+            RelativeDistanceType.LONGITUDINAL,
+            freespace=self.content.freespace,
+        )
+
+    def _wanted(self) -> float:
+        if self._kept is not None:
+            return self._kept
+        if self.content.distance is not None:
+            amount = abs(self.content.distance)
+        else:
+            amount = abs(self._other.speed) * (self.content.time_gap or 0.0)
+        return amount if self._ahead else -amount
+
+    def _pull(self, rest: float, step: float) -> float:
+        limits = limits_of(self.content.constraints, self.state.entity.performance)
+        tension = limits.acceleration if rest < 0.0 else limits.deceleration
+        stiffness = STIFFNESS * min(tension, 1e10)
+        wanted = rest * stiffness - (self.state.speed - self._other.speed) * 2.0 * sqrt(stiffness)
+        wanted = min(max(wanted, -limits.deceleration), limits.acceleration)
+        before = self._acceleration
+        if wanted < 0.0 and wanted < before:
+            return max(before - _grown(limits.deceleration_rate, step), wanted)
+        if wanted >= 0.0 and wanted > before:
+            return min(before + _grown(limits.acceleration_rate, step), wanted)
+        return wanted
+
+
+def _grown(rate: float, step: float) -> float:
+    """How far an acceleration may change; nothing in no time, even without a limit."""
+    return 0.0 if step <= 0.0 else rate * step

@@ -1,0 +1,216 @@
+"""SynchronizeAction: be at a place when another entity, the master, is at its own."""
+
+from __future__ import annotations
+
+from enum import Enum
+from math import copysign, cos, inf, sin, sqrt
+
+from xosc_lateral.playback.actions.base import Domain, RunningAction
+from xosc_lateral.playback.distances import FAR, Spot, apart, road_gap
+from xosc_lateral.playback.paths.base import Path, PathProgress, nearest_s
+from xosc_lateral.playback.positions.resolve import spot_at
+from xosc_lateral.playback.state import EntityState
+from xosc_lateral.playback.transition import EPSILON
+from xosc_lateral.scenario.actions import AbsoluteSpeed, SynchronizeAction
+from xosc_lateral.scenario.enums import SpeedTargetValueType
+from xosc_lateral.scenario.position import Position, TrajectoryPosition
+
+HARD_BRAKING = 8.0
+"""When the entity comes so early that it has to stop at once. [m/s2]"""
+
+SAME_SPEED = 0.1
+"""The entity is on the straight line to the final speed when its speed differs by less. [m/s]"""
+
+
+class Mode(Enum):
+    """Which part of the speed profile the entity is on."""
+
+    NONE = "not decided"
+    TO_APEX = "first of two accelerations"
+    LINE = "straight to the final speed"
+    STOPPING = "braking hard"
+    WAITING = "standing, the master stands too"
+    STOPPED = "standing until it is time"
+    STEADY = "at the final speed"
+
+
+class RunningSynchronize(RunningAction):
+    """Speeds that bring both to their places at the same time.
+
+    Without a final speed: one constant acceleration, worked out anew in each frame. With one: two accelerations
+    that differ in sign (first up then down, or first down then up, perhaps with a stop in between).
+    """
+
+    domains = Domain.LONGITUDINAL
+    content: SynchronizeAction
+
+    def prepare(self) -> None:
+        """Find master and places; velocities along the road are needed."""
+        self.run.derives_motion = True
+        self._master = self.run.entity(self.content.master_entity_ref, self.content.place)
+        self._own_spot: Spot | None = None
+        self._master_spot: Spot | None = None
+        self._on_paths: dict[Spot, tuple[Path, float]] = {}
+        self._mode = Mode.NONE
+        self._rushes = False
+        self._last = (FAR, FAR)
+
+    def start(self) -> None:
+        """Places are looked up once."""
+        self._own_spot = spot_at(self.content.target_position, self.run)()
+        self._master_spot = spot_at(self.content.target_position_master, self.run)()
+        self._mode = Mode.NONE
+        self._last = (FAR, FAR)
+
+    def step(self, time: float, step: float) -> None:
+        """Set the speed for this frame; end when either is there, or has gone past."""
+        assert self._own_spot is not None and self._master_spot is not None
+        state, content = self.state, self.content
+        distance = self._distance(state, self._own_spot, content.target_position)
+        master_distance = self._distance(self._master, self._master_spot, content.target_position_master)
+        tolerance, master_tolerance = content.target_tolerance or 0.0, content.target_tolerance_master or 0.0
+        there = distance < tolerance + EPSILON or master_distance < master_tolerance + EPSILON
+        passed = distance > self._last[0] or master_distance > self._last[1]
+        self._last = distance, master_distance
+        distance = max(distance - tolerance, EPSILON)
+        master_distance = max(master_distance - master_tolerance, EPSILON)
+        master_speed = along_road(self._master)
+        time_left = master_distance / master_speed if master_speed > EPSILON else FAR
+        final = self._final_speed()
+        if there or passed or (master_speed > EPSILON and time_left < step):
+            if final is not None:
+                state.set_speed(final)
+            self.end()
+            return
+        if final is None:
+            mean = distance / time_left
+            acceleration = 2.0 * (mean - state.speed) / time_left
+            state.set_speed(state.speed + acceleration * step)
+            return
+        speed = self._speed_towards(final, distance, time_left, step)
+        if speed is not None:
+            state.set_speed(speed)
+        else:
+            state.speed_taken = True
+
+    # ---- in detail ---------------------------------------------------------------------------------------------------
+    def _distance(self, entity: EntityState, spot: Spot, position: Position) -> float:
+        """Left on the trajectory, else along the road, else straight. [m]"""
+        if entity.path is not None:
+            return abs(self._target_s(entity.path, spot, position) - entity.path.s)
+        gap = road_gap(self.run.network, entity, spot)
+        if gap is not None:
+            return abs(gap.ds)
+        return apart(entity, spot.x, spot.y)
+
+    def _target_s(self, progress: PathProgress, spot: Spot, position: Position) -> float:
+        """Where on a path the place is; looked for once for each path. [m]"""
+        if isinstance(position, TrajectoryPosition):
+            return position.s
+        known = self._on_paths.get(spot)
+        if known is None or known[0] is not progress.path:
+            known = (progress.path, nearest_s(progress.path, spot.x, spot.y))
+            self._on_paths[spot] = known
+        return known[1]
+
+    def _final_speed(self) -> float | None:
+        final = self.content.final_speed
+        if final is None or isinstance(final, AbsoluteSpeed):
+            return None if final is None else final.value
+        if final.value_type is SpeedTargetValueType.DELTA:
+            return self._master.speed + final.value
+        return self._master.speed * final.value
+
+    def _steady_distance(self, final: float) -> float | None:
+        steady = None if self.content.final_speed is None else self.content.final_speed.steady_state
+        if steady is None:
+            return None
+        return steady.distance if steady.distance is not None else (steady.time or 0.0) * final
+
+    def _speed_towards(self, final: float, distance: float, time_left: float, step: float) -> float | None:
+        """The next speed; None: keep the present one."""
+        state = self.state
+        steady = self._steady_distance(final)
+        if steady is not None and self._mode is not Mode.STEADY:
+            steady_time = steady / final if final else inf
+            if distance - steady < EPSILON or time_left - steady_time < EPSILON:
+                self._mode = Mode.STEADY
+            else:
+                distance, time_left = distance - steady, time_left - steady_time
+        if self._mode is Mode.STEADY:
+            return final
+        if self._mode is Mode.WAITING:
+            if time_left >= FAR:
+                return None
+            self._mode = Mode.NONE
+        if self._mode is Mode.STOPPING:
+            speed = state.speed - HARD_BRAKING * step
+            if speed < 0.0:
+                self._mode = Mode.WAITING
+            return max(speed, 0.0)
+        if self._mode is Mode.STOPPED:
+            if time_left >= 2.0 * distance / max(final, EPSILON):
+                return 0.0
+            self._mode = Mode.LINE
+        if self._mode is Mode.TO_APEX and time_left < FAR and self._is_on_line(final, distance, time_left):
+            self._mode = Mode.LINE
+            return None
+        if self._mode is Mode.LINE:
+            return _on_line(final, distance, time_left)
+        if self._mode is Mode.NONE:
+            self._mode = Mode.TO_APEX
+            self._rushes = 0.5 * (final + state.speed) < distance / time_left
+        return self._to_apex(final, distance, time_left, step)
+
+    def _is_on_line(self, final: float, distance: float, time_left: float) -> bool:
+        return abs(self.state.speed - (2.0 * distance / time_left - final)) < SAME_SPEED
+
+    def _to_apex(self, final: float, s: float, t: float, step: float) -> float | None:
+        state = self.state
+        now = along_road(state)
+        apex, acceleration = _two_accelerations(now, final, s, t)
+        if acceleration < 0.0 if self._rushes else acceleration > 0.0:
+            self._mode = Mode.LINE
+            return state.speed
+        if apex >= 0.0:
+            return state.speed + acceleration * step
+        # The way is so short that the entity has to stop and wait, sharing way and time as the speeds do.
+        stop_time = 2.0 * now * s / (now * now + final * final) if now or final else 0.0
+        acceleration = -now / stop_time if abs(stop_time) > EPSILON else 0.0
+        if stop_time * now > s:
+            acceleration = -HARD_BRAKING
+            self._mode = Mode.STOPPING
+        if now + acceleration * step < 0.0:
+            self._mode = Mode.STOPPED
+            return 0.0
+        return state.speed + acceleration * step
+
+
+def along_road(state: EntityState) -> float:
+    """Velocity along the road's reference line, with the sign of the speed. [m/s]"""
+    heading = state.road_heading()
+    vx, vy, _ = state.velocity
+    return copysign(abs(vx * cos(heading) + vy * sin(heading)), state.speed)
+
+
+def _on_line(final: float, distance: float, time_left: float) -> float:
+    """Speed now that a constant acceleration turns into the final speed at the place; 0 while the master stands."""
+    if time_left > FAR - 1.0:
+        return 0.0
+    if time_left < 0.001 or distance < 0.001:
+        return 0.0
+    return max(2.0 * distance / time_left - max(final, 0.0), 0.0)
+
+
+def _two_accelerations(now: float, final: float, s: float, t: float) -> tuple[float, float]:
+    """Speed between two accelerations of equal amount that cover s in t, and the first of them; (0, 0): none."""
+    if abs(final - now) < EPSILON:
+        apex = (s - 0.5 * t * now) / (0.5 * t)
+        return apex, (apex - now) / (0.5 * t)
+    root = sqrt(max(2.0 * (2.0 * s * s - 2.0 * (final + now) * t * s + (final * final + now * now) * t * t), 0.0))
+    for sign in (-1.0, 1.0):
+        at = (sign * root - 2.0 * s + 2.0 * final * t) / (2.0 * (final - now))
+        if 0.0 < at < t:
+            apex = (2.0 * s + sign * root) / (2.0 * t)
+            return apex, (apex - now) / at
+    return 0.0, 0.0

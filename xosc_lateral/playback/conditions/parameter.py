@@ -1,0 +1,19 @@
+"""ParameterCondition: a parameter's present value."""
+
+from __future__ import annotations
+
+from xosc_lateral.playback.conditions.base import ValueCheck
+from xosc_lateral.playback.run import Run
+from xosc_lateral.scenario.conditions import ParameterCondition
+
+
+def prepare(content: ParameterCondition, run: Run) -> ValueCheck:
+    """Compare in the parameter's own type; false for a parameter that is not declared globally."""
+
+    def check() -> bool:
+        if content.parameter_ref not in run.parameters:
+            run.note(f"parameter '{content.parameter_ref}' is not declared: the condition stays false", content.place)
+            return False
+        return run.parameters.compare(content.parameter_ref, content.rule, content.value)
+
+    return check

@@ -1,0 +1,13 @@
+"""SimulationTimeCondition: time since the scenario's start."""
+
+from __future__ import annotations
+
+from xosc_lateral.playback.conditions.base import ValueCheck
+from xosc_lateral.playback.run import Run
+from xosc_lateral.playback.values import holds
+from xosc_lateral.scenario.conditions import SimulationTimeCondition
+
+
+def prepare(content: SimulationTimeCondition, run: Run) -> ValueCheck:
+    """Compare the time at the start of the frame. [s]"""
+    return lambda: holds(run.time, content.rule, content.value)

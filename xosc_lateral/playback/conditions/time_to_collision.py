@@ -1,0 +1,57 @@
+"""TimeToCollisionCondition: distance over closing speed."""
+
+from __future__ import annotations
+
+from math import copysign, hypot
+
+from xosc_lateral.playback.conditions.base import EntityCheck
+from xosc_lateral.playback.conditions.measure import measure_of
+from xosc_lateral.playback.distances import FAR, entity_distance, spot_distance
+from xosc_lateral.playback.positions.resolve import spot_at
+from xosc_lateral.playback.run import Run
+from xosc_lateral.playback.state import EntityState
+from xosc_lateral.playback.transition import EPSILON
+from xosc_lateral.playback.values import holds
+from xosc_lateral.scenario.conditions import TimeToCollisionCondition
+
+
+def prepare(content: TimeToCollisionCondition, run: Run) -> EntityCheck:
+    """Not defined, hence false, when they don't come closer. [s]"""
+    system, kind = measure_of(content, run)
+    freespace = content.freespace
+    target = content.target
+    if isinstance(target, str):
+        run.derives_motion = True
+        other = run.entity(target, content.place)
+
+        def to_entity(state: EntityState) -> bool:
+            if not other.active:
+                return False
+            distance = entity_distance(run.network, state, other, system, kind, freespace=freespace)
+            return _holds(distance, _closing_speed(state, other), content)
+
+        return to_entity
+    spot = spot_at(target, run)
+
+    def to_position(state: EntityState) -> bool:
+        distance = spot_distance(run.network, state, spot(), system, kind, freespace=freespace)
+        return _holds(distance, state.speed, content)
+
+    return to_position
+
+
+def _holds(distance: float | None, closing: float, content: TimeToCollisionCondition) -> bool:
+    distance = FAR if distance is None else distance
+    if abs(distance) < EPSILON or abs(closing) < EPSILON or distance / closing < 0.0:
+        return False
+    return holds(distance / closing, content.rule, content.value)
+
+
+def _closing_speed(state: EntityState, other: EntityState) -> float:
+    """Own velocity along the other's velocity, minus the other's speed; own speed when the other stands. [m/s]"""
+    vx, vy, _ = other.velocity
+    length = hypot(vx, vy)
+    if abs(vx) < EPSILON and abs(vy) < EPSILON:
+        return state.speed
+    along = (state.velocity[0] * vx + state.velocity[1] * vy) / length
+    return copysign(1.0, state.speed) * copysign(1.0, along) * (along - abs(other.speed))

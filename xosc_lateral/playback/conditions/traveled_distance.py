@@ -1,0 +1,13 @@
+"""TraveledDistanceCondition: way since the scenario's start."""
+
+from __future__ import annotations
+
+from xosc_lateral.playback.conditions.base import EntityCheck
+from xosc_lateral.playback.run import Run
+from xosc_lateral.scenario.conditions import TraveledDistanceCondition
+
+
+def prepare(content: TraveledDistanceCondition, run: Run) -> EntityCheck:
+    """Teleports don't count. [m]"""
+    run.derives_motion = True
+    return lambda state: state.odometer >= content.value

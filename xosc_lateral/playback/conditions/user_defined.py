@@ -1,0 +1,13 @@
+"""UserDefinedValueCondition: a value from outside, which playback never learns."""
+
+from __future__ import annotations
+
+from xosc_lateral.playback.conditions.base import ValueCheck
+from xosc_lateral.playback.run import Run
+from xosc_lateral.scenario.conditions import UserDefinedValueCondition
+
+
+def prepare(content: UserDefinedValueCondition, run: Run) -> ValueCheck:
+    """Always false, which is said."""
+    run.note(f"value '{content.name}' comes from outside the scenario: the condition stays false", content.place)
+    return lambda: False

@@ -1,0 +1,168 @@
+"""Moving along lanes: the default driver, and what lane changes and lane offsets need of it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import inf, pi
+
+from xosc_lateral.playback.placement import NOWHERE
+from xosc_lateral.playback.state import EntityState
+from xosc_lateral.playback.transition import EPSILON
+from xosc_lateral.road import LaneLink, RoadNetwork
+from xosc_lateral.road.network import DRIVING
+
+_TIGHT = 1e-3
+"""Beyond this share of the radius, the centre of a curve is so near that lengths beside the line say nothing. [-]"""
+
+
+def drive(state: EntityState, distance: float) -> None:
+    """Move an entity along its lane as far as it goes, lateral offset and relative heading kept.
+
+    The way along the reference line follows from the curvature at the START of the step (explicit Euler, as the
+    reference player does it). Without a road there is no lane to follow: the entity stops; at a road's end it does so
+    in the frame after the first in which it has not moved.
+
+    Parameters
+    ----------
+    state : EntityState
+    distance : float
+        Way on the entity's own track; negative: backwards. [m]
+    """
+    state.follow_lane()
+    if state.road == NOWHERE:
+        state.set_speed(0.0)
+        return
+    was_at_end, stood = state.at_road_end, state.stuck
+    way = 1 if state.is_forward else -1
+    road, s = state.road, state.s
+    travel(state, way, along_reference(state.network, road, state.lane, s, state.offset_t, distance))
+    state.stuck = state.road == road and abs(state.s - s) * abs(state.speed) < EPSILON * abs(distance)
+    state.set_speed(0.0 if was_at_end and state.at_road_end and stood else state.speed)
+
+
+def along_reference(network: RoadNetwork, road: int, lane: int, s: float, offset_t: float, distance: float) -> float:
+    """Length along the reference line of a way that lies beside it. [m]"""
+    curvature = network.curvature_at(road, s)
+    if abs(curvature) < EPSILON:
+        return distance
+    shrink = 1.0 - curvature * (network.lane_state_at(road, lane, s).centre_t + offset_t)
+    return distance / shrink if shrink > _TIGHT else distance
+
+
+def travel(state: EntityState, way: int, distance: float) -> None:
+    """Move along s: `way` +1 or -1 tells the direction of a positive distance. [m]"""
+    if distance < 0.0:
+        way, distance = -way, -distance
+    s = state.s + way * distance
+    start, end = state.section
+    if start < s < end:
+        state.s = s
+        state._pose = None
+        state.at_road_end = False
+        return
+    _travel_far(state, way, distance)
+
+
+def _travel_far(state: EntityState, way: int, distance: float) -> None:
+    network = state.network
+    links_passed = 0
+    while True:
+        moved = network.advance(
+            state.road, state.lane, state.s, distance, direction=way, choose=lambda options: _choose(state, options)
+        )
+        if moved.direction != way:
+            _turn_round(state)
+        state.move_to(moved.road, moved.lane, moved.s, state.offset_t)
+        way, distance = moved.direction, moved.remaining
+        links_passed += 1
+        if distance <= 0.0 or links_passed > _MOST_GAPS:
+            break
+        onward = _bridge_gap(state, way)
+        if onward is None:
+            break
+        way = onward
+    _leave_narrow_lane(state)
+    _note_surroundings(state, way, blocked=distance > 0.0)
+
+
+_MOST_GAPS = 8
+"""Lanes without a link that are bridged in one step, at most."""
+
+
+def _choose(state: EntityState, options: Sequence[LaneLink]) -> LaneLink:
+    """At a junction: along the route; where that says nothing, the first way on, as in the reference player; without a
+    route straight on.
+    """
+    if state.route is not None:
+        return state.route.choose(state.road, options) or options[0]
+    return state.network.straightest(options)
+
+
+def _turn_round(state: EntityState) -> None:
+    """Onto a road whose s runs the other way."""
+    state.offset_t = -state.offset_t
+    state.turn(state.relative_heading + pi)
+
+
+def _bridge_gap(state: EntityState, way: int) -> int | None:
+    """A lane ends without a link: go on in the nearest lane beyond; the new way along s, or None at a true end.
+
+    Between sections of a road the offset is kept, between roads the entity goes to the middle of the new lane (both as
+    the reference player does it).
+    """
+    network = state.network
+    road = network.roads[state.road]
+    at_end = state.s >= road.length - EPSILON if way > 0 else state.s <= EPSILON
+    t = state.t
+    if not at_end:
+        beyond = state.s + way * EPSILON
+        found = network.lane_at(state.road, beyond, t)
+        if not found.lane or found.lane == state.lane:
+            return None
+        state.move_to(state.road, found.lane, beyond, state.offset_t)
+        return way
+    link = road.successor if way > 0 else road.predecessor
+    if link is None or link.element_type != "road" or link.element_id not in network.road_ids:
+        return None
+    index = network.index_of(link.element_id)
+    entry = 1 if link.contact != "end" else -1
+    if entry != way:
+        t = -t
+        _turn_round(state)
+    s = 0.0 if entry > 0 else network.roads[index].length
+    found = network.lane_at(index, s, t)
+    if not found.lane:
+        return None
+    state.move_to(index, found.lane, s, 0.0)
+    return entry
+
+
+def _leave_narrow_lane(state: EntityState) -> None:
+    """A lane that has closed is left for the middle of the nearest open one on the same side of the road."""
+    network = state.network
+    if state.lane == 0 or network.lane_state_at(state.road, state.lane, state.s).width >= EPSILON:
+        return
+    t = state.t
+    nearest, found = inf, 0
+    for lane in network.lanes_at(state.road, state.s):
+        away = abs(lane.centre_t - t) - 0.5 * lane.width
+        if lane.width >= EPSILON and lane.type in DRIVING and lane.id * state.lane > 0 and away < nearest:
+            nearest, found = away, lane.id
+    if found:
+        state.move_to(state.road, found, state.s, 0.0)
+
+
+def _note_surroundings(state: EntityState, way: int, *, blocked: bool) -> None:
+    """Remember how far the lane id holds (not at all while the lane may close), and whether the road ends here."""
+    network = state.network
+    road = network.roads[state.road]
+    start, end = network.section_at(state.road, state.s)
+    lane = road.section_at(state.s).by_id.get(state.lane)
+    closes = (
+        state.lane == 0 or lane is None or any(lane.state_at(s).width < EPSILON for s in (*lane.starts, start, end))
+    )
+    state.section = (0.0, -1.0) if closes else (start, end)
+    dead_end = (state.s <= EPSILON and road.predecessor is None) or (
+        state.s >= road.length - EPSILON and road.successor is None
+    )
+    state.at_road_end = blocked or dead_end

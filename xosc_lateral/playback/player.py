@@ -1,0 +1,238 @@
+"""Play a scenario: frame by frame, triggers first, then actions, then the default driver.
+
+A frame from time T: the triggers are evaluated with T and the state at T; actions that start do so at once; all running
+actions step, in the file's order; time moves on; entities that no action has moved follow their lanes; trailers are
+drawn along. The first frame has no length: it starts the init actions and gives the row of time 0, and time 0 is
+evaluated once more in the frame after it.
+"""
+
+from __future__ import annotations
+
+from array import array
+from math import cos, hypot, sin
+
+import numpy as np
+
+from xosc_lateral.errors import PlaybackError
+from xosc_lateral.motion.nominal import Activity, NominalMotion
+from xosc_lateral.playback.drive import drive
+from xosc_lateral.playback.placement import NOWHERE
+from xosc_lateral.playback.recorder import NO_LANE, Rows
+from xosc_lateral.playback.run import Run
+from xosc_lateral.playback.state import EntityState
+from xosc_lateral.playback.storyboard import State
+from xosc_lateral.playback.trailers import align_trailers, connect, pull_trailers
+from xosc_lateral.playback.transition import EPSILON
+from xosc_lateral.playback.tree import grow, init_actions
+from xosc_lateral.road import RoadNetwork
+from xosc_lateral.scenario import Scenario
+from xosc_lateral.scenario.actions import FollowTrajectoryAction, TeleportAction
+
+STANDING = 1e-3
+"""Below this speed an entity stands. [m/s]"""
+
+
+def play(scenario: Scenario, network: RoadNetwork, *, step: float = 0.02, time_limit: float = 60.0) -> NominalMotion:
+    """Play a scenario to its stop trigger, or to the time limit.
+
+    Parameters
+    ----------
+    scenario : Scenario
+    network : RoadNetwork
+        Its roads; one without roads where the scenario has none.
+    step : float
+        Length of a frame. [s]
+    time_limit : float
+        Where runs end that don't stop by themselves. [s]
+
+    Returns
+    -------
+    NominalMotion
+        What was not played, or not as written, is in its notes.
+
+    Raises
+    ------
+    PlaybackError
+        If the scenario makes no sense on these roads (a lane or road that is not there).
+    UnsupportedElementError
+        If it needs something that can't be played and that motion depends on.
+    """
+    if not step > 0.0 or not time_limit >= 0.0:
+        raise ValueError(f"step {step!r} s must be above 0, time limit {time_limit!r} s not below")
+    return _Player(scenario, network, step).play(time_limit)
+
+
+class _Player:
+    def __init__(self, scenario: Scenario, network: RoadNetwork, step: float) -> None:
+        self.step_size = step
+        self.run = run = Run(scenario, network)
+        if not scenario.entities:
+            raise PlaybackError("has no entities: there is nothing to play", path=scenario.path)
+        self._couple_trailers()
+        self.init = init_actions(scenario.storyboard.init, run)
+        self.root = grow(scenario.storyboard, run)
+        self._leave_out_later_entities()
+        self.rows = [Rows(state) for state in run.entities]
+        self.times = array("d")
+
+    def play(self, time_limit: float) -> NominalMotion:
+        """Run to the end."""
+        run = self.run
+        for state in run.entities:
+            state.begin_frame()
+        for element in self.init:
+            element.start()
+        self.root.start()
+        if run.derives_motion:
+            for state in run.entities:
+                _derive_motion(state, 0.0, height=run.derives_height)
+        going = self._frame(0.0)
+        self._write(0.0)
+        last = time_limit - 0.5 * self.step_size
+        while going and run.time < last:
+            for state in run.entities:
+                state.begin_frame()
+            going = self._frame(self.step_size)
+            if going:
+                self._write(run.time)
+        ended_by = "time limit" if going else "stop trigger"
+        if going:
+            run.note(f"still runs at the time limit of {time_limit:g} s", run.scenario.storyboard.place)
+        return self._result(ended_by)
+
+    # ---- one frame ---------------------------------------------------------------------------------------------------
+    def _frame(self, step: float) -> bool:
+        """Play one frame; False when the storyboard has stopped, and nothing moved."""
+        run, root = self.run, self.root
+        time = run.time
+        run.stamp = time
+        root.evaluate_triggers(time)
+        if root.state is not State.RUNNING:
+            return False
+        run.stamp = time + step
+        for element in self.init:
+            element.step(time, step)
+        root.step(time, step)
+        run.time = time + step
+        for state in run.entities:
+            if not state.active:
+                continue
+            if not state.longitudinal_taken and state.tow is None and abs(state.speed) > EPSILON:
+                drive(state, state.speed * step)
+        pull_trailers(run.entities)
+        if run.derives_motion:
+            for state in run.entities:
+                _derive_motion(state, step, height=run.derives_height)
+        else:
+            self._speeds_of_moved(step)
+        if run.derives_states:
+            self._derive_states()
+        return True
+
+    def _speeds_of_moved(self, step: float) -> None:
+        """An entity that was moved without anybody setting its speed has the speed of that movement."""
+        for state in self.run.entities:
+            if not state.speed_taken and state.activity & Activity.LATERAL:
+                _derive_motion(state, step)
+            else:
+                state.previous = None
+
+    def _derive_states(self) -> None:
+        run = self.run
+        for state in run.entities:
+            standing = -STANDING < state.speed < STANDING
+            state.standing_since = _since(state.standing_since, standing, run.time)
+            state.road_end_since = _since(state.road_end_since, state.at_road_end, run.time)
+            if run.derives_off_road:
+                state.off_road_since = _since(state.off_road_since, _is_off_road(state), run.time)
+
+    # ---- before and after --------------------------------------------------------------------------------------------
+    def _couple_trailers(self) -> None:
+        for state in self.run.entities:
+            if state.entity.trailer is not None:
+                connect(state, self.run.entity(state.entity.trailer, state.entity.place))
+        for state in self.run.entities:
+            if state.tow is None:
+                align_trailers(state)
+
+    def _leave_out_later_entities(self) -> None:
+        """Entities without init actions are not there until an action adds them (trailers are, with their tractor)."""
+        init = self.run.scenario.storyboard.init
+        present = {private.entity_ref for private in init.privates}
+        placed = {
+            private.entity_ref
+            for private in init.privates
+            if any(isinstance(action.content, TeleportAction | FollowTrajectoryAction) for action in private.actions)
+        }
+        for state in self.run.entities:
+            if state.tow is not None or state.name in placed:
+                continue
+            if state.name not in present:
+                state.active = False
+                self.run.note(
+                    f"'{state.name}' has no init actions: it is not there until it is added", state.entity.place
+                )
+            else:
+                self.run.note(
+                    f"'{state.name}' has no initial position: it stands at the world's origin", state.entity.place
+                )
+                state.put_in_world(state.pose)
+
+    def _write(self, time: float) -> None:
+        self.times.append(time)
+        for rows in self.rows:
+            rows.write(time)
+
+    def _result(self, ended_by: str) -> NominalMotion:
+        run = self.run
+        time = np.frombuffer(self.times, dtype=np.float64).copy()
+        return NominalMotion(
+            step=self.step_size,
+            entities=tuple(rows.motion(run.network, time) for rows in self.rows),
+            actions=run.played(),
+            end_time=float(time[-1]),
+            ended_by=ended_by,
+            notes=tuple(run.notes),
+        )
+
+
+def _derive_motion(state: EntityState, step: float, *, height: bool = False) -> None:
+    """Velocity, acceleration and way travelled from the movement of the frame; speed, if nobody has set it."""
+    pose, before = state.pose if height else state.plane, state.previous
+    state.previous = pose
+    if step <= EPSILON or before is None or state.teleported:
+        velocity = (state.speed * cos(pose.heading), state.speed * sin(pose.heading), 0.0)
+        if step > EPSILON and before is not None:
+            state.acceleration = _rate(velocity, state.velocity, step)
+        state.velocity = velocity
+        return
+    rise = pose.z - before.z
+    move = (pose.x - before.x, pose.y - before.y, rise if rise == rise else 0.0)
+    velocity = (move[0] / step, move[1] / step, move[2] / step)
+    state.acceleration = _rate(velocity, state.velocity, step)
+    state.velocity = velocity
+    state.odometer += hypot(move[0], move[1])
+    if not state.speed_taken:
+        state.speed = hypot(velocity[0], velocity[1])
+
+
+def _rate(
+    now: tuple[float, float, float], before: tuple[float, float, float], step: float
+) -> tuple[float, float, float]:
+    return (now[0] - before[0]) / step, (now[1] - before[1]) / step, (now[2] - before[2]) / step
+
+
+def _since(since: float | None, holds: bool, now: float) -> float | None:
+    if not holds:
+        return None
+    return now if since is None else since
+
+
+def _is_off_road(state: EntityState) -> bool:
+    """Beside all lanes of its road; lanes of type `none` are no part of it."""
+    state.locate()
+    if state.road == NOWHERE:
+        return False
+    lanes = state.network.lanes_at(state.road, state.s)
+    t = state.t
+    return not any(abs(t - lane.centre_t) <= 0.5 * lane.width for lane in lanes if lane.type != NO_LANE)

@@ -1,0 +1,95 @@
+"""All positions that can be played: what the file says -> a place in the world."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from xosc_lateral.errors import UnsupportedElementError
+from xosc_lateral.playback.distances import Spot
+from xosc_lateral.playback.placement import NOWHERE, Placement
+from xosc_lateral.playback.positions import (
+    geo,
+    lane,
+    relative_lane,
+    relative_object,
+    relative_road,
+    relative_world,
+    road,
+    route,
+    trajectory,
+    world,
+)
+from xosc_lateral.playback.positions.reference import pose_at
+from xosc_lateral.playback.routes import RouteGuide, guide
+from xosc_lateral.playback.run import Run
+from xosc_lateral.playback.state import EntityState
+from xosc_lateral.road import Pose
+from xosc_lateral.scenario import Unsupported
+from xosc_lateral.scenario import position as written
+from xosc_lateral.scenario.position import Route
+
+POSITIONS: tuple[tuple[type, Callable[[Any, Run], Placement]], ...] = (
+    (written.GeoPosition, geo.resolve),
+    (written.LanePosition, lane.resolve),
+    (written.RelativeLanePosition, relative_lane.resolve),
+    (written.RelativeObjectPosition, relative_object.resolve),
+    (written.RelativeRoadPosition, relative_road.resolve),
+    (written.RelativeWorldPosition, relative_world.resolve),
+    (written.RoadPosition, road.resolve),
+    (written.RoutePosition, lambda position, run: route.resolve(position, run, route_guide)),
+    (written.TrajectoryPosition, lambda position, run: trajectory.resolve(position, run, pose_of)),
+    (written.WorldPosition, world.resolve),
+)
+
+_RESOLVERS = dict(POSITIONS)
+_FIXED = (written.GeoPosition, written.LanePosition, written.RoadPosition, written.WorldPosition)
+"""Positions that no entity has an influence on."""
+
+
+def resolve(position: written.Position, run: Run, *, route: RouteGuide | None = None) -> Placement:
+    """The place that a position means now; raises `PlaybackError` where there is no such place.
+
+    `route` is that of the entity which is to go there: a way along the road from another entity follows it, or else the
+    route of that other one.
+    """
+    if isinstance(position, Unsupported):
+        where = position.place
+        raise UnsupportedElementError(
+            position.reason or f"{position.kind} can't be played",
+            path=where.path,
+            line=where.line,
+            element=where.element,
+        )
+    if isinstance(position, written.RelativeLanePosition):
+        return relative_lane.resolve(position, run, route)
+    if isinstance(position, written.RelativeRoadPosition):
+        return relative_road.resolve(position, run, route)
+    return _RESOLVERS[type(position)](position, run)
+
+
+def spot_at(position: written.Position, run: Run) -> Callable[[], Spot]:
+    """A position to measure distances to, found anew each time only if it may move."""
+    if isinstance(position, _FIXED):
+        fixed = _spot(resolve(position, run), run)
+        return lambda: fixed
+    return lambda: _spot(resolve(position, run), run)
+
+
+def pose_of(position: written.Position, run: Run) -> Pose:
+    """World pose of a position now. z, pitch and roll are the road's where none are given. [m], [rad]"""
+    return pose_at(resolve(position, run), run)
+
+
+def route_guide(route_: Route, run: Run) -> RouteGuide | None:
+    """The way over a route's waypoints; None: no way leads along it."""
+    return guide(run.network, [resolve(waypoint.position, run) for waypoint in route_.waypoints])
+
+
+def _spot(place: Placement, run: Run) -> Spot:
+    scout = EntityState(run.entities[0].entity, run.network)
+    scout.put(place)
+    pose = scout.pose
+    if place.road == NOWHERE:
+        return Spot(pose.x, pose.y, NOWHERE, 0, 0.0, 0.0)
+    return Spot(pose.x, pose.y, place.road, place.lane, place.s, scout.t)

@@ -1,0 +1,101 @@
+"""One run of a scenario: everything that actions, conditions and positions may look at."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from datetime import datetime, timedelta
+from typing import Any
+
+from xosc_lateral.errors import PlaybackError
+from xosc_lateral.motion.nominal import Note, PlayedAction
+from xosc_lateral.playback.signals import TrafficSignals
+from xosc_lateral.playback.state import EntityState
+from xosc_lateral.playback.values import Values
+from xosc_lateral.road.network import RoadNetwork
+from xosc_lateral.scenario import Action, Place, Scenario
+
+
+class Run:
+    """The world of one run.
+
+    Parameters
+    ----------
+    scenario : Scenario
+    network : RoadNetwork
+    """
+
+    def __init__(self, scenario: Scenario, network: RoadNetwork) -> None:
+        self.scenario = scenario
+        self.network = network
+        self.entities = tuple(EntityState(entity, network) for entity in scenario.entities)
+        self.by_name = {state.name: state for state in self.entities}
+        self.parameters = Values(scenario.parameters)
+        self.variables = Values(scenario.variables)
+        self.signals = TrafficSignals(scenario.traffic_signal_controllers)
+        self.time = 0.0
+        """Time at the start of the present frame. [s]"""
+        self.stamp = 0.0
+        """Time to be written beside what happens now: that of the row in which it first shows. [s]"""
+        self.time_of_day: tuple[datetime, bool, float] | None = None
+        """What the environment's clock showed, whether it goes on, and when it was set. [s]"""
+        self.derives_motion = False
+        """Somebody asks for velocities, accelerations or the way travelled."""
+        self.derives_height = False
+        """Somebody asks for their vertical components, which cost a look at the road for entities on trajectories."""
+        self.derives_states = False
+        """Somebody asks since when an entity has stood, been at the end of its road, or off it."""
+        self.derives_off_road = False
+        self.when_built: list[Callable[[Any], None]] = []
+        """Called with the root of the storyboard once it stands: conditions on its elements look for theirs."""
+        self.notes: list[Note] = []
+        self._noted: set[tuple[str, str, int | None]] = set()
+        self._played: list[_Record] = []
+        for remark in scenario.remarks:
+            self.note(remark.reason or "is not read", remark.place)
+
+    def entity(self, name: str, place: Place) -> EntityState:
+        """The entity of that name; raises `PlaybackError` at `place` if there is none."""
+        state = self.by_name.get(name)
+        if state is None:
+            raise PlaybackError(
+                f"entity '{name}' is not in the scenario", path=place.path, line=place.line, element=place.element
+            )
+        return state
+
+    def note(self, what: str, place: Place) -> None:
+        """Say, once for each place, that something was not played, or not as written."""
+        key = (what, place.path, place.line)
+        if key not in self._noted:
+            self._noted.add(key)
+            self.notes.append(Note(what, place.path, place.line, place.element))
+
+    def clock(self) -> datetime | None:
+        """Time of day now; None if no environment has set it."""
+        if self.time_of_day is None:
+            return None
+        date_time, goes_on, set_at = self.time_of_day
+        return date_time + timedelta(seconds=self.time - set_at) if goes_on else date_time
+
+    # ---- what was played ---------------------------------------------------------------------------------------------
+    def record_start(self, action: Action, actor: str | None, path: tuple[str, ...]) -> int:
+        """Note the start of an action; returns the number under which to note its end."""
+        self._played.append(_Record(action, actor, path, self.time))
+        return len(self._played) - 1
+
+    def record_end(self, number: int) -> None:
+        """Note the end of an action."""
+        self._played[number].end = self.stamp
+
+    def played(self) -> tuple[PlayedAction, ...]:
+        """All actions started so far, in order of start."""
+        return tuple(PlayedAction(r.action, r.actor, r.path, r.start, r.end) for r in self._played)
+
+
+class _Record:
+    """A started action; `PlayedAction` while its end is not known."""
+
+    __slots__ = ("action", "actor", "end", "path", "start")
+
+    def __init__(self, action: Action, actor: str | None, path: tuple[str, ...], start: float) -> None:
+        self.action, self.actor, self.path, self.start = action, actor, path, start
+        self.end: float | None = None

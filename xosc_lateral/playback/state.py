@@ -1,0 +1,265 @@
+"""What the player knows of one entity at one moment."""
+
+from __future__ import annotations
+
+from math import cos, nan, pi, sin
+
+from xosc_lateral.motion.nominal import Activity
+from xosc_lateral.playback.angles import difference, is_forward, wrap
+from xosc_lateral.playback.paths.base import PathProgress
+from xosc_lateral.playback.placement import NOWHERE, Placement
+from xosc_lateral.playback.routes import RouteGuide
+from xosc_lateral.road import Pose, RoadNetwork
+from xosc_lateral.road.places import turn_for_heading, turned_in_surface
+from xosc_lateral.scenario import Entity
+
+
+class EntityState:
+    """Where an entity is, how fast, and what happened to it in the present frame.
+
+    An entity lives in road coordinates, and its world pose is worked out when somebody asks. Actions that put it
+    somewhere in the world (`free_pose`) work the other way round. `offset_t` counts along the road's t-axis and
+    `relative_heading` from the road's s-direction, so that both stay continuous where lanes of opposite direction meet;
+    the rows of a `NominalMotion` are converted at the end.
+    """
+
+    __slots__ = (
+        "_free_pose",
+        "_located",
+        "_pose",
+        "acceleration",
+        "active",
+        "activity",
+        "at_road_end",
+        "entity",
+        "event_actions",
+        "init_actions",
+        "lane",
+        "longitudinal_taken",
+        "name",
+        "network",
+        "odometer",
+        "off_road_since",
+        "offset_t",
+        "path",
+        "previous",
+        "relative_heading",
+        "road",
+        "road_end_since",
+        "route",
+        "s",
+        "section",
+        "speed",
+        "speed_taken",
+        "standing_since",
+        "stuck",
+        "teleported",
+        "tow",
+        "trailer",
+        "velocity",
+    )
+
+    def __init__(self, entity: Entity, network: RoadNetwork) -> None:
+        self.entity = entity
+        self.name = entity.name
+        self.network = network
+        self.active = True
+        self.speed = 0.0
+        self.road = NOWHERE
+        self.lane = 0
+        self.s = 0.0
+        self.offset_t = 0.0
+        self.relative_heading = 0.0
+        self.section = (0.0, -1.0)
+        """Range of s in which the lane id holds; empty: unknown. [m]"""
+        self.at_road_end = False
+        self.stuck = False
+        """The default driver could not move it in the frame before: the road had ended."""
+        self._free_pose: Pose | None = Pose(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+        self._located = True
+        self._pose: Pose | None = None
+        self.activity = 0
+        self.longitudinal_taken = False
+        """An action has moved the entity along in this frame: the default driver does not."""
+        self.speed_taken = False
+        """Somebody has set the speed in this frame: it is not derived from the movement."""
+        self.teleported = False
+        self.previous: Pose | None = None
+        self.velocity = (0.0, 0.0, 0.0)
+        self.acceleration = (0.0, 0.0, 0.0)
+        self.odometer = 0.0
+        self.standing_since: float | None = None
+        self.road_end_since: float | None = None
+        self.off_road_since: float | None = None
+        self.route: RouteGuide | None = None
+        self.path: PathProgress | None = None
+        self.tow: EntityState | None = None
+        self.trailer: EntityState | None = None
+        self.init_actions: list[object] = []
+        self.event_actions: list[object] = []
+
+    # ---- where it is -------------------------------------------------------------------------------------------------
+    @property
+    def pose(self) -> Pose:
+        """World pose. [m], [rad]"""
+        if self._pose is None:
+            free = self._free_pose
+            self._pose = self._pose_on_road() if free is None else self._pose_in_world(free)
+        return self._pose
+
+    @property
+    def plane(self) -> Pose:
+        """World pose whose z, pitch and roll may be NaN (the road's): cheap where nobody needs them. [m], [rad]"""
+        free = self._free_pose
+        return self.pose if free is None else free
+
+    @property
+    def free_pose(self) -> Pose | None:
+        """World pose as given; None while the entity follows its lane. z, pitch, roll may be NaN (the road's)."""
+        return self._free_pose
+
+    @property
+    def is_located(self) -> bool:
+        """Whether the road coordinates are those of the world pose (they are worked out on demand)."""
+        return self._located
+
+    @property
+    def is_forward(self) -> bool:
+        """Whether it points along the road's s-direction."""
+        return is_forward(self.relative_heading)
+
+    @property
+    def t(self) -> float:
+        """From the road's reference line. [m]"""
+        return self.network.lane_state_at(self.road, self.lane, self.s).centre_t + self.offset_t
+
+    def put(self, place: Placement) -> None:
+        """Put the entity there."""
+        self.road, self.lane, self.s, self.offset_t = place.road, place.lane, place.s, place.offset_t
+        self.relative_heading = wrap(place.relative_heading)
+        self._free_pose = place.pose
+        self._located = True
+        self._pose = None
+        self.section = (0.0, -1.0)
+
+    def put_in_world(self, pose: Pose) -> None:
+        """Put the entity there; its road coordinates are looked up when somebody asks for them."""
+        self._free_pose = pose
+        self._located = False
+        self._pose = None
+
+    def follow_lane(self) -> None:
+        """From now on, the road coordinates say where the entity is."""
+        self.locate()
+        if self.road != NOWHERE:
+            self._free_pose = None
+            self._pose = None
+
+    def move_to(self, road: int, lane: int, s: float, offset_t: float) -> None:
+        """New road coordinates, same relative heading."""
+        self.road, self.lane, self.s, self.offset_t = road, lane, s, offset_t
+        self._free_pose = None
+        self._located = True
+        self._pose = None
+
+    def turn(self, relative_heading: float) -> None:
+        """New heading relative to the road's s-direction. [rad]"""
+        self.relative_heading = wrap(relative_heading)
+        self._pose = None
+
+    def locate(self) -> None:
+        """Look up the road coordinates of a free pose."""
+        if self._located or self._free_pose is None:
+            return
+        place = locate(self.network, self._free_pose, near=(self.road, self.s) if self.road != NOWHERE else None)
+        self.road, self.lane, self.s, self.offset_t = place.road, place.lane, place.s, place.offset_t
+        self.relative_heading = place.relative_heading
+        self.section = (0.0, -1.0)
+        self._located = True
+        self._pose = None
+
+    def road_heading(self) -> float:
+        """Heading of the road's s-direction where the entity is; its own without a road. [rad]"""
+        self.locate()
+        return wrap(self.pose.heading - self.relative_heading)
+
+    # ---- what happened to it -----------------------------------------------------------------------------------------
+    def begin_frame(self) -> None:
+        """Forget what happened in the frame before."""
+        self.activity = Activity.ACTIVE if self.active else 0
+        self.longitudinal_taken = False
+        self.speed_taken = False
+        self.teleported = False
+
+    def set_speed(self, speed: float) -> None:
+        """Set the scalar speed. [m/s]"""
+        self.speed = speed
+        self.speed_taken = True
+
+    def take_control(self, activity: Activity) -> None:
+        """An action moves the entity in this frame, both ways; the default driver must not."""
+        self.longitudinal_taken = True
+        self.activity |= activity
+
+    def body_frame(self, vector: tuple[float, float, float]) -> tuple[float, float, float]:
+        """A world vector along the entity's own axes (in the plane)."""
+        heading = self.plane.heading
+        c, s = cos(heading), sin(heading)
+        return vector[0] * c + vector[1] * s, vector[1] * c - vector[0] * s, vector[2]
+
+    # ---- in detail ---------------------------------------------------------------------------------------------------
+    def _pose_on_road(self) -> Pose:
+        network = self.network
+        offset = network.offset_from_offset_t(self.road, self.lane, self.offset_t)
+        pose = network.pose_at(self.road, self.lane, self.s, offset)
+        along = (
+            self.relative_heading if network.travel_direction(self.road, self.lane) > 0 else self.relative_heading - pi
+        )
+        return turned(pose, along)
+
+    def _pose_in_world(self, free: Pose) -> Pose:
+        if free.z == free.z and free.pitch == free.pitch and free.roll == free.roll:
+            return free
+        self.locate()
+        if self.road == NOWHERE:
+            return Pose(free.x, free.y, _or_zero(free.z), free.heading, _or_zero(free.pitch), _or_zero(free.roll))
+        road = self._pose_on_road()
+        z, pitch, roll = (
+            given if given == given else own
+            for given, own in ((free.z, road.z), (free.pitch, road.pitch), (free.roll, road.roll))
+        )
+        return Pose(free.x, free.y, z, free.heading, pitch, roll)
+
+
+def _or_zero(value: float) -> float:
+    return value if value == value else 0.0
+
+
+def turned(pose: Pose, angle: float) -> Pose:
+    """A pose on a surface, turned about the surface's normal. [rad]"""
+    if not angle:
+        return pose
+    turn, pitch, roll = angle, pose.pitch, pose.roll
+    if pitch or roll:
+        turn, pitch, roll = turned_in_surface(turn, pitch, roll)
+    return Pose(pose.x, pose.y, pose.z, wrap(pose.heading + turn), pitch, roll)
+
+
+def locate(network: RoadNetwork, pose: Pose, *, near: tuple[int, float] | None = None) -> Placement:
+    """Road coordinates under a world pose, which is kept; road -1 where the network has no roads."""
+    if not network.road_ids:
+        return Placement(NOWHERE, 0, 0.0, 0.0, pose.heading, pose)
+    found = network.world_to_lane_at(pose.x, pose.y, pose.z if pose.z == pose.z else None, near=near)
+    lane_pose = network.pose_at(found.road, found.lane, found.s, found.offset)
+    heading = difference(pose.heading, lane_pose.heading)
+    if lane_pose.pitch or lane_pose.roll:
+        heading = turn_for_heading(heading, lane_pose.pitch, lane_pose.roll)
+    if network.travel_direction(found.road, found.lane) < 0:
+        heading += pi
+    offset_t = network.offset_from_offset_t(found.road, found.lane, found.offset)
+    return Placement(found.road, found.lane, found.s, offset_t, wrap(heading), pose)
+
+
+def free(x: float, y: float, heading: float, z: float = nan, pitch: float = nan, roll: float = nan) -> Pose:
+    """A world pose of which z, pitch and roll may be left to the road."""
+    return Pose(x, y, z, wrap(heading), pitch, roll)

@@ -1,0 +1,73 @@
+"""Trailers: drawn behind their tractor on a drawbar, the coupler always in the hitch."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from math import atan2, cos, hypot, nan, pi, sin
+
+from xosc_lateral.playback.angles import wrap
+from xosc_lateral.playback.state import EntityState, free
+
+_TRACTOR_HITCH = -1.0
+_TRAILER_COUPLER = 2.0
+"""Where a file says nothing of hitch and coupler: [m] ahead of the reference point."""
+
+
+def connect(tow: EntityState, trailer: EntityState) -> None:
+    """Hitch a trailer; whatever pulled it before lets go."""
+    if trailer.tow is not None:
+        disconnect(trailer.tow)
+    tow.trailer, trailer.tow = trailer, tow
+
+
+def disconnect(tow: EntityState) -> None:
+    """Let the trailer go."""
+    if tow.trailer is not None:
+        tow.trailer.tow = None
+        tow.trailer = None
+
+
+def align_trailers(tow: EntityState) -> None:
+    """Put all trailers straight behind their tractor."""
+    front = tow
+    while (trailer := front.trailer) is not None:
+        pose = front.plane
+        reach = _hitch(front) - _coupler(trailer)
+        trailer.put_in_world(free(pose.x + reach * cos(pose.heading), pose.y + reach * sin(pose.heading), pose.heading))
+        trailer.set_speed(tow.speed)
+        front = trailer
+
+
+def pull_trailers(entities: Iterable[EntityState]) -> None:
+    """Draw every trailer to where its hitch has gone: it turns so that its coupler is there."""
+    for front in entities:
+        if front.tow is not None or front.trailer is None:
+            continue
+        tow = front
+        while (trailer := tow.trailer) is not None:
+            _pull(tow, trailer)
+            trailer.set_speed(tow.speed)
+            tow = trailer
+
+
+def _pull(tow: EntityState, trailer: EntityState) -> None:
+    pose, own = tow.plane, trailer.plane
+    hitch_x = pose.x + _hitch(tow) * cos(pose.heading)
+    hitch_y = pose.y + _hitch(tow) * sin(pose.heading)
+    dx, dy = own.x - hitch_x, own.y - hitch_y
+    length = hypot(dx, dy)
+    if length < 1e-9:
+        dx, dy, length = -cos(own.heading), -sin(own.heading), 1.0
+    reach = _coupler(trailer) / length
+    heading = wrap(atan2(dy, dx) + pi)
+    trailer.put_in_world(free(hitch_x + reach * dx, hitch_y + reach * dy, heading, nan))
+
+
+def _hitch(state: EntityState) -> float:
+    hitch = state.entity.hitch_x
+    return _TRACTOR_HITCH if hitch is None else hitch
+
+
+def _coupler(state: EntityState) -> float:
+    coupler = state.entity.coupler_x
+    return _TRAILER_COUPLER if coupler is None else coupler

@@ -1,0 +1,84 @@
+"""The index of a batch: every output with its picture and numbers, what needs attention first."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from xosc_lateral.report.render import KeyFigure, render_page
+
+
+@dataclass(frozen=True, slots=True)
+class BatchEntry:
+    """One output of a batch.
+
+    Parameters
+    ----------
+    output, scenario : str
+        Paths below the batch's folders.
+    page, thumbnail : str
+        Relative links; empty if there is none.
+    enriched, entities : int
+        Entities that got offsets, and all.
+    segment_seconds : float
+        Road-following time of the enriched entities together. [s]
+    offset_spread : float
+        Standard deviation of all sampled offsets. [m]
+    gap_before, gap_after : float or None
+        Smallest gap between vehicles, nominal and enriched. [m]
+    warnings : tuple of str
+    error : str
+        Why there is no output; empty if there is one.
+    """
+
+    output: str
+    scenario: str
+    page: str
+    thumbnail: str
+    enriched: int
+    entities: int
+    segment_seconds: float
+    offset_spread: float
+    gap_before: float | None
+    gap_after: float | None
+    warnings: tuple[str, ...]
+    error: str
+
+    @property
+    def has_new_contact(self) -> bool:
+        """Whether vehicles touch that nominally don't."""
+        before = float("inf") if self.gap_before is None else self.gap_before
+        return self.gap_after is not None and self.gap_after <= 0.0 < before
+
+    @property
+    def urgency(self) -> tuple[int, int, str]:
+        """Sorts failures first, then contacts, then by the number of warnings."""
+        rank = 0 if self.error else 1 if self.has_new_contact else 2
+        return rank, -len(self.warnings), self.output
+
+
+def batch_page(entries: Iterable[BatchEntry], name: str) -> str:
+    """HTML index of a batch; same entries, same bytes.
+
+    Parameters
+    ----------
+    entries : iterable of BatchEntry
+    name : str
+        Of the output folder.
+    """
+    ranked = sorted(entries, key=lambda entry: entry.urgency)
+    failed = sum(bool(entry.error) for entry in ranked)
+    contacts = sum(entry.has_new_contact for entry in ranked)
+    warned = sum(bool(entry.warnings) for entry in ranked)
+    return render_page(
+        "batch.html",
+        title=f"Batch {name}",
+        provenance={},
+        entries=ranked,
+        numbers=[
+            KeyFigure(len(ranked) - failed, "outputs"),
+            KeyFigure(failed, "failed", tone="bad" if failed else ""),
+            KeyFigure(contacts, "with vehicles that touch", "and nominally don't", "bad" if contacts else ""),
+            KeyFigure(warned, "with warnings"),
+        ],
+    )

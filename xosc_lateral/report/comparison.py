@@ -1,0 +1,223 @@
+"""Several profiles side by side: how each moves, how far each is from each, which are alike."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from xosc_lateral.driver.profile import DriverProfile
+from xosc_lateral.evaluation.comparison import SNIPPET, Habits, free_runs, sum_up
+from xosc_lateral.evaluation.distances import wasserstein
+from xosc_lateral.evaluation.metrics import METRICS, cut_snippets, snippet_metrics
+from xosc_lateral.evaluation.spectra import Spectrum, spectrum
+from xosc_lateral.formats.profiles import profile_hash
+from xosc_lateral.report.figures import INK, PALETTE, figure_style, new_figure
+from xosc_lateral.report.render import render_page
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+FloatArray = NDArray[np.float64]
+
+SHOWN_S = 120.0
+"""Length of the sample paths in the figure. [s]"""
+
+SHOWN = 12
+"""So many profiles are drawn at most; the distances are of all."""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Compared:
+    """Profiles and how they differ.
+
+    Parameters
+    ----------
+    profiles : tuple of DriverProfile
+    habits : tuple of Habits
+    runs : tuple of array
+        Free runs of each, shape (drivers, n). [m]
+    spectra : tuple of Spectrum
+    metrics : array, shape (k, k, 10)
+        Wasserstein distance per metric, in standard deviations over all profiles' snippets. On the diagonal: of a
+        profile from itself, one half of its drivers from the other.
+    seed : int
+    """
+
+    profiles: tuple[DriverProfile, ...]
+    habits: tuple[Habits, ...]
+    runs: tuple[FloatArray, ...]
+    spectra: tuple[Spectrum, ...]
+    metrics: FloatArray
+    seed: int
+
+    @property
+    def distance(self) -> FloatArray:
+        """Mean over the ten metrics, shape (k, k). [-]"""
+        return np.asarray(self.metrics.mean(axis=2))
+
+    @property
+    def groups(self) -> tuple[tuple[str, ...], ...]:
+        """Profiles that are alike: no further apart (average linkage) than the shakiest profile is from itself."""
+        from scipy.cluster.hierarchy import fcluster, linkage
+        from scipy.spatial.distance import squareform
+
+        between = self.distance.copy()
+        floor = float(np.diag(between).max())
+        np.fill_diagonal(between, 0.0)
+        labels = fcluster(linkage(squareform(between, checks=False), "average"), floor, "distance")
+        names = [profile.name for profile in self.profiles]
+        return tuple(tuple(names[k] for k in np.flatnonzero(labels == one)) for one in dict.fromkeys(labels))
+
+
+def compare(profiles: Sequence[DriverProfile], seed: int) -> Compared:
+    """Sample every profile in even traffic and measure each against each; the first's luck is no other's."""
+    runs = [free_runs(profile, seed + number) for number, profile in enumerate(profiles)]
+    snippets = [
+        [snippet_metrics(cut_snippets(run, round(SNIPPET / profile.model.step) + 1)) for run in own]
+        for profile, own in zip(profiles, runs, strict=True)
+    ]
+    pooled = [np.concatenate(own) for own in snippets]
+    scale = np.concatenate(pooled).std(axis=0)
+    scale = np.where(scale > 0.0, scale, 1.0)
+    count = len(profiles)
+    metrics = np.empty((count, count, len(METRICS)))
+    for one in range(count):
+        halves = np.concatenate(snippets[one][::2]), np.concatenate(snippets[one][1::2])
+        metrics[one, one] = _gaps(*halves) / scale
+        for other in range(one):
+            metrics[one, other] = metrics[other, one] = _gaps(pooled[one], pooled[other]) / scale
+    return Compared(
+        tuple(profiles),
+        tuple(sum_up(own, profile.model.step) for profile, own in zip(profiles, runs, strict=True)),
+        tuple(runs),
+        tuple(spectrum(list(own), profile.model.step) for profile, own in zip(profiles, runs, strict=True)),
+        metrics,
+        seed,
+    )
+
+
+def _gaps(one: FloatArray, other: FloatArray) -> FloatArray:
+    return np.array([wasserstein(one[:, k], other[:, k]) for k in range(one.shape[1])])
+
+
+def comparison_text(compared: Compared) -> str:
+    """Table of summaries, distances, and who is alike."""
+    names = [profile.name for profile in compared.profiles]
+    rows = _rows(compared)
+    widths = [max(len(column), *(len(row[column]) for row in rows)) for column in rows[0]]
+    lines = ["  ".join(f"{column:<{width}}" for column, width in zip(rows[0], widths, strict=True))]
+    lines += ["  ".join(f"{text:<{width}}" for text, width in zip(row.values(), widths, strict=True)) for row in rows]
+    distance = compared.distance
+    lines.append(
+        "mean distance of ten metrics of 10 s snippets, in standard deviations (diagonal: two halves of its drivers):"
+    )
+    width = max(map(len, names))
+    for number, name in enumerate(names):
+        lines.append(f"  {name:<{width}}  " + " ".join(f"{value:5.2f}" for value in distance[number]))
+    lines += [f"alike: {', '.join(group)}" for group in compared.groups if len(group) > 1]
+    return "\n".join(line.rstrip() for line in lines)
+
+
+def _rows(compared: Compared) -> list[dict[str, str]]:
+    return [
+        {
+            "profile": profile.name,
+            "model": profile.model.kind,
+            "mean [m]": f"{one.mean_offset:+.2f}",
+            "spread [m]": f"{one.spread:.2f}",
+            "of one driver [m]": f"{one.spread_within:.2f}",
+            "5 % to 95 % [m]": f"{one.low:+.2f} to {one.high:+.2f}",
+            "lateral speed [m/s]": f"{one.lateral_speed:.3f}",
+            "effects": ", ".join(_effect(values) for values in profile.to_dict()["effects"]) or "none",
+        }
+        for profile, one in zip(compared.profiles, compared.habits, strict=True)
+    ]
+
+
+def _effect(values: dict[str, Any]) -> str:
+    columns = values.get("column") or "*".join(factor["column"] for factor in values.get("factors", ()))
+    return f"{columns} ({values['kind']})" if columns else str(values["kind"])
+
+
+def comparison_record(compared: Compared) -> dict[str, Any]:
+    """The same as plain values."""
+    return {
+        "profiles": [
+            {
+                "id": profile.name,
+                "sha256": profile_hash(profile),
+                "model": profile.model.kind,
+                "summary": {key: round(value, 4) for key, value in asdict(one).items()},
+                "effects": [_effect(values) for values in profile.to_dict()["effects"]],
+            }
+            for profile, one in zip(compared.profiles, compared.habits, strict=True)
+        ],
+        "distance": [[round(float(value), 4) for value in row] for row in compared.distance],
+        "metrics": {
+            name: [[round(float(value), 4) for value in row] for row in compared.metrics[:, :, k]]
+            for k, name in enumerate(METRICS)
+        },
+        "alike": [list(group) for group in compared.groups],
+        "seed": compared.seed,
+    }
+
+
+@figure_style()
+def comparison_figure(compared: Compared) -> Figure:
+    """Where in the lane, how fast (spectrum), and sample paths, a colour per profile."""
+    figure, axes = new_figure(1, 3, height=3.4)
+    place, power, paths = axes[0]
+    edges = np.linspace(-1.0, 1.0, 81)
+    shown = list(zip(compared.profiles, compared.runs, compared.spectra, strict=True))[:SHOWN]
+    for number, (profile, runs, density) in enumerate(shown):
+        color, dashes = PALETTE[number % len(PALETTE)], "-" if number < len(PALETTE) else "--"
+        counts, _ = np.histogram(runs, edges, density=True)
+        place.plot(0.5 * (edges[1:] + edges[:-1]), counts, dashes, color=color, label=profile.name)
+        power.loglog(density.frequency, density.density, dashes, color=color)
+        step = profile.model.step
+        rows = slice(0, round(SHOWN_S / step))
+        paths.plot(
+            step * np.arange(len(runs[0][rows])), runs[0][rows] + 0.8 * (len(shown) - number), dashes, color=color
+        )
+    place.set(xlabel="offset [m], left positive", ylabel="density [1/m]", title="Place in the lane")
+    power.set(xlabel="frequency [Hz]", ylabel="power density [m²/Hz]", title="Spectrum")
+    paths.set(xlabel="time [s]", title="Sample paths, 0.8 m apart", yticks=[])
+    figure.legend(*place.get_legend_handles_labels(), loc="outside lower center", ncols=4)
+    return figure
+
+
+@figure_style()
+def distance_figure(compared: Compared) -> Figure:
+    """The matrix of distances."""
+    names = [profile.name for profile in compared.profiles]
+    figure, axes = new_figure(1, 1, height=1.6 + 0.28 * len(names))
+    axis, distance = axes[0, 0], compared.distance
+    axis.grid(visible=False)
+    axis.imshow(distance, cmap="Blues", vmin=0.0, aspect="auto")
+    axis.set_xticks(range(len(names)), names, rotation=60, ha="right")
+    axis.set_yticks(range(len(names)), names)
+    if len(names) <= SHOWN:
+        dark = 0.6 * distance.max()
+        for row, column in np.ndindex(*distance.shape):
+            color = "white" if distance[row, column] > dark else INK
+            axis.text(column, row, f"{distance[row, column]:.2f}", ha="center", va="center", color=color, fontsize=8)
+    return figure
+
+
+def comparison_page(compared: Compared) -> str:
+    """HTML page."""
+    facts = {profile.name: profile_hash(profile)[:12] for profile in compared.profiles}
+    return render_page(
+        "comparison.html",
+        title=f"{len(compared.profiles)} driver profiles compared",
+        provenance={"seed": compared.seed, **facts},
+        alike=[", ".join(group) for group in compared.groups if len(group) > 1],
+        rows=_rows(compared),
+        overview=comparison_figure(compared),
+        left_out=max(0, len(compared.profiles) - SHOWN),
+        distances=distance_figure(compared),
+    )

@@ -1,0 +1,1 @@
+"""What the player on a page is given: a played scenario, packed small."""
