@@ -1,4 +1,4 @@
-"""Whether free runs of `best`, fitted to one drive, move as much as the drive does, at every pace.
+"""Whether free runs of `autoregressive`, fitted to one drive, move as much as the drive does, at every pace.
 
     python -m benchmarks.core_spread [DRIVE_TABLE ...] [--seeds 40 80]
 
@@ -20,18 +20,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tests.profiles import as_drive
-from tests.simulators import simulate_drive
-from xosc_lateral.driver import best_fit
-from xosc_lateral.driver.autoregression import Autoregression, fit_autoregression, stabilise
-from xosc_lateral.driver.best import BestModel
-from xosc_lateral.driver.best_batch import sample_batch
-from xosc_lateral.driver.series import PAPER_RULES, STEP, Drive, all_runs
+from xosc_lateral.datasets import simulate_drive
+from xosc_lateral.driver.models.autoregressive import fit as fitting
+from xosc_lateral.driver.models.autoregressive.autoregression import Autoregression, fit_autoregression, stabilise
+from xosc_lateral.driver.models.autoregressive.fit_matching import simulate
+from xosc_lateral.driver.models.autoregressive.model import AutoregressiveModel
+from xosc_lateral.drives.cuts import PAPER_RULES, all_runs
+from xosc_lateral.drives.drive import Drive
+from xosc_lateral.drives.resampling import STEP
+from xosc_lateral.evaluation.distances import snippet_distances
 from xosc_lateral.formats.drives import read_drives
-from xosc_lateral.loop.distance import snippet_distances
-from xosc_lateral.loop.timeline import Timeline, join_drives, local_mean
+from xosc_lateral.identification.timeline import Timeline, join_drives, local_mean
 
 FloatArray = NDArray[np.float64]
-Fit = Callable[[Sequence[FloatArray]], BestModel]
+Fit = Callable[[Sequence[FloatArray]], AutoregressiveModel]
 
 TIMES = (1.0, 3.0, 8.0, 20.0, 60.0, 200.0)
 """Averaging times between which the bands lie. [s]"""
@@ -39,9 +41,9 @@ TIMES = (1.0, 3.0, 8.0, 20.0, 60.0, 200.0)
 SNIPPET = 51
 
 
-def per_driver(runs: Sequence[FloatArray], order: int = best_fit.DEFAULT_SETTINGS.order) -> BestModel:
-    settings = best_fit.BestSettings(order=order)
-    return best_fit.fit_best(runs, ["one"] * len(runs), settings)
+def per_driver(runs: Sequence[FloatArray], order: int = fitting.DEFAULT_SETTINGS.order) -> AutoregressiveModel:
+    settings = fitting.FitSettings(order=order)
+    return fitting.fit_autoregressive(runs, ["one"] * len(runs), settings)
 
 
 def calm_moments(seconds: float) -> Fit:
@@ -64,8 +66,8 @@ def calm_moments(seconds: float) -> Fit:
             coefficients = np.linalg.solve(normal, right)
         return Autoregression(stabilise(coefficients), first.scale)
 
-    def fit(runs: Sequence[FloatArray]) -> BestModel:
-        with patch.object(best_fit, "fit_autoregression", weighted):
+    def fit(runs: Sequence[FloatArray]) -> AutoregressiveModel:
+        with patch.object(fitting, "fit_autoregression", weighted):
             return per_driver(runs)
 
     return fit
@@ -98,7 +100,7 @@ def score(drive: Drive, fit: Fit, n_runs: int, number: int) -> tuple[FloatArray,
     logs = [np.log(bands(np.where(timeline.valid, values, 0.0), timeline)) for values in sampled]
     measured = np.log(bands(timeline.offset / timeline.lane_width, timeline))
     real = np.concatenate([run[: len(run) // SNIPPET * SNIPPET].reshape(-1, SNIPPET) for run in runs])
-    made = sample_batch(model, real[:, 0], SNIPPET, np.random.default_rng(0), start=True)
+    made = simulate(model, SNIPPET, 0, drivers=len(real), starts=real[:, 0])
     return np.mean(logs, axis=0) - measured, float(np.mean(list(snippet_distances(real, made).by_metric.values())))
 
 

@@ -9,7 +9,7 @@ import argparse
 from pathlib import Path
 
 import numpy as np
-from baselines import write_between_markers
+from markers import write_between_markers
 from numpy.typing import NDArray
 
 from xosc_lateral.formats.importers import dlr_ht, lanes_from_tracks

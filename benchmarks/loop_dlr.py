@@ -1,4 +1,4 @@
-"""The closed loop over real motorway traffic: figures and tables of docs/closing_the_loop.md, section 6.
+"""The closed loop over real motorway traffic: figures and tables of docs/closing_the_loop.md, section 5.
 
     xosc-lateral import dlr-ht tasi-0.15.4-py3-none-any.whl -o dlr.parquet
     python -m benchmarks.loop_dlr dlr.parquet [--seed 1] [--write docs/closing_the_loop.md] [--figures docs/figures]
@@ -16,8 +16,8 @@ from typing import TYPE_CHECKING
 
 from xosc_lateral.formats.atomic import write_atomically
 from xosc_lateral.formats.drives import read_drives
-from xosc_lateral.loop.close import LoopResult
-from xosc_lateral.loop.leftover import Leftover, leftover_of
+from xosc_lateral.identification.close import LoopResult
+from xosc_lateral.identification.leftover import Leftover, leftover_of
 from xosc_lateral.pipeline.refined import refine_population
 from xosc_lateral.report.figures import PAPER
 from xosc_lateral.report.loop import loop_text

@@ -1,7 +1,7 @@
 """What each part of our model is worth: it left out, the rest fitted anew, on held-out drives.
 
     xosc-lateral import dlr-ht tasi-0.15.4-py3-none-any.whl -o dlr.parquet
-    python benchmarks/model_choice.py dlr.parquet [--splits 8] [--classifier] [--write docs/model.md]
+    python benchmarks/model_choice.py dlr.parquet [--splits 8] [--classifier] [--write docs/validation/driver_model.md]
 
 Half of the drives is fitted, snippets of the other half are sampled from their starts; a ratio is the mean (or worst)
 over the ten metrics of the Wasserstein distance, divided by that between the two real halves.
@@ -10,25 +10,28 @@ over the ten metrics of the Wasserstein distance, divided by that between the tw
 from __future__ import annotations
 
 import argparse
+import dataclasses
 import re
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+from msgspec.structs import replace
 from numpy.typing import NDArray
 
-from xosc_lateral.driver.best import BestModel
-from xosc_lateral.driver.best_batch import sample_batch
-from xosc_lateral.driver.best_fit import DEFAULT_SETTINGS, _matched, fit_best
-from xosc_lateral.driver.core import Start
-from xosc_lateral.driver.liveliness import Liveliness
-from xosc_lateral.driver.series import Run, all_runs
-from xosc_lateral.driver.two_level import fit_two_level
+from xosc_lateral.driver.models.autoregressive.fit import fit_autoregressive
+from xosc_lateral.driver.models.autoregressive.fit_matching import matched, simulate
+from xosc_lateral.driver.models.autoregressive.fit_settings import DEFAULT_SETTINGS
+from xosc_lateral.driver.models.autoregressive.model import AutoregressiveModel
+from xosc_lateral.driver.models.autoregressive.volatility import Volatility
+from xosc_lateral.driver.models.base import Start
+from xosc_lateral.driver.models.two_level.fit import fit_two_level
+from xosc_lateral.drives.cuts import all_runs
+from xosc_lateral.drives.drive import Run
+from xosc_lateral.evaluation.classifier import told_apart
+from xosc_lateral.evaluation.distances import snippet_distances, split_groups
+from xosc_lateral.evaluation.metrics import METRICS
 from xosc_lateral.formats.drives import read_drives
-from xosc_lateral.loop.classifier import told_apart
-from xosc_lateral.loop.distance import snippet_distances, split_groups
-from xosc_lateral.loop.metrics import METRICS
 
 FloatArray = NDArray[np.float64]
 Sampler = Callable[[FloatArray, int, np.random.Generator], FloatArray]
@@ -36,20 +39,20 @@ LENGTHS = {"10 s": 51, "60 s": 301}
 MARKER = "model-choice"
 
 
-def best(runs: Sequence[Run], **settings: object) -> BestModel:
-    return fit_best(
-        [run.rel_offset for run in runs], [run.drive for run in runs], replace(DEFAULT_SETTINGS, **settings)
+def autoregressive(runs: Sequence[Run], **settings: object) -> AutoregressiveModel:
+    return fit_autoregressive(
+        [run.rel_offset for run in runs], [run.drive for run in runs], dataclasses.replace(DEFAULT_SETTINGS, **settings)
     )
 
 
-def batch(model: BestModel) -> Sampler:
-    return lambda starts, n, rng: sample_batch(model, starts, n, rng, start=True)
+def batch(model: AutoregressiveModel) -> Sampler:
+    return lambda starts, n, rng: simulate(model, n, int(rng.integers(1 << 62)), drivers=len(starts), starts=starts)
 
 
 def rematched(runs: Sequence[Run], **parts: object) -> Sampler:
     """Our model with parts replaced, its scales matched anew."""
-    model = replace(best(runs), **parts)
-    return batch(_matched(model, [run.rel_offset for run in runs], DEFAULT_SETTINGS))
+    model = replace(autoregressive(runs), **parts)
+    return batch(matched(model, [run.rel_offset for run in runs], DEFAULT_SETTINGS))
 
 
 def two_level(runs: Sequence[Run]) -> Sampler:
@@ -64,35 +67,35 @@ def two_level(runs: Sequence[Run]) -> Sampler:
     return sample
 
 
-def keeps(part: Liveliness) -> Liveliness:
+def keeps(part: Volatility) -> Volatility:
     return replace(part, within=0.0, slow=0.0)
 
 
 def one_driver(runs: Sequence[Run]) -> Sampler:
-    return batch(fit_best([run.rel_offset for run in runs], ["all"] * len(runs)))
+    return batch(fit_autoregressive([run.rel_offset for run in runs], ["all"] * len(runs)))
 
 
 def steady_drivers(runs: Sequence[Run]) -> Sampler:
-    model = best(runs)
-    parts = {"coarse_liveliness": keeps(model.coarse_liveliness), "fine_liveliness": keeps(model.fine_liveliness)}
+    model = autoregressive(runs)
+    parts = {"coarse_volatility": keeps(model.coarse_volatility), "fine_volatility": keeps(model.fine_volatility)}
     return rematched(runs, **parts)
 
 
 VARIANTS: dict[str, Callable[[Sequence[Run]], Sampler]] = {
     "two levels (the paper)": two_level,
-    "**best**": lambda runs: batch(best(runs)),
+    "**autoregressive**": lambda runs: batch(autoregressive(runs)),
     "all drivers are one": one_driver,
     "drivers differ, but never change": steady_drivers,
-    "no liveliness at all": lambda runs: rematched(
-        runs, coarse_liveliness=Liveliness(), fine_liveliness=Liveliness(), correlation=0.0
+    "no volatility at all": lambda runs: rematched(
+        runs, coarse_volatility=Volatility(), fine_volatility=Volatility(), correlation=0.0
     ),
-    "coarse and fine mood apart": lambda runs: batch(replace(best(runs), correlation=0.0)),
-    "memory of 2 s": lambda runs: batch(best(runs, order=2)),
-    "memory of 4 s": lambda runs: batch(best(runs, order=4)),
-    "memory of 8 s": lambda runs: batch(best(runs, order=8)),
-    "memory of 24 s": lambda runs: batch(best(runs, order=24)),
-    "scale by spread alone": lambda runs: batch(best(runs, pace_weight=0.0)),
-    "scale by pace alone": lambda runs: batch(best(runs, pace_weight=1.0)),
+    "coarse and fine volatility apart": lambda runs: batch(replace(autoregressive(runs), correlation=0.0)),
+    "memory of 2 s": lambda runs: batch(autoregressive(runs, order=2)),
+    "memory of 4 s": lambda runs: batch(autoregressive(runs, order=4)),
+    "memory of 8 s": lambda runs: batch(autoregressive(runs, order=8)),
+    "memory of 24 s": lambda runs: batch(autoregressive(runs, order=24)),
+    "scale by spread alone": lambda runs: batch(autoregressive(runs, speed_weight=0.0)),
+    "scale by speed alone": lambda runs: batch(autoregressive(runs, speed_weight=1.0)),
 }
 
 

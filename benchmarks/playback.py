@@ -18,7 +18,7 @@ from xosc_lateral.errors import XoscLateralError
 from xosc_lateral.formats.opendrive import read_opendrive
 from xosc_lateral.formats.openscenario import read_scenario
 from xosc_lateral.motion.nominal import NominalMotion
-from xosc_lateral.motion.playback import play
+from xosc_lateral.playback.player import play
 from xosc_lateral.road import RoadNetwork
 
 

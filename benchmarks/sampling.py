@@ -19,7 +19,9 @@ from xosc_lateral.driver.effects import Acts, Drift, Linear
 from xosc_lateral.driver.fitting import fit_runs
 from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.driver.sampling import OffsetSampler
-from xosc_lateral.driver.series import STEP, Run, all_runs
+from xosc_lateral.drives.cuts import all_runs
+from xosc_lateral.drives.drive import Run
+from xosc_lateral.drives.resampling import STEP
 from xosc_lateral.formats.drives import read_drives
 from xosc_lateral.segment import Segment
 

@@ -14,10 +14,10 @@ from typing import Any
 
 import numpy as np
 
+from xosc_lateral.driver.models.two_level.fit import fit_two_level
 from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.driver.sampling import sample_offsets
 from xosc_lateral.driver.stream import OffsetStream
-from xosc_lateral.driver.two_level import fit_two_level
 from xosc_lateral.driver.upsampling import upsample
 from xosc_lateral.formats.profiles import read_profile
 from xosc_lateral.segment import Segment

@@ -12,12 +12,14 @@ import argparse
 from pathlib import Path
 
 import numpy as np
-from baselines import write_between_markers
+from markers import write_between_markers
 
 from xosc_lateral.driver.fitting import fit_runs
-from xosc_lateral.driver.series import STEP, Run, all_runs
+from xosc_lateral.drives.cuts import all_runs
+from xosc_lateral.drives.drive import Run
+from xosc_lateral.drives.resampling import STEP
+from xosc_lateral.evaluation.comparison import told_from_each_other
 from xosc_lateral.formats.drives import read_drives
-from xosc_lateral.loop.compare import told_from_each_other
 from xosc_lateral.pipeline.library import sliding_snippets, split_in_time
 
 

@@ -10,15 +10,14 @@ from __future__ import annotations
 import json
 import sqlite3
 import sys
+from collections.abc import Hashable, Mapping
 from contextlib import closing
 from pathlib import Path
+from typing import Any
 
-from xosc_lateral.formats.atomic import write_atomically
-from xosc_lateral.pipeline.batch import Outcome, State, convert_many
-from xosc_lateral.pipeline.jobs import plan_batch
-from xosc_lateral.pipeline.request import Request
-from xosc_lateral.pipeline.settings import ConvertSettings
-from xosc_lateral.templates import TEMPLATES
+import pandas as pd
+
+import xosc_lateral as xl
 
 SCHEMA = """
 CREATE TABLE IF NOT EXISTS scenario (id INTEGER PRIMARY KEY, path TEXT UNIQUE, seed INTEGER NOT NULL);
@@ -40,15 +39,13 @@ def main(out: Path) -> None:
 
 
 def fill(database: sqlite3.Connection, folder: Path) -> None:
-    """Write templates and list them with their tags; what is there already stays."""
-    folder.mkdir(exist_ok=True)
+    """Write templates and list them with their tags."""
     database.executescript(SCHEMA)
     with database:
-        for seed, template in enumerate(TEMPLATES[:3]):
-            path = folder / f"{template.name}.xosc"
-            for name, text in template.files().items():
-                if not (folder / name).exists():
-                    write_atomically(folder / name, text)
+        for seed, name in enumerate(("cut-in", "braking-leader", "overtake-truck")):
+            path = folder / f"{name}.xosc"
+            if not path.exists():
+                xl.write_template(name, folder)
             database.execute("INSERT OR IGNORE INTO scenario (path, seed) VALUES (?, ?)", (str(path), seed))
             tags = ("motorway", "regression") if seed != 1 else ("motorway",)
             database.executemany(
@@ -59,41 +56,41 @@ def fill(database: sqlite3.Connection, folder: Path) -> None:
 
 def enrich(database: sqlite3.Connection, tag: str, folder: Path) -> None:
     """Convert the tagged scenarios and record what is new: all of it or, if anything goes wrong, nothing."""
-    selected = database.execute(
-        "SELECT path, id, seed FROM scenario JOIN tag ON tag.scenario_id = scenario.id WHERE tag.name = ?", (tag,)
-    ).fetchall()
-    requests = [Request(Path(path), ConvertSettings(profile="motorway-car", seed=seed)) for path, _, seed in selected]
-    ids = {Path(path).name: scenario_id for path, scenario_id, _ in selected}
-    batch = plan_batch(requests, folder)
+    selected = pd.read_sql_query(
+        "SELECT path AS scenario, seed, id FROM scenario JOIN tag ON tag.scenario_id = scenario.id WHERE tag.name = ?",
+        database,
+        params=(tag,),
+    )
+    batch = xl.convert_many(selected, folder, profile="motorway-car")  # columns scenario and seed; others are ours
+    ids = {Path(path).name: int(number) for path, number in zip(selected["scenario"], selected["id"], strict=True)}
     known = dict(database.execute("SELECT path, sha256 FROM lifelike").fetchall())
-    outcomes = list(convert_many(batch))
-    new = [outcome for outcome in outcomes if known.get(str(folder / outcome.row.output)) != outcome.row.output_hash]
-    converted = sum(outcome.state is not State.UP_TO_DATE for outcome in outcomes)
+    outputs = batch.to_frame()
+    new = [row for row in outputs.to_dict("records") if known.get(str(folder / row["output"])) != row["output_sha256"]]
     with database:
         database.executemany(
             "INSERT OR REPLACE INTO lifelike VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
-            [record(outcome, folder, ids) for outcome in new],
+            [record(row, folder, ids) for row in new],
         )
     count, gap = database.execute("SELECT count(*), min(smallest_gap) FROM lifelike WHERE error = ''").fetchone()
+    converted = int((outputs["state"] != "up to date").sum())
     print(f"{len(selected)} tagged {tag!r}: {converted} converted, {len(new)} recorded")
     print(f"{count} in the database, smallest gap {gap:.2f} m")
 
 
-def record(outcome: Outcome, folder: Path, ids: dict[str, int]) -> tuple[object, ...]:
+def record(row: Mapping[Hashable, Any], folder: Path, ids: dict[str, int]) -> tuple[object, ...]:
     """The database's row of an output."""
-    row = outcome.row
     return (
-        str(folder / row.output),
-        ids[row.scenario],
-        row.output_hash,
-        row.seed,
-        row.variant,
-        json.dumps(dict(row.profiles)),
-        json.dumps(dict(row.inputs)),
-        row.package_version,
-        row.segment_seconds,
-        row.gap_after,
-        row.error,
+        str(folder / row["output"]),
+        ids[Path(row["scenario"]).name],
+        row["output_sha256"],
+        row["seed"],
+        row["variant"],
+        json.dumps(row["profiles"]),
+        json.dumps(row["inputs"]),
+        row["package_version"],
+        row["segment_seconds"],
+        row["gap_after"],
+        row["error"],
     )
 
 

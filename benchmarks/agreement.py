@@ -1,0 +1,162 @@
+"""Agreement with the reference player: every scenario of a folder is played here and there, and all rows compared.
+
+    python benchmarks/agreement.py FOLDER... --esmini PATH [--esmini-option NAME] [--limit N] [--step 0.02]
+
+PATH is esmini's executable; a headless build is enough (docs/playing.md says which version was used). Several
+folders or scenarios may be given; `--limit N` takes N, evenly spread. A scenario agrees when no row is more than 0.10 m
+or 0.05 m/s away, and the ends are no more than 0.1 s apart. What esmini can't play is counted apart.
+"""
+
+from __future__ import annotations
+
+import argparse
+import subprocess
+import tempfile
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from xosc_lateral.errors import XoscLateralError
+from xosc_lateral.motion.nominal import Activity
+from xosc_lateral.pipeline.load import Played, play_scenario
+
+FARTHEST = 0.10
+"""[m]"""
+FASTEST = 0.05
+"""[m/s]"""
+ENDS_APART = 0.1
+"""[s]"""
+PATIENCE = 120.0
+"""For one scenario in the other player. [s]"""
+
+
+def reference_rows(
+    esmini: Path, scenario: Path, step: float, limit: float, switches: Sequence[str] = ()
+) -> pd.DataFrame:
+    """`time,name,x,y,speed` as esmini logs them; empty if it can't play the scenario."""
+    with tempfile.TemporaryDirectory() as folder:
+        log = Path(folder) / "log.csv"
+        command = [str(esmini), "--osc", str(scenario.resolve()), "--headless", "--fixed_timestep", str(step)]
+        command += ["--disable_controllers", "--disable_stdout", "--seed", "1", "--csv_logger", str(log)]
+        command += ["--logfile_path", str(Path(folder) / "log.txt"), *(f"--{name}" for name in switches)]
+        player = subprocess.Popen(command, cwd=folder, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        _wait(player, log, limit)
+        lines = log.read_text(errors="replace").splitlines() if log.is_file() else []
+    rows = [row for row in _rows(lines) if row[0] < limit + 1e-6]
+    return pd.DataFrame(rows, columns=["time", "name", "x", "y", "speed"])
+
+
+def _wait(player: subprocess.Popen[bytes], log: Path, limit: float) -> None:
+    """Until it ends; a scenario without an end is stopped after the limit."""
+    for _ in range(int(PATIENCE / 0.2)):
+        try:
+            player.wait(0.2)
+            return
+        except subprocess.TimeoutExpired:
+            if _last_time(log) > limit:
+                break
+    player.kill()
+    player.wait()
+
+
+def _last_time(log: Path) -> float:
+    if not log.is_file():
+        return 0.0
+    with log.open("rb") as file:
+        file.seek(max(log.stat().st_size - (1 << 16), 0))
+        lines = file.read().split(b"\n")[1:-1]  # the first and the last one may be cut
+    fields = lines[-1].split(b",") if lines else []
+    return float(fields[1]) if len(fields) > 2 and fields[0].isdigit() else 0.0
+
+
+def _rows(lines: list[str]) -> Iterator[tuple[float, str, float, float, float]]:
+    columns: list[str] = []
+    wanted = ("World_Position_X", "World_Position_Y", "Current_Speed")
+    for line in lines:
+        fields = [field.strip() for field in line.split(",")]
+        if fields[0].startswith("Index"):
+            columns = [name.removeprefix("#1 ").split(" [")[0] for name in fields if name.startswith("#1 ")]
+        elif columns and fields[0].isdigit():
+            for first in range(2, len(fields) - len(columns) + 1, len(columns)):
+                one = dict(zip(columns, fields[first : first + len(columns)], strict=True))
+                x, y, speed = (float(one[name]) for name in wanted)
+                yield float(fields[1]), one["Entity_Name"], x, y, speed
+
+
+def own_rows(played: Played) -> pd.DataFrame:
+    """The same columns."""
+    frames = []
+    for entity in played.motion.entities:
+        rows = (entity.activity & Activity.ACTIVE) != 0
+        x, y, *_ = played.network.header_offset.apply(entity.x, entity.y, entity.z, entity.heading)
+        values = {"time": entity.time, "x": x, "y": y, "speed": entity.speed}
+        frames.append(pd.DataFrame({name: column[rows] for name, column in values.items()}).assign(name=entity.name))
+    return pd.concat(frames)
+
+
+def difference(theirs: pd.DataFrame, ours: pd.DataFrame, step: float, limit: float) -> str:
+    """What is different; empty if they agree."""
+    if set(theirs["name"]) != set(ours["name"]):
+        return f"other entities: {', '.join(sorted(set(theirs['name']) ^ set(ours['name'])))[:80]}"
+    frames = [
+        frame.assign(row=np.rint(frame["time"] / step).astype(int)).drop_duplicates(["name", "row"], keep="last")
+        for frame in (theirs, ours)
+    ]
+    both = frames[0].merge(frames[1], on=["name", "row"], suffixes=("", "_ours"))
+    away = np.hypot(both["x"] - both["x_ours"], both["y"] - both["y_ours"])
+    faster = (both["speed"] - both["speed_ours"]).abs()
+    end, own_end = theirs["time"].max(), ours["time"].max()
+    found = []
+    if min(end, own_end) < limit - 0.1 and abs(end - own_end) > ENDS_APART:
+        found.append(f"ends at {own_end:.2f} instead of {end:.2f} s")
+    if away.max() > FARTHEST or faster.max() > FASTEST:
+        first = both[(away > FARTHEST) | (faster > FASTEST)].iloc[0]
+        found.append(f"{away.max():.2f} m, {faster.max():.2f} m/s, first {first['name']} at {first['time']:.2f} s")
+    if len(both) < 0.98 * len(frames[0]):
+        found.append(f"{len(both)} of {len(frames[0])} rows")
+    return "; ".join(found)
+
+
+def scenarios(places: Sequence[Path], limit: int | None) -> list[Path]:
+    """Scenarios in the folders, no catalogs; `limit` of them, evenly spread."""
+    found = [path for place in places for path in ([place] if place.is_file() else sorted(place.rglob("*.xosc")))]
+    kept = [path for path in found if b"<Storyboard" in path.read_bytes()]
+    if limit is None or limit >= len(kept):
+        return kept
+    return [kept[k] for k in np.linspace(0, len(kept) - 1, limit).astype(int)]
+
+
+def main() -> None:
+    """Compare, print what differs and how many agree."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("folder", type=Path, nargs="+")
+    parser.add_argument("--esmini", type=Path, required=True)
+    parser.add_argument(
+        "--esmini-option", action="append", default=[], metavar="NAME", help="such as align_routepositions"
+    )
+    parser.add_argument("--limit", type=int, help="this many scenarios, evenly spread")
+    parser.add_argument("--step", type=float, default=0.02)
+    parser.add_argument("--time-limit", type=float, default=60.0)
+    options = parser.parse_args()
+    agreeing = played_there = not_played_there = 0
+    for path in scenarios(options.folder, options.limit):
+        theirs = reference_rows(options.esmini.resolve(), path, options.step, options.time_limit, options.esmini_option)
+        if theirs["time"].nunique() < 3:
+            not_played_there += 1
+            continue
+        played_there += 1
+        try:
+            ours = own_rows(play_scenario(path, step=options.step, time_limit=options.time_limit))
+            found = difference(theirs, ours, options.step, options.time_limit)
+        except XoscLateralError as error:
+            found = " ".join(str(error).split())
+        agreeing += not found
+        if found:
+            print(f"{path.parent.name}/{path.name}: {found}", flush=True)
+    print(f"{agreeing} of {played_there} agree; {not_played_there} can't be played by the reference player")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,34 @@
+"""Build the shipped driver profiles from the public recording: what `make profiles` runs.
+
+python -m benchmarks.build_library tasi-0.15.4-py3-none-any.whl -o FOLDER [--cards docs/profiles.md]
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Sequence
+from pathlib import Path
+
+from xosc_lateral.formats.atomic import write_atomically
+from xosc_lateral.formats.profiles import write_profile
+from xosc_lateral.pipeline.library import build_library
+from xosc_lateral.report.cards import library_page
+
+
+def main(argv: Sequence[str] | None = None) -> None:
+    """Build the library and write it, with its cards."""
+    ask = argparse.ArgumentParser(description="Build the shipped driver profiles from the public recording.")
+    ask.add_argument("source", type=Path)
+    ask.add_argument("-o", "--output", type=Path, required=True, metavar="FOLDER")
+    ask.add_argument("--cards", type=Path, metavar="PAGE.md")
+    ask.add_argument("--model", default="best")
+    args = ask.parse_args(argv)
+    profiles = build_library(args.source, model=args.model)
+    for profile in profiles:
+        write_profile(profile, args.output / f"{profile.name}.json")
+    if args.cards is not None:
+        write_atomically(args.cards, library_page(profiles))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,246 @@
+"""The protocol of proof, run: what is named on drives with known truth, beside what an oracle can see.
+
+    python -m benchmarks.identification_study --set design|validation|test [--only NAME] [-o OUT.jsonl]
+
+docs/validation/identification.toml fixes seeds, movements, kinds, sizes and counts; `--share` runs a part of them. One
+line per drive goes to OUT.jsonl as it is finished; `--table OUT.jsonl` prints the tables of the documents.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+import time
+import tomllib
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from benchmarks.identification_drives import (
+    answered,
+    baited,
+    long_drive,
+    quantity,
+    short_drives,
+    unit,
+    with_mean,
+    with_spread,
+)
+from xosc_lateral.formats.drives import drives_of_table
+from xosc_lateral.identification.identify import identify
+from xosc_lateral.identification.regression import Coarse, fit_model
+from xosc_lateral.identification.timeline import coarse_mean, join_drives
+
+PROTOCOL = Path(__file__).parents[1] / "docs" / "validation" / "identification.toml"
+
+
+def cases(protocol: dict[str, Any], which: str, share: float) -> Iterator[dict[str, Any]]:
+    """Every drive of a set, in a fixed order."""
+    counts, movements, first = protocol["counts"][which], protocol["movements"][which], protocol["seeds"][which]
+    wanted: list[dict[str, Any]] = [{"type": "null", "name": "null"}] * max(1, round(share * counts["null"]))
+    wanted += [{"type": "null_short", "name": "null, short"}] * max(1, round(share * counts["null_short"]))
+    repeats = max(1, round(share * counts["effect"]))
+    for bait in protocol["bait"]:
+        wanted += [{"type": "bait", "name": bait["name"]}] * repeats
+    for key, kind in (("kind", "effect"), ("short_kind", "effect_short")):
+        for entry in protocol[key]:
+            for size in entry.get("sizes", entry.get("factors")):
+                what = "factor" if "factors" in entry else "size"
+                accepted = [entry.get("columns", [_plain(entry["quantity"])]), *entry.get("accepted", [])]
+                planted = {"type": kind, "name": entry["name"], what: size, "accepted": accepted}
+                wanted += [planted] * repeats
+    for place, case in enumerate(wanted):
+        yield {**case, "seed": first + place, "movement": movements[place % len(movements)]}
+
+
+def run(case: dict[str, Any], protocol: dict[str, Any], seconds: float) -> dict[str, Any]:
+    """Make one drive, identify, and compare with the truth."""
+    seed, drives = case["seed"], protocol["drives"]
+    if case["type"].endswith("short"):
+        table = short_drives(drives["short_drives"], tuple(drives["short_s"]), seed)
+    else:
+        table = long_drive(case["movement"], seconds, seed)
+    bare = table
+    if case["type"] == "bait":
+        table = baited(table, case["name"], seed)
+    elif case["name"].startswith("slow vehicles"):
+        usual = table.groupby("drive")["speed"].transform("mean")
+        table = table.assign(offset=table["offset"] + case["size"] * unit(usual.to_numpy()))
+    elif "size" in case:
+        table = with_mean(table, case["name"], case["size"], seed)
+    elif "factor" in case:
+        table = with_spread(table, case["name"], case["factor"], seed)
+    started = time.process_time()
+    coarse = Coarse.of(join_drives(drives_of_table(table, {})))
+    found = identify(coarse, np.random.SeedSequence(1))
+    outcome = dict(case)
+    outcome["cpu_s"] = round(time.process_time() - started, 1)
+    outcome["named"] = [[one.term.kind, sorted(one.term.columns), one.p_value] for one in found.selection.accepted]
+    outcome["feedback"] = [
+        [one.column, round(one.coherence, 3), round(one.foretold, 3), one.doubtful] for one in found.feedback
+    ]
+    outcome["p_mean"] = found.least("mean")
+    if "size" in case and not case["name"].startswith("slow vehicles"):
+        outcome |= _oracle(case, bare, coarse, seed)
+        outcome |= _size(case, found, coarse)
+    return outcome
+
+
+def _oracle(case: dict[str, Any], table: pd.DataFrame, coarse: Coarse, seed: int) -> dict[str, float]:
+    """z of the planted answer itself in the same regression, its timing told."""
+    from dataclasses import dataclass
+
+    from xosc_lateral.identification.terms.mean import MeanTerm
+
+    time_, values = table["time"].to_numpy(), unit(quantity(case["name"], table))
+    if "drive" in table:
+        names, drives = table["drive"].to_numpy(), coarse.timeline.names
+        rows = [np.flatnonzero(names == name) for name in drives]
+    else:
+        rows = [np.arange(len(table))]
+    fine = np.zeros(len(coarse.timeline))
+    for span, own in zip(coarse.timeline.spans, rows, strict=True):
+        answer = answered(values[own], time_[own], np.random.default_rng([7, seed]))
+        grid = time_[own][0] + coarse.timeline.step * (np.arange(span.stop - span.start) - 75)
+        fine[span] = np.interp(grid, time_[own], answer)
+    told = coarse_mean(fine)
+    told = told - told[coarse.valid].mean()
+
+    @dataclass(frozen=True, eq=False)
+    class Told(MeanTerm):
+        def mean_columns(self, coarse: Coarse) -> np.ndarray:
+            return told[:, None]
+
+    fitted = fit_model(coarse, (Told(None),))  # type: ignore[arg-type]
+    error = float(np.sqrt(fitted.covariance[0, 0]))
+    return {"oracle_z": float(fitted.sizes[0]) / error, "oracle_size": float(fitted.sizes[0]), "oracle_error": error}
+
+
+def _size(case: dict[str, Any], found: Any, coarse: Coarse) -> dict[str, float]:
+    for one in found.selection.accepted:
+        if (
+            sorted(one.term.columns) in [sorted(columns) for columns in case["accepted"]]
+            and one.term.kind == "location"
+        ):
+            effects = one.term.estimate(found.selection.final)
+            told = one.term.describe(found.selection.final, effects, "")
+            return {"found_size": told.size, "found_error": told.error}
+    return {}
+
+
+def right(outcome: dict[str, Any]) -> bool:
+    """Whether the planted thing is named."""
+    kind = "scale" if "factor" in outcome else "location"
+    accepted = [sorted(columns) for columns in outcome["accepted"]]
+    if outcome["name"] == "both neighbours":
+        return all(any(columns == [one] for _, columns, _ in outcome["named"]) for one in outcome["accepted"][0])
+    return any(k == kind and columns in accepted for k, columns, _ in outcome["named"])
+
+
+def false(outcome: dict[str, Any]) -> list[Any]:
+    """What is named and was not planted."""
+    accepted = [sorted(columns) for columns in outcome.get("accepted", [])]
+    if outcome["name"] == "both neighbours":
+        accepted += [[one] for one in outcome["accepted"][0]]
+    kind = "scale" if "factor" in outcome else "location"
+    return [one for one in outcome["named"] if not (one[0] == kind and one[1] in accepted)]
+
+
+def table(outcomes: list[dict[str, Any]]) -> str:
+    """Markdown: per kind and size, the oracle's z, how many are named, what is false."""
+    lines = [
+        "| drives | size | drives | oracle z (median) | z >= 5 | of these named | all named | something false |",
+        "|---|---|---|---|---|---|---|---|",
+    ]
+    groups: dict[tuple[str, Any], list[dict[str, Any]]] = {}
+    for one in outcomes:
+        groups.setdefault((one["name"], one.get("size", one.get("factor", ""))), []).append(one)
+    for (name, size), own in groups.items():
+        z = [abs(one["oracle_z"]) for one in own if "oracle_z" in one]
+        seen = [one for one in own if abs(one.get("oracle_z", 0.0)) >= 5.0]
+        named = sum(right(one) for one in seen) if seen else ""
+        hits = sum(right(one) for one in own) if "accepted" in own[0] else ""
+        wrong = sum(bool(false(one)) for one in own)
+        median = f"{np.median(z):.1f}" if z else ""
+        lines.append(
+            f"| {name} | {size} | {len(own)} | {median} | {len(seen) if z else ''} | {named} | {hits} | {wrong} |"
+        )
+    return "\n".join(lines)
+
+
+def calibration(outcomes: list[dict[str, Any]]) -> str:
+    """p-values on nulls, and cover of the intervals."""
+    p = np.array([one["p_mean"] for one in outcomes if one["type"].startswith("null") and one["p_mean"] is not None])
+    told = [one for one in outcomes if "oracle_size" in one]
+    cover = (
+        np.mean([abs(one["oracle_size"] - one["size"]) <= 1.96 * one["oracle_error"] for one in told])
+        if told
+        else math.nan
+    )
+    found = [one for one in told if "found_size" in one and right(one)]
+    own = (
+        np.mean([abs(abs(one["found_size"]) - one["size"]) <= 1.96 * one["found_error"] for one in found])
+        if found
+        else math.nan
+    )
+    quantiles = ", ".join(f"{value:.2f}" for value in np.quantile(p, [0.1, 0.25, 0.5, 0.75, 0.9])) if len(p) else ""
+    return (
+        f"p-values of the mean on {len(p)} nulls: 10, 25, 50, 75, 90 % quantiles {quantiles}; "
+        f"below 0.05: {(p < 0.05).mean() if len(p) else 0:.2f}. "
+        f"95 % intervals: told {cover:.2f} of {len(told)}, found {own:.2f} of {len(found)}."
+    )
+
+
+def _plain(name: str) -> str:
+    return name
+
+
+def main() -> None:
+    """Run a set, or print the tables of one that was run."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--set", default="design", choices=("design", "validation", "test"))
+    parser.add_argument("--only", default="")
+    parser.add_argument("--share", type=float, default=1.0)
+    parser.add_argument("--seconds", type=float)
+    parser.add_argument("--part", default="0/1", help="K/N: every N-th drive from the K-th on")
+    parser.add_argument("-o", "--output", type=Path)
+    parser.add_argument("--table", type=Path)
+    args = parser.parse_args()
+    if args.table is not None:
+        outcomes = [json.loads(line) for line in args.table.read_text(encoding="utf-8").splitlines()]
+        print(table(outcomes), calibration(outcomes), sep="\n\n")
+        return
+    protocol = tomllib.loads(PROTOCOL.read_text(encoding="utf-8"))
+    part, parts = map(int, args.part.split("/"))
+    outcomes = []
+    for place, case in enumerate(cases(protocol, args.set, args.share)):
+        if place % parts != part or args.only not in case["name"]:
+            continue
+        outcome = run(case, protocol, args.seconds or protocol["drives"]["long_s"])
+        outcomes.append(outcome)
+        words = (
+            "; ".join(f"{kind} {'*'.join(columns) or '-'} {p:.1e}" for kind, columns, p in outcome["named"])
+            or "nothing"
+        )
+        print(
+            case["name"],
+            case.get("size", case.get("factor", "")),
+            case["movement"],
+            case["seed"],
+            f"z {outcome.get('oracle_z', math.nan):.1f}:",
+            words,
+            f"({outcome['cpu_s']} s)",
+            flush=True,
+        )
+        if args.output is not None:
+            with args.output.open("a", encoding="utf-8") as file:
+                file.write(json.dumps(outcome) + "\n")
+    print(table(outcomes), calibration(outcomes), sep="\n\n")
+
+
+if __name__ == "__main__":
+    main()
