@@ -5,20 +5,23 @@ BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 DEV_STAMP := $(VENV)/.installed-dev
 
-.PHONY: fuzz lock install-locked sbom licences test-matrix demo test fast lint format docs bench schema profiles templates loop-dlr picture clean
+.PHONY: fuzz lock install-locked sbom licences test-matrix demo test fast style lint format docs bench schema profiles templates loop-dlr picture clean
+
+# Python compiles what it imports when it does: a fifth of what is installed.
+QUICK := --disable-pip-version-check --progress-bar on --no-compile
 
 # What running needs, and no more.
 $(STAMP): pyproject.toml
 	@echo "Setting up $(VENV): numpy, scipy, pandas, pyarrow, numba, matplotlib ... (a minute or two, 0.8 GB)"
 	@$(PYTHON) -m venv $(VENV)
 	@$(BIN)/python -m pip install --disable-pip-version-check --progress-bar on --upgrade pip | grep -v '^Requirement' || true
-	@$(BIN)/python -m pip install --disable-pip-version-check --progress-bar on -e .
+	@$(BIN)/python -m pip install $(QUICK) -e .
 	@touch $@
 
 # And what checking needs: linters, types, tests, every extra.
 $(DEV_STAMP): pyproject.toml | $(STAMP)
 	@echo "Setting up what the tests need: ruff, mypy, pytest, dask, scikit-learn, asammdf ... (another minute or two)"
-	@$(BIN)/python -m pip install --disable-pip-version-check --progress-bar on -e '.[dev,mdf,cluster,classifier,mcap]'
+	@$(BIN)/python -m pip install $(QUICK) -e '.[dev,mdf,cluster,classifier,mcap]'
 	@touch $@
 
 demo: $(STAMP)
@@ -30,17 +33,21 @@ demo: $(STAMP)
 	@echo "Play it in esmini:      esmini --window 60 60 1000 500 --osc out/demo/cut-in_lifelike.xosc"
 	@echo "Use the command line:   source $(BIN)/activate && xosc-lateral --help"
 
-lint: $(DEV_STAMP)
+style: $(DEV_STAMP)
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
+
+lint: style
 	$(BIN)/mypy
 
-test: lint
-	$(BIN)/python -m pytest -n 2
+# mypy runs as one of the tests (tests/test_front_door.py), beside the others.
+test: style
+	$(BIN)/python -m pytest -n 2 --dist worksteal
 
-# Under a minute: everything but what simulates, fits or converts for long.
+# Half a minute: everything but what fits, converts or plays for long.
+FAST := $(addprefix tests/,road scenario motion drives formats templates enrich test_layers.py)
 fast: $(DEV_STAMP)
-	$(BIN)/python -m pytest -n 2 -q tests/road tests/scenario tests/formats tests/test_layers.py -m 'not slow'
+	$(BIN)/python -m pytest -n 2 --dist worksteal -q $(FAST) -m 'not slow'
 
 # Mutants of every input format against its reader, ten minutes or so; what hurts lands in out/faults.
 fuzz: $(DEV_STAMP)

@@ -10,7 +10,7 @@ import pytest
 from jsonschema import Draft202012Validator
 
 from xosc_lateral.cli import main
-from xosc_lateral.datasets import simulate_population
+from xosc_lateral.datasets import simulate_drive, simulate_population
 
 SCHEMAS = Path(__file__).resolve().parents[2] / "docs" / "schemas"
 LISTED = (SCHEMAS.parent / "json.md").read_text(encoding="utf-8")
@@ -22,6 +22,8 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     assert main(["template", "write", "cut-in", "-o", str(folder / "in"), "-q"]) == 0
     (folder / "in" / "broken.xosc").write_text("<a")
     simulate_population(3, duration=300.0, seed=2).to_csv(folder / "drives.csv", index=False)
+    short = simulate_drive(200.0, seed=3).table
+    short[["time", "distance_left", "distance_right", "speed", "curvature"]].to_csv(folder / "short.csv", index=False)
     return folder
 
 
@@ -54,6 +56,7 @@ def test_every_schema_is_one_and_is_listed():
         ("sample", "sample -p motorway-car --like drives.csv -o snippets.parquet"),
         ("fit", "fit drives.csv -o fitted.json"),
         ("evaluate", "evaluate drives.csv -p motorway-car --no-classify"),
+        ("close-loop", "close-loop short.csv -o refined.json --report loop"),
         ("template-list", "template list"),
         ("template-write", "template write curves -o written --set radius=800"),
         ("profiles-list", "profiles list"),

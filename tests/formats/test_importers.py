@@ -12,6 +12,7 @@ import pandas as pd
 import pyarrow.parquet as pq
 import pytest
 
+from tests.cli.test_json import holds
 from xosc_lateral.cli import main
 from xosc_lateral.errors import FormatError, NotEnoughDataError
 from xosc_lateral.formats.importers.cuts import CutSettings, lane_changes, long_gaps, name_states, number_runs
@@ -298,6 +299,7 @@ def test_import_verb_writes_a_table_with_its_provenance(dlr_csv, tmp_path, capsy
     out = tmp_path / "dlr.parquet"
     assert main(["import", "dlr-ht", str(path), "-o", str(out), "--json"]) == 0
     record = json.loads(capsys.readouterr().out)
+    holds(record, "import")
     assert record.pop("output") == str(out)
     written = json.loads(pq.read_schema(out).metadata[METADATA_KEY])
     assert written.pop("package").startswith("xosc-lateral ")

@@ -21,6 +21,9 @@ def convert(job: Job) -> ManifestRow:
     text = job.source.read_text()
     if "slow" in text:
         time.sleep(0.05)
+    if "hold" in text:
+        while not (job.source.parent / "go").exists():
+            time.sleep(0.01)
     if "bad" in text:
         raise FormatError("nothing to play", path=job.source, line=1)
     if "bug" in text:

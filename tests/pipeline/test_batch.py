@@ -229,7 +229,8 @@ for outcome in convert_many(plan_batch([sys.argv[1]], sys.argv[2]), workers=int(
 
 @pytest.mark.parametrize("workers", [0, 2])
 def test_killed_three_times_the_outputs_are_those_of_a_calm_run(tmp_path: Path, workers: int) -> None:
-    inputs = make_inputs(tmp_path / "in", 40, **{f"slow{index}": "slow" for index in range(10)})
+    special = {f"slow{index}": "slow" for index in range(10)}
+    inputs = make_inputs(tmp_path / "in", 40, **special, zz="hold")  # the last one waits: no run ends before its kill
     out = tmp_path / "out"
     rng = random.Random(workers)
     for _ in range(3):
@@ -241,6 +242,7 @@ def test_killed_three_times_the_outputs_are_those_of_a_calm_run(tmp_path: Path, 
             process.kill()
     (out / ".000.xosc.0123abcd.tmp").write_text("half")  # what a kill in the middle of writing leaves
     assert (out / STATE / "lock").exists()
+    (inputs / "go").touch()
     outcomes = run(inputs, out, workers=workers)
     assert State.UP_TO_DATE in {outcome.state for outcome in outcomes}
     run(inputs, tmp_path / "calm")

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import pandas as pd
 import pytest
 
 from xosc_lateral.errors import DriverProfileError, FormatError
+from xosc_lateral.formats.profiles import SHIPPED
 from xosc_lateral.pipeline.jobs import Batch, plan_batch
 from xosc_lateral.pipeline.request import DocumentKind, Request, document_kind
 from xosc_lateral.pipeline.settings import ConvertSettings
@@ -197,3 +200,19 @@ def test_kinds_of_documents_are_told_by_their_elements(tmp_path: Path) -> None:
     ):
         path.write_text(text)
         assert document_kind(path) is kind
+
+
+def test_a_profile_that_hides_a_shipped_one_is_said_and_makes_other_outputs(database: Path, tmp_path: Path) -> None:
+    team = tmp_path / "team"
+    team.mkdir()
+    settings = ConvertSettings(libraries=(team,))
+    before = plan_batch([database], tmp_path / "out", settings)
+    assert before.notes == ()
+    shutil.copy(SHIPPED / "motorway.json", team)  # auto does not choose this one
+    assert plan_batch([database], tmp_path / "out", settings).jobs == before.jobs
+    shutil.copy(SHIPPED / "motorway-truck.json", team / "motorway-car.json")
+    after = plan_batch([database], tmp_path / "out", settings)
+    assert after.notes == (f"{team}/motorway-car.json hides the shipped profile 'motorway-car': auto takes it",)
+    assert after.jobs[0].fingerprint != before.jobs[0].fingerprint
+    named = replace(settings, profile="motorway-truck")
+    assert plan_batch([database], tmp_path / "out", named).notes == ()

@@ -158,6 +158,11 @@ class BatchResult(Result):
         return self._batch.folder
 
     @property
+    def notes(self) -> tuple[str, ...]:
+        """What a user has to know of the whole: a shipped profile that one of their own hides, say."""
+        return self._batch.notes
+
+    @property
     def failed(self) -> int:
         """Scenarios that could not be converted; `to_frame` says why, in its column `error`."""
         return self._summary.failed
@@ -178,7 +183,8 @@ class BatchResult(Result):
 
     def __str__(self) -> str:
         report = [] if self.report is None else [f"report: {self.report}"]
-        return "\n".join([self.headline() + _left_out(self._batch), *self._summary.remarks(), *report])
+        said = [self.headline() + _left_out(self._batch), *self.notes, *self._summary.remarks(), *report]
+        return "\n".join(said)
 
     def to_frame(self) -> pd.DataFrame:
         """One row per output: the manifest's columns, with `state` and `seconds`."""
@@ -191,6 +197,7 @@ class BatchResult(Result):
         return {
             "folder": str(self.folder),
             "left_out": len(self._batch.left_out),
+            "notes": list(self.notes),
             **self._summary.to_dict(),
             **({} if self.report is None else {"report": str(self.report)}),
             "outputs": self._rows,

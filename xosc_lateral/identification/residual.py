@@ -214,6 +214,8 @@ def _by_bin(values: FloatArray, label: IntArray, used: BoolArray) -> FloatArray:
 
 
 def _bands(offset: FloatArray, used: BoolArray, timeline: Timeline) -> FloatArray:
+    if not used.any():
+        return np.full(len(BANDS_S) + 1, np.nan)
     levels = [offset, *(local_mean(offset, timeline.valid, seconds, timeline.step) for seconds in BANDS_S)]
     inside = [level[used] for level in levels]
     bands = [np.std(finer - coarser) for finer, coarser in pairwise(inside)]

@@ -8,7 +8,7 @@ from pathlib import Path
 from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.enrich.enrich import Drivers
 from xosc_lateral.errors import FormatError
-from xosc_lateral.formats.profiles import find_profile, read_profile
+from xosc_lateral.formats.profiles import SHIPPED, find_profile, read_profile
 from xosc_lateral.formats.source import check_regular, guard_input
 from xosc_lateral.pipeline.settings import AUTO, ConvertSettings
 from xosc_lateral.scenario import Entity, Scenario
@@ -66,6 +66,31 @@ def _driver(entity: Entity, settings: ConvertSettings) -> DriverProfile | str:
             return NO_DRIVER[category]
         named = SHIPPED_BY_CLASS[category]
     return named if isinstance(named, DriverProfile) else load_profile(named, settings.libraries)
+
+
+def auto_profiles(libraries: tuple[Path, ...]) -> dict[str, Path]:
+    """Profiles that "auto" chooses from, by name: a file in one of the folders comes before the shipped one.
+
+    Raises
+    ------
+    FormatError
+        If a folder isn't there.
+    """
+    return {name: find_profile(name, libraries) for name in sorted(set(SHIPPED_BY_CLASS.values()))}
+
+
+def uses_auto(settings: ConvertSettings) -> bool:
+    """Whether "auto" chooses for any entity."""
+    return AUTO in (settings.profile, *settings.entity_profiles.values())
+
+
+def hidden_by_libraries(libraries: tuple[Path, ...]) -> tuple[str, ...]:
+    """A line for each shipped profile in whose place "auto" takes one of the user's."""
+    return tuple(
+        f"{path} hides the shipped profile {name!r}: auto takes it"
+        for name, path in auto_profiles(libraries).items()
+        if path.parent != SHIPPED
+    )
 
 
 def load_profile(name_or_path: str, libraries: tuple[Path, ...]) -> DriverProfile:

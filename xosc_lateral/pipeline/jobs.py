@@ -15,9 +15,10 @@ from xosc_lateral.errors import FormatError, XoscLateralError
 from xosc_lateral.formats.hashes import file_hash
 from xosc_lateral.formats.openscenario.distribution import read_distribution
 from xosc_lateral.formats.openscenario.references import require_folders
-from xosc_lateral.formats.profiles import SHIPPED, SUFFIX, find_profile, profile_hash
+from xosc_lateral.formats.profiles import find_profile, profile_hash
 from xosc_lateral.limits import BATCH_JOBS, PARAMETER_SETS, VARIANTS
 from xosc_lateral.pipeline.convert import numbered
+from xosc_lateral.pipeline.drivers import auto_profiles, hidden_by_libraries, uses_auto
 from xosc_lateral.pipeline.manifest import ManifestRow, printable
 from xosc_lateral.pipeline.request import DocumentKind, Request, document_kind, find_requests
 from xosc_lateral.pipeline.settings import AUTO, ConvertSettings
@@ -96,12 +97,15 @@ class Batch:
         By name.
     left_out : tuple of (Path, DocumentKind)
         Files found in folders that are not to be converted: catalogs, outputs of former conversions.
+    notes : tuple of str
+        What a user has to know before it begins, a line each.
     """
 
     folder: Path
     base: Path
     jobs: tuple[Job, ...]
     left_out: tuple[tuple[Path, DocumentKind], ...] = ()
+    notes: tuple[str, ...] = ()
 
     def __len__(self) -> int:
         return len(self.jobs)
@@ -181,7 +185,9 @@ def plan_batch(
     _refuse_overwriting(jobs.values())
     pages = None if report is None else _normal(Path(report))
     planned = (jobs[name] if pages is None else _with_page(jobs[name], pages) for name in sorted(jobs))
-    return Batch(target, base, tuple(planned), tuple(left_out))
+    libraries = dict.fromkeys(request.settings.libraries for request in requests if uses_auto(request.settings))
+    notes = dict.fromkeys(note for folders in libraries for note in hidden_by_libraries(folders))
+    return Batch(target, base, tuple(planned), tuple(left_out), tuple(notes))
 
 
 def _with_page(job: Job, pages: Path) -> Job:
@@ -311,10 +317,10 @@ class _Fingerprints:
 
 
 def _profile_state(name: str, libraries: tuple[Path, ...]) -> str:
-    """What a profile's name means now: its file's hash; "auto": those of all shipped ones."""
-    if name == AUTO:
-        return " ".join(f"{path.stem}={file_hash(path)}" for path in sorted(SHIPPED.glob(f"*{SUFFIX}")))
+    """What a profile's name means now: its file's hash; "auto": those of what it chooses from."""
     try:
+        if name == AUTO:
+            return " ".join(f"{known}={file_hash(path)}" for known, path in auto_profiles(libraries).items())
         return _hash_or_missing(find_profile(name, libraries))
     except XoscLateralError:
         return "missing"  # the conversion says so
