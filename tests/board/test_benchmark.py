@@ -8,12 +8,12 @@ import pytest
 from tests.baselines.made_runs import made_run, smooth_runs
 from xosc_lateral.board.benchmark import benchmark_realism
 from xosc_lateral.board.half import floors, make_half, sample_half
-from xosc_lateral.board.measures import band_power, differences, features_of
 from xosc_lateral.board.ranking import kendall_tau, ranks, resampled_rows
 from xosc_lateral.board.result import Board
-from xosc_lateral.board.windows import halves, units_of
+from xosc_lateral.board.units import halves, units_of
 from xosc_lateral.drives.drive import Run
 from xosc_lateral.errors import NotEnoughDataError
+from xosc_lateral.evaluation.measures import band_power, differences, features_of
 from xosc_lateral.segment import Segment
 
 QUICK = ["lane-centre", "constant", "gaussian-process"]
@@ -94,7 +94,7 @@ def test_a_resample_takes_all_windows_of_the_vehicles_drawn() -> None:
     one, other = halves(smooth_runs(30, 65.0), 1)
     half = make_half(one, other, np.random.default_rng(0))
     rows = resampled_rows(half, np.random.default_rng(2))
-    units, counts = np.unique(half.windows[10.0].unit[rows[10.0]], return_counts=True)
+    units, counts = np.unique(half.windows[10.0].group[rows[10.0]], return_counts=True)
     assert (counts % 6 == 0).all()  # six windows of 10 s in 65 s
     assert counts.sum() == 6 * 15 and len(units) < 15
 

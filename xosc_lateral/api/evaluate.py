@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from xosc_lateral.driver.profile import DriverProfile
+    from xosc_lateral.evaluation.realism import Realism
     from xosc_lateral.evaluation.scores import ProfileScores
 
 
@@ -37,7 +38,7 @@ def evaluate(
     columns: Mapping[str, str] | None = None,
     library: Paths = (),
 ) -> Evaluation:
-    """Score a profile: the ten metrics, the paper's four evaluations, distances and floors, spectrum, classifier.
+    """Score a profile beside other real drivers, and by the paper's four evaluations.
 
     Parameters
     ----------
@@ -47,7 +48,7 @@ def evaluate(
     seed : int
         Same inputs and seed: same numbers.
     classify : bool
-        Train a classifier to tell sampled from measured (extra `classifier`; a few seconds).
+        Train classifiers to tell sampled from measured (extra `classifier`; a minute or two for some hours).
     library : path or paths
         Folders with further profiles.
 
@@ -79,6 +80,11 @@ class Evaluation(Result):
     def ratio(self) -> float:
         """Mean distance of the ten metrics over the mean floor; 1: as close as real data is to itself. [-]"""
         return self._scores.snippets.ratio
+
+    @property
+    def realism(self) -> Realism:
+        """The fair measure: every condition's distances, floors and classifiers."""
+        return self._scores.realism
 
     @property
     def worst(self) -> tuple[str, float]:

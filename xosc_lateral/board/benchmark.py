@@ -14,7 +14,7 @@ from xosc_lateral.board.numbers import floors_of, numbers_of
 from xosc_lateral.board.ranking import RESAMPLES, SHORT, bootstrap
 from xosc_lateral.board.result import Board
 from xosc_lateral.board.summary import make_board
-from xosc_lateral.board.windows import halves, units_of
+from xosc_lateral.board.units import halves, units_of
 from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.drives.drive import Run
 from xosc_lateral.errors import NotEnoughDataError, XoscLateralError

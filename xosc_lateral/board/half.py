@@ -9,13 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.baselines.base import LateralModel
-from xosc_lateral.board.measures import Features, differences, features_of
-from xosc_lateral.board.windows import Windows, windows_of
 from xosc_lateral.driver.snippets import segment_of
 from xosc_lateral.drives.drive import Run
 from xosc_lateral.drives.resampling import STEP
+from xosc_lateral.evaluation.condition import LENGTHS, Condition
 from xosc_lateral.evaluation.lane_keeping import VarianceParts, variance_parts
-from xosc_lateral.evaluation.same_start import windows_with_the_same_start
+from xosc_lateral.evaluation.measures import Features, features_of
+from xosc_lateral.evaluation.same_start import FLOOR_DRAWS, real_against_real, windows_with_the_same_start
+from xosc_lateral.evaluation.snippets import Snippets, snippets_of
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -26,24 +27,7 @@ LEAST_WINDOWS = 20
 ENSEMBLE = 8
 """Sampled windows for each real one of 10 s: proper scores need several."""
 
-FLOOR_DRAWS = 4
-"""Sets of stand-ins with the same start that the floor is averaged over."""
-
-
-@dataclass(frozen=True)
-class Condition:
-    """Under what windows are compared."""
-
-    seconds: float
-    same_start: bool
-
-    @property
-    def name(self) -> str:
-        """In words."""
-        return f"{self.seconds:g} s, {'same start' if self.same_start else 'free'}"
-
-
-CONDITIONS = tuple(Condition(seconds, same_start) for seconds in (10.0, 30.0, 60.0) for same_start in (True, False))
+CONDITIONS = tuple(Condition(seconds, same_start) for seconds in LENGTHS for same_start in (True, False))
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,9 +37,9 @@ class Half:
     Parameters
     ----------
     train, test : list of Run
-    windows : mapping of float to Windows
+    windows : mapping of float to Snippets
         Of the scored vehicles, by length. [s]
-    donors : mapping of float to Windows
+    donors : mapping of float to Snippets
         Of the others.
     features : mapping of float to Features
         Of the scored windows.
@@ -65,8 +49,8 @@ class Half:
 
     train: list[Run]
     test: list[Run]
-    windows: Mapping[float, Windows]
-    donors: Mapping[float, Windows]
+    windows: Mapping[float, Snippets]
+    donors: Mapping[float, Snippets]
     features: Mapping[float, Features]
     donor_features: Mapping[float, Features]
     stand_ins: Mapping[float, IntArray]
@@ -80,16 +64,16 @@ class Half:
 def make_half(train: list[Run], test: list[Run], rng: np.random.Generator) -> Half:
     """Cut windows and choose the floor's stand-ins."""
     windows, donors = {}, {}
-    for seconds in sorted({condition.seconds for condition in CONDITIONS}):
-        own, others = windows_of(test, seconds), windows_of(train, seconds)
-        if own is not None and others is not None and min(len(own), len(others)) >= LEAST_WINDOWS:
+    for seconds in LENGTHS:
+        own, others = (snippets_of(runs, seconds, STEP, by_block=False) for runs in (test, train))
+        if min(len(own), len(others)) >= LEAST_WINDOWS:
             windows[seconds], donors[seconds] = own, others
     stand_ins = {
         seconds: windows_with_the_same_start(
             own.offset[:, 0],
-            own.unit,
+            own.group,
             donors[seconds].offset[:, 0],
-            donors[seconds].unit,
+            donors[seconds].group,
             rng,
             count=ENSEMBLE,
         )
@@ -116,7 +100,7 @@ class Sampled:
     paths : list of array
         A free run for each of the half's runs. [m]
     ensemble : array, shape (n, 8, 51), or None
-        Windows of 10 s with the real starts. [m]
+        Snippets of 10 s with the real starts. [m]
     windows : mapping of Condition to array, shape (n, m)
         [m]
     features : mapping of Condition to Features
@@ -158,7 +142,7 @@ def run_names(half: Half) -> NDArray[np.str_]:
     return np.array([str(number) for number, _ in half.windows[min(half.windows)].place])
 
 
-def sample_same_start(model: LateralModel, windows: Windows, rng: np.random.Generator, members: int) -> FloatArray:
+def sample_same_start(model: LateralModel, windows: Snippets, rng: np.random.Generator, members: int) -> FloatArray:
     """Shape (n, members, m). [m]"""
     segments = [segment for segment in windows.segments for _ in range(members)]
     starts = np.repeat(windows.offset[:, 0], members)
@@ -169,13 +153,9 @@ def sample_same_start(model: LateralModel, windows: Windows, rng: np.random.Gene
 def floors(half: Half, condition: Condition) -> Mapping[str, float]:
     """Real against real under a condition, by family."""
     real, donors = half.features[condition.seconds], half.donor_features[condition.seconds]
-    everything = np.arange(len(real))
-    if not condition.same_start:
-        return differences(real, donors, everything, np.arange(len(donors)))
-    draws = [
-        differences(real, donors, everything, half.stand_ins[condition.seconds][:, draw]) for draw in range(FLOOR_DRAWS)
-    ]
-    return {name: float(np.mean([draw[name] for draw in draws])) for name in draws[0]}
+    rows, others = np.arange(len(real)), np.arange(len(donors))
+    chosen = half.stand_ins[condition.seconds][:, :FLOOR_DRAWS] if condition.same_start else None
+    return real_against_real(real, donors, rows, others, chosen)
 
 
 def pooled(values: Sequence[Mapping[str, float]]) -> dict[str, float]:

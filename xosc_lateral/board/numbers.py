@@ -7,21 +7,17 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.board.half import Condition, Half, Sampled, floors, pooled
-from xosc_lateral.board.measures import UNITS, differences, named_distances
+from xosc_lateral.board.half import Half, Sampled, floors, pooled
 from xosc_lateral.board.ranking import SHORT, ranked_numbers
 from xosc_lateral.board.result import Number
 from xosc_lateral.evaluation.classifier import told_apart
-from xosc_lateral.evaluation.ensemble_scores import energy_score, variogram_score
+from xosc_lateral.evaluation.condition import Condition
+from xosc_lateral.evaluation.ensemble_scores import PROPER, proper_scores
+from xosc_lateral.evaluation.measures import UNITS, differences, named_distances
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 Parts = Sequence[tuple[Half, Mapping[str, Sampled]]]
-
-JUDGED = 400
-"""Windows of either kind that a classifier sees: enough for an error of 0.02, and seconds instead of minutes."""
-
-PROPER = {"energy score, 10 s": "m", "variogram score, 10 s": "m"}
 
 
 def numbers_of(parts: Parts, key: str, floor: Mapping[str, float], *, classify: bool) -> tuple[Number, ...]:
@@ -65,43 +61,34 @@ def _floors_of_half(half: Half) -> dict[str, float]:
 
 
 def _proper_scores(real: FloatArray, ensemble: FloatArray) -> dict[str, float]:
-    try:
-        scores = energy_score(real, ensemble), variogram_score(real, ensemble)
-    except ImportError:  # without the extra `board`
-        return {}
-    return {name: float(score.mean()) for name, score in zip(PROPER, scores, strict=True)}
+    return {_proper_name(name): value for name, value in proper_scores(real, ensemble).items()}
+
+
+def _proper_name(name: str) -> str:
+    return f"{name.replace('_', ' ')}, {SHORT:g} s"
 
 
 def _classified(half: Half, sampled: Sampled) -> dict[str, float]:
     found = {}
     for condition in half.conditions:
         own = half.windows[condition.seconds]
-        rows = _thinned(len(own))
-        area = told_apart(own.offset[rows], sampled.windows[condition][rows], own.unit[rows], own.unit[rows])
-        if area is not None:
-            found[f"auc, {condition.name}"] = area
+        found_area = told_apart(own.offset, sampled.windows[condition], own.group, own.group)
+        if found_area is not None:
+            found[f"auc, {condition.name}"] = found_area.auc
     return found
 
 
 def _classified_floors(half: Half) -> dict[str, float]:
-    """Real against real, other vehicles on either side, with the same start where the model's windows have it."""
+    """The vehicles told from those that models were fitted on; both start alike, so one floor does for any start."""
     found = {}
     for condition in half.conditions:
         own, donors = half.windows[condition.seconds], half.donors[condition.seconds]
-        rows = _thinned(len(own))
-        others = half.stand_ins[condition.seconds][rows, 0] if condition.same_start else _thinned(len(donors))
-        # A stand-in is judged together with the window that it stands in for.
-        groups = own.unit[rows] if condition.same_start else donors.unit[others]
-        area = told_apart(own.offset[rows], donors.offset[others], own.unit[rows], groups)
+        area = told_apart(own.offset, donors.offset, own.group, donors.group)
         if area is not None:
-            found[f"auc, {condition.name}"] = area
+            found[f"auc, {condition.name}"] = area.auc
     return found
-
-
-def _thinned(count: int) -> IntArray:
-    return np.unique(np.linspace(0, count - 1, min(count, JUDGED)).astype(np.int64))
 
 
 def _unit(name: str) -> str:
     head = name.split(",")[0]
-    return PROPER.get(name) or UNITS.get(head) or ("-" if head == "auc" else "sd")
+    return PROPER.get(head.replace(" ", "_")) or UNITS.get(head) or ("-" if head == "auc" else "sd")

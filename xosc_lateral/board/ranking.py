@@ -7,8 +7,9 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.board.half import Condition, Half, Sampled, floors
-from xosc_lateral.board.measures import differences
+from xosc_lateral.board.half import Half, Sampled, floors
+from xosc_lateral.evaluation.condition import Condition
+from xosc_lateral.evaluation.measures import differences
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -54,9 +55,9 @@ def all_rows(half: Half) -> Rows:
 
 def resampled_rows(half: Half, rng: np.random.Generator) -> Rows:
     """Windows of as many vehicles as there are, drawn with replacement."""
-    units = np.unique(half.windows[SHORT].unit)
+    units = np.unique(half.windows[SHORT].group)
     drawn = rng.choice(units, len(units))
-    return {seconds: _rows_of(windows.unit, drawn) for seconds, windows in half.windows.items()}
+    return {seconds: _rows_of(windows.group, drawn) for seconds, windows in half.windows.items()}
 
 
 def _rows_of(unit: NDArray[np.str_], drawn: NDArray[np.str_]) -> IntArray:

@@ -9,12 +9,12 @@ from numpy.typing import NDArray
 
 from xosc_lateral.board.contestants import Contestant
 from xosc_lateral.board.half import Half, Sampled
-from xosc_lateral.board.measures import LAGS, autocorrelation_of, resolved_bands
 from xosc_lateral.board.ranking import SHORT, kendall_tau, ranked_numbers, ranks
 from xosc_lateral.board.result import Board, Number, Row
 from xosc_lateral.drives.drive import Run
 from xosc_lateral.drives.resampling import STEP
 from xosc_lateral.evaluation.lane_keeping import variance_parts
+from xosc_lateral.evaluation.measures import LAGS, autocorrelation_of, resolved_bands
 from xosc_lateral.evaluation.snippets import BLOCK, FEW_DRIVES
 
 FloatArray = NDArray[np.float64]

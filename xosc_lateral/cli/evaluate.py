@@ -20,14 +20,14 @@ def evaluate(
     profile: Profile,
     report: Annotated[str | None, typer.Option(metavar="PAGE.html", help="Write a report with figures.")] = None,
     seed: Seed = 0,
-    classify: Annotated[bool, typer.Option(help="Also train a classifier (extra `classifier`).")] = True,
+    classify: Annotated[bool, typer.Option(help="Also train classifiers (extra `classifier`).")] = True,
     columns: Columns = None,
     library: Library = None,
     force: Force = False,
     quiet: Quiet = False,
     as_json: AsJson = False,
 ) -> None:
-    """Score a profile on measured drives: ten metrics with their floors, four evaluations, spectrum, classifier."""
+    """Score a profile on measured drives, beside other real drivers: distances, lane keeping, spectrum, classifiers."""
     from xosc_lateral import evaluate
     from xosc_lateral.api.convert import REPORT_SUFFIXES
     from xosc_lateral.formats.targets import claim, file_target

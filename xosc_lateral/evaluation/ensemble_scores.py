@@ -9,6 +9,9 @@ from xosc_lateral.errors import NotEnoughDataError
 
 FloatArray = NDArray[np.float64]
 
+PROPER = {"energy_score": "m", "variogram_score": "m"}
+"""Proper scores and their units."""
+
 ORDER = 0.5
 """Of the variogram score: the power that its authors found to tell dependence best. [-]"""
 
@@ -66,6 +69,15 @@ def variogram_score(real: FloatArray, ensemble: FloatArray, *, every: int = 5) -
     thin, members = real[:, ::every], ensemble[:, :, ::every]
     pairs = thin.shape[1] ** 2
     return np.asarray(scoringrules.vs_ensemble(thin, members, p=ORDER, estimator="fair") / pairs, dtype=np.float64)
+
+
+def proper_scores(real: FloatArray, ensemble: FloatArray) -> dict[str, float]:
+    """Mean of each score in `PROPER` over the windows; empty without the extra `board`. [m]"""
+    try:
+        scores = energy_score(real, ensemble), variogram_score(real, ensemble)
+    except ImportError:
+        return {}
+    return {name: float(score.mean()) for name, score in zip(PROPER, scores, strict=True)}
 
 
 def _check(ensemble: FloatArray) -> None:

@@ -12,12 +12,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.errors import NotEnoughDataError
+from xosc_lateral.evaluation.measures import Features, differences
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
 NEAREST = 20
 """A stand-in is drawn among so many windows of other drivers whose starts are nearest."""
+
+FLOOR_DRAWS = 4
+"""Sets of stand-ins with the same start that a floor is averaged over."""
 
 
 def windows_with_the_same_start(
@@ -64,3 +68,22 @@ def windows_with_the_same_start(
         pool = others[np.argpartition(gaps, min(nearest, len(others)) - 1)[:nearest]]
         chosen[row] = rng.permutation(pool)[:count]
     return chosen
+
+
+def real_against_real(
+    real: Features, donors: Features, rows: IntArray, donor_rows: IntArray, stand_ins: IntArray | None
+) -> dict[str, float]:
+    """The floor of `differences`: what other drivers' windows get.
+
+    Parameters
+    ----------
+    real, donors : Features
+    rows, donor_rows : array of int, shape (n,) and (k,)
+        Windows that count.
+    stand_ins : array of int, shape (n, draws), optional
+        Rows of the donors with the same starts, averaged over the draws; without, all of `donor_rows` at once.
+    """
+    if stand_ins is None:
+        return differences(real, donors, rows, donor_rows)
+    draws = [differences(real, donors, rows, stand_ins[:, draw]) for draw in range(stand_ins.shape[1])]
+    return {name: float(np.mean([draw[name] for draw in draws])) for name in draws[0]}

@@ -1,14 +1,14 @@
 """How true a profile is to measured drives: distances with their floors, the paper's four evaluations, and beyond.
 
-The paper (arXiv:2405.17080, section IV) compares ten metrics of 10 s snippets in four evaluations. Beside them stand
-what it does not look at: 60 s snippets, spectrum, autocorrelation, the lane's margins, and a classifier.
+The paper (arXiv:2405.17080, section IV) compares ten metrics of 10 s snippets in four evaluations. Before them comes
+the fair measure (`realism`), and beside them what the paper does not look at: spectrum, autocorrelation, the lane's
+margins.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,9 +18,10 @@ from xosc_lateral.driver.models.two_level.parameters import PAPER_SETTINGS
 from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.drives.drive import Run
 from xosc_lateral.errors import NotEnoughDataError
-from xosc_lateral.evaluation.classifier import told_apart
+from xosc_lateral.evaluation.condition import Condition
 from xosc_lateral.evaluation.distances import Distances, mean_distances, metric_distances, split_groups
 from xosc_lateral.evaluation.metrics import METRICS, snippet_metrics
+from xosc_lateral.evaluation.realism import Realism, score_realism
 from xosc_lateral.evaluation.snippets import Snippets, sample_parts, sample_runs, sample_snippets, snippets_of
 from xosc_lateral.evaluation.spectra import Margins, Spectrum, autocorrelation, margins, spectrum
 
@@ -126,6 +127,8 @@ class ProfileScores:
         Its name.
     drives, runs, hours : int, int, float
         What was measured.
+    realism : Realism
+        The headline: free runs and shared starts beside other real drivers.
     snippets : SnippetScores
         10 s.
     long_snippets : SnippetScores or None
@@ -135,8 +138,6 @@ class ProfileScores:
     lags, autocorrelation_real, autocorrelation_sampled : array, shape (k,)
         [s], [-], [-]
     margins_real, margins_sampled : Margins
-    classifier_auc : float or None
-        Area under the ROC curve between real and sampled; None without scikit-learn or with too few drives.
     traces : tuple of Trace
         The longest run of each of the first `TRACES` drives, for the eye.
     seed : int
@@ -146,6 +147,7 @@ class ProfileScores:
     drives: int
     runs: int
     hours: float
+    realism: Realism
     snippets: SnippetScores
     long_snippets: SnippetScores | None
     evaluations: tuple[PartEvaluation, ...]
@@ -156,9 +158,14 @@ class ProfileScores:
     autocorrelation_sampled: FloatArray
     margins_real: Margins
     margins_sampled: Margins
-    classifier_auc: float | None
     traces: tuple[Trace, ...]
     seed: int
+
+    @property
+    def classifier_auc(self) -> float | None:
+        """Area under the ROC curve between real and sampled snippets of 10 s with the same start; None: not trained."""
+        shared = self.realism.of(Condition(SNIPPET, True))
+        return None if shared is None or shared.alone is None else shared.alone.auc
 
     @property
     def spectrum_error(self) -> float:
@@ -176,7 +183,7 @@ def score_profile(profile: DriverProfile, runs: Sequence[Run], *, seed: int, cla
     runs : sequence of Run
         At the profile's step.
     classify : bool
-        Whether to train the classifier (a few seconds).
+        Whether to train the classifiers (a minute or two for some hours of driving).
 
     Raises
     ------
@@ -200,6 +207,7 @@ def score_profile(profile: DriverProfile, runs: Sequence[Run], *, seed: int, cla
         drives=len({run.drive for run in runs}),
         runs=len(runs),
         hours=sum(map(len, runs)) * step / 3600.0,
+        realism=score_realism(profile, runs, seed=seed + 4, classify=classify),
         snippets=score_snippets(short.offset, sampled, short.group, seed=seed, seconds=SNIPPET),
         long_snippets=long_scores,
         evaluations=evaluate_parts(profile, short, sampled, seed=seed + 3),
@@ -210,7 +218,6 @@ def score_profile(profile: DriverProfile, runs: Sequence[Run], *, seed: int, cla
         autocorrelation_sampled=autocorrelation(free, lags),
         margins_real=margins(offsets, widths, step),
         margins_sampled=margins(free, widths, step),
-        classifier_auc=told_apart(short.offset, sampled, short.group, short.group) if classify else None,
         traces=_traces(runs, free, step),
         seed=seed,
     )
@@ -291,65 +298,3 @@ def _enough(snippets: Snippets) -> Snippets:
             f"{len(snippets)} snippets of {SNIPPET:g} s are left after cutting; {MIN_SNIPPETS} are needed to compare"
         )
     return snippets
-
-
-def scores_to_dict(scores: ProfileScores) -> dict[str, Any]:
-    """Plain JSON values, for `--json` and for a profile's provenance (without the single snippets)."""
-    return {
-        "profile": scores.profile,
-        "seed": scores.seed,
-        "drives": scores.drives,
-        "runs": scores.runs,
-        "hours": round(scores.hours, 4),
-        "snippets": _snippets_to_dict(scores.snippets),
-        "long_snippets": None if scores.long_snippets is None else _snippets_to_dict(scores.long_snippets),
-        "evaluations": [
-            {
-                "number": one.number,
-                "coarse": one.coarse,
-                "fine": one.fine,
-                "distances": _rounded(one.distances.by_metric),
-            }
-            for one in scores.evaluations
-        ],
-        "spectrum": {
-            "frequency_hz": [round(float(f), 5) for f in scores.spectrum_real.frequency],
-            "real_m2_per_hz": [float(f"{v:.4g}") for v in scores.spectrum_real.density],
-            "sampled_m2_per_hz": [float(f"{v:.4g}") for v in scores.spectrum_sampled.density],
-            "error_db": round(scores.spectrum_error, 3),
-        },
-        "autocorrelation": {
-            "lag_s": list(LAGS),
-            "real": [round(float(v), 4) for v in scores.autocorrelation_real],
-            "sampled": [round(float(v), 4) for v in scores.autocorrelation_sampled],
-        },
-        "margins": {"real": _margins_to_dict(scores.margins_real), "sampled": _margins_to_dict(scores.margins_sampled)},
-        "classifier_auc": None if scores.classifier_auc is None else round(scores.classifier_auc, 4),
-    }
-
-
-def _snippets_to_dict(scores: SnippetScores) -> dict[str, Any]:
-    worst, ratio = scores.worst_ratio
-    return {
-        "seconds": scores.seconds,
-        "count": scores.count,
-        "distance": _rounded(scores.distances.by_metric),
-        "floor": _rounded(scores.floor.by_metric),
-        "mean_distance": round(scores.distances.mean, 4),
-        "mean_floor": round(scores.floor.mean, 4),
-        "mean_ratio": round(scores.ratio, 3),
-        "worst_metric": worst,
-        "worst_ratio": round(ratio, 3),
-    }
-
-
-def _margins_to_dict(one: Margins) -> dict[str, float]:
-    return {
-        "share_near_marking": round(one.share_near, 5),
-        "excursions_per_hour": round(one.excursions_per_hour, 2),
-        "largest_offset_m": round(one.largest, 3),
-    }
-
-
-def _rounded(values: Mapping[str, float]) -> dict[str, float]:
-    return {name: round(value, 4) for name, value in values.items()}

@@ -12,13 +12,15 @@ from xosc_lateral.driver.models.base import Start
 from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.driver.sampling import sample_offsets
 from xosc_lateral.driver.seeds import child
-from xosc_lateral.driver.snippets import Snippet, cut_snippets, segment_of
+from xosc_lateral.driver.snippets import SENSOR, Snippet, cut_snippets, segment_of
 from xosc_lateral.drives.drive import Run
+from xosc_lateral.segment import Segment
 
 FloatArray = NDArray[np.float64]
 
 BLOCK = 120.0
 """Where there are too few drives to split between them, blocks of this length are split instead. [s]"""
+
 FEW_DRIVES = 6
 
 
@@ -28,47 +30,88 @@ class Snippets:
 
     Parameters
     ----------
+    seconds : float
+        Their length. [s]
     items : tuple of Snippet
         Where each comes from.
     offset, lane_width : array, shape (n, m)
         [m]
     group : array of str, shape (n,)
-        Drive, or block of a drive: what is split between halves as a whole.
+        Drive, or block of a drive: what is split between halves, and resampled, as a whole.
+    place : tuple of (int, slice)
+        Number of the run, and rows in it.
     """
 
+    seconds: float
     items: tuple[Snippet, ...]
     offset: FloatArray
     lane_width: FloatArray
     group: NDArray[np.str_]
+    place: tuple[tuple[int, slice], ...]
 
     def __len__(self) -> int:
         return len(self.items)
 
+    def take(self, rows: NDArray[np.int64]) -> Snippets:
+        """Some of them."""
+        chosen = rows.tolist()
+        return Snippets(
+            self.seconds,
+            tuple(self.items[row] for row in chosen),
+            self.offset[rows],
+            self.lane_width[rows],
+            self.group[rows],
+            tuple(self.place[row] for row in chosen),
+        )
 
-def snippets_of(runs: Sequence[Run], seconds: float, step: float) -> Snippets:
-    """All whole snippets, one after the other in each run, both ends counted (51 values for 10 s at 5 Hz)."""
+    @property
+    def segments(self) -> list[Segment]:
+        """Each with the context around it."""
+        return [segment_of(one.run, one.rows) for one in self.items]
+
+    def cut_from(self, paths: Sequence[FloatArray]) -> FloatArray:
+        """The same snippets out of other paths of the same runs, shape (n, m). [m]"""
+        return np.array([paths[number][rows] for number, rows in self.place]).reshape(self.offset.shape)
+
+
+def snippets_of(runs: Sequence[Run], seconds: float, step: float, *, by_block: bool | None = None) -> Snippets:
+    """All whole snippets, one after the other in each run, both ends counted (51 values for 10 s at 5 Hz).
+
+    Parameters
+    ----------
+    by_block : bool, optional
+        Whether groups are blocks of a drive; without, where there are fewer than `FEW_DRIVES` drives.
+    """
     length = round(seconds / step) + 1
     items = tuple(cut_snippets(runs, seconds, step)) if any(len(run) >= length for run in runs) else ()
-    by_block = len({run.drive for run in runs}) < FEW_DRIVES
+    if by_block is None:
+        by_block = len({run.drive for run in runs}) < FEW_DRIVES
     block = max(BLOCK, 2.0 * seconds)
     groups = [f"{one.run.drive} {int(one.time[0] // block)}" if by_block else one.run.drive for one in items]
+    numbers = {id(run): number for number, run in enumerate(runs)}
     return Snippets(
+        seconds,
         items,
         np.array([one.offset for one in items]).reshape(-1, length),
         np.array([one.run.lane_width[one.rows] for one in items]).reshape(-1, length),
         np.array(groups, dtype=np.str_),
+        tuple((numbers[id(one.run)], one.rows) for one in items),
     )
 
 
-def sample_snippets(profile: DriverProfile, snippets: Snippets, seed: int) -> FloatArray:
-    """For each snippet one of a new driver, of the same length, start and context. Shape (n, m). [m]"""
+def sample_snippets(profile: DriverProfile, snippets: Snippets, seed: int, *, with_sensor: bool = False) -> FloatArray:
+    """For each snippet one of a new driver, of the same length, start and context. Shape (n, m). [m]
+
+    With the sensor, what starts there is the sum of both, as it does in what was recorded.
+    """
     root = np.random.SeedSequence(seed)
-    return np.array(
-        [
-            sample_offsets(profile, segment_of(one.run, one.rows), child(root, k), start=float(one.offset[0]))
-            for k, one in enumerate(snippets.items)
-        ]
-    )
+    lengths = [snippets.offset.shape[1] if with_sensor else 0] * len(snippets)
+    rows = []
+    for k, (one, noise) in enumerate(zip(snippets.items, sensor_noise(profile, lengths, seed), strict=True)):
+        start = float(one.offset[0] - noise[:1].sum())
+        offset = sample_offsets(profile, segment_of(one.run, one.rows), child(root, k), start=start)
+        rows.append(offset + noise if with_sensor else offset)
+    return np.array(rows).reshape(snippets.offset.shape)
 
 
 def sample_parts(profile: DriverProfile, snippets: Snippets, seed: int) -> tuple[FloatArray, FloatArray]:
@@ -82,10 +125,20 @@ def sample_parts(profile: DriverProfile, snippets: Snippets, seed: int) -> tuple
     return coarse, fine
 
 
-def sample_runs(profile: DriverProfile, runs: Sequence[Run], seed: int) -> list[FloatArray]:
-    """For each run one of a new driver, of the same length, start and context. [m]"""
+def sample_runs(profile: DriverProfile, runs: Sequence[Run], seed: int, *, same_start: bool = True) -> list[FloatArray]:
+    """For each run one of a new driver, of the same length and context, and the same start or any. [m]"""
     root = np.random.SeedSequence(seed)
     return [
-        sample_offsets(profile, segment_of(run), child(root, k), start=float(run.offset[0]))
+        sample_offsets(profile, segment_of(run), child(root, k), start=float(run.offset[0]) if same_start else None)
         for k, run in enumerate(runs)
+    ]
+
+
+def sensor_noise(profile: DriverProfile, lengths: Sequence[int], seed: int) -> list[FloatArray]:
+    """What the profile's sensor adds to runs of these lengths; zeros where it knows of none. [m]"""
+    root, step = np.random.SeedSequence(seed), profile.model.step
+    if profile.sensor is None:
+        return [np.zeros(n) for n in lengths]
+    return [
+        profile.sensor.sample(n, step, np.random.default_rng(child(root, k, SENSOR))) for k, n in enumerate(lengths)
     ]

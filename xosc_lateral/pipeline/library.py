@@ -28,7 +28,8 @@ from xosc_lateral.drives.resampling import STEP
 from xosc_lateral.errors import NotEnoughDataError
 from xosc_lateral.evaluation.comparison import habits_of, told_from_each_other
 from xosc_lateral.evaluation.metrics import snippet_metrics
-from xosc_lateral.evaluation.scores import SNIPPET, score_profile, scores_to_dict
+from xosc_lateral.evaluation.record import scores_to_dict
+from xosc_lateral.evaluation.scores import SNIPPET, score_profile
 from xosc_lateral.evaluation.snippets import snippets_of
 from xosc_lateral.formats.drives import read_drives
 from xosc_lateral.formats.hashes import parsed_hash

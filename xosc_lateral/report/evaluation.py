@@ -3,15 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from math import isfinite
 from typing import Any
 
 from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.evaluation.metrics import METRICS
-from xosc_lateral.evaluation.scores import PartEvaluation, ProfileScores, SnippetScores, scores_to_dict
+from xosc_lateral.evaluation.realism import Realism
+from xosc_lateral.evaluation.record import scores_to_dict
+from xosc_lateral.evaluation.scores import PartEvaluation, ProfileScores, SnippetScores
 from xosc_lateral.evaluation.spectra import Margins
 from xosc_lateral.formats.profiles import profile_hash
 from xosc_lateral.report import evaluation_figures as figures
 from xosc_lateral.report.evaluation_figures import LABELS
+from xosc_lateral.report.realism import (
+    FAMILIES,
+    condition_groups,
+    indicator_rows,
+    ratio_rows,
+    realism_lines,
+    start_fade_note,
+)
 from xosc_lateral.report.render import KeyFigure, Tone, render_page
 from xosc_lateral.version import __version__
 
@@ -25,8 +36,12 @@ def evaluation_text(scores: ProfileScores, profile: DriverProfile, inputs: Mappi
         f"{scores.profile} on {scores.hours:.2f} h of {scores.drives} drives ({scores.runs} runs), seed {scores.seed}",
         *([FITTED] if _fitted_on(profile, inputs) else []),
         _worst_line(scores),
+        *realism_lines(scores.realism),
+        "the paper's measure: same start, the driver alone, floor without the start",
         *_snippet_lines(scores.snippets),
     ]
+    if note := start_fade_note(profile):
+        lines.append(f"  {note}")
     if scores.long_snippets is not None:
         lines += _snippet_lines(scores.long_snippets)
     lines.append("mean distance of the four evaluations (coarse + fine):")
@@ -41,7 +56,6 @@ def evaluation_text(scores: ProfileScores, profile: DriverProfile, inputs: Mappi
             f"near a marking, {name}: {100 * one.share_near:.2f} % of the time, "
             f"{one.excursions_per_hour:.1f} times an hour"
         )
-    lines.append(f"classifier AUC: {_auc(scores.classifier_auc)}")
     return "\n".join(lines)
 
 
@@ -66,10 +80,15 @@ def evaluation_page(scores: ProfileScores, profile: DriverProfile, inputs: Mappi
         fitted=FITTED if _fitted_on(profile, inputs) else "",
         numbers=[
             KeyFigure(f"{ratio:.2f}", f"worst of all blocks: {worst}", "1: as close as real to real", _tone(ratio)),
-            KeyFigure(f"{scores.snippets.ratio:.2f}", "distance / floor, ten metrics", "mean over 10 s snippets"),
-            KeyFigure(_auc(scores.classifier_auc), "classifier AUC", "0.5: sampled and measured look alike"),
-            KeyFigure(f"{scores.spectrum_error:.1f} dB", "spectrum", "rms difference over the bands"),
+            *_key_figures(scores.realism),
         ],
+        groups=[(heading, ratio_rows(group)) for heading, group in condition_groups(scores.realism).items()],
+        indicators=[
+            (one.condition.name, indicator_rows(one))
+            for one in scores.realism.conditions
+            if not one.condition.same_start
+        ],
+        start_fade=start_fade_note(profile),
         metric_table=_metric_table,
         part_rows=[_part_row(one) for one in scores.evaluations],
         margin_rows=[_margin_row("measured", scores.margins_real), _margin_row("sampled", scores.margins_sampled)],
@@ -120,24 +139,34 @@ def _snippet_lines(scores: SnippetScores) -> list[str]:
     return lines
 
 
-def blocks_of(scores: ProfileScores) -> dict[str, float]:
-    """Every block of the evaluation as a ratio to what real data has against itself: 1 is as good as it gets. [-]
+def _key_figures(realism: Realism) -> list[KeyFigure]:
+    """Of the shortest free runs: how near, how well told apart."""
+    figures = []
+    slow = next((one for one in realism.conditions if one.condition.slow), None)
+    free = next((one for one in realism.conditions if not one.condition.slow and not one.condition.same_start), None)
+    if slow is not None:
+        ratio = slow.families["metrics"].ratio
+        figures.append(KeyFigure(f"{ratio:.2f}", "ten metrics / floor", slow.condition.name, _tone(ratio)))
+    for one in (slow, free):
+        if one is not None and one.alone is not None:
+            what = ", with the sensor" if one.with_sensor else ""
+            figures.append(KeyFigure(f"{one.alone.auc:.2f}", "classifier AUC", f"{one.condition.name}{what}"))
+    return figures
 
-    Metrics: the worst of each snippet length. Time near a marking and excursions: the larger over the smaller. The
-    spectrum: the ratio of densities that its difference in dB stands for. The classifier: 1 where it can't tell (AUC
-    0.5), 2 where it always can (AUC 1).
+
+def blocks_of(scores: ProfileScores) -> dict[str, float]:
+    """Every block of the fair measure as a ratio to what other real drivers get: 1 is as good as it gets. [-]
+
+    Families of differences by condition; the classifiers: 1 where they can't tell (AUC 0.5), 2 where they always can.
     """
     blocks = {}
-    for one in (scores.snippets, scores.long_snippets):
-        if one is not None:
-            name, ratio = one.worst_ratio
-            blocks[f"{LABELS[name]} over {one.seconds:g} s"] = ratio
-    near = scores.margins_real.share_near, scores.margins_sampled.share_near
-    if min(near) > 0.0:
-        blocks["time near a marking"] = max(near) / min(near)
-    blocks["spectrum"] = float(10.0 ** (scores.spectrum_error / 10.0))
-    if scores.classifier_auc is not None:
-        blocks["classifier"] = 1.0 + 2.0 * max(scores.classifier_auc - 0.5, 0.0)
+    for one in scores.realism.conditions:
+        for family, beside in one.families.items():
+            if isfinite(beside.ratio):
+                blocks[f"{FAMILIES[family]}, {one.condition.name}"] = beside.ratio
+        for name, area in (("classifier", one.alone), ("classifier with context", one.jointly)):
+            if area is not None:
+                blocks[f"{name}, {one.condition.name}"] = 1.0 + 2.0 * max(area.auc - 0.5, 0.0)
     return blocks
 
 
@@ -150,16 +179,11 @@ def worst_block(scores: ProfileScores) -> tuple[str, float]:
 
 def _worst_line(scores: ProfileScores) -> str:
     block, ratio = worst_block(scores)
-    mean = f"the ten metrics on average {scores.snippets.ratio:.2f}"
-    return f"worst of all blocks: {block}, {ratio:.2f} times the floor; {mean}"
+    return f"worst of all blocks: {block}, {ratio:.2f} times the floor"
 
 
 def _tone(ratio: float) -> Tone:
     return "good" if ratio <= CLOSE else "bad" if ratio >= FAR else ""
-
-
-def _auc(value: float | None) -> str:
-    return "not computed" if value is None else f"{value:.3f}"
 
 
 def _fitted_on(profile: DriverProfile, inputs: Mapping[str, str]) -> bool:

@@ -63,21 +63,23 @@ class Features:
         )
 
 
-def features_of(offset: FloatArray, lane_width: FloatArray, step: float) -> Features:
-    """Everything that `differences` needs of windows, shape (n, m)."""
+def features_of(
+    offset: FloatArray, lane_width: FloatArray, step: float, *, highest: float = float(BANDS[-1])
+) -> Features:
+    """Everything that `differences` needs of windows, shape (n, m); bands of the spectrum up to `highest` [Hz]."""
     m = offset.shape[1]
     lags = [round(lag / step) for lag in LAGS if round(lag / step) <= m // 2]
     products = [(offset[:, lag:] * offset[:, : m - lag]).mean(axis=1) for lag in lags]
     return Features(
         snippet_metrics(offset),
         lane_keeping_indicators(offset, lane_width, step),
-        band_power(offset, step),
+        band_power(offset, step, highest=highest),
         np.array(products).reshape(len(lags), len(offset)).T,
         np.column_stack([offset.mean(axis=1), (offset**2).mean(axis=1)]),
     )
 
 
-def band_power(offset: FloatArray, step: float) -> FloatArray:
+def band_power(offset: FloatArray, step: float, *, highest: float = float(BANDS[-1])) -> FloatArray:
     """Power density of each window in the bands that it can resolve (straight line removed, Hann window). [m2/Hz]"""
     m = offset.shape[1]
     line = np.linspace(0.0, 1.0, m)
@@ -85,13 +87,14 @@ def band_power(offset: FloatArray, step: float) -> FloatArray:
     window = np.hanning(m)
     power = np.abs(np.fft.rfft((offset - ramp) * window, n=4 * m, axis=1)) ** 2 * 2.0 * step / (window**2).sum()
     frequency = np.fft.rfftfreq(4 * m, step)
-    bands = [(frequency >= low) & (frequency < high) for low, high in resolved_bands(m * step)]
+    bands = [(frequency >= low) & (frequency < high) for low, high in resolved_bands(m * step, highest)]
     return np.column_stack([power[:, inside].mean(axis=1) for inside in bands])
 
 
-def resolved_bands(seconds: float) -> list[tuple[float, float]]:
-    """Bands whose lower edge a window of that length goes through at least once. [Hz]"""
-    return [(float(low), float(high)) for low, high in pairwise(BANDS) if low * seconds >= 1.0]
+def resolved_bands(seconds: float, highest: float = float(BANDS[-1])) -> list[tuple[float, float]]:
+    """Bands up to `highest` whose lower edge a window of that length goes through at least once. [Hz]"""
+    bands = [(float(low), float(high)) for low, high in pairwise(BANDS)]
+    return [(low, high) for low, high in bands if low * seconds >= 1.0 and high <= highest]
 
 
 def differences(real: Features, other: Features, rows: IntArray, other_rows: IntArray) -> dict[str, float]:
@@ -141,3 +144,9 @@ def named_distances(real: Features, other: Features) -> Mapping[str, float]:
     names = (*METRICS, *INDICATORS)
     values = [*column_distances(real.metrics, other.metrics), *column_distances(real.indicators, other.indicators)]
     return dict(zip(names, values, strict=True))
+
+
+def named_means(real: Features, other: Features) -> Mapping[str, tuple[float, float]]:
+    """Mean of each lane-keeping indicator, real and other; units in `lane_keeping.UNITS`."""
+    means = real.indicators.mean(axis=0).tolist(), other.indicators.mean(axis=0).tolist()
+    return {name: (means[0][k], means[1][k]) for k, name in enumerate(INDICATORS)}

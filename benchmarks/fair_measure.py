@@ -1,0 +1,85 @@
+"""How near are free runs to real ones, beside other real drivers? The fair measure on held-out vehicles.
+
+    xosc-lateral import dlr-ht tasi-0.15.4-py3-none-any.whl -o dlr.parquet
+    python -m benchmarks.fair_measure dlr.parquet [--seed 0] [--no-classify] [--write docs/validation/realism.md]
+
+A profile is fitted to a random half of the vehicles and measured on the other half, and the other way round; numbers
+are means of both.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from benchmarks.markers import write_between_markers
+from xosc_lateral.driver.fitting import fit_profile
+from xosc_lateral.driver.models.kinds import ModelKind
+from xosc_lateral.drives.cuts import all_runs
+from xosc_lateral.drives.drive import Drive
+from xosc_lateral.evaluation.realism import ConditionScores, Realism, score_realism
+from xosc_lateral.formats.drives import read_drives
+from xosc_lateral.report.realism import FAMILIES
+
+
+def halves(drives: Sequence[Drive], seed: int) -> tuple[list[Drive], list[Drive]]:
+    names = sorted(drive.name for drive in drives)
+    chosen = set(np.random.default_rng(seed).permutation(names)[: len(names) // 2].tolist())
+    return [one for one in drives if one.name in chosen], [one for one in drives if one.name not in chosen]
+
+
+def measure(drives: Sequence[Drive], seed: int, model: str, *, classify: bool) -> list[Realism]:
+    one, other = halves(drives, seed)
+    found = []
+    for fitted, held_out in ((one, other), (other, one)):
+        profile = fit_profile(fitted, name="half", model=model)
+        found.append(score_realism(profile, all_runs(held_out), seed=seed, classify=classify))
+    return found
+
+
+def table(parts: Sequence[Realism]) -> list[str]:
+    columns = list(FAMILIES.values())
+    lines = [
+        f"| snippets | sampled | {' | '.join(columns)} | AUC | with context | AUC of real drivers |",
+        "|---" * (len(columns) + 5) + "|",
+    ]
+    for scores in parts[0].conditions:
+        several = [part.of(scores.condition) for part in parts]
+        known = [one for one in several if one is not None]
+        lines.append(_line(known))
+    return lines
+
+
+def _line(parts: Sequence[ConditionScores]) -> str:
+    cells = []
+    for family in FAMILIES:
+        found = [one.families[family] for one in parts if family in one.families]
+        ratio = np.exp(np.mean([np.log(one.ratio) for one in found])) if found else np.nan
+        cells.append(f"{ratio:.2f}" if found else "")
+    for which in ("alone", "jointly", "floor"):
+        areas = [area for one in parts if (area := getattr(one, which)) is not None]
+        cells.append(" / ".join(f"{area.auc:.3f}" for area in areas))
+    what = "driver and sensor" if parts[0].with_sensor else "driver"
+    return f"| {parts[0].condition.name} | {what} | {' | '.join(cells)} |"
+
+
+def main() -> None:
+    ask = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    ask.add_argument("table", type=Path, nargs="+")
+    ask.add_argument("--seed", type=int, default=0)
+    ask.add_argument("--model", default=ModelKind.AUTOREGRESSIVE)
+    ask.add_argument("--no-classify", action="store_true")
+    ask.add_argument("--write", type=Path, help="page with the markers")
+    said = ask.parse_args()
+    parts = measure(read_drives(said.table), said.seed, said.model, classify=not said.no_classify)
+    text = "\n".join(table(parts))
+    print(text)
+    if said.write is not None:
+        write_between_markers(said.write, text, "fair-measure")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,89 @@
+"""The classifier, and the shapes that it looks at."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tests.baselines.made_runs import made_run
+from xosc_lateral.evaluation.classifier import FOLDS, area_under_roc, context_features, snippet_features, told_apart
+from xosc_lateral.evaluation.shape import SHAPES, longest_true, shape_features
+from xosc_lateral.evaluation.snippets import snippets_of
+
+
+def _walks(seed: int, n: int = 100) -> np.ndarray:
+    return np.random.default_rng(seed).normal(size=(n, 51)).cumsum(axis=1)
+
+
+GROUPS = np.arange(100) // 10
+
+
+def test_rough_is_told_from_smooth_and_like_is_not_told_from_like():
+    pytest.importorskip("sklearn", reason="extra `classifier` is not installed")
+    alike = told_apart(_walks(1), _walks(2), GROUPS, GROUPS)
+    assert alike.auc == pytest.approx(0.5, abs=0.15)  # 3 standard errors of 2 x 100 snippets in ten groups
+    rough = _walks(3) + np.random.default_rng(4).normal(size=(100, 51))
+    apart = told_apart(_walks(1), rough, GROUPS, GROUPS)
+    assert apart.auc > apart.low > 0.9
+
+
+def test_what_only_context_tells_is_told_with_context_alone():
+    pytest.importorskip("sklearn", reason="extra `classifier` is not installed")
+    side = np.random.default_rng(5).choice([-1.0, 1.0], size=100)
+    real = _walks(6) + 30.0 * side[:, None]
+    other = _walks(7) - 30.0 * side[:, None]  # as often on either side, but on the wrong one
+    assert told_apart(real, other, GROUPS, GROUPS).auc < 0.65
+    assert told_apart(real, other, GROUPS, GROUPS, context=(side[:, None], side[:, None])).auc > 0.8
+
+
+def test_context_is_the_same_for_both_and_how_a_path_moves_with_it_is_not():
+    runs = [
+        made_run(walk, drive=f"d{k}", lead=np.full(51, 20.0 + k), sway=np.sin(np.arange(51.0)))
+        for k, walk in enumerate(_walks(9, 6))
+    ]
+    cut = snippets_of(runs, 10.0, 0.2)
+    real, other = context_features(cut, cut.offset), context_features(cut, _walks(10, 6))
+    assert real.shape == (6, 9)  # mean, spread and correlation of lead, speed and sway
+    np.testing.assert_array_equal(real[:, :8], other[:, :8])
+    assert not np.allclose(real[:, 8], other[:, 8])
+    assert (real[:, 2] == -2.0).all()  # `lead` never changes, so nothing moves with it
+
+
+def test_classifier_stays_silent_with_too_few_drives():
+    rows = np.zeros((10, 51))
+    assert told_apart(rows, rows, np.zeros(10), np.zeros(10)) is None
+    assert FOLDS == 5
+
+
+def test_area_is_the_share_of_pairs_in_the_right_order():
+    score = np.array([0.1, 0.4, 0.4, 0.9])
+    label = np.array([False, True, False, True])
+    assert area_under_roc(score, label, np.ones(4)) == pytest.approx((2 + 1 + 0.5) / 4)
+    # A weight of two is a row that is there twice.
+    weighted = area_under_roc(score, label, np.array([1.0, 1.0, 2.0, 1.0]))
+    twice = area_under_roc(np.append(score, 0.4), np.append(label, False), np.ones(5))
+    assert weighted == pytest.approx(twice)
+
+
+def test_shape_knows_neither_place_nor_size():
+    walks = _walks(8, 20)
+    np.testing.assert_allclose(shape_features(3.0 * walks + 2.0), shape_features(walks), atol=1e-9)
+    assert shape_features(walks).shape == (20, len(SHAPES))
+
+
+def test_shapes_follow_their_definitions():
+    ramp = np.linspace(0.0, 1.0, 40)
+    rows = np.array([ramp, -ramp, np.sin(2 * np.pi * np.arange(40) / 10)])
+    found = dict(zip(SHAPES, shape_features(rows).T, strict=True))
+    np.testing.assert_allclose(found["longest_above_mean"][:2], 0.5)
+    np.testing.assert_allclose(found["longest_decrease"][:2], [0.0, 39 / 39])
+    assert found["first_minimum"][2] == pytest.approx(4.0)  # half a period of 10 rows, counted from the second lag
+    assert found["late_extremes_high"][0] > 0.6 > -0.6 > found["late_extremes_high"][1]
+    assert found["kurtosis"][2] == pytest.approx(1.5, abs=0.01)
+    assert found["motifs"][0] < found["motifs"][2]
+    np.testing.assert_allclose(longest_true(np.array([[1, 1, 0, 1], [0, 0, 0, 0]], dtype=bool)), [0.5, 0.0])
+
+
+@pytest.mark.parametrize("rows", [np.zeros((3, 51)), np.full((3, 51), 0.2)])
+def test_no_movement_is_a_number_too(rows):
+    assert np.isfinite(shape_features(rows)).all() and np.isfinite(snippet_features(rows)).all()

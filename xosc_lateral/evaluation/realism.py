@@ -1,0 +1,245 @@
+"""How near sampled driving is to real driving, beside how near other real drivers are: the fair measure.
+
+Snippets of 10, 30 and 60 s are compared under three conditions: sampled from where the real ones start; cut from free
+runs that know no start; and free runs again, movement below 0.5 Hz alone. Every number has a floor of other drivers'
+real snippets that know as much about the start. What was recorded is the driver and the sensor, so a profile that knows
+its sensor is compared with it; below 0.5 Hz the driver is compared alone, as `convert` writes him.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from xosc_lateral.driver.profile import DriverProfile
+from xosc_lateral.drives.drive import Run
+from xosc_lateral.evaluation.bands import CUTOFF, TRANSITION, below_half_hertz, thinned
+from xosc_lateral.evaluation.classifier import Separation, context_features, told_apart
+from xosc_lateral.evaluation.condition import LENGTHS, Condition
+from xosc_lateral.evaluation.distances import split_groups
+from xosc_lateral.evaluation.ensemble_scores import PROPER, proper_scores
+from xosc_lateral.evaluation.lane_keeping import VarianceParts, variance_parts
+from xosc_lateral.evaluation.measures import (
+    UNITS,
+    Features,
+    differences,
+    features_of,
+    named_distances,
+    named_means,
+)
+from xosc_lateral.evaluation.same_start import FLOOR_DRAWS, real_against_real, windows_with_the_same_start
+from xosc_lateral.evaluation.snippets import Snippets, sample_runs, sample_snippets, sensor_noise, snippets_of
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+
+SPLITS = 8
+"""Random halves of the drives that distances and floors are averaged over."""
+
+LEAST = 20
+"""Fewer snippets of a length: it is left out."""
+
+ENSEMBLE, SCORED = 8, 200
+"""Sampled snippets for each of so many real ones of 10 s, spread evenly: proper scores need several of each."""
+
+
+@dataclass(frozen=True)
+class Beside:
+    """A number and its floor: what real driving of other drivers gets. Unit in its name's table."""
+
+    value: float
+    floor: float
+    unit: str = "sd"
+
+    @property
+    def ratio(self) -> float:
+        """Value over floor; 1: as near as other real drivers. [-]"""
+        return self.value / self.floor if self.floor > 0.0 else float("nan")
+
+
+@dataclass(frozen=True, eq=False)
+class ConditionScores:
+    """What was found under one condition.
+
+    Parameters
+    ----------
+    condition : Condition
+    with_sensor : bool
+        Whether what was sampled holds the profile's sensor.
+    count : int
+        Snippets.
+    families : mapping of str to Beside
+        `metrics`, `lane_keeping` [sd], `spectrum` [dB], `memory` [-]; see `measures.differences`. With the same start,
+        10 s, also the proper scores [m].
+    named : mapping of str to Beside
+        Distance of each of the ten metrics and of each lane-keeping indicator. [sd]
+    means : mapping of str to (float, float)
+        Mean of each lane-keeping indicator, real and sampled; units in `lane_keeping.UNITS`.
+    alone, jointly : Separation or None
+        Classifier on movement, and on context and movement jointly (below 0.5 Hz). None: not trained.
+    floor : Separation or None
+        Half of the real drivers told from the others, by movement. Jointly it is 0.5: both kinds have the same
+        context. With the same start it is as with any: both halves start alike.
+    """
+
+    condition: Condition
+    with_sensor: bool
+    count: int
+    families: Mapping[str, Beside]
+    named: Mapping[str, Beside]
+    means: Mapping[str, tuple[float, float]]
+    alone: Separation | None
+    jointly: Separation | None
+    floor: Separation | None
+
+
+@dataclass(frozen=True, eq=False)
+class Realism:
+    """The fair measure of a profile.
+
+    Parameters
+    ----------
+    conditions : tuple of ConditionScores
+        Those with enough snippets.
+    variance_real, variance_sampled : VarianceParts
+        Between drivers, within drivers and inside snippets of 10 s, of free runs. [m2]
+    """
+
+    conditions: tuple[ConditionScores, ...]
+    variance_real: VarianceParts
+    variance_sampled: VarianceParts
+
+    def of(self, condition: Condition) -> ConditionScores | None:
+        """Scores under a condition, None where there were too few snippets."""
+        return next((one for one in self.conditions if one.condition == condition), None)
+
+
+def score_realism(profile: DriverProfile, runs: Sequence[Run], *, seed: int, classify: bool = True) -> Realism:
+    """Compare a profile's snippets with real ones under every condition that has enough of them.
+
+    Parameters
+    ----------
+    runs : sequence of Run
+        Measured, at the profile's step.
+    classify : bool
+        Train classifiers too: most of the work.
+    """
+    step = profile.model.step
+    driver = sample_runs(profile, runs, seed, same_start=False)
+    noise = sensor_noise(profile, list(map(len, runs)), seed)
+    recorded = [path + error for path, error in zip(driver, noise, strict=True)]
+    slow_real = [below_half_hertz(run.offset, step) for run in runs]
+    slow_driver = [below_half_hertz(path, step) for path in driver]
+    found = []
+    for seconds in LENGTHS:
+        cut = snippets_of(runs, seconds, step)
+        if len(cut) < LEAST or len(np.unique(cut.group)) < 2:
+            continue
+        same = sample_snippets(profile, cut, seed + 1, with_sensor=True)
+        slow = cut.cut_from(slow_real), cut.cut_from(slow_driver)
+        for condition, real, sampled in (
+            (Condition(seconds, True), cut.offset, same),
+            (Condition(seconds, False), cut.offset, cut.cut_from(recorded)),
+            (Condition(seconds, False, slow=True), *slow),
+        ):
+            with_sensor = profile.sensor is not None and not condition.slow
+            found.append(_under(condition, cut, real, sampled, step, seed, classify=classify, with_sensor=with_sensor))
+    short = snippets_of(runs, LENGTHS[0], step)
+    whose = np.array([str(number) for number, _ in short.place])
+    if found and found[0].condition == Condition(LENGTHS[0], True):
+        found[0] = _with_proper_scores(found[0], profile, short, seed)
+    return Realism(tuple(found), variance_parts(short.offset, whose), variance_parts(short.cut_from(recorded), whose))
+
+
+def _under(
+    condition: Condition,
+    cut: Snippets,
+    real: FloatArray,
+    sampled: FloatArray,
+    step: float,
+    seed: int,
+    *,
+    classify: bool,
+    with_sensor: bool,
+) -> ConditionScores:
+    highest = CUTOFF - 0.5 * TRANSITION if condition.slow else np.inf
+    own = features_of(real, cut.lane_width, step, highest=highest)
+    made = features_of(sampled, cut.lane_width, step, highest=highest)
+    families, named = _distances(condition, own, made, real, cut.group, seed)
+    alone = jointly = floor = None
+    if classify:
+        shown = (thinned(real, step), thinned(sampled, step)) if condition.slow else (real, sampled)
+        alone = told_apart(*shown, cut.group, cut.group, seed=seed)
+        if not condition.same_start:
+            floor = _separated_drivers(shown[0], cut.group, seed)
+        if condition.slow:
+            context = context_features(cut, real), context_features(cut, sampled)
+            jointly = told_apart(*shown, cut.group, cut.group, context=context, seed=seed)
+    means = named_means(own, made)
+    return ConditionScores(condition, with_sensor, len(cut), families, named, means, alone, jointly, floor)
+
+
+def _distances(
+    condition: Condition, own: Features, made: Features, real: FloatArray, group: NDArray[np.str_], seed: int
+) -> tuple[dict[str, Beside], dict[str, Beside]]:
+    """Over random halves: a half beside its own sampled snippets, and beside the other half; equally many in both."""
+    rng = np.random.default_rng(seed)
+    values, floors, named, named_floors = [], [], [], []
+    for _ in range(SPLITS):
+        half = split_groups(group, rng)
+        rows, others = np.flatnonzero(half), np.flatnonzero(~half)
+        stand_ins = _stand_ins(real, group, rows, others, rng) if condition.same_start else None
+        values.append(differences(own, made, rows, rows))
+        floors.append(real_against_real(own, own, rows, others, stand_ins))
+        named.append(named_distances(own.take(rows), made.take(rows)))
+        beside = others if stand_ins is None else stand_ins[:, 0]
+        named_floors.append(named_distances(own.take(rows), own.take(beside)))
+    return _beside(values, floors, UNITS), _beside(named, named_floors, {})
+
+
+def _beside(
+    values: Sequence[Mapping[str, float]], floors: Sequence[Mapping[str, float]], units: Mapping[str, str]
+) -> dict[str, Beside]:
+    def mean(several: Sequence[Mapping[str, float]], name: str) -> float:
+        return float(np.mean([one[name] for one in several]))
+
+    return {name: Beside(mean(values, name), mean(floors, name), units.get(name, "sd")) for name in values[0]}
+
+
+def _stand_ins(
+    real: FloatArray, group: NDArray[np.str_], rows: IntArray, others: IntArray, rng: np.random.Generator
+) -> IntArray:
+    """Other drivers' snippets with the same start, shape (rows, draws)."""
+    count = min(FLOOR_DRAWS, len(others))
+    starts = real[:, 0]
+    return others[
+        windows_with_the_same_start(starts[rows], group[rows], starts[others], group[others], rng, count=count)
+    ]
+
+
+def _separated_drivers(real: FloatArray, group: NDArray[np.str_], seed: int) -> Separation | None:
+    """One random half of the drivers told from the other."""
+    half = split_groups(group, np.random.default_rng(seed))
+    return told_apart(real[half], real[~half], group[half], group[~half], seed=seed)
+
+
+def _with_proper_scores(scores: ConditionScores, profile: DriverProfile, cut: Snippets, seed: int) -> ConditionScores:
+    """Energy and variogram score of several sampled snippets, beside other drivers' snippets with the same start."""
+    chosen = np.unique(np.linspace(0, len(cut) - 1, min(len(cut), SCORED)).astype(np.int64))
+    some = cut.take(chosen)
+    members = [sample_snippets(profile, some, seed + 10 + k, with_sensor=True) for k in range(ENSEMBLE)]
+    drivers = windows_with_the_same_start(
+        some.offset[:, 0],
+        some.group,
+        cut.offset[:, 0],
+        cut.group,
+        np.random.default_rng(seed),
+        count=ENSEMBLE,
+    )
+    sampled = proper_scores(some.offset, np.stack(members, axis=1))
+    real = proper_scores(some.offset, cut.offset[drivers])
+    added = {name: Beside(sampled[name], real[name], PROPER[name]) for name in sampled}
+    return replace(scores, families={**scores.families, **added})
