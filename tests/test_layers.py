@@ -17,6 +17,7 @@ LAYERS = {
     "segment": 0,
     "limits": 0,
     "jit": 0,
+    "mask": 0,
     "road": 1,
     "scenario": 1,
     "motion": 2,

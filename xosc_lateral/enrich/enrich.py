@@ -15,6 +15,7 @@ from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.driver.sampling import OffsetSampler
 from xosc_lateral.enrich.give_way import Sampled, give_way
 from xosc_lateral.enrich.result import Enriched, EntityResult, LaneDeparture, SampledSegment
+from xosc_lateral.mask import stretches_of
 from xosc_lateral.motion.context import entity_context
 from xosc_lateral.motion.deviation import SETTLING_TIME, SampledStretch, deviation_through
 from xosc_lateral.motion.gaps import BoxPath, Gap, smallest_gaps
@@ -321,9 +322,7 @@ def _lateral_within_a_lane(motion: EntityMotion) -> list[tuple[int, int]]:
     lateral = (
         ((motion.activity & Activity.LATERAL) != 0) & ((motion.activity & Activity.ACTIVE) != 0) & (motion.road >= 0)
     )
-    edges = np.flatnonzero(np.diff(np.concatenate(([False], lateral, [False])).astype(np.int8)))
-    runs = [(int(begin), int(end) - 1) for begin, end in zip(edges[::2], edges[1::2], strict=True)]
-    return [(a, b) for a, b in runs if len(set(motion.lane[a : b + 1].tolist())) == 1]
+    return [(part.start, part.stop - 1) for part in stretches_of(lateral) if len(set(motion.lane[part].tolist())) == 1]
 
 
 def _gaps(motion: NominalMotion, trajectories: Sequence[Trajectory]) -> tuple[Gap, ...]:

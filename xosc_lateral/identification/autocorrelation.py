@@ -19,6 +19,8 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from xosc_lateral.mask import stretches_of
+
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
 IntArray = NDArray[np.intp]
@@ -199,8 +201,7 @@ class Whitener:
     def _runs(self) -> list[slice]:
         if self.runs:
             return list(self.runs)
-        edges = np.flatnonzero(np.diff(np.concatenate([[0], self.valid.astype(np.int8), [0]])))
-        return [slice(int(first), int(last)) for first, last in zip(edges[::2], edges[1::2], strict=True)]
+        return stretches_of(self.valid)
 
     @cached_property
     def _edges(self) -> IntArray:

@@ -14,6 +14,7 @@ from xosc_lateral.drives.resampling import STEP
 from xosc_lateral.identification.regression import Fitted
 from xosc_lateral.identification.terms.base import Removal, Term
 from xosc_lateral.identification.timeline import Timeline
+from xosc_lateral.mask import stretches_of
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
@@ -47,7 +48,7 @@ def bare_runs(timeline: Timeline, removal: Removal, used: BoolArray) -> list[Run
     """Runs of the movement without effects, from the valid rows in `used`."""
     runs: list[Run] = []
     for index, name in enumerate(timeline.names):
-        for rows in uninterrupted(timeline.valid & used & (timeline.drive == index)):
+        for rows in stretches_of(timeline.valid & used & (timeline.drive == index)):
             if (rows.stop - rows.start) * STEP >= MIN_RUN:
                 runs.append(_run(timeline, removal, rows, name, len(runs)))
     return runs
@@ -60,12 +61,6 @@ def bare_movement(timeline: Timeline, removal: Removal, rows: slice, mean: float
     slow = _smooth(left)
     spread, fine = np.exp(-removal.spread[rows]), np.exp(-removal.fine[rows])
     return np.asarray(mean + (slow - mean) * spread + (left - slow) * fine)
-
-
-def uninterrupted(mask: BoolArray) -> list[slice]:
-    """Stretches of rows in a row, in order."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], mask.astype(np.int8), [0]])))
-    return [slice(int(first), int(last)) for first, last in zip(edges[::2], edges[1::2], strict=True)]
 
 
 def _run(timeline: Timeline, removal: Removal, rows: slice, name: str, index: int) -> Run:

@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.errors import NotEnoughDataError
+from xosc_lateral.mask import stretches_of
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -186,8 +187,5 @@ def _covered(s: FloatArray, stretch: IntArray, window: float = 100.0) -> tuple[f
 
 def _longest(good: NDArray[np.bool_]) -> tuple[int, int]:
     """First index and one past the last of the longest stretch of True; (0, 0) if there is none."""
-    edges = np.flatnonzero(np.diff(np.r_[False, good, False].astype(np.int8)))
-    if len(edges) == 0:
-        return 0, 0
-    longest = int(np.argmax(edges[1::2] - edges[::2]))
-    return int(edges[2 * longest]), int(edges[2 * longest + 1])
+    longest = max(stretches_of(good), key=lambda part: part.stop - part.start, default=slice(0, 0))
+    return longest.start, longest.stop

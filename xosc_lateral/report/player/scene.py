@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.enrich.result import Enriched, EntityResult
+from xosc_lateral.mask import stretches_of
 from xosc_lateral.motion.nominal import Activity, EntityMotion, NominalMotion
 from xosc_lateral.motion.trajectory import Trajectory
 from xosc_lateral.report.path_dynamics import lateral_dynamics
@@ -97,7 +98,7 @@ def _entity(
         "ahead": box.center_x,
         "left": box.center_y,
         "vehicle": motion.entity.is_vehicle,
-        "present": _runs(_present(motion)[rows]),
+        "present": [[part.start, part.stop - 1] for part in stretches_of(_present(motion)[rows])],
         "jumps": _jumps(motion, rows),
         "lanes": _lane_changes(network, motion, rows),
         "track": [pack(track[:, k], TRACK_RESOLUTION) for k in (0, 1)],
@@ -125,12 +126,6 @@ def _path(path: EntityMotion | Trajectory, rows: RowArray, origin: FloatArray, m
 def _filled(values: FloatArray) -> FloatArray:
     """Numbers instead of NaN, where an entity is absent: nobody sees them there."""
     return np.nan_to_num(np.asarray(values, dtype=np.float64))
-
-
-def _runs(wanted: NDArray[np.bool_]) -> list[list[int]]:
-    """First and last index of each stretch of True."""
-    edges = np.flatnonzero(np.diff(np.concatenate(([0], wanted.astype(np.int8), [0]))))
-    return [[int(first), int(last) - 1] for first, last in edges.reshape(-1, 2)]
 
 
 def _jumps(motion: EntityMotion, rows: RowArray) -> list[int]:

@@ -15,6 +15,8 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from xosc_lateral.mask import stretches_of
+
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
 
@@ -67,8 +69,8 @@ def cut_moves(time: FloatArray, x: FloatArray, y: FloatArray, active: BoolArray,
         The entity exists; it was placed anew in the step that ends with this row.
     """
     moves: list[Move] = []
-    for first, last in _runs(active):
-        cuts = [first, *(row for row in range(first + 1, last + 1) if teleported[row]), last + 1]
+    for part in stretches_of(active):
+        cuts = [part.start, *(row for row in range(part.start + 1, part.stop) if teleported[row]), part.stop]
         for begin, end in pairwise(cuts):
             placed = begin > 0
             moves.extend(_cut_at_stops(time, x, y, begin, end - 1, placed))
@@ -161,21 +163,17 @@ def _spaced(rows: NDArray[np.intp], way: FloatArray) -> NDArray[np.intp]:
     return np.array(kept)
 
 
-def _runs(mask: BoolArray) -> list[tuple[int, int]]:
-    """First and last index of every run of True."""
-    edges = np.flatnonzero(np.diff(np.concatenate(([False], mask, [False])).astype(np.int8)))
-    return [(int(begin), int(end) - 1) for begin, end in zip(edges[::2], edges[1::2], strict=True)]
-
-
 def _cut_at_stops(time: FloatArray, x: FloatArray, y: FloatArray, first: int, last: int, placed: bool) -> list[Move]:
     """Moves between the stops inside rows first..last, which hold no jump."""
     rows = slice(first, last + 1)
     step = np.diff(time[rows])
     still = np.hypot(np.diff(x[rows]), np.diff(y[rows])) < STANDSTILL_SPEED * step
     stops = [
-        (first + begin, first + end + 1)
-        for begin, end in _runs(still)
-        if begin == 0 or first + end + 1 == last or time[first + end + 1] - time[first + begin] >= STANDSTILL_TIME
+        (first + part.start, first + part.stop)
+        for part in stretches_of(still)
+        if part.start == 0
+        or first + part.stop == last
+        or time[first + part.stop] - time[first + part.start] >= STANDSTILL_TIME
     ]
     moves = []
     begin = first
