@@ -46,6 +46,7 @@ def convert_many(
     road_path: Paths = (),
     attempts: int = 1,
     time_limit: float = TIME_LIMIT,
+    with_sensor: bool = False,
     strict: bool = False,
     workers: int = 1,
     cluster: str | None = None,
@@ -65,6 +66,7 @@ def convert_many(
     output : str or Path
         Folder; it mirrors the inputs, and holds `manifest.parquet` at the end.
     profile, entity, only, seed, context, parameters, mode, library, allow, road, road_path, attempts, time_limit
+    with_sensor
         See `convert`.
     strict : bool
         A missing vehicle catalog fails a scenario, instead of a note and a usual car.
@@ -104,6 +106,7 @@ def convert_many(
         road_path=road_path,
         attempts=attempts,
         time_limit=time_limit,
+        with_sensor=with_sensor,
         strict=strict,
     )
     if isinstance(scenarios, str | Path):

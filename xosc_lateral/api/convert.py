@@ -42,6 +42,7 @@ def convert(
     road_path: Paths = (),
     attempts: int = 1,
     time_limit: float = TIME_LIMIT,
+    with_sensor: bool = False,
     strict: bool = False,
     force: bool = False,
 ) -> Conversion:
@@ -78,6 +79,9 @@ def convert(
         Sample anew up to so many times while cars touch or leave their lane.
     time_limit : float
         End of a scenario that has none. [s]
+    with_sensor : bool
+        Add the sensor error of the drives that profiles were fitted on, for tests of a perception chain; without, the
+        driver alone is written.
     strict : bool
         A missing vehicle catalog is an error, instead of a note and a usual car.
     force : bool
@@ -102,6 +106,7 @@ def convert(
         road_path=road_path,
         attempts=attempts,
         time_limit=time_limit,
+        with_sensor=with_sensor,
         strict=strict,
     )
     source = Path(scenario)
@@ -142,6 +147,7 @@ def convert_settings(
     road_path: Paths = (),
     attempts: int = 1,
     time_limit: float = TIME_LIMIT,
+    with_sensor: bool = False,
     strict: bool = False,
 ) -> ConvertSettings:
     """Settings of a conversion from what a user says; see `convert`."""
@@ -160,6 +166,7 @@ def convert_settings(
         allowed=as_paths(allow),
         roads=road_search(road, road_path),
         time_limit=time_limit,
+        with_sensor=with_sensor,
         strict=strict,
     )
 

@@ -16,6 +16,7 @@ from xosc_lateral.cli.words import (
     RoadPath,
     Seed,
     TimeLimit,
+    With,
     examples,
     pairs,
     say,
@@ -82,6 +83,7 @@ def convert(
     road_path: RoadPath = None,
     resample: Annotated[int, typer.Option(help="Attempts, as long as vehicles touch or leave their lane.", min=1)] = 1,
     time_limit: TimeLimit = 60.0,
+    with_: With = None,
     jobs: Annotated[int, typer.Option(help="Batch: number of processes; -1: one per core.")] = 1,
     job_timeout: Annotated[
         float, typer.Option(help="Batch: time limit per scenario [s].", min=1, max=86_400)
@@ -115,6 +117,7 @@ def convert(
         "road": road,
         "road_path": road_path or (),
         "time_limit": time_limit,
+        "with_sensor": bool(with_),
         "strict": strict,
         "force": force,
     }

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from enum import StrEnum
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -16,6 +15,7 @@ from xosc_lateral.cli.words import (
     Profile,
     Quiet,
     Seed,
+    With,
     examples,
     pairs,
     say_json,
@@ -23,12 +23,6 @@ from xosc_lateral.cli.words import (
 )
 
 Table = list[Path] | None
-
-
-class WithPart(StrEnum):
-    """Parts of a profile that are left out unless asked for."""
-
-    SENSOR = "sensor"
 
 
 def register(app: typer.Typer) -> None:
@@ -58,9 +52,7 @@ def sample(
     lane_width: Annotated[
         float | None, typer.Option(help="Lane width of the free run [m]; default: the profile's.", min=1, max=10)
     ] = None,
-    with_: Annotated[
-        list[WithPart] | None, typer.Option("--with", help="sensor: add the sensor error of the fitted drives.")
-    ] = None,
+    with_: With = None,
     columns: Columns = None,
     library: Library = None,
     force: Force = False,

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import sys
 from collections.abc import Iterable
+from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -40,6 +41,15 @@ RoadPath = Annotated[
 TimeLimit = Annotated[
     float, typer.Option(help="End time of a scenario that has none of its own [s].", min=0.1, max=86_400)
 ]
+
+
+class Part(StrEnum):
+    """Parts of a profile that are left out unless asked for."""
+
+    SENSOR = "sensor"
+
+
+With = Annotated[list[Part] | None, typer.Option("--with", help="sensor: add the sensor error of the fitted drives.")]
 
 
 def examples(*lines: str) -> str:

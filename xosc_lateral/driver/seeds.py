@@ -18,6 +18,8 @@ class DriveSeed(IntEnum):
     """One per hidden effect, by its place among them."""
     SLOPES = 2
     """One per column effect whose coefficients differ between drivers, by its place among the column effects."""
+    SENSOR = 77
+    """One per piece of the drive that a sensor measured."""
 
 
 class TwoLevelSeed(IntEnum):

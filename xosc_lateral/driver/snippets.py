@@ -12,20 +12,17 @@ from xosc_lateral.driver.plausibility import check_offsets
 from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.driver.sampling import sample_offsets
 from xosc_lateral.driver.seeds import child
-from xosc_lateral.driver.sensor.model import SensorModel
+from xosc_lateral.driver.sensor.error import known_sensor, sensor_error
 from xosc_lateral.drives.cuts import PAPER_RULES, CutRules, all_runs, whole_run
 from xosc_lateral.drives.drive import Drive, Run
 from xosc_lateral.drives.resampling import STEP
-from xosc_lateral.errors import DriverProfileError, NotEnoughDataError
+from xosc_lateral.errors import NotEnoughDataError
 from xosc_lateral.segment import Segment
 
 FloatArray = NDArray[np.float64]
 
 PAST, FUTURE = 30.0, 10.0
 """Context before and after a snippet that effects may look at. [s]"""
-
-SENSOR = 77
-"""Key of the sensor's random numbers among a drive's."""
 
 MEAN_SPEED = 30.0
 """Of a free run whose speed nobody named: about 108 km/h. [m/s]"""
@@ -115,13 +112,13 @@ def sample_like(
     with_sensor: bool = False,
 ) -> Iterator[Sampled]:
     """For each snippet of the measured drives a sampled one of the same length, start, lane width and context."""
-    sensor = _sensor(profile) if with_sensor else None
+    sensor = known_sensor(profile) if with_sensor else None
     numbers = {drive.name: number for number, drive in enumerate(drives)}
     root = np.random.SeedSequence(seed)
     for snippet in cut_snippets(all_runs(drives, rules), seconds):
         own = child(root, numbers[snippet.run.drive], snippet.index)
         segment = segment_of(snippet.run, snippet.rows)
-        noise = _noise(sensor, len(snippet.time), own)
+        noise = sensor_error(sensor, len(snippet.time), STEP, own)
         offset = sample_offsets(profile, segment, own, start=float(snippet.offset[0] - noise[0])) + noise
         _check(offset, segment, profile, snippet.run.drive)
         yield Sampled(snippet.run.drive, snippet.index, snippet.time, offset, snippet.offset)
@@ -131,12 +128,12 @@ def sample_context(
     profile: DriverProfile, drives: Sequence[Drive], seed: int, *, with_sensor: bool = False
 ) -> Iterator[Sampled]:
     """One free run per measured drive, under its context from its first row to its last, lane changes included."""
-    sensor = _sensor(profile) if with_sensor else None
+    sensor = known_sensor(profile) if with_sensor else None
     root = np.random.SeedSequence(seed)
     for number, drive in enumerate(drives):
         run = whole_run(drive)
         own, segment = child(root, number), segment_of(run)
-        offset = sample_offsets(profile, segment, own) + _noise(sensor, len(run), own)
+        offset = sample_offsets(profile, segment, own) + sensor_error(sensor, len(run), STEP, own)
         _check(offset, segment, profile, drive.name)
         yield Sampled(drive.name, 0, run.time, offset, None)
 
@@ -174,25 +171,7 @@ def sample_free(
     width = profile.lane_width if lane_width is None else lane_width
     segment = Segment(time=time, lane_width=np.full(n, width), speed=np.full(n, speed))
     own = child(np.random.SeedSequence(seed), 0)
-    offset = sample_offsets(profile, segment, own) + _noise(_sensor(profile) if with_sensor else None, n, own)
+    offset = sample_offsets(profile, segment, own) + sensor_error(
+        known_sensor(profile) if with_sensor else None, n, STEP, own
+    )
     yield Sampled(profile.name, 0, time, offset, None)
-
-
-def _sensor(profile: DriverProfile) -> SensorModel:
-    """What the profile's drives were measured by.
-
-    Raises
-    ------
-    DriverProfileError
-        When the profile doesn't know.
-    """
-    if profile.sensor is None:
-        raise DriverProfileError(f"profile {profile.name} holds no sensor: fit it anew, or sample the driver alone")
-    return profile.sensor
-
-
-def _noise(sensor: SensorModel | None, n: int, own: np.random.SeedSequence) -> FloatArray:
-    """What the sensor adds to n offsets, from random numbers of its own. [m]"""
-    if sensor is None:
-        return np.zeros(n)
-    return sensor.sample(n, STEP, np.random.default_rng(child(own, SENSOR)))

@@ -23,6 +23,8 @@ class ConversionProvenance:
     seed, variant : int
     parameters : mapping of str to str
         Scenario parameters that were replaced.
+    with_sensor : bool
+        Offsets hold the sensor error of the drives that profiles were fitted on; else the driver alone.
     """
 
     package_version: str
@@ -31,6 +33,7 @@ class ConversionProvenance:
     seed: int
     variant: int
     parameters: Mapping[str, str] = field(default_factory=dict)
+    with_sensor: bool = False
 
 
 @dataclass(frozen=True, eq=False, slots=True)

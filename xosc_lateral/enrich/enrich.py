@@ -13,6 +13,7 @@ from xosc_lateral.driver.drivability import drivable
 from xosc_lateral.driver.plausibility import check_offsets
 from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.driver.sampling import OffsetSampler
+from xosc_lateral.driver.sensor.error import known_sensor, sensor_error
 from xosc_lateral.enrich.give_way import Sampled, give_way
 from xosc_lateral.enrich.result import Enriched, EntityResult, LaneDeparture, SampledSegment
 from xosc_lateral.mask import stretches_of
@@ -58,6 +59,7 @@ def enrich(
     trailers: Mapping[str, str] | None = None,
     attempts: int = 1,
     joint: bool = True,
+    with_sensor: bool = False,
 ) -> Enriched:
     """Enrich a played scenario.
 
@@ -81,6 +83,14 @@ def enrich(
         Sample anew up to so many times while vehicles touch or leave their lane that nominally don't; the best is kept.
     joint : bool
         Neighbours give way to each other (`give_way`); False: every vehicle as its profile alone has it.
+    with_sensor : bool
+        Add what the sensor added to the drives that each profile was fitted on. Nobody drives that: it is added after
+        drivers have given way and after what nobody could drive was smoothed.
+
+    Raises
+    ------
+    DriverProfileError
+        When the sensor is asked for and a profile knows of none.
     """
     trailers = trailers or {}
     stretches = {
@@ -98,6 +108,7 @@ def enrich(
                 drivers.get(entity.name, "not chosen"),
                 np.random.SeedSequence([seed, variant, attempt, zlib.crc32(entity.name.encode()), *entropy]),
                 context or {},
+                with_sensor,
             )
             for index, entity in enumerate(motion.entities)
         ]
@@ -128,6 +139,8 @@ class _Drawn:
         All; `segments` are those that were sampled: stretch, rows of its samples, offsets there [m].
     why : str
         It was not sampled.
+    errors : tuple of array
+        What a sensor adds to each segment's offsets; zeros unless asked for. [m]
     """
 
     motion: EntityMotion
@@ -136,6 +149,7 @@ class _Drawn:
     why: str
     segments: tuple[tuple[Stretch, IntArray, FloatArray], ...] = ()
     neutral: tuple[str, ...] = ()
+    errors: tuple[FloatArray, ...] = ()
 
     def deviation(self, distance: FloatArray) -> FloatArray:
         """On every row, positive left. [m]"""
@@ -155,13 +169,15 @@ def _draw(
     driver: DriverProfile | str,
     seed: np.random.SeedSequence,
     foreign_context: Mapping[str, tuple[FloatArray, FloatArray]],
+    with_sensor: bool,
 ) -> _Drawn:
     entity = motion.entities[index]
     if isinstance(driver, str):
         return _Drawn(entity, stretches, None, driver)
-    sampler = OffsetSampler(driver, seed)
+    sampler, sensor = OffsetSampler(driver, seed), known_sensor(driver) if with_sensor else None
     every = max(1, round(SAMPLE_STEP / motion.step))
     segments: list[tuple[Stretch, IntArray, FloatArray]] = []
+    errors: list[FloatArray] = []
     neutral: set[str] = set()
     for stretch in stretches:
         knots = np.arange(stretch.first, stretch.last + 1, every)
@@ -172,10 +188,11 @@ def _draw(
         wanted, inside = sampler.sample(segment), segment.inside
         who = f"profile {driver.name} for {entity.name!r}"
         check_offsets(wanted, segment.lane_width[inside], who, segment.time[inside])
+        errors.append(sensor_error(sensor, len(knots), SAMPLE_STEP, seed, part=len(segments)))
         segments.append((stretch, knots, wanted))
     if not segments:
         return _Drawn(entity, stretches, None, "no road-following segment")
-    return _Drawn(entity, stretches, driver, "", tuple(segments), tuple(sorted(neutral)))
+    return _Drawn(entity, stretches, driver, "", tuple(segments), tuple(sorted(neutral)), tuple(errors))
 
 
 def _apart(drawn: Sequence[_Drawn], motion: NominalMotion, network: RoadNetwork) -> list[_Drawn]:
@@ -212,7 +229,8 @@ def _result(drawn: _Drawn, network: RoadNetwork) -> EntityResult:
     bounded = [drivable(offset, SAMPLE_STEP, entity.speed[knots]) for _, knots, offset in drawn.segments]
     worst = max((bound for _, bound in bounded if bound), key=lambda bound: bound.before.excess, default=None)
     segments = tuple(
-        (stretch, knots, offset) for (stretch, knots, _), (offset, _) in zip(drawn.segments, bounded, strict=True)
+        (stretch, knots, offset + error)
+        for (stretch, knots, _), (offset, _), error in zip(drawn.segments, bounded, drawn.errors, strict=True)
     )
     deviation = replace(drawn, segments=segments).deviation(distance_driven(entity))
     return EntityResult(

@@ -12,7 +12,8 @@ from xosc_lateral.driver.models.base import Start
 from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.driver.sampling import sample_offsets
 from xosc_lateral.driver.seeds import child
-from xosc_lateral.driver.snippets import SENSOR, Snippet, cut_snippets, segment_of
+from xosc_lateral.driver.sensor.error import sensor_error
+from xosc_lateral.driver.snippets import Snippet, cut_snippets, segment_of
 from xosc_lateral.drives.drive import Run
 from xosc_lateral.segment import Segment
 
@@ -137,8 +138,4 @@ def sample_runs(profile: DriverProfile, runs: Sequence[Run], seed: int, *, same_
 def sensor_noise(profile: DriverProfile, lengths: Sequence[int], seed: int) -> list[FloatArray]:
     """What the profile's sensor adds to runs of these lengths; zeros where it knows of none. [m]"""
     root, step = np.random.SeedSequence(seed), profile.model.step
-    if profile.sensor is None:
-        return [np.zeros(n) for n in lengths]
-    return [
-        profile.sensor.sample(n, step, np.random.default_rng(child(root, k, SENSOR))) for k, n in enumerate(lengths)
-    ]
+    return [sensor_error(profile.sensor, n, step, child(root, k)) for k, n in enumerate(lengths)]

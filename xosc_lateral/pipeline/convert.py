@@ -98,6 +98,7 @@ def _convert(
         context=context,
         trailers=played.trailers,
         attempts=settings.attempts,
+        with_sensor=settings.with_sensor,
     )
     _refuse_lanes_without_width(played, enriched)
     provenance = _provenance(played, enriched, settings, variant, inputs)
@@ -154,6 +155,7 @@ def _provenance(
         seed=settings.seed,
         variant=variant,
         parameters=dict(sorted(settings.parameters.items())),
+        with_sensor=settings.with_sensor,
     )
 
 
@@ -189,6 +191,7 @@ def _write(
 ) -> WrittenScenario:
     profiles = sorted({name for name, _ in provenance.profiles.values()})
     summary = f"seed {provenance.seed}, variant {provenance.variant}, {', '.join(profiles) or 'no profile'}"
+    summary += ", with sensor" if provenance.with_sensor else ""
     facts = asdict(provenance)
     if settings.mode is Mode.LANE_OFFSET:
         chains = [

@@ -79,6 +79,7 @@ class Job:
             parameters=dict(sorted(self.settings.parameters.items())),
             settings=self.fingerprint,
             package_version=self.package_version,
+            with_sensor=self.settings.with_sensor,
             error=error,
         )
 
@@ -297,6 +298,8 @@ class _Fingerprints:
         del values["libraries"], values["allowed"], values["roads"]  # where files are looked for, not what is in them
         if not settings.strict:  # refuses more, and changes no output; what was made without it is not trusted with it
             del values["strict"]
+        if not settings.with_sensor:  # as it always was
+            del values["with_sensor"]
         values["profile"] = self._profile(settings.profile, settings.libraries)
         values["entity_profiles"] = {
             entity: self._profile(name, settings.libraries) for entity, name in settings.entity_profiles.items()

@@ -56,6 +56,8 @@ class ManifestRow:
     settings : str
         SHA-256 over package version, settings, variant, profile files and context table.
     package_version : str
+    with_sensor : bool
+        Offsets hold the sensor error of the drives that profiles were fitted on; else the driver alone.
     output_sha256 : str
         SHA-256 of the output.
     road, road_sha256 : str, str
@@ -94,6 +96,7 @@ class ManifestRow:
     parameters: Mapping[str, str]
     settings: str
     package_version: str
+    with_sensor: bool = False
     output_sha256: str = ""
     road: str = ""
     road_sha256: str = ""
@@ -156,7 +159,7 @@ def manifest_schema() -> pa.Schema:
     """Columns of `manifest.parquet`."""
     import pyarrow as pa
 
-    types: dict[str, pa.DataType] = {"stale": pa.bool_()}
+    types: dict[str, pa.DataType] = {"stale": pa.bool_(), "with_sensor": pa.bool_()}
     types |= {"variant": pa.int64(), "seed": pa.int64(), "entities": pa.int64()}
     types |= dict.fromkeys(("segment_seconds", "offset_spread", "gap_before", "gap_after"), pa.float64())
     types |= dict.fromkeys(("enriched", "warnings"), pa.list_(pa.string()))

@@ -60,6 +60,8 @@ class ConvertSettings:
         Refuse a missing vehicle catalog, instead of playing a usual car.
     step, time_limit : float
         Of playback. [s]
+    with_sensor : bool
+        Add the sensor error of the drives that profiles were fitted on.
     """
 
     profile: str | DriverProfile = AUTO
@@ -76,3 +78,4 @@ class ConvertSettings:
     strict: bool = False
     step: float = STEP
     time_limit: float = TIME_LIMIT
+    with_sensor: bool = False
