@@ -198,3 +198,30 @@ def test_only_leaves_the_others_as_they_are(
     written = Path("one.xosc").read_text()
     assert written.count("<FollowTrajectoryAction>") == 1
     assert "<LaneChangeAction>" in written
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["--version", "1.5"], "1.0, 1.1, 1.2, 1.3, 1.4"),
+        (["--for", "carla", "--version", "1.2"], "1.0 alone"),
+        (["--for", "carla", "--mode", "lane-offset"], "--mode trajectory"),
+        (["--for", "sumo"], "standard"),
+    ],
+)
+def test_what_can_not_be_written_is_wrong_usage(
+    scenario: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], words: list[str], said: str
+) -> None:
+    assert main(["convert", str(scenario), "-o", str(tmp_path / "x" / "out.xosc"), *words]) == 2
+    assert said in " ".join(capsys.readouterr().err.split())
+    assert not (tmp_path / "x").exists()
+
+
+def test_a_target_is_in_the_json_and_in_the_file(
+    scenario: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    output = tmp_path / "out.xosc"
+    assert main(["convert", str(scenario), "-o", str(output), "--for", "carla", "--json", "--time-limit", "3"]) == 0
+    provenance = json.loads(capsys.readouterr().out)["provenance"]
+    assert (provenance["player"], provenance["version"]) == ("carla", "1.0")
+    assert 'revMinor="0"' in output.read_text(encoding="utf-8")

@@ -10,6 +10,7 @@ import pandas as pd
 import pytest
 
 from xosc_lateral.errors import DriverProfileError, FormatError
+from xosc_lateral.formats.openscenario.write import target
 from xosc_lateral.formats.profiles import SHIPPED
 from xosc_lateral.pipeline.jobs import Batch, plan_batch
 from xosc_lateral.pipeline.request import DocumentKind, Request, document_kind
@@ -182,6 +183,10 @@ def test_the_fingerprint_follows_a_profiles_bytes_not_its_place(database: Path, 
     assert fingerprint(here) == fingerprint(there)
     assert fingerprint(here) != fingerprint(here, seed=1)
     assert fingerprint(here) != fingerprint(here, parameters={"Speed": "1"})
+    assert (
+        len({fingerprint(here, target=target(*words)) for words in (("esmini",), ("carla",), ("esmini", "1.2"))}) == 3
+    )
+    assert fingerprint(here) == fingerprint(here, target=target("standard"))
     before = fingerprint(here)
     here.write_text('{"changed": true}')
     assert fingerprint(here) != before

@@ -40,6 +40,8 @@ def convert_many(
     context: PathLike | None = None,
     parameters: Mapping[str, object] | None = None,
     mode: Literal["trajectory", "lane-offset"] = "trajectory",
+    player: Literal["standard", "esmini", "carla"] = "standard",
+    version: str | None = None,
     library: Paths = (),
     allow: Paths = (),
     road: PathLike | None = None,
@@ -65,8 +67,9 @@ def convert_many(
         if wanted `profile`, `profile:ENTITY`, `seed`, `variants`, `only`, `parameter:NAME`; or several of them.
     output : str or Path
         Folder; it mirrors the inputs, and holds `manifest.parquet` at the end.
-    profile, entity, only, seed, context, parameters, mode, library, allow, road, road_path, attempts, time_limit
-    with_sensor
+    profile, entity, only, seed, context, parameters, mode, player, version
+        See `convert`.
+    library, allow, road, road_path, attempts, time_limit, with_sensor
         See `convert`.
     strict : bool
         A missing vehicle catalog fails a scenario, instead of a note and a usual car.
@@ -100,6 +103,8 @@ def convert_many(
         context=context,
         parameters=parameters,
         mode=mode,
+        player=player,
+        version=version,
         library=library,
         allow=allow,
         road=road,

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from xosc_lateral.api.inputs import PathLike, Paths, ProfileLike, as_paths, road_search
 from xosc_lateral.api.result import Result
+from xosc_lateral.formats.openscenario.write.target import target
 from xosc_lateral.formats.targets import claim, file_target
 from xosc_lateral.pipeline.convert import convert_scenario
 from xosc_lateral.pipeline.settings import AUTO, TIME_LIMIT, ConvertSettings, Mode
@@ -36,6 +37,8 @@ def convert(
     context: PathLike | None = None,
     parameters: Mapping[str, object] | None = None,
     mode: Literal["trajectory", "lane-offset"] = "trajectory",
+    player: Literal["standard", "esmini", "carla"] = "standard",
+    version: str | None = None,
     library: Paths = (),
     allow: Paths = (),
     road: PathLike | None = None,
@@ -71,6 +74,11 @@ def convert(
         Scenario parameters that replace those declared.
     mode : {"trajectory", "lane-offset"}
         Play maneuvers out, or keep them and add lane offsets between them.
+    player : {"standard", "esmini", "carla"}
+        Who is to play it: nobody in particular, or a player with ways of its own.
+    version : str, optional
+        Of the standard, "1.0" to "1.4"; without it the input's (1.0 for CARLA). What an older version lacks is sampled,
+        or left out and named in `Conversion.warnings`.
     library, allow : path or paths
         Folders with further profiles; folders that roads and catalogs may lie in.
     road, road_path : path; path or paths
@@ -100,6 +108,8 @@ def convert(
         context=context,
         parameters=parameters,
         mode=mode,
+        player=player,
+        version=version,
         library=library,
         allow=allow,
         road=road,
@@ -110,10 +120,10 @@ def convert(
         strict=strict,
     )
     source = Path(scenario)
-    target = source if output is None else scenario_target(output, source)
-    page = None if report is None else file_target(report, f"{target.stem}.html", REPORT_SUFFIXES)
-    claim([None if output is None else target, page], [source], force=force)
-    made = convert_scenario(source, target, settings, variant=variant, report=page, save=output is not None)
+    written = source if output is None else scenario_target(output, source)
+    page = None if report is None else file_target(report, f"{written.stem}.html", REPORT_SUFFIXES)
+    claim([None if output is None else written, page], [source], force=force)
+    made = convert_scenario(source, written, settings, variant=variant, report=page, save=output is not None)
     result = Conversion(made)
     if page is not None:
         result.write_report(page, force=force)
@@ -122,9 +132,9 @@ def convert(
 
 def scenario_target(output: PathLike, source: Path) -> Path:
     """Path of a converted scenario; in a folder its source's name, `_lifelike` where that would be the source."""
-    target = file_target(output, source.name, SCENARIO_SUFFIXES)
-    same = target.parent.resolve() == source.parent.resolve() and target.name == source.name
-    return lifelike(source) if same and target != Path(output) else target
+    path = file_target(output, source.name, SCENARIO_SUFFIXES)
+    same = path.parent.resolve() == source.parent.resolve() and path.name == source.name
+    return lifelike(source) if same and path != Path(output) else path
 
 
 def lifelike(source: Path) -> Path:
@@ -141,6 +151,8 @@ def convert_settings(
     context: PathLike | None = None,
     parameters: Mapping[str, object] | None = None,
     mode: str = "trajectory",
+    player: str = "standard",
+    version: str | None = None,
     library: Paths = (),
     allow: Paths = (),
     road: PathLike | None = None,
@@ -162,6 +174,7 @@ def convert_settings(
         parameters={name: str(value) for name, value in (parameters or {}).items()},
         attempts=attempts,
         mode=Mode(mode),
+        target=target(player, version),
         libraries=as_paths(library),
         allowed=as_paths(allow),
         roads=road_search(road, road_path),
@@ -271,7 +284,7 @@ class Conversion(Result):
         from xosc_lateral.formats.atomic import write_atomically
         from xosc_lateral.report.scenario import conversion_page
 
-        target = file_target(path, f"{self._made.output.stem}.html", REPORT_SUFFIXES)
-        claim([target], [self.source], force=force)
-        self.report = write_atomically(target, conversion_page(self._made))
-        return target
+        page = file_target(path, f"{self._made.output.stem}.html", REPORT_SUFFIXES)
+        claim([page], [self.source], force=force)
+        self.report = write_atomically(page, conversion_page(self._made))
+        return page

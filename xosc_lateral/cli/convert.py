@@ -22,6 +22,7 @@ from xosc_lateral.cli.words import (
     say,
     write_stdout,
 )
+from xosc_lateral.formats.openscenario.write.target import Player
 from xosc_lateral.limits import JOB_MEMORY, JOB_TIMEOUT
 from xosc_lateral.pipeline.settings import Mode
 
@@ -76,6 +77,15 @@ def convert(
     mode: Annotated[
         Mode, typer.Option(help="trajectory: play the maneuvers out; lane-offset: keep them reactive.")
     ] = Mode.TRAJECTORY,
+    player: Annotated[
+        Player, typer.Option("--for", help="Who plays it: standard, or made for esmini or CARLA's ScenarioRunner.")
+    ] = Player.STANDARD,
+    version: Annotated[
+        str | None,
+        typer.Option(
+            metavar="1.0..1.4", help="Version of OpenSCENARIO to write; default: the input's.", show_default=False
+        ),
+    ] = None,
     allow: Annotated[
         list[Path] | None, typer.Option(help="Folder that roads and catalogs may be read from; may be repeated.")
     ] = None,
@@ -103,6 +113,7 @@ def convert(
     """Give every car in a scenario the lateral movement of a real driver."""
     from xosc_lateral.cli.batches import convert_batch, is_batch
 
+    _check_target(player, version, mode)
     settings: dict[str, Any] = {
         "profile": profile,
         "entity": pairs(entity, "--entity"),
@@ -112,6 +123,8 @@ def convert(
         "parameters": pairs(parameter, "--set"),
         "attempts": resample,
         "mode": mode.value,
+        "player": player.value,
+        "version": version,
         "library": library or (),
         "allow": allow or (),
         "road": road,
@@ -146,6 +159,17 @@ def convert(
         )
     else:
         _convert_one(Path(scenario[0]), output, settings, variants, report, strict, quiet, as_json)
+
+
+def _check_target(player: Player, version: str | None, mode: Mode) -> None:
+    from xosc_lateral.formats.openscenario.write.target import target
+
+    try:
+        target(player.value, version)
+    except ValueError as error:
+        raise typer.BadParameter(str(error), param_hint="--version") from error
+    if player is Player.CARLA and mode is Mode.LANE_OFFSET:
+        raise typer.BadParameter("CARLA's lane offsets have no shape; use --mode trajectory", param_hint="--for")
 
 
 def _convert_one(

@@ -25,6 +25,8 @@ class ConversionProvenance:
         Scenario parameters that were replaced.
     with_sensor : bool
         Offsets hold the sensor error of the drives that profiles were fitted on; else the driver alone.
+    player, version : str
+        What it was written for; version of the standard.
     """
 
     package_version: str
@@ -34,6 +36,8 @@ class ConversionProvenance:
     variant: int
     parameters: Mapping[str, str] = field(default_factory=dict)
     with_sensor: bool = False
+    player: str = "standard"
+    version: str = ""
 
 
 @dataclass(frozen=True, eq=False, slots=True)

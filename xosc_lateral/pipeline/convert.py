@@ -15,7 +15,10 @@ from xosc_lateral.errors import FormatError
 from xosc_lateral.formats.atomic import refuse_targets
 from xosc_lateral.formats.context_table import read_context
 from xosc_lateral.formats.openscenario.write import (
+    Player,
     WrittenScenario,
+    motion_unknown_to,
+    named,
     offset_chain,
     write_lane_offset_scenario,
     write_trajectory_scenario,
@@ -82,6 +85,7 @@ def _convert(
         strict=settings.strict,
     )
     _refuse_lane_offsets_for_carla(played.scenario, settings)
+    sampled = _sampled_too(played, settings)
     context = None if settings.context is None else read_context(settings.context)
     inputs = dict(input_hashes(played.scenario, played.network))
     if context is not None and settings.context is not None:
@@ -102,10 +106,11 @@ def _convert(
     )
     _refuse_lanes_without_width(played, enriched)
     provenance = _provenance(played, enriched, settings, variant, inputs)
-    written = _write(played, enriched, output, provenance, settings, save=save)
+    written = _write(played, enriched, output, provenance, settings, frozenset(sampled), save=save)
     warnings = enriched.warnings() + tuple(
         f"{removed.place.element}: left out ({removed.reason})" for removed in written.removed
     )
+    warnings += tuple(f"'{name}' follows a trajectory, too: {why}" for name, why in sampled.items()) + written.notes
     if settings.mode is Mode.LANE_OFFSET and save:
         warnings += tuple(_shifted(played, output, settings))
     data = b"" if save else written.data
@@ -113,6 +118,10 @@ def _convert(
 
 
 def _refuse_lane_offsets_for_carla(scenario: Scenario, settings: ConvertSettings) -> None:
+    if settings.mode is Mode.LANE_OFFSET and settings.target.player is Player.CARLA:
+        raise FormatError(
+            "lane offset actions have no shape in CARLA's ScenarioRunner; use --mode trajectory", path=scenario.path
+        )
     if settings.mode is Mode.LANE_OFFSET and scenario.header.is_left_handed:
         raise FormatError(
             "is written for CARLA, whose lane offsets differ from the standard's; use --mode trajectory",
@@ -156,6 +165,8 @@ def _provenance(
         variant=variant,
         parameters=dict(sorted(settings.parameters.items())),
         with_sensor=settings.with_sensor,
+        player=settings.target.player.value,
+        version=named(settings.target.version_for(scenario)),
     )
 
 
@@ -186,6 +197,7 @@ def _write(
     output: Path,
     provenance: ConversionProvenance,
     settings: ConvertSettings,
+    sampled: frozenset[str],
     *,
     save: bool,
 ) -> WrittenScenario:
@@ -200,16 +212,40 @@ def _write(
             for segment in entity.segments
         ]
         return write_lane_offset_scenario(
-            played.scenario, played.motion, chains, output, provenance=facts, summary=summary, save=save
+            played.scenario,
+            played.motion,
+            chains,
+            output,
+            provenance=facts,
+            summary=summary,
+            save=save,
+            target=settings.target,
         )
     # Whom --only leaves out keeps its maneuvers and its controller.
-    chosen = None if settings.only is None else settings.only | _pulled_by(played, settings.only)
+    chosen = None if settings.only is None else settings.only | _pulled_by(played, settings.only) | sampled
     trajectories = {
         entity.name: entity.trajectory for entity in enriched.entities if chosen is None or entity.name in chosen
     }
     return write_trajectory_scenario(
-        played.scenario, played.motion, trajectories, output, provenance=facts, summary=summary, save=save
+        played.scenario,
+        played.motion,
+        trajectories,
+        output,
+        provenance=facts,
+        summary=summary,
+        save=save,
+        target=settings.target,
     )
+
+
+def _sampled_too(played: Played, settings: ConvertSettings) -> dict[str, str]:
+    """Entities that `only` leaves out, but whose maneuvers the target does not know, and why."""
+    if settings.only is None or settings.mode is Mode.LANE_OFFSET:
+        return {}
+    others = [entity.name for entity in played.motion.entities if entity.name not in settings.only]
+    if settings.target.player is Player.CARLA:
+        return dict.fromkeys(others, "CARLA's ScenarioRunner plays maneuvers in ways of its own")
+    return motion_unknown_to(settings.target.version_for(played.scenario), played.scenario, played.motion, others)
 
 
 def _pulled_by(played: Played, tractors: frozenset[str]) -> frozenset[str]:

@@ -68,6 +68,7 @@ def describe(job: Job, conversion: Conversion) -> ManifestRow:
         gap_before=_smallest(enriched.gaps_before),
         gap_after=_smallest(enriched.gaps_after),
         warnings=conversion.warnings,
+        version=provenance.version,
     )
 
 

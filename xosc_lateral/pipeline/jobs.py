@@ -15,6 +15,7 @@ from xosc_lateral.errors import FormatError, XoscLateralError
 from xosc_lateral.formats.hashes import file_hash
 from xosc_lateral.formats.openscenario.distribution import read_distribution
 from xosc_lateral.formats.openscenario.references import require_folders
+from xosc_lateral.formats.openscenario.write.target import STANDARD
 from xosc_lateral.formats.profiles import find_profile, profile_hash
 from xosc_lateral.limits import BATCH_JOBS, PARAMETER_SETS, VARIANTS
 from xosc_lateral.pipeline.convert import numbered
@@ -80,6 +81,7 @@ class Job:
             settings=self.fingerprint,
             package_version=self.package_version,
             with_sensor=self.settings.with_sensor,
+            player=self.settings.target.player.value,
             error=error,
         )
 
@@ -300,6 +302,10 @@ class _Fingerprints:
             del values["strict"]
         if not settings.with_sensor:  # as it always was
             del values["with_sensor"]
+        player, version = settings.target.player.value, settings.target.version
+        values["target"] = [player, None if version is None else list(version)]
+        if settings.target == STANDARD:  # what was made before there were others is trusted
+            del values["target"]
         values["profile"] = self._profile(settings.profile, settings.libraries)
         values["entity_profiles"] = {
             entity: self._profile(name, settings.libraries) for entity, name in settings.entity_profiles.items()

@@ -81,6 +81,8 @@ class ManifestRow:
     gap_before, gap_after : float or None
         Smallest gap between any two vehicles, nominal and enriched; None: no two come near each other. [m]
     warnings : tuple of str
+    player, version : str, str
+        What it was written for; version of the standard.
     error : str
         One line; empty if the output is what the inputs and settings give.
     stale : bool
@@ -111,6 +113,8 @@ class ManifestRow:
     gap_before: float | None = None
     gap_after: float | None = None
     warnings: tuple[str, ...] = ()
+    player: str = "standard"
+    version: str = ""
     error: str = ""
     stale: bool = False
 

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from xosc_lateral.formats.openscenario.read import NO_ROADS, RoadSearch
+from xosc_lateral.formats.openscenario.write.target import STANDARD, Target
 
 if TYPE_CHECKING:
     from xosc_lateral.driver.profile import DriverProfile
@@ -50,6 +51,8 @@ class ConvertSettings:
     attempts : int
         Sample anew up to so many times while vehicles touch or leave their lane that nominally don't.
     mode : Mode
+    target : Target
+        Player and version of the standard to write for.
     libraries : tuple of Path
         Folders with further profiles.
     allowed : tuple of Path
@@ -72,6 +75,7 @@ class ConvertSettings:
     parameters: Mapping[str, str] = field(default_factory=dict)
     attempts: int = 1
     mode: Mode = Mode.TRAJECTORY
+    target: Target = STANDARD
     libraries: tuple[Path, ...] = ()
     allowed: tuple[Path, ...] = ()
     roads: RoadSearch = NO_ROADS

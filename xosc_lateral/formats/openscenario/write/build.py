@@ -13,6 +13,11 @@ from xosc_lateral.scenario.enums import Priority
 Version = tuple[int, int]
 
 
+def named(version: Version) -> str:
+    """A version as people write it."""
+    return f"{version[0]}.{version[1]}"
+
+
 def decimal(value: float, digits: int) -> str:
     """Fixed-point text without trailing zeros; the same on every machine."""
     text = f"{value:.{digits}f}"

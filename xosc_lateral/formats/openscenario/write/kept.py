@@ -68,6 +68,7 @@ def add_kept_actions(
     scenario: Scenario,
     root: etree._Element,
     scope: Scope,
+    version: build.Version,
 ) -> None:
     """Add one event for each action, in the order of the run.
 
@@ -84,6 +85,8 @@ def add_kept_actions(
         Unchanged parse of the scenario's bytes: actions are copied from it.
     scope : Scope
         Global parameters.
+    version : Version
+        Of the output.
     """
     maneuver: etree._Element | None = None
     actor: str | None = None
@@ -91,15 +94,15 @@ def add_kept_actions(
         if maneuver is None or item.actor != actor:
             actor = item.actor
             maneuver = build.maneuver(act, f"kept {index + 1}", actor)
-        name = item.action.name or local_name(_source(item.action, scenario, root))
-        event = build.event(maneuver, f"kept {index + 1}: {name}", Priority.PARALLEL, scenario.header.version)
+        name = item.action.name or local_name(source_of(item.action, scenario, root))
+        event = build.event(maneuver, f"kept {index + 1}: {name}", Priority.PARALLEL, version)
         action = build.sub(event, "Action", name=name)
         action.append(_copied(item.action, scenario, root, scope))
         if index in poses:
             add = next(element for element in action.iter() if local_name(element) == "AddEntityAction")
             add[:] = []
             build.world_position(add, poses[index])
-        build.time_trigger(event, "StartTrigger", item.start, scenario.header.version)
+        build.time_trigger(event, "StartTrigger", item.start, version)
 
 
 def dropped_reason(action: Action, scenario: Scenario) -> str | None:
@@ -117,7 +120,8 @@ def is_placing(action: Action) -> bool:
     return isinstance(action.content, AddEntityAction)
 
 
-def _source(action: Action, scenario: Scenario, root: etree._Element) -> etree._Element:
+def source_of(action: Action, scenario: Scenario, root: etree._Element) -> etree._Element:
+    """The element that an action was read from: in the scenario, whose unchanged parse `root` is, or in a catalog."""
     if action.place.path == str(scenario.path):
         return at_node(root, action.place.node)
     path = Path(action.place.path)
@@ -130,7 +134,7 @@ def _source(action: Action, scenario: Scenario, root: etree._Element) -> etree._
 
 def _copied(action: Action, scenario: Scenario, root: etree._Element, scope: Scope) -> etree._Element:
     """Copy with the parameters of story, maneuver and catalog filled in; global ones stay parameters."""
-    element = copy.deepcopy(_source(action, scenario, root))
+    element = copy.deepcopy(source_of(action, scenario, root))
     element.tail = None
     if not action.scope:
         return element

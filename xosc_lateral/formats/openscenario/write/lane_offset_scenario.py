@@ -22,6 +22,7 @@ from xosc_lateral.formats.openscenario.element import local_name
 from xosc_lateral.formats.openscenario.provenance import mark
 from xosc_lateral.formats.openscenario.write import build
 from xosc_lateral.formats.openscenario.write.checks import check_convertible
+from xosc_lateral.formats.openscenario.write.fit import fit
 from xosc_lateral.formats.openscenario.write.lateral_actions import (
     LATERAL,
     LateralAction,
@@ -32,6 +33,7 @@ from xosc_lateral.formats.openscenario.write.offset_chain import LEAST_CHANGE, O
 from xosc_lateral.formats.openscenario.write.parameters import global_scope, override_parameters
 from xosc_lateral.formats.openscenario.write.relocate import relocate
 from xosc_lateral.formats.openscenario.write.result import WrittenScenario
+from xosc_lateral.formats.openscenario.write.target import STANDARD, Target
 from xosc_lateral.formats.xml import parse_xml
 from xosc_lateral.motion.nominal import NominalMotion, PlayedAction
 from xosc_lateral.scenario import Scenario
@@ -50,6 +52,7 @@ def write_lane_offset_scenario(
     provenance: Mapping[str, Any],
     summary: str,
     save: bool = True,
+    target: Target = STANDARD,
 ) -> WrittenScenario:
     """Write the scenario with its maneuvers as they are and lane offset actions added.
 
@@ -68,11 +71,13 @@ def write_lane_offset_scenario(
         A few words of it for the file header's description.
     save : bool
         Write it; else the bytes are only handed back.
+    target : Target
+        Player and version that it is made for.
 
     Raises
     ------
     FormatError
-        The scenario was converted before.
+        The scenario was converted before, or can't be expressed for the target.
     OSError
         The output can't be written; nothing is left half-written.
     ValueError
@@ -86,20 +91,21 @@ def write_lane_offset_scenario(
     for number, chain in enumerate(chains, start=1):
         if not np.isfinite(chain.offset_t).all():
             raise ValueError(f"offsets of '{chain.entity}' are not finite")
-        _add_act(story, f"xosc-lateral offsets {number}", chain, motion, lateral, scenario.header.version)
+        _add_act(story, f"xosc-lateral offsets {number}", chain, motion, lateral, target.version_for(scenario))
     if len(story):
         storyboard = next(element for element in root if local_name(element) == "Storyboard")
         # Last: a lane change that starts in the same frame has started before ours are looked at.
         stop = next((element for element in storyboard if local_name(element) == "StopTrigger"), None)
         build.insert_indented(storyboard, len(storyboard) if stop is None else storyboard.index(stop), story)
     override_parameters(root, scenario)
+    notes = fit(root, scenario, motion, target, global_scope(scenario))
     relocate(root, scenario, output, global_scope(scenario))
     mark(root, provenance, summary)
     data = build.document(root)
     if save:
         write_atomically(output, data)
     names = tuple(dict.fromkeys(chain.entity for chain in chains))
-    return WrittenScenario(output, hashlib.sha256(data).hexdigest(), names, (), data)
+    return WrittenScenario(output, hashlib.sha256(data).hexdigest(), names, (), data, notes)
 
 
 def _add_act(

@@ -23,6 +23,8 @@ class WrittenScenario:
         Controllers and actions that are no longer in the file although they are no motion, with reasons.
     data : bytes
         The file's bytes.
+    notes : tuple of str
+        What the version or the player that it was made for lacks, a line each.
     """
 
     path: Path
@@ -30,3 +32,4 @@ class WrittenScenario:
     converted: tuple[str, ...]
     removed: tuple[Unsupported, ...]
     data: bytes
+    notes: tuple[str, ...] = ()

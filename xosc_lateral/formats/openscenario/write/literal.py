@@ -1,0 +1,127 @@
+"""Values in place of what stands for them: expressions, parameters, entries of catalogs."""
+
+from __future__ import annotations
+
+import copy
+import os
+from collections.abc import Iterator
+from pathlib import Path
+
+from lxml import etree
+
+from xosc_lateral.errors import FormatError
+from xosc_lateral.formats.openscenario.declarations import entry_scope, local_scope, parameter_name
+from xosc_lateral.formats.openscenario.element import Element, local_name
+from xosc_lateral.formats.openscenario.write.losses import Losses
+from xosc_lateral.formats.xml import read_document
+from xosc_lateral.scenario import Scenario
+from xosc_lateral.scenario.expressions import ExpressionError
+from xosc_lateral.scenario.parameters import Scope
+
+NAMES = frozenset({"parameterRef", "variableRef", "parameterName"})
+"""Attributes that name a parameter instead of standing for its value."""
+_DEEPEST = 20
+"""Catalog entries that refer to catalog entries."""
+
+
+def fill_in(losses: Losses, scope: Scope, *, parameters: bool) -> None:
+    """Write values in place of expressions and, if wanted, of parameters; declarations stay.
+
+    Raises
+    ------
+    FormatError
+        One that has no value.
+    """
+    _fill(losses, losses.root, scope, parameters)
+
+
+def _fill(losses: Losses, item: etree._Element, scope: Scope, parameters: bool) -> None:
+    inner = scope
+    if item is not losses.root:
+        inner = local_scope(Element(item, losses.path, scope))
+    for name, value in item.attrib.items():
+        text = str(value)
+        if name in NAMES or not text.startswith("$") or not (parameters or text.startswith("${")):
+            continue
+        try:
+            item.set(name, inner.fill(text))
+        except ExpressionError as error:
+            raise FormatError(str(error), path=losses.path, element=local_name(item)) from error
+    for child in item:
+        if isinstance(child.tag, str):
+            _fill(losses, child, inner, parameters)
+
+
+def inline_catalogs(losses: Losses, scenario: Scenario, scope: Scope) -> None:
+    """Entries in place of references to catalogs, which are files of the input's version; then no catalog is named.
+
+    Only catalogs that the reader took something from are looked at. What can't be found stays, and is noted.
+    """
+    missing = set()
+    for _ in range(_DEEPEST):
+        references = [(item, within) for item, within in _references(losses, losses.root, scope) if item not in missing]
+        if not references:
+            break
+        for item, within in references:
+            if not _inline(item, within, scenario):
+                missing.add(item)
+                names = f"{item.get('catalogName')}/{item.get('entryName')}"
+                losses.note(f"CatalogReference: '{names}' was not found and stays a reference")
+    for locations in losses.root.iter("{*}CatalogLocations"):
+        if not missing:
+            locations[:] = []
+            locations.text = None
+
+
+def _references(losses: Losses, item: etree._Element, scope: Scope) -> Iterator[tuple[etree._Element, Scope]]:
+    inner = scope if item is losses.root else local_scope(Element(item, losses.path, scope))
+    for child in item:
+        if isinstance(child.tag, str):
+            if local_name(child) == "CatalogReference":
+                yield child, inner
+            else:
+                yield from _references(losses, child, inner)
+
+
+def _inline(reference: etree._Element, scope: Scope, scenario: Scenario) -> bool:
+    asking = Element(reference, scenario.path, scope)
+    found = _entry(asking.text("catalogName"), asking.text("entryName"), scenario)
+    if found is None:
+        return False
+    entry, path = found
+    within = entry_scope(Element(entry, path, Scope({})), asking)
+    entry = copy.deepcopy(entry)
+    entry.tail = reference.tail
+    for item in [item for item in entry if isinstance(item.tag, str) and local_name(item) == "ParameterDeclarations"]:
+        entry.remove(item)
+    for item in entry.iter("{*}*"):
+        for name, value in item.attrib.items():
+            if str(value).startswith("$") and parameter_name(str(name)) not in NAMES:
+                item.set(name, within.fill(str(value)))
+    _seen_from(entry, path, scenario)
+    parent = reference.getparent()
+    assert parent is not None
+    parent.replace(reference, entry)
+    return True
+
+
+def _entry(catalog: str, name: str, scenario: Scenario) -> tuple[etree._Element, Path] | None:
+    for path in scenario.input_files[1:]:
+        document = read_document(path)
+        if scenario.input_hashes.get(path, document.sha256) != document.sha256:
+            raise FormatError("changed during the conversion", path=path)
+        for owner in document.root.iter("{*}Catalog"):
+            if catalog in (path.stem, owner.get("name")):
+                found = next((item for item in owner if isinstance(item.tag, str) and item.get("name") == name), None)
+                if found is not None:
+                    return found, path
+    return None
+
+
+def _seen_from(entry: etree._Element, path: Path, scenario: Scenario) -> None:
+    """Files that an entry names, as seen from the scenario."""
+    for item in entry.iter("{*}*"):
+        for name in ("model3d", "filepath"):
+            file = path.parent / (item.get(name) or "")
+            if item.get(name) and not Path(item.get(name) or "").is_absolute() and file.is_file():
+                item.set(name, Path(os.path.relpath(file, scenario.path.parent)).as_posix())

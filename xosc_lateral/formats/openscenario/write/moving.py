@@ -1,0 +1,161 @@
+"""One entity on its way: its path cut into moves, and each of them as a trajectory that starts at its time."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from lxml import etree
+from numpy.typing import NDArray
+
+from xosc_lateral.formats.openscenario.write import build
+from xosc_lateral.formats.openscenario.write.kept import Pose
+from xosc_lateral.formats.openscenario.write.moves import Move, cut_moves, vertex_times
+from xosc_lateral.motion.nominal import Activity, EntityMotion, NominalMotion
+from xosc_lateral.motion.trajectory import Trajectory
+from xosc_lateral.scenario.enums import Priority
+
+FloatArray = NDArray[np.float64]
+
+MOTION_SINCE = (1, 4)
+"""Version from which a vertex may say how fast the entity is there."""
+
+
+class Moving:
+    """An entity with its path cut into moves."""
+
+    def __init__(self, entity: EntityMotion, path: Trajectory, motion: NominalMotion) -> None:
+        self.name, self.path, self.end = entity.name, path, motion.end_time
+        active = (entity.activity & Activity.ACTIVE) != 0
+        teleported = (entity.activity & Activity.TELEPORTED) != 0
+        _check(entity, path, active)
+        self.active_at_start = bool(active[0])
+        self.moves = cut_moves(path.time, path.x, path.y, active, teleported)
+
+    @property
+    def start(self) -> tuple[Pose, float] | None:
+        """Pose and speed at time 0; None for an entity that is not there yet. A car that stands does so by speed 0."""
+        if not self.active_at_start:
+            return None
+        drives = bool(self.moves) and self.moves[0].first == 0
+        return self.pose(0), float(self.path.speed[0]) if drives else 0.0
+
+    def pose(self, row: int) -> Pose:
+        """Pose in one row."""
+        path = self.path
+        arrays = (path.x, path.y, path.z, _wrapped(path.heading), path.pitch, path.roll)
+        x, y, z, h, p, r = (float(values[row]) for values in arrays)
+        return x, y, z, h, p, r
+
+    def pose_after(self, moment: float) -> Pose:
+        """Pose in the row that the step beginning at `moment` leads to."""
+        row = int(np.searchsorted(self.path.time, moment + 1e-9, side="right"))
+        return self.pose(min(row, len(self.path.time) - 1))
+
+    def poses_at(self, moments: FloatArray, rows: slice) -> list[FloatArray]:
+        """x, y, z [m], heading, pitch, roll [rad] at any times, held before and after some rows of the path."""
+        path = self.path
+        arrays = (path.x[rows], path.y[rows], path.z[rows], np.unwrap(path.heading[rows]), path.pitch[rows])
+        return [np.interp(moments, path.time[rows], values) for values in (*arrays, path.roll[rows])]
+
+    def trigger_time(self, move: Move) -> float:
+        """When a move has to begin: being placed anew happens in the step before its first row."""
+        return float(self.path.time[move.first - 1 if move.placed else move.first])
+
+
+def _check(entity: EntityMotion, path: Trajectory, active: NDArray[np.bool_]) -> None:
+    arrays = (path.time, path.x, path.y, path.z, path.heading, path.pitch, path.roll)
+    if any(len(values) != len(entity.time) for values in arrays):
+        raise ValueError(f"trajectory of '{entity.name}' does not have the {len(entity.time)} rows of its motion")
+    if any(not np.isfinite(values[active]).all() for values in arrays):
+        raise ValueError(f"trajectory of '{entity.name}' is not finite")
+
+
+def add_moves(maneuver: etree._Element, item: Moving, version: build.Version) -> None:
+    """Add an event for every move of an entity, and one for every stop."""
+    for number, move in enumerate(item.moves, start=1):
+        rows = slice(move.first, move.last + 1)
+        times = vertex_times(item.path.time[rows], item.path.x[rows], item.path.y[rows])
+        name = f"{item.name} trajectory {number}"
+        event = build.event(maneuver, name, Priority.OVERRIDE, version)
+        if len(times) < 2:
+            _add_hop(event, name, item, move, version)
+            continue
+        if move.placed:
+            place = build.private_action(event, f"{name} place")
+            build.world_position(build.sub(place, "TeleportAction"), item.pose(move.first))
+        _add_trajectory(build.private_action(event, name), name, item.path, rows, times, version)
+        build.time_trigger(event, "StartTrigger", item.trigger_time(move), version)
+        if move.stops:
+            name = f"{item.name} stand {number}"
+            stand = build.event(maneuver, name, Priority.OVERRIDE, version)
+            build.speed_step(build.private_action(stand, name), 0.0)
+            build.time_trigger(stand, "StartTrigger", float(item.path.time[move.last]), version)
+
+
+def _add_hop(event: etree._Element, name: str, item: Moving, move: Move, version: build.Version) -> None:
+    """A move too short for two vertices: the entity is put where it ends."""
+    place = build.private_action(event, f"{name} place")
+    build.world_position(build.sub(place, "TeleportAction"), item.pose(move.last))
+    speed = 0.0 if move.stops else float(item.path.speed[move.last])
+    build.speed_step(build.private_action(event, f"{name} speed"), speed)
+    start = item.trigger_time(move) if move.placed else float(item.path.time[move.last])
+    build.time_trigger(event, "StartTrigger", start, version)
+
+
+def _add_trajectory(
+    owner: etree._Element, name: str, path: Trajectory, rows: slice, times: FloatArray, version: build.Version
+) -> None:
+    time = path.time[rows]
+    arrays = (path.x, path.y, path.z, np.unwrap(path.heading[rows]), path.pitch, path.roll)
+    columns = [np.interp(times, time, values if len(values) == len(time) else values[rows]) for values in arrays]
+    speed = path.speed[rows]
+    motion = None
+    if version >= MOTION_SINCE:
+        motion = [np.interp(times, time, values) for values in (speed, np.gradient(speed, time))]
+    add_vertices(owner, name, times, columns, version, motion)
+
+
+def add_vertices(
+    owner: etree._Element,
+    name: str,
+    times: FloatArray,
+    columns: Sequence[FloatArray],
+    version: build.Version,
+    motion: Sequence[FloatArray] | None = None,
+) -> None:
+    """Add a FollowTrajectoryAction along a polyline.
+
+    Parameters
+    ----------
+    owner : element
+        A PrivateAction.
+    name : str
+        Of the trajectory.
+    times : array, shape (n,)
+        Of its vertices. [s]
+    columns : six arrays, shape (n,)
+        x, y, z [m], heading, pitch, roll [rad].
+    version : Version
+    motion : two arrays, shape (n,), optional
+        Speed [m/s] and acceleration [m/s2] along the path; from version 1.4 on.
+    """
+    follow = build.sub(build.sub(owner, "RoutingAction"), "FollowTrajectoryAction")
+    holder = follow if version < (1, 1) else build.sub(follow, "TrajectoryRef")
+    trajectory = build.sub(holder, "Trajectory", name=name, closed="false")
+    polyline = build.sub(build.sub(trajectory, "Shape"), "Polyline")
+    x, y, z, h, p, r = columns
+    for moment, *pose in zip(*(values.tolist() for values in (times, x, y, z, _wrapped(h), p, r)), strict=True):
+        build.world_position(build.sub(polyline, "Vertex", time=build.decimal(moment, 6)), (*pose,))
+    if motion is not None:
+        for vertex, speed, acceleration in zip(polyline, *(values.tolist() for values in motion), strict=True):
+            speeds = {"speed_longitudinal": speed, "acceleration_longitudinal": acceleration}
+            build.sub(vertex, "Motion", **{key: build.decimal(value, 4) for key, value in speeds.items()})
+    timing = build.sub(follow, "TimeReference")
+    build.sub(timing, "Timing", domainAbsoluteRelative="absolute", scale="1", offset="0")
+    build.sub(follow, "TrajectoryFollowingMode", followingMode="position")
+
+
+def _wrapped(angle: FloatArray) -> FloatArray:
+    """Into (-pi, pi]."""
+    return np.pi - np.mod(np.pi - angle, 2.0 * np.pi)
