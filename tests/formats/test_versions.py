@@ -59,7 +59,7 @@ CONTROLLER = (
     '<ObjectController name="c{n}"><Controller name="d" controllerType="all"><Properties/></Controller>'
     "</ObjectController>"
 )
-CONSTRAINT = '<ConstraintGroup><ValueConstraint rule="lessThan" value="50"/></ConstraintGroup>'
+CONSTRAINT = ' <!-- not more --> <ConstraintGroup><ValueConstraint rule="lessThan" value="50"/></ConstraintGroup>'
 RICH = {
     "parameters": declarations(parameter("fast", "33", constraints=CONSTRAINT), parameter("lane", "-1", "int"))
     + '<VariableDeclarations><VariableDeclaration name="v" variableType="int" value="1"/></VariableDeclarations>'
