@@ -20,8 +20,8 @@ if TYPE_CHECKING:
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
 
-CLUSTER_S = 120
-"""Squares that are so close count as clustered (Newey-West). [s]"""
+COSINES = 0.4
+"""Cosines that the long-run variance is taken from, over rows to the power of 2/3; source: see `_probability`. [-]"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,7 +92,15 @@ class VarianceTrend(Term):
 
 
 def _probability(fitted: Fitted, slow: bool) -> float:
-    from scipy.stats import norm
+    """Two-sided p-value of squares regressed on time, their long-run variance by equally weighted cosines [1]_.
+
+    References
+    ----------
+    .. [1] E. Lazarus, D. Lewis, J. Stock, M. Watson, "HAR inference: recommendations for practice", J. Business &
+       Economic Statistics 36, 2018.
+    """
+    from scipy.fft import dct
+    from scipy.stats import t
 
     coarse = fitted.coarse
     if slow:
@@ -100,18 +108,11 @@ def _probability(fitted: Fitted, slow: bool) -> float:
         squares, valid = own.standardised, own.valid
     else:
         squares, valid = squared_innovations(fitted.rows, coarse.valid), coarse.valid
-    time = np.where(valid, elapsed(coarse), 0.0)
-    time = time - np.where(valid, time[valid].mean(), 0.0)
-    slope = float(time @ squares) / max(float(time @ time), 1e-300)
-    left = np.where(valid, squares - slope * time, 0.0)
-    weights = 1.0 - np.arange(1, CLUSTER_S + 1) / (CLUSTER_S + 1.0)
-    correlations = [_correlation(left, valid, lag) for lag in range(1, CLUSTER_S + 1)]
-    inflation = 1.0 + 2.0 * float(weights @ correlations)
-    z = slope * np.sqrt(float(time @ time)) / np.sqrt(max(inflation, 1.0))
-    return max(2.0 * float(norm.sf(abs(z))), LEAST)
-
-
-def _correlation(values: FloatArray, valid: BoolArray, lag: int) -> float:
-    both = float(np.sum(valid[:-lag] & valid[lag:]))
-    power = float(values @ values) / max(float(valid.sum()), 1.0)
-    return float(values[:-lag] @ values[lag:]) / max(both, 1.0) / max(power, 1e-12)
+    time = elapsed(coarse)[valid]
+    time = time - time.mean()
+    slope = float(time @ squares[valid]) / max(float(time @ time), 1e-300)
+    scores = time * (squares[valid] - slope * time)
+    cosines = max(4, round(COSINES * len(scores) ** (2.0 / 3.0)))
+    weights = dct(scores, type=2, norm="ortho")[1 : cosines + 1]
+    error = float(np.sqrt(len(scores) * np.mean(weights**2))) / max(float(time @ time), 1e-300)
+    return max(2.0 * float(t.sf(abs(slope) / max(error, 1e-300), cosines)), LEAST)
