@@ -26,8 +26,8 @@ TAIL_SHARE = 0.25
 
 WEIGHTS = {
     "mean": 10.0,
-    "spread": 5.0,
-    "slow_spread": 1.0,
+    "spread": 3.0,
+    "slow_spread": 3.0,
     "fine_noise": 1.0,
     "restoring": 0.5,
     "between": 1.0,
@@ -36,7 +36,7 @@ WEIGHTS = {
     "variance_trend": 1.0,
     "regimes": 0.5,
 }
-"""Shares of the budget: half for the mean, a quarter for the spread, and about equal parts for the rest."""
+"""Shares of the budget: half for the mean, a quarter for both measures of the spread, and about equal parts for the rest."""
 
 
 def level_of(component: str) -> float:
