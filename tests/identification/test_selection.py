@@ -38,7 +38,7 @@ def effect_of(selection: Selection, columns: tuple[str, ...]) -> ColumnEffect:
         (plants.curve_cutting(0.4), ("location", ("curvature",))),
         (plants.truck_avoidance(0.3), ("location", ("truck_right",))),
         (plants.SideWind(0.4), ("location", ("wind_direction", "wind_speed"))),
-        (plants.SpreadBy("rain", 2.2), ("scale", ("rain",))),
+        (plants.SpreadBy("rain", 4.0), ("scale", ("rain",))),
         (plants.Fatigue(2.5), ("scale", ())),
         (plants.Weave(0.15, 12.0), ("periodic", ())),
         (plants.CameraStep(0.6), ("step", ())),
@@ -53,14 +53,7 @@ def test_a_planted_effect_is_named(driven: Driven, plant: plants.Plant, expected
     ("plant", "shape"),
     [
         (plants.ShiftBy(("truck_right", "lane_index"), 0.5, plants.Response(lag=1.0)), Product),
-        pytest.param(
-            plants.ShiftBy(("grade",), 0.4, plants.Response(plants.threshold(2.0), lag=1.0)),
-            Threshold,
-            marks=pytest.mark.xfail(
-                reason="the threshold is named as a curve with two bends: the right column, not the simplest shape",
-                strict=True,
-            ),
-        ),
+        (plants.ShiftBy(("grade",), 0.4, plants.Response(plants.threshold(2.0), lag=1.0)), Threshold),
         (plants.ShiftBy(("grade",), 0.4, plants.Response(plants.saturating(1.0), lag=1.0)), Saturating),
         (plants.LaneHabit((0.3, -0.3, 0.3)), Levels),
     ],

@@ -23,9 +23,6 @@ def words(drives: list[Drive]) -> str:
     return ", ".join(f"{one.term.component} {one.term.columns}" for one in selected(drives).accepted)
 
 
-@pytest.mark.xfail(
-    reason="4 of 12: p-values of the spread of slow movement are far too small (1e-4 on nulls)", strict=True
-)
 def test_hardly_ever_is_anything_named_where_nothing_was_planted(driven: Driven) -> None:
     named = {seed: words(driven(seed, duration=1500.0)) for seed in SEEDS}
     blamed = {seed: what for seed, what in named.items() if what}

@@ -99,7 +99,7 @@ def candidates_of(columns: Sequence[Column], context: Mapping[str, FloatArray], 
 
 def shapes_of(column: Column, values: FloatArray) -> list[Candidate]:
     """Every shape of one column, with a fine choice of limits, for refinement; costs as if each were the only one."""
-    many = tuple(np.linspace(0.05, 0.95, 19))
+    many = tuple(np.linspace(0.05, 0.95, 37))
     effects = [effect for effect, _ in (*_plain(column, values), *_bent(column, values, many))]
     unique = {repr(effect): effect for effect in effects}
     return [

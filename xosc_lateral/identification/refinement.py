@@ -71,6 +71,7 @@ class Refinement:
         left = problem.response
         left = left - known @ (known.T @ left)
         self._left = left / max(float(np.sqrt(np.mean(left**2))), 1e-300)
+        self._shape_cost = 0.0
         self._quantities: dict[ColumnEffect, FloatArray] = {}
         self._responses: dict[tuple[ColumnEffect, float], FloatArray] = {}
 
@@ -148,13 +149,13 @@ class Refinement:
         seen = self._coarse.context[column.name][self._coarse.timeline.valid]
         shapes = [shape.effect for shape in shapes_of(column, seen)]
         shapes += [] if self._single else list(_curves(column, seen))
-        cost = 2.0 * float(np.log(max(1, len(shapes))))
+        cost = self._shape_cost = 2.0 * float(np.log(max(1, len(shapes))))
         for shape in shapes:
             yield structs.replace(shape, **timing), 0.0 if _is_plain(shape) else cost
 
     def _paid(self, effect: ColumnEffect) -> float:
         """What the shape of an effect has cost already is paid by its variants too."""
-        return 0.0 if _is_plain(effect) or isinstance(effect, Product) else 2.0 * float(np.log(40.0))
+        return 0.0 if _is_plain(effect) or isinstance(effect, Product) else self._shape_cost
 
 
 def _is_plain(effect: ColumnEffect) -> bool:

@@ -39,6 +39,9 @@ ROUNDS = 4
 CLIP = 9.0
 """Squared innovations (variance 1) beyond this count as this: three standard deviations. [-]"""
 
+CLUSTER_S = 60
+"""Length of the stretches whose squares count as one cluster in errors of the log scale. [s]"""
+
 OWN_LEVEL_S = 30.0
 """A drive's level of the scale is its own as far as it lasts longer than this. [s]"""
 
@@ -222,7 +225,8 @@ def fit_model(coarse: Coarse, terms: Sequence[ModelTerm]) -> Fitted:
     left = np.where(coarse.valid, coarse.offset - columns @ sizes - levels[coarse.drive], 0.0)
     return Fitted(
         coarse, tuple(terms), whitener, columns, sizes, covariance * variance, levels, scales, log_sizes,
-        _scale_covariance(scales, coarse), rows / np.sqrt(variance), left / scale, _log_likelihood(rows, whitener),
+        _scale_covariance(scales, rows, coarse), rows / np.sqrt(variance), left / scale,
+        _log_likelihood(rows, whitener),
     )  # fmt: skip
 
 
@@ -322,8 +326,20 @@ def _log_scale_step(scales: FloatArray, rows: FloatArray, coarse: Coarse) -> Flo
     return np.asarray(np.linalg.pinv(2.0 * design.T @ design) @ (design.T @ (variance / variance.mean() - 1.0)))
 
 
-def _scale_covariance(scales: FloatArray, coarse: Coarse) -> FloatArray:
+def _scale_covariance(scales: FloatArray, rows: FloatArray, coarse: Coarse) -> FloatArray:
+    """Sandwich with stretches as clusters [1]_: squares have heavy tails and come in clusters.
+
+    References
+    ----------
+    .. [1] K.-Y. Liang, S. Zeger, "Longitudinal data analysis using generalized linear models", Biometrika 73, 1986.
+    """
     if scales.shape[1] == 0:
         return np.zeros((0, 0))
     design = _within_drives(scales, coarse)
-    return np.asarray(np.linalg.pinv(2.0 * design.T @ design))
+    bread = np.linalg.pinv(2.0 * design.T @ design)
+    squares = _clipped_squares(rows, coarse.valid)[coarse.valid]
+    scores = design * (squares / squares.mean() - 1.0)[:, None]
+    stretch = np.flatnonzero(coarse.valid) // CLUSTER_S
+    edges = np.flatnonzero(np.diff(stretch, prepend=-1))
+    sums = np.add.reduceat(scores, edges, axis=0)
+    return np.asarray(bread @ (sums.T @ sums) @ bread * len(sums) / max(1, len(sums) - 1))

@@ -36,7 +36,7 @@ WEIGHTS = {
     "variance_trend": 1.0,
     "regimes": 0.5,
 }
-"""Shares of the budget: half for the mean, a quarter for both measures of the spread, and about equal parts for the rest."""
+"""Shares of the budget: half for the mean, a quarter for both measures of spread, about equal parts for the rest."""
 
 
 def level_of(component: str) -> float:

@@ -23,7 +23,7 @@ SLOW_S = 8
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Squares:
-    """Clipped mean squares per second, about 1.
+    """Mean squares per second, about 1; clipped where they are tested and sized.
 
     Parameters
     ----------
@@ -37,11 +37,12 @@ class Squares:
 
     @property
     def standardised(self) -> FloatArray:
-        """Mean 0 and variance 1 over the valid rows, 0 elsewhere."""
+        """Clipped, mean 0 and variance 1 over the valid rows, 0 elsewhere."""
         if not self.valid.any():
             return np.zeros(len(self.values))
-        inside = self.values[self.valid]
-        return np.where(self.valid, (self.values - inside.mean()) / max(float(inside.std()), 1e-12), 0.0)
+        clipped = np.minimum(self.values, CLIP)
+        inside = clipped[self.valid]
+        return np.where(self.valid, (clipped - inside.mean()) / max(float(inside.std()), 1e-12), 0.0)
 
 
 def fine_squares(fitted: Fitted) -> Squares:
@@ -55,7 +56,7 @@ def fine_squares(fitted: Fitted) -> Squares:
     process = fit_autoregression(moved, valid, FINE_ORDER)
     innovations = moving_sum(process.polynomial, moved)
     settled = moving_sum(np.ones(process.order + 1), valid.astype(np.float64)) > process.order + 0.5
-    squares = coarse_mean(np.where(settled, np.minimum(innovations**2, CLIP), 0.0))
+    squares = coarse_mean(np.where(settled, np.square(innovations), 0.0))
     whole = coarse_all(settled)
     return Squares(squares / own_levels(squares, whole, coarse.drive)[coarse.drive], whole)
 
@@ -66,7 +67,7 @@ def slow_squares(fitted: Fitted) -> Squares:
     sums = moving_sum(np.ones(SLOW_S), fitted.rows)
     whole = valid & (moving_sum(np.ones(SLOW_S), valid.astype(np.float64)) >= SLOW_S - 0.5)
     deviation = float(sums[whole].std()) if whole.any() else 1.0
-    return Squares(np.where(whole, np.minimum((sums / max(deviation, 1e-12)) ** 2, CLIP), 0.0), whole)
+    return Squares(np.where(whole, np.square(sums / max(deviation, 1e-12)), 0.0), whole)
 
 
 def log_sizes(squares: Squares, columns: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -83,7 +84,9 @@ def log_sizes(squares: Squares, columns: FloatArray) -> tuple[FloatArray, FloatA
     left = squares.values[squares.valid]
     relative = left
     for _ in range(8):
+        # clipped about what is expected there: a large effect must not clip itself
         relative = left / np.exp(np.clip(2.0 * design @ sizes, -6.0, 6.0))
+        relative = np.minimum(relative / max(float(relative.mean()), 1e-300), CLIP)
         relative = relative / max(float(relative.mean()), 1e-300)
         sizes = sizes + inverse @ (design.T @ (relative - 1.0))
     return sizes, np.sqrt(np.diag(inverse)) * float(np.std(relative)) / np.sqrt(2.0)

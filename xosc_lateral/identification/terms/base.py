@@ -100,13 +100,19 @@ class Term(ABC):
     kind: ClassVar[str]
     """As in the report's schema."""
 
-    predictable: ClassVar[bool] = True
-    """Whether it says anything about rows that it was not fitted on; the latent path of a cycle or a drift does not."""
-
     @property
     def columns(self) -> tuple[str, ...]:
         """Context columns that it reads; empty: hidden."""
         return ()
+
+    @property
+    def predictable(self) -> bool:
+        """Whether the model's likelihood of rows that it was not fitted on can tell it from nothing.
+
+        Only what the mean or the innovations' scale follow can: not the latent path of a cycle or a drift, nor what
+        changes the slow movement alone.
+        """
+        return True
 
     @property
     def kind_key(self) -> str:
@@ -120,6 +126,10 @@ class Term(ABC):
     def scale_columns(self, coarse: Coarse) -> FloatArray:
         """Columns of the log scale, shape (n, j)."""
         return np.zeros((len(coarse), 0))
+
+    def size_columns(self, coarse: Coarse) -> FloatArray:
+        """Columns with which the movement's size changes, in whatever measure, shape (n, i): no other term's doing."""
+        return self.scale_columns(coarse)
 
     def known_scale(self, coarse: Coarse) -> FloatArray | None:
         """Log scale that is known as a whole, shape (n,)."""
@@ -141,10 +151,6 @@ class Term(ABC):
     @abstractmethod
     def describe(self, fitted: Fitted, effects: tuple[Effect, ...], key: str) -> Description:
         """Size and words; `key` names its group of summary statistics."""
-
-    def retested(self, search: Search, fitted: Fitted) -> float:
-        """Probability of the term beside all others, once everything is known; 0: not looked at again."""
-        return 0.0
 
     def matches(self, other: Self) -> bool:
         """Whether another fit's term is the same finding."""

@@ -46,10 +46,14 @@ class BetweenTerm(ColumnTerm):
 
     component: ClassVar[str] = "between"
     kind: ClassVar[str] = "location"
-    predictable: ClassVar[bool] = False
     acts: ClassVar[Acts] = Acts.LOCATION
     what: ClassVar[str] = "place that a drive keeps"
     group: ClassVar[str] = "mean"
+
+    @property
+    def predictable(self) -> bool:
+        """Not by the likelihood of held-out rows."""
+        return False
 
     @classmethod
     def problem(cls, fitted: Fitted) -> Problem:

@@ -32,7 +32,11 @@ class DriftTerm(Term):
 
     component: ClassVar[str] = "low_frequency"
     kind: ClassVar[str] = "drift"
-    predictable: ClassVar[bool] = False
+
+    @property
+    def predictable(self) -> bool:
+        """Not by the likelihood of held-out rows."""
+        return False
 
     def mean_columns(self, coarse: Coarse) -> FloatArray:
         """Half cosines."""

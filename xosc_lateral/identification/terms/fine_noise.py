@@ -22,10 +22,14 @@ class FineNoiseTerm(ColumnTerm):
 
     component: ClassVar[str] = "fine_noise"
     kind: ClassVar[str] = "scale"
-    predictable: ClassVar[bool] = False
     single: ClassVar[bool] = True
     acts: ClassVar[Acts] = Acts.FINE
     what: ClassVar[str] = "fine noise"
+
+    @property
+    def predictable(self) -> bool:
+        """Not by the likelihood of held-out rows."""
+        return False
 
     @classmethod
     def problem(cls, fitted: Fitted) -> Problem:

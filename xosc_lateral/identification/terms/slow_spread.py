@@ -6,13 +6,16 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from xosc_lateral.driver.effects import Acts, Effect
 from xosc_lateral.identification.problem import Problem, of_squares
-from xosc_lateral.identification.regression import Fitted
+from xosc_lateral.identification.regression import Coarse, Fitted
 from xosc_lateral.identification.squares import SLOW_S, log_sizes, slow_squares
-from xosc_lateral.identification.terms.column import ColumnTerm, answers, columns_on_size
+from xosc_lateral.identification.terms.column import ColumnTerm, columns_on_size
 from xosc_lateral.identification.terms.spread import known_log_scale
+
+FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -21,16 +24,23 @@ class SlowSpreadTerm(ColumnTerm):
 
     component: ClassVar[str] = "slow_spread"
     kind: ClassVar[str] = "scale"
-    predictable: ClassVar[bool] = False
     acts: ClassVar[Acts] = Acts.SPREAD
     what: ClassVar[str] = "spread"
+
+    @property
+    def predictable(self) -> bool:
+        """Not by the likelihood of held-out rows."""
+        return False
+
+    def size_columns(self, coarse: Coarse) -> FloatArray:
+        """The answer, although the innovations' own scale does not follow it."""
+        return coarse.answer(self.effect, keep=True)
 
     @classmethod
     def problem(cls, fitted: Fitted) -> Problem:
         """Squares of running sums."""
         squares = slow_squares(fitted)
-        known = np.concatenate([known_log_scale(fitted), answers(fitted, cls)], axis=1)
-        return of_squares(fitted.coarse, squares.standardised, squares.valid, known)
+        return of_squares(fitted.coarse, squares.standardised, squares.valid, known_log_scale(fitted))
 
     @classmethod
     def barred(cls, fitted: Fitted) -> frozenset[str]:

@@ -12,6 +12,7 @@ from xosc_lateral.driver.effects import Acts, ColumnEffect, Effect
 from xosc_lateral.identification.problem import Problem, of_squares
 from xosc_lateral.identification.regression import Coarse, Fitted, squared_innovations
 from xosc_lateral.identification.squares import fine_squares, log_sizes
+from xosc_lateral.identification.terms.base import Term
 from xosc_lateral.identification.terms.column import ColumnTerm, columns_on_size
 
 FloatArray = NDArray[np.float64]
@@ -61,6 +62,8 @@ def fine_twin(term: ColumnTerm, fitted: Fitted) -> ColumnEffect:
 
 
 def known_log_scale(fitted: Fitted) -> FloatArray:
-    """What is known of the log scale, shape (n, k)."""
-    known = [term.known_scale(fitted.coarse) for term in fitted.terms]
-    return np.column_stack([fitted.scales, *(scale for scale in known if scale is not None)])
+    """What is known of the movement's size, shape (n, k)."""
+    coarse, terms = fitted.coarse, [term for term in fitted.terms if isinstance(term, Term)]
+    columns = [term.size_columns(coarse) for term in terms]
+    known = [scale[:, None] for term in terms if (scale := term.known_scale(coarse)) is not None]
+    return np.concatenate([np.zeros((len(coarse), 0)), *columns, *known], axis=1)

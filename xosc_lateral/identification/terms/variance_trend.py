@@ -38,9 +38,18 @@ class VarianceTrend(Term):
     kind: ClassVar[str] = "scale"
     slow: bool = False
 
+    @property
+    def predictable(self) -> bool:
+        """As far as the innovations grow."""
+        return not self.slow
+
     def scale_columns(self, coarse: Coarse) -> FloatArray:
         """Time."""
         return np.zeros((len(coarse), 0)) if self.slow else elapsed(coarse)[:, None]
+
+    def size_columns(self, coarse: Coarse) -> FloatArray:
+        """Time, whichever movement grows."""
+        return elapsed(coarse)[:, None]
 
     @classmethod
     def test(cls, search: Search, fitted: Fitted) -> Outcome | None:
@@ -51,10 +60,6 @@ class VarianceTrend(Term):
         term = cls(slow=slow < fast)
         p_value = min(1.0, 2.0 * min(fast, slow))
         return Outcome(term, (), p_value)
-
-    def retested(self, search: Search, fitted: Fitted) -> float:
-        """The same test beside everything else."""
-        return min(1.0, 2.0 * min(_probability(fitted, False), _probability(fitted, True)))
 
     def matches(self, other: Self) -> bool:
         """Either of the two."""
