@@ -12,10 +12,10 @@ import pytest
 
 from tests.pipeline.fake_converter import convert, convert_and_log
 from tests.pipeline.test_batch import make_inputs, run, states, tree
-from xosc_lateral.pipeline import workers
+from xosc_lateral.pipeline import cluster as dask_cluster
 from xosc_lateral.pipeline.batch import State, convert_many
 from xosc_lateral.pipeline.jobs import plan_batch
-from xosc_lateral.pipeline.workers import ClusterError
+from xosc_lateral.pipeline.tasks import ClusterError
 
 dask = pytest.importorskip("dask")
 distributed = pytest.importorskip("distributed")
@@ -55,7 +55,7 @@ def test_a_scenario_that_kills_every_worker_costs_one_row(tmp_path: Path, cluste
 
 
 def test_no_scheduler_at_the_address_is_said_in_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(workers, "CONNECT_TIMEOUT", 0.5)
+    monkeypatch.setattr(dask_cluster, "CONNECT_TIMEOUT", 0.5)
     batch = plan_batch([make_inputs(tmp_path / "in", 1)], tmp_path / "out")
     with pytest.raises(ClusterError, match=r"no dask scheduler answers at tcp://127\.0\.0\.1:9"):
         list(convert_many(batch, cluster="tcp://127.0.0.1:9", converter=convert))

@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 
 from xosc_lateral.datasets.driver_simulator import simulate_drive
-from xosc_lateral.datasets.plants import Response, ShiftBy
+from xosc_lateral.datasets.plants import ShiftBy
+from xosc_lateral.datasets.response import Response
 from xosc_lateral.driver.effects import (
     Acts,
     Angular,

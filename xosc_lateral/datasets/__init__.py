@@ -1,7 +1,7 @@
 """A driver simulator that is no relative of the package's model, for docs, examples, tests and benchmarks.
 
 `simulate_drive` gives a drive table with the truth behind it. Effects are planted by arguments and act through the
-simulated driver; see `plants` for what there is.
+simulated driver; see `plants` and `hidden_plants` for what there is.
 """
 
 from xosc_lateral.datasets.driver_simulator import (
@@ -12,26 +12,27 @@ from xosc_lateral.datasets.driver_simulator import (
     simulate_drive,
     simulate_population,
 )
-from xosc_lateral.datasets.plants import (
+from xosc_lateral.datasets.hidden_plants import (
     CameraStep,
     Companion,
     Distraction,
     Fatigue,
-    LaneHabit,
-    Plant,
-    Response,
-    RestoringBy,
     SensorDrift,
+    TargetWander,
+    Weave,
+)
+from xosc_lateral.datasets.intent import Plant
+from xosc_lateral.datasets.plants import (
+    LaneHabit,
+    RestoringBy,
     ShakyCamera,
-    Shape,
     ShiftBy,
     SideWind,
     SpreadBy,
-    TargetWander,
-    Weave,
     curve_cutting,
     truck_avoidance,
 )
+from xosc_lateral.datasets.response import Response, Shape
 
 __all__ = [
     "CameraStep",

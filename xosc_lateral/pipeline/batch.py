@@ -20,7 +20,8 @@ from xosc_lateral.pipeline.jobs import Batch, Job
 from xosc_lateral.pipeline.journal import Journal
 from xosc_lateral.pipeline.lock import folder_lock
 from xosc_lateral.pipeline.manifest import ManifestRow
-from xosc_lateral.pipeline.workers import WorkerDiedError, open_pool, run_tasks
+from xosc_lateral.pipeline.tasks import WorkerDiedError, run_tasks
+from xosc_lateral.pipeline.workers import open_pool
 from xosc_lateral.version import __version__
 
 Converter = Callable[[Job], ManifestRow]

@@ -1,8 +1,4 @@
-"""Where jobs run: in this process, on this machine's cores (joblib's executor), on a dask.distributed cluster.
-
-All three are `concurrent.futures` executors, so the loop that feeds them is the same. joblib's `Parallel` is not in
-between because it ends, and on dask waits for ever, when one task takes its worker down; here that costs one row.
-"""
+"""Where jobs run: in this process, on this machine's cores (joblib's executor), on a dask.distributed cluster."""
 
 from __future__ import annotations
 
@@ -12,165 +8,19 @@ import signal
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, CancelledError, Executor, Future, wait
-from contextlib import AbstractContextManager
+from collections.abc import Callable
+from concurrent.futures import BrokenExecutor, Future
 from types import TracebackType
-from typing import Any, Protocol, Self, TypeVar
+from typing import Any, Self
 
-from xosc_lateral.errors import XoscLateralError
 from xosc_lateral.pipeline.guard import let_worker_die
-from xosc_lateral.version import __version__
-
-Task = TypeVar("Task")
-Answer = TypeVar("Answer")
-
-AHEAD = 2
-"""Tasks handed out per worker: one at work, one to begin with at once."""
-
-LONG_TRY = 60.0
-"""A task that was alone and worked for so long before its worker died is not tried again: that was no accident. [s]"""
-
-TRIES_ALONE = 3
-"""Tries of a task that may have killed its worker; more than one, for a worker may be killed from outside as well.
-
-On a cluster one is enough: its scheduler has had the task on several workers before it says so, and each further try
-takes more of them down.
-"""
-
-CONNECT_TIMEOUT = 10.0
-"""A scheduler that has not answered after this is not there. [s]"""
-
-CHECK_EVERY = 5.0
-"""How often it is looked whether a pool that does not answer still has workers. [s]"""
-
-WORKERLESS = 120.0
-"""A cluster without workers for so long is given up; restarting one takes seconds. [s]"""
+from xosc_lateral.pipeline.tasks import AHEAD, TRIES_ALONE, Answer, Pool, Task
 
 PARENT_CHECK = 0.5
 """How often a worker looks whether its run is still there. [s]"""
 
 PR_SET_PDEATHSIG = 1
 """Of Linux's prctl(2), from <linux/prctl.h>: the signal that this process gets when its parent ends."""
-
-
-class ClusterError(XoscLateralError):
-    """The cluster can't be reached, or is gone."""
-
-
-class WorkerDiedError(XoscLateralError):
-    """A task took down its worker, time and again."""
-
-
-class Pool(AbstractContextManager["Pool"], Protocol):
-    """Workers; use as a context.
-
-    Attributes
-    ----------
-    tries_alone : int
-        How often a task that may have killed its worker is tried by itself.
-    """
-
-    tries_alone: int
-
-    def capacity(self) -> int:
-        """How many tasks may be handed out at once."""
-        ...
-
-    def submit(self, work: Callable[[Task], Answer], task: Task) -> Future[Answer]:
-        """Hand out a task."""
-        ...
-
-    def recover(self) -> None:
-        """Get fit again after a worker died; raises `ClusterError` if that can't be."""
-        ...
-
-    def lost(self, error: BaseException) -> bool:
-        """Whether a future's error means that its worker died, rather than that the task raised it."""
-        ...
-
-    def check(self) -> None:
-        """Raise `ClusterError` when no answer can come any more; called every few seconds without one."""
-        ...
-
-
-def run_tasks(
-    pool: Pool, work: Callable[[Task], Answer], tasks: Iterable[Task]
-) -> Iterator[tuple[Task, Answer | WorkerDiedError]]:
-    """Answers as they come, in any order.
-
-    When a worker dies, whatever had been handed out is tried again, one by one: what kills its worker then as well is
-    the culprit and is answered by a `WorkerDiedError`; the rest is fine.
-
-    Raises
-    ------
-    ClusterError
-        When the cluster is gone.
-    Exception
-        What `work` raises.
-    """
-    waiting = iter(tasks)
-    running: dict[Future[Answer], Task] = {}
-    suspects: list[Task] = []
-    while True:
-        if not suspects:
-            suspects += _feed(pool, work, waiting, running)
-        if not running:
-            if not suspects:
-                return
-            pool.recover()
-            while suspects:
-                task = suspects.pop(0)
-                yield task, _alone(pool, work, task)
-            continue
-        done = wait(running, CHECK_EVERY, FIRST_COMPLETED).done
-        if not done:
-            pool.check()
-        for future in done:
-            task = running.pop(future)
-            try:
-                answer = future.result()
-            except (Exception, CancelledError) as error:
-                if not pool.lost(error):
-                    raise
-                suspects.append(task)
-            else:
-                yield task, answer
-
-
-def _feed(
-    pool: Pool, work: Callable[[Task], Answer], waiting: Iterator[Task], running: dict[Future[Answer], Task]
-) -> list[Task]:
-    """Hand out as many as may be; returns the task during whose submission the pool turned out to be broken."""
-    while len(running) < pool.capacity():
-        try:
-            task = next(waiting)
-        except StopIteration:
-            break
-        try:
-            running[pool.submit(work, task)] = task
-        except BrokenExecutor:
-            return [task]
-    return []
-
-
-def _alone(pool: Pool, work: Callable[[Task], Answer], task: Task) -> Answer | WorkerDiedError:
-    deaths = 1
-    for _ in range(pool.tries_alone):
-        begin = time.monotonic()
-        try:
-            future = pool.submit(work, task)
-            while not wait([future], CHECK_EVERY).done:
-                pool.check()
-            return future.result()
-        except (Exception, CancelledError) as error:
-            if not pool.lost(error):
-                raise
-            pool.recover()
-        deaths += 1
-        if time.monotonic() - begin > LONG_TRY:
-            break
-    return WorkerDiedError(f"its worker process died {deaths} times (killed, out of memory, or a crash in a library)")
 
 
 class ThisProcess:
@@ -281,104 +131,6 @@ def _end_with_parent(parent: int) -> None:
     threading.Thread(target=watch, daemon=True, name="watch parent").start()
 
 
-class Cluster:
-    """Workers of a running dask.distributed cluster.
-
-    They have to see the same files under the same paths, and have the same version of this package. The scheduler
-    itself gives a dead worker's tasks to another. Whoever can talk to the scheduler can run code on the workers and
-    here: it has to be trusted.
-
-    Parameters
-    ----------
-    address : str
-        Of the scheduler, as in ``tcp://10.0.0.1:8786``.
-
-    Raises
-    ------
-    ClusterError
-        The extra ``cluster`` is not installed, nobody answers, or a worker has another version of this package.
-    """
-
-    tries_alone = 1
-
-    def __init__(self, address: str) -> None:
-        try:
-            import distributed
-        except ImportError as error:
-            raise ClusterError("dask.distributed is not installed: pip install 'xosc-lateral[cluster]'") from error
-        try:
-            library: Any = distributed
-            self._client: Any = library.Client(address, set_as_default=False, timeout=CONNECT_TIMEOUT)
-        except (OSError, ValueError, TimeoutError) as error:
-            raise ClusterError(f"no dask scheduler answers at {address}: {error}") from error
-        self._address, self._had_workers = address, time.monotonic()
-        self._check_versions()
-        # pure=False: the key of a task must not come from its arguments, a repeated task has to run again
-        self._executor: Executor = self._client.get_executor(pure=False)
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self._executor.shutdown(wait=error is None)
-        self._client.close()
-
-    def capacity(self) -> int:
-        """A few per thread of the workers that there are now; workers may come and go."""
-        return AHEAD * max(1, sum(map(int, self._client.nthreads().values())))
-
-    def submit(self, work: Callable[[Task], Answer], task: Task) -> Future[Answer]:
-        """Hand out a task."""
-        self._check()
-        return self._executor.submit(work, task)
-
-    def recover(self) -> None:
-        """The scheduler sees to it, if it is still there."""
-        self._check()
-
-    def lost(self, error: BaseException) -> bool:
-        """Whether the scheduler has given the task up, rather than that it is gone."""
-        from distributed import KilledWorker
-
-        self._check()
-        return isinstance(error, KilledWorker | CancelledError)
-
-    def check(self) -> None:
-        """Whether scheduler and workers are there; a worker that is being restarted has its time."""
-        self._check()
-        if self._client.nthreads():
-            self._had_workers = time.monotonic()
-        elif time.monotonic() - self._had_workers > WORKERLESS:
-            raise ClusterError(f"the dask scheduler at {self._address} has no workers left; run it again with some")
-
-    def _check_versions(self) -> None:
-        """Before the first job: afterwards every one of them would fail."""
-        try:
-            found: dict[str, str] = self._client.run(installed_version)
-        except Exception as error:  # what a worker without this package raises, dask hands on
-            self._client.close()
-            raise ClusterError(f"the workers at {self._address} can't run xosc-lateral: {error}") from error
-        wrong = {worker: version for worker, version in found.items() if version != __version__}
-        if wrong:
-            self._client.close()
-            worker, version = min(wrong.items())
-            raise ClusterError(
-                f"{len(wrong)} of {len(found)} workers at {self._address} have another version of xosc-lateral "
-                f"({worker}: {version}, here: {__version__}); nothing was converted"
-            )
-
-    def _check(self) -> None:
-        if self._client.status != "running":
-            raise ClusterError(f"the dask scheduler at {self._address} is gone; what is finished is kept, run it again")
-
-
-def installed_version() -> str:
-    """Version of this package where the call is run."""
-    return __version__
-
-
 def open_pool(workers: int, cluster: str | None) -> Pool:
     """Pool for so many processes on this machine (-1: one per core; 0: this process), or for a cluster.
 
@@ -390,6 +142,8 @@ def open_pool(workers: int, cluster: str | None) -> Pool:
         Fewer than none.
     """
     if cluster is not None:
+        from xosc_lateral.pipeline.cluster import Cluster
+
         return Cluster(cluster)
     if workers == -1:
         import joblib

@@ -7,9 +7,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from xosc_lateral.road.lane_tables import CHUNK
 from xosc_lateral.road.positions import FloatArray, IntArray
 from xosc_lateral.road.road import Road
-from xosc_lateral.road.tables import CHUNK, NetworkTables
+from xosc_lateral.road.tables import NetworkTables
 
 ITERATIONS = 40
 """Newton takes 3-6; bisection, where the reference line has a kink, 40 for 1e-11 m."""

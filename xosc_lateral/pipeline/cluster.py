@@ -1,0 +1,116 @@
+"""Workers of a dask.distributed cluster."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from concurrent.futures import CancelledError, Executor, Future
+from types import TracebackType
+from typing import Any, Self
+
+from xosc_lateral.pipeline.tasks import AHEAD, Answer, ClusterError, Task
+from xosc_lateral.version import __version__
+
+CONNECT_TIMEOUT = 10.0
+"""A scheduler that has not answered after this is not there. [s]"""
+
+WORKERLESS = 120.0
+"""A cluster without workers for so long is given up; restarting one takes seconds. [s]"""
+
+
+class Cluster:
+    """Workers of a running dask.distributed cluster.
+
+    They have to see the same files under the same paths, and have the same version of this package. The scheduler
+    itself gives a dead worker's tasks to another. Whoever can talk to the scheduler can run code on the workers and
+    here: it has to be trusted.
+
+    Parameters
+    ----------
+    address : str
+        Of the scheduler, as in ``tcp://10.0.0.1:8786``.
+
+    Raises
+    ------
+    ClusterError
+        The extra ``cluster`` is not installed, nobody answers, or a worker has another version of this package.
+    """
+
+    tries_alone = 1
+
+    def __init__(self, address: str) -> None:
+        try:
+            import distributed
+        except ImportError as error:
+            raise ClusterError("dask.distributed is not installed: pip install 'xosc-lateral[cluster]'") from error
+        try:
+            library: Any = distributed
+            self._client: Any = library.Client(address, set_as_default=False, timeout=CONNECT_TIMEOUT)
+        except (OSError, ValueError, TimeoutError) as error:
+            raise ClusterError(f"no dask scheduler answers at {address}: {error}") from error
+        self._address, self._had_workers = address, time.monotonic()
+        self._check_versions()
+        # pure=False: the key of a task must not come from its arguments, a repeated task has to run again
+        self._executor: Executor = self._client.get_executor(pure=False)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._executor.shutdown(wait=error is None)
+        self._client.close()
+
+    def capacity(self) -> int:
+        """A few per thread of the workers that there are now; workers may come and go."""
+        return AHEAD * max(1, sum(map(int, self._client.nthreads().values())))
+
+    def submit(self, work: Callable[[Task], Answer], task: Task) -> Future[Answer]:
+        """Hand out a task."""
+        self._check()
+        return self._executor.submit(work, task)
+
+    def recover(self) -> None:
+        """The scheduler sees to it, if it is still there."""
+        self._check()
+
+    def lost(self, error: BaseException) -> bool:
+        """Whether the scheduler has given the task up, rather than that it is gone."""
+        from distributed import KilledWorker
+
+        self._check()
+        return isinstance(error, KilledWorker | CancelledError)
+
+    def check(self) -> None:
+        """Whether scheduler and workers are there; a worker that is being restarted has its time."""
+        self._check()
+        if self._client.nthreads():
+            self._had_workers = time.monotonic()
+        elif time.monotonic() - self._had_workers > WORKERLESS:
+            raise ClusterError(f"the dask scheduler at {self._address} has no workers left; run it again with some")
+
+    def _check_versions(self) -> None:
+        """Before the first job: afterwards every one of them would fail."""
+        try:
+            found: dict[str, str] = self._client.run(installed_version)
+        except Exception as error:  # what a worker without this package raises, dask hands on
+            self._client.close()
+            raise ClusterError(f"the workers at {self._address} can't run xosc-lateral: {error}") from error
+        wrong = {worker: version for worker, version in found.items() if version != __version__}
+        if wrong:
+            self._client.close()
+            worker, version = min(wrong.items())
+            raise ClusterError(
+                f"{len(wrong)} of {len(found)} workers at {self._address} have another version of xosc-lateral "
+                f"({worker}: {version}, here: {__version__}); nothing was converted"
+            )
+
+    def _check(self) -> None:
+        if self._client.status != "running":
+            raise ClusterError(f"the dask scheduler at {self._address} is gone; what is finished is kept, run it again")
+
+
+def installed_version() -> str:
+    """Version of this package where the call is run."""
+    return __version__
