@@ -10,9 +10,11 @@ import pandas as pd
 import pytest
 from lxml import etree
 
+import xosc_lateral as xl
 from tests.pipeline.test_batch import tree
 from tests.profiles import simulated_profile
 from xosc_lateral.cli import main
+from xosc_lateral.errors import FormatError
 from xosc_lateral.formats.hashes import file_hash
 from xosc_lateral.formats.profiles import write_profile
 from xosc_lateral.pipeline.batch import State, convert_many
@@ -148,3 +150,44 @@ def test_a_file_in_the_place_of_the_output_folder_is_one_line(database: Path, tm
     assert code == 1
     assert errors.count("\n") == 1
     assert (tmp_path / "out").read_text() == "mine"
+
+
+def test_inputs_that_change_during_a_run_are_stated_as_they_were_read(tmp_path: Path, profile: str) -> None:
+    source, out = tmp_path / "db", tmp_path / "out"
+    source.mkdir()
+    for file, text in find_template("cut-in").files({}).items():
+        (source / file).write_text(text, encoding="utf-8")
+    scenario, road = source / "cut-in.xosc", source / "cut-in.xodr"
+    for copy in ("a.xosc", "b.xosc", "c.xosc"):
+        (source / copy).write_bytes(scenario.read_bytes())
+    scenario.unlink()
+    settings = ConvertSettings(profile=profile, time_limit=2.0)
+    before = file_hash(road), file_hash(source / "a.xosc")
+    outcomes = convert_many(plan_batch([source], out, settings), workers=0)
+    for number, outcome in enumerate(outcomes):
+        assert outcome.state is State.WRITTEN
+        if number == 0:  # others look at the same road, and at a scenario that was planned as it was
+            road.write_text(road.read_text().replace("<header", "<!-- moved --><header"))
+            (source / "c.xosc").write_text(
+                (source / "c.xosc").read_text().replace("<FileHeader", "<!-- --><FileHeader")
+            )
+    rows = pd.read_parquet(out / MANIFEST).set_index("output")
+    assert (rows.road_sha256["a.xosc"], rows.scenario_sha256["a.xosc"]) == before
+    assert rows.road_sha256["b.xosc"] == rows.road_sha256["c.xosc"] == file_hash(road) != before[0]
+    assert rows.scenario_sha256["c.xosc"] == file_hash(source / "c.xosc")
+    again = {one.row.output: one.state for one in convert_many(plan_batch([source], out, settings), workers=0)}
+    assert again == {"a.xosc": State.WRITTEN, "b.xosc": State.UP_TO_DATE, "c.xosc": State.UP_TO_DATE}
+
+
+def test_a_result_reads_its_rows_from_the_manifest(database: Path, tmp_path: Path, profile: str) -> None:
+    told: list[dict] = []
+    options = {"profile": profile, "time_limit": 2.0, "workers": 0}
+    result = xl.convert_many(database / "curves", tmp_path / "out", on_outcome=told.append, **options)
+    assert result.to_dict()["outputs"] == told
+    result = xl.convert_many(database, tmp_path / "out", on_outcome=told.append, **options)
+    frame = result.to_frame()
+    assert frame["output"].tolist() == ["broken.xosc", "curves/curves.xosc", "cut-in/cut-in.xosc"]
+    assert frame["state"].tolist() == ["failed", "written", "written"]
+    (tmp_path / "out" / MANIFEST).unlink()
+    with pytest.raises(FormatError, match=r"manifest\.parquet: is gone"):
+        result.to_frame()

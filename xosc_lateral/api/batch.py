@@ -12,10 +12,11 @@ from xosc_lateral.api.result import Result
 from xosc_lateral.errors import FormatError
 from xosc_lateral.formats.targets import claim, folder_target
 from xosc_lateral.limits import JOB_MEMORY, JOB_TIMEOUT
-from xosc_lateral.pipeline.batch import Outcome
+from xosc_lateral.pipeline.batch import Outcome, State
 from xosc_lateral.pipeline.batch import convert_many as outcomes_of
 from xosc_lateral.pipeline.guard import JobLimits
 from xosc_lateral.pipeline.jobs import Batch, plan_batch
+from xosc_lateral.pipeline.manifest import MANIFEST, ManifestRow, read_manifest
 from xosc_lateral.pipeline.progress import Display, Summary, follow
 from xosc_lateral.pipeline.reports import write_batch_index
 from xosc_lateral.pipeline.request import frame_requests
@@ -127,21 +128,26 @@ def convert_many(
     claim((job.output for job in batch.jobs if not job.output.is_dir()), force=force)
     limits = JobLimits(job_timeout, job_memory)
     outcomes = outcomes_of(batch, workers=workers, cluster=cluster, limits=limits, notify=_notifier(show))
-    rows: list[dict[str, Any]] = []
-    summary = follow(_noted(outcomes, rows, on_outcome), len(batch), Display(show))
+    became: dict[str, tuple[State, float]] = {}
+    summary = follow(_noted(outcomes, became, on_outcome), len(batch), Display(show))
     index = None if report is None else write_batch_index(batch, Path(report))
-    return BatchResult(batch, summary, sorted(rows, key=lambda row: str(row["output"])), index)
+    return BatchResult(batch, summary, became, index)
 
 
 def _noted(
-    outcomes: Iterator[Outcome], rows: list[dict[str, Any]], tell: Callable[[Mapping[str, Any]], None] | None
+    outcomes: Iterator[Outcome],
+    became: dict[str, tuple[State, float]],
+    tell: Callable[[Mapping[str, Any]], None] | None,
 ) -> Iterator[Outcome]:
     for outcome in outcomes:
-        row = {"state": outcome.state.value, "seconds": round(outcome.seconds, 4), **outcome.row.to_dict()}
-        rows.append(row)
+        became[outcome.row.output] = outcome.state, outcome.seconds
         if tell is not None:
-            tell(row)
+            tell(_row(outcome.state, outcome.seconds, outcome.row))
         yield outcome
+
+
+def _row(state: State, seconds: float, row: ManifestRow) -> dict[str, Any]:
+    return {"state": state.value, "seconds": round(seconds, 4), **row.to_dict()}
 
 
 def _notifier(show: str) -> Callable[[str], None] | None:
@@ -151,12 +157,14 @@ def _notifier(show: str) -> Callable[[str], None] | None:
 
 
 class BatchResult(Result):
-    """What became of a batch."""
+    """What became of a batch; of single outputs, `to_frame` and `to_dict` read it from the manifest."""
 
-    __slots__ = ("_batch", "_rows", "_summary", "report")
+    __slots__ = ("_batch", "_became", "_summary", "report")
 
-    def __init__(self, batch: Batch, summary: Summary, rows: list[dict[str, Any]], report: Path | None) -> None:
-        self._batch, self._summary, self._rows = batch, summary, rows
+    def __init__(
+        self, batch: Batch, summary: Summary, became: dict[str, tuple[State, float]], report: Path | None
+    ) -> None:
+        self._batch, self._summary, self._became = batch, summary, became
         self.report = report
         """Index of the pages, if there are any."""
 
@@ -198,17 +206,29 @@ class BatchResult(Result):
         """One row per output: the manifest's columns, with `state` and `seconds`."""
         import pandas as pd
 
-        return pd.DataFrame(self._rows)
+        return pd.DataFrame(self._rows())
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values, as ``--json`` prints them."""
+        return {**self.totals(), "outputs": list(self._rows())}
+
+    def _rows(self) -> Iterator[dict[str, Any]]:
+        """Of this batch's outputs, sorted."""
+        manifest = self.folder / MANIFEST
+        if not manifest.is_file():
+            raise FormatError("is gone, and with it what became of single outputs", path=manifest)
+        for row in read_manifest(manifest):
+            if row.output in self._became:
+                yield _row(*self._became[row.output], row)
+
+    def totals(self) -> dict[str, Any]:
+        """Plain values of the whole batch: the last line that ``--json`` prints."""
         return {
             "folder": str(self.folder),
             "left_out": len(self._batch.left_out),
             "notes": list(self.notes),
             **self._summary.to_dict(),
             **({} if self.report is None else {"report": str(self.report)}),
-            "outputs": self._rows,
         }
 
 

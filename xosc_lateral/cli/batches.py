@@ -47,7 +47,7 @@ def convert_batch(
         )
         raise typer.Exit(130) from None
     if as_json:
-        say_json({"kind": "summary", **{name: value for name, value in result.to_dict().items() if name != "outputs"}})
+        say_json({"kind": "summary", **result.totals()})
     elif not quiet:
         typer.echo(str(result))
     if result.failed or (strict and (result.with_warnings or result.nobody_enriched)):

@@ -202,15 +202,22 @@ def library_folders(folders: Iterable[str | Path] = ()) -> tuple[Path, ...]:
     return found
 
 
-def configuration_file() -> Path:
-    """Where the user's configuration is looked for."""
-    home = os.environ.get("APPDATA" if os.name == "nt" else "XDG_CONFIG_HOME")
-    return (Path(home) if home else Path.home() / ".config") / "xosc-lateral" / "config.toml"
+def configuration_file() -> Path | None:
+    """Where the user's configuration is looked for; None: whoever runs this has no home (a service in a container)."""
+    named = os.environ.get("APPDATA" if os.name == "nt" else "XDG_CONFIG_HOME")
+    try:
+        home = Path(named) if named else Path.home() / ".config"
+    except RuntimeError:
+        return None
+    return home / "xosc-lateral" / "config.toml"
 
 
 def _configured() -> list[Path]:
     path = configuration_file()
-    if not path.is_file():
+    try:
+        if path is None or not path.is_file():
+            return []
+    except PermissionError:  # the home is somebody else's
         return []
     import tomllib
 
@@ -226,7 +233,10 @@ def _configured() -> list[Path]:
         library = [library]
     if not isinstance(library, list) or not all(isinstance(name, str) for name in library):
         raise FormatError(f"library = {library!r}: expected a list of folders", path=path)
-    return [path.parent / Path(name).expanduser() for name in library]
+    try:
+        return [path.parent / Path(name).expanduser() for name in library]
+    except RuntimeError as error:
+        raise FormatError(f"library = {library!r}: there is no home that ~ could stand for", path=path) from error
 
 
 def _from_plugins() -> dict[str, Path]:

@@ -50,6 +50,9 @@ FULL_WIDTH = 9.2
 LARGEST_SVG = 1_500_000
 """A figure beyond this is embedded as a picture: browsers get slow on larger SVG. [byte]"""
 
+LONGEST_NAME = 40
+"""Longer names are cut in figures, which they would leave no room for; the page's tables have them whole."""
+
 _RASTER_DPI = 160
 _STYLE: dict[Any, Any] = {
     "figure.facecolor": "none",
@@ -88,6 +91,11 @@ _STYLE: dict[Any, Any] = {
     "path.simplify_threshold": 0.2,
     "svg.fonttype": "none",  # text stays text: searchable, read aloud, a tenth of the size
 }
+
+
+def label_of(name: str) -> str:
+    """An entity's name as figures have it."""
+    return name if len(name) <= LONGEST_NAME else f"{name[: LONGEST_NAME - 1]}…"
 
 
 @contextmanager

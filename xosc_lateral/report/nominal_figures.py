@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from xosc_lateral.motion.nominal import Activity, NominalMotion
-from xosc_lateral.report.figures import PALETTE, figure_style, new_figure
+from xosc_lateral.report.figures import PALETTE, figure_style, label_of, new_figure
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -25,7 +25,7 @@ def nominal_speeds(motion: NominalMotion) -> Figure:
     for number, entity in enumerate(motion.entities):
         present = (entity.activity[::every] & Activity.ACTIVE) != 0
         speed = np.where(present, entity.speed[::every], np.nan)
-        ax.plot(entity.time[::every], speed, color=PALETTE[number % len(PALETTE)], label=entity.name)
+        ax.plot(entity.time[::every], speed, color=PALETTE[number % len(PALETTE)], label=label_of(entity.name))
     ax.set_ylim(bottom=min(0.0, ax.get_ylim()[0]))
     ax.set_xlabel("time [s]")
     ax.set_ylabel("speed [m/s]")

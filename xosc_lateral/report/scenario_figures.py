@@ -22,6 +22,7 @@ from xosc_lateral.report.figures import (
     PALETTE,
     SHADE,
     figure_style,
+    label_of,
     new_figure,
     new_panels,
 )
@@ -92,7 +93,7 @@ def _draw_paths(ax: Any, enriched: Enriched, view: View) -> float:
         rows = _rows(entity.motion)
         breaks = _pieces(entity.motion, rows)
         x, y = view.turn(entity.motion.x[rows], entity.motion.y[rows])
-        label = f"{entity.name}, nominal"
+        label = f"{label_of(entity.name)}, nominal"
         ax.plot(
             _broken(x, breaks), _broken(y, breaks), color=NOMINAL, linewidth=0.8, dashes=(3, 2), zorder=3, label=label
         )
@@ -100,7 +101,12 @@ def _draw_paths(ax: Any, enriched: Enriched, view: View) -> float:
             x, y = view.turn(entity.trajectory.x[rows], entity.trajectory.y[rows])
             color = color_of(number)
             ax.plot(
-                _broken(x, breaks), _broken(y, breaks), color=color, linewidth=1.3, zorder=4, label=f"{entity.name}"
+                _broken(x, breaks),
+                _broken(y, breaks),
+                color=color,
+                linewidth=1.3,
+                zorder=4,
+                label=label_of(entity.name),
             )
         ax.plot(x[0], y[0], "o", color=color_of(number), markersize=3.5, zorder=5)
         seen_x += [x.min(), x.max()]
@@ -160,17 +166,17 @@ def _draw_on_road(
     breaks = _pieces(motion, rows)[here] | (np.diff(kept, prepend=kept[0] - 1) > 2 * (rows[-1] - rows[0]) / len(rows))
     breaks[0] = False
     nominal = enriched.network.offset_to_t(road, motion.lane[kept], motion.s[kept], motion.offset[kept])
-    label = f"{entity.name}, nominal"
+    label = f"{label_of(entity.name)}, nominal"
     style = {"color": NOMINAL, "linewidth": 0.9, "dashes": (3, 2), "zorder": 3, "label": label}
     ax.plot(motion.s[kept], _broken(nominal, breaks), **style)
     sign = np.where(np.cos(motion.heading_relative[kept]) >= 0.0, 1.0, -1.0)
     offset = motion.offset[kept] + sign * entity.deviation[kept]
     shifted = enriched.network.offset_to_t(road, motion.lane[kept], motion.s[kept], offset)
     color = color_of(number) if entity.is_enriched else INK
-    ax.plot(motion.s[kept], _broken(shifted, breaks), color=color, linewidth=1.4, zorder=4, label=entity.name)
+    ax.plot(motion.s[kept], _broken(shifted, breaks), color=color, linewidth=1.4, zorder=4, label=label_of(entity.name))
     ax.plot(motion.s[kept[0]], shifted[0], "o", color=color, markersize=4, zorder=5)
     is_first_road = road == motion.road[np.argmax(motion.road >= 0)]
-    return (float(motion.s[kept[0]]), float(shifted[0]), motion.name, color) if is_first_road else None
+    return (float(motion.s[kept[0]]), float(shifted[0]), label_of(motion.name), color) if is_first_road else None
 
 
 def _label_starts(ax: Any, places: Sequence[tuple[float, float, str, str]]) -> None:
@@ -218,8 +224,8 @@ def offsets_over_time(enriched: Enriched, entities: Sequence[EntityResult]) -> F
                 ax.axvspan(stretch.start, stretch.end, color=SHADE, linewidth=0, zorder=0)
         ax.axhline(0.0, color=NOMINAL, linewidth=0.9, dashes=(3, 2))
         number = [each.name for each in enriched.entities].index(entity.name)
-        ax.plot(entity.motion.time[rows], entity.deviation[rows], color=color_of(number), label=entity.name)
-        ax.set_title(entity.name)
+        ax.plot(entity.motion.time[rows], entity.deviation[rows], color=color_of(number), label=label_of(entity.name))
+        ax.set_title(label_of(entity.name))
     reach = max(0.5, 1.1 * max(float(np.abs(entity.deviation).max()) for entity in entities))
     axes[0, 0].set_ylim(-reach, reach)
     axes[len(entities) // 2, 0].set_ylabel("offset [m]")
@@ -239,8 +245,8 @@ def speeds_over_time(enriched: Enriched) -> Figure:
         time = entity.motion.time[rows]
         speed = _broken(entity.trajectory.speed[rows], absent)
         nominal = _broken(entity.motion.speed[rows], absent)
-        shown += ax.plot(time, speed, color=color_of(number), label=entity.name)
-        label = f"{entity.name}, nominal"
+        shown += ax.plot(time, speed, color=color_of(number), label=label_of(entity.name))
+        label = f"{label_of(entity.name)}, nominal"
         ax.plot(time, nominal, color=NOMINAL, linewidth=0.9, dashes=(3, 2), label=label)
     ax.set_ylim(bottom=min(0.0, ax.get_ylim()[0]))
     ax.set_xlabel("time [s]")
@@ -267,7 +273,7 @@ def dynamics_over_time(entities: Sequence[EntityResult]) -> Figure:
         ):
             ax.plot(made.time, after, color=ENRICHED, linewidth=1.0, label="enriched")
             ax.plot(nominal.time, before, color=NOMINAL, linewidth=1.0, dashes=(3, 2), label="nominal")
-        row[0].set_title(f"{entity.name}: lateral acceleration [m/s²]")
+        row[0].set_title(f"{label_of(entity.name)}: lateral acceleration [m/s²]")
         row[1].set_title("lateral jerk [m/s³]")
     for ax in axes[-1]:
         ax.set_xlabel("time [s]")
@@ -298,7 +304,7 @@ def timeline(enriched: Enriched) -> Figure:
             if not stretch.is_road_following and stretch.end - stretch.start > 0.08 * enriched.motion.end_time:
                 middle = 0.5 * (stretch.start + stretch.end)
                 ax.text(middle, number, stretch.kind.value, ha="center", va="center", fontsize=7.5)
-    ax.set_yticks(range(n), [entity.name for entity in enriched.entities])
+    ax.set_yticks(range(n), [label_of(entity.name) for entity in enriched.entities])
     ax.set_ylim(n - 0.4, -0.6)
     ax.grid(axis="y", visible=False)
     ax.set_xlabel("time [s]")
@@ -313,7 +319,7 @@ def gaps_before_and_after(pairs: Sequence[tuple[Gap | None, Gap | None]]) -> Fig
     names = []
     drawn: dict[str, Any] = {}
     for number, (before, after) in enumerate(pairs):
-        names.append(" and ".join((before or after).names))  # type: ignore[union-attr]
+        names.append(" and ".join(map(label_of, (before or after).names)))  # type: ignore[union-attr]
         ends = [gap.distance for gap in (before, after) if gap is not None]
         for a, b in pairwise(ends):
             ax.plot([a, b], [number, number], color=GRID, linewidth=3, zorder=1)
