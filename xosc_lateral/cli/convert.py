@@ -183,6 +183,7 @@ def _convert_one(
     as_json: bool,
 ) -> None:
     from xosc_lateral.api.convert import REPORT_SUFFIXES, convert, lifelike, scenario_target
+    from xosc_lateral.api.variants import variant_files, variant_set
     from xosc_lateral.formats.targets import STDOUT, claim, file_target
     from xosc_lateral.pipeline.convert import numbered
 
@@ -198,11 +199,16 @@ def _convert_one(
         page = None if report is None else file_target(report, f"{target.stem}.html", REPORT_SUFFIXES)
         outputs = [numbered(target, variant, variants) for variant in range(variants)]
         pages = [None if page is None else numbered(page, variant, variants) for variant in range(variants)]
-        claim([*outputs, *pages], [source], force=settings["force"])
+        files = variant_files(target, variants, settings["mode"], settings["player"])
+        claim([*outputs, *pages, *(files or ())], [source], force=settings["force"])
         unclean = False
         for variant, (path, its_page) in enumerate(zip(outputs, pages, strict=True)):
             result = convert(source, path, variant=variant, report=its_page, **settings)
             say(result, as_json=as_json, quiet=quiet)
             unclean |= bool(result.warnings) or not result.enriched
+        if files is not None:
+            found = variant_set(outputs, target, source=source, force=True)
+            if not (quiet or as_json):
+                typer.echo(str(found))
     if strict and unclean:
         raise typer.Exit(1)

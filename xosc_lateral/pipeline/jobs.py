@@ -7,17 +7,16 @@ import json
 import os
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, fields, replace
-from itertools import islice
 from pathlib import Path
 
 from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.errors import FormatError, XoscLateralError
 from xosc_lateral.formats.hashes import file_hash
-from xosc_lateral.formats.openscenario.distribution import read_distribution
 from xosc_lateral.formats.openscenario.references import require_folders
 from xosc_lateral.formats.openscenario.write.target import STANDARD
 from xosc_lateral.formats.profiles import find_profile, profile_hash
-from xosc_lateral.limits import BATCH_JOBS, PARAMETER_SETS, VARIANTS
+from xosc_lateral.limits import BATCH_JOBS, VARIANTS
+from xosc_lateral.pipeline.concrete import concrete
 from xosc_lateral.pipeline.convert import numbered
 from xosc_lateral.pipeline.drivers import auto_profiles, hidden_by_libraries, uses_auto
 from xosc_lateral.pipeline.manifest import ManifestRow, printable
@@ -169,7 +168,8 @@ def plan_batch(
         if request.variants > VARIANTS.value:
             raise FormatError(VARIANTS.refusal(request.variants), path=request.scenario)
         kind = document_kind(request.scenario)
-        if kind in (DocumentKind.CATALOG, DocumentKind.CONVERTED) and not request.listed:
+        ours_or_catalog = kind in (DocumentKind.CATALOG, DocumentKind.CONVERTED, DocumentKind.VARIANTS)
+        if ours_or_catalog and not request.listed:
             left_out.append((request.scenario, kind))
             continue
         before = asked.setdefault(request.scenario, {})
@@ -232,10 +232,12 @@ def _jobs(
     request: Request, kind: DocumentKind, base: Path, target: Path, fingerprints: _Fingerprints, repeat: str
 ) -> Iterator[Job]:
     relative = request.scenario.relative_to(base)
-    for source, suffix, settings, error in _concrete(request, kind):
-        for variant in range(request.variants):
-            named = relative.with_name(f"{relative.stem}{repeat}{suffix}{relative.suffix}")
-            output = numbered(named, variant, request.variants)
+    for one in concrete(request, kind):
+        source, settings, error = one.source, one.settings, one.error
+        for number in range(request.variants):
+            variant = number if one.variant is None else one.variant
+            named = relative.with_name(f"{relative.stem}{repeat}{one.suffix}{relative.suffix}")
+            output = numbered(named, number, request.variants)
             name = printable(output.as_posix())
             if name != output.as_posix():
                 error = error or f"{printable(str(source))}: the file's name is no UTF-8; rename it"
@@ -250,30 +252,6 @@ def _jobs(
                 fingerprint=fingerprints.of(settings, variant),
                 error=error,
             )
-
-
-def _concrete(request: Request, kind: DocumentKind) -> Iterator[tuple[Path, str, ConvertSettings, str]]:
-    """The scenarios that a file stands for: itself, or those of its distribution."""
-    if kind is not DocumentKind.DISTRIBUTION:
-        yield request.scenario, "", request.settings, ""
-        return
-    try:
-        logical = read_distribution(request.scenario, allowed=request.settings.allowed)
-        sets = list(islice(logical.parameter_sets(request.settings.seed), int(PARAMETER_SETS.value) + 1))
-        if len(sets) > PARAMETER_SETS.value:
-            raise FormatError(f"{PARAMETER_SETS.refusal(logical.count)}", path=request.scenario)
-        if not sets:
-            raise FormatError("no set of parameters satisfies the scenario's constraints", path=request.scenario)
-    except (XoscLateralError, OSError) as error:
-        yield request.scenario, "", request.settings, " ".join(str(error).split())
-        return
-    except Exception as error:  # a bug of ours in one file must not cost the others; the row says that it is one
-        what = f"{request.scenario}: internal error: {type(error).__name__}: {error}"
-        yield request.scenario, "", request.settings, " ".join(what.split())
-        return
-    for index, values in enumerate(sets):
-        parameters = {**values, **request.settings.parameters}
-        yield logical.scenario_file, f"_p{index:05d}", replace(request.settings, parameters=parameters), ""
 
 
 def _refuse_overwriting(jobs: Iterable[Job]) -> None:

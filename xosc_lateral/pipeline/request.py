@@ -38,8 +38,11 @@ class DocumentKind(Enum):
     CATALOG = "catalog"
     DISTRIBUTION = "parameter value distribution"
     CONVERTED = "converted scenario"
+    VARIANTS = "set of converted variants"
 
 
+DISTRIBUTIONS = frozenset({DocumentKind.DISTRIBUTION, DocumentKind.VARIANTS})
+"""Files that stand for several scenarios."""
 _KINDS = {"Catalog": DocumentKind.CATALOG, "ParameterValueDistribution": DocumentKind.DISTRIBUTION}
 _SCENARIO_PARTS = frozenset({"CatalogLocations", "RoadNetwork", "Entities", "Storyboard"})
 
@@ -152,7 +155,7 @@ def is_single(given: str | Path) -> bool:
     path = Path(given)
     if path.is_file():
         is_table = path.name.lower().endswith(TABLE_SUFFIXES)
-        return not is_table and document_kind(path) is not DocumentKind.DISTRIBUTION
+        return not is_table and document_kind(path) not in DISTRIBUTIONS
     return not path.is_dir() and not _GLOB_CHARACTERS & set(str(given))
 
 
@@ -169,15 +172,19 @@ def _kind_from(file: IO[bytes]) -> DocumentKind:
     events = etree.iterparse(
         file, events=("start",), resolve_entities=False, no_network=True, load_dtd=False, remove_comments=True
     )
+    is_ours = False
     for _, element in events:
         parent = element.getparent()
         if parent is not None and parent.getparent() is None and isinstance(element.tag, str):
             name = local_name(element)
             if name == "FileHeader" and HEADER_MARK in (element.get("description") or ""):
-                return DocumentKind.CONVERTED
+                is_ours = True
+            elif is_ours:
+                is_set = name == "ParameterValueDistribution"
+                return DocumentKind.VARIANTS if is_set else DocumentKind.CONVERTED
             if name in _KINDS or name in _SCENARIO_PARTS:
                 return _KINDS.get(name, DocumentKind.SCENARIO)
-    return DocumentKind.SCENARIO
+    return DocumentKind.CONVERTED if is_ours else DocumentKind.SCENARIO
 
 
 def _search(folder: Path, leave_out: Path | None) -> Iterator[Path]:

@@ -121,9 +121,14 @@ def remove(element: etree._Element) -> None:
     if element.getnext() is None and before is not None:
         before.tail = tail
     parent.remove(element)
-    if all(not isinstance(child.tag, str) for child in parent):  # empty, but for comments: white space counts there
-        parent.text = None
-        for comment in parent:
+    tidy(parent)
+
+
+def tidy(element: etree._Element) -> None:
+    """No white space in an element that is empty but for comments: it would count as content."""
+    if all(not isinstance(child.tag, str) for child in element):
+        element.text = None
+        for comment in element:
             comment.tail = None
 
 

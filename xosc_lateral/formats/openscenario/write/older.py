@@ -13,7 +13,7 @@ from lxml import etree
 
 from xosc_lateral.formats.openscenario.element import local_name
 from xosc_lateral.formats.openscenario.write import build
-from xosc_lateral.formats.openscenario.write.losses import Losses, remove
+from xosc_lateral.formats.openscenario.write.losses import Losses, remove, tidy
 
 VALUES: Mapping[tuple[str, str], str] = {
     ("rule", "greaterOrEqual"): "greaterThan",
@@ -123,6 +123,9 @@ def complete_choices(losses: Losses) -> None:
 
 
 def _complete_3(losses: Losses) -> None:
+    for item in _found(losses.root, "TrafficSourceAction", "TrafficSwarmAction"):
+        if _child(item, "TrafficDefinition") is None:
+            losses.action(item, f"{losses.target} asks for a TrafficDefinition")
     for item in _found(losses.root, "Vehicle", "Pedestrian", "MiscObject", "Controller"):
         if _child(item, "Properties") is None:
             build.insert_indented(item, len(item), etree.Element("Properties"))
@@ -248,6 +251,8 @@ def _whole_controller_action(action: etree._Element) -> None:
 
 
 def _complete_1(losses: Losses) -> None:
+    for item in _found(losses.root, "FileHeader", "ParameterDeclaration"):
+        tidy(item)
     for action in _found(losses.root, "ControllerAction"):
         if _child(action, "AssignControllerAction") is None:
             losses.action(action, f"{losses.target} overrides values only of a controller that it assigns")
