@@ -104,3 +104,17 @@ def test_a_set_of_version_1_0_has_a_distribution_of_1_1(folder: Path, tmp_path: 
     for part, version in (("set", "1.0.0"), ("trajectories", "1.0.0"), ("distribution", "1.1.1")):
         schema = etree.XMLSchema(etree.parse(str(XSD / f"OpenSCENARIO-{version}.xsd")))
         schema.assertValid(etree.parse(str(tmp_path / f"x_{part}.xosc")))
+
+
+def test_a_scenario_may_have_a_parameter_of_that_name(folder: Path, tmp_path: Path) -> None:
+    text = (folder / "in" / "cut-in.xosc").read_text(encoding="utf-8")
+    own = '<ParameterDeclarations><ParameterDeclaration name="variant" parameterType="string" value="mine"/>'
+    source = tmp_path / "in.xosc"
+    source.write_text(text.replace("<ParameterDeclarations>", own), encoding="utf-8")
+    (tmp_path / "cut-in.xodr").write_bytes((folder / "in" / "cut-in.xodr").read_bytes())
+    output = tmp_path / "x.xosc"
+    assert main(["convert", str(source), "-o", str(output), "--variants", "2", "--time-limit", "3", "-q"]) == 0
+    first, second = read_distribution(tmp_path / "x_distribution.xosc").parameter_sets()
+    assert (first["variant_2"], second["variant_2"]) == ("1", "2")
+    again = ["convert", str(tmp_path / "x_distribution.xosc"), "-o", str(tmp_path / "again"), "--time-limit", "3", "-q"]
+    assert main(again) == 0

@@ -10,7 +10,7 @@ from pathlib import Path
 from xosc_lateral.errors import FormatError, XoscLateralError
 from xosc_lateral.formats.openscenario.distribution import read_distribution
 from xosc_lateral.formats.openscenario.references import Boundary, allowed_roots
-from xosc_lateral.formats.openscenario.write import VARIANT, source_of_set
+from xosc_lateral.formats.openscenario.write import source_of_set
 from xosc_lateral.limits import PARAMETER_SETS
 from xosc_lateral.pipeline.request import DISTRIBUTIONS, DocumentKind, Request
 from xosc_lateral.pipeline.settings import ConvertSettings
@@ -67,13 +67,14 @@ def concrete(request: Request, kind: DocumentKind) -> Iterator[Concrete]:
 def _one(request: Request, scenario: Path, index: int, values: ParameterSet) -> Concrete:
     """A set of parameters; of a set of ours, the variant of the scenario that it was made from."""
     suffix = f"_p{index:05d}"
-    source = source_of_set(scenario)
-    if source is None:
+    found = source_of_set(scenario)
+    if found is None:
         parameters = {**values, **request.settings.parameters}
         return Concrete(scenario, suffix, replace(request.settings, parameters=parameters))
-    number = values.get(VARIANT, "")
+    source, parameter = found
+    number = values.get(parameter, "")
     if not number.isdecimal() or int(number) < 1:
-        raise FormatError(f"{VARIANT} '{number[:20]}' is no number from 1 on", path=request.scenario)
+        raise FormatError(f"{parameter} '{number[:20]}' is no number from 1 on", path=request.scenario)
     boundary = Boundary(scenario.parent, allowed_roots(scenario, request.settings.allowed))
     path = boundary.inside(source, Place(str(scenario), None, "provenance"))
     if not path.is_file():

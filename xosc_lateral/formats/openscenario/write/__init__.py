@@ -8,11 +8,10 @@ from xosc_lateral.formats.openscenario.write.result import WrittenScenario
 from xosc_lateral.formats.openscenario.write.sampled import motion_unknown_to
 from xosc_lateral.formats.openscenario.write.target import STANDARD, Player, Target, target
 from xosc_lateral.formats.openscenario.write.trajectory_scenario import write_trajectory_scenario
-from xosc_lateral.formats.openscenario.write.variant_set import VARIANT, VariantFiles, source_of_set, write_variant_set
+from xosc_lateral.formats.openscenario.write.variant_set import VariantFiles, source_of_set, write_variant_set
 
 __all__ = [
     "STANDARD",
-    "VARIANT",
     "OffsetChain",
     "Player",
     "Target",

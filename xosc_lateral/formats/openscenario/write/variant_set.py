@@ -23,9 +23,9 @@ from xosc_lateral.formats.openscenario.write import build
 from xosc_lateral.formats.xml import read_document
 
 VARIANT = "variant"
-"""Parameter that says which variant it is, from 1."""
+"""Parameter that says which variant it is, from 1; with a number where the scenario has one of that name."""
 SOURCE = "source"
-"""In the provenance of a set: where the scenario lies that it was made from."""
+"""In the provenance of a set: where the scenario lies that it was made from, and the parameter of the variant."""
 _POSE = frozenset("xyzhpr")
 _FIRST_WITH_DISTRIBUTIONS = (1, 1)
 
@@ -54,6 +54,7 @@ class _Difference:
     """What differs between variants, collected on the way through all of them at once."""
 
     catalog_name: str
+    taken: set[str] = field(default_factory=set)  # names of the scenario's own parameters
     entries: list[etree._Element] = field(default_factory=list)
     values: dict[str, tuple[str, list[str]]] = field(default_factory=dict)  # name -> type, a value per variant
 
@@ -62,7 +63,7 @@ class _Difference:
         name = re.sub(r"\W", "_", name, flags=re.ASCII)
         name = f"_{name}" if name[:1].isdigit() else name
         unique, number = name, 1
-        while unique in self.values:
+        while unique in self.values or unique in self.taken:
             number += 1
             unique = f"{name}_{number}"
         self.values[unique] = kind, values
@@ -88,21 +89,22 @@ def write_variant_set(variants: Sequence[Path], files: VariantFiles, source: str
     """
     roots = [read_document(path).root for path in variants]
     root = copy.deepcopy(roots[0])
-    number = [str(k + 1) for k in range(len(roots))]
     header = root.find("{*}FileHeader")
     assert header is not None
     version = int(header.get("revMajor") or 1), int(header.get("revMinor") or 0)
     whole = "integer" if version < (1, 2) else "int"
-    difference = _Difference(files.catalog.stem, values={VARIANT: (whole, number)})
+    declared = (item for item in root.iterfind("{*}ParameterDeclarations/{*}ParameterDeclaration"))
+    difference = _Difference(files.catalog.stem, {str(item.get("name")) for item in declared})
+    number = difference.parameter(VARIANT, whole, [str(k + 1) for k in range(len(roots))]).removeprefix("$")
     try:
         _compare(root, roots, difference)
     except _NotAlikeError as error:
         raise FormatError(f"is no variant of the same scenario ({error})", path=variants[0]) from error
     facts = dict(provenance_of(roots[0]) or {})
-    facts |= {VARIANT: None, "variants": len(roots), SOURCE: source}
+    facts |= {"variant": None, "variants": len(roots), SOURCE: [source, number]}
     _unmark(root, header)
     summary = f"set of {len(roots)} variants, seed {facts.get('seed')}"
-    _declare(root, header, difference, variants[0])
+    _declare(root, header, difference)
     if difference.entries:
         _locate(root, header, files.logical)
     mark(root, facts, summary)
@@ -111,11 +113,16 @@ def write_variant_set(variants: Sequence[Path], files: VariantFiles, source: str
     write_atomically(files.distribution, _distribution(difference, files.logical.name, version, summary))
 
 
-def source_of_set(path: Path) -> str | None:
-    """Where the scenario lies that a set was made from, as the set's provenance has it; None for any other file."""
+def source_of_set(path: Path) -> tuple[str, str] | None:
+    """Where the scenario lies that a set was made from, and the parameter that says which variant it is.
+
+    As the set's provenance has it; None for any other file.
+    """
     facts = provenance_of(read_document(path).root)
-    found = None if facts is None else facts.get(SOURCE)
-    return found if isinstance(found, str) else None
+    match None if facts is None else facts.get(SOURCE):
+        case [str(source), str(parameter)]:
+            return source, parameter
+    return None
 
 
 class _NotAlikeError(Exception):
@@ -179,14 +186,11 @@ def _unmark(root: etree._Element, header: etree._Element) -> None:
     header.set("description", (header.get("description") or "").partition(HEADER_MARK)[0].rstrip())
 
 
-def _declare(root: etree._Element, header: etree._Element, difference: _Difference, path: Path) -> None:
+def _declare(root: etree._Element, header: etree._Element, difference: _Difference) -> None:
     owner = next((item for item in root if local_name(item) == "ParameterDeclarations"), None)
     if owner is None:
         owner = etree.Element("ParameterDeclarations")
         build.insert_indented(root, root.index(header) + 1, owner)
-    taken = sorted({str(item.get("name")) for item in owner if isinstance(item.tag, str)} & set(difference.values))
-    if taken:
-        raise FormatError(f"the scenario has a parameter '{taken[0]}' of its own", path=path)
     for name, (kind, values) in difference.values.items():
         attributes = {"name": name, "parameterType": kind, "value": values[0]}
         build.insert_indented(owner, len(owner), etree.Element("ParameterDeclaration", attributes))
@@ -219,7 +223,7 @@ def _distribution(difference: _Difference, logical: str, version: build.Version,
     build.sub(owner, "ScenarioFile", filepath=logical)
     several = build.sub(build.sub(owner, "Deterministic"), "DeterministicMultiParameterDistribution")
     sets = build.sub(several, "ValueSetDistribution")
-    for k in range(len(difference.values[VARIANT][1])):
+    for k in range(len(next(iter(difference.values.values()))[1])):
         one = build.sub(sets, "ParameterValueSet")
         for name, (_, values) in difference.values.items():
             build.sub(one, "ParameterAssignment", parameterRef=name, value=values[k])
