@@ -329,3 +329,35 @@ def test_tables_are_checked_by_a_walk_that_sees_everything() -> None:
     assert len(parts) > 300
     assert len(attributes) > 300
     assert ("Event", "priority", "override") in values
+
+
+TRAILER = (
+    '<TrailerHitch dx="-1"/><Trailer><Trailer name="t"><Vehicle name="t" vehicleCategory="trailer">'
+    '<BoundingBox><Center x="1" y="0" z="0.5"/><Dimensions width="2" length="3" height="1"/></BoundingBox>'
+    '<Performance maxSpeed="70" maxAcceleration="10" maxDeceleration="10"/><Axles>'
+    '<RearAxle maxSteering="0" wheelDiameter="0.7" trackWidth="1.6" positionX="0" positionZ="0.35"/></Axles>'
+    '<TrailerCoupler dx="2"/></Vehicle></Trailer></Trailer></Vehicle>'
+)
+
+
+@pytest.mark.parametrize("minor", range(4))
+def test_a_trailer_follows_by_itself_or_is_an_entity_of_its_own(tmp_path: Path, minor: int) -> None:
+    source = tree(tmp_path, entities=entity("Ego", vehicle().replace("</Vehicle>", TRAILER)))
+    schema_of(3).assertValid(etree.parse(str(source)))
+    found, root = written(source, f"1.{minor}")
+    schema_of(minor).assertValid(root)
+    assert ("Ego+" in found.converted) == (minor < 3)
+    names = [item.get("name") for item in root.iter("ScenarioObject")]
+    assert names == (["Ego", "Ego+"] if minor < 3 else ["Ego"])
+    before = {one.name: one for one in played(read_scenario(source)).entities}
+    for after in played(read_scenario(found.path)).entities:
+        one = before[after.name]
+        n = min(len(one.time), len(after.time))
+        assert np.hypot(one.x[:n] - after.x[:n], one.y[:n] - after.y[:n]).max() < 0.02
+
+
+def test_an_input_that_goes_beyond_its_version_is_left_as_it_is(tmp_path: Path) -> None:
+    source = tree(tmp_path, 1, entities=entity("Ego", vehicle().replace("</Vehicle>", TRAILER)))
+    found, root = written(source, None)
+    assert found.converted == ("Ego",)
+    assert root.find(".//Trailer/Trailer") is not None

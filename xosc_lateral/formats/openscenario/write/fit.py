@@ -52,7 +52,7 @@ def fit(
     """
     version, source = target.version_for(scenario), scenario.header.version
     losses = Losses(root, scenario.path, f"version {named(version)}", reactive=converted is None)
-    if version != source or target.player is Player.CARLA:
+    if target.adapts(scenario):
         inline_catalogs(losses, scenario, scope)
         if version == (1, 0):
             fill_in(losses, scope, parameters=target.player is Player.CARLA)

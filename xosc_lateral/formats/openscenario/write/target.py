@@ -57,6 +57,13 @@ class Target:
             return (1, 0)
         return min(scenario.header.version, VERSIONS[-1])
 
+    def adapts(self, scenario: Scenario) -> bool:
+        """Whether the output is more than the input in its own version: in another one, or for a strict reader.
+
+        Else what an input has beyond its version stays as it is.
+        """
+        return self.player is Player.CARLA or self.version_for(scenario) != scenario.header.version
+
 
 STANDARD = Target()
 

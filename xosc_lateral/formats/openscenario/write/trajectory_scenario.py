@@ -97,7 +97,8 @@ def write_trajectory_scenario(
     check_convertible(root, scenario, motion)
     scope = global_scope(scenario)
     version = target.version_for(scenario)
-    pulled = _trailers(scenario, motion) if version >= TRAILERS_SINCE else set()
+    alone = target.adapts(scenario) and version < TRAILERS_SINCE
+    pulled = set() if alone else _trailers(scenario, motion)
     if scenario.header.is_left_handed:
         trajectories = {name: _mirrored(path) for name, path in trajectories.items()}
     moving = {
