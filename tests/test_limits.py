@@ -19,7 +19,12 @@ def test_every_standard_context_has_a_range() -> None:
 
 
 @pytest.mark.parametrize(
-    ("value", "words"), [(4000.5, "4000.5 MB, at most 4000 MB"), (1e12, "1000000000000 MB, at most 4000 MB")]
+    ("value", "words"),
+    [
+        (4000.5, "4000.5 MB, at most 4000 MB"),
+        (1e12, "1000000000000 MB, at most 4000 MB"),
+        (float("inf"), "inf MB, at most 4000 MB"),
+    ],
 )
 def test_a_refusal_names_value_and_limit(value: float, words: str) -> None:
     assert FILE_SIZE.refusal(value) == f"size of an input file: {words}"

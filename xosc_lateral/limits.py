@@ -40,7 +40,7 @@ class Limit:
         return f"{self.what}: {self._with_unit(found)}, at most {self}"
 
     def _with_unit(self, value: float) -> str:
-        number = f"{value:.0f}" if value == round(value) and abs(value) < 1e15 else f"{value:.6g}"
+        number = f"{value:.0f}" if abs(value) < 1e15 and value == round(value) else f"{value:.6g}"
         return f"{number} {self.unit}" if self.unit else number
 
     @property

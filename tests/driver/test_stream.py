@@ -212,6 +212,21 @@ def test_the_state_of_another_profile_is_refused() -> None:
         OffsetStream.from_dict(make_profile(), {})
 
 
+def test_a_state_that_is_not_what_was_written_is_refused() -> None:
+    profile = make_profile(*HIDDEN)
+    stream = OffsetStream(profile, 1)
+    for _ in range(30):
+        stream.step({"speed": 30.0})
+    state = json.loads(json.dumps(stream.to_dict(), indent=1, sort_keys=True))
+    OffsetStream.from_dict(profile, state)
+    for name, value in (("row", state["row"] + 1), ("samples", []), ("process", None), ("sha256", "0" * 64)):
+        with pytest.raises(DriverProfileError, match="damaged"):
+            OffsetStream.from_dict(profile, {**state, name: value})
+    for version in (3, "2", None, [2]):
+        with pytest.raises(DriverProfileError, match="newer version"):
+            OffsetStream.from_dict(profile, {**state, "version": version})
+
+
 def test_nothing_grows() -> None:
     profile, contexts = make_profile(*COLUMNED, *HIDDEN), rows(make_contexts(500))
     stream = OffsetStream(profile, 2, rate=50.0)

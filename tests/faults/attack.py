@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from tests.faults.mutants import mutate
-from tests.faults.readers import NonsenseError, Reader, refusal_of
+from tests.faults.reader import NonsenseError, Reader, refusal_of
 from xosc_lateral.pipeline.guard import JobLimitError, JobLimits, within_limits
 
 LIMITS = JobLimits(timeout=30.0, memory=1000.0)

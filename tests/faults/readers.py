@@ -8,20 +8,20 @@ from __future__ import annotations
 import json
 import math
 import shutil
-import warnings
-import zipfile
-from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from collections.abc import Iterable
 from pathlib import Path
 
 import numpy as np
 
+from tests.faults.reader import NonsenseError, Reader, sane
+from tests.faults.recordings import RECORDINGS
 from tests.formats.made_scenario import ROAD, declarations, entity, parameter, scenario_text, vehicle
 from tests.profiles import simulated_profile
 from xosc_lateral.datasets import simulate_drive
 from xosc_lateral.driver.snippets import sample_free
+from xosc_lateral.driver.stream import OffsetStream
 from xosc_lateral.drives.cuts import all_runs
-from xosc_lateral.errors import XoscLateralError
+from xosc_lateral.errors import DriverProfileError
 from xosc_lateral.formats.context_table import read_context
 from xosc_lateral.formats.drives import read_drives
 from xosc_lateral.formats.openscenario import read_scenario
@@ -33,38 +33,6 @@ from xosc_lateral.pipeline.jobs import plan_batch
 from xosc_lateral.pipeline.journal import Journal
 from xosc_lateral.pipeline.manifest import MANIFEST, ManifestRow, write_manifest
 from xosc_lateral.pipeline.settings import ConvertSettings
-
-
-class NonsenseError(AssertionError):
-    """Accepted, and it should not have been."""
-
-
-@dataclass(frozen=True)
-class Reader:
-    """A reader under attack.
-
-    Parameters
-    ----------
-    name : str
-    seeds : callable
-        Folder -> good files that are made there; each of them is mutated.
-    use : callable
-        Reads a file and does with it what a user would.
-    share : float
-        Of the mutants that the others get: one that takes long gets fewer.
-    """
-
-    name: str
-    seeds: Callable[[Path], Iterable[Path]]
-    use: Callable[[Path], object]
-    share: float = 1.0
-
-
-def sane(values: object, low: float, high: float, what: str) -> None:
-    """Raise `NonsenseError` for what is not within the limits, or not finite."""
-    array = np.asarray(values, dtype=np.float64)
-    if array.size and not (np.isfinite(array).all() and array.min() >= low and array.max() <= high):
-        raise NonsenseError(f"{what}: {array.min()} to {array.max()}")
 
 
 # ---- tables ----------------------------------------------------------------------------------------------------------
@@ -118,69 +86,6 @@ def _use_requests(path: Path) -> None:
         raise NonsenseError("a million jobs")
 
 
-# ---- recordings ------------------------------------------------------------------------------------------------------
-def _levelx_files(folder: Path) -> Iterable[Path]:
-    from tests.formats.test_importers import _exid, _highd
-
-    _highd(folder, 0.4, -0.3)
-    _exid(folder, True)
-    return sorted(folder.glob("*.csv"))
-
-
-def _use_levelx(path: Path) -> None:
-    from xosc_lateral.formats.importers.levelx import import_levelx
-
-    _sane_table(import_levelx(path.with_name(f"{path.name.split('_')[0]}_tracks.csv")).table)
-
-
-def _dlr_files(folder: Path) -> Iterable[Path]:
-    from tests.formats.test_importers import _dlr_recording
-
-    tracks, _ = _dlr_recording(11, per_lane=14)
-    tracks.to_csv(folder / "trajectories_1.csv", index=False, float_format="%.3f")
-    with zipfile.ZipFile(folder / "t.zip", "w", zipfile.ZIP_DEFLATED) as archive:
-        archive.write(folder / "trajectories_1.csv", "x/trajectories/trajectories_1.csv")
-    return [folder / "trajectories_1.csv", folder / "t.zip"]
-
-
-def _use_dlr(path: Path) -> None:
-    from xosc_lateral.formats.importers.dlr_ht import import_dlr_ht
-
-    _sane_table(import_dlr_ht(path).table)
-
-
-MF4_MAP = ("distance_left=LnLeft:cm", "distance_right=LnRight:cm", "speed=VehSpd:km/h")
-
-
-def _mf4_files(folder: Path) -> Iterable[Path]:
-    import asammdf
-
-    fast = np.arange(0, 30, 0.04)
-    sway = 0.3 * np.sin(2 * np.pi * fast / 10)
-    for compression in (0, 2):
-        with asammdf.MDF(version="4.10") as mdf:
-            left, right = 100 * (1.8 - sway), 100 * (1.8 + sway)
-            mdf.append([asammdf.Signal(left, fast, name="LnLeft"), asammdf.Signal(right, fast, name="LnRight")])
-            mdf.append([asammdf.Signal(np.full(len(fast), 108.0), fast, name="VehSpd")])
-            yield Path(mdf.save(folder / f"d{compression}.mf4", overwrite=True, compression=compression))
-
-
-def _use_mf4(path: Path) -> None:
-    from xosc_lateral.formats.importers.mf4 import import_mf4
-
-    _sane_table(import_mf4(path, MF4_MAP).table)
-
-
-def _sane_table(table: object) -> None:
-    for name in table.columns:  # type: ignore[attr-defined]
-        column = table[name]  # type: ignore[index]
-        if column.dtype.kind in "fiu":
-            believed = context_range(name)
-            low, high = (-1e10, 1e10) if name == "time" else (believed.low, believed.high)
-            values = column.to_numpy(dtype=np.float64)
-            sane(values[~np.isnan(values)], low, high, str(name))
-
-
 # ---- profiles --------------------------------------------------------------------------------------------------------
 def _profile_files(folder: Path) -> Iterable[Path]:
     for number, source in enumerate([*list_profiles()[:3], None]):
@@ -193,6 +98,27 @@ def _use_profile(path: Path) -> None:
     profile = read_profile(path)
     for sampled in sample_free(profile, 60.0, 5):
         sane(sampled.offset, -15.0, 15.0, "offset")
+
+
+def _stream_files(folder: Path) -> Iterable[Path]:
+    for number, name in enumerate(("motorway-car", "motorway-refined")):
+        stream = OffsetStream(read_profile(name), 3)
+        for k in range(400):
+            stream.step({"speed": 30.0 + 0.01 * k})
+        (folder / f"{name}{number}.json").write_text(json.dumps(stream.to_dict()))
+        yield folder / f"{name}{number}.json"
+
+
+def _use_stream(path: Path) -> None:
+    try:
+        state = json.loads(path.read_bytes())
+    except (ValueError, RecursionError):
+        return  # a caller's own file, and its reader's error
+    try:
+        stream = OffsetStream.from_dict(read_profile(path.stem[:-1]), state)
+    except DriverProfileError as error:
+        raise DriverProfileError(f"{path}: {error}") from error
+    sane([stream.step({"speed": 30.0}) for _ in range(100)], -15.0, 15.0, "offset")
 
 
 # ---- scenarios -------------------------------------------------------------------------------------------------------
@@ -263,22 +189,10 @@ READERS = (
     Reader("drives", _drive_files, _use_drives),
     Reader("context", _context_files, _use_context),
     Reader("requests", _request_files, _use_requests),
-    Reader("levelx", _levelx_files, _use_levelx),
-    Reader("dlr", _dlr_files, _use_dlr, 0.1),
-    Reader("mf4", _mf4_files, _use_mf4),
+    *RECORDINGS,
     Reader("profile", _profile_files, _use_profile),
+    Reader("stream", _stream_files, _use_stream),
     Reader("scenario", _scenario_files, _use_scenario),
     Reader("distribution", _distribution_files, _use_distribution),
     Reader("state", _state_files, _use_state),
 )
-
-
-def refusal_of(use: Callable[[Path], object], path: Path) -> str:
-    """The line that a reader refuses a file with; empty if it takes it. Anything else comes through."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        try:
-            use(path)
-        except XoscLateralError as error:
-            return str(error)
-    return ""

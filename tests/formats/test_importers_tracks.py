@@ -27,7 +27,11 @@ ROAD = """<?xml version="1.0"?>
 
 @pytest.fixture
 def road(tmp_path: Path) -> Path:
-    """Two lanes each way for 2 km, straight, at an angle; a section border in the middle."""
+    return two_lanes_each_way(tmp_path)
+
+
+def two_lanes_each_way(folder: Path) -> Path:
+    """For 2 km, straight, at an angle; a section border in the middle."""
     both = []
     for start, link in ((0, "successor"), (1000, "predecessor")):
         lanes = {k: LANE.format(id=k, link=f'<link><{link} id="{k}"/></link>') for k in (2, 1, -1, -2)}
@@ -36,7 +40,7 @@ def road(tmp_path: Path) -> Path:
             f'<laneSection s="{start}"><left>{lanes[2]}{lanes[1]}</left>{middle}<right>{lanes[-1]}{lanes[-2]}</right>'
             "</laneSection>"
         )
-    path = tmp_path / "road.xodr"
+    path = folder / "road.xodr"
     path.write_text(ROAD.format(sections="".join(both)))
     return path
 

@@ -18,7 +18,7 @@ from xosc_lateral.driver.plausibility import check_context
 from xosc_lateral.driver.process import DriveProcess, combine
 from xosc_lateral.driver.profile import DriverProfile, sampling_hash
 from xosc_lateral.driver.records import plain, read_as
-from xosc_lateral.driver.stream_state import FORMAT, VERSION, AnswerState, SeedState, StreamState, upgraded
+from xosc_lateral.driver.stream_state import AnswerState, SeedState, StreamState, sealed, upgraded
 from xosc_lateral.driver.upsampling import extrapolate, piece
 from xosc_lateral.errors import DriverProfileError
 
@@ -236,7 +236,7 @@ class OffsetStream:
                 process=self._process.state,
             )
         )
-        return {"format": FORMAT, "version": VERSION, **values}
+        return sealed(values)
 
     @classmethod
     def from_dict(cls, profile: DriverProfile, state: Mapping[str, Any]) -> Self:
@@ -251,8 +251,17 @@ class OffsetStream:
         Raises
         ------
         DriverProfileError
-            If the state is none, of a newer version, or of another profile.
+            If the state is none, damaged, of a newer version, or of another profile.
         """
+        try:
+            return cls._restored(profile, state)
+        except DriverProfileError:
+            raise
+        except (ArithmeticError, LookupError, TypeError, ValueError) as error:  # of 0.1, whose states had no hash
+            raise DriverProfileError(f"the state of an offset stream is damaged: {error!r}") from error
+
+    @classmethod
+    def _restored(cls, profile: DriverProfile, state: Mapping[str, Any]) -> Self:
         saved = read_as(StreamState, upgraded(state, profile), "state")
         if saved.profile != sampling_hash(profile):
             raise DriverProfileError(f"the state belongs to another profile than {profile.name}")

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import hashlib
+import json
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -75,23 +77,37 @@ class StreamState(Record, frozen=True, kw_only=True):
     process: Any
 
 
+def sealed(values: Mapping[str, Any]) -> dict[str, Any]:
+    """A state's plain values with format, version and the hash of all of it."""
+    state = {"format": FORMAT, "version": VERSION, **values}
+    return {**state, "sha256": _hash(state)}
+
+
+def _hash(state: Mapping[str, Any]) -> str:
+    """SHA-256 of a state, whatever the order and the layout of its JSON."""
+    return hashlib.sha256(json.dumps(state, sort_keys=True).encode()).hexdigest()
+
+
 def upgraded(state: Mapping[str, Any], profile: DriverProfile) -> dict[str, Any]:
     """A state's values as the present version writes them, without format and version.
 
     Raises
     ------
     DriverProfileError
-        If it is no state of a stream, or of a newer version.
+        If it is no state of a stream, of a newer version, or not what was written: nobody edits a generator's state.
     """
     if not isinstance(state, Mapping) or state.get("format") != FORMAT:
         raise DriverProfileError(f'no state of an offset stream: "format" is not "{FORMAT}"')
     version = state.get("version", 1)
-    if not isinstance(version, int) or version > VERSION:
+    if version not in (1, VERSION):
         raise DriverProfileError(
-            f"a state written by a newer version of xosc-lateral (format {version}; this one reads up to {VERSION})"
+            f"a state written by a newer version of xosc-lateral (format {version!r}; this one reads up to {VERSION})"
         )
     if version == 1:
         from xosc_lateral.driver.stream_state_1 import from_version_1
 
         return from_version_1(state, profile)
-    return {name: value for name, value in state.items() if name not in ("format", "version")}
+    written = {name: value for name, value in state.items() if name != "sha256"}
+    if state.get("sha256") != _hash(written):
+        raise DriverProfileError("the state of an offset stream is damaged: its sha256 is another")
+    return {name: value for name, value in written.items() if name not in ("format", "version")}
