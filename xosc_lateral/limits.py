@@ -110,6 +110,7 @@ CONTEXT_RANGES: Mapping[str, Range] = MappingProxyType(
         "crossfall": Range(-100, 100, "45 degrees"),
         "grade": Range(-100, 100, "45 degrees"),
         "lead_distance": Range(-100, 1e5, "overlapping by a road train's length, to 100 km"),
+        "is_truck": Range(0, 1, "a truth value"),
         "lead_is_truck": Range(0, 1, "a truth value"),
         "left_distance": Range(-1e5, 1e5, "100 km"),
         "right_distance": Range(-1e5, 1e5, "100 km"),

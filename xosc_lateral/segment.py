@@ -24,6 +24,7 @@ CONTEXT_UNITS: Mapping[str, str] = MappingProxyType(
         "crossfall": "%",
         "grade": "%",
         "lead_distance": "m",
+        "is_truck": "-",
         "lead_is_truck": "-",
         "left_distance": "m",
         "right_distance": "m",

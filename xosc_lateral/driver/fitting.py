@@ -12,7 +12,9 @@ from numpy.typing import NDArray
 from xosc_lateral.driver.models.base import CoreModel
 from xosc_lateral.driver.models.kinds import ModelKind
 from xosc_lateral.driver.models.registry import model_named
+from xosc_lateral.driver.place import fit_place, without_place
 from xosc_lateral.driver.profile import DriverProfile, Provenance
+from xosc_lateral.driver.sensor.model import SensorModel
 from xosc_lateral.driver.sensor.runs import driver_runs
 from xosc_lateral.drives.cuts import PAPER_RULES, CutRules, all_runs
 from xosc_lateral.drives.drive import Drive, Run
@@ -30,7 +32,9 @@ def fit_profile(
     provenance: Provenance | None = None,
     sensor_noise: float | None = None,
 ) -> DriverProfile:
-    """Cut drives into runs, tell driver and sensor apart, and fit a profile without effects.
+    """Cut drives into runs, tell driver and sensor apart, and fit a profile.
+
+    Of a population it holds what class, lane and speed do to level and spread (`place`), else no effects.
 
     Parameters
     ----------
@@ -56,8 +60,29 @@ def fit_profile(
     ):  # to the letter: the paper takes offsets as they were measured
         return fit_runs(runs, name=name, model=model, provenance=provenance)
     cleaned, sensor = driver_runs(runs, drives, sensor_noise=sensor_noise)
-    profile = fit_runs(cleaned, name=name, model=model, provenance=provenance)
-    return replace(profile, sensor=sensor)
+    return fit_population(cleaned, name=name, model=model, provenance=provenance, sensor=sensor)
+
+
+def fit_population(
+    runs: Sequence[Run],
+    *,
+    name: str,
+    model: ModelKind | str = ModelKind.AUTOREGRESSIVE,
+    provenance: Provenance | None = None,
+    sensor: SensorModel | None = None,
+) -> DriverProfile:
+    """Fit a profile to the driver's part of runs: what class, lane and speed do first (`place`), then the drivers.
+
+    Parameters
+    ----------
+    runs : sequence of Run
+        Without the sensor's part, see `driver_runs`.
+    sensor : SensorModel, optional
+        What was taken out; the profile keeps it.
+    """
+    place = fit_place(runs)
+    profile = fit_runs(without_place(runs, place), name=name, model=model, provenance=provenance)
+    return replace(profile, sensor=sensor, effects=place)
 
 
 def fit_runs(

@@ -72,7 +72,8 @@ def _own_motion(entity: EntityMotion, grid: IntArray) -> dict[str, FloatArray]:
         acceleration = (speed[last] - speed[first]) / (entity.time[last] - entity.time[first])
     else:
         acceleration = np.zeros(len(grid))
-    return {"speed": speed[grid].copy(), "acceleration": acceleration}
+    is_truck = np.full(len(grid), float(entity.entity.vehicle_category in TRUCKS))
+    return {"speed": speed[grid].copy(), "acceleration": acceleration, "is_truck": is_truck}
 
 
 def _road(entity: EntityMotion, network: RoadNetwork, grid: IntArray) -> dict[str, FloatArray]:

@@ -11,8 +11,10 @@ those of the others. What is written is fitted to all.
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from dataclasses import replace as with_fields
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -20,8 +22,10 @@ import numpy as np
 from msgspec.structs import replace
 from numpy.typing import NDArray
 
-from xosc_lateral.driver.fitting import fit_runs
+from xosc_lateral.driver.fitting import fit_population, fit_runs
 from xosc_lateral.driver.profile import DriverProfile, Metadata, Provenance
+from xosc_lateral.driver.sensor.model import SensorModel
+from xosc_lateral.driver.sensor.runs import driver_runs
 from xosc_lateral.drives.cuts import all_runs
 from xosc_lateral.drives.drive import Drive, Run
 from xosc_lateral.drives.resampling import STEP
@@ -80,8 +84,15 @@ GROUPS = (
 )
 
 
-def build_library(source: Path, *, model: str = "best") -> list[DriverProfile]:
+def build_library(source: Path, *, model: str = "best", refine: bool = True) -> list[DriverProfile]:
     """All shipped profiles, from the wheel of `tasi` (or the data set's zip or CSV).
+
+    All vehicles were seen by the same cameras: driver and sensor are told apart once, every profile knows the sensor.
+
+    Parameters
+    ----------
+    refine : bool
+        Whether to close the loop for `motorway-refined` as well: most of the time.
 
     Raises
     ------
@@ -94,14 +105,38 @@ def build_library(source: Path, *, model: str = "best") -> list[DriverProfile]:
         table = Path(folder) / "dlr-ht.parquet"
         write_imported(imported, table)
         drives = read_drives(table)
-    runs = all_runs(drives)
+    runs = [_with_class(run, kind[run.drive]) for run in all_runs(drives)]
+    seen = Seen(runs, *driver_runs(runs, drives))
     known = Provenance(source=SOURCE, licence=LICENCE, inputs={source.name: parsed_hash(source)})
-    groups = [
-        _group_profile(group, [run for run in runs if group.holds(run, kind)], replace(known, notes=group.notes), model)
-        for group in GROUPS
-    ]
-    profiles = [*groups, _refined_profile(drives, runs, known), *_single_profiles(runs, kind, known, model)]
+    groups = [_group_profile(seen.of(partial(group.holds, kind=kind)), group, known, model) for group in GROUPS]
+    refined = [_refined_profile(drives, runs, known)] if refine else []
+    profiles = [*groups, *refined, *_single_profiles(seen, kind, known, model)]
     return [replace(profile, metadata=shipped_metadata(profile)) for profile in profiles]
+
+
+def _with_class(run: Run, kind: str) -> Run:
+    """A scenario states its vehicles' classes, so what they do can be part of a profile; tables state them in words."""
+    return with_fields(run, context={**run.context, "is_truck": np.full(len(run), float(kind == "truck"))})
+
+
+@dataclass(frozen=True, eq=False)
+class Seen:
+    """Runs as recorded, the driver's part of each, and what the cameras added to all.
+
+    Parameters
+    ----------
+    recorded, driven : list of Run
+    sensor : SensorModel or None
+    """
+
+    recorded: list[Run]
+    driven: list[Run]
+    sensor: SensorModel | None
+
+    def of(self, holds: Callable[[Run], bool]) -> Seen:
+        """Some of the runs."""
+        chosen = [k for k, run in enumerate(self.recorded) if holds(run)]
+        return Seen([self.recorded[k] for k in chosen], [self.driven[k] for k in chosen], self.sensor)
 
 
 def shipped_metadata(profile: DriverProfile) -> Metadata:
@@ -113,12 +148,14 @@ def shipped_metadata(profile: DriverProfile) -> Metadata:
     return Metadata(version="1", vehicle=vehicle, road="motorway", country="DE", date="2024-10-07", tags=tags)
 
 
-def _group_profile(group: Group, runs: Sequence[Run], known: Provenance, model: str) -> DriverProfile:
+def _group_profile(seen: Seen, group: Group, known: Provenance, model: str) -> DriverProfile:
     """Score on held-out vehicles, then fit to all."""
-    chosen = _fitted_half(runs)
-    half = fit_runs([run for run in runs if run.drive in chosen], name=group.name, model=model)
-    evaluation = _evaluation(half, [run for run in runs if run.drive not in chosen])
-    return fit_runs(runs, name=group.name, model=model, provenance=replace(known, evaluation=evaluation))
+    chosen = _fitted_half(seen.recorded)
+    fitted = seen.of(lambda run: run.drive in chosen)
+    half = fit_population(fitted.driven, name=group.name, model=model, sensor=seen.sensor)
+    evaluation = _evaluation(half, seen.of(lambda run: run.drive not in chosen).recorded)
+    provenance = replace(known, notes=group.notes, evaluation=evaluation)
+    return fit_population(seen.driven, name=group.name, model=model, provenance=provenance, sensor=seen.sensor)
 
 
 def _refined_profile(drives: Sequence[Drive], runs: Sequence[Run], known: Provenance) -> DriverProfile:
@@ -150,12 +187,10 @@ def _evaluation(half: DriverProfile, others: Sequence[Run]) -> dict[str, Any]:
 
 
 # ---- single vehicles -------------------------------------------------------------------------------------------------
-def _single_profiles(
-    runs: Sequence[Run], kind: Mapping[str, str], known: Provenance, model: str
-) -> list[DriverProfile]:
+def _single_profiles(seen: Seen, kind: Mapping[str, str], known: Provenance, model: str) -> list[DriverProfile]:
     """Vehicles with long drives whose movement differs most from one another."""
     by_vehicle: dict[str, list[Run]] = {}
-    for run in runs:
+    for run in seen.driven:
         by_vehicle.setdefault(run.drive, []).append(run)
     long = {name: mine for name, mine in by_vehicle.items() if sum(map(len, mine)) * STEP >= LONG_DRIVE}
     whole = {name: fit_runs(mine, name=name, model=model) for name, mine in long.items()}
@@ -179,7 +214,8 @@ def _single_profiles(
         provenance = replace(
             known, notes=notes, evaluation=evaluation, fit={"vehicle": name, "vehicle_class": kind[name]}
         )
-        profiles.append(fit_runs(long[name], name=label, model=model, provenance=provenance))
+        fitted = fit_runs(long[name], name=label, model=model, provenance=provenance)
+        profiles.append(replace(fitted, sensor=seen.sensor))
     return profiles
 
 

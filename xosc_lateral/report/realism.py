@@ -99,6 +99,8 @@ def realism_lines(realism: Realism) -> list[str]:
         for row in ratio_rows(group):
             label, *cells = row.values()
             lines.append(f"    {label!s:44s}" + "".join(f"{cell!s:>18s}" for cell in cells))
+    if all(one.alone is None for one in realism.conditions):
+        lines.append("    classifier AUC: not computed")
     shown = next((one for one in realism.conditions if not one.condition.same_start), None)
     if shown is not None:
         lines.append(f"lane keeping, {shown.condition.name:24s} measured    sampled   distance  floor [sd]")

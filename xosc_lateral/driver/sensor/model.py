@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
-from math import isfinite
+from itertools import pairwise
+from math import inf, isfinite
 
 import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.driver.records import Record
 from xosc_lateral.driver.sensor.likelihood import Colour
+from xosc_lateral.driver.sensor.texture import wandering_level
 from xosc_lateral.errors import DriverProfileError
 
 FloatArray = NDArray[np.float64]
+
+FAINTEST = 1e-16
+"""Added to measured densities, so that none at all has a logarithm. [m2/Hz]"""
 
 HIGHEST = 1.5
 """Runs are low-passed here on being resampled to 5 Hz, and so is what is sampled. [Hz]"""
@@ -37,6 +42,12 @@ class SensorModel(Record, frozen=True):
     driver_share : tuple of float
         Share of the driver: 95 % interval. [-]
 
+    frequencies, densities : tuple of float
+        Density of the error as it was measured in runs, see `texture`; empty: as the parts above have it.
+        [Hz], [m2/Hz]
+    wanders, lasts : float
+        Variance of the log of the density over time [-], and how long a level lasts [s].
+
     Raises
     ------
     DriverProfileError
@@ -51,11 +62,19 @@ class SensorModel(Record, frozen=True):
     driver_variance: float = 0.0
     sensor_variance: float = 0.0
     driver_share: tuple[float, float] = (0.0, 1.0)
+    frequencies: tuple[float, ...] = ()
+    densities: tuple[float, ...] = ()
+    wanders: float = 0.0
+    lasts: float = 60.0
 
     def __post_init__(self) -> None:
         """Check."""
-        numbers = (self.white, self.coloured, self.rounding, self.driver_variance, self.sensor_variance)
+        parts = (self.white, self.coloured, self.rounding, self.driver_variance, self.sensor_variance)
+        numbers = (*parts, self.wanders, *self.frequencies, *self.densities)
         if not all(map(isfinite, numbers)) or min(numbers) < 0 or self.order < 0 or not self.corner > 0:
+            raise DriverProfileError(f"sensor: {self}")
+        rising = all(low < high for low, high in pairwise(self.frequencies))
+        if len(self.frequencies) != len(self.densities) or not rising or not 0.0 < self.lasts < inf:
             raise DriverProfileError(f"sensor: {self}")
 
     @property
@@ -82,11 +101,20 @@ class SensorModel(Record, frozen=True):
     def sample(self, n: int, step: float, rng: np.random.Generator) -> FloatArray:
         """Noise as it is in measured runs at this step, shape (n,). [m]
 
-        What rounding adds is left out: runs are low-passed, and no longer lie on its lattice.
+        Without a measured density, what rounding adds is left out: runs are low-passed, and lie on its lattice no more.
         """
         if not n:
             return np.empty(0)
         padded = n + round(30.0 / step)  # a low-passed part must not come round to its own beginning
         frequency: FloatArray = np.asarray(np.fft.rfftfreq(padded, step), dtype=np.float64)
-        gain = np.sqrt(self.density(frequency) / (2.0 * step)) * (frequency <= HIGHEST)
-        return np.fft.irfft(np.fft.rfft(rng.normal(size=padded)) * gain, padded)[:n]
+        gain = np.sqrt(self.in_runs(frequency) / (2.0 * step))
+        error: FloatArray = np.fft.irfft(np.fft.rfft(rng.normal(size=padded)) * gain, padded)[:n]
+        return error * wandering_level(self.wanders, self.lasts, n, step, rng) if self.wanders else error
+
+    def in_runs(self, frequency: FloatArray) -> FloatArray:
+        """One-sided power density of the error in runs at 5 Hz. [m2/Hz]"""
+        if not self.frequencies:
+            return np.asarray(self.density(frequency) * (frequency <= HIGHEST))
+        table = np.log(np.array(self.densities) + FAINTEST)
+        log = np.interp(np.log(np.maximum(frequency, 1e-9)), np.log(self.frequencies), table)
+        return np.asarray(np.exp(log))

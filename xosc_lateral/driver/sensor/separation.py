@@ -6,12 +6,14 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from msgspec.structs import replace
 from numpy.typing import NDArray
 
 from xosc_lateral.driver.sensor.likelihood import Colour, Known, Solution, solve
 from xosc_lateral.driver.sensor.model import SensorModel
 from xosc_lateral.driver.sensor.periodogram import Periodogram, periodogram, windows_of
 from xosc_lateral.driver.sensor.quantisation import COARSEST, quantisation_step, rounding_density
+from xosc_lateral.driver.sensor.texture import FAST, LEAST_SHARE, MANY, measured_density, wandering
 from xosc_lateral.driver.sensor.vehicle_bound import density
 
 FloatArray = NDArray[np.float64]
@@ -65,11 +67,15 @@ class Separation:
         about = offset - mean
         extended = np.concatenate([2.0 * about[0] - about[:0:-1], about, 2.0 * about[-1] - about[-2::-1]])
         frequency: FloatArray = np.asarray(np.fft.rfftfreq(len(extended), step), dtype=np.float64)
+        filtered = np.fft.irfft(np.fft.rfft(extended) * np.sqrt(self.driver_share_of(frequency)), len(extended))
+        return np.asarray(mean + filtered[n - 1 : 2 * n - 1])
+
+    def driver_share_of(self, frequency: FloatArray) -> FloatArray:
+        """Driver's share of the power at each frequency from 0 on, shape (m,). [-]"""
         driver = density(self.knots, frequency)
         share = driver / (driver + self.sensor.density(frequency) + self.rounding(frequency))
         share[0] = 1.0
-        filtered = np.fft.irfft(np.fft.rfft(extended) * np.sqrt(share), len(extended))
-        return np.asarray(mean + filtered[n - 1 : 2 * n - 1])
+        return share
 
 
 def separate(
@@ -122,7 +128,21 @@ def separate(
     plausible = [one for one, good in zip(found, criteria < criteria.min() + PLAUSIBLE, strict=True) if good]
     interval = _interval(frequency, windows, best, colour, base, known, plausible, share, data)
     sensor = _sensor(best, colour, grain, share * variance, (1.0 - share) * variance, interval)
-    return Separation(best.knots, sensor, rounding, bool(coarse))
+    return _textured(Separation(best.knots, sensor, rounding, bool(coarse)), runs, frequency, windows, step)
+
+
+def _textured(
+    split: Separation, runs: Sequence[FloatArray], frequency: FloatArray, windows: FloatArray, step: float
+) -> Separation:
+    """With the error's density as measured, and how its level wanders where the sensor outweighs the driver."""
+    share = 1.0 - split.driver_share_of(frequency)
+    frequencies, densities = measured_density(frequency, windows, share)
+    sensor = replace(split.sensor, frequencies=rounded(frequencies), densities=rounded(densities))
+    fast = frequency > FAST
+    if (windows.mean(axis=0) * share)[fast].sum() > LEAST_SHARE * windows.mean(axis=0)[fast].sum():
+        wanders, lasts = wandering(runs, sensor.sample(MANY, step, np.random.default_rng(0)), step)
+        sensor = replace(sensor, wanders=rounded((wanders,))[0], lasts=rounded((lasts,))[0])
+    return Separation(split.knots, sensor, split.rounding, split.is_too_coarse)
 
 
 def _colours() -> list[Colour]:
@@ -137,16 +157,18 @@ def _sensor(
     rest: float = 0.0,
     interval: tuple[float, float] = (0.0, 1.0),
 ) -> SensorModel:
-    return SensorModel(
-        float(np.exp(found.white)),
-        float(np.exp(found.colour)),
-        colour.corner,
-        colour.order,
-        grain,
-        driver,
-        rest,
-        interval,
-    )
+    levels = (np.exp(found.white), np.exp(found.colour), driver, rest)
+    white, coloured, driver, rest, low, high = rounded((*levels, *interval))
+    return SensorModel(white, coloured, colour.corner, colour.order, grain, driver, rest, (low, high))
+
+
+DIGITS = 7
+"""Significant digits kept of a sensor's numbers: what differs beyond is the processor's rounding. [-]"""
+
+
+def rounded(values: Sequence[float]) -> tuple[float, ...]:
+    """Numbers as a profile keeps them: the same on any machine."""
+    return tuple(float(f"{value:.{DIGITS}g}") for value in values)
 
 
 def _no_density(frequency: FloatArray) -> FloatArray:

@@ -20,8 +20,13 @@ from xosc_lateral.driver.models.autoregressive.volatility import (
     log_power,
 )
 from xosc_lateral.driver.models.base import Start
+from xosc_lateral.drives.periodogram import Detrend, periodograms
 
 FloatArray = NDArray[np.float64]
+
+LARGEST_STEP = float(np.log(1.5))
+"""By which the fine noise's log amplitude changes at a frequency in one round: a whole step would overshoot where the
+coarse movement outweighs it. [-]"""
 
 
 def with_volatility(
@@ -89,11 +94,27 @@ def matched(model: AutoregressiveModel, runs: Sequence[FloatArray], settings: Fi
         [run[: len(run) // length * length].reshape(-1, length) for run in runs if len(run) >= length]
     )
     starts = np.resize(real[:, 0], max(settings.n_snippets, len(real)))
-    target = _moments(real)
+    target, spectrum = _moments(real), _log_spectrum(real)
     for _ in range(settings.rounds):
         simulated = simulate(model, length, settings.seed, drivers=len(starts), starts=starts)
+        lacks = spectrum - _log_spectrum(simulated)
         model = _corrected(model, target - _moments(simulated), settings)
+        model = replace(model, fine=replace(model.fine, damping=model.fine.damping * _gain(model, lacks)))
     return model
+
+
+def _log_spectrum(snippets: FloatArray) -> FloatArray:
+    """Mean log power of snippets at their own frequencies from 0 on, straight line from end to end taken out."""
+    size = snippets.shape[1] - 1
+    rows = [periodograms(row[:-1], size, detrend=Detrend.ENDS) for row in snippets]
+    return np.asarray(np.log(np.concatenate(rows) + 1e-30).mean(axis=0))
+
+
+def _gain(model: AutoregressiveModel, lacks: FloatArray) -> FloatArray:
+    """Factor on the damping at its knots from what the log spectrum of snippets lacks; knots without noise stay so."""
+    knots = np.linspace(0.0, 0.5, len(model.fine.damping))
+    known = np.linspace(0.0, 0.5, len(lacks))
+    return np.asarray(np.exp(np.clip(0.5 * np.interp(knots, known, lacks), -LARGEST_STEP, LARGEST_STEP)))
 
 
 def _moments(snippets: FloatArray) -> FloatArray:
@@ -110,7 +131,7 @@ def _moments(snippets: FloatArray) -> FloatArray:
 def _corrected(model: AutoregressiveModel, lacks: FloatArray, settings: FitSettings) -> AutoregressiveModel:
     """The model with each parameter moved against what its moment lacks."""
     coarse, fine = model.coarse_volatility, model.fine_volatility
-    spread_mean, spread_variance, speed_mean, speed_variance, rough_mean, rough_variance, covariance = lacks
+    spread_mean, spread_variance, speed_mean, speed_variance, _, rough_variance, covariance = lacks
     larger = np.exp((1.0 - settings.speed_weight) * spread_mean + settings.speed_weight * speed_mean)
     # Calm and volatile snippets differ in spread and in speed; one variance has to serve both and meets them half-way.
     factors = [
@@ -124,7 +145,6 @@ def _corrected(model: AutoregressiveModel, lacks: FloatArray, settings: FitSetti
     return replace(
         model,
         coarse=Autoregression(model.coarse.coefficients, model.coarse.scale * float(larger)),
-        fine=replace(model.fine, damping=model.fine.damping * float(np.exp(rough_mean))),
         coarse_volatility=coarse.scaled(factors[0]),
         fine_volatility=fine.scaled(factors[1]),
         correlation=float(np.clip(model.correlation + covariance / both, 0.0, 0.95)),

@@ -1,0 +1,75 @@
+"""What class, lane and speed do is found where it is planted, and nowhere else."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tests.baselines.made_runs import made_run, smooth_runs
+from xosc_lateral.driver.effects import Acts
+from xosc_lateral.driver.fitting import fit_population
+from xosc_lateral.driver.place import LEAST_DRIVES, fit_place, without_place
+from xosc_lateral.driver.sampling import sample_offsets
+from xosc_lateral.driver.snippets import segment_of
+from xosc_lateral.drives.drive import Run
+
+
+def population(
+    seed: int, *, truck: float = 0.0, lane: float = 0.0, spread: float = 0.0, drivers: int = 60
+) -> list[Run]:
+    """Drivers of 60 s: every third a truck, at most 25 m/s; lanes at random, overtaking ones faster. [m], [-]"""
+    rng = np.random.default_rng([seed, 1])
+    runs = []
+    for k, run in enumerate(smooth_runs(drivers, 60.0, seed=seed)):
+        is_truck, in_right = float(k % 3 == 0), float(rng.random() < 0.5)
+        speed = 22.0 + 3.0 * rng.random() if is_truck else 26.0 + 6.0 * rng.random() + 6.0 * (1.0 - in_right)
+        level = run.offset.mean()
+        moved = level + (run.offset - level) * np.exp(spread * (speed - 28.0)) + truck * is_truck + lane * in_right
+        n = len(run)
+        context = {"is_truck": np.full(n, is_truck), "lane_index": np.full(n, 1.0 - in_right)}
+        runs.append(made_run(moved, drive=run.drive, speed=speed, **context))
+    return runs
+
+
+def test_what_is_planted_is_found_with_its_size():
+    found = fit_place(population(1, truck=-0.5, lane=0.35, spread=0.08))
+    by = {(effect.acts, effect.columns): effect for effect in found}
+    for key, size in (
+        ((Acts.LOCATION, ("is_truck",)), -0.5),
+        ((Acts.LOCATION, ("lane_index",)), 0.35),
+        ((Acts.SPREAD, ("speed",)), 0.08),
+    ):
+        effect = by[key]
+        slope, error = effect.coefficients[-1], effect.errors[-1]
+        slope = -slope if key[1] == ("speed",) else slope  # the last knot takes the slope back
+        assert abs(slope - size) < 4.0 * error
+        assert error < 0.3 * abs(size)
+
+
+def test_nothing_is_found_where_nothing_is():
+    # Six candidates a population, each kept by chance with p = 0.04 (a z of the root of log 60): 20 make 5.
+    assert sum(len(fit_place(population(seed))) for seed in range(10, 30)) <= 11
+
+
+def test_too_few_drives_and_missing_columns_give_none():
+    assert fit_place(population(2, truck=-0.5, drivers=LEAST_DRIVES - 1)) == ()
+    assert fit_place([]) == ()
+    bare = [made_run(run.offset, drive=run.drive) for run in population(2, truck=-0.5)]
+    assert fit_place(bare) == ()  # everybody at one speed
+
+
+def test_what_is_taken_out_is_gone():
+    runs = population(3, truck=-0.5, lane=0.35, spread=0.08)
+    assert fit_place(without_place(runs, fit_place(runs))) == ()
+
+
+@pytest.mark.parametrize("is_truck", [0.0, 1.0])
+def test_one_profile_gives_trucks_and_cars_their_own_level(is_truck: float):
+    runs = population(4, truck=-0.5)
+    profile = fit_population(runs, name="all")
+    n = len(runs[0])
+    like = made_run(np.zeros(n), is_truck=np.full(n, is_truck), lane_index=np.zeros(n), speed=24.0)
+    sampled = [sample_offsets(profile, segment_of(like), np.random.SeedSequence(k)).mean() for k in range(60)]
+    measured = [run.offset.mean() for run in runs if run.context["is_truck"][0] == is_truck]
+    error = np.hypot(np.std(sampled) / np.sqrt(len(sampled)), np.std(measured) / np.sqrt(len(measured)))
+    assert abs(np.mean(sampled) - np.mean(measured)) < 3.5 * error
