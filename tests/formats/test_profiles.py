@@ -157,3 +157,8 @@ def test_canonical_json_is_plain_json() -> None:
     assert json.loads(canonical_json(value)) == value
     with pytest.raises(ValueError, match="nan"):
         canonical_json([float("nan")])
+
+
+def test_a_name_that_no_file_can_have_is_unknown():
+    with pytest.raises(DriverProfileError, match="no profile has a name of 5000 characters"):
+        read_profile("a" * 5000)

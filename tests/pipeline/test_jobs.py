@@ -221,3 +221,12 @@ def test_a_profile_that_hides_a_shipped_one_is_said_and_makes_other_outputs(data
     assert after.jobs[0].fingerprint != before.jobs[0].fingerprint
     named = replace(settings, profile="motorway-truck")
     assert plan_batch([database], tmp_path / "out", named).notes == ()
+
+
+def test_cells_that_name_no_file_are_refused_in_a_line(database: Path, tmp_path: Path) -> None:
+    table = tmp_path / "rows.csv"
+    table.write_bytes(b"scenario,profile\ndb/a/x.xosc,\ndb/a/\0y.xosc,\n")
+    with pytest.raises(FormatError, match=r"rows\.csv:3: .*zero byte"):
+        plan_batch([table], tmp_path / "out")
+    table.write_text(f"scenario,profile\ndb/a/x.xosc,{'p' * 5000}\n")
+    assert names(plan_batch([table], tmp_path / "out")) == ["db/a/x.xosc"]  # the conversion says what is wrong

@@ -27,6 +27,9 @@ from xosc_lateral.shipped import shipped_folder
 SHIPPED = shipped_folder("driver_profiles")
 """Profiles that come with the package."""
 
+LONGEST_NAME = 200
+"""Characters of a profile's name; file systems take 255 bytes, the suffix included."""
+
 SCHEMA = Path(__file__).resolve().parents[1] / "resources" / "driver_profile.schema.json"
 """JSON Schema of a profile file."""
 
@@ -161,6 +164,8 @@ def find_profile(name_or_path: str | Path, folders: Iterable[str | Path] = ()) -
         if not path.exists() or path.is_dir():
             raise FormatError("is a folder, not a profile" if path.is_dir() else "no such file", path=path)
         return path
+    if len(text) > LONGEST_NAME:
+        raise DriverProfileError(f"{text[:20]!r}...: no profile has a name of {len(text)} characters")
     for folder in (*library_folders(folders), SHIPPED):
         found = folder / f"{text}{SUFFIX}"
         if found.is_file():

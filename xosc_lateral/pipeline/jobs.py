@@ -309,7 +309,7 @@ def _profile_state(name: str, libraries: tuple[Path, ...]) -> str:
         if name == AUTO:
             return " ".join(f"{known}={file_hash(path)}" for known, path in auto_profiles(libraries).items())
         return _hash_or_missing(find_profile(name, libraries))
-    except XoscLateralError:
+    except (XoscLateralError, OSError):
         return "missing"  # the conversion says so
 
 

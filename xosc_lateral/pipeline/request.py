@@ -143,6 +143,8 @@ def _table_requests(
             scenario = cells.pop("scenario", "")
             if not scenario:
                 raise ValueError("no scenario")
+            if "\0" in scenario:
+                raise ValueError(f"scenario {scenario!r}: a path holds no zero byte")
             rows_variants = _whole_number(cells, "variants", variants, smallest=1)
             row_settings = _row_settings(cells, settings, folder)
         except ValueError as error:
