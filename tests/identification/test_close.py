@@ -11,8 +11,8 @@ import pandas as pd
 import pytest
 
 from tests.identification import truth
+from xosc_lateral import datasets as plants
 from xosc_lateral.cli import main
-from xosc_lateral.datasets import plants
 from xosc_lateral.datasets.driver_simulator import Driver, simulate_drive
 from xosc_lateral.datasets.movements import record_movement, wandering
 from xosc_lateral.driver.effects import Linear, Product

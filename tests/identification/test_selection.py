@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from tests.identification.selected import named, selected
-from xosc_lateral.datasets import plants
+from xosc_lateral import datasets as plants
 from xosc_lateral.datasets.driver_simulator import Driver, simulate_drive
 from xosc_lateral.datasets.movements import held, in_regimes, record_movement
 from xosc_lateral.driver.effects import ColumnEffect, Levels, Product, Saturating, Threshold

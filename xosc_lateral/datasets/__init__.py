@@ -32,7 +32,7 @@ from xosc_lateral.datasets.plants import (
     curve_cutting,
     truck_avoidance,
 )
-from xosc_lateral.datasets.response import Response, Shape
+from xosc_lateral.datasets.response import Response, Shape, linear, saturating, threshold
 
 __all__ = [
     "CameraStep",
@@ -56,7 +56,10 @@ __all__ = [
     "Weave",
     "curve_cutting",
     "draw_driver",
+    "linear",
+    "saturating",
     "simulate_drive",
     "simulate_population",
+    "threshold",
     "truck_avoidance",
 ]
