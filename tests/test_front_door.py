@@ -156,5 +156,5 @@ def test_sampling_says_which_columns_it_takes_as_neutral():
     from xosc_lateral.driver.effects import Acts, Linear
 
     windy = Linear(column="wind_speed", acts=Acts.LOCATION, coefficients=(0.1,), errors=(0.0,), reference=(0.0,))
-    made = xl.sample(xl.read_profile("motorway-car").with_effects(windy), duration=10.0)
+    made = xl.sample(xl.read_profile("motorway-vehicle-1").with_effects(windy), duration=10.0)
     assert made.warnings == ("a free run: wind_speed not known, taken as neutral",)
