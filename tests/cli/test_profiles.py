@@ -122,6 +122,7 @@ def test_comparing_shows_which_are_alike(team, tmp_path, capsys):
     compared = json.loads(out)
     (alike,) = [group for group in compared["alike"] if len(group) > 1]
     assert set(alike) == {"driver-00", "driver-04"}
+    assert compared["floor"] == max(row[k] for k, row in enumerate(compared["distance"]))
     assert "driver-02" in page.read_text(encoding="utf-8")
 
 

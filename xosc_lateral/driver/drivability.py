@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.driver.sampling import sample_offsets
+from xosc_lateral.driver.sensor.quantisation import is_too_coarse
 from xosc_lateral.segment import Segment
 
 FloatArray = NDArray[np.float64]
@@ -135,7 +136,21 @@ def drivable(offset: FloatArray, step: float, speed: FloatArray) -> tuple[FloatA
 
 
 def fit_warnings(profile: DriverProfile) -> list[str]:
-    """What to know about a profile's drivability, in lines."""
+    """What to know about a profile's sensor and drivability, in lines."""
+    return [*_coarse_steps(profile), *_strained(profile)]
+
+
+def _coarse_steps(profile: DriverProfile) -> list[str]:
+    sensor = profile.sensor
+    if sensor is None or not is_too_coarse(sensor.rounding, sensor.driver_variance + sensor.sensor_variance):
+        return []
+    return [
+        f"the offsets come in steps of {sensor.rounding:.3g} m, too coarse to tell driver and sensor apart: "
+        f"{profile.name} holds rounding as driving"
+    ]
+
+
+def _strained(profile: DriverProfile) -> list[str]:
     n = round(FREE_RUN / profile.model.step) + 1
     time: FloatArray = profile.model.step * np.arange(n, dtype=np.float64)
     speed = np.full(n, 30.0)

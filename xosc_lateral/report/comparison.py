@@ -60,15 +60,19 @@ class Compared:
         return np.asarray(self.metrics.mean(axis=2))
 
     @property
+    def floor(self) -> float:
+        """Distance up to which profiles are alike: the largest that one has from itself, between halves of drivers."""
+        return float(np.diag(self.distance).max())
+
+    @property
     def groups(self) -> tuple[tuple[str, ...], ...]:
         """Profiles that are alike: no further apart (average linkage) than the shakiest profile is from itself."""
         from scipy.cluster.hierarchy import fcluster, linkage
         from scipy.spatial.distance import squareform
 
         between = self.distance.copy()
-        floor = float(np.diag(between).max())
         np.fill_diagonal(between, 0.0)
-        labels = fcluster(linkage(squareform(between, checks=False), "average"), floor, "distance")
+        labels = fcluster(linkage(squareform(between, checks=False), "average"), self.floor, "distance")
         names = [profile.name for profile in self.profiles]
         return tuple(tuple(names[k] for k in np.flatnonzero(labels == one)) for one in dict.fromkeys(labels))
 
@@ -118,6 +122,7 @@ def comparison_text(compared: Compared) -> str:
     width = max(map(len, names))
     for number, name in enumerate(names):
         lines.append(f"  {name:<{width}}  " + " ".join(f"{value:5.2f}" for value in distance[number]))
+    lines.append(f"floor: {compared.floor:.2f}; profiles that are further apart than it differ")
     lines += [f"alike: {', '.join(group)}" for group in compared.groups if len(group) > 1]
     return "\n".join(line.rstrip() for line in lines)
 
@@ -161,6 +166,7 @@ def comparison_record(compared: Compared) -> dict[str, Any]:
             name: [[round(float(value), 4) for value in row] for row in compared.metrics[:, :, k]]
             for k, name in enumerate(METRICS)
         },
+        "floor": round(compared.floor, 4),
         "alike": [list(group) for group in compared.groups],
         "seed": compared.seed,
     }

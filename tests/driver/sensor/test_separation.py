@@ -4,8 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from msgspec.structs import replace
 
+from tests.baselines.made_runs import made_run
 from xosc_lateral.datasets.driver_simulator import simulate_drive
+from xosc_lateral.driver.drivability import fit_warnings
+from xosc_lateral.driver.fitting import fit_runs
 from xosc_lateral.driver.records import plain, read_as
 from xosc_lateral.driver.sensor.model import SensorModel
 from xosc_lateral.driver.sensor.quantisation import quantisation_step, rounding_density
@@ -91,6 +95,9 @@ def test_steps_of_a_lattice_are_found_and_their_noise_is_known(truth):
     assert found.sensor.driver_variance == pytest.approx(np.concatenate(truth[1]).var(), rel=0.1)
     coarse, _ = split(truth, [np.round(x / 1.5) * 1.5 - x for x in truth[1]])
     assert coarse.is_too_coarse
+    profile = fit_runs([made_run(x[::4]) for x in truth[1][:2]], name="coarse", model="two-level")
+    assert any("steps of 1.5 m, too coarse" in line for line in fit_warnings(replace(profile, sensor=coarse.sensor)))
+    assert not any("too coarse" in line for line in fit_warnings(replace(profile, sensor=found.sensor)))
 
 
 def test_a_known_noise_level_is_kept_to(truth):

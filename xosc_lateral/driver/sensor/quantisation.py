@@ -17,6 +17,11 @@ COARSEST = 2.5
 correlation with the signal, left out here, grows beyond a tenth (Widrow, Kollar 2008, chapter 5). [-]"""
 
 
+def is_too_coarse(step: float, variance: float) -> bool:
+    """Whether values in steps [m] with this variance [m2] can't be split into what was measured and its rounding."""
+    return bool(step > COARSEST * np.sqrt(max(variance - step**2 / 12.0, 1e-12)))
+
+
 def quantisation_step(values: FloatArray) -> float:
     """Step of the lattice that all values lie on, 0 if there is none of at least `LEAST_STEP`. [m]"""
     levels = np.unique(np.round(values, 7))

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from xosc_lateral.driver.sensor.likelihood import Colour, Known, Solution, solve
 from xosc_lateral.driver.sensor.model import SensorModel
 from xosc_lateral.driver.sensor.periodogram import Periodogram, periodogram, windows_of
-from xosc_lateral.driver.sensor.quantisation import COARSEST, quantisation_step, rounding_density
+from xosc_lateral.driver.sensor.quantisation import is_too_coarse, quantisation_step, rounding_density
 from xosc_lateral.driver.sensor.texture import FAST, LEAST_SHARE, MANY, measured_density, wandering
 from xosc_lateral.driver.sensor.vehicle_bound import density
 
@@ -112,7 +112,7 @@ def separate(
     data = periodogram(frequency, windows)
     known = None if sensor_noise is None else Known(sensor_noise, rate or 1.0 / step)
     grain = quantisation_step(np.concatenate(measured))
-    coarse = grain > COARSEST * np.sqrt(max(variance - grain**2 / 12.0, 1e-12))
+    coarse = is_too_coarse(grain, variance)
     rounding: Callable[[FloatArray], FloatArray] = _no_density
     colours = [Colour(), *_colours()]
     if grain and not coarse:
