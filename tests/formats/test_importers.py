@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import json
+import re
 import zipfile
 from pathlib import Path
 
@@ -308,6 +309,13 @@ def test_import_verb_writes_a_table_with_its_provenance(dlr_csv, tmp_path, capsy
     again = tmp_path / "again.parquet"
     assert main(["import", "dlr-ht", str(path), "-o", str(again)]) == 0
     assert again.read_bytes() == out.read_bytes()
+
+
+def test_too_little_traffic_names_the_file(dlr_csv, tmp_path, capsys):
+    lines = dlr_csv[0].read_text().splitlines()
+    (tmp_path / "few.csv").write_text("\n".join(lines[:60]) + "\n")
+    assert main(["import", "dlr-ht", str(tmp_path / "few.csv"), "-o", str(tmp_path / "t.parquet")]) == 1
+    assert re.match(r"xosc-lateral: \S*few\.csv: .* are needed\n$", capsys.readouterr().err)
 
 
 def test_a_foreign_csv_is_refused_in_one_line(tmp_path, capsys):

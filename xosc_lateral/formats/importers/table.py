@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, TypeVar, cast
 import numpy as np
 
 from xosc_lateral.drives.cleaning import LANE_WIDTHS, MAX_OUTSIDE
-from xosc_lateral.errors import FormatError
+from xosc_lateral.errors import FormatError, NotEnoughDataError
 from xosc_lateral.formats.hashes import parsed_hash
 from xosc_lateral.formats.importers.cuts import KEPT
 from xosc_lateral.formats.output_tables import write_csv, write_frame
@@ -83,6 +83,8 @@ def guarded(read: Importer) -> Importer:
 
     Raises
     ------
+    NotEnoughDataError
+        Too little is left; the message begins with the source.
     FormatError
         Whatever else breaks in the source; offsets and lane widths that are none; a column beyond `limits`.
     """
@@ -91,7 +93,12 @@ def guarded(read: Importer) -> Importer:
     def within(source: Path | Sequence[Path], *args: Any, **settings: Any) -> Imported:
         path = source if isinstance(source, Path) else source[0]
         with foreign_errors(path, "can't be imported"), np.errstate(all="ignore"):
-            imported = read(source, *args, **settings)
+            try:
+                imported = read(source, *args, **settings)
+            except NotEnoughDataError as error:  # said by arithmetic that knows no files
+                if path.name in str(error):
+                    raise
+                raise NotEnoughDataError(f"{path}: {error}") from error
             _refuse_nonsense(imported.table, path)
         return imported
 
