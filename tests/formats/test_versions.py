@@ -36,6 +36,8 @@ from xosc_lateral.formats.openscenario.write import (
     write_trajectory_scenario,
 )
 from xosc_lateral.formats.openscenario.write.additions import ATTRIBUTES, ELEMENTS, VALUES
+from xosc_lateral.formats.openscenario.write.literal import name_literally
+from xosc_lateral.scenario.parameters import Scope
 
 XSD = Path(__file__).parents[1] / "data" / "xsd"
 FILES = {0: "1.0.0", 1: "1.1.1", 2: "1.2.0", 3: "1.3.0"}
@@ -361,3 +363,26 @@ def test_an_input_that_goes_beyond_its_version_is_left_as_it_is(tmp_path: Path) 
     found, root = written(source, None)
     assert found.converted == ("Ego",)
     assert root.find(".//Trailer/Trailer") is not None
+
+
+@pytest.mark.parametrize("wanted", [{"Egochange"}, {"other"}])
+def test_names_by_an_expression_are_written_where_ours_refer_to_them(tmp_path: Path, wanted: set[str]) -> None:
+    state = (
+        '<ConditionGroup><Condition name="s" delay="0" conditionEdge="none"><ByValueCondition>'
+        '<StoryboardElementStateCondition storyboardElementType="action" storyboardElementRef="${$who + change}" '
+        'state="completeState"/></ByValueCondition></Condition></ConditionGroup>'
+    )
+    change = event("first", action("${$who + change}", speed_action()))
+    after = event("$who", action("then", speed_action())).replace(time_condition(1.0), state)
+    text = story(change, after, parameters=declarations(parameter("who", "Ego", "string")))
+    path = tree(tmp_path, stories=text)
+    root = etree.parse(str(path)).getroot()
+    name_literally(root, path, Scope({}), wanted)
+    (reference,) = root.iter("StoryboardElementStateCondition")
+    names = [item.get("name") for item in root.iter("Event", "Action")]
+    if wanted == {"Egochange"}:
+        assert names == ["first", "Egochange", "Ego", "then"]
+        assert reference.get("storyboardElementRef") == "Egochange"
+    else:
+        assert names == ["first", "${$who + change}", "$who", "then"]
+        assert reference.get("storyboardElementRef") == "${$who + change}"

@@ -29,6 +29,7 @@ from xosc_lateral.formats.openscenario.write.lateral_actions import (
     LateralActions,
     lateral_actions,
 )
+from xosc_lateral.formats.openscenario.write.literal import name_literally
 from xosc_lateral.formats.openscenario.write.offset_chain import LEAST_CHANGE, OffsetChain, Ramp, ramps
 from xosc_lateral.formats.openscenario.write.parameters import global_scope, override_parameters
 from xosc_lateral.formats.openscenario.write.relocate import relocate
@@ -97,6 +98,7 @@ def write_lane_offset_scenario(
         # Last: a lane change that starts in the same frame has started before ours are looked at.
         stop = next((element for element in storyboard if local_name(element) == "StopTrigger"), None)
         build.insert_indented(storyboard, len(storyboard) if stop is None else storyboard.index(stop), story)
+    name_literally(root, scenario.path, global_scope(scenario), _referred(story))
     override_parameters(root, scenario)
     notes = fit(root, scenario, motion, target, global_scope(scenario))
     relocate(root, scenario, output, global_scope(scenario))
@@ -106,6 +108,12 @@ def write_lane_offset_scenario(
         write_atomically(output, data)
     names = tuple(dict.fromkeys(chain.entity for chain in chains))
     return WrittenScenario(output, hashlib.sha256(data).hexdigest(), names, (), data, notes)
+
+
+def _referred(story: etree._Element) -> set[str]:
+    """Names of the elements that our conditions look at, with those above them where they are needed."""
+    references = (item.get("storyboardElementRef") or "" for item in story.iter("StoryboardElementStateCondition"))
+    return {name for reference in references for name in reference.split("::")}
 
 
 def _add_act(

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import copy
 import os
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
+from contextlib import suppress
 from pathlib import Path
 
 from lxml import etree
@@ -20,6 +21,8 @@ from xosc_lateral.scenario.parameters import Scope
 
 NAMES = frozenset({"parameterRef", "variableRef", "parameterName"})
 """Attributes that name a parameter instead of standing for its value."""
+_NAMED = frozenset({"Story", "Act", "ManeuverGroup", "Maneuver", "Event", "Action"})
+"""Elements that conditions refer to by name."""
 _DEEPEST = 20
 """Catalog entries that refer to catalog entries."""
 
@@ -50,6 +53,34 @@ def _fill(losses: Losses, item: etree._Element, scope: Scope, parameters: bool) 
     for child in item:
         if isinstance(child.tag, str):
             _fill(losses, child, inner, parameters)
+
+
+def name_literally(root: etree._Element, path: Path, scope: Scope, wanted: Collection[str]) -> None:
+    """Storyboard elements and references to them by their names, if one that is wanted is named by an expression.
+
+    Conditions elsewhere refer to such an element by its value; who looks at the file alone would find no element of
+    that name.
+    """
+    found: list[tuple[etree._Element, str, str]] = []
+    for storyboard in root.iter("{*}Storyboard"):
+        _named_by_expression(storyboard, path, scope, found)
+    if any(attribute == "name" and value in wanted for _, attribute, value in found):
+        for item, attribute, value in found:
+            item.set(attribute, value)
+
+
+def _named_by_expression(
+    item: etree._Element, path: Path, scope: Scope, found: list[tuple[etree._Element, str, str]]
+) -> None:
+    inner = local_scope(Element(item, path, scope))
+    for attribute in ("name", "storyboardElementRef"):
+        text = item.get(attribute) or ""
+        if text.startswith("$") and (attribute != "name" or local_name(item) in _NAMED):
+            with suppress(ExpressionError):  # then nobody can refer to it
+                found.append((item, attribute, inner.fill(text)))
+    for child in item:
+        if isinstance(child.tag, str):
+            _named_by_expression(child, path, inner, found)
 
 
 def inline_catalogs(losses: Losses, scenario: Scenario, scope: Scope) -> None:
