@@ -18,7 +18,7 @@ from xosc_lateral.identification.columns import Column, Role
 from xosc_lateral.identification.dictionary import orthonormal
 from xosc_lateral.identification.problem import Problem
 from xosc_lateral.identification.regression import Coarse
-from xosc_lateral.identification.timeline import coarse_mean
+from xosc_lateral.identification.timeline import COARSE
 
 FloatArray = NDArray[np.float64]
 
@@ -120,8 +120,9 @@ class Refinement:
             self._quantities[shape] = (values - inside.mean(axis=0)) / np.maximum(inside.std(axis=0), 1e-12)
         key = (shape, effect.response_s)
         if key not in self._responses:
-            self._responses[key] = respond(self._quantities[shape], step, 0.0, effect.response_s)
-        return coarse_mean(np.roll(self._responses[key], round(effect.lag_s / step), axis=0))
+            responded = respond(self._quantities[shape], step, 0.0, effect.response_s)
+            self._responses[key] = np.cumsum(np.pad(responded, ((1, 0), (0, 0))), axis=0)
+        return _means_by_second(self._responses[key], round(effect.lag_s / step))
 
     def _best(self, best: Refined, others: Iterable[tuple[ColumnEffect, float]]) -> Refined:
         several = list(others)
@@ -156,6 +157,14 @@ class Refinement:
     def _paid(self, effect: ColumnEffect) -> float:
         """What the shape of an effect has cost already is paid by its variants too."""
         return 0.0 if _is_plain(effect) or isinstance(effect, Product) else self._shape_cost
+
+
+def _means_by_second(sums: FloatArray, late: int) -> FloatArray:
+    """Means over each second of a series that comes `late` samples later, from its running sums; the ends stay."""
+    last = len(sums) - 1
+    first = np.arange(0, last - COARSE + 1, COARSE)
+    start, stop = (np.clip(first + more - late, 0, last) for more in (0, COARSE))
+    return np.asarray((sums[stop] - sums[start]) / np.maximum(stop - start, 1)[:, None])
 
 
 def _is_plain(effect: ColumnEffect) -> bool:
