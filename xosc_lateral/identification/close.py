@@ -186,7 +186,7 @@ def close_loop(
     progress(1.0, "done")
     return LoopResult(
         timeline.names, base, refined, given, tuple(findings), coarse, selection.final, found.columns, found.feedback,
-        selection.rejected, dict(found.unused), found.nested.total if found.nested and found.gains else None,
+        selection.rejected, dict(found.unused), found.total if found.gains else None,
         found.returned_base, memory, population, held_out_words(timeline, blocks), scored.cells, unmoved, scored.real,
         scored.before, scored.after, *scored.errors, floor, scores, scored.runs_before, scored.runs_after, seed,
     )  # fmt: skip

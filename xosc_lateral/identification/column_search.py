@@ -12,7 +12,6 @@ from xosc_lateral.driver.effects import ColumnEffect
 from xosc_lateral.identification.dictionary import (
     Dictionary,
     Scores,
-    draw_shifts,
     orthonormal,
     score_entries,
 )
@@ -45,6 +44,10 @@ minute and a half. [s]"""
 GROWN = 2.0
 """Standard errors by which the movement must have grown. A term of the right size lowers it by as much as one of twice
 the right size leaves it the same: a true one is lost in at most 2 % of the tables, however weak it is. [-]"""
+
+ROUNDING = 1e-6
+"""A term may lower the likelihood of the rows that it is fitted to by so much. More, and the model contradicts it: a
+factor on the movement that changes faster than the movement does, say, which its innovations alone allow. [nat]"""
 
 CROSS_BASIS = 0.01
 """Directions of a column's cross-basis with less than this share of the largest variance are left in. [-]"""
@@ -103,7 +106,7 @@ def find_column(search: Search, kind: type[ColumnKind], fitted: Fitted) -> Outco
         refined, alike = _refine(search, kind, problem, known, dictionary, scores)
         term = kind.of(refined.effect, alike)
         after = fit_model(fitted.coarse, (*fitted.terms, term))
-        if not _grows(fitted, after):
+        if not _grows(fitted, after) and after.log_likelihood >= fitted.log_likelihood - ROUNDING:
             assert isinstance(term, Term)
             return Outcome(term, term.columns, p_value, after)
         barred = barred | np.array([one.columns == term.columns for one in dictionary.candidates], dtype=np.bool_)
@@ -131,8 +134,8 @@ def _grows(before: Fitted, after: Fitted) -> bool:
 
 
 def _scored(search: Search, dictionary: Dictionary, problem: Problem, known: FloatArray, barred: BoolArray) -> Scores:
-    shifts = draw_shifts(len(problem.response), search.rng(0))
-    return score_entries(dictionary, problem.response, known, barred, shifts)
+    drive = search.coarse.drive[problem.valid]
+    return score_entries(dictionary, problem.response, known, barred, drive, search.rng(0))
 
 
 def _known(problem: Problem, dictionary: Dictionary, own: Sequence[ColumnKind]) -> FloatArray:

@@ -1,4 +1,4 @@
-"""All candidates as whitened rows of length one, their scores, and what chance gives: rotations of the residuals."""
+"""All candidates as whitened rows of length one, their scores, and what chance gives."""
 
 from __future__ import annotations
 
@@ -29,8 +29,11 @@ PRODUCT_LAGS = (-2, 0)
 PRODUCT_RESPONSES = (2.0,)
 """The same for products, of which there are many more."""
 
-ROTATIONS = 400
-"""Rotations of the residuals that the null is taken from."""
+NULL_DRAWS = 400
+"""Rotated or re-signed residuals that the null is taken from."""
+
+MANY_DRIVES = 20
+"""From so many drives on, the null draws the sign of each drive anew in place of rotating; see `draw_null`."""
 
 LEAST_SHIFT_S = 60
 """No rotation is shorter: a driver's answer must be out of reach. [s]"""
@@ -172,13 +175,13 @@ def _unit_rows(rows: FloatArray) -> tuple[FloatArray, FloatArray, BoolArray]:
 
 @dataclass(frozen=True, eq=False)
 class Scores:
-    """Scores of all entries, and the largest ones that rotations give.
+    """Scores of all entries, and the largest ones that the null gives.
 
     Parameters
     ----------
     scores : array, shape (entries,)
         Squared score less cost; -inf: barred.
-    maxima : array, shape (rotations,)
+    maxima : array, shape (NULL_DRAWS,)
     """
 
     scores: FloatArray
@@ -191,9 +194,14 @@ class Scores:
 
 
 def score_entries(
-    dictionary: Dictionary, residual: FloatArray, known: FloatArray, barred: BoolArray, shifts: IntArray
+    dictionary: Dictionary,
+    residual: FloatArray,
+    known: FloatArray,
+    barred: BoolArray,
+    drive: IntArray,
+    rng: np.random.Generator,
 ) -> Scores:
-    """Score every entry, and all of them against rotated residuals.
+    """Score every entry, and all of them against the null's residuals.
 
     Parameters
     ----------
@@ -202,14 +210,14 @@ def score_entries(
     known : array, shape (seconds, k)
         Orthonormal; partialled out of residual and entries.
     barred : bool array, shape (entries,)
-    shifts : int array, shape (rotations,)
+    drive : int array, shape (seconds,)
+        Drive that each row is of.
     """
     left = residual - known @ (known.T @ residual)
     left = left / max(float(np.sqrt(np.mean(left**2))), 1e-300)
     if len(dictionary) == 0 or barred.all():
         return Scores(np.full(len(dictionary), -np.inf), np.zeros(0))
-    doubled = np.concatenate([left, left])
-    rotated = np.stack([doubled[shift : shift + len(left)] for shift in (0, *shifts)], axis=1)
+    rotated = np.concatenate([left[:, None], draw_null(left, drive, rng)], axis=1)
     rotated = (rotated - known @ (known.T @ rotated)).astype(np.float32)
     basis = known.astype(np.float32)
     squared = np.empty((len(dictionary), rotated.shape[1]), dtype=np.float32)
@@ -227,10 +235,27 @@ def score_entries(
     return Scores(squared[:, 0].astype(np.float64), largest[1:] if np.isfinite(largest).all() else np.zeros(0))
 
 
-def draw_shifts(seconds: int, rng: np.random.Generator) -> IntArray:
-    """Rotations of the valid seconds, none shorter than `LEAST_SHIFT_S` either way round."""
+def draw_null(residual: FloatArray, drive: IntArray, rng: np.random.Generator) -> FloatArray:
+    """Residuals whose tie to the columns is broken, shape (seconds, NULL_DRAWS).
+
+    Few long drives: rotated by at least `LEAST_SHIFT_S`. Many short ones: the sign of each whole drive drawn anew
+    (a wild cluster bootstrap [1]_). Drives are independent, and what an autoregression fitted to runs of a minute
+    leaves in a drive's slow movement and first rows stays beside the columns of that very drive; rotation would spread
+    it evenly.
+
+    References
+    ----------
+    .. [1] A. C. Cameron, J. B. Gelbach, D. L. Miller, "Bootstrap-based improvements for inference with clustered
+       errors", Review of Economics and Statistics 90, 2008.
+    """
+    seconds = len(residual)
+    names, own = np.unique(drive, return_inverse=True)
+    if len(names) >= MANY_DRIVES:
+        return np.asarray(residual[:, None] * rng.choice([-1.0, 1.0], size=(len(names), NULL_DRAWS))[own])
     low = min(LEAST_SHIFT_S, seconds // 4)
-    return rng.integers(low, max(low + 1, seconds - low), size=ROTATIONS).astype(np.intp)
+    shifts = rng.integers(low, max(low + 1, seconds - low), size=NULL_DRAWS)
+    doubled = np.concatenate([residual, residual])
+    return np.stack([doubled[shift : shift + seconds] for shift in shifts], axis=1)
 
 
 def orthonormal(columns: FloatArray, share: float = 1e-6) -> FloatArray:
@@ -249,7 +274,7 @@ __all__ = [
     "Quantities",
     "Scores",
     "build_dictionary",
-    "draw_shifts",
+    "draw_null",
     "orthonormal",
     "score_entries",
 ]

@@ -39,6 +39,8 @@ class Identified:
         Selections of all folds; None: nothing was found.
     gains : mapping of int to Gain
         By identity of the term.
+    total : Gain or None
+        Of all kept terms together.
     returned_base : str
         Why nothing is kept although something was found; empty otherwise.
     columns : list of Column
@@ -52,6 +54,7 @@ class Identified:
     selection: Selection
     nested: Nested | None
     gains: Mapping[int, Gain]
+    total: Gain | None
     returned_base: str
     columns: list[Column]
     feedback: list[Feedback]
@@ -93,8 +96,8 @@ def identify(
     columns, feedback, unused = usable_columns(coarse.timeline, excluded)
     search = Search.over(coarse, columns, seed, lambda what: progress(0.1, what))
     selection = select(search, initial)
-    kept, nested, gains, reason = _judged(search, selection, hold_out_blocks(coarse.timeline), initial, progress)
-    return Identified(kept, nested, gains, reason, columns, feedback, unused)
+    kept, nested, gains, total, reason = _judged(search, selection, hold_out_blocks(coarse.timeline), initial, progress)
+    return Identified(kept, nested, gains, total, reason, columns, feedback, unused)
 
 
 def usable_columns(
@@ -114,7 +117,9 @@ def initial_terms(base: DriverProfile, timeline: Timeline) -> tuple[Term, ...]:
     terms: list[Term] = []
     for effect in base.effects:
         if isinstance(effect, ColumnEffect) and set(effect.columns) <= there:
-            bare = structs.replace(effect, coefficients=(), errors=(), reference=(), between_drivers=())
+            bare = structs.replace(
+                effect, coefficients=(), errors=(), reference=(), between_drivers=(), answer_range=()
+            )
             if effect.acts is Acts.LOCATION:
                 terms.append(BetweenTerm.of(bare) if is_between(effect) else MeanTerm.of(bare))
             elif effect.acts is Acts.SPREAD:
@@ -128,10 +133,10 @@ def initial_terms(base: DriverProfile, timeline: Timeline) -> tuple[Term, ...]:
 
 def _judged(
     search: Search, selection: Selection, blocks: NDArray[np.intp], initial: Sequence[Term], progress: Progress
-) -> tuple[Selection, Nested | None, dict[int, Gain], str]:
+) -> tuple[Selection, Nested | None, dict[int, Gain], Gain | None, str]:
     """What gains nothing on blocks that it was not chosen on goes, and all of it if nothing is gained."""
     if not selection.accepted:
-        return selection, None, {}, ""
+        return selection, None, {}, None, ""
     # what happened once, and when, can't be found without the block in which it happened: folds size it, and know of it
     once = tuple(one.term for one in selection.accepted if one.term.component == StepTerm.component)
     components = frozenset(one.term.component for one in selection.accepted) - {StepTerm.component}
@@ -147,9 +152,9 @@ def _judged(
     if useless:
         why = "chance does not explain it, but chosen and sized on other blocks it does not foretell the held-out ones"
         selection = selection.without(useless, why)
-    reason = ""
-    if any(one.term.predictable for one in selection.accepted) and nested.total.mean <= 0.0:
-        low, high = nested.total.interval
-        reason = f"the effects found gain {nested.total.mean:.2f} nat a held-out block ({low:.2f} to {high:.2f})"
+    reason, total = "", nested.together([one.term for one in selection.accepted if one.term.predictable])
+    if any(one.term.predictable for one in selection.accepted) and total.mean <= 0.0:
+        low, high = total.interval
+        reason = f"the effects found gain {total.mean:.2f} nat a held-out block ({low:.2f} to {high:.2f})"
         selection = selection.without([one.term for one in selection.accepted], reason)
-    return selection, nested, gains, reason
+    return selection, nested, gains, total, reason

@@ -50,12 +50,9 @@ class Nested:
     ----------
     selections : tuple of Selection
         One per fold.
-    total : Gain
-        Of all terms together over the start.
     """
 
     selections: tuple[Selection, ...]
-    total: Gain
     _by_row: tuple[tuple[BoolArray, Coarse], ...]
     _blocks: IntArray
 
@@ -71,6 +68,20 @@ class Nested:
             rest = fit_model(selection.final.coarse, tuple(one for one in selection.final.terms if one is not own[0]))
             rows += held_out_likelihood(selection.final, coarse, held) - held_out_likelihood(rest, coarse, held)
         return _over_blocks(rows, self._blocks, self._by_row, chosen)
+
+    def together(self, terms: Sequence[Term]) -> Gain:
+        """What several accepted terms gain over the start: in each fold those of them that were chosen there."""
+        rows = np.zeros(len(self._blocks))
+        for selection, (held, coarse) in zip(self.selections, self._by_row, strict=True):
+            own = [
+                one.term
+                for one in selection.accepted
+                if any(type(one.term) is type(t) and one.term.matches(t) for t in terms)
+            ]
+            if own:
+                fitted = fit_model(selection.final.coarse, (*selection.start.terms, *own))
+                rows += held_out_likelihood(fitted, coarse, held) - held_out_likelihood(selection.start, coarse, held)
+        return _over_blocks(rows, self._blocks, self._by_row, len(self.selections))
 
 
 def nest(
@@ -92,7 +103,7 @@ def nest(
     coarse = search.coarse
     seconds = coarse_middle(blocks)[: len(coarse)]
     folds = folds_of(blocks)
-    selections, by_row, rows = [], [], np.zeros(len(coarse))
+    selections, by_row = [], []
     for fold in range(folds):
         progress(fold / folds)
         held = seconds % folds == fold
@@ -100,9 +111,7 @@ def nest(
         selection = select(replace(search, coarse=part, _built=[]), initial, only=components)
         selections.append(selection)
         by_row.append((held, coarse))
-        rows += held_out_likelihood(selection.final, coarse, held) - held_out_likelihood(selection.start, coarse, held)
-    where = tuple(by_row)
-    return Nested(tuple(selections), _over_blocks(rows, seconds, where, folds), where, seconds)
+    return Nested(tuple(selections), tuple(by_row), seconds)
 
 
 def _over_blocks(rows: FloatArray, blocks: IntArray, where: Sequence[tuple[BoolArray, Coarse]], folds: int) -> Gain:

@@ -39,6 +39,10 @@ ROUNDS = 4
 CLIP = 9.0
 """Squared innovations (variance 1) beyond this count as this: three standard deviations. [-]"""
 
+MOST_LOG_SCALE = 3.0
+"""Scale terms together change the movement by at most this factor's logarithm, 20 either way: scoring steps of a factor
+that the movement contradicts grow without end. [-]"""
+
 CLUSTER_S = 60
 """Length of the stretches whose squares count as one cluster in errors of the log scale. [s]"""
 
@@ -107,7 +111,9 @@ class Coarse:
 
     def answer(self, effect: ColumnEffect, *, keep: bool = False) -> FloatArray:
         """The effect's quantity as the driver answers to it, less its mean where valid; shape (n, k)."""
-        key = structs.replace(effect, acts=Acts.LOCATION, coefficients=(), errors=(), reference=(), between_drivers=())
+        key = structs.replace(
+            effect, acts=Acts.LOCATION, coefficients=(), errors=(), reference=(), between_drivers=(), answer_range=()
+        )
         if key in self._answers:
             return self._answers[key]
         answer = coarse_mean(key.answer(self.timeline.step, self.context))
@@ -218,7 +224,7 @@ def fit_model(coarse: Coarse, terms: Sequence[ModelTerm]) -> Fitted:
         rows = response - design @ sizes
         levels = whitener.levels(coarse.offset - columns @ sizes)
         if scales.shape[1]:
-            log_sizes = log_sizes + _log_scale_step(scales, rows, coarse)
+            log_sizes = _bounded(log_sizes + _log_scale_step(scales, rows, coarse), scales[coarse.valid])
         spread = spread * np.sqrt(own_levels(_clipped_squares(rows, coarse.valid), coarse.valid, coarse.drive))
     n = int(coarse.valid.sum())
     variance = float(rows @ rows) / max(1, n - len(sizes))
@@ -324,6 +330,11 @@ def _log_scale_step(scales: FloatArray, rows: FloatArray, coarse: Coarse) -> Flo
     variance = np.minimum(rows[coarse.valid] ** 2, CLIP * float(np.mean(rows[coarse.valid] ** 2)))
     design = _within_drives(scales, coarse)
     return np.asarray(np.linalg.pinv(2.0 * design.T @ design) @ (design.T @ (variance / variance.mean() - 1.0)))
+
+
+def _bounded(log_sizes: FloatArray, scales: FloatArray) -> FloatArray:
+    reach = float(np.max(np.abs(scales @ log_sizes), initial=0.0))
+    return log_sizes * min(1.0, MOST_LOG_SCALE / max(reach, 1e-300))
 
 
 def _scale_covariance(scales: FloatArray, rows: FloatArray, coarse: Coarse) -> FloatArray:

@@ -40,6 +40,9 @@ class ColumnEffect(Effect, frozen=True, kw_only=True):
         Value of the quantity at which nothing changes: its mean over the drives it was fitted on.
     between_drivers : tuple of float
         Standard deviations of the coefficients between drivers (random slopes); empty: all drivers answer alike.
+    answer_range : tuple of (float, float)
+        Lowest and highest answer, per component, that the effect was fitted on; answers beyond are taken as these.
+        Empty: no bounds. [unit of the quantity]
 
     Raises
     ------
@@ -58,6 +61,7 @@ class ColumnEffect(Effect, frozen=True, kw_only=True):
     response_s: float = 0.0
     reference: tuple[float, ...] = ()
     between_drivers: tuple[float, ...] = ()
+    answer_range: tuple[tuple[float, float], ...] = ()
 
     def __post_init__(self) -> None:
         """Coerce and validate once."""
@@ -77,6 +81,14 @@ class ColumnEffect(Effect, frozen=True, kw_only=True):
             raise DriverProfileError(
                 f"effect {self.kind}: between_drivers {self.between_drivers}, expected none or a number >= 0 for each "
                 "coefficient"
+            )
+        ranges = tuple((float(low), float(high)) for low, high in self.answer_range)
+        set_once(self, answer_range=ranges)
+        if ranges and (
+            len(ranges) != len(self.coefficients) or not all(-np.inf < low <= high < np.inf for low, high in ranges)
+        ):
+            raise DriverProfileError(
+                f"effect {self.kind}: answer_range {ranges}, expected none or (lowest, highest) for each coefficient"
             )
 
     @property
@@ -134,10 +146,13 @@ class ColumnEffect(Effect, frozen=True, kw_only=True):
         """Strength of answers, shape (n, k): coefficients . (answer - reference), shape (n,). [m] or [-]"""
         # Component by component: a matrix product adds in another order for one row than for many.
         parts = [
-            (answer[:, k] - reference) * coefficient
+            (self._within(answer[:, k], k) - reference) * coefficient
             for k, (coefficient, reference) in enumerate(zip(self.coefficients, self.reference, strict=True))
         ]
         return np.asarray(reduce(add, parts) if parts else np.zeros(len(answer)))
+
+    def _within(self, answer: FloatArray, component: int) -> FloatArray:
+        return np.clip(answer, *self.answer_range[component]) if self.answer_range else answer
 
     def acting(self, answer: FloatArray) -> EffectTerms:
         """Terms [m], [-] of answers, shape (n, k), in the unit of the quantity."""
@@ -161,6 +176,8 @@ class ColumnEffect(Effect, frozen=True, kw_only=True):
         values: dict[str, Any] = plain(self)
         if not self.between_drivers:
             del values["between_drivers"]
+        if not self.answer_range:
+            del values["answer_range"]
         return values
 
 

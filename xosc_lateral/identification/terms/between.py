@@ -15,7 +15,7 @@ from msgspec import structs
 from numpy.typing import NDArray
 
 from xosc_lateral.driver.effects import Acts, ColumnEffect, Effect
-from xosc_lateral.identification.dictionary import ROTATIONS
+from xosc_lateral.identification.dictionary import NULL_DRAWS
 from xosc_lateral.identification.problem import Problem
 from xosc_lateral.identification.regression import Fitted
 from xosc_lateral.identification.significance import upper_tail
@@ -81,8 +81,8 @@ class BetweenTerm(ColumnTerm):
         quantities, costs = np.stack(usual, axis=1), np.array([candidate.cost for candidate in candidates])
         response, rng = places.left(places.place), search.rng(5)
         scores = np.square(response @ quantities) - costs
-        rows, null = np.flatnonzero(places.weight), np.empty(ROTATIONS)
-        for index in range(ROTATIONS):
+        rows, null = np.flatnonzero(places.weight), np.empty(NULL_DRAWS)
+        for index in range(NULL_DRAWS):
             dealt = np.zeros_like(response)
             dealt[rows] = response[rng.permutation(rows)]
             null[index] = float((np.square(dealt @ quantities) - costs).max())

@@ -22,6 +22,9 @@ if TYPE_CHECKING:
 
 FloatArray = NDArray[np.float64]
 
+FACTOR_QUANTILES = (0.05, 0.95)
+"""Answers between which a factor on the movement is believed; the report tells its size between the same. [-]"""
+
 
 @dataclass(frozen=True, eq=False)
 class ColumnTerm(Term):
@@ -107,15 +110,37 @@ class ColumnTerm(Term):
             response_s=effect.response_s,
         )
 
+    def ends(self, coarse: Coarse) -> tuple[FloatArray, FloatArray]:
+        """Lowest and highest answer that counts, about the mean answer, shape (k,) each.
+
+        All that was seen, for a shift. For what multiplies the movement the 5 % and 95 % quantile: a log-linear factor
+        would be anything at a column's few extremes.
+        """
+        answer = coarse.answer(self.effect, keep=True)[coarse.valid]
+        least, most = answer.min(axis=0), answer.max(axis=0)
+        if self.acts is Acts.LOCATION:
+            return least, most
+        low, high = np.quantile(answer, FACTOR_QUANTILES, axis=0)
+        varies = high > low  # not so for a switch that is hardly ever on
+        return np.where(varies, low, least), np.where(varies, high, most)
+
+    def bounded(self, coarse: Coarse) -> FloatArray:
+        """Answers within `ends`, about their mean, shape (n, k)."""
+        answer = np.clip(coarse.answer(self.effect, keep=True), *self.ends(coarse))
+        return np.asarray(answer - answer[coarse.valid].mean(axis=0))
+
     def sized(self, coarse: Coarse, acts: Acts, sizes: FloatArray, errors: FloatArray) -> ColumnEffect:
-        """The effect with its sizes, shrunk by how sure they are, neutral at its mean."""
+        """The effect with its sizes, shrunk by how sure they are, bounded, neutral at its mean."""
         raw = self.effect.answer(coarse.timeline.step, coarse.context)[coarse.timeline.valid]
+        usual, (low, high) = raw.mean(axis=0), self.ends(coarse)
+        within = np.clip(raw, usual + low, usual + high)
         return structs.replace(
             self.effect,
             acts=acts,
             coefficients=tuple(shrunk(sizes, errors)),
             errors=tuple(errors),
-            reference=tuple(raw.mean(axis=0)),
+            reference=tuple(within.mean(axis=0)),
+            answer_range=tuple(zip((usual + low).tolist(), (usual + high).tolist(), strict=True)),
         )
 
 

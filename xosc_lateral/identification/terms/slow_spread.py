@@ -33,8 +33,8 @@ class SlowSpreadTerm(ColumnTerm):
         return False
 
     def size_columns(self, coarse: Coarse) -> FloatArray:
-        """The answer, although the innovations' own scale does not follow it."""
-        return coarse.answer(self.effect, keep=True)
+        """The bounded answer, although the innovations' own scale does not follow it."""
+        return self.bounded(coarse)
 
     @classmethod
     def problem(cls, fitted: Fitted) -> Problem:
@@ -49,5 +49,5 @@ class SlowSpreadTerm(ColumnTerm):
 
     def estimate(self, fitted: Fitted) -> tuple[Effect, ...]:
         """Neighbouring sums overlap, so errors are wider."""
-        sizes, errors = log_sizes(slow_squares(fitted), fitted.coarse.answer(self.effect))
+        sizes, errors = log_sizes(slow_squares(fitted), self.bounded(fitted.coarse))
         return (self.sized(fitted.coarse, Acts.SPREAD, sizes, errors * np.sqrt(SLOW_S)),)

@@ -31,8 +31,8 @@ class SpreadTerm(ColumnTerm):
     what: ClassVar[str] = "spread"
 
     def scale_columns(self, coarse: Coarse) -> FloatArray:
-        """The answer."""
-        return coarse.answer(self.effect, keep=True)
+        """The bounded answer."""
+        return self.bounded(coarse)
 
     @classmethod
     def problem(cls, fitted: Fitted) -> Problem:
@@ -57,7 +57,7 @@ class SpreadTerm(ColumnTerm):
 
 def fine_twin(term: ColumnTerm, fitted: Fitted) -> ColumnEffect:
     """The same quantity's effect on the fine noise."""
-    sizes, errors = log_sizes(fine_squares(fitted), fitted.coarse.answer(term.effect))
+    sizes, errors = log_sizes(fine_squares(fitted), term.bounded(fitted.coarse))
     return term.sized(fitted.coarse, Acts.FINE, sizes, errors)
 
 
