@@ -44,10 +44,10 @@ lint: style
 test: style
 	$(BIN)/python -m pytest -n 2 --dist worksteal
 
-# Half a minute: everything but what fits, converts or plays for long.
+# Under a minute, in one process: everything but what fits, converts, plays, imports or mutates for long.
 FAST := $(addprefix tests/,road scenario motion drives formats templates enrich test_layers.py)
 fast: $(DEV_STAMP)
-	$(BIN)/python -m pytest -n 2 --dist worksteal -q $(FAST) -m 'not slow'
+	$(BIN)/python -m pytest -q $(FAST) -m 'not slow' -k 'not importers and not fuzz and not corpus'
 
 # Mutants of every input format against its reader, ten minutes or so; what hurts lands in out/faults.
 fuzz: $(DEV_STAMP)
