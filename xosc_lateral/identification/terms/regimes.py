@@ -26,8 +26,8 @@ MEMORIES_S = (6.0, 15.0, 40.0)
 """Lengths of regimes that are looked for. [s]"""
 
 SHORTEST_S = 20
-"""Loudness that comes and goes faster is how people steer, by a correction now and then, and no regime: clusters of up to
-6 s are called regimes on 4 of 10 such movements with 8 s here, on 1 of 10 with 20 s. [s]"""
+"""Loudness that comes and goes faster is how people steer, by a correction now and then, and no regime. Clusters of up
+to 6 s are taken for regimes on 4 of 10 such movements with 8 s here, on 1 of 10 with 20 s. [s]"""
 
 SHUFFLES = 400
 """Random orders of the seconds that are the null."""
