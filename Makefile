@@ -42,7 +42,7 @@ lint: style
 
 # mypy runs as one of the tests (tests/test_front_door.py), beside the others.
 test: style
-	$(BIN)/python -m pytest -n 2 --dist worksteal
+	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n 2 --dist worksteal
 
 # Under a minute, in one process: everything but what fits, converts, plays, imports or mutates for long.
 FAST := $(addprefix tests/,road scenario motion drives formats templates enrich test_layers.py)

@@ -31,9 +31,10 @@ assert again.to_dict() == loop.profile.to_dict()
 
 known = {"coefficients": (0.3,), "errors": (0.0,), "reference": (0.0,)}
 effect = Ripple(column="wind_speed", period=5.0, acts=Acts.LOCATION, **known)
-windy = xl.read_profile("motorway-car").with_effects(effect, name="windy")
+base = xl.read_profile("motorway-car")
+windy = base.with_effects(effect, name="windy")
 xl.write_profile(windy, "windy.json")
-assert xl.read_profile("windy.json").effects == (effect,)
+assert xl.read_profile("windy.json").effects == (*base.effects, effect)
 time = np.arange(0.0, 60.0, 0.04)
 drive = pd.DataFrame({"time": time, "offset": 0.0 * time, "lane_width": 3.5, "speed": 30.0})
 shift = [
