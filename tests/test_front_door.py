@@ -151,10 +151,13 @@ def test_a_profile_goes_in_by_name_path_and_object(tmp_path):
 
 
 def test_sampling_says_which_columns_it_takes_as_neutral():
-    made = xl.sample("motorway-refined", duration=10.0)
-    assert made.warnings == ()  # its effect reads the speed, which a free run has
     from xosc_lateral.driver.effects import Acts, Linear
 
-    windy = Linear(column="wind_speed", acts=Acts.LOCATION, coefficients=(0.1,), errors=(0.0,), reference=(0.0,))
+    fast, windy = (
+        Linear(column=column, acts=Acts.LOCATION, coefficients=(0.1,), errors=(0.0,), reference=(0.0,))
+        for column in ("speed", "wind_speed")
+    )
+    made = xl.sample(xl.read_profile("motorway-vehicle-1").with_effects(fast), duration=10.0)
+    assert made.warnings == ()  # a free run has a speed
     made = xl.sample(xl.read_profile("motorway-vehicle-1").with_effects(windy), duration=10.0)
     assert made.warnings == ("a free run: wind_speed not known, taken as neutral",)
