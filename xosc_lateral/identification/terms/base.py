@@ -99,6 +99,9 @@ class Term(ABC):
     """Key of its share of the error budget."""
     kind: ClassVar[str]
     """As in the report's schema."""
+    seen_held_out: ClassVar[bool] = True
+    """Whether the mean or the innovations' scale follow terms of this class on held-out rows: not the latent path of a
+    cycle or a drift, nor what changes the slow movement alone."""
 
     @property
     def columns(self) -> tuple[str, ...]:
@@ -107,12 +110,8 @@ class Term(ABC):
 
     @property
     def predictable(self) -> bool:
-        """Whether the model's likelihood of rows that it was not fitted on can tell it from nothing.
-
-        Only what the mean or the innovations' scale follow can: not the latent path of a cycle or a drift, nor what
-        changes the slow movement alone.
-        """
-        return True
+        """Whether the model's likelihood of rows that it was not fitted on can tell this term from nothing."""
+        return self.seen_held_out
 
     @property
     def kind_key(self) -> str:

@@ -46,14 +46,10 @@ class BetweenTerm(ColumnTerm):
 
     component: ClassVar[str] = "between"
     kind: ClassVar[str] = "location"
+    seen_held_out: ClassVar[bool] = False
     acts: ClassVar[Acts] = Acts.LOCATION
     what: ClassVar[str] = "place that a drive keeps"
     group: ClassVar[str] = "mean"
-
-    @property
-    def predictable(self) -> bool:
-        """Not by the likelihood of held-out rows."""
-        return False
 
     @classmethod
     def problem(cls, fitted: Fitted) -> Problem:

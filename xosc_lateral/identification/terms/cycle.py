@@ -44,13 +44,9 @@ class Cycle(Term):
 
     component: ClassVar[str] = "cycle"
     kind: ClassVar[str] = "periodic"
+    seen_held_out: ClassVar[bool] = False
     frequency: float
     width: int = 1
-
-    @property
-    def predictable(self) -> bool:
-        """Not by the likelihood of held-out rows."""
-        return False
 
     def mean_columns(self, coarse: Coarse) -> FloatArray:
         """Cosines and sines for each drive, shape (n, 2 * width * drives)."""

@@ -32,11 +32,7 @@ class DriftTerm(Term):
 
     component: ClassVar[str] = "low_frequency"
     kind: ClassVar[str] = "drift"
-
-    @property
-    def predictable(self) -> bool:
-        """Not by the likelihood of held-out rows."""
-        return False
+    seen_held_out: ClassVar[bool] = False
 
     def mean_columns(self, coarse: Coarse) -> FloatArray:
         """Half cosines."""

@@ -22,14 +22,10 @@ class FineNoiseTerm(ColumnTerm):
 
     component: ClassVar[str] = "fine_noise"
     kind: ClassVar[str] = "scale"
+    seen_held_out: ClassVar[bool] = False
     single: ClassVar[bool] = True
     acts: ClassVar[Acts] = Acts.FINE
     what: ClassVar[str] = "fine noise"
-
-    @property
-    def predictable(self) -> bool:
-        """Not by the likelihood of held-out rows."""
-        return False
 
     @classmethod
     def problem(cls, fitted: Fitted) -> Problem:

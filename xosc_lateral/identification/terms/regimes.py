@@ -44,12 +44,8 @@ class RegimesTerm(Term):
 
     component: ClassVar[str] = "regimes"
     kind: ClassVar[str] = "regime"
+    seen_held_out: ClassVar[bool] = False
     fit: RegimeFit = field(repr=False)
-
-    @property
-    def predictable(self) -> bool:
-        """Not by the likelihood of held-out rows."""
-        return False
 
     def known_scale(self, coarse: Coarse) -> FloatArray | None:
         """As far as the regimes can be told, about its mean."""

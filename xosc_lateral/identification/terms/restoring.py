@@ -30,14 +30,10 @@ class RestoringTerm(ColumnTerm):
 
     component: ClassVar[str] = "restoring"
     kind: ClassVar[str] = "dynamics"
+    seen_held_out: ClassVar[bool] = False
     single: ClassVar[bool] = True
     acts: ClassVar[Acts] = Acts.RATE
     what: ClassVar[str] = "restoring strength"
-
-    @property
-    def predictable(self) -> bool:
-        """Not by the likelihood of held-out rows."""
-        return False
 
     @classmethod
     def problem(cls, fitted: Fitted) -> Problem:

@@ -24,13 +24,9 @@ class SlowSpreadTerm(ColumnTerm):
 
     component: ClassVar[str] = "slow_spread"
     kind: ClassVar[str] = "scale"
+    seen_held_out: ClassVar[bool] = False
     acts: ClassVar[Acts] = Acts.SPREAD
     what: ClassVar[str] = "spread"
-
-    @property
-    def predictable(self) -> bool:
-        """Not by the likelihood of held-out rows."""
-        return False
 
     def size_columns(self, coarse: Coarse) -> FloatArray:
         """The bounded answer, although the innovations' own scale does not follow it."""

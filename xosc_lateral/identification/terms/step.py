@@ -36,12 +36,8 @@ class StepTerm(Term):
 
     component: ClassVar[str] = "low_frequency"
     kind: ClassVar[str] = "step"
+    seen_held_out: ClassVar[bool] = False
     at: int
-
-    @property
-    def predictable(self) -> bool:
-        """Not by the likelihood of held-out rows."""
-        return False
 
     def mean_columns(self, coarse: Coarse) -> FloatArray:
         """0 before, 1 after."""
