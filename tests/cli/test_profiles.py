@@ -106,6 +106,18 @@ def test_a_name_that_hides_a_shipped_one_is_said(tmp_path, capsys):
     assert "motorway-car.json hides the shipped profile 'motorway-car'" in out
 
 
+def test_a_folder_that_is_named_twice_counts_once(team, capsys, monkeypatch):
+    monkeypatch.setenv("XOSC_LATERAL_LIBRARY", str(team))
+    monkeypatch.chdir(team.parent)
+    once, twice = (
+        run(capsys, "profiles", "list", "--json", *words)[1] for words in ([], ["--library", f"./{team.name}/"])
+    )
+    assert [entry["id"] for entry in json.loads(once)["profiles"]] == [
+        entry["id"] for entry in json.loads(twice)["profiles"]
+    ]
+    assert not [entry for entry in json.loads(twice)["profiles"] if entry["hidden_by"]]
+
+
 def test_adding_does_not_replace_and_export_writes_what_was_there(team, tmp_path, capsys):
     code, _, err = run(capsys, "profiles", "add", "motorway-car", "--library", team, "--name", "driver-03")
     assert code == 1 and "there is a profile of this id" in err

@@ -184,7 +184,8 @@ def list_profiles(folders: Iterable[str | Path] = ()) -> list[Path]:
     FormatError
         If a folder isn't one.
     """
-    found = [path for folder in (*library_folders(folders), SHIPPED) for path in sorted(folder.glob(f"*{SUFFIX}"))]
+    searched = _each_once((*library_folders(folders), SHIPPED))
+    found = [path for folder in searched for path in sorted(folder.glob(f"*{SUFFIX}"))]
     return found + [path for _, path in sorted(_from_plugins().items())]
 
 
@@ -200,11 +201,19 @@ def library_folders(folders: Iterable[str | Path] = ()) -> tuple[Path, ...]:
         If one of them isn't there.
     """
     said = [Path(name) for name in os.environ.get(LIBRARY_VARIABLE, "").split(os.pathsep) if name]
-    found = tuple(dict.fromkeys([*map(Path, folders), *said, *_configured()]))
+    found = [*map(Path, folders), *said, *_configured()]
     for folder in found:
         if not folder.is_dir():
             raise FormatError("no such folder", path=folder)
-    return found
+    return _each_once(found)
+
+
+def _each_once(folders: Iterable[Path]) -> tuple[Path, ...]:
+    """A folder that is named twice, however it is spelled, counts where it comes first."""
+    found: dict[Path, Path] = {}
+    for folder in folders:
+        found.setdefault(folder.resolve(), folder)
+    return tuple(found.values())
 
 
 def configuration_file() -> Path | None:
