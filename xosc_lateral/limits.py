@@ -72,8 +72,10 @@ VARIANTS = Limit(10_000, "", "variants of one scenario", "more tell nothing new"
 BATCH_JOBS = Limit(1_000_000, "", "outputs of one batch", "1 GB of plans; a database that large is converted in parts")
 DECIMAL_EXPONENT = Limit(30, "", "decimal exponent of a range's numbers", "exact arithmetic writes out every digit")
 
-JOB_TIMEOUT = Limit(600, "s", "time for one scenario", "field scenarios take a second; 500 entities a few minutes")
-JOB_MEMORY = Limit(4000, "MB", "memory for one scenario", "500 entities for a minute take 1 GB")
+JOB_TIMEOUT = Limit(
+    600, "s", "time for one scenario", "field scenarios take a second; 500 entities for a minute take half of one"
+)
+JOB_MEMORY = Limit(4000, "MB", "memory for one scenario", "500 entities for a minute take 1.5 GB")
 
 OFFSET_LANES = Limit(
     1.5,

@@ -8,7 +8,11 @@ import time
 from pathlib import Path
 
 from tests.faults.attack import Count, attack
+from tests.faults.mutants import mutate
 from tests.faults.readers import READERS
+from tests.faults.structured import mutate_structure
+
+CHANGES = {"bytes": mutate, "structure": mutate_structure}
 
 
 def main() -> int:
@@ -16,6 +20,7 @@ def main() -> int:
     parser.add_argument("readers", nargs="*")
     parser.add_argument("--count", type=int, default=200)
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--how", choices=[*CHANGES], default="bytes", help="damage bytes, or change what a file says")
     parser.add_argument("--out", type=Path, default=Path("out/faults"))
     given = parser.parse_args()
     faults = 0
@@ -24,7 +29,7 @@ def main() -> int:
             continue
         tally, begin = Count(), time.monotonic()
         with tempfile.TemporaryDirectory() as folder:
-            for fault in attack(reader, given.count, given.seed, Path(folder), tally):
+            for fault in attack(reader, given.count, given.seed, Path(folder), tally, CHANGES[given.how]):
                 faults += 1
                 given.out.mkdir(parents=True, exist_ok=True)
                 path = given.out / f"{reader.name}-{'-'.join(map(str, fault.seed))}-{fault.file}"

@@ -5,13 +5,13 @@ from __future__ import annotations
 import logging
 import shutil
 import traceback
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
-from tests.faults.mutants import mutate
+from tests.faults.mutants import Rng, mutate
 from tests.faults.reader import NonsenseError, Reader, refusal_of
 from xosc_lateral.pipeline.guard import JobLimitError, JobLimits, within_limits
 
@@ -48,7 +48,9 @@ class Count:
     accepted: int = 0
 
 
-def attack(reader: Reader, count: int, seed: int, folder: Path, tally: Count) -> Iterator[Fault]:
+def attack(
+    reader: Reader, count: int, seed: int, folder: Path, tally: Count, change: Callable[[bytes, Rng], bytes] = mutate
+) -> Iterator[Fault]:
     """Try so many mutants of a reader's files; yields the faults."""
     logging.disable(logging.CRITICAL)  # what libraries log about damaged files
     good = folder / "good"
@@ -63,7 +65,7 @@ def attack(reader: Reader, count: int, seed: int, folder: Path, tally: Count) ->
     for number in range(max(1, round(reader.share * count))):
         path = seeds[number % len(seeds)]
         words = (seed, sum(map(ord, reader.name)), number)
-        data = mutate(path.read_bytes(), np.random.default_rng(words))
+        data = change(path.read_bytes(), np.random.default_rng(words))
         shutil.rmtree(folder / "try")
         shutil.copytree(good, folder / "try")
         target = folder / "try" / path.name

@@ -12,18 +12,19 @@ from collections.abc import Iterable
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 
 from tests.faults.reader import NonsenseError, Reader, sane
 from tests.faults.recordings import RECORDINGS
 from tests.formats.made_scenario import ROAD, declarations, entity, parameter, scenario_text, vehicle
 from tests.profiles import simulated_profile
+from xosc_lateral.api.inputs import given_drives, naming
 from xosc_lateral.datasets import simulate_drive
 from xosc_lateral.driver.snippets import sample_free
 from xosc_lateral.driver.stream import OffsetStream
 from xosc_lateral.drives.cuts import all_runs
 from xosc_lateral.errors import DriverProfileError
 from xosc_lateral.formats.context_table import read_context
-from xosc_lateral.formats.drives import read_drives
 from xosc_lateral.formats.openscenario import read_scenario
 from xosc_lateral.formats.openscenario.distribution import read_distribution
 from xosc_lateral.formats.profiles import list_profiles, profile_bytes, read_profile
@@ -31,7 +32,7 @@ from xosc_lateral.limits import context_range
 from xosc_lateral.pipeline.convert import convert_scenario
 from xosc_lateral.pipeline.jobs import plan_batch
 from xosc_lateral.pipeline.journal import Journal
-from xosc_lateral.pipeline.manifest import MANIFEST, ManifestRow, write_manifest
+from xosc_lateral.pipeline.manifest import MANIFEST, ManifestRow, read_manifest, write_manifest
 from xosc_lateral.pipeline.settings import ConvertSettings
 
 
@@ -46,8 +47,9 @@ def _drive_files(folder: Path) -> Iterable[Path]:
 
 
 def _use_drives(path: Path) -> None:
-    drives = read_drives(path)
-    runs = all_runs(drives)
+    given = given_drives([path])
+    with naming(given):
+        runs = all_runs(given.drives)
     for run in runs:
         sane(run.offset, -12.0, 12.0, "offset")
         sane(run.lane_width, 0.5, 13.0, "lane width")
@@ -61,6 +63,8 @@ def _context_files(folder: Path) -> Iterable[Path]:
     rows = ["time,wind_speed,rain,curvature", *(f"{k / 5:.1f},{3 + k % 4},{k % 2},0.00{k % 9}" for k in range(50))]
     (folder / "c.csv").write_text("\n".join(rows) + "\n")
     yield folder / "c.csv"
+    pd.read_csv(folder / "c.csv").to_parquet(folder / "c.parquet")
+    yield folder / "c.parquet"
 
 
 def _use_context(path: Path) -> None:
@@ -79,6 +83,8 @@ def _request_files(folder: Path) -> Iterable[Path]:
     ]
     (folder / "r.csv").write_text("\n".join(rows) + "\n")
     yield folder / "r.csv"
+    pd.read_csv(folder / "r.csv").to_parquet(folder / "r.parquet")
+    yield folder / "r.parquet"
 
 
 def _use_requests(path: Path) -> None:
@@ -166,13 +172,13 @@ def _use_distribution(path: Path) -> None:
 
 
 # ---- what a batch leaves ---------------------------------------------------------------------------------------------
-def _row(number: int) -> ManifestRow:
+def manifest_row(number: int) -> ManifestRow:
     return ManifestRow(f"{number}.xosc", "a.xosc", "ab" * 32, number, 1, "auto", {"p": "1"}, "cd" * 32, "0.1.0")
 
 
 def _state_files(folder: Path) -> Iterable[Path]:
-    write_manifest((_row(number) for number in range(20)), folder / MANIFEST)
-    lines = [json.dumps({"row": _row(number).to_dict(), "seconds": 0.5}) for number in range(20)]
+    write_manifest((manifest_row(number) for number in range(20)), folder / MANIFEST)
+    lines = [json.dumps({"row": manifest_row(number).to_dict(), "seconds": 0.5}) for number in range(20)]
     (folder / "journal.jsonl").write_text("\n".join(lines) + "\n")
     return [folder / MANIFEST, folder / "journal.jsonl"]
 
@@ -183,6 +189,9 @@ def _use_state(path: Path) -> None:
         for output in journal:
             if not math.isfinite(journal.seconds(output)) or not isinstance(journal.row(output), ManifestRow):
                 raise NonsenseError(output)
+        journal.finish()
+    for row in read_manifest(path.with_name(MANIFEST)):
+        json.dumps(row.to_dict(), allow_nan=False)
 
 
 READERS = (

@@ -8,14 +8,18 @@ import os
 import re
 from pathlib import Path
 
+import pandas as pd
 import pytest
 
+from tests.faults.readers import manifest_row
 from tests.formats.made_scenario import scenario_text, write_scenario
 from tests.profiles import simulated_profile
 from xosc_lateral.cli import main
 from xosc_lateral.datasets import simulate_drive
 from xosc_lateral.driver.stream import OffsetStream
 from xosc_lateral.formats.profiles import profile_bytes
+from xosc_lateral.pipeline.journal import Journal
+from xosc_lateral.pipeline.manifest import MANIFEST, read_manifest
 
 
 @pytest.fixture
@@ -118,3 +122,27 @@ def test_too_little_data_names_the_file(drive, tmp_path, capsys):
     lines = drive.read_text().splitlines()
     drive.write_text("\n".join(lines[:60]) + "\n")
     assert "drive.csv" in refused(["fit", drive, "-o", tmp_path / "p.json"], capsys)
+
+
+@pytest.mark.parametrize("cell", [[1.0], {"a": 1.0}, b"\xff"], ids=["list", "record", "bytes"])
+def test_a_parquet_column_that_holds_no_numbers_is_left_out_or_named(cell, drive, tmp_path, capsys):
+    table = pd.read_csv(drive)
+    table.assign(odd=[cell] * len(table)).to_parquet(tmp_path / "d.parquet")
+    assert main(["fit", str(tmp_path / "d.parquet"), "-o", str(tmp_path / "p.json")]) == 0
+    capsys.readouterr()
+    table.assign(time=[cell] * len(table)).to_parquet(tmp_path / "d.parquet")
+    assert "'time'" in refused(["fit", tmp_path / "d.parquet", "-o", tmp_path / "p.json"], capsys)
+
+
+@pytest.mark.parametrize(
+    "row", ["[]", '"x"', '{"output": 1}', '{"seed": 1e400}', f'{{"seed": 1{"0" * 30}}}', '{"error": "\\ud800"}']
+)
+def test_a_journal_with_a_damaged_row_ends_before_it(row, tmp_path):
+    whole = json.dumps({"row": manifest_row(1).to_dict(), "seconds": 0.5})
+    changed = json.loads(row)
+    broken = manifest_row(2).to_dict() | changed if isinstance(changed, dict) else changed
+    (tmp_path / "j.jsonl").write_text(f"{whole}\n{json.dumps({'row': broken, 'seconds': 0.5})}\n")
+    with Journal(tmp_path, tmp_path / "j.jsonl", print) as journal:
+        assert list(journal) == ["1.xosc"]
+        journal.finish()
+    assert [row.output for row in read_manifest(tmp_path / MANIFEST)] == ["1.xosc"]

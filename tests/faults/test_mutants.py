@@ -6,12 +6,13 @@ from pathlib import Path
 
 import pytest
 
+from tests.faults.__main__ import CHANGES
 from tests.faults.attack import Count, attack
 from tests.faults.reader import Reader
 from tests.faults.readers import READERS
 
-COUNT = 20
-"""Mutants of each reader, fewer of the slow ones: half a minute together."""
+COUNT = 10
+"""Mutants of each reader and kind, fewer of the slow ones: half a minute together."""
 
 
 @pytest.mark.filterwarnings("ignore")
@@ -19,7 +20,11 @@ COUNT = 20
 def test_mutants_are_refused_in_one_line_or_make_sense(reader: Reader, tmp_path: Path) -> None:
     if reader.needs:
         pytest.importorskip(reader.needs, reason="its extra is not installed")
-    tally = Count()
-    faults = [f"{fault.file} {fault.seed}: {fault.what}" for fault in attack(reader, COUNT, 1, tmp_path, tally)]
-    assert not faults
-    assert tally.refused + tally.accepted == max(1, round(reader.share * COUNT))
+    for change in CHANGES.values():
+        tally = Count()
+        folder = tmp_path / change.__name__
+        faults = [
+            f"{fault.file} {fault.seed}: {fault.what}" for fault in attack(reader, COUNT, 1, folder, tally, change)
+        ]
+        assert not faults
+        assert tally.refused + tally.accepted == max(1, round(reader.share * COUNT))

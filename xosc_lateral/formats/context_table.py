@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from xosc_lateral.driver.plausibility import first_implausible, implausible
 from xosc_lateral.errors import FormatError
 from xosc_lateral.formats.tables import read_table
+from xosc_lateral.formats.text_columns import plain_cells
 from xosc_lateral.limits import TIME
 
 if TYPE_CHECKING:
@@ -93,6 +94,7 @@ def read_context(path: Path) -> ContextTable:
 def _no_number(column: pd.Series, time: FloatArray) -> str:
     import pandas as pd
 
+    column = plain_cells(column)
     wrong = np.flatnonzero((pd.to_numeric(column.astype("string"), errors="coerce").isna() & column.notna()).to_numpy())
     row = int(wrong[0]) if len(wrong) else 0
     return f"{str(column.iloc[row])!r} at {time[row]:g} s is not a number; leave the column out if it is no context"

@@ -16,7 +16,7 @@ from xosc_lateral.drives.cuts import MIN_RUN
 from xosc_lateral.drives.drive import Drive
 from xosc_lateral.errors import FormatError, NotEnoughDataError
 from xosc_lateral.formats.tables import read_table
-from xosc_lateral.formats.text_columns import comma_numbers, indicators, seconds_of_text
+from xosc_lateral.formats.text_columns import comma_numbers, indicators, plain_cells, seconds_of_text
 from xosc_lateral.formats.units import factor
 from xosc_lateral.limits import context_range
 from xosc_lateral.segment import CONTEXT_UNITS
@@ -141,9 +141,9 @@ def _translated(table: pd.DataFrame, mapping: Mapping[str, ColumnSource], path: 
             raise FormatError(
                 f"no column {source.column!r} for {name}; there are {_listed(table.columns)}", path=path, line=1
             )
-    kept = {name: table[name] for name in table.columns if name not in taken and name not in mapping}
+    kept = {name: plain_cells(table[name]) for name in table.columns if name not in taken and name not in mapping}
     for name, source in mapping.items():
-        column = table[source.column]
+        column = plain_cells(table[source.column])
         kept[name] = column if name == "drive" or source.factor == 1.0 else _scaled(column, source.factor, path, name)
     return pd.DataFrame(kept)
 

@@ -129,7 +129,11 @@ def _read_parquet(source: Source) -> pd.DataFrame:
         source.unpacked(max(0, sum(about.row_group(group).total_byte_size for group in groups)))
         _check_size(about.num_rows, about.num_columns, source)
         table: pd.DataFrame = file.read().to_pandas()
-        return table
+    if not table.columns.is_unique:
+        raise FormatError(
+            f"column {str(table.columns[table.columns.duplicated()][0])!r} appears twice", path=source.path
+        )
+    return table
 
 
 def _check_size(rows: int, columns: int, source: Source) -> None:

@@ -17,6 +17,14 @@ _CLOCK = r"\s*\d{1,2}:\d{2}(?::\d{2}(?:[.,]\d+)?)?\s*"
 _DAY = 86_400.0
 
 
+def plain_cells(column: pd.Series) -> pd.Series:
+    """The column with lists, records and bytes, which Parquet has, as text: then a cell can be compared and named."""
+    if column.dtype != object:
+        return column
+    strange = column.map(lambda cell: isinstance(cell, list | dict | tuple | bytes | np.ndarray))
+    return column.mask(strange, column[strange].map(str)) if strange.any() else column
+
+
 def comma_numbers(column: pd.Series) -> pd.Series | None:
     """Numbers such as ``3,75`` or ``1.234,5``; None if a value is no such number or none has a comma."""
     import pandas as pd

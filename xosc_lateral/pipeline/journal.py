@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -111,7 +112,9 @@ class Journal:
                 try:
                     values = json.loads(line)
                     output, seconds = ManifestRow.from_dict(values["row"]).output, float(values["seconds"])
-                except (ValueError, KeyError, TypeError, RecursionError):
+                    if not math.isfinite(seconds):
+                        break
+                except (ValueError, KeyError, TypeError, OverflowError, RecursionError):
                     break
                 if not line.endswith(b"\n"):
                     break

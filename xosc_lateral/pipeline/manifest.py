@@ -28,6 +28,7 @@ MANIFEST, TIMINGS = "manifest.parquet", "timings.parquet"
 ROW_GROUP = 1000
 """Rows held in memory while writing."""
 
+_LARGEST = 2**63 - 1
 
 _OLD_NAMES = {
     "scenario_hash": "scenario_sha256",
@@ -132,16 +133,20 @@ class ManifestRow:
 
         Raises
         ------
-        TypeError
+        ValueError
             When a value is missing or of the wrong kind.
         """
-        values = {_OLD_NAMES.get(name, name): value for name, value in values.items()}
-        names = {item.name for item in fields(cls)}
-        known: dict[str, Any] = {name: value for name, value in values.items() if name in names}
-        known |= {name: tuple(known[name]) for name in ("enriched", "warnings") if name in known}
-        row = cls(**known)
-        if not all(isinstance(getattr(row, name), Mapping) for name in _MAPPINGS) or not isinstance(row.output, str):
-            raise TypeError("a column is of the wrong kind")
+        import msgspec
+
+        if not isinstance(values, Mapping):
+            raise ValueError(f"a row is a {type(values).__name__}")
+        named = {_OLD_NAMES.get(name, name): value for name, value in values.items()}
+        row = msgspec.convert(named, cls)
+        if any(isinstance(value, int) and abs(value) > _LARGEST for value in named.values()):
+            raise ValueError("a number has more than 64 bits")
+        json.dumps(
+            row.to_dict(), ensure_ascii=False, allow_nan=False
+        ).encode()  # no text or number that can't be written
         return row
 
 

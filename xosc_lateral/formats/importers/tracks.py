@@ -64,6 +64,8 @@ def import_tracks(
     network = read_opendrive(road)
     tracks = read_tracks(source, columns)
     pieces, graph = lane_graph(network)
+    if not pieces:
+        raise FormatError("the road has no driving lane that tracks could lie in", path=Path(road))
     placed = place(tracks, network, pieces)
     if not (placed.piece >= 0).any():
         raise FormatError(
