@@ -4,8 +4,9 @@ VENV ?= .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 DEV_STAMP := $(VENV)/.installed-dev
+DOCS_STAMP := $(VENV)/.installed-docs
 
-.PHONY: fuzz lock install-locked sbom licences test-matrix demo test fast style lint format docs bench schema profiles templates loop-dlr picture clean
+.PHONY: fuzz lock install-locked sbom licences test-matrix demo test fast style lint format docs schema profiles templates loop-dlr picture clean
 
 # Python compiles what it imports when it does: a fifth of what is installed.
 QUICK := --disable-pip-version-check --progress-bar on --no-compile
@@ -22,6 +23,11 @@ $(STAMP): pyproject.toml
 $(DEV_STAMP): pyproject.toml | $(STAMP)
 	@echo "Setting up what the tests need: ruff, mypy, pytest, dask, scikit-learn, asammdf ... (another minute or two)"
 	@$(BIN)/python -m pip install $(QUICK) -e '.[dev,mdf,cluster,classifier,mcap]'
+	@touch $@
+
+# And what building the documentation needs.
+$(DOCS_STAMP): pyproject.toml | $(STAMP)
+	@$(BIN)/python -m pip install $(QUICK) -e '.[docs]'
 	@touch $@
 
 demo: $(STAMP)
@@ -57,6 +63,11 @@ fuzz: $(DEV_STAMP)
 format: $(DEV_STAMP)
 	$(BIN)/ruff check --fix .
 	$(BIN)/ruff format .
+
+# The documentation site, into out/site: references from the code, pages from docs/. A warning is an error.
+docs: $(DOCS_STAMP)
+	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --strict --quiet
+	@echo "Open out/site/index.html"
 
 # JSON Schema of profile files, from the types.
 schema: $(STAMP)

@@ -132,7 +132,7 @@ class RealismBoard(Result):
         paths = board_files(folder)
         claim(paths, self._given.files, force=force)
         record = json.dumps(self.to_dict(), indent=1, ensure_ascii=False, allow_nan=False) + "\n"
-        page = board_page(self._board, self._given.inputs).html()
+        page = board_page(self._board, self._given.inputs)
         note = f"<!-- made by xosc-lateral, seed {self._board.seed} -->\n"
         for path, text in zip(paths, (record, note + board_markdown(self._board), page), strict=True):
             write_atomically(path, text)

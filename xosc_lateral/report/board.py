@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
-from xosc_lateral.report.page import KeyFigure, Page
+from xosc_lateral.report.render import KeyFigure, render_page, render_text
 from xosc_lateral.version import __version__
 
 if TYPE_CHECKING:
@@ -16,17 +16,9 @@ FAMILIES = {
     "metrics": "ten metrics",
     "lane_keeping": "lane keeping",
     "spectrum": "spectrum",
-    "memory": "memory",
+    "memory": "autocorrelation",
     "auc": "classifier",
 }
-
-METHOD = (
-    "Every model is fitted on half of the vehicles and scored on the other half, and the other way round. The score is "
-    "the geometric mean of five ratios, distance over floor: the ten metrics of windows that start where the real ones "
-    "start, and metrics, lane keeping, spectrum and memory of free runs. A floor is the distance of real driving of "
-    "other vehicles, with the same start where the model's windows have it and without where they have not. 1 is as "
-    "good as other real drivers."
-)
 
 
 def board_text(board: Board) -> str:
@@ -46,7 +38,7 @@ def headline(board: Board) -> str:
     first = board.rows[0]
     return (
         f"{len(board.rows)} models on {board.hours:.2f} h of {board.vehicles} drives: {first.title} first with "
-        f"{first.score:.2f} times the floor; rank correlation between the halves {board.tau:.2f}"
+        f"{first.score:.2f} times the floor; rank correlation between the two halves {board.tau:.2f}"
     )
 
 
@@ -56,7 +48,7 @@ def board_record(board: Board, inputs: Mapping[str, str]) -> dict[str, Any]:
         "made_by": f"xosc-lateral {__version__}",
         "seed": board.seed,
         "inputs": dict(inputs),
-        "method": METHOD,
+        "method": _method(board),
         "data": {
             "drives": board.vehicles,
             "runs": board.runs,
@@ -108,29 +100,20 @@ def _short(value: float) -> float | None:
 def board_markdown(board: Board) -> str:
     """The ranking and the sources, for a document."""
     columns = shown_columns(board)
-    lines = [METHOD, "", *_markdown_table(["", "model", "score", "95 %", "ranks", *columns.values()])]
-    cells = ([*_head(row), *(_cell(row, name) for name in columns)] for row in board.rows)
-    lines += ["| " + " | ".join(line) + " |" for line in cells]
-    lines += [
-        "",
-        f"Floors: {_floors(board, columns)}.",
-        f"Kendall's tau between the halves' rankings: {board.tau:.2f}.",
-    ]
-    lines += [f"Not on the board: {key} ({why})." for key, why in board.absent.items()]
-    lines += ["", "| model | fitted | source | departures |", "|---|---|---|---|"]
-    for row in board.rows:
-        fitted = ", ".join(f"{name} {value:.3g}" for name, value in row.settings.items())
-        lines.append(f"| {row.title} | {fitted} | {row.source} | {row.departures} |")
-    return "\n".join(lines) + "\n"
+    return render_text(
+        "board.md",
+        board=board,
+        method=_method(board),
+        columns=list(columns.values()),
+        ranking=[(row, [_cell(row, name) for name in columns]) for row in board.rows],
+        floors=[f"{head} {board.rows[0].number(name).floor:.3f}" for name, head in columns.items()],
+        fitted=lambda row: ", ".join(f"{name} {value:.3g}" for name, value in row.settings.items()),
+    )
 
 
-def _markdown_table(heads: list[str]) -> list[str]:
-    return ["| " + " | ".join(heads) + " |", "|" + "---|" * len(heads)]
-
-
-def _head(row: Row) -> list[str]:
-    places = f"{row.best_rank}-{row.worst_rank}"
-    return [str(row.rank), row.title, f"{row.score:.2f}", f"{row.low:.2f}-{row.high:.2f}", places]
+def _method(board: Board) -> str:
+    n_ranked = sum(number.ranked for number in board.rows[0].numbers)
+    return render_text("board_method.md", n_ranked=n_ranked).strip()
 
 
 def shown_columns(board: Board) -> dict[str, str]:
@@ -153,58 +136,43 @@ def _value(number: Number) -> str:
     return f"{number.value:.3f}" if number.value < 10 else f"{number.value:.1f}"
 
 
-def _floors(board: Board, columns: Mapping[str, str]) -> str:
-    return "; ".join(f"{head} {board.rows[0].number(name).floor:.3f}" for name, head in columns.items())
-
-
-def board_page(board: Board, inputs: Mapping[str, str]) -> Page:
-    """The page: ranking, pictures, all numbers, sources."""
-    from xosc_lateral.report.board_figures import dynamics_figure, ranking_figure, windows_figure
+def board_page(board: Board, inputs: Mapping[str, str]) -> str:
+    """HTML page: ranking, pictures, all numbers, sources; same board, same bytes."""
+    from xosc_lateral.report import board_figures as figures
 
     first = board.rows[0]
-    page = Page("Board of in-lane realism").lead(
-        headline(board) + ".",
-        [
+    return render_page(
+        "board.html",
+        title="Board of in-lane realism",
+        provenance={"seed": board.seed, "inputs": dict(inputs), "resamples": board.resamples},
+        board=board,
+        figures=figures,
+        headline=f"{headline(board)}.",
+        method=_method(board),
+        seconds=figures.STEP * (len(board.real_example[0]) - 1),
+        numbers=[
             KeyFigure(
-                f"{first.score:.2f}", first.title, f"95 %: {first.low:.2f} to {first.high:.2f}; 1 is real driving"
+                f"{first.score:.2f}", first.title, f"95 %: {first.low:.2f} to {first.high:.2f}; 1: as other drivers"
             ),
-            KeyFigure(f"{board.tau:.2f}", "Kendall's tau", "between the rankings of both halves of the vehicles"),
+            KeyFigure(f"{board.tau:.2f}", "Kendall's tau", "between the rankings of the two halves"),
             KeyFigure(f"{board.hours:.1f} h", f"{board.vehicles} drives", f"{sum(board.windows.values())} windows"),
         ],
+        number_rows=_number_rows(board),
+        variance_rows=[
+            {"": name, "between": parts.between, "within": parts.within, "inside": parts.inside}
+            for name, parts in (("measured", board.real_variance), *((row.title, row.variance) for row in board.rows))
+        ],
+        source_rows=[{"model": row.title, "source": row.source, "departures": row.departures} for row in board.rows],
     )
-    page.section("Ranking", METHOD)
-    page.figure(
-        ranking_figure(board),
-        f"Score with its 95 % interval: the spread of {board.resamples} resamples (unit: {board.unit}) about the "
-        "score; strokes: the two halves.",
-        "Models in order of their score on a logarithmic axis",
-    )
-    page.section("What they look like")
-    page.figure(
-        windows_figure(board), "Ten seconds from the same starts.", "Small multiples of sampled and measured offsets"
-    )
-    page.figure(dynamics_figure(board), "Free runs: spectrum and memory.", "Power density and autocorrelation")
+
+
+def _number_rows(board: Board) -> list[dict[str, object]]:
+    """A row per model, and the floors below them."""
     columns = shown_columns(board)
-    page.section("Numbers")
-    rows = [
+    rows: list[dict[str, object]] = [
         {"": row.rank, "model": row.title, "score": round(row.score, 3)}
         | {head: row.number(name).value for name, head in columns.items()}
         for row in board.rows
     ]
-    floor = {"": None, "model": "floor: other real drives", "score": 1.0}
-    page.table(
-        [*rows, floor | {head: first.number(name).floor for name, head in columns.items()}], "Means over the halves"
-    )
-    parts = [("measured", board.real_variance), *((row.title, row.variance) for row in board.rows)]
-    page.table(
-        [{"": name, "between": p.between, "within": p.within, "inside": p.inside} for name, p in parts],
-        "Variance of the offset between drivers, within drivers between windows of 10 s, and inside windows [m²]",
-    )
-    page.section("Sources")
-    page.table(
-        [{"model": row.title, "source": row.source, "departures": row.departures} for row in board.rows],
-        "Where each model comes from, and what is not as published",
-    )
-    if board.absent:
-        page.warning("Not on the board: " + "; ".join(f"{key} ({why})" for key, why in board.absent.items()))
-    return page.provenance({"seed": board.seed, "inputs": dict(inputs), "resamples": board.resamples})
+    floor: dict[str, object] = {"": None, "model": "floor: other real drivers", "score": 1.0}
+    return [*rows, floor | {head: board.rows[0].number(name).floor for name, head in columns.items()}]

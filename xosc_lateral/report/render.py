@@ -30,7 +30,7 @@ from xosc_lateral.version import __version__
 
 if TYPE_CHECKING:
     import pandas as pd
-    from jinja2 import Environment
+    from jinja2 import Environment, Template
     from markupsafe import Markup
     from matplotlib.figure import Figure
 
@@ -48,13 +48,13 @@ class KeyFigure(NamedTuple):
     tone: Tone = ""
 
 
-def render_page(template: str, *, title: str, provenance: Mapping[str, object], **values: Any) -> str:
+def render_page(template: str | Template, *, title: str, provenance: Mapping[str, object], **values: Any) -> str:
     """Render a page.
 
     Parameters
     ----------
-    template : str
-        Name in ``pages/``; extends ``frame.html``.
+    template : str or Template
+        Name in ``pages/``, or a template of `environment`; extends ``frame.html``.
     title : str
         Heading and window title.
     provenance : mapping
@@ -62,26 +62,15 @@ def render_page(template: str, *, title: str, provenance: Mapping[str, object], 
     values
         What the template speaks of.
     """
-    return _render(template, Parts(), title=title, provenance=provenance, **values)
-
-
-def render_built(parts: Parts, *, title: str, provenance: Mapping[str, object], lead: str, body: str) -> str:
-    """Render a page whose lead and body are finished markup, made with `parts`."""
-    return _render("built.html", parts, title=title, provenance=provenance, lead=_markup(lead), body=_markup(body))
-
-
-def render_text(template: str, **values: Any) -> str:
-    """Render a text that is no page: Markdown in ``pages/``, nothing escaped."""
-    return f"{_environment().overlay(autoescape=False).get_template(template).render(**values).rstrip()}\n"
-
-
-def _render(template: str, parts: Parts, **values: Any) -> str:
+    parts = Parts()
     text = (
-        _environment()
+        environment()
         .get_template(template)
         .render(
             version=__version__,
             style=_static("page.css"),
+            title=title,
+            provenance=provenance,
             parts=parts,
             section=parts.section,
             figure=parts.figure,
@@ -92,6 +81,11 @@ def _render(template: str, parts: Parts, **values: Any) -> str:
         )
     )
     return f"{text}\n"
+
+
+def render_text(template: str, **values: Any) -> str:
+    """Render a text that is no page: Markdown in ``pages/``, nothing escaped."""
+    return f"{environment().overlay(autoescape=False).get_template(template).render(**values).rstrip()}\n"
 
 
 class Parts:
@@ -186,7 +180,8 @@ def inline(text: object) -> Markup:
 
 
 @cache
-def _environment() -> Environment:
+def environment() -> Environment:
+    """Jinja2's environment of all pages: templates of ``pages/``, everything escaped, unknown names refused."""
     from jinja2 import Environment, PackageLoader, StrictUndefined
 
     environment = Environment(
