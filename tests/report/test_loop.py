@@ -41,10 +41,10 @@ from xosc_lateral.identification.findings import Finding
 from xosc_lateral.identification.leftover import Leftover, leftover_of
 from xosc_lateral.identification.partial import curve_of
 from xosc_lateral.report.loop import loop_page, loop_text
-from xosc_lateral.report.loop_figures import DRIVES, effect_figure, residual_figure, spectrum
+from xosc_lateral.report.loop_figures import DRIVES, effect_figure, residual_figure
 from xosc_lateral.report.loop_hidden_figures import DRAWINGS
 from xosc_lateral.report.loop_json import loop_json
-from xosc_lateral.report.loop_words import chance_words, leftover_words, meaning, size_words
+from xosc_lateral.report.loop_words import leftover_words, meaning, p_value_words, size_words
 
 SHIFT = 0.4  # [m]
 
@@ -108,8 +108,8 @@ def test_the_page_says_in_words_what_was_found_how_sure_and_when(page: str, resu
     assert finding.columns == ("grade",)
     assert f"mean offset by grade ({size_words(finding)})" in page
     assert "further left" in page
-    assert "practically never (p = " in page
-    assert re.search(r"The driver acts (at once|[\d.]+ s (ahead of|after) it)", page)
+    assert "is found practically never (p = " in page
+    assert re.search(r"The driver responds (at once|[\d.]+ s (in advance|later))", page)
 
 
 def test_the_page_has_every_part_that_a_reader_needs(page: str) -> None:
@@ -119,7 +119,7 @@ def test_the_page_has_every_part_that_a_reader_needs(page: str) -> None:
         "Tested and rejected", "How to read this page",
     ]  # fmt: skip
     assert "the mean of 24 simulated runs" in page  # counted, not typed
-    assert page.count("<figure") == 5  # effect, residual of mean and of spread, spectra, violins
+    assert page.count("<figure") == 6  # effect, residual of mean and of spread, traces, spectra, violins
     assert "**" not in page.split("<script>")[0]
 
 
@@ -223,32 +223,9 @@ def test_every_shape_is_told_and_drawn(result: LoopResult, effect: ColumnEffect)
     assert len(effect_figure(result, finding).axes) == 2
 
 
-def test_chance_is_said_as_one_in_so_many_tables() -> None:
-    assert chance_words(0.004) == "in 1 of 250 tables"
-    assert chance_words(1e-9) == "practically never"
-
-
-def test_the_spectrum_of_white_noise_is_flat_and_holds_its_variance() -> None:
-    rng = np.random.default_rng(1)
-    series = rng.normal(size=(4, 20_000))
-    frequency, density, number = spectrum(
-        series, np.ones(20_000, dtype=np.bool_), np.zeros(20_000, dtype=np.intp), 0.2, 512
-    )
-    assert number == 77
-    assert density.sum() * frequency[0] == pytest.approx(1.0, rel=0.03)
-    assert density[:50].mean() == pytest.approx(density[-50:].mean(), rel=0.05)
-
-
-def test_a_jump_between_blocks_does_not_enter_the_spectrum() -> None:
-    rng = np.random.default_rng(2)
-    n = 8192
-    seams = np.arange(n) // 1024
-    valid = np.ones(n, dtype=np.bool_)
-    smooth = 0.01 * rng.normal(size=(1, n)).cumsum(axis=1)
-    jumping = smooth + 5.0 * seams
-    within = spectrum(jumping, valid, seams, 0.2, 512)[1]
-    across = spectrum(jumping, valid, np.zeros(n, dtype=np.intp), 0.2, 512)[1]
-    assert across[100:].mean() > 10.0 * within[100:].mean()
+def test_a_p_value_is_told_as_one_in_so_many_tables() -> None:
+    assert p_value_words(0.004) == "in 1 of 250 tables"
+    assert p_value_words(1e-9) == "practically never"
 
 
 def test_courses_leave_out_what_is_cut(result: LoopResult) -> None:

@@ -191,6 +191,18 @@ def test_a_figure_is_described_in_the_units_of_its_picture():
     assert top < min(places[1::2]) < max(places[1::2]) < bottom
 
 
+def test_what_the_script_is_told_of_is_in_the_picture_though_panels_are_hidden():
+    """A grid of panels with an empty place once stopped the script on a whole page."""
+    with figure_style():
+        figure, axes = new_figure(1, 3, height=2.0, sharex=True)
+        axes[0, 0].set_visible(False)
+        axes[0, 2].plot([0.0, 1.0], [0.0, 1.0], label="a")
+    markup, plot = figure_markup(figure, "grid", key="f1")
+    assert [one["id"] for one in plot["axes"]] == ["f1-a1", "f1-a2"]
+    assert all(f'id="{one["id"]}"' in markup for one in plot["axes"])
+    assert [one["xgroup"] for one in plot["axes"]] == [0, 0]  # places in this list
+
+
 def test_figure_style_leaves_the_callers_settings_alone():
     import matplotlib as mpl
 

@@ -150,7 +150,7 @@ def _judged(
     gains = {id(one.term): nested.of(one.term) for one in selection.accepted if one.term.predictable}
     useless = [one.term for one in selection.accepted if id(one.term) in gains and gains[id(one.term)].mean <= 0.0]
     if useless:
-        why = "chance does not explain it, but chosen and sized on other blocks it does not foretell the held-out ones"
+        why = "significant, but chosen and estimated on other blocks it does not predict the held-out ones"
         selection = selection.without(useless, why)
     reason, total = "", nested.together([one.term for one in selection.accepted if one.term.predictable])
     if any(one.term.predictable for one in selection.accepted) and total.mean <= 0.0:

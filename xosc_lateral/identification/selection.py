@@ -120,6 +120,5 @@ def _asked(search: Search, kind: type[Term], fitted: Fitted) -> Outcome | None:
 
 
 def _rejected(component: str, test: Outcome) -> Rejected:
-    allowed = 100 * level_of(component)
-    why = f"chance gives as much in {100 * test.p_value:.3g} % of tables; {allowed:.2g} % is allowed"
+    why = f"not significant: its p-value is above {level_of(component):.2g}"
     return Rejected(component, test.columns, test.p_value, why)

@@ -78,7 +78,7 @@ def batch_page(entries: Iterable[BatchEntry], name: str) -> str:
         numbers=[
             KeyFigure(len(ranked) - failed, "outputs"),
             KeyFigure(failed, "failed", tone="bad" if failed else ""),
-            KeyFigure(contacts, "with vehicles that touch", "and nominally don't", "bad" if contacts else ""),
+            KeyFigure(contacts, "with collisions", "that the nominal motion does not have", "bad" if contacts else ""),
             KeyFigure(warned, "with warnings"),
         ],
     )

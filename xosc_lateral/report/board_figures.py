@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from xosc_lateral.report.figures import INK, MEASURED, MUTED, SAMPLED, figure_style, new_figure, new_panels
+from xosc_lateral.report.figures import INK, MEASURED, MUTED, PALETTE, SAMPLED, figure_style, new_figure, new_panels
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -15,6 +15,10 @@ if TYPE_CHECKING:
 
 STEP = 0.2
 COLUMNS = 4
+TICKS = (0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0)
+COLOURED = 5
+"""Models with a colour of their own, from the first place on."""
+
 QUIETEST = 1e-7
 """Power densities below are not drawn. [m2/Hz]"""
 
@@ -22,6 +26,8 @@ QUIETEST = 1e-7
 @figure_style()
 def ranking_figure(board: Board) -> Figure:
     """Score of every model with its interval, on a logarithmic axis, and the floor."""
+    from matplotlib.ticker import FormatStrFormatter, NullFormatter
+
     figure, axes = new_figure(height=0.6 + 0.28 * len(board.rows))
     axis = axes[0, 0]
     for place, row in enumerate(board.rows):
@@ -39,16 +45,20 @@ def ranking_figure(board: Board) -> Figure:
         textcoords="offset points",
     )
     axis.set_xscale("log")
+    low, high = axis.get_xlim()
+    axis.set_xticks([tick for tick in TICKS if low <= tick <= high], minor=False)
+    axis.xaxis.set_major_formatter(FormatStrFormatter("%g"))
+    axis.xaxis.set_minor_formatter(NullFormatter())
     axis.set_yticks(range(len(board.rows)), [row.title for row in board.rows])
     axis.set_ylim(len(board.rows) - 0.4, -0.7)
-    axis.set_xlabel("distance from real driving / floor [-]")
+    axis.set_xlabel("distance from measured driving / floor [-]")
     return figure
 
 
 @figure_style()
 def windows_figure(board: Board) -> Figure:
     """Ten seconds of every model beside the measured ones that begin at the same offset."""
-    shown = [("measured", board.real_example), *((row.title, row.example) for row in board.rows)]
+    shown = [("measured", board.real_example), *((row.key, row.example) for row in board.rows)]
     lines = -(-len(shown) // COLUMNS)
     figure, axes = new_panels(lines, COLUMNS, panel_height=1.1, sharex=True, sharey=True)
     time = STEP * np.arange(board.real_example.shape[1])
@@ -59,7 +69,7 @@ def windows_figure(board: Board) -> Figure:
             continue
         title, paths = shown[number]
         axis.plot(time, paths.T, color=MEASURED if number == 0 else SAMPLED, linewidth=1.0)
-        axis.set_title(title if len(title) < 27 else title[:25] + "…", fontsize=8.5)
+        axis.set_title(title, fontsize=8.5)
         axis.set_ylim(-reach, reach)
     for axis in axes[-1]:
         axis.set_xlabel("time [s]")
@@ -70,14 +80,14 @@ def windows_figure(board: Board) -> Figure:
 
 @figure_style()
 def dynamics_figure(board: Board) -> Figure:
-    """Spectrum and autocorrelation of free runs, the first five models and the measured ones in colour."""
+    """Spectrum and autocorrelation of free runs, the first models and the measured runs in colour."""
     from matplotlib.ticker import NullFormatter
 
     figure, axes = new_figure(1, 2, height=3.4)
     left, right = axes[0]
     for place, row in reversed(list(enumerate(board.rows))):
-        color, width = (f"C{place}", 1.4) if place < 5 else (MUTED, 0.6)
-        label = row.title if place < 5 else None
+        color, width = (PALETTE[place], 1.4) if place < COLOURED else (MUTED, 0.6)
+        label = row.title if place < COLOURED else None
         left.loglog(board.frequency, np.maximum(row.spectrum, QUIETEST), color=color, linewidth=width, label=label)
         right.plot(board.lags, row.autocorrelation, color=color, linewidth=width)
     left.loglog(board.frequency, board.real_spectrum, color=INK, linewidth=2.2, label="measured")

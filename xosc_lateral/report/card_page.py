@@ -56,9 +56,9 @@ def card_page(profile: DriverProfile, seed: int = 0) -> str:
         ],
         paths=_paths(runs, step),
         places=_places(runs, spectrum(list(runs), step)),
-        effects=[effect_line(effect.to_dict()) for effect in profile.effects],
+        effects=[effect_line(effect) for effect in profile.effects],
         facts=[
-            {"": name, "value": value} for name, value in (("fitted on", amount(profile)), *provenance_items(known))
+            {"fact": name, "value": value} for name, value in (("fitted on", amount(profile)), *provenance_items(known))
         ],
     )
 
@@ -83,7 +83,7 @@ def _places(runs: FloatArray, power: Spectrum) -> Figure:
     edges = np.linspace(-1.2, 1.2, 97)
     density, _ = np.histogram(runs, edges, density=True)
     place.plot(0.5 * (edges[1:] + edges[:-1]), density, color=SAMPLED, label="density")
-    place.set(xlabel="offset [m], positive left", ylabel="density [1/m]", title="Place in the lane")
+    place.set(xlabel="offset [m], positive to the left", ylabel="density [1/m]", title="Distribution")
     spectral.loglog(power.frequency, power.density, color=SAMPLED, label="power density")
     spectral.set(xlabel="frequency [Hz]", ylabel="power density [m²/Hz]", title="Spectrum")
     return figure

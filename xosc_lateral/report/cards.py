@@ -6,12 +6,21 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from typing import Any
 
+from xosc_lateral.driver.effects import Acts, ColumnEffect, Effect
 from xosc_lateral.driver.profile import DriverProfile, Provenance
 from xosc_lateral.evaluation.comparison import Habits, habits_of
 from xosc_lateral.formats.library import FIELDS, Entry, facts_of
 from xosc_lateral.formats.profiles import profile_hash
 from xosc_lateral.report.render import render_text
 from xosc_lateral.report.values import format_value
+
+CHANGED: Mapping[Acts, str] = {
+    Acts.LOCATION: "mean offset",
+    Acts.SPREAD: "spread",
+    Acts.RATE: "rate of mean reversion",
+    Acts.FINE: "fine noise",
+}
+"""What a column effect changes, in words."""
 
 
 def list_text(entries: Sequence[Entry]) -> str:
@@ -91,7 +100,7 @@ def card_text(profile: DriverProfile) -> str:
         profile.name,
         *_indented("", known.notes),
         f"  model      {profile.model.kind}, {_effects(profile)}, lane width {profile.lane_width:.2f} m",
-        *(f"  effect     {effect_line(effect.to_dict())}" for effect in profile.effects),
+        *(f"  effect     {effect_line(effect)}" for effect in profile.effects),
         *_habit_lines(profile, habits_of(profile)),
         f"  fitted on  {amount(profile)}",
         *_indented("source", known.source),
@@ -154,7 +163,7 @@ def _evaluation_items(evaluation: Mapping[str, Any]) -> list[tuple[str, str]]:
             )
         )
     if evaluation.get("spectrum_error_db") is not None:
-        items.append(("spectrum", f"differs by {evaluation['spectrum_error_db']:.1f} dB (rms over bands)"))
+        items.append(("spectrum", f"differs by {evaluation['spectrum_error_db']:.1f} dB (rms over frequency bands)"))
     if evaluation.get("told_apart"):
         items.append(("own driver", str(evaluation["told_apart"])))
     return items
@@ -186,10 +195,15 @@ def _spread(profile: DriverProfile, habits: Habits) -> str:
     return f"{habits.spread:.2f} m over all drivers, {habits.spread_within:.2f} m within one driver over 5 min"
 
 
-def effect_line(values: Mapping[str, Any]) -> str:
-    """An effect's plain values in one line."""
-    plain = {name: value for name, value in values.items() if not isinstance(value, list | dict)}
-    return ", ".join(f"{name} {format_value(value)}" for name, value in plain.items())
+def effect_line(effect: Effect) -> str:
+    """An effect in a line: what it changes, by which columns, of what shape; a hidden one by its parameters."""
+    if isinstance(effect, ColumnEffect):
+        lag = f", {abs(effect.lag_s):g} s {'ahead' if effect.lag_s < 0 else 'behind'}" if effect.lag_s else ""
+        response = f", response time {effect.response_s:g} s" if effect.response_s else ""
+        return f"{CHANGED[effect.acts]} by {' and '.join(effect.columns)} ({effect.shape}{lag}{response})"
+    plain = {name: value for name, value in effect.to_dict().items() if not isinstance(value, list | dict)}
+    kind = str(plain.pop("kind")).replace("-", " ")
+    return f"{kind}: " + ", ".join(f"{name} {format_value(value)}" for name, value in plain.items())
 
 
 def _effects(profile: DriverProfile) -> str:

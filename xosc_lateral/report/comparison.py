@@ -15,7 +15,7 @@ from xosc_lateral.evaluation.distances import wasserstein
 from xosc_lateral.evaluation.metrics import METRICS, cut_snippets, snippet_metrics
 from xosc_lateral.evaluation.spectra import Spectrum, spectrum
 from xosc_lateral.formats.profiles import profile_hash
-from xosc_lateral.report.figures import INK, PALETTE, figure_style, new_figure
+from xosc_lateral.report.figures import PALETTE, figure_style, new_figure
 from xosc_lateral.report.render import render_page
 
 if TYPE_CHECKING:
@@ -25,6 +25,9 @@ FloatArray = NDArray[np.float64]
 
 SHOWN_S = 120.0
 """Length of the sample paths in the figure. [s]"""
+
+APART = 0.8
+"""Between the zero lines of two sample paths. [m]"""
 
 SHOWN = 12
 """So many profiles are drawn at most; the distances are of all."""
@@ -132,7 +135,7 @@ def _rows(compared: Compared) -> list[dict[str, str]]:
         {
             "profile": profile.name,
             "model": profile.model.kind,
-            "mean [m]": f"{one.mean_offset:+.2f}",
+            "mean [m]": f"{one.mean_offset + 0.0:+.2f}".replace("-0.00", "0.00").replace("+0.00", "0.00"),
             "spread [m]": f"{one.spread:.2f}",
             "of one driver [m]": f"{one.spread_within:.2f}",
             "5 % to 95 % [m]": f"{one.low:+.2f} to {one.high:+.2f}",
@@ -187,11 +190,11 @@ def comparison_figure(compared: Compared) -> Figure:
         step = profile.model.step
         rows = slice(0, round(SHOWN_S / step))
         paths.plot(
-            step * np.arange(len(runs[0][rows])), runs[0][rows] + 0.8 * (len(shown) - number), dashes, color=color
+            step * np.arange(len(runs[0][rows])), runs[0][rows] + APART * (len(shown) - number), dashes, color=color
         )
-    place.set(xlabel="offset [m], left positive", ylabel="density [1/m]", title="Place in the lane")
+    place.set(xlabel="offset [m], positive to the left", ylabel="density [1/m]", title="Distribution")
     power.set(xlabel="frequency [Hz]", ylabel="power density [m²/Hz]", title="Spectrum")
-    paths.set(xlabel="time [s]", title="Sample paths, 0.8 m apart", yticks=[])
+    paths.set(xlabel="time [s]", title=f"Sample paths, {APART:g} m apart", yticks=[])
     figure.legend(*place.get_legend_handles_labels(), loc="outside lower center", ncols=4)
     return figure
 
@@ -209,7 +212,7 @@ def distance_figure(compared: Compared) -> Figure:
     if len(names) <= SHOWN:
         dark = 0.6 * distance.max()
         for row, column in np.ndindex(*distance.shape):
-            color = "white" if distance[row, column] > dark else INK
+            color = "#fefefe" if distance[row, column] > dark else "#101010"  # the map is the same in both themes
             axis.text(column, row, f"{distance[row, column]:.2f}", ha="center", va="center", color=color, fontsize=8)
     return figure
 
@@ -226,4 +229,5 @@ def comparison_page(compared: Compared) -> str:
         overview=comparison_figure(compared),
         left_out=max(0, len(compared.profiles) - SHOWN),
         distances=distance_figure(compared),
+        snippet_s=SNIPPET,
     )

@@ -11,7 +11,7 @@ from xosc_lateral.evaluation.metrics import METRICS
 from xosc_lateral.evaluation.realism import Realism
 from xosc_lateral.evaluation.record import scores_to_dict
 from xosc_lateral.evaluation.scores import PartEvaluation, ProfileScores, SnippetScores
-from xosc_lateral.evaluation.spectra import Margins
+from xosc_lateral.evaluation.spectra import NEAR_MARKING, Margins
 from xosc_lateral.formats.profiles import profile_hash
 from xosc_lateral.report import evaluation_figures as figures
 from xosc_lateral.report.evaluation_figures import LABELS
@@ -37,7 +37,7 @@ def evaluation_text(scores: ProfileScores, profile: DriverProfile, inputs: Mappi
         *([FITTED] if _fitted_on(profile, inputs) else []),
         _worst_line(scores),
         *realism_lines(scores.realism),
-        "the paper's measure: same start, the driver alone, floor without the start",
+        "as in the paper: from the same start, without the sensor; the floor has no common start",
         *_snippet_lines(scores.snippets),
     ]
     if note := start_fade_note(profile):
@@ -79,7 +79,7 @@ def evaluation_page(scores: ProfileScores, profile: DriverProfile, inputs: Mappi
         scores=scores,
         fitted=FITTED if _fitted_on(profile, inputs) else "",
         numbers=[
-            KeyFigure(f"{ratio:.2f}", f"worst of all blocks: {worst}", "1: as close as real to real", _tone(ratio)),
+            KeyFigure(f"{ratio:.2f}", f"worst comparison: {worst}", "1: as close as other real drivers", _tone(ratio)),
             *_key_figures(scores.realism),
         ],
         groups=[(heading, ratio_rows(group)) for heading, group in condition_groups(scores.realism).items()],
@@ -90,6 +90,7 @@ def evaluation_page(scores: ProfileScores, profile: DriverProfile, inputs: Mappi
         ],
         start_fade=start_fade_note(profile),
         metric_table=_metric_table,
+        near_marking=f"{NEAR_MARKING:g}",
         part_rows=[_part_row(one) for one in scores.evaluations],
         margin_rows=[_margin_row("measured", scores.margins_real), _margin_row("sampled", scores.margins_sampled)],
         figures=figures,
@@ -179,7 +180,7 @@ def worst_block(scores: ProfileScores) -> tuple[str, float]:
 
 def _worst_line(scores: ProfileScores) -> str:
     block, ratio = worst_block(scores)
-    return f"worst of all blocks: {block}, {ratio:.2f} times the floor"
+    return f"worst comparison: {block}, {ratio:.2f} times the floor"
 
 
 def _tone(ratio: float) -> Tone:

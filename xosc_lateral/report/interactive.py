@@ -44,7 +44,9 @@ def describe_axes(figure: Figure, key: str, color: Callable[[str], str]) -> dict
     dict
         ``axes``: per axes its id, box (left, top, right, bottom), limits, scales, labels, lines and texts.
     """
-    return {"axes": [_axes(axes, number, key, color) for number, axes in enumerate(figure.axes)]}
+    # axes that are not visible, such as the empty places of a grid of panels, are not in the SVG
+    drawn = [(number, axes) for number, axes in enumerate(figure.axes) if axes.get_visible()]
+    return {"axes": [_axes(axes, number, key, color) for number, axes in drawn]}
 
 
 def _axes(axes: Axes, number: int, key: str, color: Callable[[str], str]) -> dict[str, Any]:
@@ -74,7 +76,7 @@ def _axes(axes: Axes, number: int, key: str, color: Callable[[str], str]) -> dic
 def _axis(axes: Axes, name: str) -> dict[str, Any]:
     axis = axes.xaxis if name == "x" else axes.yaxis
     shared = axes.get_shared_x_axes() if name == "x" else axes.get_shared_y_axes()
-    all_axes = list(axes.figure.axes)
+    all_axes = [other for other in axes.figure.axes if other.get_visible()]
     low, high = axis.get_view_interval()
     limits = axes.get_xlim() if name == "x" else axes.get_ylim()  # may run from high to low
     values: dict[str, Any] = {

@@ -12,9 +12,10 @@ from xosc_lateral.formats.profiles import profile_hash
 from xosc_lateral.identification.close import LoopResult
 from xosc_lateral.identification.findings import Finding
 from xosc_lateral.identification.leftover import GroupError, Leftover, leftover_of
+from xosc_lateral.identification.scorecard import SNIPPET_ROWS
 from xosc_lateral.report.loop_words import (
+    CERTAIN,
     LOOKS,
-    chance_words,
     feedback_words,
     group_words,
     leftover_words,
@@ -41,9 +42,9 @@ FAR, CLOSE = 2.0, 1.2
 def loop_text(result: LoopResult, leftover: Leftover | None = None) -> str:
     """The outcome in a few lines; what is left is worked out unless it is given."""
     lines = [f"{finding_sentence(finding)} (p = {finding.p_value:.1e})" for finding in result.findings]
-    lines = lines or ["no effect found beyond chance"]
+    lines = lines or ["no significant effect found"]
     for item in result.feedback:
-        sure = "perhaps a" if item.doubtful else "a"
+        sure = "possibly a" if item.doubtful else "a"
         lines.append(f"{item.column}: {sure} consequence of the car's movement, not used as a cause")
     if result.returned_base:
         lines.append(f"the base is returned: {result.returned_base}")
@@ -57,8 +58,8 @@ def finding_sentence(finding: Finding) -> str:
     """One finding in a line."""
     when = ""
     if finding.lag_s is not None:
-        early = f"{-finding.lag_s:.1f} s ahead" if finding.lag_s < 0 else f"{finding.lag_s:.1f} s behind"
-        when = f", {early}, answered within {finding.response_s:.1f} s"
+        early = f"{-finding.lag_s:.1f} s ahead" if finding.lag_s < 0 else f"lag {finding.lag_s:.1f} s"
+        when = f", {early}, response time {finding.response_s:.1f} s"
     alike = f"; {', '.join(finding.alike)} would explain it as well" if finding.alike else ""
     size = "" if finding.kind == "memory" else f", {size_words(finding)}"
     return f"{finding.effect}: {finding.shape}{size}{when}{alike}"
@@ -66,6 +67,7 @@ def finding_sentence(finding: Finding) -> str:
 
 def loop_page(result: LoopResult, leftover: Leftover, tables: Sequence[Path]) -> str:
     """HTML page; same result, same bytes."""
+    from xosc_lateral.report.loop_traces import traces_figure
     from xosc_lateral.report.render import render_page
 
     groups = sorted(leftover.groups, key=lambda group: -group.unexplained)[:LEFT_ROWS]
@@ -82,6 +84,9 @@ def loop_page(result: LoopResult, leftover: Leftover, tables: Sequence[Path]) ->
         },
         result=result,
         outcome=outcome(result),
+        certain=CERTAIN,
+        trace=traces_figure(result),
+        snippet_s=(SNIPPET_ROWS - 1) * result.coarse.timeline.step,
         unexplained=leftover_words(result, leftover),
         numbers=_numbers(result, leftover),
         capital=_capital,
@@ -96,9 +101,9 @@ def loop_page(result: LoopResult, leftover: Leftover, tables: Sequence[Path]) ->
         feedback_rows=[{"column": item.column, "reason": feedback_words(item)} for item in result.feedback],
         rejected_rows=[
             {
-                "question": LOOKS.get(item.component, item.component),
-                "strongest": ", ".join(item.columns) or None,
-                "chance": f"{100 * item.p_value:.3g} %",
+                "component": LOOKS.get(item.component, item.component),
+                "strongest candidate": ", ".join(item.columns) or None,
+                "p-value": item.p_value,
                 "reason": item.why,
             }
             for item in result.rejected
@@ -118,9 +123,9 @@ def _numbers(result: LoopResult, leftover: Leftover) -> list[KeyFigure]:
     errors = (result.error_before, result.error_after, result.floor)
     before, after, floor = (f"{1000 * value:.1f} mm" for value in errors)
     return [
-        KeyFigure(before, "error before", "profile without the effects, against the drives"),
-        KeyFigure(after, "error after", "profile with the effects", tone=tone),
-        KeyFigure(floor, "floor", "measured drives against other parts of themselves"),
+        KeyFigure(before, "error before", "of the profile without the effects"),
+        KeyFigure(after, "error after", "of the profile with the effects", tone=tone),
+        KeyFigure(floor, "floor", "between random halves of the measured drives"),
     ]
 
 
@@ -132,7 +137,7 @@ def _finding_row(finding: Finding, timed: bool) -> dict[str, object]:
         "shape": finding.shape,
         "size": size_words(finding),
         **timing,
-        "chance gives as much": chance_words(finding.p_value),
+        "p-value": finding.p_value,
         "error before [mm]": 1000.0 * finding.error_before,
         "error after [mm]": 1000.0 * finding.error_after,
     }
@@ -151,8 +156,8 @@ def _pictures(result: LoopResult, finding: Finding) -> list[_Picture]:
     effect = finding.effects[0] if finding.effects else None
     if isinstance(effect, ColumnEffect):
         caption = (
-            "Left: the fitted effect over the drives' own means with everything else taken out (bars and band: two "
-            "standard errors). Right: what held-out blocks show, by fifths of the effect."
+            "Left: the fitted effect and the measured offsets, less the drives' own means and all other effects (bars "
+            "and band: two standard errors). Right: means of held-out blocks, by fifths of the effect."
         )
         alt = f"Curve of {finding.effect} over measured points, and measured against expected before and after."
         return [_Picture(effect_figure(result, finding), caption, alt)] if finding.cell in result.real else []

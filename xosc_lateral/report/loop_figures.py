@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from xosc_lateral.driver.effects import Acts, ColumnEffect, Product
 from xosc_lateral.evaluation.metrics import METRICS
+from xosc_lateral.evaluation.spectra import gapped_spectrum
 from xosc_lateral.identification.blocks import hold_out_blocks
 from xosc_lateral.identification.close import LoopResult
 from xosc_lateral.identification.findings import Finding
@@ -24,7 +25,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
 
 DRIVES, BEFORE, AFTER = BLUE, MUTED, VERMILLION
 """Measured drives, the profile before and the profile after, in every figure of the loop."""
@@ -41,9 +41,6 @@ FLAT_AXIS_CM = 1.0
 NEGLIGIBLE = 1e-2
 """Share of a column's range that is written as 0. [-]"""
 
-MANY_SEGMENTS = 8
-"""With so many segments without a gap, spectra are taken from these only."""
-
 PANELS = 4
 """Residual panels side by side."""
 
@@ -58,7 +55,7 @@ def residual_figure(result: LoopResult, leftover: Leftover, what: str) -> Figure
         group = f"{what} by {name}"
         place = np.arange(len(result.real[group]))
         floor = 100.0 * CHANCE * leftover.floors[group]
-        axis.fill_between(place, -floor, floor, color=MUTED, alpha=0.2, linewidth=0, label="chance")
+        axis.fill_between(place, -floor, floor, color=MUTED, alpha=0.2, linewidth=0, label="sampling error")
         axis.axhline(0.0, color=MUTED, linewidth=0.6)
         for cells, color, label in ((result.before, BEFORE, "before"), (result.after, AFTER, "after")):
             axis.plot(place, 100.0 * (result.real[group] - cells[group]), "o-", color=color, markersize=3, label=label)
@@ -114,59 +111,20 @@ def draw_spectra(axis: Axes, result: LoopResult, segment: int, *, within_blocks:
     """Measured spectrum with its uncertainty, and the mean of either profile's runs; `segment` in samples."""
     timeline = result.coarse.timeline
     seams = hold_out_blocks(timeline) if within_blocks else timeline.drive
-    frequency, density, number = spectrum(timeline.offset[None], timeline.valid, seams, timeline.step, segment)
+    frequency, density, number = gapped_spectrum(timeline.offset[None], timeline.valid, seams, timeline.step, segment)
     # the mean of so many independent periodograms, which overlap by half
     about = CHANCE / np.sqrt(max(0.75 * number, 1.0))
     low, high = density * np.exp(-about), density * np.exp(about)
     axis.fill_between(frequency, low, high, color=DRIVES, alpha=0.2, linewidth=0)
-    axis.plot(frequency, density, color=DRIVES, label="measured (band: chance)")
+    axis.plot(frequency, density, color=DRIVES, label="measured (band: two standard errors)")
     for runs, color, label, style in (
         (result.runs_before, BEFORE, "profile before", "-"),
         (result.runs_after, AFTER, "profile after", "--"),
     ):
-        frequency, density, _ = spectrum(runs, timeline.valid, seams, timeline.step, segment)
+        frequency, density, _ = gapped_spectrum(runs, timeline.valid, seams, timeline.step, segment)
         axis.plot(frequency, density, color=color, label=label, linestyle=style)
     axis.set_xlabel("frequency [Hz]")
     axis.set_ylabel("power density [m²/Hz]")
-
-
-def spectrum(
-    series: FloatArray, valid: BoolArray, seams: NDArray[np.intp], step: float, segment: int
-) -> tuple[FloatArray, FloatArray, int]:
-    """Welch's estimate over segments that are mostly valid and lie within one part.
-
-    Parameters
-    ----------
-    series : array, shape (runs, n)
-        Gaps are filled with the mean. [m]
-    valid : bool array, shape (n,)
-    seams : int array, shape (n,)
-        Number of the part that a row belongs to: runs are put together from parts, with a jump between them.
-    step : float
-        [s]
-    segment : int
-        Samples.
-
-    Returns
-    -------
-    frequency : array [Hz], density : array [m^2/Hz], number of segments : int
-        Without frequency 0; the density is NaN if no segment is long enough.
-    """
-    centred = np.where(valid, series - series[:, valid].mean(axis=1, keepdims=True), 0.0)
-    window = np.hanning(segment)
-    sums = np.zeros(segment // 2 + 1)
-    starts = np.arange(0, valid.size - segment + 1, segment // 2)
-    shares = np.array([float(valid[first : first + segment].mean()) for first in starts])
-    usable = (shares > 0.8) & (seams[starts] == seams[starts + segment - 1])
-    whole = usable & (shares == 1.0)
-    chosen = np.flatnonzero(whole if whole.sum() >= MANY_SEGMENTS else usable)
-    number = len(chosen)
-    for index in chosen:
-        rows = slice(starts[index], starts[index] + segment)
-        sums += np.mean(np.abs(np.fft.rfft(centred[:, rows] * window, axis=1)) ** 2, axis=0) / shares[index]
-    frequency = np.asarray(np.fft.rfftfreq(segment, step), dtype=np.float64)
-    density = 2.0 * step * sums / number / float(np.sum(window**2)) if number else np.full(len(frequency), np.nan)
-    return frequency[1:], density[1:], number
 
 
 @figure_style()

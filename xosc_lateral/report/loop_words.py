@@ -9,13 +9,13 @@ import numpy as np
 
 from xosc_lateral.driver.effects import Acts, Angular, ColumnEffect, Levels, Magnitude, Product
 from xosc_lateral.identification.close import LoopResult
-from xosc_lateral.identification.feedback import Feedback
+from xosc_lateral.identification.feedback import BAND, Feedback
 from xosc_lateral.identification.findings import Finding
 from xosc_lateral.identification.leftover import GroupError, Leftover
 from xosc_lateral.segment import CONTEXT_UNITS
 
 CERTAIN = 1e-4
-"""Chances below this are extrapolated beyond the null's sample: "certain", and no better known. [-]"""
+"""p-values below this are extrapolated far beyond the null's sample: "certain", and no better known. [-]"""
 
 GAP = "\N{NO-BREAK SPACE}"
 """Between a number and its unit: they stay on one line."""
@@ -33,23 +33,23 @@ HINTS: Mapping[str, str] = MappingProxyType(
 
 LOOKS: Mapping[str, str] = MappingProxyType(
     {
-        "mean": "a column that moves the mean",
-        "between": "a column that goes with the place that different drives keep",
+        "mean": "a column that changes the mean offset",
+        "between": "a column that goes with the mean offset of whole drives",
         "spread": "a column that changes the spread",
         "slow_spread": "a column that changes the spread of slow movement",
         "fine_noise": "a column that changes the fine noise",
-        "restoring": "a column that changes how fast the driver corrects",
-        "variance_trend": "spread that grows or shrinks with time",
-        "regimes": "on/off regimes",
-        "cycle": "a periodic movement",
-        "low_frequency": "a slow drift or a step of the mean",
+        "restoring": "a column that changes the rate of mean reversion",
+        "variance_trend": "a trend of the variance",
+        "regimes": "regimes of small and large spread",
+        "cycle": "a periodic oscillation",
+        "low_frequency": "a slow drift or a step of the mean offset",
     }
 )
 """What is asked of each component."""
 
 _CELLS: Mapping[str, str] = MappingProxyType(
     {
-        "movement by band": "size of the movement by frequency band",
+        "movement by band": "standard deviation by frequency band",
         "spread by time": "spread by sixths of the drive",
         "mean by effect: step 0": "mean before and after it",
     }
@@ -60,24 +60,24 @@ _HIDDEN: Mapping[str, str] = MappingProxyType(
     {
         "periodic": "The car oscillates at a steady frequency, whatever the road and the traffic do.",
         "drift": (
-            "The mean position moves slowly over minutes, without any column that goes along: a driver's mood, or a "
-            "camera whose calibration drifts with temperature."
+            "The mean position drifts over minutes, and no column drifts with it: a change in the driver's habits, "
+            "or a camera whose calibration depends on temperature."
         ),
         "step": (
-            "From one moment on the car keeps to another position in the lane, and no column changes there: a "
-            "camera that was recalibrated, for example, or a change of driver."
+            "From one moment on the car keeps to another position in the lane, and no column changes at that time: a "
+            "recalibrated camera, for example, or a change of driver."
         ),
-        "scale": "The spread about the driver's mean position changes steadily over time, as with fatigue.",
+        "scale": "The spread about the mean position changes steadily over the drive, as with fatigue.",
         "regime": (
-            "The movement switches between two levels of spread, and no column tells when: distraction, for example."
+            "The movement switches between two levels of spread, and no column predicts when: distraction, for example."
         ),
         "memory": (
-            "How the car moves now depends on more than where it was one step ago. The core model is replaced by "
-            "`autoregressive`, which has memory."
+            "How the car moves depends on more than its position one step ago. The core model is replaced by "
+            "`autoregressive`, which has a longer memory."
         ),
         "population": (
-            "The drives are of drivers who keep to different positions and move by different amounts. The refined "
-            "profile draws a driver for every vehicle."
+            "The drivers keep to different positions and move by different amounts. The refined profile draws a driver "
+            "for every vehicle."
         ),
     }
 )
@@ -108,8 +108,8 @@ def size_words(finding: Finding) -> str:
     return f"{what}{size:{sign}.2f}{spread}{GAP}m"
 
 
-def chance_words(p_value: float) -> str:
-    """How often chance alone gives as much, in words."""
+def p_value_words(p_value: float) -> str:
+    """How often tables without the effect show one as strong, in words."""
     if p_value < CERTAIN:
         return "practically never"
     return f"in 1 of {1.0 / p_value:,.0f} tables".replace(",", GAP)
@@ -118,11 +118,11 @@ def chance_words(p_value: float) -> str:
 def when_words(finding: Finding) -> str:
     """Lag and response, or nothing; what goes with whole drives has neither."""
     if finding.lag_s is None or finding.response_s is None:
-        return "It is each drive's usual value that counts, not its changes within a drive." if finding.columns else ""
+        return "What counts is the mean of each drive, not changes within a drive." if finding.columns else ""
     lag = finding.lag_s
-    start = "at once" if abs(lag) < 0.1 else f"{-lag:.1f} s ahead of it" if lag < 0 else f"{lag:.1f} s after it"
-    slow = f", with two thirds of the answer there {finding.response_s:.1f} s later" if finding.response_s > 0 else ""
-    return f"The driver acts {start}{slow}."
+    start = "at once" if abs(lag) < 0.1 else f"{-lag:.1f} s in advance" if lag < 0 else f"{lag:.1f} s later"
+    slow = f", with a response time of {finding.response_s:.1f} s" if finding.response_s > 0 else ""
+    return f"The driver responds {start}{slow}."
 
 
 def meaning(finding: Finding, result: LoopResult) -> str:
@@ -131,11 +131,11 @@ def meaning(finding: Finding, result: LoopResult) -> str:
     words = [
         _column_sentence(finding, effect, result) if isinstance(effect, ColumnEffect) else _hidden_sentence(finding),
         when_words(finding),
-        f"Chance alone gives as much {chance_words(finding.p_value)} (p = {finding.p_value:.1e}).",
+        f"Without this effect, one as strong is found {p_value_words(finding.p_value)} (p = {finding.p_value:.1e}).",
     ]
     if finding.alike:
         names = ", ".join(f"`{name}`" for name in finding.alike)
-        words.append(f"{names} would explain it equally well; these drives do not tell which of them it is.")
+        words.append(f"{names} would explain it equally well; these drives cannot tell which of them it is.")
     measure = _CELLS.get(finding.cell, finding.measure)
     change = f"{_cm(finding.error_before)} before, {_cm(finding.error_after)} now"
     words.append(f"Error of the {measure} on held-out blocks: {change}.")
@@ -144,12 +144,10 @@ def meaning(finding: Finding, result: LoopResult) -> str:
 
 def feedback_words(item: Feedback) -> str:
     """Why a column is no cause, in a sentence."""
-    shares = (
-        f"above 0.2{GAP}Hz, too fast for a driver's answer, it shares {100 * item.coherence:.0f}{GAP}% of its variance"
-    )
+    shared = f"above {BAND[0]:g}{GAP}Hz, where drivers hardly respond, its squared coherence with the {item.of} is"
     told = f"the movement predicts {100 * item.foretold:.0f}{GAP}% of its changes"
     verdict = "it may follow from the car's own movement" if item.doubtful else "it follows from the car's own movement"
-    return f"{shares} with the {item.of}, and {told}: {verdict}"
+    return f"{shared} {item.coherence:.2f}, and {told}: {verdict}"
 
 
 def outcome(result: LoopResult) -> str:
@@ -157,7 +155,7 @@ def outcome(result: LoopResult) -> str:
     if result.returned_base:
         return f"The base profile is returned: {result.returned_base}."
     if not result.findings:
-        return "No effect was found beyond what chance produces, and none was added."
+        return "No significant effect was found, and none was added."
     several = len(result.findings) > 1
     names = "; ".join(f"{finding.effect} ({size_words(finding)})" for finding in result.findings)
     return f"{len(result.findings)} effect{'s' * several} found and added to the profile: {names}."
@@ -222,17 +220,18 @@ def _between(effect: ColumnEffect, result: LoopResult) -> str:
     coarse = result.coarse
     inside = coarse.timeline.valid
     if isinstance(effect, Levels):
-        return f"Where `{effect.column}` is {' or '.join(f'{level:g}' for level in effect.levels)}, beside elsewhere"
+        levels = " or ".join(f"{level:g}" for level in effect.levels)
+        return f"Where `{effect.column}` is {levels}, compared with elsewhere"
     if isinstance(effect, Product):
         return f"From the low to the high end of `{product_label(effect)}` (the middle 90 % of the time)"
     column = effect.columns[0]
     if isinstance(effect, Angular):
-        return f"From the `{column}` that acts least to the one that acts most (the middle 90 % of the time)"
+        return f"From the `{column}` of the weakest to that of the strongest effect (the middle 90 % of the time)"
     seen = coarse.context[column][inside]
     seen = seen[np.isfinite(seen)]
     name = f"`{column}`"
     if isinstance(effect, Magnitude):
-        seen, name = np.abs(seen), f"the size of `{column}`, of either sign,"
+        seen, name = np.abs(seen), f"the magnitude of `{column}`"
     if set(np.unique(seen)) <= {0.0, 1.0}:
         return f"While `{column}` is on"
     low, high = np.quantile(seen, [0.05, 0.95])

@@ -28,19 +28,19 @@ AREAS: Mapping[str, str] = {
 
 INDICATOR_LABELS: Mapping[str, str] = {
     "sdlp": "SDLP",
-    "tlc_min": "least time to line crossing",
+    "tlc_min": "smallest time to line crossing",
     "tlc_median": "median time to line crossing",
-    "beyond_wandering_zone": "beyond the wandering zone (UN R157)",
-    "near_marking": "near a marking",
+    "beyond_wandering_zone": "share of time beyond the wandering zone (UN R157)",
+    "near_marking": "share of time near a marking",
     "lateral_acceleration": "lateral acceleration, rms",
     "lateral_jerk": "lateral jerk, rms",
 }
 
 START_FADE = (
-    "The two-level model fades from the measured start into its own movement over 1 s, which raises diff. std of "
-    "snippets with the same start by about 5 %."
+    "The two-level model fades from the measured start into its own movement within the first second, which raises "
+    "diff. std of snippets with the same start slightly."
 )
-"""Said where that metric is judged. Measured on the motorway recording, with and without the fade."""
+"""Said where that metric is judged: 5 % on the motorway recording, with and without the fade."""
 
 
 def start_fade_note(profile: DriverProfile) -> str:
@@ -65,11 +65,11 @@ def ratio_rows(group: list[ConditionScores]) -> list[dict[str, object]]:
     for family, label in FAMILIES.items():
         if any(family in one.families for one in group):
             cells = {_length(one): _ratio(one, family) for one in group}
-            rows.append({"over the floor": label, **cells})
+            rows.append({"ratio to the floor": label, **cells})
     for key, label in AREAS.items():
         areas = {_length(one): getattr(one, key) for one in group}
         if any(area is not None for area in areas.values()):
-            rows.append({"over the floor": label, **{length: _area(area) for length, area in areas.items()}})
+            rows.append({"ratio to the floor": label, **{length: _area(area) for length, area in areas.items()}})
     return rows
 
 
@@ -81,7 +81,7 @@ def indicator_rows(scores: ConditionScores) -> list[dict[str, object]]:
         beside = scores.named[name]
         rows.append(
             {
-                "indicator": INDICATOR_LABELS[name] + ("" if unit == "-" else f" [{unit}]"),
+                "indicator": INDICATOR_LABELS[name] + ("" if unit == "-" else _bracketed(unit)),
                 "measured": real,
                 "sampled": sampled,
                 "distance [sd]": beside.value,
@@ -93,7 +93,7 @@ def indicator_rows(scores: ConditionScores) -> list[dict[str, object]]:
 
 def realism_lines(realism: Realism) -> list[str]:
     """For the terminal."""
-    lines = ["beside other real drivers (1: as near as they are; AUC 0.5: can't be told apart)"]
+    lines = ["compared with other real drivers (1: as close as they are; AUC 0.5: cannot be told apart)"]
     for heading, group in condition_groups(realism).items():
         lines.append(f"  {heading:46s}" + "".join(f"{_length(one):>18s}" for one in group))
         for row in ratio_rows(group):
@@ -109,10 +109,15 @@ def realism_lines(realism: Realism) -> list[str]:
             lines.append(f"  {label!s:40s}{real:8.4f}  {sampled:9.4f}  {distance:9.3f}  {floor:6.3f}")
     real, made = realism.variance_real, realism.variance_sampled
     lines.append(
-        f"variance between drivers, within, inside 10 s [m2]: measured {real.between:.4f}, {real.within:.4f}, "
-        f"{real.inside:.4f}; sampled {made.between:.4f}, {made.within:.4f}, {made.inside:.4f}"
+        f"variance between drivers, within drivers, inside snippets [m²]: "
+        f"measured {real.between:.4f}, {real.within:.4f}, {real.inside:.4f}; "
+        f"sampled {made.between:.4f}, {made.within:.4f}, {made.inside:.4f}"
     )
     return lines
+
+
+def _bracketed(unit: str) -> str:
+    return f" [{unit.replace('/s2', '/s²').replace('/s3', '/s³')}]"
 
 
 def _length(one: ConditionScores) -> str:

@@ -145,8 +145,8 @@ def _key_figures(enriched: Enriched) -> list[KeyFigure]:
         ),
         KeyFigure(
             f"{added.max():.2f} m/s²",
-            "largest lateral acceleration added",
-            f"over {COMFORTABLE} m/s² in {100.0 * rough:.1f} % of the time; real drivers seldom are, in their lane",
+            "largest added lateral acceleration",
+            f"above {COMFORTABLE} m/s² for {100.0 * rough:.1f} % of the time; real drivers rarely are, in their lane",
             "bad" if rough > SELDOM else "",
         ),
     ]
@@ -168,10 +168,10 @@ def _entity_row(entity: EntityResult) -> dict[str, object]:
         "profile": "" if entity.profile is None else entity.profile.name,
         "segments": len(entity.segments),
         "time [s]": entity.segment_seconds,
-        "spread [m]": entity.offset_spread,
-        "max. [m]": float(np.abs(entity.deviation).max()),
+        "std. deviation [m]": entity.offset_spread,
+        "max. offset [m]": float(np.abs(entity.deviation).max()),
         "acc. rms [m/s²]": float(np.sqrt(np.mean(added**2))),
-        "max. [m/s²]": float(added.max()),
+        "acc. max. [m/s²]": float(added.max()),
         f"> {COMFORTABLE} m/s² [%]": 100.0 * float(np.mean(added > COMFORTABLE)),
         "jerk rms [m/s³]": float(np.sqrt(np.mean(jerk**2))),
     }
