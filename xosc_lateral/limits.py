@@ -50,7 +50,9 @@ class Limit:
 
 
 FILE_SIZE = Limit(4000, "MB", "size of an input file", "a day of 60 channels at 50 Hz as text; larger logs are split")
-PACKING_RATIO = Limit(200, "", "unpacked bytes per byte of a file", "measured tables pack 3 to 30 times, bombs 1000")
+PACKING_RATIO = Limit(
+    200, "", "unpacked bytes per byte of a file", "measured tables shrink 3 to 30 times, decompression bombs 1000 times"
+)
 UNPACKED_UNASKED = Limit(100, "MB", "unpacked size that needs no such ratio", "takes a second, and little memory")
 UNPACKED_SIZE = Limit(4000, "MB", "unpacked size of a gz, zip or Parquet file", "as for a file that is not packed")
 TABLE_CELLS = Limit(250e6, "", "cells of a table", "2 GB as doubles: 24 h at 50 Hz with 57 columns")
@@ -68,7 +70,7 @@ VALUE = Limit(10_000, "", "characters of a parameter's value", "each reference m
 PARAMETER_SETS = Limit(100_000, "", "parameter sets of one distribution", "a day of conversions on two cores")
 COMBINATIONS = Limit(1_000_000, "", "combinations of parameters tried", "constraints may leave some out")
 DISTRIBUTION_TIME = Limit(120, "s", "time to draw the parameter sets of a distribution", "100 000 take seconds")
-VARIANTS = Limit(10_000, "", "variants of one scenario", "more tell nothing new")
+VARIANTS = Limit(10_000, "", "variants of one scenario", "more add no information")
 BATCH_JOBS = Limit(1_000_000, "", "outputs of one batch", "1 GB of plans; a database that large is converted in parts")
 DECIMAL_EXPONENT = Limit(30, "", "decimal exponent of a range's numbers", "exact arithmetic writes out every digit")
 

@@ -177,7 +177,7 @@ def test_without_the_plug_in_its_kinds_are_unknown(installed: dict[str, list[Ent
 @pytest.mark.parametrize(
     ("value", "message"),
     [
-        ("tests.driver.test_plugins:NO_EFFECT", "plug-in odd: tests.driver.test_plugins:NO_EFFECT is no effect"),
+        ("tests.driver.test_plugins:NO_EFFECT", "plug-in odd: tests.driver.test_plugins:NO_EFFECT is not an effect"),
         ("xosc_lateral.driver.effects:Drift", "plug-in odd: there is an effect of the kind 'drift' already"),
     ],
     ids=["no effect", "taken"],

@@ -238,7 +238,7 @@ def test_provenance_is_inside_and_a_second_conversion_is_refused(tmp_path: Path)
     assert provenance_of(etree.fromstring(scenario.source)) is None
     again = read_scenario(tmp_path / "out.xosc")
     assert "seed 3" in again.header.description
-    with pytest.raises(FormatError, match="was written by xosc-lateral already"):
+    with pytest.raises(FormatError, match="was converted by xosc-lateral already"):
         converted(again, tmp_path / "again.xosc")
     assert not (tmp_path / "again.xosc").exists()
 

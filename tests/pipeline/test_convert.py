@@ -69,7 +69,7 @@ def test_same_inputs_and_seed_give_the_same_bytes_and_another_seed_does_not(tmp_
 
 def test_a_converted_file_is_not_converted_again(tmp_path: Path, profile: str) -> None:
     conversion = _convert(tmp_path, "cut-in", profile)
-    with pytest.raises(FormatError, match=r"written by xosc-lateral already; convert cut-in\.xosc instead"):
+    with pytest.raises(FormatError, match=r"converted by xosc-lateral already; convert cut-in\.xosc instead"):
         convert_scenario(conversion.output, tmp_path / "twice.xosc", ConvertSettings(profile=profile))
     assert not (tmp_path / "twice.xosc").exists()
 

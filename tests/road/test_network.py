@@ -241,7 +241,7 @@ def test_a_place_off_the_road_or_nowhere_does_not_pass_quietly():
         network.lane_to_world([0, -1], -1, 5.0)
     with pytest.raises(ValueError, match="must be finite, found nan"):
         network.lane_to_world(0, -1, [1.0, np.nan])
-    with pytest.raises(ValueError, match="is no coordinate"):
+    with pytest.raises(ValueError, match="is not a coordinate"):
         network.world_to_lane([0.0, np.inf], 0.0)
 
 

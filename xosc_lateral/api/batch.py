@@ -216,7 +216,7 @@ class BatchResult(Result):
         """Of this batch's outputs, sorted."""
         manifest = self.folder / MANIFEST
         if not manifest.is_file():
-            raise FormatError("is gone, and with it what became of single outputs", path=manifest)
+            raise FormatError("is gone, so what became of single outputs is not known", path=manifest)
         for row in read_manifest(manifest):
             if row.output in self._became:
                 yield _row(*self._became[row.output], row)

@@ -200,7 +200,7 @@ class ProfileList(Result):
     def headline(self) -> str:
         """One line."""
         broken = sum(entry.profile is None for entry in self.entries)
-        return f"{len(self.names)} profiles{f', {broken} that can not be read' if broken else ''}"
+        return f"{len(self.names)} profiles{f', {broken} that cannot be read' if broken else ''}"
 
     def __str__(self) -> str:
         from xosc_lateral.report.cards import list_text

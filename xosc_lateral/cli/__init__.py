@@ -95,7 +95,8 @@ def main(argv: Sequence[str] | None = None) -> int:
             code = 1
     except (typer.Abort, KeyboardInterrupt):
         print(
-            "\nxosc-lateral: stopped; what was written is whole, the rest is not there. Run it again.", file=sys.stderr
+            "\nxosc-lateral: interrupted; files that were written are complete. Run it again for the rest.",
+            file=sys.stderr,
         )
         code = 130
     except Exception as error:

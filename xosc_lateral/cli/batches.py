@@ -43,7 +43,8 @@ def convert_batch(
         result = convert_many(list(inputs), output, on_outcome=tell, **settings)
     except KeyboardInterrupt:
         typer.echo(
-            f"\nxosc-lateral: stopped; {finished} finished in {output} are kept: the same command goes on", err=True
+            f"\nxosc-lateral: interrupted; {finished} outputs in {output} are finished, and the same command continues",
+            err=True,
         )
         raise typer.Exit(130) from None
     if as_json:

@@ -13,7 +13,7 @@ def register(app: typer.Typer) -> None:
     """Add the verb to the command line."""
     benchmark = typer.Typer(help="Compare lateral models from the literature.", no_args_is_help=True)
     epilog = examples("benchmark realism drives.parquet -o board/")
-    benchmark.command("realism", short_help="Rank lateral models by measured drives.", epilog=epilog)(realism)
+    benchmark.command("realism", short_help="Rank lateral models on measured drives.", epilog=epilog)(realism)
     app.add_typer(benchmark, name="benchmark", short_help="Compare lateral models from the literature.")
 
 
@@ -21,25 +21,27 @@ def realism(
     tables: Tables,
     output: Annotated[
         str | None,
-        typer.Option("--output", "-o", metavar="FOLDER/", help="Write board.json, board.md, board.html there."),
+        typer.Option("--output", "-o", metavar="FOLDER/", help="Folder for board.json, board.md and board.html."),
     ] = None,
     model: Annotated[list[str] | None, typer.Option(metavar="NAME", help="Only these models; may be repeated.")] = None,
     profile: Annotated[
         list[str] | None,
         typer.Option(
-            "--profile", "-p", metavar="NAME|PATH", help="A profile of your own beside them; may be repeated."
+            "--profile", "-p", metavar="NAME|PATH", help="Also score this profile of your own; may be repeated."
         ),
     ] = None,
     seed: Seed = 0,
-    resamples: Annotated[int, typer.Option(help="Of the vehicles, for the intervals.", min=10, max=10_000)] = 200,
-    classify: Annotated[bool, typer.Option(help="Train classifiers too (extra `board`; minutes).")] = True,
+    resamples: Annotated[
+        int, typer.Option(help="Bootstrap resamples of the drives, for the intervals.", min=10, max=10_000)
+    ] = 200,
+    classify: Annotated[bool, typer.Option(help="Also train classifiers (extra `board`; takes minutes).")] = True,
     columns: Columns = None,
     library: Library = None,
     force: Force = False,
     quiet: Quiet = False,
     as_json: AsJson = False,
 ) -> None:
-    """Fit every model on half of the drives, score it on the other half: distances, floors, intervals, ranks."""
+    """Fit every model to half of the drives and rank it on the other half: distances, floors, intervals."""
     from xosc_lateral.api.benchmark import benchmark_realism, board_files
     from xosc_lateral.baselines.catalogue import MODELS
     from xosc_lateral.formats.targets import claim

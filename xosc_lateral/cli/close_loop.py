@@ -16,7 +16,7 @@ def register(app: typer.Typer) -> None:
         "close-loop drives.csv.gz -o refined.json --report loop/",
         "close-loop drives.csv.gz -p motorway-car -o refined.json --report loop/",
     )
-    app.command("close-loop", short_help="What a profile lacks, found and added.", epilog=epilog)(close_loop)
+    app.command("close-loop", short_help="Find and add what a profile lacks.", epilog=epilog)(close_loop)
 
 
 def close_loop(

@@ -42,7 +42,8 @@ def convert(
     scenario: Annotated[
         list[str],
         typer.Argument(
-            help="Maneuver-based scenario (.xosc). A folder, a glob, a table or several: a batch.", show_default=False
+            help="Maneuver-based scenario (.xosc); several files, a folder, a glob or a table: a batch.",
+            show_default=False,
         ),
     ],
     output: Annotated[
@@ -71,7 +72,7 @@ def convert(
     ] = None,
     parameter: Annotated[
         list[str] | None,
-        typer.Option("--set", metavar="NAME=VALUE", help="Value of a scenario parameter; may be repeated."),
+        typer.Option("--set", metavar="NAME=VALUE", help="Set a scenario parameter; may be repeated."),
     ] = None,
     library: Library = None,
     mode: Annotated[
@@ -91,7 +92,9 @@ def convert(
     ] = None,
     road: Road = None,
     road_path: RoadPath = None,
-    resample: Annotated[int, typer.Option(help="Attempts, as long as vehicles touch or leave their lane.", min=1)] = 1,
+    resample: Annotated[
+        int, typer.Option(help="Attempts at most, while vehicles collide or leave their lane.", min=1)
+    ] = 1,
     time_limit: TimeLimit = 60.0,
     with_: With = None,
     jobs: Annotated[int, typer.Option(help="Batch: number of processes; -1: one per core.")] = 1,
@@ -103,7 +106,8 @@ def convert(
     ] = JOB_MEMORY.value,
     cluster: Annotated[str | None, typer.Option(metavar="ADDRESS", help="Batch: address of a dask scheduler.")] = None,
     strict: Annotated[
-        bool, typer.Option("--strict", help="Exit with 1 on warnings, a missing vehicle catalog, nobody enriched.")
+        bool,
+        typer.Option("--strict", help="Exit with 1 on warnings, a missing vehicle catalog, or no entity enriched."),
     ] = False,
     log_json: Annotated[bool, typer.Option("--log-json", help="Batch: progress as JSON lines on stderr.")] = False,
     force: Force = False,
@@ -189,7 +193,7 @@ def _convert_one(
 
     if output == STDOUT:
         if variants > 1 or as_json:
-            raise typer.BadParameter("standard output takes one scenario, and nothing beside it", param_hint="-o -")
+            raise typer.BadParameter("standard output takes a single scenario and no other output", param_hint="-o -")
         result = convert(source, None, report=report, **settings)
         write_stdout(result.data)
         say(result, as_json=False, quiet=quiet, aside=True)

@@ -12,7 +12,7 @@ from xosc_lateral.cli.words import AsJson, Columns, Force, Library, Profile, Qui
 def register(app: typer.Typer) -> None:
     """Add the verb to the command line."""
     epilog = examples("evaluate drives.csv.gz -p mine.json --report evaluation.html")
-    app.command("evaluate", short_help="How true a profile is to measured drives.", epilog=epilog)(evaluate)
+    app.command("evaluate", short_help="Score a profile on measured drives.", epilog=epilog)(evaluate)
 
 
 def evaluate(
@@ -27,7 +27,7 @@ def evaluate(
     quiet: Quiet = False,
     as_json: AsJson = False,
 ) -> None:
-    """Score a profile on measured drives, beside other real drivers: distances, lane keeping, spectrum, classifiers."""
+    """Score a profile on measured drives and on a floor of other real drivers: metrics, spectrum, classifiers."""
     from xosc_lateral import evaluate
     from xosc_lateral.api.convert import REPORT_SUFFIXES
     from xosc_lateral.formats.targets import claim, file_target

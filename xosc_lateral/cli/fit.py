@@ -15,7 +15,7 @@ def register(app: typer.Typer) -> None:
         "fit drives.csv.gz -o mine.json",
         "fit monday.csv tuesday.csv -o profiles/ --name anna --map speed=v_kmh:km/h",
     )
-    app.command("fit", short_help="Measured drives into a profile.", epilog=epilog)(fit)
+    app.command("fit", short_help="Fit a profile to measured drives.", epilog=epilog)(fit)
 
 
 def _known_model(text: str) -> str:
@@ -38,7 +38,7 @@ def fit(
         typer.Option(
             parser=_known_model,
             metavar="[two-level|autoregressive|PLUG-IN]",
-            help="two-level: Neis and Beyerer; autoregressive: ours (formerly best).",
+            help="two-level: Neis and Beyerer; autoregressive: the default (formerly best).",
         ),
     ] = "autoregressive",
     columns: Columns = None,

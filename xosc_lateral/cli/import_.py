@@ -11,7 +11,7 @@ from typer.core import TyperGroup
 
 from xosc_lateral.cli.words import AsJson, Force, Quiet, examples, pairs, say_json, write_stdout
 
-Source = Annotated[Path, typer.Argument(metavar="SOURCE", help="What to read.", show_default=False)]
+Source = Annotated[Path, typer.Argument(metavar="SOURCE", help="File or folder to read.", show_default=False)]
 Output = Annotated[
     str, typer.Option("--output", "-o", metavar="TABLE", help="Drive table: .parquet, .csv, .csv.gz, folder/, - .")
 ]
@@ -34,7 +34,7 @@ def register(app: typer.Typer) -> None:
     formats.command("tracks", short_help="Tracks on an OpenDRIVE road.", epilog=tracks_example)(tracks)
     commonroad_example = examples("import commonroad DEU_A9-1_1_T-1.xml -o drives.parquet")
     formats.command("commonroad", short_help="CommonRoad scenarios.", epilog=commonroad_example)(commonroad)
-    app.add_typer(formats, name="import", short_help="Recordings into drive tables.", no_args_is_help=True)
+    app.add_typer(formats, name="import", short_help="Convert recordings into drive tables.", no_args_is_help=True)
 
 
 def dlr_ht(
@@ -63,7 +63,7 @@ def levelx(
     quiet: Quiet = False,
     as_json: AsJson = False,
 ) -> None:
-    """HighD or exiD: a folder of recordings, or one XX_tracks.csv with its two meta files beside it."""
+    """Recordings of highD or exiD: a folder, or one XX_tracks.csv with its two meta files beside it."""
     _import("levelx", [source], output, {"keep_cut": keep_cut}, force, quiet, as_json)
 
 
@@ -87,7 +87,7 @@ def mf4(
     quiet: Quiet = False,
     as_json: AsJson = False,
 ) -> None:
-    """ASAM MDF bus logs (extra `mdf`): need a channel map, since signal names differ from car to car."""
+    """ASAM MDF bus logs (extra `mdf`). They need a channel map, since signal names differ from car to car."""
     from xosc_lateral.formats.importers.mf4 import channels_wanted
 
     if not channels:

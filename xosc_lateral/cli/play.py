@@ -27,7 +27,7 @@ EXAMPLES = examples(
 
 def register(app: typer.Typer) -> None:
     """Add the verb to the command line."""
-    app.command("play", short_help="Nominal motion as a table.", epilog=EXAMPLES)(play)
+    app.command("play", short_help="Write the nominal motion as a table.", epilog=EXAMPLES)(play)
 
 
 def play(
@@ -39,7 +39,7 @@ def play(
     time_limit: TimeLimit = 60.0,
     parameter: Annotated[
         list[str] | None,
-        typer.Option("--set", metavar="NAME=VALUE", help="Value of a scenario parameter; may be repeated."),
+        typer.Option("--set", metavar="NAME=VALUE", help="Set a scenario parameter; may be repeated."),
     ] = None,
     allow: Annotated[
         list[Path] | None, typer.Option(help="Folder that roads and catalogs may be read from; may be repeated.")

@@ -11,24 +11,32 @@ from xosc_lateral.cli.words import AsJson, Force, Library, Quiet, Seed, examples
 
 Name = Annotated[str, typer.Argument(metavar="NAME|PATH", help="Driver profile.", show_default=False)]
 Names = Annotated[list[str], typer.Argument(metavar="NAME|PATH...", help="Driver profiles.", show_default=False)]
-Page = Annotated[str | None, typer.Option(metavar="PAGE.html", help="Also write it as a page.")]
-Tags = Annotated[list[str] | None, typer.Option("--tag", metavar="TAG", help="May be repeated.")]
+Page = Annotated[str | None, typer.Option(metavar="PAGE.html", help="Also write a page with figures.")]
+Tags = Annotated[list[str] | None, typer.Option("--tag", metavar="TAG", help="Tag to add; may be repeated.")]
 Fields = Annotated[
     list[str] | None,
-    typer.Option("--set", metavar="FIELD=VALUE", help="version, driver, vehicle, road, country, date or licence."),
+    typer.Option(
+        "--set", metavar="FIELD=VALUE", help="Metadata: version, driver, vehicle, road, country, date or licence."
+    ),
 ]
 
 HELP = {
-    "list": ("All profiles, or those with a tag.", examples("profiles list --tag truck --where country=DE")),
-    "show": ("One profile's card.", examples("profiles show motorway-car --report card.html")),
+    "list": ("List profiles.", examples("profiles list --tag truck --where country=DE")),
+    "show": ("Show one profile's card.", examples("profiles show motorway-car --report card.html")),
     "compare": (
-        "Several side by side; which are alike.",
+        "Compare several profiles.",
         examples("profiles compare motorway-car motorway-truck --report compared.html"),
     ),
-    "add": ("Put one into a library.", examples("profiles add mine.json --library team/ --tag truck --set country=DE")),
+    "add": (
+        "Add a profile to a library.",
+        examples("profiles add mine.json --library team/ --tag truck --set country=DE"),
+    ),
     "tag": ("Change tags and metadata.", examples("profiles tag mine --library team/ --tag night --remove day")),
-    "export": ("Write profiles elsewhere.", examples("profiles export motorway-car motorway-truck -o for-a-friend/")),
-    "check": ("What is wrong in a library.", examples("profiles check --library team/")),
+    "export": (
+        "Copy profiles, to pass them on.",
+        examples("profiles export motorway-car motorway-truck -o for-a-friend/"),
+    ),
+    "check": ("Check a library for broken files.", examples("profiles check --library team/")),
 }
 
 
@@ -39,19 +47,22 @@ def register(app: typer.Typer) -> None:
         name = verb.__name__.rstrip("_")
         short, epilog = HELP[name]
         profiles.command(name, short_help=short, epilog=epilog)(verb)
-    app.add_typer(profiles, name="profiles", short_help="The library of drivers.")
+    app.add_typer(profiles, name="profiles", short_help="The library of driver profiles.")
 
 
 def list_(
     library: Library = None,
-    tags: Tags = None,
+    tags: Annotated[
+        list[str] | None, typer.Option("--tag", metavar="TAG", help="Only profiles with this tag; may be repeated.")
+    ] = None,
     where: Annotated[
-        list[str] | None, typer.Option(metavar="FIELD=VALUE", help="Only with this; may be repeated.")
+        list[str] | None,
+        typer.Option(metavar="FIELD=VALUE", help="Only profiles with this value, e.g. country=DE; may be repeated."),
     ] = None,
     quiet: Quiet = False,
     as_json: AsJson = False,
 ) -> None:
-    """Ids, models and sources of all profiles; a file that can't be read is said in a line."""
+    """List all profiles with model and source, and name files that cannot be read."""
     from xosc_lateral import list_profiles
 
     found = list_profiles(library or (), tags=tags or (), where=pairs(where, "--where"))
@@ -89,11 +100,11 @@ def compare(
     quiet: Quiet = False,
     as_json: AsJson = False,
 ) -> None:
-    """Compare profiles, and say which are alike."""
+    """Compare profiles, and show which cannot be told apart."""
     from xosc_lateral import compare_profiles
 
     if len(names) < 2:
-        raise typer.BadParameter("two profiles at least", param_hint="NAME|PATH...")
+        raise typer.BadParameter("at least two profiles are needed", param_hint="NAME|PATH...")
     compared = compare_profiles(*names, seed=seed, library=library or ())
     if report is not None:
         compared.write_report(report, force=force)
@@ -102,8 +113,8 @@ def compare(
 
 def add(
     name: Name,
-    library: Annotated[Path, typer.Option(metavar="FOLDER", help="Where to; made if it is missing.")],
-    called: Annotated[str | None, typer.Option("--name", help="Its id there; else its own.")] = None,
+    library: Annotated[Path, typer.Option(metavar="FOLDER", help="Folder of the library; created if missing.")],
+    called: Annotated[str | None, typer.Option("--name", help="Id in the library; default: its own.")] = None,
     tags: Tags = None,
     fields: Fields = None,
     force: Force = False,
@@ -124,7 +135,7 @@ def tag(
     name: Name,
     library: Library = None,
     tags: Tags = None,
-    remove: Annotated[list[str] | None, typer.Option(metavar="TAG", help="Take it away; may be repeated.")] = None,
+    remove: Annotated[list[str] | None, typer.Option(metavar="TAG", help="Tag to remove; may be repeated.")] = None,
     fields: Fields = None,
     quiet: Quiet = False,
     as_json: AsJson = False,
@@ -144,7 +155,9 @@ def tag(
 
 def export(
     names: Names,
-    output: Annotated[str, typer.Option("--output", "-o", help="File, folder/, or - for one.", show_default=False)],
+    output: Annotated[
+        str, typer.Option("--output", "-o", help="One profile: file or -; several: folder/.", show_default=False)
+    ],
     library: Library = None,
     force: Force = False,
     quiet: Quiet = False,
@@ -170,7 +183,7 @@ def export(
 
 
 def check(library: Library = None, quiet: Quiet = False, as_json: AsJson = False) -> None:
-    """Read every profile of the library; exit 1 if one is broken, foreign, or not called as its file."""
+    """Read every profile of the library; exit with 1 if one cannot be read or its id is not its file's name."""
     from xosc_lateral import list_profiles
 
     found = list_profiles(library or ())

@@ -31,7 +31,7 @@ def register(app: typer.Typer) -> None:
         "sample -p motorway-car --duration 600 --speed 33 --seed 1 -o offsets.csv",
         "sample -p mine.json --like drives.parquet --snippet 10 -o snippets.parquet",
     )
-    app.command("sample", short_help="Offsets alone, as a table.", epilog=epilog)(sample)
+    app.command("sample", short_help="Sample offsets alone, as a table.", epilog=epilog)(sample)
 
 
 def sample(

@@ -21,7 +21,7 @@ def segments(
     time_limit: TimeLimit = 60.0,
     parameter: Annotated[
         list[str] | None,
-        typer.Option("--set", metavar="NAME=VALUE", help="Value of a scenario parameter; may be repeated."),
+        typer.Option("--set", metavar="NAME=VALUE", help="Set a scenario parameter; may be repeated."),
     ] = None,
     allow: Annotated[
         list[Path] | None, typer.Option(help="Folder that roads and catalogs may be read from; may be repeated.")

@@ -15,18 +15,18 @@ EXAMPLES = examples("view cut-in.xosc", "view cut-in_lifelike.xosc -o pages/", "
 
 def register(app: typer.Typer) -> None:
     """Add the verb to the command line."""
-    app.command("view", short_help="A scenario in the browser.", epilog=EXAMPLES)(view)
+    app.command("view", short_help="Play a scenario in the browser.", epilog=EXAMPLES)(view)
 
 
 def view(
     scenario: Annotated[Path, typer.Argument(help="Any scenario (.xosc), converted or not.", show_default=False)],
     output: Annotated[
         str | None,
-        typer.Option("--output", "-o", help="Page (.html) or recording (.mcap); else NAME_view.html beside it."),
+        typer.Option("--output", "-o", help="Page (.html) or recording (.mcap); default: NAME_view.html beside it."),
     ] = None,
     parameter: Annotated[
         list[str] | None,
-        typer.Option("--set", metavar="NAME=VALUE", help="Value of a scenario parameter; may be repeated."),
+        typer.Option("--set", metavar="NAME=VALUE", help="Set a scenario parameter; may be repeated."),
     ] = None,
     allow: Annotated[
         list[Path] | None, typer.Option(help="Folder that roads and catalogs may be read from; may be repeated.")
@@ -38,7 +38,7 @@ def view(
     force: Force = False,
     quiet: Quiet = False,
 ) -> None:
-    """Play a scenario in the browser: one self-contained page, without any lateral movement added."""
+    """Play any scenario in the browser, on one self-contained page; adds no lateral movement."""
     from xosc_lateral import play
 
     played = play(scenario, time_limit=time_limit, parameters=pairs(parameter, "--set"), allow=allow or ())

@@ -49,7 +49,9 @@ class Part(StrEnum):
     SENSOR = "sensor"
 
 
-With = Annotated[list[Part] | None, typer.Option("--with", help="sensor: add the sensor error of the fitted drives.")]
+With = Annotated[
+    list[Part] | None, typer.Option("--with", help="sensor: add the error of the sensor that measured the drives.")
+]
 
 
 def examples(*lines: str) -> str:

@@ -81,9 +81,9 @@ class Bound:
     def __str__(self) -> str:
         """For a remark."""
         return (
-            f"sampled movement could not be driven ({self.before.seldom:.2f} m/s2 to the side in 0.1 % of the time, "
-            f"{self.before.largest:.2f} m/s2 and {self.before.jerk:.1f} m/s3 at most): smoothed over "
-            f"{self.width:.1f} s, now {self.after.seldom:.2f}, {self.after.largest:.2f} m/s2 and "
+            f"sampled movement could not be driven (lateral acceleration above {self.before.seldom:.2f} m/s2 for 0.1 % "
+            f"of the time, at most {self.before.largest:.2f} m/s2, jerk at most {self.before.jerk:.1f} m/s3): smoothed "
+            f"over {self.width:.1f} s, now {self.after.seldom:.2f} m/s2, {self.after.largest:.2f} m/s2 and "
             f"{self.after.jerk:.1f} m/s3"
         )
 
@@ -145,8 +145,8 @@ def _coarse_steps(profile: DriverProfile) -> list[str]:
     if sensor is None or not is_too_coarse(sensor.rounding, sensor.driver_variance + sensor.sensor_variance):
         return []
     return [
-        f"the offsets come in steps of {sensor.rounding:.3g} m, too coarse to tell driver and sensor apart: "
-        f"{profile.name} holds rounding as driving"
+        f"the offsets are rounded to {sensor.rounding:.3g} m, too coarse to separate driver and sensor: "
+        f"{profile.name} contains the rounding as movement of the driver"
     ]
 
 
@@ -158,14 +158,15 @@ def _strained(profile: DriverProfile) -> list[str]:
     found = strain(sample_offsets(profile, segment, 1), profile.model.step, speed)
     if found.excess > 1.0:
         return [
-            f"what {profile.name} writes could not be driven at 30 m/s: {found.seldom:.2f} m/s2 to the side in 0.1 % "
-            f"of the time (comfort ends at {float(comfort(speed[:1])[0]):.2f}), {found.largest:.1f} m/s2 and "
-            f"{found.jerk:.1f} m/s3 at most (limits {LIMIT:g} and {JERK_LIMIT:g}, UN R79); convert will smooth it"
+            f"movement of {profile.name} could not be driven at {speed[0]:g} m/s: lateral acceleration above "
+            f"{found.seldom:.2f} m/s2 for 0.1 % of the time (comfort limit {float(comfort(speed[:1])[0]):.2f}), "
+            f"at most {found.largest:.1f} m/s2, jerk at most {found.jerk:.1f} m/s3 (UN R79: {LIMIT:g} and {JERK_LIMIT:g}); "
+            "convert will smooth it"
         ]
     if found.seldom > TRAFFIC:
         return [
-            f"{profile.name} moves to the side with {found.seldom:.2f} m/s2 in 0.1 % of the time; real motorway "
-            "traffic stays below 0.3: look at the sensor that the drives were measured by"
+            f"lateral acceleration of {profile.name} is above {found.seldom:.2f} m/s2 for 0.1 % of the time, twice "
+            "that of real motorway traffic or more: check the sensor that measured the drives"
         ]
     return []
 

@@ -1,4 +1,4 @@
-"""Measured drives into a profile."""
+"""Fit a profile to measured drives."""
 
 from __future__ import annotations
 

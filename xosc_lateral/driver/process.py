@@ -170,7 +170,7 @@ class DriveProcess:
             self._core = self._model.stream(child(self._seed, DriveSeed.CORE), _start(start, width, terms))
             self.state.core = self._core.state
         elif start is not None:
-            raise ValueError("a drive that goes on can't start anew")
+            raise ValueError("a drive that continues from a state has no start")
         coarse, fine = self._take_core(self._core, len(width), terms.rate)
         mean = self._core.mean
         moved = coarse if terms.spread is None else mean + terms.spread * (coarse - mean)

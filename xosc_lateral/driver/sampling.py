@@ -68,7 +68,7 @@ class OffsetSampler:
             return np.empty(0)
         terms = self._terms(segment)
         if start is not None and self._process.has_begun:
-            raise ValueError("a drive that goes on can't start anew")
+            raise ValueError("a drive that continues from a state has no start")
         prepare(n)
         offset = np.empty(n)
         for first in range(0, n, BLOCK):

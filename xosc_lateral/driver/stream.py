@@ -107,14 +107,14 @@ class OffsetStream:
         """
         self._check(context)
         if self._looked or self._samples:
-            raise ValueError("recall what was before the drive before looking ahead and before the first step")
+            raise ValueError("`recall` comes before `look` and before the first `step`")
         self._recalled += 1
         self._see(context, before=True)
 
     def look(self, context: Mapping[str, float]) -> None:
         """Context from time 0 on, at the stream's rate: `preview_steps` calls before the first `step`, or none."""
         if self._samples or self._looked >= self.preview_steps:
-            raise ValueError(f"look {self.preview_steps} steps ahead, before the first step")
+            raise ValueError(f"`look` takes {self.preview_steps} steps, before the first `step`")
         if self._looked % self._factor == 0:
             self._check(context)
             self._take(context)
@@ -180,7 +180,7 @@ class OffsetStream:
     def _begin(self, context: Mapping[str, float]) -> None:
         """Before the first step: what was not looked at is taken to be like the first context."""
         if self._looked not in (0, self.preview_steps):
-            raise ValueError(f"looked {self._looked} steps ahead; {self.preview_steps} or none")
+            raise ValueError(f"`look` was given {self._looked} steps, expected {self.preview_steps} or none")
         if not self._looked:
             for _ in range(self._ahead):
                 self._take(context)

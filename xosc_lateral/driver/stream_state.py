@@ -97,7 +97,7 @@ def upgraded(state: Mapping[str, Any], profile: DriverProfile) -> dict[str, Any]
         If it is no state of a stream, of a newer version, or not what was written: nobody edits a generator's state.
     """
     if not isinstance(state, Mapping) or state.get("format") != FORMAT:
-        raise DriverProfileError(f'no state of an offset stream: "format" is not "{FORMAT}"')
+        raise DriverProfileError(f'not a state of an offset stream: "format" is not "{FORMAT}"')
     version = state.get("version", 1)
     if version not in (1, VERSION):
         raise DriverProfileError(

@@ -32,7 +32,7 @@ def upgraded(values: object) -> dict[str, Any]:
         If the file is none of ours, or of a newer version.
     """
     if not isinstance(values, Mapping) or values.get("format") != FORMAT:
-        raise DriverProfileError(f'no driver profile: "format" is not "{FORMAT}"')
+        raise DriverProfileError(f'not a driver profile: "format" is not "{FORMAT}"')
     version = values.get("version")
     if not isinstance(version, int) or isinstance(version, bool) or version < 1:
         raise DriverProfileError(f"version {version!r}, expected a whole number from 1")

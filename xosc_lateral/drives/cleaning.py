@@ -99,7 +99,7 @@ def _in_order(columns: dict[str, FloatArray], name: str, path: Path) -> dict[str
     steps = np.diff(columns["time"])
     if len(steps) and np.median(steps) > MAX_STEP:
         raise FormatError(
-            f"drive {name}: rows are {np.median(steps):.4g} s apart (median), at most {MAX_STEP} s can give 5 Hz; "
+            f"drive {name}: rows are {np.median(steps):.4g} s apart (median), 5 Hz needs at most {MAX_STEP} s; "
             "if the clock is in milliseconds: --map time=COLUMN:ms",
             path=path,
             element="column 'time'",

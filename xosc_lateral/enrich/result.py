@@ -161,7 +161,7 @@ class Enriched:
     def warnings(self) -> tuple[str, ...]:
         """What a user has to know, a line each."""
         lines = [
-            f"{a} and {b} touch at {gap.time:.1f} s (nominally they don't)"
+            f"{a} and {b} touch at {gap.time:.1f} s (in the nominal motion they do not)"
             for gap in self.new_contacts
             for a, b in [gap.names]
         ]
@@ -170,8 +170,8 @@ class Enriched:
             for departure in self.departures
         ]
         lines += [
-            f"{entity.name} jumps {length:.1f} m at {time:.1f} s, as nominally: the lane that it follows closes, or "
-            "its road has a gap; a lane change before would be driven"
+            f"{entity.name} jumps {length:.1f} m at {time:.1f} s, as in the nominal motion: the lane that it follows "
+            "ends, or its road has a gap; a lane change before it would avoid that"
             for entity in self.entities
             for time, length in leaps(entity.motion)
         ]

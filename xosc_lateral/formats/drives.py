@@ -123,7 +123,7 @@ def drives_of_table(
     found = [drive for drive in drives if drive is not None]
     if not found:
         raise NotEnoughDataError(
-            f"{path}: no drive holds two rows with time, offset and lane width; {MIN_RUN:g} s are needed"
+            f"{path}: no drive has two rows with time, offset and lane width; {MIN_RUN:g} s are needed"
         )
     return found
 

@@ -64,7 +64,7 @@ def read_profile(name_or_path: str | Path, folders: Iterable[str | Path] = ()) -
     path = find_profile(name_or_path, folders)
     values = parse_json(read_source(path, PROFILE_SIZE).data, path)
     try:
-        with foreign_errors(path, "no driver profile"):
+        with foreign_errors(path, "not a driver profile"):
             profile = DriverProfile.from_dict(values)
             check_profile(profile)
             return profile

@@ -93,7 +93,7 @@ def foreign_errors(path: Path, what: str) -> Iterator[None]:
     except XoscLateralError:
         raise
     except MemoryError as error:
-        raise FormatError(f"{what}: it takes more memory than there is", path=path) from error
+        raise FormatError(f"{what}: not enough memory to read it", path=path) from error
     except Exception as error:  # readers of binary formats raise anything, damaged bytes being what they are
         said = " ".join(str(error).split())[:LONGEST_MESSAGE]
         raise FormatError(f"{what}: {said or type(error).__name__}", path=path) from error

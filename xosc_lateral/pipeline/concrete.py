@@ -74,7 +74,7 @@ def _one(request: Request, scenario: Path, index: int, values: ParameterSet) -> 
     source, parameter = found
     number = values.get(parameter, "")
     if not number.isdecimal() or int(number) < 1:
-        raise FormatError(f"{parameter} '{number[:20]}' is no number from 1 on", path=request.scenario)
+        raise FormatError(f"{parameter} '{number[:20]}' is not a whole number from 1 on", path=request.scenario)
     boundary = Boundary(scenario.parent, allowed_roots(scenario, request.settings.allowed))
     path = boundary.inside(source, Place(str(scenario), None, "provenance"))
     if not path.is_file():

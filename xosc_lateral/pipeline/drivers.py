@@ -26,8 +26,8 @@ SHIPPED_BY_CLASS = {
 
 NO_DRIVER = {
     VehicleCategory.TRAILER: "a trailer has no driver",
-    VehicleCategory.TRAIN: "a train has no lane to wander in",
-    VehicleCategory.TRAM: "a tram has no lane to wander in",
+    VehicleCategory.TRAIN: "a train is bound to its track",
+    VehicleCategory.TRAM: "a tram is bound to its track",
     VehicleCategory.BICYCLE: "there is no profile for bicycles; name one with --entity",
 }
 """Vehicles that "auto" leaves alone, and why."""

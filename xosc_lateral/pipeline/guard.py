@@ -119,14 +119,14 @@ class _Watch:
 
     def _exceeded(self) -> str:
         if time.monotonic() - self._begin > self._limits.timeout:
-            return f"took longer than {self._limits.timeout:g} s; a longer time is set by --job-timeout"
+            return f"took longer than {self._limits.timeout:g} s; --job-timeout raises the limit"
         if _resident() - self._resident > 1e6 * self._limits.memory:
             return _too_much(self._limits)
         return ""
 
 
 def _too_much(limits: JobLimits) -> str:
-    return f"took more than {limits.memory:g} MB of memory; more is allowed by --job-memory"
+    return f"took more than {limits.memory:g} MB of memory; --job-memory raises the limit"
 
 
 @contextmanager

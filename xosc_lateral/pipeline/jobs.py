@@ -240,7 +240,7 @@ def _jobs(
             output = numbered(named, number, request.variants)
             name = printable(output.as_posix())
             if name != output.as_posix():
-                error = error or f"{printable(str(source))}: the file's name is no UTF-8; rename it"
+                error = error or f"{printable(str(source))}: the file's name is not valid UTF-8; rename it"
             yield Job(
                 name=name,
                 scenario=printable(Path(os.path.relpath(source, base)).as_posix()),

@@ -55,7 +55,7 @@ def _open_locked(path: Path) -> IO[str]:
             holder = _holder(file)
             file.close()
             raise FolderInUseError(
-                f"{path.parent.parent}: another run ({holder}) writes into this folder; wait for it, or choose another"
+                f"{path.parent.parent}: another run ({holder}) is writing into this folder; wait for it, or use another"
             )
         try:
             if os.path.samestat(os.fstat(file.fileno()), path.stat()):

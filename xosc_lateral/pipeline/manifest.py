@@ -222,7 +222,7 @@ def read_timings(path: Path) -> dict[str, float]:
     try:
         return {str(values["output"]): float(values["seconds"]) for values in _read_table(path)}
     except (TypeError, ValueError, KeyError) as error:
-        raise FormatError(f"no timings of this package: {error}", path=path) from error
+        raise FormatError(f"not a timings file of this package: {error}", path=path) from error
 
 
 def _packed(row: ManifestRow) -> dict[str, Any]:

@@ -22,7 +22,7 @@ def as_text(conversion: Conversion, report: Path | None = None) -> str:
         else:
             lines.append(f"  {entity.name}: as in the scenario ({entity.why})")
     if conversion.provenance.with_sensor:
-        lines.append("  offsets hold the sensor error of the drives that the profiles were fitted on")
+        lines.append("  offsets include the sensor error of the drives that the profiles were fitted to")
     lines += [f"  note: {note.what}" for note in conversion.enriched.motion.notes]
     lines += [f"  warning: {warning}" for warning in conversion.warnings]
     if report is not None:

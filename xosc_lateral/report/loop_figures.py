@@ -169,7 +169,7 @@ def _draw_curve(axis: Axes, result: LoopResult, effect: ColumnEffect) -> None:
         )  # fmt: skip
     axis.set_title("The effect")
     axis.set_xlabel(_quantity_label(effect))
-    axis.set_ylabel("shift of the mean [m], + is left" if effect.acts is Acts.LOCATION else "factor [-]")
+    axis.set_ylabel("shift of the mean [m], positive to the left" if effect.acts is Acts.LOCATION else "factor [-]")
     axis.locator_params(axis="x", nbins=6)
     axis.legend()
 

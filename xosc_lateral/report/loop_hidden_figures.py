@@ -63,7 +63,7 @@ def weave_figure(result: LoopResult, finding: Finding) -> Figure:
     low, high = max(0.0, line - SURROUNDINGS_HZ), line + SURROUNDINGS_HZ
     axis.set_xlim(low, high)
     _fit_height(axis, low, high)
-    label = f"fitted weave: {line:.3f} Hz, once in {effect.period_s:.1f} s"
+    label = f"fitted oscillation: {line:.3f} Hz, once in {effect.period_s:.1f} s"
     axis.axvline(line, color=ORANGE, linewidth=6.0, alpha=0.4, zorder=0, label=label)
     axis.legend()
     return figure
@@ -105,7 +105,14 @@ def regime_figure(result: LoopResult, finding: Finding) -> Figure:
     loud = on > 0.5
     top = float(course.measured.max()) * 1.05
     axis.fill_between(
-        course.time, 0.0, top, where=list(loud), color=ORANGE, alpha=0.3, linewidth=0, label="loud more likely than not"
+        course.time,
+        0.0,
+        top,
+        where=list(loud),
+        color=ORANGE,
+        alpha=0.3,
+        linewidth=0,
+        label="large spread more likely than not",
     )
     axis.set_ylim(0.0, top)
     axis.set_ylabel(f"spread within {REGIME_S:.0f} s [m]")
@@ -113,7 +120,7 @@ def regime_figure(result: LoopResult, finding: Finding) -> Figure:
     axis = axes[1, 0]
     axis.plot(course.time, _gapped(course, on), color=ORANGE, linewidth=0.8)
     axis.set_ylim(-0.03, 1.03)
-    axis.set_ylabel("loud is on [-]")
+    axis.set_ylabel("probability of large spread [-]")
     axis.set_xlabel("time [s]")
     return figure
 
@@ -128,7 +135,7 @@ def mean_figure(result: LoopResult, finding: Finding) -> Figure:
     _draw_course(axis, course)
     word = "step" if isinstance(finding.effects[0], Step) else "drift"
     axis.plot(course.time, hidden + course.measured.mean(), color=ORANGE, linewidth=2.0, label=f"fitted {word}")
-    axis.set_ylabel(f"mean over {MEAN_S / 60:.0f} min [m], + is left")
+    axis.set_ylabel(f"mean over {MEAN_S / 60:.0f} min [m], positive to the left")
     axis.legend()
     return figure
 
@@ -140,7 +147,7 @@ def drivers_figure(result: LoopResult, finding: Finding) -> Figure:
     for axis, values, label in zip(
         axes[0],
         by_drive(result, LEAST_S),
-        ("mean offset of a drive [m], + is left", "spread of a drive [m]"),
+        ("mean offset of a drive [m], positive to the left", "spread of a drive [m]"),
         strict=True,
     ):
         for name, color in (("measured", DRIVES), ("before", BEFORE), ("after", AFTER)):
@@ -167,8 +174,8 @@ def memory_figure(result: LoopResult, finding: Finding) -> Figure:
         axis.plot(place, cells[cell] / result.real[cell], "o-", color=color, label=label)
     axis.axhline(1.0, color=DRIVES, label="measured")
     axis.set_xticks(place, labels)
-    axis.set_xlabel("movement between averaging times")
-    axis.set_ylabel("size over the measured [-]")
+    axis.set_xlabel("averaging times that the movement lies between")
+    axis.set_ylabel("std. deviation / measured [-]")
     axis.legend()
     return figure
 
@@ -193,13 +200,25 @@ def quantiles_figure(result: LoopResult) -> Figure:
 
 DRAWINGS: Mapping[str, tuple[Callable[[LoopResult, Finding], Figure], str]] = MappingProxyType(
     {
-        Weave.kind: (weave_figure, "Power density about the weave: a line that the profile before does not have."),
-        GrowingSpread.kind: (spread_figure, "How widely the car moves, over the drive; orange: the fitted course."),
-        Regimes.kind: (regime_figure, "How widely the car moves, with the stretches that the model takes for loud."),
+        Weave.kind: (
+            weave_figure,
+            "Power spectral density about the fitted oscillation, a peak that the profile before does not have.",
+        ),
+        GrowingSpread.kind: (spread_figure, "Spread over the drive; orange: the fitted trend."),
+        Regimes.kind: (
+            regime_figure,
+            "Local spread over the drive; shaded: the regime of large spread is more likely than not.",
+        ),
         Step.kind: (mean_figure, "Mean position over the drive; orange: the fitted step."),
         Drift.kind: (mean_figure, "Mean position over the drive; orange: the fitted drift."),
-        "memory": (memory_figure, "Size of the movement by pace: 1 is as large as measured."),
-        "population": (drivers_figure, "How much the drives differ in place (left) and in spread (right)."),
+        "memory": (
+            memory_figure,
+            "Standard deviation of the movement by averaging time, relative to the measured one.",
+        ),
+        "population": (
+            drivers_figure,
+            "Distribution over the drives of the mean offset (left) and the spread (right).",
+        ),
     }
 )
 """By kind of effect, or of finding: what draws it, and the caption."""

@@ -238,4 +238,4 @@ def _refuse_nan(arrays: Sequence[FloatArray]) -> None:
     for array in arrays:
         if not np.isfinite(array).all():
             i = int(np.flatnonzero(~np.isfinite(array))[0])
-            raise ValueError(f"point {i}: {array[i]} is no coordinate")
+            raise ValueError(f"point {i}: {array[i]} is not a coordinate")

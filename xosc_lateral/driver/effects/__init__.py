@@ -69,7 +69,7 @@ def known_effects() -> tuple[type[Effect], ...]:
     for entry in entry_points(group=ENTRY_POINTS):
         effect = entry.load()
         if not (isinstance(effect, type) and issubclass(effect, Effect)):
-            raise DriverProfileError(f"plug-in {entry.name}: {entry.value} is no effect")
+            raise DriverProfileError(f"plug-in {entry.name}: {entry.value} is not an effect")
         if effect.kind in {known.kind for known in found}:
             raise DriverProfileError(f"plug-in {entry.name}: there is an effect of the kind {effect.kind!r} already")
         found.append(effect)

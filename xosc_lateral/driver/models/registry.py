@@ -64,7 +64,7 @@ def known_models() -> dict[str, KnownModel]:
     for plugin in entry_points(group=ENTRY_POINTS):
         entry = plugin.load()
         if not (isinstance(entry, KnownModel) and issubclass(entry.model, CoreModel)):
-            raise DriverProfileError(f"plug-in {plugin.name}: {plugin.value} is no KnownModel")
+            raise DriverProfileError(f"plug-in {plugin.name}: {plugin.value} is not a KnownModel")
         kind = entry.model.kind
         if kind in known:
             raise DriverProfileError(f"plug-in {plugin.name}: there is a model of the kind {kind!r} already")

@@ -87,8 +87,8 @@ class SensorModel(Record, frozen=True):
         """How the measured variance is split, in a sentence."""
         low, high = self.driver_share
         return (
-            f"of the measured variance {100 * self.share:.1f} % is the driver's (95 %: {100 * low:.1f} to "
-            f"{100 * high:.1f} %), the rest the sensor's ({np.sqrt(self.sensor_variance):.3f} m rms)"
+            f"{100 * self.share:.1f} % of the measured variance is the driver's (95 % interval: {100 * low:.1f} to "
+            f"{100 * high:.1f} %), the rest is sensor error ({np.sqrt(self.sensor_variance):.3f} m rms)"
         )
 
     def density(self, frequency: FloatArray) -> FloatArray:

@@ -123,7 +123,7 @@ def _sure_part(lane: LaneCentre) -> LaneCentre:
     s = np.arange(lane.start, lane.end, 10.0)
     first, last = _longest(lane.standard_error(s) <= MAX_ERROR)
     if last <= first:
-        raise NotEnoughDataError(f"a lane centre is nowhere known to {MAX_ERROR:g} m (standard error)")
+        raise NotEnoughDataError(f"no lane centre is known anywhere to within {MAX_ERROR:g} m (standard error)")
     return replace(lane, start=float(s[first]), end=float(s[last - 1]))
 
 

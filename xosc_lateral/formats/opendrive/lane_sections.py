@@ -55,7 +55,7 @@ def _read_all(road: XmlElement, length: float, source: Source) -> list[_Written]
     for element in elements:
         start = source.number(element, "s")
         if start >= length and by_start:
-            source.note(f"lane section at s={start:g} m, behind the road's end at {length:g} m, left out", element)
+            source.note(f"lane section at s={start:g} m, beyond the road's end at {length:g} m, left out", element)
             continue
         if start in by_start:
             source.note(f"second lane section at s={start:g} m replaces the first", element)
@@ -65,7 +65,7 @@ def _read_all(road: XmlElement, length: float, source: Source) -> list[_Written]
         return [_Written(0.0, (), (), ())]
     sections = list(by_start.values())
     if sections[0].start > 0.0:
-        source.note(f"first lane section starts at s={sections[0].start:g} m: taken to hold from 0", elements[0])
+        source.note(f"first lane section starts at s={sections[0].start:g} m: taken to start at 0", elements[0])
     sections[0] = replace(sections[0], start=0.0)
     return sections
 

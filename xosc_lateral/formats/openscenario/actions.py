@@ -52,7 +52,7 @@ def read_actions(owner: Element, name: str, context: Context) -> list[Action]:
     scope = owner.scope.local_values()
     contents = [owner] if owner.tag == "UserDefinedAction" else list(_contents(owner))
     if not contents:
-        owner.fail("holds no action")
+        owner.fail("contains no action")
     actions = []
     for element in contents:
         reader = readers.get(element.tag)

@@ -73,7 +73,7 @@ class Catalogs:
     def _search(self, catalog: str, reference: Element) -> Path:
         """By file name in every location, as the reference player does; then by the name inside; then near by."""
         if not catalog or any(separator in catalog for separator in "/\\\0"):
-            reference.fail(f"'{catalog[:60]}' is no catalog name")
+            reference.fail(f"'{catalog[:60]}' is not a catalog name")
         refused: FormatError | None = None
         folders: list[Path] = []
         for written, place in self.locations.values():

@@ -84,7 +84,7 @@ def _read_condition(element: Element, context: Context) -> Condition:
         kind = owner.child()
         readers = {**VALUE_CONDITIONS}
     if kind is None:
-        owner.fail("holds no condition")
+        owner.fail("contains no condition")
     reader = readers.get(kind.tag)
     content = reader(kind, context) if reader else Unsupported(kind.tag, kind.place())
     delay = element.number("delay", 0.0)
@@ -131,7 +131,7 @@ def _end_of_road(e: Element, _: Context) -> EntityCondition:
 def _collision(e: Element, context: Context) -> EntityCondition:
     reference, by_type = e.child("EntityRef"), e.child("ByType")
     if reference is None and by_type is None:
-        e.fail("holds neither EntityRef nor ByType")
+        e.fail("contains neither EntityRef nor ByType")
     return CollisionCondition(
         e.place(),
         None if reference is None else context.entity(reference),
@@ -269,7 +269,7 @@ def _simulation_time(e: Element, _: Context) -> ValueCondition:
 def _time_of_day(e: Element, _: Context) -> ValueCondition:
     moment = read_date_time(e)
     if moment is None:
-        e.fail(f"dateTime='{e.text('dateTime')}' is no date and time")
+        e.fail(f"dateTime='{e.text('dateTime')}' is not a date and time")
     return TimeOfDayCondition(moment, _rule(e), e.place())
 
 

@@ -194,7 +194,7 @@ def _deterministic(owner: Element) -> Deterministic:
         elif item.tag == "DeterministicSingleParameterDistribution":
             parts.append(_single(item))
         else:
-            item.fail("is no deterministic distribution")
+            item.fail("is not a deterministic distribution")
     return Deterministic(tuple(parts))
 
 

@@ -100,7 +100,7 @@ class Element:
         if math.isnan(value) or (finite and math.isinf(value)):
             self.fail(f"{name}='{text[:60]}' is not finite")
         if finite and abs(value) > LARGEST:
-            self.fail(f"{name}='{text[:60]}' is beyond anything on earth (at most {LARGEST:g})")
+            self.fail(f"{name}='{text[:60]}' is implausibly large (at most {LARGEST:g})")
         return value
 
     def number(self, name: str, default: float | None = None, *, finite: bool = True) -> float:

@@ -62,7 +62,7 @@ def _read_object(item: Element, context: Context, name: str | None = None) -> li
         item.fail("attribute 'name' is empty")
     content = item.child(*CATEGORIES, "CatalogReference")
     if content is None:
-        item.fail("holds neither Vehicle, Pedestrian, MiscObject nor CatalogReference")
+        item.fail("contains no Vehicle, Pedestrian, MiscObject or CatalogReference")
     if content.tag == "CatalogReference":
         try:
             content = context.catalogs.entry(content)

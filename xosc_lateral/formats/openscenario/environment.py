@@ -44,7 +44,7 @@ def _time_of_day(element: Element | None, context: Context) -> TimeOfDay | None:
         return None
     moment = read_date_time(element)
     if moment is None:
-        context.remark(element, f"dateTime='{element.text('dateTime')}' is no date and time")
+        context.remark(element, f"dateTime='{element.text('dateTime')}' is not a date and time")
         return None
     return TimeOfDay(moment, element.boolean("animation", False))
 

@@ -47,7 +47,7 @@ def read_position(owner: Element, context: Context) -> Position:
     """The position inside an element of type Position (``Position``, ``TargetPosition`` ...)."""
     content = owner.child()
     if content is None:
-        owner.fail("holds no position")
+        owner.fail("contains no position")
     reader = _POSITIONS.get(content.tag)
     if reader is None:
         return Unsupported(content.tag, content.place())
@@ -84,7 +84,7 @@ def read_trajectory(owner: Element, context: Context) -> Trajectory:
     shape_owner = trajectory.required("Shape")
     content = shape_owner.child()
     if content is None:
-        shape_owner.fail("holds no shape")
+        shape_owner.fail("contains no shape")
     reader = _SHAPES.get(content.tag)
     context.enter(content)
     shape = Unsupported(content.tag, content.place()) if reader is None else reader(content, context)

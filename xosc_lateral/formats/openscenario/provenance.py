@@ -55,7 +55,7 @@ def refuse_converted(root: etree._Element, path: object) -> None:
     hint = f"; convert {beside[0]} instead" if len(beside) == 1 else "; convert its source instead"
     header = root.find("{*}FileHeader")
     line = None if header is None else line_of(header)
-    raise FormatError(f"was written by xosc-lateral already{hint}", path=path, line=line, element="FileHeader")
+    raise FormatError(f"was converted by xosc-lateral already{hint}", path=path, line=line, element="FileHeader")
 
 
 def _comment_safe(text: str) -> str:

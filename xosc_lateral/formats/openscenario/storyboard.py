@@ -104,7 +104,7 @@ def _read_event(element: Element, context: Context) -> Event:
     for item in element.children("Action"):
         contents = list(item.children("PrivateAction", "GlobalAction", "UserDefinedAction"))
         if not contents and item.child() is not None:
-            item.fail("holds neither PrivateAction, GlobalAction nor UserDefinedAction")
+            item.fail("contains no PrivateAction, GlobalAction or UserDefinedAction")
         for content in contents:
             actions.extend(read_actions(content, item.text("name", ""), context))
     return Event(

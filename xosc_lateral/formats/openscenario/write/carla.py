@@ -167,11 +167,13 @@ def _note_ways(losses: Losses, motion: NominalMotion, name: str) -> None:
     entity = next(entity for entity in motion.entities if entity.name == name)
     there = (entity.activity & Activity.ACTIVE) != 0
     if not there[0]:
-        losses.note(f"'{name}' is there from the start, where it appears later: ScenarioRunner can't add it")
+        losses.note(
+            f"'{name}' is present from the start instead of appearing later: ScenarioRunner cannot add entities"
+        )
     if (entity.speed[there] < 0.0).any():
         losses.note(f"'{name}' drives backwards, and is turned round by ScenarioRunner")
     for item in [item for item in losses.root.iter("{*}EntityAction") if item.get("entityRef") == name]:
-        losses.action(item, "ScenarioRunner's control does without no car: all are there from start to end")
+        losses.action(item, "ScenarioRunner needs every car that it controls from start to end")
 
 
 def _entities(losses: Losses, scenario: Scenario, converted: Sequence[str]) -> None:

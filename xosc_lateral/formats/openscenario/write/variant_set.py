@@ -99,7 +99,7 @@ def write_variant_set(variants: Sequence[Path], files: VariantFiles, source: str
     try:
         _compare(root, roots, difference)
     except _NotAlikeError as error:
-        raise FormatError(f"is no variant of the same scenario ({error})", path=variants[0]) from error
+        raise FormatError(f"is not a variant of the same scenario ({error})", path=variants[0]) from error
     facts = dict(provenance_of(roots[0]) or {})
     facts |= {"variant": None, "variants": len(roots), SOURCE: [source, number]}
     _unmark(root, header)
