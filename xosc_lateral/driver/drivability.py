@@ -160,8 +160,8 @@ def _strained(profile: DriverProfile) -> list[str]:
         return [
             f"movement of {profile.name} could not be driven at {speed[0]:g} m/s: lateral acceleration above "
             f"{found.seldom:.2f} m/s2 for 0.1 % of the time (comfort limit {float(comfort(speed[:1])[0]):.2f}), "
-            f"at most {found.largest:.1f} m/s2, jerk at most {found.jerk:.1f} m/s3 (UN R79: {LIMIT:g} and {JERK_LIMIT:g}); "
-            "convert will smooth it"
+            f"at most {found.largest:.1f} m/s2, jerk at most {found.jerk:.1f} m/s3 "
+            f"(UN R79: {LIMIT:g} and {JERK_LIMIT:g}); convert will smooth it"
         ]
     if found.seldom > TRAFFIC:
         return [
