@@ -96,7 +96,7 @@ def test_report_is_one_page_with_violins_and_the_same_bytes_each_time(table, pro
         pages.append((tmp_path / name).read_text(encoding="utf-8"))
     assert pages[0] == pages[1]
     assert pages[0].count("<svg") == 7, "traces, four evaluations, spectrum, autocorrelation"
-    assert "real" in pages[0] and "artificial" in pages[0] and "drives.parquet" in pages[0]
+    assert "measured" in pages[0] and "sampled" in pages[0] and "drives.parquet" in pages[0]
     assert not re.search(r"\bsrc=|@import", pages[0].split("<script>")[0]) and 'href="http' not in pages[0], (
         "opens offline"
     )

@@ -23,6 +23,9 @@ FloatArray = NDArray[np.float64]
 SHOWN_DRIVERS, SHOWN_S = 6, 120.0
 """Sample paths that are drawn, and their length. [s]"""
 
+TICK_M = 0.5
+"""Between the ticks of offsets. [m]"""
+
 
 def card_page(profile: DriverProfile, seed: int = 0) -> str:
     """HTML page; same profile and seed, same bytes.
@@ -65,12 +68,15 @@ def card_page(profile: DriverProfile, seed: int = 0) -> str:
 
 @figure_style()
 def _paths(runs: FloatArray, step: float) -> Figure:
+    from matplotlib.ticker import MultipleLocator
+
     figure, axes = new_panels(min(SHOWN_DRIVERS, len(runs)), sharex=True, sharey=True, panel_height=0.6)
     for number, (axis, run) in enumerate(zip(axes[:, 0], runs, strict=False), start=1):
         shown = run[: round(SHOWN_S / step) + 1]
         axis.plot(step * np.arange(len(shown)), shown, color=SAMPLED, label=f"driver {number}")
         axis.axhline(0.0, color=GRID, linewidth=0.8)
         axis.set_title(f"Driver {number}")
+    axes[0, 0].yaxis.set_major_locator(MultipleLocator(TICK_M))
     axes[len(axes) // 2, 0].set_ylabel("offset [m]")
     axes[-1, 0].set_xlabel("time [s]")
     return figure

@@ -55,21 +55,21 @@ def trace_figure(scores: ProfileScores) -> Figure:
 
 @figure_style()
 def violin_figure(evaluation: PartEvaluation) -> Figure:
-    """Ten pairs of half violins, real beside artificial, with bars at minimum, mean and maximum."""
+    """Ten pairs of half violins, measured beside sampled, with bars at minimum, mean and maximum."""
     figure, axes = new_figure(2, 5, height=5.0)
     for k, name in enumerate(METRICS):
         axis = axes[k // 5, k % 5]
         for values, side, color, name_ in (
-            (evaluation.real[:, k], -1.0, MEASURED, "real"),
-            (evaluation.artificial[:, k], 1.0, SAMPLED, "artificial"),
+            (evaluation.real[:, k], -1.0, MEASURED, "measured"),
+            (evaluation.artificial[:, k], 1.0, SAMPLED, "sampled"),
         ):
             _half_violin(axis, values, side, color, name_)
         axis.set_title(LABELS[name])
-        axis.set_xticks([-0.5, 0.5], ["real", "artificial"])
+        axis.set_xticks([-0.5, 0.5], ["measured", "sampled"], fontsize=8.0)
         axis.set_xlim(-1.15, 1.15)
         axis.grid(False, axis="x")
         if k % 5 == 0:
-            axis.set_ylabel("m")
+            axis.set_ylabel("[m]")
     return figure
 
 

@@ -17,10 +17,15 @@ if TYPE_CHECKING:
 SHOWN_DRIVES, SHOWN_S = 3, 120.0
 """Drives that are drawn, and the longest stretch of each. [-], [s]"""
 
+TICK_M = 0.5
+"""Between the ticks of offsets. [m]"""
+
 
 @figure_style()
 def traces_figure(result: LoopResult) -> Figure:
     """The longest uninterrupted stretches of a few drives: measured, profile before, profile after, on one scale."""
+    from matplotlib.ticker import MultipleLocator
+
     timeline = result.coarse.timeline
     stretches = longest_stretches(result)
     columns = (
@@ -35,6 +40,7 @@ def traces_figure(result: LoopResult) -> Figure:
             axis.plot(timeline.time[rows] - timeline.time[rows.start], offset[rows], color=color, label=label)
             axis.axhline(0.0, color=GRID, linewidth=0.8)
             axis.set_title(f"{name}, {label}")
+    axes[0, 0].yaxis.set_major_locator(MultipleLocator(TICK_M))
     axes[len(stretches) // 2, 0].set_ylabel("offset [m]")
     for axis in axes[-1]:
         axis.set_xlabel("time [s]")
