@@ -5,7 +5,7 @@ python benchmarks/give_way.py WHEEL
 
 from __future__ import annotations
 
-import sys
+import argparse
 from pathlib import Path
 
 import numpy as np
@@ -46,7 +46,9 @@ def side_by_side(source: Path) -> tuple[pd.DataFrame, pd.DataFrame]:
 
 def main() -> None:
     """Print both distributions."""
-    pairs, rows = side_by_side(Path(sys.argv[1]))
+    ask = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    ask.add_argument("wheel", type=Path, metavar="WHEEL")
+    pairs, rows = side_by_side(ask.parse_args().wheel)
     free = pairs["apart"] - 0.5 * (pairs["width"] + pairs["width_left"])
     real = free + pairs["offset_left"] - pairs["offset"]
     n = 20 * len(pairs)

@@ -8,7 +8,7 @@ Without a table the profiles are fitted to simulated offsets.
 
 from __future__ import annotations
 
-import sys
+import argparse
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -67,7 +67,9 @@ def sampled(profile: DriverProfile, segment: Segment) -> Callable[[], object]:
 
 
 def main() -> None:
-    tables = [Path(word) for word in sys.argv[1:]]
+    ask = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    ask.add_argument("tables", nargs="*", type=Path, metavar="DRIVE_TABLE")
+    tables = ask.parse_args().tables
     begin = time.process_time()
     drives = read_drives(tables) if tables else []
     read = time.process_time() - begin

@@ -1,13 +1,17 @@
 """The documentation is true: pages run as shown from an empty folder, commands exist, links lead somewhere.
 
 Blocks marked ``sh`` and ``python`` of the pages in `RUN` are run in order, as a new user would from the page alone.
-Blocks marked ``text`` are for other programs, or take too long; their commands are only looked up.
+Blocks marked ``text`` are for other programs, or take too long: commands of this project in them, and in the running
+text, are run up to where the work would begin.
 """
 
 from __future__ import annotations
 
+import argparse
 import re
+import runpy
 import shlex
+import sys
 from importlib.util import find_spec
 from pathlib import Path
 from urllib.parse import unquote
@@ -19,7 +23,7 @@ from xosc_lateral.cli import app, main
 
 ROOT = Path(__file__).resolve().parents[2]
 DOCS = ROOT / "docs"
-PAGES = sorted(path.relative_to(ROOT).as_posix() for path in [*DOCS.rglob("*.md"), ROOT / "README.md"])
+PAGES = sorted(path.relative_to(ROOT).as_posix() for path in [*DOCS.rglob("*.md"), *ROOT.glob("*.md")])
 RUN = (
     "quickstart.md",
     "tutorials/scenario_engineer.md",
@@ -28,19 +32,17 @@ RUN = (
     "tutorials/researcher.md",
     "how_to/effect.md",
     "how_to/importer.md",
+    "how_to/carla.md",
+    "how_to/esmini.md",
+    "how_to/osi.md",
+    "pipeline.md",
+    "api.md",
 )
 BLOCK = re.compile(r"^```(\w*)\n(.*?)^```", flags=re.DOTALL | re.MULTILINE)
 
 
 def blocks(page: str) -> list[tuple[str, str]]:
     return BLOCK.findall((ROOT / page).read_text(encoding="utf-8"))
-
-
-def commands(page: str) -> list[str]:
-    """Lines that call the command line, in blocks of any kind but Python's."""
-    lines = [line for kind, text in blocks(page) if kind != "python" for line in text.replace("\\\n", " ").splitlines()]
-    lines = [line.split("  #")[0].strip() for line in lines]
-    return [line for line in lines if line.startswith("xosc-lateral ")]
 
 
 def run_line(line: str) -> None:
@@ -68,21 +70,72 @@ def test_page_runs_as_shown(page, tmp_path, monkeypatch):
         assert written.exists() or list(written.parent.glob(f"{written.stem}_*{written.suffix}")), target
 
 
-@pytest.mark.parametrize("page", PAGES)
-def test_commands_and_options_exist(page):
-    root = get_command(app)
-    for line in commands(page):
-        words = shlex.split(re.split(r"\s[|>]\s", line)[0])[1:]
-        if words[0].isupper() or words[0].startswith("-"):
-            continue  # `xosc-lateral VERB --help`
-        command = root.commands[words.pop(0)]
-        if hasattr(command, "commands") and words and not words[0].startswith("-"):
-            command = command.commands[words.pop(0)]
-        known = {name for option in command.params for name in (*option.opts, *option.secondary_opts)} | {
-            "--help",
-            "-h",
-        }
-        assert {word.split("=")[0] for word in words if re.match(r"--?[a-z]", word)} <= known, line
+class BegunError(Exception):
+    """The arguments are read and checked; the work would begin."""
+
+
+def begun_commands() -> list[tuple[str, str]]:
+    """Commands of this project that no test runs whole: in blocks for other programs or long work, and in the text."""
+    found = []
+    for page in PAGES:
+        run = page == "README.md" or page.removeprefix("docs/") in RUN
+        kinds = ("text",) if run else ("", "sh", "text")
+        lines = [line.split("  #")[0] for kind, text in blocks(page) if kind in kinds for line in text.splitlines()]
+        prose = BLOCK.sub("", (ROOT / page).read_text(encoding="utf-8"))
+        lines += re.findall(r"`((?:python|make) [^`]+)`", prose)
+        found += [(page, line.strip()) for line in lines if re.match(r"(xosc-lateral|python|make) ", line)]
+    return sorted(set(found))
+
+
+@pytest.mark.parametrize(("page", "line"), begun_commands())
+def test_a_command_that_takes_long_is_accepted(page, line, tmp_path, monkeypatch):
+    """Its program exists and takes every option and value; the work itself is left to other tests."""
+    program, *words = shlex.split(re.split(r"\s[|>]\s", line)[0].replace("...", ""))
+    if program == "make":
+        makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
+        assert re.search(rf"^{re.escape(words[0])}:[^\n]*\n\t", makefile, flags=re.MULTILINE), f"no target {words[0]}"
+    elif program == "python":
+        begin_script(words, monkeypatch)
+    else:
+        monkeypatch.chdir(tmp_path)
+        parse_verb(words)
+
+
+def begin_script(words: list[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    """Run a benchmark or an example until its arguments are parsed; of others, look whether they are there."""
+    if words[0] == "-m" and not words[1].startswith("benchmarks."):
+        assert words[1] == "build" or find_spec(words[1])
+        assert all((ROOT / word).exists() for word in words if word.startswith("tests/"))
+        return
+    if words[0] == "scenario_runner.py":  # CARLA's
+        return
+    parse = argparse.ArgumentParser.parse_args
+
+    def stop(parser, *given, **named):
+        parse(parser, *given, **named)
+        raise BegunError
+
+    monkeypatch.setattr(argparse.ArgumentParser, "parse_args", stop)
+    monkeypatch.setattr(sys, "argv", words[1:] if words[0] == "-m" else words)
+    monkeypatch.syspath_prepend(str(ROOT))
+    with pytest.raises(BegunError):
+        if words[0] == "-m":
+            runpy.run_module(words[1], run_name="__main__")
+        else:
+            monkeypatch.syspath_prepend(str((ROOT / words[0]).parent))
+            runpy.run_path(str(ROOT / words[0]), run_name="__main__")
+
+
+def parse_verb(words: list[str]) -> None:
+    """Let the command line read the words as it would, values and file names included."""
+    for word in words:
+        if Path(word).suffix and not word.startswith("-"):
+            Path(word).parent.mkdir(parents=True, exist_ok=True)
+            Path(word).touch()
+    command = get_command(app)
+    while hasattr(command, "commands"):
+        command = command.commands[words.pop(0)]
+    command.make_context(command.name, words)
 
 
 @pytest.mark.parametrize("page", PAGES)

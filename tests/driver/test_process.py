@@ -78,7 +78,7 @@ def test_a_drive_can_not_go_back_nor_start_twice(profile: DriverProfile) -> None
     offsets(process, [50])
     with pytest.raises(ValueError, match="row 10 of a drive that has gone on to row 49"):
         process.hidden_terms_at(np.arange(10, 20))
-    with pytest.raises(ValueError, match="can't start anew"):
+    with pytest.raises(ValueError, match="has no start"):
         process.take(EffectTerms(), WIDTH[:1], 0.1)
 
 

@@ -208,7 +208,7 @@ def test_the_state_of_another_profile_is_refused() -> None:
     state = OffsetStream(make_profile(), 1).to_dict()
     with pytest.raises(DriverProfileError, match="another profile"):
         OffsetStream.from_dict(make_profile(Drift(size=0.1)), state)
-    with pytest.raises(DriverProfileError, match="no state"):
+    with pytest.raises(DriverProfileError, match="not a state"):
         OffsetStream.from_dict(make_profile(), {})
 
 
@@ -272,7 +272,7 @@ def test_wrong_use_is_refused() -> None:
         OffsetStream(profile, 1, rate=24.0)
     stream = OffsetStream(profile, 1)
     stream.look({})
-    with pytest.raises(ValueError, match="looked 1 steps ahead; 7 or none"):
+    with pytest.raises(ValueError, match="given 1 steps, expected 7 or none"):
         stream.step({})
     stream = OffsetStream(profile, 1)
     stream.step({})

@@ -136,7 +136,7 @@ BAD = {
     "one marking": (table().drop(columns="distance_left"), FormatError, "needs distance_left and distance_right, or"),
     "words": (changed(speed=["fast"] * 600), FormatError, r":2: column 'speed': 'fast' is not a number"),
     "empty": (table().iloc[:0], NotEnoughDataError, r"no rows; 10 s of driving are needed"),
-    "all missing": (changed(distance_left=np.nan), NotEnoughDataError, "no drive holds two rows"),
+    "all missing": (changed(distance_left=np.nan), NotEnoughDataError, "no drive has two rows"),
     "nameless drive": (changed(drive=["a"] * 599 + [None]), FormatError, ":601: column 'drive': no value"),
 }
 

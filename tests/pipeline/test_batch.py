@@ -167,7 +167,7 @@ def test_two_files_that_break_planning_cost_a_row_each(tmp_path: Path) -> None:
     )
     (tmp_path / "out" / "000.xosc").mkdir(parents=True)
     errors = {outcome.row.output: outcome.row.error for outcome in run(inputs, tmp_path / "out")}
-    assert "is no UTF-8; rename it" in errors["caf\\udce9.xosc"]
+    assert "is not valid UTF-8; rename it" in errors["caf\\udce9.xosc"]
     assert "1000000000000, at most 100000" in errors["many.xosc"]
     assert "directory" in errors["000.xosc"].lower()
     assert len(list(read_manifest(tmp_path / "out" / MANIFEST))) == 3

@@ -96,7 +96,7 @@ def test_steps_of_a_lattice_are_found_and_their_noise_is_known(truth):
     coarse, _ = split(truth, [np.round(x / 1.5) * 1.5 - x for x in truth[1]])
     assert coarse.is_too_coarse
     profile = fit_runs([made_run(x[::4]) for x in truth[1][:2]], name="coarse", model="two-level")
-    assert any("steps of 1.5 m, too coarse" in line for line in fit_warnings(replace(profile, sensor=coarse.sensor)))
+    assert any("rounded to 1.5 m, too coarse" in line for line in fit_warnings(replace(profile, sensor=coarse.sensor)))
     assert not any("too coarse" in line for line in fit_warnings(replace(profile, sensor=found.sensor)))
 
 
