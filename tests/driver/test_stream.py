@@ -276,7 +276,7 @@ def test_wrong_use_is_refused() -> None:
         stream.step({})
     stream = OffsetStream(profile, 1)
     stream.step({})
-    with pytest.raises(ValueError, match="before the first step"):
+    with pytest.raises(ValueError, match="before the first `step`"):
         stream.look({})
     with pytest.raises(ValueError, match="lane_width -1"):
         stream.step({"lane_width": -1.0})
