@@ -34,6 +34,7 @@ from xosc_lateral.formats.openscenario.write.kept import Pose
 from xosc_lateral.formats.openscenario.write.losses import Losses, remove
 from xosc_lateral.formats.openscenario.write.moves import VERTEX_SPACING, Move, vertex_times
 from xosc_lateral.formats.openscenario.write.moving import Moving, add_vertices
+from xosc_lateral.formats.openscenario.write.vertices import Vertices
 from xosc_lateral.motion.nominal import Activity, NominalMotion
 from xosc_lateral.scenario import Entity, Scenario
 from xosc_lateral.scenario.enums import EntityCategory, Priority
@@ -66,8 +67,11 @@ def start_of(item: Moving) -> tuple[Pose, float]:
     return pose, max(speed, 0.0)
 
 
-def add_drives(maneuver: etree._Element, item: Moving) -> None:
-    """Add an event for every drive of an entity: from where it is placed to where it is placed anew."""
+def add_drives(maneuver: etree._Element, item: Moving, vertices: Vertices, *, flat: bool) -> None:
+    """Add an event for every drive of an entity: from where it is placed to where it is placed anew.
+
+    `flat`: without pitch, as everywhere in a scenario whose coordinates are not CARLA's own.
+    """
     for number, moves in enumerate(_drives(item.moves), start=1):
         name = f"{item.name} trajectory {number}"
         event = build.event(maneuver, name, Priority.OVERRIDE, VERSION)
@@ -77,7 +81,9 @@ def add_drives(maneuver: etree._Element, item: Moving) -> None:
             place = build.private_action(event, f"{name} place")
             build.world_position(build.sub(place, "TeleportAction"), item.pose(moves[0].first))
         times, columns = _vertices(item, moves, begin)
-        add_vertices(build.private_action(event, name), name, times, columns, VERSION)
+        if flat:
+            columns[4] = np.zeros_like(columns[4])
+        add_vertices(build.private_action(event, name), name, vertices, VERSION, times, columns)
         build.time_trigger(event, "StartTrigger", begin, VERSION)
 
 

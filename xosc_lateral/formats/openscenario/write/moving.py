@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from xosc_lateral.formats.openscenario.write import build
 from xosc_lateral.formats.openscenario.write.kept import Pose
 from xosc_lateral.formats.openscenario.write.moves import Move, cut_moves, vertex_times
+from xosc_lateral.formats.openscenario.write.vertices import Polyline, Vertices
 from xosc_lateral.motion.nominal import Activity, EntityMotion, NominalMotion
 from xosc_lateral.motion.trajectory import Trajectory
 from xosc_lateral.scenario.enums import Priority
@@ -71,7 +72,7 @@ def _check(entity: EntityMotion, path: Trajectory, active: NDArray[np.bool_]) ->
         raise ValueError(f"trajectory of '{entity.name}' is not finite")
 
 
-def add_moves(maneuver: etree._Element, item: Moving, version: build.Version) -> None:
+def add_moves(maneuver: etree._Element, item: Moving, version: build.Version, vertices: Vertices) -> None:
     """Add an event for every move of an entity, and one for every stop."""
     for number, move in enumerate(item.moves, start=1):
         rows = slice(move.first, move.last + 1)
@@ -84,7 +85,7 @@ def add_moves(maneuver: etree._Element, item: Moving, version: build.Version) ->
         if move.placed:
             place = build.private_action(event, f"{name} place")
             build.world_position(build.sub(place, "TeleportAction"), item.pose(move.first))
-        _add_trajectory(build.private_action(event, name), name, item.path, rows, times, version)
+        _add_trajectory(build.private_action(event, name), name, item.path, rows, times, version, vertices)
         build.time_trigger(event, "StartTrigger", item.trigger_time(move), version)
         if move.stops:
             name = f"{item.name} stand {number}"
@@ -104,7 +105,13 @@ def _add_hop(event: etree._Element, name: str, item: Moving, move: Move, version
 
 
 def _add_trajectory(
-    owner: etree._Element, name: str, path: Trajectory, rows: slice, times: FloatArray, version: build.Version
+    owner: etree._Element,
+    name: str,
+    path: Trajectory,
+    rows: slice,
+    times: FloatArray,
+    version: build.Version,
+    vertices: Vertices,
 ) -> None:
     time = path.time[rows]
     arrays = (path.x, path.y, path.z, np.unwrap(path.heading[rows]), path.pitch, path.roll)
@@ -113,15 +120,16 @@ def _add_trajectory(
     motion = None
     if version >= MOTION_SINCE:
         motion = [np.interp(times, time, values) for values in (speed, np.gradient(speed, time))]
-    add_vertices(owner, name, times, columns, version, motion)
+    add_vertices(owner, name, vertices, version, times, columns, motion)
 
 
 def add_vertices(
     owner: etree._Element,
     name: str,
+    vertices: Vertices,
+    version: build.Version,
     times: FloatArray,
     columns: Sequence[FloatArray],
-    version: build.Version,
     motion: Sequence[FloatArray] | None = None,
 ) -> None:
     """Add a FollowTrajectoryAction along a polyline.
@@ -132,25 +140,22 @@ def add_vertices(
         A PrivateAction.
     name : str
         Of the trajectory.
+    vertices : Vertices
+        Of the document: takes those of this trajectory.
+    version : Version
     times : array, shape (n,)
         Of its vertices. [s]
     columns : six arrays, shape (n,)
         x, y, z [m], heading, pitch, roll [rad].
-    version : Version
     motion : two arrays, shape (n,), optional
         Speed [m/s] and acceleration [m/s2] along the path; from version 1.4 on.
     """
     follow = build.sub(build.sub(owner, "RoutingAction"), "FollowTrajectoryAction")
     holder = follow if version < (1, 1) else build.sub(follow, "TrajectoryRef")
     trajectory = build.sub(holder, "Trajectory", name=name, closed="false")
-    polyline = build.sub(build.sub(trajectory, "Shape"), "Polyline")
     x, y, z, h, p, r = columns
-    for moment, *pose in zip(*(values.tolist() for values in (times, x, y, z, _wrapped(h), p, r)), strict=True):
-        build.world_position(build.sub(polyline, "Vertex", time=build.decimal(moment, 6)), (*pose,))
-    if motion is not None:
-        for vertex, speed, acceleration in zip(polyline, *(values.tolist() for values in motion), strict=True):
-            speeds = {"speed_longitudinal": speed, "acceleration_longitudinal": acceleration}
-            build.sub(vertex, "Motion", **{key: build.decimal(value, 4) for key, value in speeds.items()})
+    polyline = build.sub(build.sub(trajectory, "Shape"), "Polyline")
+    vertices.add(polyline, Polyline(times, (x, y, z, _wrapped(h), p, r), motion))
     timing = build.sub(follow, "TimeReference")
     build.sub(timing, "Timing", domainAbsoluteRelative="absolute", scale="1", offset="0")
     build.sub(follow, "TrajectoryFollowingMode", followingMode="position")

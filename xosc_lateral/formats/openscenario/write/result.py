@@ -22,7 +22,7 @@ class WrittenScenario:
     removed : tuple of Unsupported
         Controllers and actions that are no longer in the file although they are no motion, with reasons.
     data : bytes
-        The file's bytes.
+        The file's bytes; empty if they were written.
     notes : tuple of str
         What the version or the player that it was made for lacks, a line each.
     """

@@ -12,7 +12,7 @@ import numpy as np
 from lxml import etree
 from numpy.typing import NDArray
 
-from xosc_lateral.formats.atomic import write_atomically
+from xosc_lateral.formats.atomic import write_pieces_atomically
 from xosc_lateral.formats.openscenario.element import local_name
 from xosc_lateral.formats.openscenario.provenance import mark
 from xosc_lateral.formats.openscenario.write import build
@@ -32,6 +32,7 @@ from xosc_lateral.formats.openscenario.write.parameters import global_scope, ove
 from xosc_lateral.formats.openscenario.write.relocate import relocate
 from xosc_lateral.formats.openscenario.write.result import WrittenScenario
 from xosc_lateral.formats.openscenario.write.target import STANDARD, Player, Target
+from xosc_lateral.formats.openscenario.write.vertices import Vertices
 from xosc_lateral.formats.xml import parse_xml
 from xosc_lateral.motion.nominal import NominalMotion, PlayedAction
 from xosc_lateral.motion.trajectory import Trajectory
@@ -112,16 +113,17 @@ def write_trajectory_scenario(
     if target.player is Player.CARLA:
         starts = {name: start_of(item) for name, item in moving.items()}
     rewrite_init(root, scenario, starts)
-    _replace_stories(root, scenario, motion, moving, untouched, scope, target)
+    vertices = Vertices(scenario.source)
+    _replace_stories(root, scenario, motion, moving, untouched, scope, target, vertices)
     _replace_stop_trigger(root, scenario, motion, version)
     override_parameters(root, scenario)
     notes = fit(root, scenario, motion, target, scope, tuple(moving))
     relocate(root, scenario, output, scope)
     mark(root, provenance, summary)
-    data = build.document(root)
-    if save:
-        write_atomically(output, data)
-    return WrittenScenario(output, hashlib.sha256(data).hexdigest(), tuple(moving), tuple(removed), data, notes)
+    pieces = vertices.document(root)
+    data = b"" if save else b"".join(pieces)
+    sha256 = write_pieces_atomically(output, pieces) if save else hashlib.sha256(data).hexdigest()
+    return WrittenScenario(output, sha256, tuple(moving), tuple(removed), data, notes)
 
 
 def _trailers(scenario: Scenario, motion: NominalMotion) -> set[str]:
@@ -142,6 +144,7 @@ def _replace_stories(
     untouched: etree._Element,
     scope: Scope,
     target: Target,
+    vertices: Vertices,
 ) -> None:
     storyboard = _child(root, "Storyboard")
     stories = [element for element in storyboard if local_name(element) == "Story"]
@@ -153,7 +156,7 @@ def _replace_stories(
         kept = etree.Comment(comment.text)
         build.insert_indented(storyboard, index, kept)
         index += 1
-    story = _new_story(scenario, motion, moving, untouched, scope, target)
+    story = _new_story(scenario, motion, moving, untouched, scope, target, vertices)
     if len(story):
         build.insert_indented(storyboard, index, story)
 
@@ -165,6 +168,7 @@ def _new_story(
     untouched: etree._Element,
     scope: Scope,
     target: Target,
+    vertices: Vertices,
 ) -> etree._Element:
     story = build.story(STORY)
     version = target.version_for(scenario)
@@ -186,9 +190,9 @@ def _new_story(
         for item in with_moves:
             maneuver = build.maneuver(act, f"{STORY} {item.name}", item.name)
             if target.player is Player.CARLA:
-                add_drives(maneuver, item)
+                add_drives(maneuver, item, vertices, flat=not scenario.header.is_left_handed)
             else:
-                add_moves(maneuver, item, version)
+                add_moves(maneuver, item, version, vertices)
         if not with_moves:
             build.maneuver_group(act, f"{STORY} nothing", None)
         build.time_trigger(act, "StartTrigger", 0.0, version)

@@ -1,0 +1,34 @@
+"""Vertices become text while the document is written: set out like elements, and never all at once."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from lxml import etree
+
+from xosc_lateral.formats.openscenario.write import build
+from xosc_lateral.formats.openscenario.write.vertices import BLOCK, Polyline, Vertices
+
+SOURCE = b"<?xml version='1.0' encoding='UTF-8'?>\n<Root>\n   <A/>\n   <B/>\n</Root>\n"
+
+
+@pytest.mark.parametrize("motion", [False, True])
+def test_the_text_is_what_elements_would_be(motion: bool) -> None:
+    rng = np.random.default_rng(1)
+    n = 2 * BLOCK + 7
+    columns = [rng.normal(size=n) for _ in range(9)]
+    root, vertices = etree.fromstring(SOURCE), Vertices(SOURCE)
+    holder = etree.Element("Holder")
+    vertices.add(build.sub(holder, "Polyline"), Polyline(columns[0], columns[1:7], columns[7:] if motion else None))
+    vertices.add(build.sub(holder, "Polyline"), Polyline(columns[0][:2], [values[:2] for values in columns[1:7]], None))
+    build.insert_indented(root, 1, holder)
+    pieces = list(vertices.document(root))
+    assert max(map(len, pieces)) < 600 * BLOCK  # no piece holds more than a block
+    whole = b"".join(pieces)
+    first, second = (list(line) for line in etree.fromstring(whole).iter("Polyline"))
+    assert (len(first), len(second)) == (n, 2)
+    assert float(first[-1].get("time") or 0) == pytest.approx(columns[0][-1], abs=1e-6)
+    assert [child.tag for child in first[BLOCK]] == (["Position", "Motion"] if motion else ["Position"])
+    again = etree.fromstring(whole)
+    etree.indent(again, "   ")
+    assert build.document(again) == whole
