@@ -177,7 +177,12 @@ def test_an_empty_folder_and_a_glob_without_a_match_are_errors(
     assert "empty: no .xosc file in this folder" in capsys.readouterr().err
     assert main(["convert", "*.xosc", "-o", "out"]) == 1
     assert "*.xosc: nothing matches" in capsys.readouterr().err
+    assert main(["convert", "not-mounted", "-o", "out"]) == 1
+    assert "not-mounted: no such file or folder" in capsys.readouterr().err
     assert not Path("out").exists()
+    Path("out").mkdir()
+    assert main(["convert", "not-mounted", "-o", "out"]) == 1
+    assert "not-mounted: no such file or folder" in capsys.readouterr().err
 
 
 def test_errors_are_json_too(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from xosc_lateral.api.inputs import PathLike, Paths, ProfileLike, as_paths, road_search
 from xosc_lateral.api.result import Result
+from xosc_lateral.errors import FormatError
 from xosc_lateral.formats.openscenario.write.target import target
 from xosc_lateral.formats.targets import claim, file_target
 from xosc_lateral.pipeline.convert import convert_scenario
@@ -132,6 +133,8 @@ def convert(
 
 def scenario_target(output: PathLike, source: Path) -> Path:
     """Path of a converted scenario; in a folder its source's name, `_lifelike` where that would be the source."""
+    if not source.exists():
+        raise FormatError("no such file or folder", path=source)
     path = file_target(output, source.name, SCENARIO_SUFFIXES)
     same = path.parent.resolve() == source.parent.resolve() and path.name == source.name
     return lifelike(source) if same and path != Path(output) else path
