@@ -10,6 +10,7 @@ or 0.05 m/s away, and the ends are no more than 0.1 s apart. What esmini can't p
 from __future__ import annotations
 
 import argparse
+import re
 import subprocess
 import tempfile
 from collections.abc import Iterator, Sequence
@@ -28,6 +29,7 @@ FASTEST = 0.05
 """[m/s]"""
 ENDS_APART = 0.1
 """[s]"""
+_NUMBER = re.compile(r"\d+$")
 PATIENCE = 120.0
 """For one scenario in the other player. [s]"""
 
@@ -79,6 +81,8 @@ def _rows(lines: list[str]) -> Iterator[tuple[float, str, float, float, float]]:
         if fields[0].startswith("Index"):
             columns = [name.removeprefix("#1 ").split(" [")[0] for name in fields if name.startswith("#1 ")]
         elif columns and fields[0].isdigit():
+            while len(fields) > 3 and _NUMBER.match(fields[2]):  # frames without entities have no line end of their own
+                fields = fields[2:]
             for first in range(2, len(fields) - len(columns) + 1, len(columns)):
                 one = dict(zip(columns, fields[first : first + len(columns)], strict=True))
                 x, y, speed = (float(one[name]) for name in wanted)

@@ -159,7 +159,7 @@ def test_story_and_maneuver_parameters_reach_their_elements_alone(tmp_path: Path
     found = scenario.storyboard.stories[0].acts[0].maneuver_groups[0].maneuvers[0].events[0].actions[0]
     assert isinstance(found.content, SpeedAction)
     assert found.content.target == AbsoluteTargetSpeed(21.0)
-    assert found.scope == {"Target": "21.0000000000"}
+    assert found.scope == {"Target": "21.000000"}
     with pytest.raises(FormatError, match="parameter 'Target' is not declared"):
         made(tmp_path, stories=story(event("e", action("a", speed_action("$Target")))))
 

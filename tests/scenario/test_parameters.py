@@ -9,7 +9,7 @@ from xosc_lateral.scenario.parameters import MAX_CHAIN, Scope, satisfies
 
 def test_parameters_may_refer_to_later_ones() -> None:
     scope = Scope({"a": "$b", "b": "${$c * 2}", "c": "4"})
-    assert scope.fill("$a") == "8.0000000000"
+    assert scope.fill("$a") == "8.000000"
 
 
 def test_inner_scope_hides_outer_one_and_falls_back_to_it() -> None:

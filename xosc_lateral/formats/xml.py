@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -16,6 +17,8 @@ from xosc_lateral.limits import XML_TREE
 
 MAX_CACHED_BYTES = 1_000_000
 """Larger files are read anew each time: catalogs are small, and 16 trees are kept."""
+
+_LATE_DECLARATION = re.compile(rb"(?:\xef\xbb\xbf)?(?:\s|<!--(?:(?!-->).)*+-->)++(<\?xml\s[^<>\r\n]*\?>)", re.DOTALL)
 
 # Measured with libxml2 2.14 on element-only, attribute-rich and text-rich files: within 15 % of the memory taken.
 _BYTES_PER_TAG, _BYTES_PER_ATTRIBUTE = 150, 250
@@ -46,6 +49,7 @@ def parse_xml(data: bytes, path: object) -> etree._Element:
         line = data[: data.index(b"<!ENTITY")].count(b"\n") + 1
         raise FormatError("entity declarations are not allowed", path=path, line=line, element="DOCTYPE")
     # A parser of its own for each call: lxml's are not meant to be shared between threads, and making one is cheap.
+    data = _declared_late(data)
     parser = etree.XMLParser(
         resolve_entities=False, no_network=True, load_dtd=False, dtd_validation=False, huge_tree=False
     )
@@ -59,6 +63,18 @@ def parse_xml(data: bytes, path: object) -> etree._Element:
     if document_type is not None and any(True for _ in document_type.entities()):
         raise FormatError("entity declarations are not allowed", path=path, element="DOCTYPE")
     return root
+
+
+def _declared_late(data: bytes) -> bytes:
+    """Blanks in place of an XML declaration that comments or blanks stand before: the encoding is UTF-8 then.
+
+    Not allowed, yet in the field; places in the file stay the same.
+    """
+    found = _LATE_DECLARATION.match(data)
+    if found is None:
+        return data
+    start, end = found.span(1)
+    return data[:start] + b" " * (end - start) + data[end:]
 
 
 def read_xml(path: Path) -> tuple[etree._Element, bytes]:

@@ -51,13 +51,9 @@ class RoadGap:
 
 
 def ahead_and_left(state: EntityState, x: float, y: float) -> tuple[float, float]:
-    """Components of the way to a point, along and across the road as the entity points."""
-    pose = state.pose
-    heading = state.road_heading() if state.road != NOWHERE or not state.is_located else pose.heading
-    if state.road != NOWHERE and not is_forward(state.relative_heading):
-        c, s = -cos(heading), -sin(heading)
-    else:
-        c, s = cos(heading), sin(heading)
+    """Components of the way to a point in the entity's own frame: along its heading, and to its left. [m]"""
+    pose = state.plane
+    c, s = cos(pose.heading), sin(pose.heading)
     dx, dy = x - pose.x, y - pose.y
     return dx * c + dy * s, dy * c - dx * s
 

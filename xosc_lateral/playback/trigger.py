@@ -47,15 +47,16 @@ class RunningCondition:
         self._value = False
 
     def evaluate(self, time: float) -> bool:
-        """Value at `time` [s]. At the same time again, the value stays: a run looks twice at time 0."""
+        """Value at `time` [s]. At the same time again (a run looks twice at time 0) the new value replaces the old one."""
         now = self.check()
         filtered = self._filter(now)
         self._last = now
         self._armed = True
-        if time >= self._time + EPSILON:
-            if self.delay > 0.0 and (filtered is not self._value or not self._history):
-                self._history.append((time, filtered))
-            self._time, self._value = time, filtered
+        if self.delay > 0.0 and (filtered is not self._value or not self._history):
+            if self._history and time < self._time + EPSILON:
+                self._history.pop()
+            self._history.append((time, filtered))
+        self._time, self._value = time, filtered
         return self._value if self.delay <= 0.0 else self._delayed(time - self.delay)
 
     def rearm(self) -> None:

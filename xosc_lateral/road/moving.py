@@ -14,6 +14,9 @@ from xosc_lateral.road.road import Road
 Chooser = Callable[[Sequence[LaneLink]], LaneLink]
 """Picks one of several ways on; gets at least one."""
 
+_TOUCHING = 1e-3
+"""Lanes of two sections touch with a gap of no more, such as one that has closed and one that opens beside it. [m]"""
+
 
 def advance(
     links: Links,
@@ -89,7 +92,7 @@ def follow_section(road: Road, section: LaneSection, beyond: LaneSection, lane: 
     if same is None:
         return None
     (centre, _, width), (other, _, other_width) = here.state_at(at), same.state_at(at)
-    return lane if abs(centre - other) < 0.5 * max(width, other_width) else None
+    return lane if abs(centre - other) <= 0.5 * max(width, other_width) + _TOUCHING else None
 
 
 def _just_before(s: float) -> float:

@@ -77,7 +77,7 @@ def evaluate(expression: str, resolve: Callable[[str], str]) -> str:
     Returns
     -------
     str
-        Numbers with 10 decimals, as the reference player writes them; ``true`` or ``false``; or the joined words.
+        Numbers with 6 decimals, as the reference player writes them; ``true`` or ``false``; or the joined words.
 
     Raises
     ------
@@ -115,7 +115,7 @@ def as_text(value: Value) -> str:
         return "true" if value else "false"
     if not math.isfinite(value):
         raise ExpressionError(f"gives {value}")
-    return f"{value:.10f}"
+    return f"{value:.6f}"
 
 
 def from_text(text: str) -> Value:

@@ -92,12 +92,12 @@ class Catalogs:
             for path in sorted(folder.glob("*.xosc"))[:MAX_FILES_SCANNED]:
                 if self.boundary.holds(path) and _calls_itself(path, catalog):
                     return path
-        if refused is not None:
-            raise refused
         near = _near_by(self.boundary, f"{catalog}.xosc")
         if near is not None:
             self.remarks.append(Unsupported("CatalogReference", reference.place(), f"catalog taken from {near}"))
             return near
+        if refused is not None:
+            raise refused
         searched = ", ".join(str(folder) for folder in dict.fromkeys(folders)) or "no folder is named"
         place = reference.place()
         what = f"catalog '{catalog}' not found ({searched})"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from xosc_lateral.errors import MissingFileError
+from xosc_lateral.errors import FormatError, MissingFileError
 from xosc_lateral.formats.openscenario.context import Context
 from xosc_lateral.formats.openscenario.declarations import local_scope
 from xosc_lateral.formats.openscenario.element import Element
@@ -82,7 +82,7 @@ def _read_object(item: Element, context: Context, name: str | None = None) -> li
         category=category,
         place=item.place(),
         bounding_box=DEFAULT_BOX if box is None else _bounding_box(box),
-        vehicle_category=_vehicle_category(content) if category is EntityCategory.VEHICLE else None,
+        vehicle_category=_vehicle_category(content, context) if category is EntityCategory.VEHICLE else None,
         performance=_performance(content.child("Performance")),
         axles=_axles(content.child("Axles")),
         controllers=_controllers(item, context),
@@ -111,8 +111,12 @@ def _stand_in(reference: Element, name: str, context: Context, error: MissingFil
     )
 
 
-def _vehicle_category(vehicle: Element) -> VehicleCategory:
-    return vehicle.choice("vehicleCategory", VehicleCategory, VehicleCategory.CAR)
+def _vehicle_category(vehicle: Element, context: Context) -> VehicleCategory:
+    try:
+        return vehicle.choice("vehicleCategory", VehicleCategory, VehicleCategory.CAR)
+    except FormatError as error:
+        context.remark(vehicle, f"{error.what}: taken as a car")
+        return VehicleCategory.CAR
 
 
 def _read_trailer(vehicle: Element, tractor: str, context: Context) -> tuple[str | None, list[Entity]]:

@@ -157,8 +157,11 @@ def _relative_lane(e: Element, context: Context) -> Position:
     ds, ds_lane = e.optional_number("ds"), e.optional_number("dsLane")
     if ds is None and ds_lane is None:
         ds = 0.0
+    lanes = e.optional_integer("dLane")
+    if lanes is None:
+        context.remark(e, "dLane is missing: taken as 0, the same lane")
     return RelativeLanePosition(
-        context.entity(e), e.integer("dLane"), e.place(), ds, ds_lane, e.number("offset", 0.0), _orientation(e)
+        context.entity(e), lanes or 0, e.place(), ds, ds_lane, e.number("offset", 0.0), _orientation(e)
     )
 
 

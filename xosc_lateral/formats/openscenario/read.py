@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path, PureWindowsPath
@@ -137,7 +138,10 @@ def read_header(root: Element) -> FileHeader:
     header = root.child("FileHeader")
     if header is None:
         root.fail("FileHeader is missing")
-    major, minor = header.integer("revMajor", 1), header.integer("revMinor", 0)
+    # tools have written "1+" for what came after 1.1
+    minor_text = header.text("revMinor", "0").strip()
+    minor = int(minor_text[:-1]) if re.fullmatch(r"\d{1,3}\+", minor_text) else header.integer("revMinor", 0)
+    major = header.integer("revMajor", 1)
     if major != 1:
         header.fail(f"OpenSCENARIO {major}.{minor} is not read; versions 1.0 to 1.3 are")
     return FileHeader(major, minor, header.text("author", ""), header.text("description", ""), header.text("date", ""))

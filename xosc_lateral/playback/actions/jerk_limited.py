@@ -33,23 +33,26 @@ class NoSolutionError(ValueError):
     """No jerk-limited profile meets the speeds at their times."""
 
 
-def follow(targets: Sequence[Target], acceleration: float, limits: Limits) -> list[Row]:
-    """Pieces of the profile through `targets`, beginning with the present acceleration. [m/s2]"""
+def follow(targets: Sequence[Target], acceleration: float, limits: Limits) -> tuple[list[Row], str]:
+    """Pieces of the profile through `targets`, beginning with the present acceleration, and why the last of them are
+    straight lines (empty: they are not). [m/s2]
+
+    Raises
+    ------
+    NoSolutionError
+        When not even the first target can be met so.
+    """
     up, down = min(limits.acceleration_rate, _NO_LIMIT), min(limits.deceleration_rate, _NO_LIMIT)
     if len(targets) < 2:
-        return [(target.time, target.speed, 0.0, 0.0) for target in targets]
-    rows = (
-        _single(targets, acceleration, limits, up, down)
-        if len(targets) == 2
-        else _several(targets, acceleration, up, down)
-    )
-    for time, _, slope, _ in rows:
-        if slope > limits.acceleration + EPSILON or slope < -limits.deceleration - EPSILON:
-            raise NoSolutionError(f"acceleration {slope:.2f} m/s2 at {time:.2f} s is beyond the limits")
-    return rows
+        return [(target.time, target.speed, 0.0, 0.0) for target in targets], ""
+    if len(targets) == 2:
+        return _single(targets, acceleration, limits, up, down), ""
+    if not -limits.deceleration - EPSILON <= acceleration <= limits.acceleration + EPSILON:
+        raise NoSolutionError(f"the present acceleration of {acceleration:.2f} m/s2 is beyond the limits")
+    return _several(targets, acceleration, up, down)
 
 
-def _several(targets: Sequence[Target], acceleration: float, up: float, down: float) -> list[Row]:
+def _several(targets: Sequence[Target], acceleration: float, up: float, down: float) -> tuple[list[Row], str]:
     first = targets[0]
     rows: list[Row] = []
     time, jerk = first.time, 0.0
@@ -61,7 +64,7 @@ def _several(targets: Sequence[Target], acceleration: float, up: float, down: fl
     speed = first.speed + u * (acceleration + 0.5 * jerk * u)
     rows.append((time, speed, first.slope, 0.0))
     slope, intercept = first.slope, speed - first.slope * time
-    for target in targets[1:]:
+    for index, target in enumerate(targets[1:], 1):
         following, its_intercept = target.slope, target.speed - target.slope * target.time
         if abs(slope - following) >= EPSILON:
             jerk = -down if following < slope else up
@@ -69,7 +72,9 @@ def _several(targets: Sequence[Target], acceleration: float, up: float, down: fl
                 2.0 * jerk * (slope - following)
             )
             if corner < time:
-                raise NoSolutionError(f"the speed at {target.time:.2f} s leaves no time for the jerk")
+                # the reference player goes on in straight lines, from the target after the one that it came for
+                rest = [(later.time, later.speed, later.slope, 0.0) for later in targets[index:]]
+                return rows + rest, f"the speed at {target.time:.2f} s leaves no time for the jerk"
             at_corner = speed + slope * (corner - time)
             rows.append((corner, at_corner, slope, jerk))
             time = corner + (following - slope) / jerk
@@ -77,7 +82,7 @@ def _several(targets: Sequence[Target], acceleration: float, up: float, down: fl
             speed = at_corner + u * (slope + 0.5 * jerk * u)
         rows.append((time, speed, following, 0.0))
         slope, intercept = following, its_intercept
-    return rows
+    return rows, ""
 
 
 def _single(targets: Sequence[Target], acceleration: float, limits: Limits, up: float, down: float) -> list[Row]:
@@ -86,7 +91,7 @@ def _single(targets: Sequence[Target], acceleration: float, limits: Limits, up: 
     j0 = -down if wanted < a0 else up
     j1 = up if wanted < 0.0 else -down
     if abs(j1 - j0) < EPSILON:
-        raise NoSolutionError("the present acceleration is already beyond what is needed")
+        return _one_way(targets, a0, j1)
     middle: Row | None = None
     room = (
         j0
@@ -120,3 +125,20 @@ def _single(targets: Sequence[Target], acceleration: float, limits: Limits, up: 
     if middle is not None:
         rows.append(middle)
     return [*rows, (t2, v2, a1, j1), (t3, v3, 0.0, 0.0)]
+
+
+def _one_way(targets: Sequence[Target], a0: float, jerk: float) -> list[Row]:
+    """Both ends with the same jerk: the present acceleration is beyond what is needed, and is taken back."""
+    (t0, v0, _), (t3, v3, _) = targets
+    span = jerk * (t0 - t3) - a0
+    if abs(span) < EPSILON:
+        raise NoSolutionError("the present acceleration leaves no way to the speed")
+    t1 = (2.0 * jerk * (v0 + t0 * jerk * (t0 - t3) - v3) + a0 * a0 + 2.0 * a0 * jerk * (t3 - 2.0 * t0)) / (
+        2.0 * jerk * span
+    )
+    a1 = a0 + jerk * (t1 - t0)
+    t2 = a1 / jerk + t3
+    if not t0 <= t1 <= t2:
+        raise NoSolutionError("the present acceleration is already beyond what is needed")
+    v1 = v0 + a0 * (t1 - t0) + 0.5 * jerk * (t1 - t0) ** 2
+    return [(t0, v0, a0, jerk), (t1, v1, a1, 0.0), (t2, v1 + a1 * (t2 - t1), a1, jerk), (t3, v3, 0.0, 0.0)]

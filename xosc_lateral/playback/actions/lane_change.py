@@ -101,6 +101,8 @@ class RunningLaneChange(RunningAction):
             return target.lane_id
         assert self._reference is not None
         self._reference.locate()
+        if self._reference.lane == 0 and target.value == 0:
+            return 1  # nobody drives on lane 0: the lane to its left, as in the reference player
         return beside(self._reference.lane, target.value if self._reference.is_forward else -target.value)
 
     def _move_of_frame(self, way: float, step: float) -> tuple[float, float, float]:

@@ -26,7 +26,8 @@ class Piece(NamedTuple):
 class RunningSpeedProfile(RunningAction):
     """Straight lines between the speeds (`position`), or the same with a limited jerk (`follow`).
 
-    An entry without a time is reached as fast as the constraints allow. Times count from the entry before.
+    An entry without a time is reached as fast as the constraints allow, one whose time is too short likewise. Times
+    count from the entry before.
     """
 
     domains = Domain.LONGITUDINAL
@@ -51,9 +52,13 @@ class RunningSpeedProfile(RunningAction):
         if self.content.following_mode is FollowingMode.FOLLOW:
             acceleration = state.body_frame(state.acceleration)[0]
             try:
-                self._pieces = [Piece(*piece) for piece in follow(targets, acceleration, limits)]
+                pieces, why_straight = follow(targets, acceleration, limits)
             except NoSolutionError as error:
                 self.note(f"{error}: played as straight lines between the speeds")
+                return
+            self._pieces = [Piece(*piece) for piece in pieces]
+            if why_straight:
+                self.note(f"{why_straight}: played as straight lines between the speeds from there on")
 
     def step(self, time: float, step: float) -> None:
         """Set the speed of the end of the frame."""
@@ -86,7 +91,7 @@ class RunningSpeedProfile(RunningAction):
                 if not follows:
                     points[0] = (time, target)
                 continue
-            time += _fastest(target - points[-1][1], limits) if entry.time is None else entry.time
+            time += max(_fastest(target - points[-1][1], limits), entry.time or 0.0)
             if time - points[-1][0] < EPSILON:
                 points[-1] = (points[-1][0], target)
             else:

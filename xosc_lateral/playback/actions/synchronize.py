@@ -6,7 +6,7 @@ from enum import Enum
 from math import copysign, cos, inf, sin, sqrt
 
 from xosc_lateral.playback.actions.base import Domain, RunningAction
-from xosc_lateral.playback.distances import FAR, Spot, apart, road_gap
+from xosc_lateral.playback.distances import FAR, Spot, ahead_and_left, apart, road_gap
 from xosc_lateral.playback.paths.base import Path, PathProgress, nearest_s
 from xosc_lateral.playback.positions.resolve import spot_at
 from xosc_lateral.playback.state import EntityState
@@ -66,16 +66,20 @@ class RunningSynchronize(RunningAction):
         """Set the speed for this frame; end when either is there, or has gone past."""
         assert self._own_spot is not None and self._master_spot is not None
         state, content = self.state, self.content
-        distance = self._distance(state, self._own_spot, content.target_position)
-        master_distance = self._distance(self._master, self._master_spot, content.target_position_master)
+        distance = abs(self._way_to(state, self._own_spot, content.target_position))
+        master_way = self._way_to(self._master, self._master_spot, content.target_position_master)
+        master_distance = abs(master_way)
         tolerance, master_tolerance = content.target_tolerance or 0.0, content.target_tolerance_master or 0.0
         there = distance < tolerance + EPSILON or master_distance < master_tolerance + EPSILON
         passed = distance > self._last[0] or master_distance > self._last[1]
         self._last = distance, master_distance
         distance = max(distance - tolerance, EPSILON)
         master_distance = max(master_distance - master_tolerance, EPSILON)
-        master_speed = along_road(self._master)
+        master_speed = copysign(1.0, master_way) * along_road(self._master)
         time_left = master_distance / master_speed if master_speed > EPSILON else FAR
+        if time_left == FAR and self._mode is not Mode.WAITING:
+            self._mode = Mode.WAITING
+            state.set_speed(0.0)
         final = self._final_speed()
         if there or passed or (master_speed > EPSILON and time_left < step):
             if final is not None:
@@ -83,6 +87,10 @@ class RunningSynchronize(RunningAction):
             self.end()
             return
         if final is None:
+            if time_left == FAR:
+                state.speed_taken = True
+                return
+            self._mode = Mode.LINE
             mean = distance / time_left
             acceleration = 2.0 * (mean - state.speed) / time_left
             state.set_speed(state.speed + acceleration * step)
@@ -94,14 +102,15 @@ class RunningSynchronize(RunningAction):
             state.speed_taken = True
 
     # ---- in detail ---------------------------------------------------------------------------------------------------
-    def _distance(self, entity: EntityState, spot: Spot, position: Position) -> float:
-        """Left on the trajectory, else along the road, else straight. [m]"""
+    def _way_to(self, entity: EntityState, spot: Spot, position: Position) -> float:
+        """Left on the trajectory, else along the road, else straight; negative: the place lies behind. [m]"""
         if entity.path is not None:
-            return abs(self._target_s(entity.path, spot, position) - entity.path.s)
+            return self._target_s(entity.path, spot, position) - entity.path.s
         gap = road_gap(self.run.network, entity, spot)
         if gap is not None:
-            return abs(gap.ds)
-        return apart(entity, spot.x, spot.y)
+            return gap.ds
+        ahead, _ = ahead_and_left(entity, spot.x, spot.y)
+        return copysign(apart(entity, spot.x, spot.y), ahead)
 
     def _target_s(self, progress: PathProgress, spot: Spot, position: Position) -> float:
         """Where on a path the place is; looked for once for each path. [m]"""
