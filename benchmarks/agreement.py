@@ -4,16 +4,18 @@
 
 PATH is esmini's executable; a headless build is enough (docs/playing.md says which version was used). Several
 folders or scenarios may be given; `--limit N` takes N, evenly spread. A scenario agrees when no row is more than 0.10 m
-or 0.05 m/s away, and the ends are no more than 0.1 s apart. What esmini can't play is counted apart.
+or 0.05 m/s away, and the ends are no more than 0.1 s apart. What esmini can't play is counted apart, and so is what
+differs where esmini itself comes to another end with another seed (it draws a way at junctions).
 """
 
 from __future__ import annotations
 
 import argparse
+import itertools
 import re
 import subprocess
 import tempfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -29,24 +31,25 @@ FASTEST = 0.05
 """[m/s]"""
 ENDS_APART = 0.1
 """[s]"""
+OTHER_SEEDS = (2, 3, 4)
+"""Of the reference player's chance: what comes out otherwise with one of them is nothing to agree with."""
 _NUMBER = re.compile(r"\d+$")
 PATIENCE = 120.0
 """For one scenario in the other player. [s]"""
 
 
 def reference_rows(
-    esmini: Path, scenario: Path, step: float, limit: float, switches: Sequence[str] = ()
+    esmini: Path, scenario: Path, step: float, limit: float, switches: Sequence[str] = (), seed: int = 1
 ) -> pd.DataFrame:
     """`time,name,x,y,speed` as esmini logs them; empty if it can't play the scenario."""
     with tempfile.TemporaryDirectory() as folder:
         log = Path(folder) / "log.csv"
         command = [str(esmini), "--osc", str(scenario.resolve()), "--headless", "--fixed_timestep", str(step)]
-        command += ["--disable_controllers", "--disable_stdout", "--seed", "1", "--csv_logger", str(log)]
+        command += ["--disable_controllers", "--disable_stdout", "--seed", str(seed), "--csv_logger", str(log)]
         command += ["--logfile_path", str(Path(folder) / "log.txt"), *(f"--{name}" for name in switches)]
         player = subprocess.Popen(command, cwd=folder, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
         _wait(player, log, limit)
-        lines = log.read_text(errors="replace").splitlines() if log.is_file() else []
-    rows = [row for row in _rows(lines) if row[0] < limit + 1e-6]
+        rows = _logged(log, limit)
     return pd.DataFrame(rows, columns=["time", "name", "x", "y", "speed"])
 
 
@@ -68,12 +71,21 @@ def _last_time(log: Path) -> float:
         return 0.0
     with log.open("rb") as file:
         file.seek(max(log.stat().st_size - (1 << 16), 0))
-        lines = file.read().split(b"\n")[1:-1]  # the first and the last one may be cut
-    fields = lines[-1].split(b",") if lines else []
-    return float(fields[1]) if len(fields) > 2 and fields[0].isdigit() else 0.0
+        tail = file.read()
+    lines = tail.split(b"\n")[1:-1]  # the first and the last one may be cut
+    fields = lines[-1].split(b",") if lines else tail.split(b",")[-3:]
+    return float(fields[1]) if len(fields) > 2 and fields[0].strip().isdigit() else 0.0
 
 
-def _rows(lines: list[str]) -> Iterator[tuple[float, str, float, float, float]]:
+def _logged(log: Path, limit: float) -> list[tuple[float, str, float, float, float]]:
+    """Rows up to the limit: a scenario without an end may have been logged far beyond."""
+    if not log.is_file():
+        return []
+    with log.open(errors="replace") as lines:
+        return list(itertools.takewhile(lambda row: row[0] < limit + 1e-6, _rows(lines)))
+
+
+def _rows(lines: Iterable[str]) -> Iterator[tuple[float, str, float, float, float]]:
     columns: list[str] = []
     wanted = ("World_Position_X", "World_Position_Y", "Current_Speed")
     for line in lines:
@@ -81,8 +93,9 @@ def _rows(lines: list[str]) -> Iterator[tuple[float, str, float, float, float]]:
         if fields[0].startswith("Index"):
             columns = [name.removeprefix("#1 ").split(" [")[0] for name in fields if name.startswith("#1 ")]
         elif columns and fields[0].isdigit():
-            while len(fields) > 3 and _NUMBER.match(fields[2]):  # frames without entities have no line end of their own
-                fields = fields[2:]
+            # frames without entities have no line end of their own: only the last of a line has names
+            own = next((k for k in range(0, len(fields) - 2, 2) if not _NUMBER.match(fields[k + 2])), len(fields))
+            fields = fields[own:]
             for first in range(2, len(fields) - len(columns) + 1, len(columns)):
                 one = dict(zip(columns, fields[first : first + len(columns)], strict=True))
                 x, y, speed = (float(one[name]) for name in wanted)
@@ -144,9 +157,10 @@ def main() -> None:
     parser.add_argument("--step", type=float, default=0.02)
     parser.add_argument("--time-limit", type=float, default=60.0)
     options = parser.parse_args()
-    agreeing = played_there = not_played_there = 0
+    agreeing = played_there = not_played_there = left_to_chance = 0
     for path in scenarios(options.folder, options.limit):
-        theirs = reference_rows(options.esmini.resolve(), path, options.step, options.time_limit, options.esmini_option)
+        run = (options.esmini.resolve(), path, options.step, options.time_limit, options.esmini_option)
+        theirs = reference_rows(*run)
         if theirs["time"].nunique() < 3:
             not_played_there += 1
             continue
@@ -156,10 +170,17 @@ def main() -> None:
             found = difference(theirs, ours, options.step, options.time_limit)
         except XoscLateralError as error:
             found = " ".join(str(error).split())
+        if found and any(difference(theirs, reference_rows(*run, seed), *run[2:4]) for seed in OTHER_SEEDS):
+            played_there -= 1
+            left_to_chance += 1
+            continue
         agreeing += not found
         if found:
             print(f"{path.parent.name}/{path.name}: {found}", flush=True)
-    print(f"{agreeing} of {played_there} agree; {not_played_there} can't be played by the reference player")
+    print(
+        f"{agreeing} of {played_there} agree; {not_played_there} can't be played by the reference player, "
+        f"{left_to_chance} differ and come out there otherwise with another seed"
+    )
 
 
 if __name__ == "__main__":

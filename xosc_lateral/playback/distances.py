@@ -10,7 +10,6 @@ from dataclasses import dataclass
 from math import copysign, cos, hypot, sin
 
 from xosc_lateral.playback import boxes
-from xosc_lateral.playback.angles import is_forward
 from xosc_lateral.playback.paths.base import nearest_s
 from xosc_lateral.playback.placement import NOWHERE
 from xosc_lateral.playback.state import EntityState

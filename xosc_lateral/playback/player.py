@@ -122,7 +122,8 @@ class _Player:
         pull_trailers(run.entities)
         if run.derives_motion:
             for state in run.entities:
-                _derive_motion(state, step, height=run.derives_height)
+                if state.active:  # who is taken out keeps the speed that others may refer to
+                    _derive_motion(state, step, height=run.derives_height)
         else:
             self._speeds_of_moved(step)
         if run.derives_states:

@@ -47,7 +47,7 @@ class RunningCondition:
         self._value = False
 
     def evaluate(self, time: float) -> bool:
-        """Value at `time` [s]. At the same time again (a run looks twice at time 0) the new value replaces the old one."""
+        """Value at `time` [s]. At the same time again, as at time 0, the new value replaces the old one."""
         now = self.check()
         filtered = self._filter(now)
         self._last = now

@@ -6,6 +6,7 @@ from enum import Enum
 from math import copysign, cos, inf, sin, sqrt
 
 from xosc_lateral.playback.actions.base import Domain, RunningAction
+from xosc_lateral.playback.angles import is_forward
 from xosc_lateral.playback.distances import FAR, Spot, ahead_and_left, apart, road_gap
 from xosc_lateral.playback.paths.base import Path, PathProgress, nearest_s
 from xosc_lateral.playback.positions.resolve import spot_at
@@ -75,7 +76,8 @@ class RunningSynchronize(RunningAction):
         self._last = distance, master_distance
         distance = max(distance - tolerance, EPSILON)
         master_distance = max(master_distance - master_tolerance, EPSILON)
-        master_speed = copysign(1.0, master_way) * along_road(self._master)
+        # in the frame of no duration nothing has moved yet: every master stands (as in the reference player)
+        master_speed = copysign(1.0, master_way) * along_road(self._master) if step > EPSILON else 0.0
         time_left = master_distance / master_speed if master_speed > EPSILON else FAR
         if time_left == FAR and self._mode is not Mode.WAITING:
             self._mode = Mode.WAITING
@@ -103,9 +105,11 @@ class RunningSynchronize(RunningAction):
 
     # ---- in detail ---------------------------------------------------------------------------------------------------
     def _way_to(self, entity: EntityState, spot: Spot, position: Position) -> float:
-        """Left on the trajectory, else along the road, else straight; negative: the place lies behind. [m]"""
+        """Left on the trajectory, else along the road, else straight; negative: the entity has it in its back. [m]"""
         if entity.path is not None:
-            return self._target_s(entity.path, spot, position) - entity.path.s
+            way = self._target_s(entity.path, spot, position) - entity.path.s
+            tangent = entity.path.path.at(entity.path.s).tangent
+            return way if is_forward(entity.plane.heading - tangent) else -way
         gap = road_gap(self.run.network, entity, spot)
         if gap is not None:
             return gap.ds
