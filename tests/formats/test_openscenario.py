@@ -409,3 +409,13 @@ def test_a_missing_vehicle_catalog_costs_a_remark_and_a_usual_car(tmp_path: Path
 def test_an_empty_action_is_nothing(tmp_path: Path) -> None:
     scenario = made(tmp_path, stories=story(event("e", '<Action name="idle"/>')))
     assert scenario.storyboard.stories[0].acts[0].maneuver_groups[0].maneuvers[0].events[0].actions == ()
+
+
+def test_what_field_files_leave_out_is_taken_as_meant_and_said(tmp_path: Path) -> None:
+    text = scenario_text(init=private("Ego", teleport(), "<PrivateAction></PrivateAction>"))
+    text = text.replace('vehicleCategory="car"', 'vehicleCategory="EgoCar"').replace('revMinor="2"', 'revMinor="1+"')
+    path = write_scenario(tmp_path, "<!-- before the declaration -->\n" + text)
+    scenario = read_scenario(path)
+    assert (scenario.header.minor, scenario.entities[0].vehicle_category) == (1, VehicleCategory.CAR)
+    said = "; ".join(remark.reason for remark in scenario.remarks)
+    assert "taken as a car" in said and "holds no action" in said

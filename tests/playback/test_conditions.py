@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import sin
 from pathlib import Path
 
 import pytest
@@ -151,6 +152,14 @@ def test_lateral_distance(tmp_path: Path, freespace: bool, value: float) -> None
     for margin, expected in ((0.01, 0.0), (-0.01, None)):
         trigger = when(by_entity(distance_condition("lateral", value + margin, freespace=freespace)))
         assert fires(tmp_path, trigger, start=NEXT_TO) == expected
+
+
+def test_the_entity_frame_turns_with_the_entity(tmp_path: Path) -> None:
+    """100 m ahead along the road lies 100 sin(0.5) to the right of a car that is turned to the left by 0.5."""
+    turned = {**TWO, "Ego": teleport(on_lane(-1, 10.0, orientation=facing(0.5))) + speed(10.0)}
+    for margin, expected in ((0.01, 0.0), (-0.01, None)):
+        trigger = when(by_entity(distance_condition("lateral", 100.0 * sin(0.5) + margin)))
+        assert fires(tmp_path, trigger, start=turned) == expected
 
 
 def test_distance_to_a_position(tmp_path: Path) -> None:

@@ -246,3 +246,14 @@ def test_a_relative_position_follows_the_route_of_who_is_put_there(
     start = {"Lead": teleport(on_lane(-1, 80.0)), "Ego": way + teleport(ahead)}
     played = Stage(tmp_path, crossing()).play(start=start, last=0.1)
     assert played.network.road_ids[entity(played).road[0]] == by
+
+
+def test_where_a_lane_has_closed_the_one_of_its_side_that_opens_beside_it_goes_on(tmp_path: Path) -> None:
+    closing = '<lane id="-1" type="driving"><width sOffset="0" a="3.5" b="-0.0175" c="0" d="0"/></lane>'
+    apart = dict.fromkeys((1, -1), (None, None))
+    sections = section(lanes(1, links=apart), closing) + section(lanes(1, links=apart), lanes(-1, links=apart), s=200.0)
+    roads = map_of(road("1", line(length=400.0), 400.0, sections=sections))
+    start = {"Ego": teleport(on_lane(-1, 150.0)) + speed(10.0)}
+    motion = entity(Stage(tmp_path, roads).play(start=start, last=8.0))
+    assert motion.x[-1] > 200.0
+    assert motion.y[-1] == pytest.approx(-0.5 * WIDTH)

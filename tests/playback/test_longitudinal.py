@@ -121,6 +121,14 @@ def test_a_speed_profile_with_limited_jerk(tmp_path: Path) -> None:
     assert np.abs(np.diff(acceleration)).max() / 0.02 <= 3.0 + 1e-3
 
 
+def test_a_speed_profile_whose_time_is_too_short_takes_what_its_limits_need(tmp_path: Path) -> None:
+    limits = '<DynamicConstraints maxAcceleration="4" maxDeceleration="4"/>'
+    entries = '<SpeedProfileEntry time="1" speed="30"/>'
+    profile = longitudinal(f'<SpeedProfileAction followingMode="position">{limits}{entries}</SpeedProfileAction>')
+    motion = entity(Stage(tmp_path).play(maneuvers(event(profile, trigger=after(1.0))), last=6.0))
+    np.testing.assert_allclose(motion.speed, np.interp(motion.time, [1.0, 3.5], [20.0, 30.0]), atol=0.09)
+
+
 def test_a_distance_without_limits_is_taken_at_once(tmp_path: Path) -> None:
     keep = longitudinal(
         '<LongitudinalDistanceAction entityRef="Lead" continuous="true" freespace="false" distance="30" '
@@ -192,6 +200,13 @@ def test_a_standing_master_is_waited_for(tmp_path: Path) -> None:
     ego = entity(played)
     assert ego.speed[-1] == 0.0
     assert ego.x[-1] < 400.0
+
+
+@pytest.mark.parametrize(("master", "place"), [(0.0, 200.0), (15.0, 450.0)])
+def test_nobody_drives_to_meet_a_master_that_stands_or_has_passed(tmp_path: Path, master: float, place: float) -> None:
+    start = {"Ego": teleport(on_lane(-2, 50.0)) + speed(20.0), "Lead": teleport(on_lane(-1, place)) + speed(master)}
+    ego = entity(Stage(tmp_path).play(maneuvers(event(synchronised(""), trigger=after(1.0))), start=start))
+    assert ego.speed[-1] == 0.0
 
 
 def test_driving_backwards(tmp_path: Path) -> None:
