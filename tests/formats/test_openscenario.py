@@ -418,4 +418,4 @@ def test_what_field_files_leave_out_is_taken_as_meant_and_said(tmp_path: Path) -
     scenario = read_scenario(path)
     assert (scenario.header.minor, scenario.entities[0].vehicle_category) == (1, VehicleCategory.CAR)
     said = "; ".join(remark.reason for remark in scenario.remarks)
-    assert "taken as a car" in said and "holds no action" in said
+    assert "taken as a car" in said and "contains no action" in said
