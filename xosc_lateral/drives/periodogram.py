@@ -53,7 +53,12 @@ def periodograms(values: FloatArray, size: int, *, detrend: Detrend = Detrend.NO
     """
     if len(values) < size:
         return np.empty((0, size // 2 + 1))
-    pieces = np.lib.stride_tricks.sliding_window_view(values, size)[:: max(1, size // 2)]
+    return window_powers(np.lib.stride_tricks.sliding_window_view(values, size)[:: max(1, size // 2)], detrend=detrend)
+
+
+def window_powers(pieces: FloatArray, *, detrend: Detrend = Detrend.NOTHING) -> FloatArray:
+    """Power of Hann windows, one per row: shape (k, size) to (k, size // 2 + 1); see `periodograms`."""
+    size = pieces.shape[1]
     if detrend is Detrend.MEAN:
         pieces = pieces - pieces.mean(axis=1, keepdims=True)
     elif detrend is Detrend.ENDS:

@@ -20,7 +20,7 @@ from xosc_lateral.driver.models.autoregressive.volatility import (
     log_power,
 )
 from xosc_lateral.driver.models.base import Start
-from xosc_lateral.drives.periodogram import Detrend, periodograms
+from xosc_lateral.drives.periodogram import Detrend, window_powers
 
 FloatArray = NDArray[np.float64]
 
@@ -105,9 +105,7 @@ def matched(model: AutoregressiveModel, runs: Sequence[FloatArray], settings: Fi
 
 def _log_spectrum(snippets: FloatArray) -> FloatArray:
     """Mean log power of snippets at their own frequencies from 0 on, straight line from end to end taken out."""
-    size = snippets.shape[1] - 1
-    rows = [periodograms(row[:-1], size, detrend=Detrend.ENDS) for row in snippets]
-    return np.asarray(np.log(np.concatenate(rows) + 1e-30).mean(axis=0))
+    return np.asarray(np.log(window_powers(snippets[:, :-1], detrend=Detrend.ENDS) + 1e-30).mean(axis=0))
 
 
 def _gain(model: AutoregressiveModel, lacks: FloatArray) -> FloatArray:
