@@ -9,6 +9,7 @@ import importlib
 import os
 import posixpath
 import re
+from html import escape
 from pathlib import Path
 from typing import Any
 
@@ -68,7 +69,8 @@ def _verb(names: list[str], command: Any) -> list[str]:
     parts = [f"{'#' * (1 + len(names))} `{' '.join(names)}`", _text(command.help), f"```text\n{usage}\n```"]
     records = [one.get_help_record(context) for one in command.params if one.name != "help"]
     rows = [
-        f"| `{_text(name)}` | {_text(meaning).replace('[', chr(92) + '[')} |" for name, meaning in filter(None, records)
+        f"| {_code(_plain(name))} | {_text(meaning).replace('[', chr(92) + '[')} |"
+        for name, meaning in filter(None, records)
     ]
     parts.append("\n".join(["| option | meaning |", "|---|---|", *rows]))
     examples = re.search(r"Examples:\n(.*)", command.epilog or "", flags=re.DOTALL)
@@ -80,7 +82,14 @@ def _verb(names: list[str], command: Any) -> list[str]:
 
 def _plain(option: str) -> str:
     """Types as a user would say them: Typer writes ``<list[Path]>``."""
-    return re.sub(r"<(?:list\[)?(\w+)\]?(?: range)?>", lambda match: f"<{match[1].lower()}>", option)
+    words = {"str": "text", "int": "whole number", "float": "number"}
+    kind = r"<(?:list\[)?(\w+)\]?(?: range)?>"
+    return re.sub(kind, lambda match: f"<{words.get(match[1].lower(), match[1].lower())}>", option)
+
+
+def _code(text: str) -> str:
+    """Code in a table's cell, where a bar in backticks would keep its backslash."""
+    return f"<code>{escape(' '.join(text.split())).replace('|', '&#124;')}</code>"
 
 
 def _text(text: str | None) -> str:

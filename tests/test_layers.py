@@ -80,7 +80,11 @@ def _module_name(path: Path) -> str:
 
 
 def _imported_modules(path: Path, modules: set[str]) -> set[str]:
-    """Modules that one names anywhere: also inside functions, and for type checking alone."""
+    """Modules that one names anywhere: also inside functions, and for type checking alone.
+
+    Packages that a name lies in count: they are imported first, so that what they import comes along. Packages that the
+    module itself lies in don't: they have been begun by then.
+    """
     found = set()
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
         if isinstance(node, ast.ImportFrom) and node.module:
@@ -88,7 +92,10 @@ def _imported_modules(path: Path, modules: set[str]) -> set[str]:
             found |= inner or {node.module}
         elif isinstance(node, ast.Import):
             found |= {alias.name for alias in node.names}
-    return (found & modules) - {_module_name(path)}
+    own = _module_name(path)
+    around = {".".join(name.split(".")[:k]) for name in found & modules for k in range(2, name.count(".") + 1)}
+    above = {name for name in around if own == name or own.startswith(f"{name}.")}
+    return ((found | around - above) & modules) - {own}
 
 
 def test_no_module_imports_itself_by_a_detour() -> None:

@@ -8,8 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.identification.close import LoopResult
-from xosc_lateral.identification.terms import Cycle, DriftTerm, RegimesTerm, StepTerm
-from xosc_lateral.identification.terms.cycle import course
+from xosc_lateral.identification.terms.cycle import Cycle, course
+from xosc_lateral.identification.terms.drift import DriftTerm
+from xosc_lateral.identification.terms.regimes import RegimesTerm
+from xosc_lateral.identification.terms.step import StepTerm
 from xosc_lateral.identification.timeline import LOCAL_S, coarse_mean, coarse_middle, local_mean
 
 FloatArray = NDArray[np.float64]

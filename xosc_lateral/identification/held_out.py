@@ -21,8 +21,9 @@ from xosc_lateral.identification.regression import Coarse, Fitted, fit_model
 from xosc_lateral.identification.removal import Estimates, bare_runs, estimate_all, removal_of
 from xosc_lateral.identification.residual import Cells, cells_of, error_between, expected, own_runs
 from xosc_lateral.identification.selection import Selection
-from xosc_lateral.identification.terms import Cycle, StepTerm
 from xosc_lateral.identification.terms.base import Term
+from xosc_lateral.identification.terms.cycle import Cycle
+from xosc_lateral.identification.terms.step import StepTerm
 from xosc_lateral.identification.timeline import COARSE
 
 FloatArray = NDArray[np.float64]

@@ -18,9 +18,13 @@ from xosc_lateral.identification.nested import Gain, Nested, nest
 from xosc_lateral.identification.regression import Coarse
 from xosc_lateral.identification.search import Search
 from xosc_lateral.identification.selection import Selection, select
-from xosc_lateral.identification.terms import BetweenTerm, DriftTerm, MeanTerm, SpreadTerm, StepTerm, VarianceTrend
 from xosc_lateral.identification.terms.base import Term
-from xosc_lateral.identification.terms.between import is_between
+from xosc_lateral.identification.terms.between import BetweenTerm, is_between
+from xosc_lateral.identification.terms.drift import DriftTerm
+from xosc_lateral.identification.terms.mean import MeanTerm
+from xosc_lateral.identification.terms.spread import SpreadTerm
+from xosc_lateral.identification.terms.step import StepTerm
+from xosc_lateral.identification.terms.variance_trend import VarianceTrend
 from xosc_lateral.identification.timeline import Timeline
 
 Progress = Callable[[float, str], None]

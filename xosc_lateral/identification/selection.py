@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from xosc_lateral.identification.regression import Fitted, fit_model
 from xosc_lateral.identification.search import Search
 from xosc_lateral.identification.significance import level_of
-from xosc_lateral.identification.terms import STAGES
+from xosc_lateral.identification.stages import STAGES
 from xosc_lateral.identification.terms.base import Outcome, Term
 
 MAX_TERMS = 8

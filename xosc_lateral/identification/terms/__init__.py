@@ -1,45 +1,5 @@
 """Terms of the model, one file each: columns, test, estimate, remove, describe.
 
-A new one is a class here and its effect under `driver/effects`, and a line in `STAGES`.
+A new one is a class here and its effect under `driver/effects`, and a line in `identification/stages.py`. Nothing is
+imported here: the search needs `base`, and the terms need the search.
 """
-
-from __future__ import annotations
-
-from xosc_lateral.identification.terms.base import Term
-from xosc_lateral.identification.terms.between import BetweenTerm
-from xosc_lateral.identification.terms.cycle import Cycle
-from xosc_lateral.identification.terms.drift import DriftTerm
-from xosc_lateral.identification.terms.fine_noise import FineNoiseTerm
-from xosc_lateral.identification.terms.mean import MeanTerm
-from xosc_lateral.identification.terms.regimes import RegimesTerm
-from xosc_lateral.identification.terms.restoring import RestoringTerm
-from xosc_lateral.identification.terms.slow_spread import SlowSpreadTerm
-from xosc_lateral.identification.terms.spread import SpreadTerm
-from xosc_lateral.identification.terms.step import StepTerm
-from xosc_lateral.identification.terms.variance_trend import VarianceTrend
-
-STAGES: tuple[tuple[type[Term], ...], ...] = (
-    (MeanTerm,),
-    (Cycle, StepTerm),
-    (MeanTerm,),
-    (VarianceTrend, SpreadTerm, SlowSpreadTerm),
-    (RegimesTerm,),
-    (FineNoiseTerm, RestoringTerm),
-    (BetweenTerm,),
-)
-"""What is looked for, in this order. The mean comes first: a mean that is not known looks like a spread. Of a stage,
-what has the smallest p-value is added first; regimes come after the spread, because they explain whatever comes in
-clusters, and before what a regime's loud stretches might be taken for."""
-
-__all__ = [
-    "STAGES",
-    "BetweenTerm",
-    "Cycle",
-    "DriftTerm",
-    "MeanTerm",
-    "RegimesTerm",
-    "SpreadTerm",
-    "StepTerm",
-    "Term",
-    "VarianceTrend",
-]
