@@ -12,9 +12,7 @@ from xosc_lateral.motion.nominal import Activity, NominalMotion
 from xosc_lateral.pipeline.load import play_scenario
 
 DIFFERENT = {
-    "esmini/keep_lateral_distance": "ends 0.14 s later: a spring creeps over a threshold",
     "esmini/lane-change_clothoid_spline_based_trajectory": "exact clothoids here, samples of 1 m there",
-    "esmini/tunnels": "a road's end 1e-5 m from a frame's",
 }
 """References that are known not to agree; docs/playing.md says more."""
 
