@@ -18,13 +18,15 @@ from xosc_lateral.report.cards import library_page
 
 def main(argv: Sequence[str] | None = None) -> None:
     """Build the library and write it, with its cards."""
-    ask = argparse.ArgumentParser(description="Build the shipped driver profiles from the public recording.")
-    ask.add_argument("source", type=Path)
-    ask.add_argument("-o", "--output", type=Path, required=True, metavar="FOLDER")
-    ask.add_argument("--cards", type=Path, metavar="PAGE.md")
-    ask.add_argument("--model", default="best")
-    ask.add_argument("--keep-refined", action="store_true", help="leave what the closed loop made as it is in FOLDER")
-    args = ask.parse_args(argv)
+    parser = argparse.ArgumentParser(description="Build the shipped driver profiles from the public recording.")
+    parser.add_argument("source", type=Path)
+    parser.add_argument("-o", "--output", type=Path, required=True, metavar="FOLDER")
+    parser.add_argument("--cards", type=Path, metavar="PAGE.md")
+    parser.add_argument("--model", default="best")
+    parser.add_argument(
+        "--keep-refined", action="store_true", help="leave what the closed loop made as it is in FOLDER"
+    )
+    args = parser.parse_args(argv)
     profiles = build_library(args.source, model=args.model, refine=not args.keep_refined)
     for profile in profiles:
         write_profile(profile, args.output / f"{profile.name}.json")

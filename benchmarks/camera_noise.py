@@ -73,16 +73,16 @@ def loud_pieces(source: Path) -> str:
 
 def main() -> None:
     """Print the table, or write it into a page."""
-    ask = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    ask.add_argument("source", type=Path)
-    ask.add_argument("--write", type=Path, metavar="PAGE.md")
-    said = ask.parse_args()
-    text = loud_pieces(said.source)
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("source", type=Path)
+    parser.add_argument("--write", type=Path, metavar="PAGE.md")
+    args = parser.parse_args()
+    text = loud_pieces(args.source)
     print(text)
-    if said.write is not None:
-        page = said.write.read_text(encoding="utf-8")
+    if args.write is not None:
+        page = args.write.read_text(encoding="utf-8")
         marked = re.compile(r"(<!-- camera-noise: begin -->\n).*(<!-- camera-noise: end -->)", re.DOTALL)
-        write_atomically(said.write, marked.sub(lambda match: f"{match[1]}{text}\n{match[2]}", page))
+        write_atomically(args.write, marked.sub(lambda match: f"{match[1]}{text}\n{match[2]}", page))
 
 
 if __name__ == "__main__":

@@ -113,17 +113,17 @@ def drives_of(tables: Sequence[Path], seeds: range) -> Iterator[Drive]:
 
 
 def main() -> None:
-    ask = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    ask.add_argument("table", type=Path, nargs="*")
-    ask.add_argument("--seeds", type=int, nargs=2, default=(40, 80), help="first, and one beyond the last")
-    ask.add_argument("--runs", type=int, default=8, help="free runs per drive")
-    said = ask.parse_args()
-    drives = list(drives_of(said.table, range(*said.seeds)))
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("table", type=Path, nargs="*")
+    parser.add_argument("--seeds", type=int, nargs=2, default=(40, 80), help="first, and one beyond the last")
+    parser.add_argument("--runs", type=int, default=8, help="free runs per drive")
+    args = parser.parse_args()
+    drives = list(drives_of(args.table, range(*args.seeds)))
     edges = [0.0, *TIMES]
     names = ["offset", *(f"{low:g}-{high:g} s" for low, high in pairwise(edges)), f"> {edges[-1]:g} s"]
     print("| weights | " + " | ".join(names) + " | ten metrics |\n" + "|---" * (len(names) + 2) + "|")
     for variant, fit in VARIANTS.items():
-        found = [score(drive, fit, said.runs, number) for number, drive in enumerate(drives)]
+        found = [score(drive, fit, args.runs, number) for number, drive in enumerate(drives)]
         logs = np.array([log for log, _ in found])
         cells = [f"{a:.2f} ({b:.2f})" for a, b in zip(np.exp(logs.mean(axis=0)), np.exp(logs.max(axis=0)), strict=True)]
         print(f"| {variant} | " + " | ".join(cells) + f" | {np.mean([d for _, d in found]):.3f} |", flush=True)

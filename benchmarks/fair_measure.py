@@ -67,18 +67,18 @@ def _line(parts: Sequence[ConditionScores]) -> str:
 
 
 def main() -> None:
-    ask = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    ask.add_argument("table", type=Path, nargs="+")
-    ask.add_argument("--seed", type=int, default=0)
-    ask.add_argument("--model", default=ModelKind.AUTOREGRESSIVE)
-    ask.add_argument("--no-classify", action="store_true")
-    ask.add_argument("--write", type=Path, help="page with the markers")
-    said = ask.parse_args()
-    parts = measure(read_drives(said.table), said.seed, said.model, classify=not said.no_classify)
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("table", type=Path, nargs="+")
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--model", default=ModelKind.AUTOREGRESSIVE)
+    parser.add_argument("--no-classify", action="store_true")
+    parser.add_argument("--write", type=Path, help="page with the markers")
+    args = parser.parse_args()
+    parts = measure(read_drives(args.table), args.seed, args.model, classify=not args.no_classify)
     text = "\n".join(table(parts))
     print(text)
-    if said.write is not None:
-        write_between_markers(said.write, text, "fair-measure")
+    if args.write is not None:
+        write_between_markers(args.write, text, "fair-measure")
 
 
 if __name__ == "__main__":

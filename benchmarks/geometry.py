@@ -98,9 +98,9 @@ def report(path: Path) -> None:
 
 def main() -> None:
     """Measure the files named, else public ones beside the project."""
-    ask = argparse.ArgumentParser(description=__doc__)
-    ask.add_argument("roads", nargs="*", type=Path)
-    paths = ask.parse_args().roads or [path for path in DEFAULTS if path.exists()]
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("roads", nargs="*", type=Path)
+    paths = parser.parse_args().roads or [path for path in DEFAULTS if path.exists()]
     for path in paths or sorted((ROOT / "tests" / "data" / "xodr" / "valid").glob("*.xodr")):
         report(path)
 

@@ -46,9 +46,9 @@ def side_by_side(source: Path) -> tuple[pd.DataFrame, pd.DataFrame]:
 
 def main() -> None:
     """Print both distributions."""
-    ask = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    ask.add_argument("wheel", type=Path, metavar="WHEEL")
-    pairs, rows = side_by_side(ask.parse_args().wheel)
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("wheel", type=Path, metavar="WHEEL")
+    pairs, rows = side_by_side(parser.parse_args().wheel)
     free = pairs["apart"] - 0.5 * (pairs["width"] + pairs["width_left"])
     real = free + pairs["offset_left"] - pairs["offset"]
     n = 20 * len(pairs)

@@ -90,15 +90,15 @@ def gaps_table(stretches: list[FloatArray]) -> list[str]:
 
 
 def main() -> None:
-    ask = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    ask.add_argument("source", type=Path)
-    ask.add_argument("--write", type=Path, help="document with the markers")
-    said = ask.parse_args()
-    lanes, stretches = lanes_of(said.source)
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("source", type=Path)
+    parser.add_argument("--write", type=Path, help="document with the markers")
+    args = parser.parse_args()
+    lanes, stretches = lanes_of(args.source)
     text = "\n".join([*knots_table(lanes), "", *gaps_table(stretches)])
     print(text)
-    if said.write is not None:
-        write_between_markers(said.write, text, "lane-centres")
+    if args.write is not None:
+        write_between_markers(args.write, text, "lane-centres")
 
 
 if __name__ == "__main__":

@@ -33,24 +33,24 @@ DPI = 110
 
 def main() -> None:
     """Run the loop, print what it found, write figures and table where asked."""
-    ask = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    ask.add_argument("table", type=Path)
-    ask.add_argument("--seed", type=int, default=1)
-    ask.add_argument("--write", type=Path, metavar="PAGE.md")
-    ask.add_argument("--figures", type=Path, metavar="FOLDER")
-    said = ask.parse_args()
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("table", type=Path)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--write", type=Path, metavar="PAGE.md")
+    parser.add_argument("--figures", type=Path, metavar="FOLDER")
+    args = parser.parse_args()
     started = time.perf_counter()
-    result = refine_population(read_drives([said.table]), said.seed)
+    result = refine_population(read_drives([args.table]), args.seed)
     took = time.perf_counter() - started
     leftover = leftover_of(result)
     text = f"```\n{loop_text(result, leftover)}\n```\n\nIn {took:.0f} s.\n\n{group_table(leftover)}"
     print(text)
-    if said.write is not None:
-        page = said.write.read_text(encoding="utf-8")
+    if args.write is not None:
+        page = args.write.read_text(encoding="utf-8")
         marked = re.compile(r"(<!-- loop-dlr: begin -->\n).*(<!-- loop-dlr: end -->)", re.DOTALL)
-        write_atomically(said.write, marked.sub(lambda match: f"{match[1]}{text}\n{match[2]}", page))
-    if said.figures is not None:
-        draw(result, leftover, said.figures)
+        write_atomically(args.write, marked.sub(lambda match: f"{match[1]}{text}\n{match[2]}", page))
+    if args.figures is not None:
+        draw(result, leftover, args.figures)
 
 
 def group_table(leftover: Leftover) -> str:

@@ -28,7 +28,7 @@ from xosc_lateral.driver.models.base import Start
 from xosc_lateral.driver.models.two_level.fit import fit_two_level
 from xosc_lateral.drives.cuts import all_runs
 from xosc_lateral.drives.drive import Run
-from xosc_lateral.evaluation.classifier import told_apart
+from xosc_lateral.evaluation.classifier import classifier_two_sample_test
 from xosc_lateral.evaluation.distances import snippet_distances, split_groups
 from xosc_lateral.evaluation.metrics import METRICS
 from xosc_lateral.formats.drives import read_drives
@@ -125,7 +125,7 @@ def score(runs: Sequence[Run], fit: Callable[[Sequence[Run]], Sampler], splits: 
             model[name] += list(snippet_distances(real, made).by_metric.values())
             floor[name] += list(snippet_distances(real, snippets(train, length)[0]).by_metric.values())
             if classify and not split and length == LENGTHS["10 s"]:
-                auc = told_apart(real, made, whose, whose)
+                auc = classifier_two_sample_test(real, made, whose, whose)
     cells = []
     for name in LENGTHS:
         ratio = model[name] / floor[name]
@@ -135,22 +135,22 @@ def score(runs: Sequence[Run], fit: Callable[[Sequence[Run]], Sampler], splits: 
 
 
 def main() -> None:
-    ask = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    ask.add_argument("table", type=Path, nargs="+")
-    ask.add_argument("--splits", type=int, default=8)
-    ask.add_argument("--classifier", action="store_true", help="also train a classifier (20 s a variant)")
-    ask.add_argument("--write", type=Path, help="put the table between the markers of this page")
-    said = ask.parse_args()
-    runs = all_runs(read_drives(said.table))
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("table", type=Path, nargs="+")
+    parser.add_argument("--splits", type=int, default=8)
+    parser.add_argument("--classifier", action="store_true", help="also train a classifier (20 s a variant)")
+    parser.add_argument("--write", type=Path, help="put the table between the markers of this page")
+    args = parser.parse_args()
+    runs = all_runs(read_drives(args.table))
     lines = ["| variant | mean, 10 s | worst | mean, 60 s | worst | AUC |", "|---|---|---|---|---|---|"]
     for name, fit in VARIANTS.items():
-        lines.append("| " + " | ".join([name, *score(runs, fit, said.splits, said.classifier)]) + " |")
+        lines.append("| " + " | ".join([name, *score(runs, fit, args.splits, args.classifier)]) + " |")
         print(lines[-1], flush=True)
-    if said.write:
-        page = said.write.read_text(encoding="utf-8")
+    if args.write:
+        page = args.write.read_text(encoding="utf-8")
         table = "\n".join(lines)
         pattern = rf"(<!-- {MARKER}: begin -->\n).*?(<!-- {MARKER}: end -->)"
-        said.write.write_text(re.sub(pattern, rf"\g<1>{table}\n\g<2>", page, flags=re.DOTALL), encoding="utf-8")
+        args.write.write_text(re.sub(pattern, rf"\g<1>{table}\n\g<2>", page, flags=re.DOTALL), encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -59,18 +59,18 @@ def costs(folder: Path, step: float, limit: float, repeat: int) -> Iterator[Cost
 
 
 def main() -> None:
-    ask = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    ask.add_argument("folder", type=Path)
-    ask.add_argument("--step", type=float, default=0.02)
-    ask.add_argument("--time-limit", type=float, default=60.0)
-    ask.add_argument("--slowest", type=int, default=10)
-    ask.add_argument("--repeat", type=int, default=3)
-    said = ask.parse_args()
-    found = list(costs(said.folder, said.step, said.time_limit, said.repeat))
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("folder", type=Path)
+    parser.add_argument("--step", type=float, default=0.02)
+    parser.add_argument("--time-limit", type=float, default=60.0)
+    parser.add_argument("--slowest", type=int, default=10)
+    parser.add_argument("--repeat", type=int, default=3)
+    args = parser.parse_args()
+    found = list(costs(args.folder, args.step, args.time_limit, args.repeat))
     if not found:
-        raise SystemExit(f"{said.folder}: nothing to play")
+        raise SystemExit(f"{args.folder}: nothing to play")
     print(f"{'scenario':60} {'reading s':>10} {'playing s':>10} {'rows':>8} {'us/row':>8} {'x real time':>12}")
-    for cost in sorted(found, key=lambda cost: -cost.per_row)[: said.slowest]:
+    for cost in sorted(found, key=lambda cost: -cost.per_row)[: args.slowest]:
         factor = cost.simulated / cost.playing
         times = f"{cost.reading:10.3f} {cost.playing:10.3f}"
         print(f"{cost.name[:60]:60} {times} {cost.rows:8d} {cost.per_row:8.1f} {factor:12.0f}")

@@ -67,9 +67,9 @@ def sampled(profile: DriverProfile, segment: Segment) -> Callable[[], object]:
 
 
 def main() -> None:
-    ask = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    ask.add_argument("tables", nargs="*", type=Path, metavar="DRIVE_TABLE")
-    tables = ask.parse_args().tables
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("tables", nargs="*", type=Path, metavar="DRIVE_TABLE")
+    tables = parser.parse_args().tables
     begin = time.process_time()
     drives = read_drives(tables) if tables else []
     read = time.process_time() - begin

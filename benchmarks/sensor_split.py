@@ -69,12 +69,12 @@ def errors(drive: Drive, spread: float, rng: np.random.Generator) -> Iterator[tu
 
 def main() -> None:
     """Print one line per kind and ratio."""
-    ask = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    ask.add_argument("drives", nargs="*", type=Path)
-    ask.add_argument("--set", choices=SEEDS, default="design")
-    said = ask.parse_args()
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("drives", nargs="*", type=Path)
+    parser.add_argument("--set", choices=SEEDS, default="design")
+    args = parser.parse_args()
     found: dict[tuple[str, float], list[tuple[float, float, float, bool]]] = {}
-    for drive in [*map(smoothed, said.drives), *map(simulated, SEEDS[said.set])]:
+    for drive in [*map(smoothed, args.drives), *map(simulated, SEEDS[args.set])]:
         runs = cut_runs(drive)
         rows = [(drive.time >= run.time[0] - 1e-9) & (drive.time <= run.time[-1] + 1e-9) for run in runs]
         truth = np.concatenate([run.offset for run in runs])

@@ -18,39 +18,39 @@ from xosc_lateral.driver.fitting import fit_runs
 from xosc_lateral.drives.cuts import all_runs
 from xosc_lateral.drives.drive import Run
 from xosc_lateral.drives.resampling import STEP
-from xosc_lateral.evaluation.comparison import told_from_each_other
+from xosc_lateral.evaluation.comparison import driver_distances
 from xosc_lateral.formats.drives import read_drives
 from xosc_lateral.pipeline.library import sliding_snippets, split_in_time
 
 
 def main() -> None:
-    ask = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    ask.add_argument("table", type=Path)
-    ask.add_argument("--seconds", type=float, default=140.0)
-    ask.add_argument("--model", default="best")
-    ask.add_argument("--write", type=Path, help="document with the markers")
-    said = ask.parse_args()
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("table", type=Path)
+    parser.add_argument("--seconds", type=float, default=140.0)
+    parser.add_argument("--model", default="best")
+    parser.add_argument("--write", type=Path, help="document with the markers")
+    args = parser.parse_args()
     by_vehicle: dict[str, list[Run]] = {}
-    for run in all_runs(read_drives(said.table)):
+    for run in all_runs(read_drives(args.table)):
         by_vehicle.setdefault(run.drive, []).append(run)
     parts = {
-        name: split_in_time(runs) for name, runs in by_vehicle.items() if sum(map(len, runs)) * STEP >= said.seconds
+        name: split_in_time(runs) for name, runs in by_vehicle.items() if sum(map(len, runs)) * STEP >= args.seconds
     }
     parts = {name: part for name, part in parts.items() if max(map(len, part[1])) * STEP > 10.0}
-    profiles = [fit_runs(early, name=name, model=said.model) for name, (early, _) in parts.items()]
-    distance = told_from_each_other(profiles, [sliding_snippets(late) for _, late in parts.values()])
+    profiles = [fit_runs(early, name=name, model=args.model) for name, (early, _) in parts.items()]
+    distance = driver_distances(profiles, [sliding_snippets(late) for _, late in parts.values()])
     own = np.diag(distance)[:, None]
     others = ~np.eye(len(own), dtype=bool)
     right = (own < distance)[others].mean()
     first = (distance.argmin(axis=1) == np.arange(len(own))).mean()
     text = (
-        f"{len(own)} vehicles with at least {said.seconds:g} s, model `{said.model}`: the profile is nearer to its own "
+        f"{len(own)} vehicles with at least {args.seconds:g} s, model `{args.model}`: the profile is nearer to its own "
         f"driver's held-out part than to another's in {100 * right:.0f} % of {others.sum()} ordered pairs; its own "
         f"driver is the nearest of all {len(own)} for {100 * first:.0f} % (chance: {100 / len(own):.0f} %)."
     )
     print(text)
-    if said.write is not None:
-        write_between_markers(said.write, text, "told-apart")
+    if args.write is not None:
+        write_between_markers(args.write, text, "told-apart")
 
 
 if __name__ == "__main__":

@@ -115,25 +115,25 @@ def _short(scenario: str) -> str:
 
 def main() -> None:
     """Run and write."""
-    ask = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    ask.add_argument("scenarios", type=Path)
-    ask.add_argument("output", type=Path)
-    ask.add_argument("--seeds", type=int, default=100)
-    ask.add_argument("--profile", default="motorway")
-    ask.add_argument("--table", type=Path)
-    ask.add_argument("--only", nargs="+", metavar="PART", help="scenarios whose name has one of these parts")
-    said = ask.parse_args()
-    paths = sorted(said.scenarios.glob("*.xosc"))
-    if said.only:
-        paths = [path for path in paths if any(part in path.name for part in said.only)]
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("scenarios", type=Path)
+    parser.add_argument("output", type=Path)
+    parser.add_argument("--seeds", type=int, default=100)
+    parser.add_argument("--profile", default="motorway")
+    parser.add_argument("--table", type=Path)
+    parser.add_argument("--only", nargs="+", metavar="PART", help="scenarios whose name has one of these parts")
+    args = parser.parse_args()
+    paths = sorted(args.scenarios.glob("*.xosc"))
+    if args.only:
+        paths = [path for path in paths if any(part in path.name for part in args.only)]
     if not paths:
-        raise SystemExit(f"{said.scenarios}: no .xosc files")
-    record = study(paths, said.profile, said.seeds, said.table)
+        raise SystemExit(f"{args.scenarios}: no .xosc files")
+    record = study(paths, args.profile, args.seeds, args.table)
     verdicts: dict[str, Verdicts] = record.pop("_verdicts")
-    said.output.mkdir(parents=True, exist_ok=True)
-    (said.output / "study.json").write_text(json.dumps(record, indent=1) + "\n", encoding="utf-8")
-    (said.output / "study.md").write_text(markdown(record), encoding="utf-8")
-    verdict_figure(verdicts, GAPS).savefig(said.output / "verdict.svg", metadata={"Date": None})
+    args.output.mkdir(parents=True, exist_ok=True)
+    (args.output / "study.json").write_text(json.dumps(record, indent=1) + "\n", encoding="utf-8")
+    (args.output / "study.md").write_text(markdown(record), encoding="utf-8")
+    verdict_figure(verdicts, GAPS).savefig(args.output / "verdict.svg", metadata={"Date": None})
     print(markdown(record))
 
 

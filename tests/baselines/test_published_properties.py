@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tests.baselines.made_runs import STEP, made_run, smooth_runs, straight
-from xosc_lateral.baselines.base import BURN_IN, batch_of, habits_of
+from xosc_lateral.baselines.base import BURN_IN, batch_of, driver_means_of
 from xosc_lateral.baselines.bounded_noise import BoundedNoise
 from xosc_lateral.baselines.constant_offset import ConstantOffset
 from xosc_lateral.baselines.gaussian_process import GaussianProcess
@@ -148,7 +148,7 @@ def test_linear_preview_recovers_the_gains_of_a_driver_who_looks_ahead() -> None
     found = LinearPreview.fit(runs)
     np.testing.assert_allclose(found.left, truth.left, rtol=0.05)
     np.testing.assert_allclose(found.right, truth.right, rtol=0.05)
-    assert found.habits.std() == pytest.approx(habits_of(runs).std())
+    assert found.driver_means.std() == pytest.approx(driver_means_of(runs).std())
 
 
 def test_linear_preview_moves_before_the_curve_begins_and_to_its_inside() -> None:
@@ -185,5 +185,5 @@ def _bursts(change: np.ndarray) -> list[np.ndarray]:
 
 def test_a_free_run_has_forgotten_where_it_began() -> None:
     assert BURN_IN >= 60.0
-    model = OrnsteinUhlenbeck(habits=np.full(1, 5.0), mean=0.0, time_constant=4.0, spread=0.2)
+    model = OrnsteinUhlenbeck(driver_means=np.full(1, 5.0), mean=0.0, time_constant=4.0, spread=0.2)
     assert _free(model, 500, 4.0).mean() == pytest.approx(0.0, abs=0.03)

@@ -6,7 +6,13 @@ import numpy as np
 import pytest
 
 from tests.baselines.made_runs import made_run
-from xosc_lateral.evaluation.classifier import FOLDS, area_under_roc, context_features, snippet_features, told_apart
+from xosc_lateral.evaluation.classifier import (
+    FOLDS,
+    area_under_roc,
+    classifier_two_sample_test,
+    context_features,
+    snippet_features,
+)
 from xosc_lateral.evaluation.shape import SHAPES, longest_true, shape_features
 from xosc_lateral.evaluation.snippets import snippets_of
 
@@ -20,10 +26,10 @@ GROUPS = np.arange(100) // 10
 
 def test_rough_is_told_from_smooth_and_like_is_not_told_from_like():
     pytest.importorskip("sklearn", reason="extra `classifier` is not installed")
-    alike = told_apart(_walks(1), _walks(2), GROUPS, GROUPS)
+    alike = classifier_two_sample_test(_walks(1), _walks(2), GROUPS, GROUPS)
     assert alike.auc == pytest.approx(0.5, abs=0.15)  # 3 standard errors of 2 x 100 snippets in ten groups
     rough = _walks(3) + np.random.default_rng(4).normal(size=(100, 51))
-    apart = told_apart(_walks(1), rough, GROUPS, GROUPS)
+    apart = classifier_two_sample_test(_walks(1), rough, GROUPS, GROUPS)
     assert apart.auc > apart.low > 0.9
 
 
@@ -32,8 +38,8 @@ def test_what_only_context_tells_is_told_with_context_alone():
     side = np.random.default_rng(5).choice([-1.0, 1.0], size=100)
     real = _walks(6) + 30.0 * side[:, None]
     other = _walks(7) - 30.0 * side[:, None]  # as often on either side, but on the wrong one
-    assert told_apart(real, other, GROUPS, GROUPS).auc < 0.65
-    assert told_apart(real, other, GROUPS, GROUPS, context=(side[:, None], side[:, None])).auc > 0.8
+    assert classifier_two_sample_test(real, other, GROUPS, GROUPS).auc < 0.65
+    assert classifier_two_sample_test(real, other, GROUPS, GROUPS, context=(side[:, None], side[:, None])).auc > 0.8
 
 
 def test_context_is_the_same_for_both_and_how_a_path_moves_with_it_is_not():
@@ -51,7 +57,7 @@ def test_context_is_the_same_for_both_and_how_a_path_moves_with_it_is_not():
 
 def test_classifier_stays_silent_with_too_few_drives():
     rows = np.zeros((10, 51))
-    assert told_apart(rows, rows, np.zeros(10), np.zeros(10)) is None
+    assert classifier_two_sample_test(rows, rows, np.zeros(10), np.zeros(10)) is None
     assert FOLDS == 5
 
 

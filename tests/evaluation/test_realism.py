@@ -12,8 +12,8 @@ from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.driver.sensor.model import SensorModel
 from xosc_lateral.drives.drive import Run
 from xosc_lateral.drives.resampling import STEP
-from xosc_lateral.evaluation.bands import below_half_hertz
 from xosc_lateral.evaluation.condition import Condition
+from xosc_lateral.evaluation.filters import below_half_hertz
 from xosc_lateral.evaluation.realism import Beside, Realism, score_realism
 from xosc_lateral.evaluation.snippets import sample_runs, sensor_noise, snippets_of
 from xosc_lateral.report.realism import realism_lines, start_fade_note

@@ -14,7 +14,7 @@ from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.drives.drive import Run
 from xosc_lateral.drives.resampling import STEP
 from xosc_lateral.errors import NotEnoughDataError
-from xosc_lateral.evaluation.comparison import compare_profiles, free_runs, habits_of, told_from_each_other
+from xosc_lateral.evaluation.comparison import compare_profiles, driver_distances, free_runs, summary_of
 from xosc_lateral.evaluation.distances import (
     floor_distances,
     metric_distances,
@@ -259,12 +259,12 @@ def test_profiles_know_their_drivers():
     runs = [_swaying(20 + k, 1, mean, spread, n=2000)[0] for k, (mean, spread) in enumerate(drivers)]
     early = [fit_runs([_run(run.offset[:1200], "d")], name=f"d{k}", model="two-level") for k, run in enumerate(runs)]
     late = [cut_snippets(run.offset[1200:], 51) for run in runs]
-    distance = told_from_each_other(early, late)
+    distance = driver_distances(early, late)
     assert (distance.argmin(axis=1) == np.arange(3)).all() and (distance.argmin(axis=0) == np.arange(3)).all()
 
 
 def test_comparison_tells_left_from_right(profile):
     left = fit_runs(_swaying(30, 20, mean=0.4), name="left", model="two-level")
-    assert habits_of(left).mean_offset == pytest.approx(0.4, abs=0.08)
+    assert summary_of(left).mean_offset == pytest.approx(0.4, abs=0.08)
     assert compare_profiles(left, profile).by_metric["mean"] > 1.0
     assert compare_profiles(profile, profile).mean < 0.15

@@ -12,7 +12,7 @@ import pytest
 
 from xosc_lateral.cli import main
 from xosc_lateral.errors import NotEnoughDataError
-from xosc_lateral.evaluation.comparison import free_runs, habits_of
+from xosc_lateral.evaluation.comparison import free_runs, summary_of
 from xosc_lateral.formats.profiles import list_profiles, read_profile
 from xosc_lateral.pipeline.library import GROUPS, most_different
 from xosc_lateral.report.cards import card_text
@@ -140,9 +140,9 @@ def test_the_refined_profile_says_what_the_loop_found_and_differs_little_from_th
     assert {"memory beyond one step", "drivers that differ"} <= set(loop["found"])
     assert refined.model.kind == "autoregressive"
     assert f"found: {', '.join(loop['found'])}" in card_text(refined)
-    habits, others = habits_of(refined), habits_of(direct)
-    assert habits.spread == pytest.approx(others.spread, rel=0.1)
-    assert habits.lateral_speed == pytest.approx(others.lateral_speed, rel=0.2)
+    summary, others = summary_of(refined), summary_of(direct)
+    assert summary.spread == pytest.approx(others.spread, rel=0.1)
+    assert summary.lateral_speed == pytest.approx(others.lateral_speed, rel=0.2)
 
 
 def test_a_fitted_profile_has_no_word_about_a_loop(profile):

@@ -77,7 +77,7 @@ def given_drives(drives: DrivesLike, columns: Mapping[str, str] | None = None) -
     FormatError, NotEnoughDataError
         See `formats.drives.read_drives`.
     """
-    from xosc_lateral.formats.drives import drives_of_table, parse_map, read_drives, told_apart
+    from xosc_lateral.formats.drives import drives_of_table, parse_map, read_drives, with_distinct_names
 
     items = _listed(drives)
     mapping = parse_map(f"{name}={column}" for name, column in (columns or {}).items())
@@ -96,7 +96,7 @@ def given_drives(drives: DrivesLike, columns: Mapping[str, str] | None = None) -
             name = "DataFrame" if len(items) == 1 else f"DataFrame {number}"
             found += drives_of_table(item, mapping, name)
             inputs[name] = frame_hash(item)
-    return GivenDrives(told_apart(found), inputs, tuple(files))
+    return GivenDrives(with_distinct_names(found), inputs, tuple(files))
 
 
 def frame_hash(frame: pd.DataFrame) -> str:

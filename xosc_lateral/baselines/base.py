@@ -141,12 +141,12 @@ class SimulatedModel(ABC):
 
     Parameters
     ----------
-    habits : array, shape (k,)
+    driver_means : array, shape (k,)
         Mean offsets of the drivers that were fitted: a free run's driver takes one of them where the model has a
         preferred place. [m]
     """
 
-    habits: FloatArray = field(default_factory=lambda: np.zeros(1))
+    driver_means: FloatArray = field(default_factory=lambda: np.zeros(1))
 
     @abstractmethod
     def simulate(self, batch: Batch, rng: np.random.Generator) -> FloatArray:
@@ -154,7 +154,7 @@ class SimulatedModel(ABC):
 
     def free_starts(self, n: int, rng: np.random.Generator) -> FloatArray:
         """Where n free runs begin, a minute before they are looked at. [m]"""
-        return np.asarray(rng.choice(self.habits, n))
+        return np.asarray(rng.choice(self.driver_means, n))
 
     def sample(
         self, segments: Sequence[Segment], starts: FloatArray | None, rng: np.random.Generator
@@ -172,7 +172,7 @@ class SimulatedModel(ABC):
         return [row[:length] for row, length in zip(rows, lengths, strict=True)]
 
 
-def habits_of(runs: Sequence[Run]) -> FloatArray:
+def driver_means_of(runs: Sequence[Run]) -> FloatArray:
     """Mean offset of each driver. [m]"""
     names = sorted({run.drive for run in runs})
     return np.array([np.concatenate([run.offset for run in runs if run.drive == name]).mean() for name in names])

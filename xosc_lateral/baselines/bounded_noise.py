@@ -9,7 +9,7 @@ from typing import ClassVar, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.baselines.base import Batch, SimulatedModel, habits_of
+from xosc_lateral.baselines.base import Batch, SimulatedModel, driver_means_of
 from xosc_lateral.baselines.calibration import Bounds, calibrate
 from xosc_lateral.baselines.ornstein_uhlenbeck import recursion
 from xosc_lateral.drives.drive import Run
@@ -52,9 +52,9 @@ class BoundedNoise(SimulatedModel):
     @classmethod
     def fit(cls, runs: Sequence[Run]) -> Self:
         """Numbers of the smallest distance (`calibrate`)."""
-        habits, mean = habits_of(runs), float(np.concatenate([run.offset for run in runs]).mean())
+        driver_means, mean = driver_means_of(runs), float(np.concatenate([run.offset for run in runs]).mean())
         bounds = {"relaxation": Bounds(0.5, 100.0), "bound": Bounds(0.01, 1.0), "memory": Bounds(0.1, 20.0)}
-        return calibrate(lambda values: cls(habits=habits, mean=mean, **values), bounds, runs)
+        return calibrate(lambda values: cls(driver_means=driver_means, mean=mean, **values), bounds, runs)
 
     def noise(self, n: int, m: int, step: float, rng: np.random.Generator) -> FloatArray:
         """Stationary sine-Wiener noise, shape (n, m). [m/s]"""

@@ -9,7 +9,7 @@ from typing import ClassVar, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.baselines.base import Batch, SimulatedModel, habits_of
+from xosc_lateral.baselines.base import Batch, SimulatedModel, driver_means_of
 from xosc_lateral.drives.drive import Run
 
 FloatArray = NDArray[np.float64]
@@ -26,7 +26,7 @@ class ConstantOffset(SimulatedModel):
     @classmethod
     def fit(cls, runs: Sequence[Run]) -> Self:
         """Means of the drivers."""
-        return cls(habits=habits_of(runs))
+        return cls(driver_means=driver_means_of(runs))
 
     def simulate(self, batch: Batch, rng: np.random.Generator) -> FloatArray:
         """See `SimulatedModel.simulate`."""
@@ -35,4 +35,4 @@ class ConstantOffset(SimulatedModel):
     @property
     def settings(self) -> Mapping[str, float]:
         """Spread of the drivers' means."""
-        return {"spread_m": float(self.habits.std())}
+        return {"spread_m": float(self.driver_means.std())}

@@ -9,7 +9,7 @@ from typing import ClassVar, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.baselines.base import Batch, SimulatedModel, habits_of
+from xosc_lateral.baselines.base import Batch, SimulatedModel, driver_means_of
 from xosc_lateral.baselines.calibration import Bounds, calibrate
 from xosc_lateral.drives.drive import Run
 
@@ -61,7 +61,7 @@ class Intermittent(SimulatedModel):
     @classmethod
     def fit(cls, runs: Sequence[Run]) -> Self:
         """Numbers of the smallest distance (`calibrate`)."""
-        habits = habits_of(runs)
+        driver_means = driver_means_of(runs)
         bounds = {
             "look_ahead": Bounds(2.0, 20.0),
             "threshold": Bounds(0.003, 0.5),
@@ -69,7 +69,7 @@ class Intermittent(SimulatedModel):
             "motor_noise": Bounds(0.02, 1.0),
             "unrest": Bounds(0.001, 0.1),
         }
-        return calibrate(lambda values: cls(habits=habits, **values), bounds, runs)
+        return calibrate(lambda values: cls(driver_means=driver_means, **values), bounds, runs)
 
     def simulate(self, batch: Batch, rng: np.random.Generator) -> FloatArray:
         """See `SimulatedModel.simulate`."""

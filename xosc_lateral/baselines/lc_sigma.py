@@ -9,7 +9,7 @@ from typing import ClassVar, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.baselines.base import Batch, SimulatedModel, habits_of
+from xosc_lateral.baselines.base import Batch, SimulatedModel, driver_means_of
 from xosc_lateral.baselines.calibration import Bounds, calibrate
 from xosc_lateral.baselines.ornstein_uhlenbeck import recursion
 from xosc_lateral.drives.drive import Run
@@ -45,8 +45,8 @@ class LcSigma(SimulatedModel):
     @classmethod
     def fit(cls, runs: Sequence[Run]) -> Self:
         """Numbers of the smallest distance (`calibrate`)."""
-        habits = habits_of(runs)
-        return calibrate(lambda values: cls(habits=habits, **values), {"sigma": Bounds(0.01, 0.99)}, runs)
+        driver_means = driver_means_of(runs)
+        return calibrate(lambda values: cls(driver_means=driver_means, **values), {"sigma": Bounds(0.01, 0.99)}, runs)
 
     def simulate(self, batch: Batch, rng: np.random.Generator) -> FloatArray:
         """See `SimulatedModel.simulate`."""

@@ -10,7 +10,7 @@ from typing import ClassVar, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.baselines.base import Batch, SimulatedModel, habits_of
+from xosc_lateral.baselines.base import Batch, SimulatedModel, driver_means_of
 from xosc_lateral.drives.drive import Run
 from xosc_lateral.drives.resampling import STEP
 
@@ -64,7 +64,7 @@ class LinearPreview(SimulatedModel):
         gains = np.zeros(6)
         if used.any():
             gains[used] = np.linalg.lstsq(x[:, used] / scale[used], y, rcond=SMALLEST)[0] / scale[used]
-        return cls(habits=habits_of(runs), left=gains[:3], right=gains[3:])
+        return cls(driver_means=driver_means_of(runs), left=gains[:3], right=gains[3:])
 
     def simulate(self, batch: Batch, rng: np.random.Generator) -> FloatArray:
         """See `SimulatedModel.simulate`."""

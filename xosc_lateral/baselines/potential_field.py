@@ -9,7 +9,7 @@ from typing import ClassVar, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.baselines.base import Batch, SimulatedModel, habits_of
+from xosc_lateral.baselines.base import Batch, SimulatedModel, driver_means_of
 from xosc_lateral.baselines.calibration import Bounds, calibrate
 from xosc_lateral.drives.drive import Run
 
@@ -50,14 +50,14 @@ class PotentialField(SimulatedModel):
     @classmethod
     def fit(cls, runs: Sequence[Run]) -> Self:
         """Numbers of the smallest distance (`calibrate`)."""
-        habits = habits_of(runs)
+        driver_means = driver_means_of(runs)
         bounds = {
             "strength": Bounds(0.01, 10.0),
             "reach": Bounds(0.1, 3.0),
             "friction": Bounds(0.02, 5.0),
             "noise": Bounds(0.003, 0.5),
         }
-        return calibrate(lambda values: cls(habits=habits, **values), bounds, runs)
+        return calibrate(lambda values: cls(driver_means=driver_means, **values), bounds, runs)
 
     def force(self, offset: FloatArray, lane_width: FloatArray, beside: FloatArray) -> FloatArray:
         """Acceleration that the potentials give at rest. [m/s2]"""

@@ -9,7 +9,7 @@ from typing import ClassVar, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.baselines.base import ALONGSIDE, Batch, SimulatedModel, habits_of
+from xosc_lateral.baselines.base import ALONGSIDE, Batch, SimulatedModel, driver_means_of
 from xosc_lateral.baselines.calibration import Bounds, calibrate
 from xosc_lateral.baselines.potential_field import move
 from xosc_lateral.drives.drive import Run
@@ -56,9 +56,9 @@ class SocialForce(SimulatedModel):
     @classmethod
     def fit(cls, runs: Sequence[Run]) -> Self:
         """The shift from the runs where neighbours are known, the rest by the smallest distance (`calibrate`)."""
-        habits, shift = habits_of(runs), shift_beside(runs)
+        driver_means, shift = driver_means_of(runs), shift_beside(runs)
         bounds = {"stiffness": Bounds(0.001, 3.0), "friction": Bounds(0.02, 5.0), "noise": Bounds(0.003, 0.5)}
-        return calibrate(lambda values: cls(habits=habits, shift=shift, **values), bounds, runs)
+        return calibrate(lambda values: cls(driver_means=driver_means, shift=shift, **values), bounds, runs)
 
     def force(self, offset: FloatArray, lane_width: FloatArray, beside: FloatArray) -> FloatArray:
         """Acceleration at rest. [m/s2]"""

@@ -9,7 +9,7 @@ from typing import ClassVar, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.baselines.base import Batch, SimulatedModel, habits_of
+from xosc_lateral.baselines.base import Batch, SimulatedModel, driver_means_of
 from xosc_lateral.baselines.calibration import Bounds, calibrate
 from xosc_lateral.drives.drive import Run
 
@@ -56,14 +56,14 @@ class StripBased(SimulatedModel):
     @classmethod
     def fit(cls, runs: Sequence[Run]) -> Self:
         """Numbers of the smallest distance (`calibrate`)."""
-        habits = habits_of(runs)
+        driver_means = driver_means_of(runs)
         bounds = {
             "strip_width": Bounds(0.03, 1.0),
             "interval": Bounds(0.4, 20.0),
             "discipline": Bounds(0.01, 3.0),
             "lateral_speed": Bounds(0.02, 1.0),
         }
-        return calibrate(lambda values: cls(habits=habits, **values), bounds, runs)
+        return calibrate(lambda values: cls(driver_means=driver_means, **values), bounds, runs)
 
     def simulate(self, batch: Batch, rng: np.random.Generator) -> FloatArray:
         """See `SimulatedModel.simulate`."""

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from xosc_lateral.board.half import Half, Sampled, floors, pooled
 from xosc_lateral.board.ranking import SHORT, ranked_numbers
 from xosc_lateral.board.result import Number
-from xosc_lateral.evaluation.classifier import told_apart
+from xosc_lateral.evaluation.classifier import classifier_two_sample_test
 from xosc_lateral.evaluation.condition import Condition
 from xosc_lateral.evaluation.ensemble_scores import PROPER, proper_scores
 from xosc_lateral.evaluation.measures import UNITS, differences, named_distances
@@ -72,7 +72,7 @@ def _classified(half: Half, sampled: Sampled) -> dict[str, float]:
     found = {}
     for condition in half.conditions:
         own = half.windows[condition.seconds]
-        found_area = told_apart(own.offset, sampled.windows[condition], own.group, own.group)
+        found_area = classifier_two_sample_test(own.offset, sampled.windows[condition], own.group, own.group)
         if found_area is not None:
             found[f"auc, {condition.name}"] = found_area.auc
     return found
@@ -83,7 +83,7 @@ def _classified_floors(half: Half) -> dict[str, float]:
     found = {}
     for condition in half.conditions:
         own, donors = half.windows[condition.seconds], half.donors[condition.seconds]
-        area = told_apart(own.offset, donors.offset, own.group, donors.group)
+        area = classifier_two_sample_test(own.offset, donors.offset, own.group, donors.group)
         if area is not None:
             found[f"auc, {condition.name}"] = area.auc
     return found

@@ -127,7 +127,7 @@ def _filled(column: FloatArray) -> FloatArray:
     return np.where(known, column, column[known].min() - 1.0 if known.any() else 0.0)
 
 
-def told_apart(
+def classifier_two_sample_test(
     real: FloatArray,
     other: FloatArray,
     groups_real: NDArray[np.generic],

@@ -26,7 +26,7 @@ DRIVERS, DURATION = 60, 300.0
 
 
 @dataclass(frozen=True)
-class Habits:
+class MovementSummary:
     """What a profile does in even traffic, in figures that a person can picture.
 
     Parameters
@@ -61,15 +61,15 @@ def free_runs(profile: DriverProfile, seed: int, *, drivers: int = DRIVERS, dura
     return np.array([sample_offsets(profile, segment, child(root, k)) for k in range(drivers)])
 
 
-def habits_of(profile: DriverProfile, seed: int = 0) -> Habits:
+def summary_of(profile: DriverProfile, seed: int = 0) -> MovementSummary:
     """Sample free runs and sum them up."""
-    return sum_up(free_runs(profile, seed), profile.model.step)
+    return summarise(free_runs(profile, seed), profile.model.step)
 
 
-def sum_up(runs: FloatArray, step: float) -> Habits:
+def summarise(runs: FloatArray, step: float) -> MovementSummary:
     """Sum up free runs, shape (drivers, n) [m], with rows `step` seconds apart."""
     low, high = np.quantile(runs, [0.05, 0.95])
-    return Habits(
+    return MovementSummary(
         mean_offset=float(runs.mean()),
         spread=float(runs.std()),
         spread_within=float(runs.std(axis=1).mean()),
@@ -90,7 +90,7 @@ def compare_profiles(one: DriverProfile, other: DriverProfile, seed: int = 0) ->
     return metric_distances(free_metrics(one, seed), free_metrics(other, seed + 1))
 
 
-def told_from_each_other(
+def driver_distances(
     profiles: Sequence[DriverProfile], held_out: Sequence[FloatArray], seed: int = 0
 ) -> NDArray[np.float64]:
     """Mean distance from each profile's snippets to each driver's held-out ones.

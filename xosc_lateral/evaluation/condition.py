@@ -20,7 +20,7 @@ class Condition:
         A sampled snippet starts where its real one starts, and the floor is made of other drivers' snippets that start
         there too. Else neither knows the start: sampled ones are cut from free runs.
     slow : bool
-        Movement below 0.5 Hz alone, see `bands`; else everything that was recorded.
+        Movement below 0.5 Hz alone, see `filters`; else everything that was recorded.
     """
 
     seconds: float

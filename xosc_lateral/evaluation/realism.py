@@ -16,11 +16,11 @@ from numpy.typing import NDArray
 
 from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.drives.drive import Run
-from xosc_lateral.evaluation.bands import CUTOFF, TRANSITION, below_half_hertz, thinned
-from xosc_lateral.evaluation.classifier import Separation, context_features, told_apart
+from xosc_lateral.evaluation.classifier import Separation, classifier_two_sample_test, context_features
 from xosc_lateral.evaluation.condition import LENGTHS, Condition
 from xosc_lateral.evaluation.distances import split_groups
 from xosc_lateral.evaluation.ensemble_scores import PROPER, proper_scores
+from xosc_lateral.evaluation.filters import CUTOFF, TRANSITION, below_half_hertz, thinned
 from xosc_lateral.evaluation.lane_keeping import VarianceParts, variance_parts
 from xosc_lateral.evaluation.measures import (
     UNITS,
@@ -172,12 +172,12 @@ def _under(
     alone = jointly = floor = None
     if classify:
         shown = (thinned(real, step), thinned(sampled, step)) if condition.slow else (real, sampled)
-        alone = told_apart(*shown, cut.group, cut.group, seed=seed)
+        alone = classifier_two_sample_test(*shown, cut.group, cut.group, seed=seed)
         if not condition.same_start:
             floor = _separated_drivers(shown[0], cut.group, seed)
         if condition.slow:
             context = context_features(cut, real), context_features(cut, sampled)
-            jointly = told_apart(*shown, cut.group, cut.group, context=context, seed=seed)
+            jointly = classifier_two_sample_test(*shown, cut.group, cut.group, context=context, seed=seed)
     means = named_means(own, made)
     return ConditionScores(condition, with_sensor, len(cut), families, named, means, alone, jointly, floor)
 
@@ -223,7 +223,7 @@ def _stand_ins(
 def _separated_drivers(real: FloatArray, group: NDArray[np.str_], seed: int) -> Separation | None:
     """One random half of the drivers told from the other."""
     half = split_groups(group, np.random.default_rng(seed))
-    return told_apart(real[half], real[~half], group[half], group[~half], seed=seed)
+    return classifier_two_sample_test(real[half], real[~half], group[half], group[~half], seed=seed)
 
 
 def _with_proper_scores(scores: ConditionScores, profile: DriverProfile, cut: Snippets, seed: int) -> ConditionScores:

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from math import isfinite
 from typing import Any
 
-from xosc_lateral.evaluation.bands import CUTOFF
+from xosc_lateral.evaluation.filters import CUTOFF
 from xosc_lateral.evaluation.lane_keeping import UNITS, VarianceParts
 from xosc_lateral.evaluation.realism import Beside, ConditionScores
 from xosc_lateral.evaluation.scores import LAGS, ProfileScores, SnippetScores

@@ -92,10 +92,12 @@ def read_drives(
     files = [Path(path) for path in ([paths] if isinstance(paths, str | Path) else paths)]
     if twice := {str(path) for path in files if files.count(path) > 1}:
         raise FormatError("the table is named twice", path=min(twice))
-    return told_apart([drive for path in files for drive in drives_of_table(read_table(path)[0], mapping or {}, path)])
+    return with_distinct_names(
+        [drive for path in files for drive in drives_of_table(read_table(path)[0], mapping or {}, path)]
+    )
 
 
-def told_apart(drives: Sequence[Drive]) -> list[Drive]:
+def with_distinct_names(drives: Sequence[Drive]) -> list[Drive]:
     """Drives of several tables; those of one name are called by their table as well."""
     names = [drive.name for drive in drives]
     return [drive if names.count(drive.name) == 1 else _named_by_source(drive) for drive in drives]

@@ -30,7 +30,7 @@ from xosc_lateral.drives.cuts import all_runs
 from xosc_lateral.drives.drive import Drive, Run
 from xosc_lateral.drives.resampling import STEP
 from xosc_lateral.errors import NotEnoughDataError
-from xosc_lateral.evaluation.comparison import habits_of, told_from_each_other
+from xosc_lateral.evaluation.comparison import driver_distances, summary_of
 from xosc_lateral.evaluation.metrics import snippet_metrics
 from xosc_lateral.evaluation.record import scores_to_dict
 from xosc_lateral.evaluation.scores import SNIPPET, score_profile
@@ -198,7 +198,7 @@ def _single_profiles(seen: Seen, kind: Mapping[str, str], known: Provenance, mod
     chosen = most_different({name: snippets_of(mine, SNIPPET, STEP).offset for name, mine in long.items()})
     parts = {name: split_in_time(long[name]) for name in chosen}
     early = [fit_runs(parts[name][0], name=name, model=model) for name in chosen]
-    distance = told_from_each_other(early, [sliding_snippets(parts[name][1]) for name in chosen], SEED)
+    distance = driver_distances(early, [sliding_snippets(parts[name][1]) for name in chosen], SEED)
     profiles = []
     for k, name in enumerate(chosen):
         others = np.delete(distance[k], k)
@@ -210,7 +210,7 @@ def _single_profiles(seen: Seen, kind: Mapping[str, str], known: Provenance, mod
             "told_apart": f"nearer to its own held-out part than to those of {nearer} of {len(others)} others",
         }
         label = f"motorway-vehicle-{k + 1}"
-        notes = f"One {kind[name]}, {_habit(long[name])}."
+        notes = f"One {kind[name]}, {_place_and_spread(long[name])}."
         provenance = replace(
             known, notes=notes, evaluation=evaluation, fit={"vehicle": name, "vehicle_class": kind[name]}
         )
@@ -222,7 +222,7 @@ def _single_profiles(seen: Seen, kind: Mapping[str, str], known: Provenance, mod
 def _describes(profile: DriverProfile, runs: Sequence[Run]) -> bool:
     """Whether free runs of the profile spread about as widely as the drive did: two minutes don't always suffice."""
     measured = float(np.concatenate([run.offset for run in runs]).std())
-    return 1.0 / SPREAD_FACTOR <= habits_of(profile).spread / measured <= SPREAD_FACTOR
+    return 1.0 / SPREAD_FACTOR <= summary_of(profile).spread / measured <= SPREAD_FACTOR
 
 
 def most_different(snippets: Mapping[str, FloatArray], count: int = SINGLE_VEHICLES) -> list[str]:
@@ -289,7 +289,7 @@ def sliding_snippets(runs: Sequence[Run]) -> FloatArray:
     return np.concatenate(windows)
 
 
-def _habit(runs: Sequence[Run]) -> str:
+def _place_and_spread(runs: Sequence[Run]) -> str:
     """What strikes the eye, in words."""
     offset = np.concatenate([run.offset for run in runs])
     mean, spread = float(offset.mean()), float(np.mean([run.offset.std() for run in runs]))

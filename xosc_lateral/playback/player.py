@@ -21,9 +21,9 @@ from xosc_lateral.playback.recorder import NO_LANE, Rows
 from xosc_lateral.playback.run import Run
 from xosc_lateral.playback.state import EntityState
 from xosc_lateral.playback.storyboard import State
+from xosc_lateral.playback.storyboard_builder import build_storyboard, init_actions
 from xosc_lateral.playback.trailers import align_trailers, connect, pull_trailers
 from xosc_lateral.playback.transition import EPSILON
-from xosc_lateral.playback.tree import grow, init_actions
 from xosc_lateral.road import RoadNetwork
 from xosc_lateral.scenario import Scenario
 from xosc_lateral.scenario.actions import FollowTrajectoryAction, TeleportAction
@@ -70,7 +70,7 @@ class _Player:
             raise PlaybackError("has no entities: there is nothing to play", path=scenario.path)
         self._couple_trailers()
         self.init = init_actions(scenario.storyboard.init, run)
-        self.root = grow(scenario.storyboard, run)
+        self.root = build_storyboard(scenario.storyboard, run)
         self._leave_out_later_entities()
         self.rows = [Rows(state) for state in run.entities]
         self.times = array("d")

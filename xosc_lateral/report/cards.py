@@ -8,7 +8,7 @@ from typing import Any
 
 from xosc_lateral.driver.effects import Acts, ColumnEffect, Effect
 from xosc_lateral.driver.profile import DriverProfile, Provenance
-from xosc_lateral.evaluation.comparison import Habits, habits_of
+from xosc_lateral.evaluation.comparison import MovementSummary, summary_of
 from xosc_lateral.formats.library import FIELDS, Entry, facts_of
 from xosc_lateral.formats.profiles import profile_hash
 from xosc_lateral.report.render import render_text
@@ -88,7 +88,7 @@ def card(profile: DriverProfile) -> dict[str, Any]:
         "model": profile.model.kind,
         "effects": [effect.to_dict() for effect in profile.effects],
         "lane_width": profile.lane_width,
-        "summary": {name: round(value, 4) for name, value in asdict(habits_of(profile)).items()},
+        "summary": {name: round(value, 4) for name, value in asdict(summary_of(profile)).items()},
         "provenance": known.to_dict(),
     }
 
@@ -101,7 +101,7 @@ def card_text(profile: DriverProfile) -> str:
         *_indented("", known.notes),
         f"  model      {profile.model.kind}, {_effects(profile)}, lane width {profile.lane_width:.2f} m",
         *(f"  effect     {effect_line(effect)}" for effect in profile.effects),
-        *_habit_lines(profile, habits_of(profile)),
+        *_summary_lines(profile, summary_of(profile)),
         f"  fitted on  {amount(profile)}",
         *_indented("source", known.source),
         *_indented("licence", known.licence),
@@ -114,8 +114,8 @@ def card_text(profile: DriverProfile) -> str:
 
 def card_markdown(profile: DriverProfile) -> str:
     """The card for a document."""
-    known, habits = profile.provenance, habits_of(profile)
-    side = "left" if habits.mean_offset > 0 else "right"
+    known, summary = profile.provenance, summary_of(profile)
+    side = "left" if summary.mean_offset > 0 else "right"
     rows = [
         f"### `{profile.name}`",
         "",
@@ -125,10 +125,10 @@ def card_markdown(profile: DriverProfile) -> str:
         "|---|---|",
         f"| model | {profile.model.kind}, {_effects(profile)} |",
         f"| fitted on | {amount(profile)} |",
-        f"| mean offset | {abs(habits.mean_offset):.2f} m to the {side} |",
-        f"| spread | {_spread(profile, habits)} |",
-        f"| 5 % to 95 % | {habits.low:+.2f} m to {habits.high:+.2f} m |",
-        f"| lateral speed | {habits.lateral_speed:.3f} m/s rms |",
+        f"| mean offset | {abs(summary.mean_offset):.2f} m to the {side} |",
+        f"| spread | {_spread(profile, summary)} |",
+        f"| 5 % to 95 % | {summary.low:+.2f} m to {summary.high:+.2f} m |",
+        f"| lateral speed | {summary.lateral_speed:.3f} m/s rms |",
     ]
     rows += [f"| {name} | {value} |" for name, value in provenance_items(known)]
     return "\n".join([*rows, ""])
@@ -169,12 +169,12 @@ def _evaluation_items(evaluation: Mapping[str, Any]) -> list[tuple[str, str]]:
     return items
 
 
-def _habit_lines(profile: DriverProfile, habits: Habits) -> list[str]:
-    side = "left" if habits.mean_offset > 0 else "right"
+def _summary_lines(profile: DriverProfile, summary: MovementSummary) -> list[str]:
+    side = "left" if summary.mean_offset > 0 else "right"
     return [
-        f"  mean       {abs(habits.mean_offset):.2f} m to the {side} of the lane centre",
-        f"  spread     {_spread(profile, habits)}; 90 % within {habits.low:+.2f} to {habits.high:+.2f} m",
-        f"  speed      {habits.lateral_speed:.3f} m/s lateral (rms)",
+        f"  mean       {abs(summary.mean_offset):.2f} m to the {side} of the lane centre",
+        f"  spread     {_spread(profile, summary)}; 90 % within {summary.low:+.2f} to {summary.high:+.2f} m",
+        f"  speed      {summary.lateral_speed:.3f} m/s lateral (rms)",
     ]
 
 
@@ -189,10 +189,10 @@ def amount(profile: DriverProfile) -> str:
     )
 
 
-def _spread(profile: DriverProfile, habits: Habits) -> str:
+def _spread(profile: DriverProfile, summary: MovementSummary) -> str:
     if profile.provenance.drives == 1:
-        return f"{habits.spread:.2f} m"
-    return f"{habits.spread:.2f} m over all drivers, {habits.spread_within:.2f} m within one driver over 5 min"
+        return f"{summary.spread:.2f} m"
+    return f"{summary.spread:.2f} m over all drivers, {summary.spread_within:.2f} m within one driver over 5 min"
 
 
 def effect_line(effect: Effect) -> str:

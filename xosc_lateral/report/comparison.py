@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.driver.profile import DriverProfile
-from xosc_lateral.evaluation.comparison import SNIPPET, Habits, free_runs, sum_up
+from xosc_lateral.evaluation.comparison import SNIPPET, MovementSummary, free_runs, summarise
 from xosc_lateral.evaluation.distances import wasserstein
 from xosc_lateral.evaluation.metrics import METRICS, cut_snippets, snippet_metrics
 from xosc_lateral.evaluation.spectra import Spectrum, spectrum
@@ -40,7 +40,7 @@ class Compared:
     Parameters
     ----------
     profiles : tuple of DriverProfile
-    habits : tuple of Habits
+    summaries : tuple of MovementSummary
     runs : tuple of array
         Free runs of each, shape (drivers, n). [m]
     spectra : tuple of Spectrum
@@ -51,7 +51,7 @@ class Compared:
     """
 
     profiles: tuple[DriverProfile, ...]
-    habits: tuple[Habits, ...]
+    summaries: tuple[MovementSummary, ...]
     runs: tuple[FloatArray, ...]
     spectra: tuple[Spectrum, ...]
     metrics: FloatArray
@@ -99,7 +99,7 @@ def compare(profiles: Sequence[DriverProfile], seed: int) -> Compared:
             metrics[one, other] = metrics[other, one] = _gaps(pooled[one], pooled[other]) / scale
     return Compared(
         tuple(profiles),
-        tuple(sum_up(own, profile.model.step) for profile, own in zip(profiles, runs, strict=True)),
+        tuple(summarise(own, profile.model.step) for profile, own in zip(profiles, runs, strict=True)),
         tuple(runs),
         tuple(spectrum(list(own), profile.model.step) for profile, own in zip(profiles, runs, strict=True)),
         metrics,
@@ -142,7 +142,7 @@ def _rows(compared: Compared) -> list[dict[str, str]]:
             "lateral speed [m/s]": f"{one.lateral_speed:.3f}",
             "effects": ", ".join(_effect(values) for values in profile.to_dict()["effects"]) or "none",
         }
-        for profile, one in zip(compared.profiles, compared.habits, strict=True)
+        for profile, one in zip(compared.profiles, compared.summaries, strict=True)
     ]
 
 
@@ -162,7 +162,7 @@ def comparison_record(compared: Compared) -> dict[str, Any]:
                 "summary": {key: round(value, 4) for key, value in asdict(one).items()},
                 "effects": [_effect(values) for values in profile.to_dict()["effects"]],
             }
-            for profile, one in zip(compared.profiles, compared.habits, strict=True)
+            for profile, one in zip(compared.profiles, compared.summaries, strict=True)
         ],
         "distance": [[round(float(value), 4) for value in row] for row in compared.distance],
         "metrics": {

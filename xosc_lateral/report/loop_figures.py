@@ -32,7 +32,7 @@ DRIVES, BEFORE, AFTER = BLUE, MUTED, VERMILLION
 SPECTRUM_ROWS = 512
 """Samples per segment of a spectrum: 102 s."""
 
-CHANCE = 2.0
+TWO_ERRORS = 2.0
 """Half width of bands, in standard errors: chance leaves them 1 time in 20. [-]"""
 
 FLAT_AXIS_CM = 1.0
@@ -54,7 +54,7 @@ def residual_figure(result: LoopResult, leftover: Leftover, what: str) -> Figure
     for axis, name in zip(axes.ravel(), names, strict=False):
         group = f"{what} by {name}"
         place = np.arange(len(result.real[group]))
-        floor = 100.0 * CHANCE * leftover.floors[group]
+        floor = 100.0 * TWO_ERRORS * leftover.floors[group]
         axis.fill_between(place, -floor, floor, color=MUTED, alpha=0.2, linewidth=0, label="sampling error")
         axis.axhline(0.0, color=MUTED, linewidth=0.6)
         for cells, color, label in ((result.before, BEFORE, "before"), (result.after, AFTER, "after")):
@@ -113,7 +113,7 @@ def draw_spectra(axis: Axes, result: LoopResult, segment: int, *, within_blocks:
     seams = hold_out_blocks(timeline) if within_blocks else timeline.drive
     frequency, density, number = gapped_spectrum(timeline.offset[None], timeline.valid, seams, timeline.step, segment)
     # the mean of so many independent periodograms, which overlap by half
-    about = CHANCE / np.sqrt(max(0.75 * number, 1.0))
+    about = TWO_ERRORS / np.sqrt(max(0.75 * number, 1.0))
     low, high = density * np.exp(-about), density * np.exp(about)
     axis.fill_between(frequency, low, high, color=DRIVES, alpha=0.2, linewidth=0)
     axis.plot(frequency, density, color=DRIVES, label="measured (band: two standard errors)")
@@ -156,12 +156,14 @@ def violins_figure(result: LoopResult) -> Figure:
 
 def _draw_curve(axis: Axes, result: LoopResult, effect: ColumnEffect) -> None:
     curve = curve_of(result, effect)
-    middle, low, high = (_in_unit(effect, curve.strength + share * curve.error) for share in (0.0, -CHANCE, CHANCE))
+    middle, low, high = (
+        _in_unit(effect, curve.strength + share * curve.error) for share in (0.0, -TWO_ERRORS, TWO_ERRORS)
+    )
     axis.fill_between(curve.over, low, high, color=AFTER, alpha=0.2, linewidth=0, label="two standard errors")
     axis.plot(curve.over, middle, color=AFTER, label="fitted effect")
     if len(curve.seen):
         points, bottom, top = (
-            _in_unit(effect, curve.measured + share * curve.measured_error) for share in (0.0, -CHANCE, CHANCE)
+            _in_unit(effect, curve.measured + share * curve.measured_error) for share in (0.0, -TWO_ERRORS, TWO_ERRORS)
         )
         axis.errorbar(
             curve.seen, points, np.stack([points - bottom, top - points]),

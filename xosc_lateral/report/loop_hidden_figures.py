@@ -21,7 +21,7 @@ from xosc_lateral.identification.course import (
 )
 from xosc_lateral.identification.findings import Finding
 from xosc_lateral.report.figures import MUTED, ORANGE, figure_style, new_figure
-from xosc_lateral.report.loop_figures import AFTER, BEFORE, CHANCE, DRIVES, draw_spectra
+from xosc_lateral.report.loop_figures import AFTER, BEFORE, DRIVES, TWO_ERRORS, draw_spectra
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -84,7 +84,7 @@ def spread_figure(result: LoopResult, finding: Finding) -> Figure:
     figure, axes = new_figure(height=3.2)
     axis = axes[0, 0]
     _draw_course(axis, course)
-    low, high = (fitted(effect.factor + sign * CHANCE * effect.factor_error) for sign in (-1.0, 1.0))
+    low, high = (fitted(effect.factor + sign * TWO_ERRORS * effect.factor_error) for sign in (-1.0, 1.0))
     axis.fill_between(course.time, low, high, color=ORANGE, alpha=0.25, linewidth=0)
     axis.plot(
         course.time, fitted(effect.factor), color=ORANGE, label=f"fitted: factor {effect.factor:.2f} over the drive"

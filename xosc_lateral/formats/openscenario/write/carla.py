@@ -30,10 +30,10 @@ from numpy.typing import NDArray
 
 from xosc_lateral.formats.openscenario.element import local_name
 from xosc_lateral.formats.openscenario.write import build
-from xosc_lateral.formats.openscenario.write.kept import Pose
 from xosc_lateral.formats.openscenario.write.losses import Losses, remove
-from xosc_lateral.formats.openscenario.write.moves import VERTEX_SPACING, Move, vertex_times
 from xosc_lateral.formats.openscenario.write.moving import Moving, add_vertices
+from xosc_lateral.formats.openscenario.write.non_motion_actions import Pose
+from xosc_lateral.formats.openscenario.write.path_pieces import VERTEX_SPACING, PathPiece, vertex_times
 from xosc_lateral.formats.openscenario.write.vertices import Vertices
 from xosc_lateral.motion.nominal import Activity, NominalMotion
 from xosc_lateral.scenario import Entity, Scenario
@@ -62,7 +62,7 @@ def start_of(item: Moving) -> tuple[Pose, float]:
     """Pose and speed at the start, where an entity that appears later waits: all are there from the start."""
     found = item.start
     if found is None:
-        return item.pose(item.moves[0].first if item.moves else 0), 0.0
+        return item.pose(item.pieces[0].first if item.pieces else 0), 0.0
     pose, speed = found
     return pose, max(speed, 0.0)
 
@@ -72,43 +72,43 @@ def add_drives(maneuver: etree._Element, item: Moving, vertices: Vertices, *, fl
 
     `flat`: without pitch, as everywhere in a scenario whose coordinates are not CARLA's own.
     """
-    for number, moves in enumerate(_drives(item.moves), start=1):
+    for number, pieces in enumerate(_drives(item.pieces), start=1):
         name = f"{item.name} trajectory {number}"
         event = build.event(maneuver, name, Priority.OVERRIDE, VERSION)
-        placed = moves[0].placed
-        begin = item.trigger_time(moves[0]) if placed else 0.0
+        placed = pieces[0].placed
+        begin = item.trigger_time(pieces[0]) if placed else 0.0
         if placed:
             place = build.private_action(event, f"{name} place")
-            build.world_position(build.sub(place, "TeleportAction"), item.pose(moves[0].first))
-        times, columns = _vertices(item, moves, begin)
+            build.world_position(build.sub(place, "TeleportAction"), item.pose(pieces[0].first))
+        times, columns = _vertices(item, pieces, begin)
         if flat:
             columns[4] = np.zeros_like(columns[4])
         add_vertices(build.private_action(event, name), name, vertices, VERSION, times, columns)
         build.time_trigger(event, "StartTrigger", begin, VERSION)
 
 
-def _drives(moves: Sequence[Move]) -> list[list[Move]]:
-    drives: list[list[Move]] = []
-    for move in moves:
-        if move.placed or not drives:
+def _drives(pieces: Sequence[PathPiece]) -> list[list[PathPiece]]:
+    drives: list[list[PathPiece]] = []
+    for piece in pieces:
+        if piece.placed or not drives:
             drives.append([])
-        drives[-1].append(move)
+        drives[-1].append(piece)
     return drives
 
 
-def _vertices(item: Moving, moves: Sequence[Move], begin: float) -> tuple[FloatArray, list[FloatArray]]:
+def _vertices(item: Moving, pieces: Sequence[PathPiece], begin: float) -> tuple[FloatArray, list[FloatArray]]:
     """Times from the drive's start and x, y, z, h, p, r of its vertices. [s], [m], [rad]"""
     path, found = item.path, [begin]
-    for move in moves:
-        rows = slice(move.first, move.last + 1)
-        found += [float(path.time[move.first]), *vertex_times(path.time[rows], path.x[rows], path.y[rows]).tolist()]
-        found.append(float(path.time[move.last]) + FRAME)
+    for piece in pieces:
+        rows = slice(piece.first, piece.last + 1)
+        found += [float(path.time[piece.first]), *vertex_times(path.time[rows], path.x[rows], path.y[rows]).tolist()]
+        found.append(float(path.time[piece.last]) + FRAME)
     between = (np.floor((np.array(found[1:]) - begin) / FRAME - 0.5) + 0.5) * FRAME
     moments = begin + np.unique(np.append(0.0, np.maximum(np.round(between, 6), 0.5 * FRAME)))
-    last = moves[-1].last
+    last = pieces[-1].last
     over = float(moments[-1] - path.time[last])
-    columns = item.poses_at(moments, slice(moves[0].first if moves[0].placed else 0, last + 1))
-    onward = float(path.speed[last]) * over if not moves[-1].stops else 0.0
+    columns = item.poses_at(moments, slice(pieces[0].first if pieces[0].placed else 0, last + 1))
+    onward = float(path.speed[last]) * over if not pieces[-1].stops else 0.0
     heading = float(path.heading[last])
     moments = np.append(moments, moments[-1] + HOLD)
     columns = [np.append(values, values[-1]) for values in columns]

@@ -9,7 +9,7 @@ from lxml import etree
 from xosc_lateral.formats.openscenario.actions import GROUPING
 from xosc_lateral.formats.openscenario.element import at_node, local_name
 from xosc_lateral.formats.openscenario.write import build
-from xosc_lateral.formats.openscenario.write.kept import CONTROLLER, MOTION, Pose
+from xosc_lateral.formats.openscenario.write.non_motion_actions import CONTROLLER, MOTION, Pose
 from xosc_lateral.scenario import Scenario
 from xosc_lateral.scenario.place import Unsupported
 

@@ -2,7 +2,7 @@
 
 All outputs are written such that it plays them to the millimetre, since other players mind none of that:
 
-- vertices at least 0.1 m apart, which it would merge (`moves`), and paths cut where a car stands;
+- vertices at least 0.1 m apart, which it would merge (`path_pieces`), and paths cut where a car stands;
 - lane offset actions as half cosines whose duration follows from the lateral acceleration (`offset_chain`);
 - triggers without an edge, which it would miss in its first frame.
 

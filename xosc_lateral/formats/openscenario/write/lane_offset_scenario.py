@@ -32,7 +32,7 @@ from xosc_lateral.formats.openscenario.write.lateral_actions import (
 from xosc_lateral.formats.openscenario.write.literal import name_literally
 from xosc_lateral.formats.openscenario.write.offset_chain import LEAST_CHANGE, OffsetChain, Ramp, ramps
 from xosc_lateral.formats.openscenario.write.parameters import global_scope, override_parameters
-from xosc_lateral.formats.openscenario.write.relocate import relocate
+from xosc_lateral.formats.openscenario.write.relative_paths import rewrite_paths
 from xosc_lateral.formats.openscenario.write.result import WrittenScenario
 from xosc_lateral.formats.openscenario.write.target import STANDARD, Target
 from xosc_lateral.formats.xml import parse_xml
@@ -101,7 +101,7 @@ def write_lane_offset_scenario(
     name_literally(root, scenario.path, global_scope(scenario), _referred(story))
     override_parameters(root, scenario)
     notes = fit(root, scenario, motion, target, global_scope(scenario))
-    relocate(root, scenario, output, global_scope(scenario))
+    rewrite_paths(root, scenario, output, global_scope(scenario))
     mark(root, provenance, summary)
     data = build.document(root)
     if save:

@@ -1,4 +1,4 @@
-"""One entity on its way: its path cut into moves, and each of them as a trajectory that starts at its time."""
+"""One entity on its way: its path cut into pieces, and each of them as a trajectory that starts at its time."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from lxml import etree
 from numpy.typing import NDArray
 
 from xosc_lateral.formats.openscenario.write import build
-from xosc_lateral.formats.openscenario.write.kept import Pose
-from xosc_lateral.formats.openscenario.write.moves import Move, cut_moves, vertex_times
+from xosc_lateral.formats.openscenario.write.non_motion_actions import Pose
+from xosc_lateral.formats.openscenario.write.path_pieces import PathPiece, cut_path, vertex_times
 from xosc_lateral.formats.openscenario.write.vertices import Polyline, Vertices
 from xosc_lateral.motion.nominal import Activity, EntityMotion, NominalMotion
 from xosc_lateral.motion.trajectory import Trajectory
@@ -23,7 +23,7 @@ MOTION_SINCE = (1, 4)
 
 
 class Moving:
-    """An entity with its path cut into moves."""
+    """An entity with its path cut into pieces."""
 
     def __init__(self, entity: EntityMotion, path: Trajectory, motion: NominalMotion) -> None:
         self.name, self.path, self.end = entity.name, path, motion.end_time
@@ -31,14 +31,14 @@ class Moving:
         teleported = (entity.activity & Activity.TELEPORTED) != 0
         _check(entity, path, active)
         self.active_at_start = bool(active[0])
-        self.moves = cut_moves(path.time, path.x, path.y, active, teleported)
+        self.pieces = cut_path(path.time, path.x, path.y, active, teleported)
 
     @property
     def start(self) -> tuple[Pose, float] | None:
         """Pose and speed at time 0; None for an entity that is not there yet. A car that stands does so by speed 0."""
         if not self.active_at_start:
             return None
-        drives = bool(self.moves) and self.moves[0].first == 0
+        drives = bool(self.pieces) and self.pieces[0].first == 0
         return self.pose(0), float(self.path.speed[0]) if drives else 0.0
 
     def pose(self, row: int) -> Pose:
@@ -59,9 +59,9 @@ class Moving:
         arrays = (path.x[rows], path.y[rows], path.z[rows], np.unwrap(path.heading[rows]), path.pitch[rows])
         return [np.interp(moments, path.time[rows], values) for values in (*arrays, path.roll[rows])]
 
-    def trigger_time(self, move: Move) -> float:
-        """When a move has to begin: being placed anew happens in the step before its first row."""
-        return float(self.path.time[move.first - 1 if move.placed else move.first])
+    def trigger_time(self, piece: PathPiece) -> float:
+        """When a piece has to begin: being placed anew happens in the step before its first row."""
+        return float(self.path.time[piece.first - 1 if piece.placed else piece.first])
 
 
 def _check(entity: EntityMotion, path: Trajectory, active: NDArray[np.bool_]) -> None:
@@ -72,35 +72,35 @@ def _check(entity: EntityMotion, path: Trajectory, active: NDArray[np.bool_]) ->
         raise ValueError(f"trajectory of '{entity.name}' is not finite")
 
 
-def add_moves(maneuver: etree._Element, item: Moving, version: build.Version, vertices: Vertices) -> None:
-    """Add an event for every move of an entity, and one for every stop."""
-    for number, move in enumerate(item.moves, start=1):
-        rows = slice(move.first, move.last + 1)
+def add_trajectories(maneuver: etree._Element, item: Moving, version: build.Version, vertices: Vertices) -> None:
+    """Add an event for every piece of an entity, and one for every stop."""
+    for number, piece in enumerate(item.pieces, start=1):
+        rows = slice(piece.first, piece.last + 1)
         times = vertex_times(item.path.time[rows], item.path.x[rows], item.path.y[rows])
         name = f"{item.name} trajectory {number}"
         event = build.event(maneuver, name, Priority.OVERRIDE, version)
         if len(times) < 2:
-            _add_hop(event, name, item, move, version)
+            _add_hop(event, name, item, piece, version)
             continue
-        if move.placed:
+        if piece.placed:
             place = build.private_action(event, f"{name} place")
-            build.world_position(build.sub(place, "TeleportAction"), item.pose(move.first))
+            build.world_position(build.sub(place, "TeleportAction"), item.pose(piece.first))
         _add_trajectory(build.private_action(event, name), name, item.path, rows, times, version, vertices)
-        build.time_trigger(event, "StartTrigger", item.trigger_time(move), version)
-        if move.stops:
+        build.time_trigger(event, "StartTrigger", item.trigger_time(piece), version)
+        if piece.stops:
             name = f"{item.name} stand {number}"
             stand = build.event(maneuver, name, Priority.OVERRIDE, version)
             build.speed_step(build.private_action(stand, name), 0.0)
-            build.time_trigger(stand, "StartTrigger", float(item.path.time[move.last]), version)
+            build.time_trigger(stand, "StartTrigger", float(item.path.time[piece.last]), version)
 
 
-def _add_hop(event: etree._Element, name: str, item: Moving, move: Move, version: build.Version) -> None:
-    """A move too short for two vertices: the entity is put where it ends."""
+def _add_hop(event: etree._Element, name: str, item: Moving, piece: PathPiece, version: build.Version) -> None:
+    """A piece too short for two vertices: the entity is put where it ends."""
     place = build.private_action(event, f"{name} place")
-    build.world_position(build.sub(place, "TeleportAction"), item.pose(move.last))
-    speed = 0.0 if move.stops else float(item.path.speed[move.last])
+    build.world_position(build.sub(place, "TeleportAction"), item.pose(piece.last))
+    speed = 0.0 if piece.stops else float(item.path.speed[piece.last])
     build.speed_step(build.private_action(event, f"{name} speed"), speed)
-    start = item.trigger_time(move) if move.placed else float(item.path.time[move.last])
+    start = item.trigger_time(piece) if piece.placed else float(item.path.time[piece.last])
     build.time_trigger(event, "StartTrigger", start, version)
 
 

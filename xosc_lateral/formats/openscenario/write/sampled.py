@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection
 
 from xosc_lateral.formats.openscenario.write.build import Version, named
-from xosc_lateral.formats.openscenario.write.kept import MOTION, source_of
+from xosc_lateral.formats.openscenario.write.non_motion_actions import MOTION, source_of
 from xosc_lateral.formats.openscenario.write.versions import newer_than
 from xosc_lateral.formats.xml import parse_xml
 from xosc_lateral.motion.nominal import NominalMotion

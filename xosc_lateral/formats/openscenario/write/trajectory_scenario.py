@@ -20,16 +20,16 @@ from xosc_lateral.formats.openscenario.write.carla import add_drives, start_of
 from xosc_lateral.formats.openscenario.write.checks import check_convertible
 from xosc_lateral.formats.openscenario.write.entities import remove_controllers, rewrite_init
 from xosc_lateral.formats.openscenario.write.fit import fit
-from xosc_lateral.formats.openscenario.write.kept import (
+from xosc_lateral.formats.openscenario.write.moving import Moving, add_trajectories
+from xosc_lateral.formats.openscenario.write.non_motion_actions import (
     CONTROLLER,
-    add_kept_actions,
+    add_non_motion_actions,
     dropped_reason,
     is_placing,
     is_replaced,
 )
-from xosc_lateral.formats.openscenario.write.moving import Moving, add_moves
 from xosc_lateral.formats.openscenario.write.parameters import global_scope, override_parameters
-from xosc_lateral.formats.openscenario.write.relocate import relocate
+from xosc_lateral.formats.openscenario.write.relative_paths import rewrite_paths
 from xosc_lateral.formats.openscenario.write.result import WrittenScenario
 from xosc_lateral.formats.openscenario.write.target import STANDARD, Player, Target
 from xosc_lateral.formats.openscenario.write.vertices import Vertices
@@ -118,7 +118,7 @@ def write_trajectory_scenario(
     _replace_stop_trigger(root, scenario, motion, version)
     override_parameters(root, scenario)
     notes = fit(root, scenario, motion, target, scope, tuple(moving))
-    relocate(root, scenario, output, scope)
+    rewrite_paths(root, scenario, output, scope)
     mark(root, provenance, summary)
     pieces = vertices.document(root)
     data = b"" if save else b"".join(pieces)
@@ -172,7 +172,7 @@ def _new_story(
 ) -> etree._Element:
     story = build.story(STORY)
     version = target.version_for(scenario)
-    kept = [played for played in motion.actions if _is_kept(played, scenario, moving)]
+    kept = [played for played in motion.actions if _is_non_motion(played, scenario, moving)]
     if kept:
         # Before the trajectories: an entity has to be there before it moves.
         act = build.sub(story, "Act", name=f"{STORY} kept actions")
@@ -181,25 +181,25 @@ def _new_story(
             for index, played in enumerate(kept)
             if is_placing(played.action) and played.action.content.entity_ref in moving
         }
-        add_kept_actions(act, kept, poses, scenario, untouched, scope, version)
+        add_non_motion_actions(act, kept, poses, scenario, untouched, scope, version)
         build.time_trigger(act, "StartTrigger", 0.0, version)
-    with_moves = [item for item in moving.values() if item.moves]
+    with_pieces = [item for item in moving.values() if item.pieces]
     # Up to 1.1 there has to be a story, even if nothing happens in it.
-    if with_moves or (not kept and version < (1, 2)):
+    if with_pieces or (not kept and version < (1, 2)):
         act = build.sub(story, "Act", name=f"{STORY} trajectories")
-        for item in with_moves:
+        for item in with_pieces:
             maneuver = build.maneuver(act, f"{STORY} {item.name}", item.name)
             if target.player is Player.CARLA:
                 add_drives(maneuver, item, vertices, flat=not scenario.header.is_left_handed)
             else:
-                add_moves(maneuver, item, version, vertices)
-        if not with_moves:
+                add_trajectories(maneuver, item, version, vertices)
+        if not with_pieces:
             build.maneuver_group(act, f"{STORY} nothing", None)
         build.time_trigger(act, "StartTrigger", 0.0, version)
     return story
 
 
-def _is_kept(played: PlayedAction, scenario: Scenario, moving: Mapping[str, Moving]) -> bool:
+def _is_non_motion(played: PlayedAction, scenario: Scenario, moving: Mapping[str, Moving]) -> bool:
     if played.path == ("Init",):
         return False  # stays where it is
     return not is_replaced(played.action, played.actor, moving) and dropped_reason(played.action, scenario) is None

@@ -9,27 +9,27 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from xosc_lateral.formats.openscenario.write.moves import Move, cut_moves, vertex_times
+from xosc_lateral.formats.openscenario.write.path_pieces import PathPiece, cut_path, vertex_times
 
 STEP = 0.02
 FloatArray = NDArray[np.float64]
 
 
-def moves(x: FloatArray, *, active: FloatArray | None = None, teleported: FloatArray | None = None) -> list[Move]:
+def pieces(x: FloatArray, *, active: FloatArray | None = None, teleported: FloatArray | None = None) -> list[PathPiece]:
     time = STEP * np.arange(len(x))
     there = np.ones(len(x), bool) if active is None else active.astype(bool)
     placed = np.zeros(len(x), bool) if teleported is None else teleported.astype(bool)
-    return cut_moves(time, x, np.zeros_like(x), there, placed)
+    return cut_path(time, x, np.zeros_like(x), there, placed)
 
 
 def driven(speed: FloatArray) -> FloatArray:
     return np.concatenate(([0.0], np.cumsum(speed[1:] * STEP)))
 
 
-def checked(x: FloatArray, move: Move) -> tuple[FloatArray, float, float]:
-    """Vertex times, least spacing, largest error of one move."""
-    time = (STEP * np.arange(len(x)))[move.first : move.last + 1]
-    inside = x[move.first : move.last + 1]
+def checked(x: FloatArray, piece: PathPiece) -> tuple[FloatArray, float, float]:
+    """Vertex times, least spacing, largest error of one piece."""
+    time = (STEP * np.arange(len(x)))[piece.first : piece.last + 1]
+    inside = x[piece.first : piece.last + 1]
     times = vertex_times(time, inside, np.zeros_like(inside))
     at = np.interp(times, time, inside)
     return times, float(np.abs(np.diff(at)).min()), float(np.abs(np.interp(time, times, at) - inside).max())
@@ -40,29 +40,29 @@ TIME = STEP * np.arange(1500)
 
 def test_steady_driving_is_one_move_with_a_vertex_every_tenth_of_a_second() -> None:
     x = driven(np.full_like(TIME, 30.0))
-    (move,) = moves(x)
-    assert move == Move(0, len(x) - 1, placed=False, stops=False)
-    times, _, error = checked(x, move)
+    (piece,) = pieces(x)
+    assert piece == PathPiece(0, len(x) - 1, placed=False, stops=False)
+    times, _, error = checked(x, piece)
     assert np.diff(times)[:-1] == pytest.approx(0.1, abs=1e-9)
     assert times[-1] == pytest.approx(TIME[-1])
     assert error < 1e-9
 
 
 def test_a_car_that_never_moves_has_no_move() -> None:
-    assert moves(np.zeros(200)) == []
+    assert pieces(np.zeros(200)) == []
 
 
 def test_braking_standing_and_moving_off_are_two_moves_within_three_centimetres() -> None:
     speed = np.clip(20.0 - 6.0 * np.clip(TIME - 3.0, 0.0, None), 0.0, None)
     speed[TIME > 12.0] = np.minimum(2.0 * (TIME[TIME > 12.0] - 12.0), 15.0)
     x = driven(speed)
-    first, second = moves(x)
+    first, second = pieces(x)
     assert first.stops
     assert not second.stops
     assert TIME[first.last] == pytest.approx(3.0 + 20.0 / 6.0, abs=2 * STEP)
     assert TIME[second.first] == pytest.approx(12.0, abs=2 * STEP)
-    for move in (first, second):
-        _, spacing, error = checked(x, move)
+    for piece in (first, second):
+        _, spacing, error = checked(x, piece)
         assert spacing >= 0.1
         # A quarter of the spacing at the stop.
         assert error <= 0.03
@@ -71,8 +71,8 @@ def test_braking_standing_and_moving_off_are_two_moves_within_three_centimetres(
 @pytest.mark.parametrize("pace", [0.05, 0.2, 1.0, 4.0])
 def test_creeping_stays_within_five_centimetres(pace: float) -> None:
     x = driven(pace * (1.0 + np.sin(TIME)))
-    for move in moves(x):
-        times, spacing, error = checked(x, move) if x[move.last] - x[move.first] > 0.2 else (np.empty(0), 1.0, 0.0)
+    for piece in pieces(x):
+        times, spacing, error = checked(x, piece) if x[piece.last] - x[piece.first] > 0.2 else (np.empty(0), 1.0, 0.0)
         assert spacing >= 0.1
         assert error <= 0.05
         assert (np.diff(times) > 0).all()
@@ -80,8 +80,8 @@ def test_creeping_stays_within_five_centimetres(pace: float) -> None:
 
 def test_a_sudden_change_of_speed_gets_a_vertex() -> None:
     x = driven(np.where(TIME > 10.05, 1.0, 33.0))
-    (move,) = moves(x)
-    _, spacing, error = checked(x, move)
+    (piece,) = pieces(x)
+    _, spacing, error = checked(x, piece)
     assert spacing >= 0.1
     assert error < 0.02
 
@@ -90,9 +90,9 @@ def test_a_start_in_the_second_row_is_not_smeared_over_the_first() -> None:
     speed = np.full_like(TIME, 36.0)
     speed[1] = 0.0
     x = driven(speed)
-    (move,) = moves(x)
-    assert move.first == 1
-    assert checked(x, move)[2] < 1e-9
+    (piece,) = pieces(x)
+    assert piece.first == 1
+    assert checked(x, piece)[2] < 1e-9
 
 
 def test_a_teleport_begins_a_move_that_is_placed() -> None:
@@ -100,7 +100,7 @@ def test_a_teleport_begins_a_move_that_is_placed() -> None:
     x[700:] += 500.0
     teleported = np.zeros_like(x)
     teleported[700] = 1
-    first, second = moves(x, teleported=teleported)
+    first, second = pieces(x, teleported=teleported)
     assert (first.last, second.first) == (699, 700)
     assert (first.placed, second.placed) == (False, True)
 
@@ -109,14 +109,14 @@ def test_a_teleport_to_a_place_to_stand_at_is_a_move_of_one_row() -> None:
     x = np.where(np.arange(300) < 100, 0.0, 50.0)
     teleported = np.zeros_like(x)
     teleported[100] = 1
-    assert moves(x, teleported=teleported) == [Move(100, 100, placed=True, stops=True)]
+    assert pieces(x, teleported=teleported) == [PathPiece(100, 100, placed=True, stops=True)]
 
 
 def test_an_entity_that_is_added_later_is_placed() -> None:
     x = driven(np.full_like(TIME, 10.0))
     x[:200] = np.nan
-    (move,) = moves(x, active=(np.arange(len(x)) >= 200).astype(float))
-    assert (move.first, move.placed) == (200, True)
+    (piece,) = pieces(x, active=(np.arange(len(x)) >= 200).astype(float))
+    assert (piece.first, piece.placed) == (200, True)
 
 
 def test_a_move_shorter_than_the_spacing_has_no_vertices_but_its_start() -> None:

@@ -15,7 +15,7 @@ from xosc_lateral.scenario.actions import TeleportAction
 from xosc_lateral.scenario.enums import StoryboardElementType
 
 
-def grow(storyboard: Storyboard, run: Run) -> Element:
+def build_storyboard(storyboard: Storyboard, run: Run) -> Element:
     """The tree of the storyboard; conditions that watch an element have found it."""
     stories = [_story(story, run) for story in storyboard.stories]
     stop = storyboard.stop_trigger

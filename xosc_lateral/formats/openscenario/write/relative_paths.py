@@ -22,7 +22,7 @@ REFERENCES = {
 }
 
 
-def relocate(root: etree._Element, scenario: Scenario, output: Path, scope: Scope) -> None:
+def rewrite_paths(root: etree._Element, scenario: Scenario, output: Path, scope: Scope) -> None:
     """Rewrite relative file references so that they lead from the output's folder to where they led before.
 
     Nothing changes when the output lies beside the input, but for the road and a catalog that the reader found

@@ -35,11 +35,11 @@ REFINEMENTS = 4
 STANDSTILL_SPEED = 0.005
 """Slower counts as standing. [m/s]"""
 STANDSTILL_TIME = 0.3
-"""A shorter stop is driven through, unless the move begins or ends with it. [s]"""
+"""A shorter stop is driven through, unless the piece begins or ends with it. [s]"""
 
 
 @dataclass(frozen=True, slots=True)
-class Move:
+class PathPiece:
     """A stretch of rows without a stop.
 
     Parameters
@@ -58,8 +58,10 @@ class Move:
     stops: bool
 
 
-def cut_moves(time: FloatArray, x: FloatArray, y: FloatArray, active: BoolArray, teleported: BoolArray) -> list[Move]:
-    """Moves of one entity in order.
+def cut_path(
+    time: FloatArray, x: FloatArray, y: FloatArray, active: BoolArray, teleported: BoolArray
+) -> list[PathPiece]:
+    """Pieces of one entity's path, in order.
 
     Parameters
     ----------
@@ -68,17 +70,17 @@ def cut_moves(time: FloatArray, x: FloatArray, y: FloatArray, active: BoolArray,
     active, teleported : array of bool, shape (n,)
         The entity exists; it was placed anew in the step that ends with this row.
     """
-    moves: list[Move] = []
+    pieces: list[PathPiece] = []
     for part in stretches_of(active):
         cuts = [part.start, *(row for row in range(part.start + 1, part.stop) if teleported[row]), part.stop]
         for begin, end in pairwise(cuts):
             placed = begin > 0
-            moves.extend(_cut_at_stops(time, x, y, begin, end - 1, placed))
-    return moves
+            pieces.extend(_cut_at_stops(time, x, y, begin, end - 1, placed))
+    return pieces
 
 
 def vertex_times(time: FloatArray, x: FloatArray, y: FloatArray) -> FloatArray:
-    """Times of the vertices of one move, ends included; fewer than 2 when it is shorter than the vertex spacing. [s]
+    """Times of the vertices of one piece, ends included; fewer than 2 when it is shorter than the vertex spacing. [s]
 
     Every `VERTEX_STEP`, but never closer than `VERTEX_SPACING`. Counted from the start, and near the end from the end,
     so that the last stretch before a stop is not longer than it has to be.
@@ -163,8 +165,10 @@ def _spaced(rows: NDArray[np.intp], way: FloatArray) -> NDArray[np.intp]:
     return np.array(kept)
 
 
-def _cut_at_stops(time: FloatArray, x: FloatArray, y: FloatArray, first: int, last: int, placed: bool) -> list[Move]:
-    """Moves between the stops inside rows first..last, which hold no jump."""
+def _cut_at_stops(
+    time: FloatArray, x: FloatArray, y: FloatArray, first: int, last: int, placed: bool
+) -> list[PathPiece]:
+    """Pieces between the stops inside rows first..last, which hold no jump."""
     rows = slice(first, last + 1)
     step = np.diff(time[rows])
     still = np.hypot(np.diff(x[rows]), np.diff(y[rows])) < STANDSTILL_SPEED * step
@@ -175,15 +179,15 @@ def _cut_at_stops(time: FloatArray, x: FloatArray, y: FloatArray, first: int, la
         or first + part.stop == last
         or time[first + part.stop] - time[first + part.start] >= STANDSTILL_TIME
     ]
-    moves = []
+    pieces = []
     begin = first
     for stop_begin, stop_end in stops:
         if stop_begin > begin or (begin == first and placed):
-            moves.append(Move(begin, stop_begin, placed and begin == first, stops=True))
+            pieces.append(PathPiece(begin, stop_begin, placed and begin == first, stops=True))
         begin = stop_end
     if begin < last or (begin == first and placed):
-        moves.append(Move(begin, last, placed and begin == first, stops=False))
-    return moves
+        pieces.append(PathPiece(begin, last, placed and begin == first, stops=False))
+    return pieces
 
 
 def _head(time: FloatArray, way: FloatArray, until: float) -> list[float]:

@@ -61,7 +61,7 @@ def is_replaced(action: Action, actor: str | None, converted: Collection[str]) -
     return actor in converted and isinstance(action.content, MOTION + CONTROLLER)
 
 
-def add_kept_actions(
+def add_non_motion_actions(
     act: etree._Element,
     played: Sequence[PlayedAction],
     poses: dict[int, Pose],
