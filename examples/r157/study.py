@@ -1,16 +1,18 @@
 """What lifelike traffic does to a safety verdict: the public ALKS scenarios, nominal against many seeds.
 
     python examples/r157/study.py FOLDER_OF_SCENARIOS OUTPUT_FOLDER [--seeds 100] [--profile NAME] [--table DRIVES]
+        [--page docs/r157.md]
 
 FOLDER_OF_SCENARIOS holds the concrete scenarios of github.com/openMSL/sl-3-1-osc-alks-scenarios. Written are
 study.json (all numbers), study.md (tables) and verdict.svg (one figure). With a drive table, false alarms are counted
-on measured vehicles too.
+on measured vehicles too. With a page, its tables are put between that page's markers.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
+import re
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -121,6 +123,7 @@ def main() -> None:
     parser.add_argument("--seeds", type=int, default=100)
     parser.add_argument("--profile", default="motorway")
     parser.add_argument("--table", type=Path)
+    parser.add_argument("--page", type=Path, help="page whose tables, between two markers, are replaced")
     parser.add_argument("--only", nargs="+", metavar="PART", help="scenarios whose name has one of these parts")
     args = parser.parse_args()
     paths = sorted(args.scenarios.glob("*.xosc"))
@@ -135,6 +138,13 @@ def main() -> None:
     (args.output / "study.md").write_text(markdown(record), encoding="utf-8")
     verdict_figure(verdicts, GAPS).savefig(args.output / "verdict.svg", metadata={"Date": None})
     print(markdown(record))
+    if args.page is not None:
+        _put_into(args.page, markdown(record))
+
+
+def _put_into(page: Path, text: str) -> None:
+    marked = re.compile(r"(<!-- r157: begin -->\n).*(<!-- r157: end -->)", re.DOTALL)
+    page.write_text(marked.sub(lambda match: match[1] + text + match[2], page.read_text("utf-8")), encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -13,6 +13,7 @@ from xosc_lateral.evaluation.classifier import (
     context_features,
     snippet_features,
 )
+from xosc_lateral.evaluation.rocket import BIASES, rocket_features
 from xosc_lateral.evaluation.shape import SHAPES, longest_true, shape_features
 from xosc_lateral.evaluation.snippets import snippets_of
 
@@ -31,6 +32,31 @@ def test_rough_is_told_from_smooth_and_like_is_not_told_from_like():
     rough = _walks(3) + np.random.default_rng(4).normal(size=(100, 51))
     apart = classifier_two_sample_test(_walks(1), rough, GROUPS, GROUPS)
     assert apart.auc > apart.low > 0.9
+
+
+def test_convolutions_tell_shapes_apart_that_have_the_same_spectrum():
+    """A jump there and back against the same one mirrored in time: slow rise, sudden fall."""
+    pytest.importorskip("sklearn", reason="extra `classifier` is not installed")
+    rng = np.random.default_rng(8)
+    rise = np.minimum(np.arange(51.0) % 17.0, 12.0) / 12.0
+    real, other = (
+        np.array([np.roll(shape, rng.integers(51)) for _ in range(100)]) + 0.3 * rng.normal(size=(100, 51))
+        for shape in (rise, rise[::-1])
+    )
+    assert classifier_two_sample_test(real, other, GROUPS, GROUPS, rocket=True).auc > 0.9
+    alike = classifier_two_sample_test(real[:50], real[50:], GROUPS[:50], GROUPS[:50], rocket=True)
+    assert alike.auc == pytest.approx(0.5, abs=0.2)
+
+
+def test_a_convolutions_feature_is_the_share_above_its_bias():
+    features = rocket_features(_walks(11, 5), _walks(12, 7))
+    assert features.shape == (5, 84 * BIASES) and ((features >= 0.0) & (features <= 1.0)).all()
+    level = (
+        _walks(11, 5) + 1000.0
+    )  # weights sum to zero: away from the ends a level is not seen, and half are bare of them
+    unseen = (rocket_features(level, _walks(12, 7) + 1000.0) == features).mean()
+    assert unseen > 0.4
+    np.testing.assert_array_equal(features, rocket_features(_walks(11, 5), _walks(12, 7)))
 
 
 def test_what_only_context_tells_is_told_with_context_alone():

@@ -9,12 +9,14 @@ from typing import ClassVar, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.driver.fitting import fit_runs
+from xosc_lateral.driver.fitting import fit_population, fit_runs
 from xosc_lateral.driver.models.kinds import ModelKind
 from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.driver.sampling import sample_offsets
 from xosc_lateral.driver.seeds import child
+from xosc_lateral.driver.sensor.runs import driver_runs
 from xosc_lateral.drives.drive import Drive, Run
+from xosc_lateral.evaluation.snippets import sensor_noise
 from xosc_lateral.segment import Segment
 
 FloatArray = NDArray[np.float64]
@@ -29,13 +31,20 @@ class ProfileModel:
     def sample(
         self, segments: Sequence[Segment], starts: FloatArray | None, rng: np.random.Generator
     ) -> list[FloatArray]:
-        """See `LateralModel.sample`."""
-        root = np.random.SeedSequence(int(rng.integers(2**32)))
-        first = [None] * len(segments) if starts is None else starts.tolist()
-        return [
-            sample_offsets(self.profile, segment, child(root, number), start=start)
-            for number, (segment, start) in enumerate(zip(segments, first, strict=True))
-        ]
+        """See `LateralModel.sample`.
+
+        What was recorded is driver and sensor, so a profile that knows its sensor is sampled with it.
+        """
+        seed = int(rng.integers(2**32))
+        root = np.random.SeedSequence(seed)
+        lengths = [segment.lane_width[segment.inside].size for segment in segments]
+        found = []
+        for number, (segment, noise) in enumerate(
+            zip(segments, sensor_noise(self.profile, lengths, seed), strict=True)
+        ):
+            start = None if starts is None else float(starts[number] - noise[:1].sum())
+            found.append(sample_offsets(self.profile, segment, child(root, number), start=start) + noise)
+        return found
 
     @property
     def settings(self) -> Mapping[str, float]:
@@ -84,8 +93,9 @@ class Autoregressive(ProfileModel):
 
     @classmethod
     def fit(cls, runs: Sequence[Run]) -> Self:
-        """See `xosc_lateral.driver.fitting.fit_runs`."""
-        return cls(fit_runs(runs, name="autoregressive", model=ModelKind.AUTOREGRESSIVE))
+        """What `fit` does: the sensor's part is taken out, then what class, lane and speed do, then the drivers."""
+        cleaned, sensor = driver_runs(runs)
+        return cls(fit_population(cleaned, name="autoregressive", model=ModelKind.AUTOREGRESSIVE, sensor=sensor))
 
 
 def drives_of(runs: Sequence[Run]) -> list[Drive]:

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.driver.effects import Acts, ColumnEffect, Levels, Linear, Piecewise
+from xosc_lateral.driver.effects.rounding import rounded_number
 from xosc_lateral.drives.drive import Run
 from xosc_lateral.drives.resampling import STEP
 
@@ -26,9 +27,6 @@ PIECE = 10.0
 
 WITHIN = (0.05, 0.95)
 """Quantiles of the speed within which its effect is a straight line; beyond, it stays as it is there. [-]"""
-
-DIGITS = 6
-"""Significant digits kept of a coefficient: what differs beyond is the processor's rounding. [-]"""
 
 RIGHTMOST = 0.0
 """Lane index with a level of its own; overtaking lanes share another."""
@@ -177,7 +175,7 @@ def _regressed(response: FloatArray, quantities: FloatArray, drive: NDArray[np.i
 def _effect(shape: ColumnEffect, acts: Acts, slope: float, error: float, reference: float) -> ColumnEffect:
     from msgspec.structs import replace as with_fields
 
-    slope, error, reference = (float(f"{value:.{DIGITS}g}") for value in (slope, error, reference))
+    slope, error, reference = (rounded_number(value) for value in (slope, error, reference))
     if not isinstance(shape, Piecewise):
         return with_fields(shape, acts=acts, coefficients=(slope,), errors=(error,), reference=(reference,))
     # Flat, then a straight line between the knots, then flat; the reference is one place on it.

@@ -5,11 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.evaluation.metrics import DIFFERENCE_SCALE, snippet_metrics
+from xosc_lateral.evaluation.rocket import rocket_features
 from xosc_lateral.evaluation.shape import shape_features
 from xosc_lateral.evaluation.snippets import Snippets
 
@@ -134,6 +136,7 @@ def classifier_two_sample_test(
     groups_other: NDArray[np.generic],
     *,
     context: Sequence[FloatArray] | None = None,
+    rocket: bool = False,
     seed: int = 0,
 ) -> Separation | None:
     """Train a gradient-boosted classifier to tell two sets of snippets apart, and judge it on drives it has not seen.
@@ -145,6 +148,8 @@ def classifier_two_sample_test(
         Drives: no drive is both learnt from and judged.
     context : two arrays, shape (n, c) and (k, c), optional
         Features of the context of either: then context and movement are judged jointly.
+    rocket : bool
+        Random convolutions (`rocket`) and a ridge classifier instead, as their authors have it.
 
     Returns
     -------
@@ -152,7 +157,6 @@ def classifier_two_sample_test(
         None without scikit-learn (extra `classifier`) or with fewer than five drives.
     """
     try:
-        from sklearn.ensemble import HistGradientBoostingClassifier
         from sklearn.model_selection import GroupKFold, cross_val_predict
         from threadpoolctl import threadpool_limits  # comes with scikit-learn
     except ImportError:
@@ -161,17 +165,33 @@ def classifier_two_sample_test(
     groups = np.concatenate([groups_real[rows], groups_other[others]])
     if len(np.unique(groups)) < FOLDS:
         return None
-    features = np.vstack([snippet_features(real[rows]), snippet_features(other[others])])
+    seen_by = _by_convolutions if rocket else _by_features
+    features, model, method = seen_by(real[rows], other[others], seed)
     if context is not None:
         features = np.hstack([features, np.vstack([context[0][rows], context[1][others]])])
     label = np.r_[np.zeros(len(rows)), np.ones(len(others))]
-    model = HistGradientBoostingClassifier(max_iter=100, max_bins=63, random_state=seed)
     # One thread: on a machine that is busy otherwise, its threads waiting for one another take twenty times as long.
     with threadpool_limits(1):
-        chance = cross_val_predict(
-            model, features, label, groups=groups, cv=GroupKFold(FOLDS), method="predict_proba", n_jobs=1
-        )
-    return _judged(chance[:, 1], label.astype(bool), groups, seed)
+        chance = cross_val_predict(model, features, label, groups=groups, cv=GroupKFold(FOLDS), method=method, n_jobs=1)
+    score = chance[:, 1] if chance.ndim > 1 else chance
+    return _judged(score, label.astype(bool), groups, seed)
+
+
+def _by_features(real: FloatArray, other: FloatArray, seed: int) -> tuple[FloatArray, Any, str]:
+    from sklearn.ensemble import HistGradientBoostingClassifier
+
+    model = HistGradientBoostingClassifier(max_iter=100, max_bins=63, random_state=seed)
+    return np.vstack([snippet_features(real), snippet_features(other)]), model, "predict_proba"
+
+
+def _by_convolutions(real: FloatArray, other: FloatArray, seed: int) -> tuple[FloatArray, Any, str]:
+    from sklearn.linear_model import RidgeClassifierCV
+    from sklearn.pipeline import make_pipeline
+    from sklearn.preprocessing import StandardScaler
+
+    both = np.vstack([real, other])
+    model = make_pipeline(StandardScaler(), RidgeClassifierCV(alphas=np.logspace(-3.0, 5.0, 9)))
+    return rocket_features(both, both, seed), model, "decision_function"
 
 
 def spread_out(count: int) -> NDArray[np.int64]:

@@ -14,7 +14,7 @@ FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
 
 PERCEPTION_DISTANCE = 0.72
-"""Lateral distance covered in the risk evaluation time: 0.4 s at 1.8 m/s, UN R157's fastest lateral movement. [m]"""
+"""Lateral distance that a cut-in covers at most in the risk evaluation time of 0.4 s: JRC-FSM and esmini. [m]"""
 
 INTRUSION = 0.3
 """Beyond the outer edge of the marking: UN R157, 5.2.5.2. [m]"""

@@ -83,6 +83,8 @@ class ConditionScores:
     floor : Separation or None
         Half of the real drivers told from the others, by movement. Jointly it is 0.5: both kinds have the same
         context. With the same start it is as with any: both halves start alike.
+    convolved : Separation or None
+        Classifier on random convolutions of the movement. None: not asked for.
     """
 
     condition: Condition
@@ -94,6 +96,7 @@ class ConditionScores:
     alone: Separation | None
     jointly: Separation | None
     floor: Separation | None
+    convolved: Separation | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,7 +120,9 @@ class Realism:
         return next((one for one in self.conditions if one.condition == condition), None)
 
 
-def score_realism(profile: DriverProfile, runs: Sequence[Run], *, seed: int, classify: bool = True) -> Realism:
+def score_realism(
+    profile: DriverProfile, runs: Sequence[Run], *, seed: int, classify: bool = True, rocket: bool = False
+) -> Realism:
     """Compare a profile's snippets with real ones under every condition that has enough of them.
 
     Parameters
@@ -126,6 +131,8 @@ def score_realism(profile: DriverProfile, runs: Sequence[Run], *, seed: int, cla
         Measured, at the profile's step.
     classify : bool
         Train classifiers too: most of the work.
+    rocket : bool
+        And one on random convolutions (`rocket`).
     """
     step = profile.model.step
     driver = sample_runs(profile, runs, seed, same_start=False)
@@ -146,7 +153,8 @@ def score_realism(profile: DriverProfile, runs: Sequence[Run], *, seed: int, cla
             (Condition(seconds, False, slow=True), *slow),
         ):
             with_sensor = profile.sensor is not None and not condition.slow
-            found.append(_under(condition, cut, real, sampled, step, seed, classify=classify, with_sensor=with_sensor))
+            asked = _Asked(seed, classify, rocket, with_sensor)
+            found.append(_under(condition, cut, real, sampled, step, asked))
     short = snippets_of(runs, LENGTHS[0], step)
     whose = np.array([str(number) for number, _ in short.place])
     if found and found[0].condition == Condition(LENGTHS[0], True):
@@ -154,24 +162,27 @@ def score_realism(profile: DriverProfile, runs: Sequence[Run], *, seed: int, cla
     return Realism(tuple(found), variance_parts(short.offset, whose), variance_parts(short.cut_from(recorded), whose))
 
 
+@dataclass(frozen=True)
+class _Asked:
+    seed: int
+    classify: bool
+    rocket: bool
+    with_sensor: bool
+
+
 def _under(
-    condition: Condition,
-    cut: Snippets,
-    real: FloatArray,
-    sampled: FloatArray,
-    step: float,
-    seed: int,
-    *,
-    classify: bool,
-    with_sensor: bool,
+    condition: Condition, cut: Snippets, real: FloatArray, sampled: FloatArray, step: float, asked: _Asked
 ) -> ConditionScores:
+    seed = asked.seed
     highest = CUTOFF - 0.5 * TRANSITION if condition.slow else np.inf
     own = features_of(real, cut.lane_width, step, highest=highest)
     made = features_of(sampled, cut.lane_width, step, highest=highest)
     families, named = _distances(condition, own, made, real, cut.group, seed)
-    alone = jointly = floor = None
-    if classify:
-        shown = (thinned(real, step), thinned(sampled, step)) if condition.slow else (real, sampled)
+    alone = jointly = floor = convolved = None
+    shown = (thinned(real, step), thinned(sampled, step)) if condition.slow else (real, sampled)
+    if asked.rocket:
+        convolved = classifier_two_sample_test(*shown, cut.group, cut.group, rocket=True, seed=seed)
+    if asked.classify:
         alone = classifier_two_sample_test(*shown, cut.group, cut.group, seed=seed)
         if not condition.same_start:
             floor = _separated_drivers(shown[0], cut.group, seed)
@@ -179,7 +190,9 @@ def _under(
             context = context_features(cut, real), context_features(cut, sampled)
             jointly = classifier_two_sample_test(*shown, cut.group, cut.group, context=context, seed=seed)
     means = named_means(own, made)
-    return ConditionScores(condition, with_sensor, len(cut), families, named, means, alone, jointly, floor)
+    return ConditionScores(
+        condition, asked.with_sensor, len(cut), families, named, means, alone, jointly, floor, convolved
+    )
 
 
 def _distances(

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 from msgspec.structs import replace
 
+from xosc_lateral.driver.effects.rounding import rounded_effect, rounded_number
 from xosc_lateral.driver.fitting import fit_profile
 from xosc_lateral.driver.models.kinds import ModelKind
 from xosc_lateral.driver.profile import DriverProfile, Provenance
@@ -26,7 +27,7 @@ def refine_population(drives: Sequence[Drive], seed: int, known: Provenance | No
 
 
 def refined_profile(result: LoopResult) -> DriverProfile:
-    """The refined profile, with what the loop found in its provenance.
+    """The refined profile, its effects rounded to what is known, with what the loop found in its provenance.
 
     The loop's errors are not in it: they are the loop's own figures (docs/closing_the_loop.md, section 5), and a change
     of how they are measured must not change a driver.
@@ -38,4 +39,10 @@ def refined_profile(result: LoopResult) -> DriverProfile:
         "found": [finding.effect for finding in result.findings],
     }
     fit = {**refined.provenance.fit, "closed_loop": loop}
-    return replace(refined, provenance=replace(refined.provenance, fit=fit))
+    return rounded_profile(replace(refined, provenance=replace(refined.provenance, fit=fit)))
+
+
+def rounded_profile(profile: DriverProfile) -> DriverProfile:
+    """The same with its effects and its lane width rounded; the core model's numbers are when they are fitted."""
+    effects = tuple(rounded_effect(effect) for effect in profile.effects)
+    return replace(profile, effects=effects, lane_width=rounded_number(profile.lane_width))

@@ -1,0 +1,71 @@
+"""Human against lane-keeping assist, in the layout of openpilot logs: who steers is named, and each has a profile."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from xosc_lateral.cli import main
+from xosc_lateral.datasets.assist import FLAG, OPENLKA_MAP, LaneKeepingAssist, openlka_layout
+from xosc_lateral.datasets.driver_simulator import simulate_drive
+from xosc_lateral.drives.cuts import all_runs
+from xosc_lateral.evaluation.snippets import sample_runs
+from xosc_lateral.formats.drives import parse_map, read_drives
+from xosc_lateral.formats.profiles import read_profile
+
+WORDS = [word for one in OPENLKA_MAP for word in ("--map", one)]
+PLACE, SECONDS = 0.2, 1200.0
+
+
+@pytest.fixture(scope="module")
+def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("assist") / "route.csv"
+    drive = simulate_drive(SECONDS, 1, effects=[LaneKeepingAssist(place=PLACE, tightness=0.4)])
+    openlka_layout(drive.table).to_csv(path, index=False)
+    return path
+
+
+@pytest.mark.slow
+def test_the_loop_names_the_assist_and_not_what_follows_from_steering(log: Path, tmp_path: Path) -> None:
+    words = [
+        "close-loop",
+        str(log),
+        "-o",
+        str(tmp_path / "refined.json"),
+        "--report",
+        str(tmp_path),
+        "-q",
+        "--seed",
+        "1",
+    ]
+    assert main([*words, *WORDS]) == 0
+    report = json.loads((tmp_path / "report.json").read_text())
+    found = {tuple(one["columns"]): one for one in report["findings"]}
+    assert set(found) == {(FLAG,)}
+    assert found[FLAG,]["size_m"] == pytest.approx(
+        PLACE, abs=0.1
+    )  # a driver's moods of a minute: 0.11 m over 15 spells
+    assert {one["column"] for one in report["consequences"]} >= {"op_curvature_actual", "op_state_steer_angle"}
+    assert report["error"]["after"] < 0.75 * report["error"]["before"]
+
+
+def test_driver_and_assist_have_a_profile_each(log: Path, tmp_path: Path) -> None:
+    table, spread = pd.read_csv(log), {}
+    for on, name in ((False, "human"), (True, "assist")):
+        part = tmp_path / f"{name}.csv"
+        table[table[FLAG] == on].to_csv(part, index=False)  # where the other steers is a gap, and cut
+        assert main(["fit", str(part), "-o", str(tmp_path / f"{name}.json"), "-q", *WORDS]) == 0
+        runs = all_runs(read_drives([part], parse_map(OPENLKA_MAP)))
+        free = sample_runs(read_profile(tmp_path / f"{name}.json"), runs, 0, same_start=False)
+        measured, spread[name] = (_within(some) for some in ([run.offset for run in runs], free))
+        assert spread[name] == pytest.approx(measured, rel=0.3)  # ten minutes of one driver tell no more
+    assert spread["assist"] < 0.8 * spread["human"]
+
+
+def _within(runs: list[np.ndarray]) -> float:
+    """Standard deviation about each run's own mean. [m]"""
+    return float(np.sqrt(np.mean(np.concatenate([(run - run.mean()) ** 2 for run in runs]))))
