@@ -107,7 +107,7 @@ class Batch:
 
 
 def batch_of(segments: Sequence[Segment], starts: FloatArray) -> Batch:
-    """Arrays of the longest segment's length."""
+    """Arrays of the longest segment's length. `starts` of shape (n,). [m]"""
     length = max(segment.lane_width[segment.inside].size for segment in segments)
 
     def column(name: str, fill: float) -> FloatArray:
@@ -153,7 +153,7 @@ class SimulatedModel(ABC):
         """Offsets, shape (n, m), from `batch.start` at the first row on. [m]"""
 
     def free_starts(self, n: int, rng: np.random.Generator) -> FloatArray:
-        """Where n free runs begin, a minute before they are looked at. [m]"""
+        """Where n free runs begin, a minute before they are looked at. [m] Shape (n,)."""
         return np.asarray(rng.choice(self.driver_means, n))
 
     def sample(
@@ -173,6 +173,6 @@ class SimulatedModel(ABC):
 
 
 def driver_means_of(runs: Sequence[Run]) -> FloatArray:
-    """Mean offset of each driver. [m]"""
+    """Mean offset of each driver. [m] Shape (drivers,)."""
     names = sorted({run.drive for run in runs})
     return np.array([np.concatenate([run.offset for run in runs if run.drive == name]).mean() for name in names])

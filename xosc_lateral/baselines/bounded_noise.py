@@ -72,7 +72,7 @@ class BoundedNoise(SimulatedModel):
 
     @property
     def settings(self) -> Mapping[str, float]:
-        """Fitted numbers."""
+        """Fitted numbers; [m], [s], [-] as in their names."""
         return {
             "mean_m": self.mean,
             "relaxation_s": self.relaxation,

@@ -34,5 +34,5 @@ class ConstantOffset(SimulatedModel):
 
     @property
     def settings(self) -> Mapping[str, float]:
-        """Spread of the drivers' means."""
+        """Spread of the drivers' means. [m]"""
         return {"spread_m": float(self.driver_means.std())}

@@ -63,16 +63,16 @@ class GaussianProcess(SimulatedModel):
         return cls(mean=float(everything.mean()), constant=float(found[-1]), variances=found[:-1])
 
     def covariance(self, lags: FloatArray) -> FloatArray:
-        """At time differences. [s] -> [m2]"""
+        """At time differences. [s] -> [m2] Shape as `lags`."""
         return np.asarray(self.constant + np.column_stack(_kernels(lags)) @ self.variances)
 
     def free_starts(self, n: int, rng: np.random.Generator) -> FloatArray:
-        """As the process has them."""
+        """As the process has them. Shape (n,). [m]"""
         spread = float(np.sqrt(self.covariance(np.zeros(1))[0]))
         return self.mean + spread * rng.standard_normal(n)
 
     def simulate(self, batch: Batch, rng: np.random.Generator) -> FloatArray:
-        """Free paths, then moved onto their start by Matheron's rule: exact conditional samples."""
+        """Free paths, then moved onto their start by Matheron's rule: exact conditional samples. Shape (n, m). [m]"""
         from scipy.linalg import toeplitz
 
         n, m = batch.shape
@@ -83,7 +83,7 @@ class GaussianProcess(SimulatedModel):
 
     @property
     def settings(self) -> Mapping[str, float]:
-        """Fitted numbers: total standard deviation, and the constants' share of the variance."""
+        """Fitted numbers: total standard deviation [m], and the constants' share of the variance [-]."""
         total = float(self.constant + self.variances.sum())
         return {"spread_m": float(np.sqrt(total)), "constant_share": self.constant / total if total else 0.0}
 
@@ -94,13 +94,16 @@ def _kernels(lags: FloatArray) -> list[FloatArray]:
 
 
 def matern(lags: FloatArray, scale: float) -> FloatArray:
-    """Matérn correlation of order 3/2."""
+    """Matérn correlation of order 3/2. Shape as `lags` [s]. [-]"""
     r = np.sqrt(3.0) * np.abs(lags) / scale
     return np.asarray((1.0 + r) * np.exp(-r))
 
 
 def pooled_variogram(runs: Sequence[Run]) -> tuple[FloatArray, FloatArray]:
-    """Lags [s] and half the mean squared change over each [m2], over all runs; blind to every driver's own mean."""
+    """Lags [s] and half the mean squared change over each [m2], over all runs; blind to every driver's own mean.
+
+    Shape (lags,) each.
+    """
     steps = range(1, round(LONGEST_LAG / STEP) + 1)
     squares, pairs = np.zeros(len(steps)), np.zeros(len(steps))
     for run in runs:

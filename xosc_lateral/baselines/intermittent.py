@@ -109,7 +109,7 @@ class Intermittent(SimulatedModel):
 
     @property
     def settings(self) -> Mapping[str, float]:
-        """Fitted numbers."""
+        """Fitted numbers; [m], [s], [-] as in their names."""
         return {
             "look_ahead_s": self.look_ahead,
             "threshold_m_s2": self.threshold,

@@ -36,5 +36,5 @@ class LaneCentre:
 
     @property
     def settings(self) -> Mapping[str, float]:
-        """None."""
+        """None. [-]"""
         return {}

@@ -56,5 +56,5 @@ class LcSigma(SimulatedModel):
 
     @property
     def settings(self) -> Mapping[str, float]:
-        """The fitted number."""
+        """The fitted number. [-]"""
         return {"sigma": self.sigma}

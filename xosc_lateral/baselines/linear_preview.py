@@ -77,7 +77,7 @@ class LinearPreview(SimulatedModel):
 
     @property
     def settings(self) -> Mapping[str, float]:
-        """Gains for the curvature between the nodes."""
+        """Gains for the curvature between the nodes. [m2]"""
         names = [f"{side}_{a:g}_{b:g}_m2" for side in ("left", "right") for a, b in pairwise(NODES)]
         return dict(zip(names, [*self.left.tolist(), *self.right.tolist()], strict=True))
 

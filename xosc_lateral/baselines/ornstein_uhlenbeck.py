@@ -53,12 +53,15 @@ class OrnsteinUhlenbeck(SimulatedModel):
 
     @property
     def settings(self) -> Mapping[str, float]:
-        """Fitted numbers."""
+        """Fitted numbers; [m], [s]."""
         return {"mean_m": self.mean, "time_constant_s": self.time_constant, "spread_m": self.spread}
 
 
 def recursion(start: FloatArray, keep: float, kicks: FloatArray) -> FloatArray:
-    """``x[k] = keep x[k-1] + kicks[k]`` along each row, with ``x[0] = start``."""
+    """``x[k] = keep x[k-1] + kicks[k]`` along each row, with ``x[0] = start``.
+
+    Shapes (n,) and (n, m); result (n, m).
+    """
     from scipy.signal import lfilter
 
     kicks[:, 0] = start

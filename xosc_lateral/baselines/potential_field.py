@@ -60,7 +60,7 @@ class PotentialField(SimulatedModel):
         return calibrate(lambda values: cls(driver_means=driver_means, **values), bounds, runs)
 
     def force(self, offset: FloatArray, lane_width: FloatArray, beside: FloatArray) -> FloatArray:
-        """Acceleration that the potentials give at rest. [m/s2]"""
+        """Acceleration that the potentials give at rest. [m/s2] Shape (n,) each."""
         half = 0.5 * lane_width
         edges = np.exp(-(half + offset) / self.reach) - np.exp(-(half - offset) / self.reach)
         # A neighbour in the middle of its own lane, a lane's width away on the side `beside`.
@@ -73,7 +73,7 @@ class PotentialField(SimulatedModel):
 
     @property
     def settings(self) -> Mapping[str, float]:
-        """Fitted numbers."""
+        """Fitted numbers; [m], [m/s2], [-] as in their names."""
         return {
             "strength_m_s2": self.strength,
             "reach_m": self.reach,
@@ -83,7 +83,10 @@ class PotentialField(SimulatedModel):
 
 
 def move(batch: Batch, rng: np.random.Generator, force: object, friction: float, noise: float) -> FloatArray:
-    """Offsets under a force, linear friction and white noise: exact friction, then the step (semi-implicit Euler)."""
+    """Offsets under a force, linear friction and white noise: exact friction, then the step (semi-implicit Euler).
+
+    Shape (n, m). [m]
+    """
     assert callable(force)
     n, m = batch.shape
     keep = float(np.exp(-friction * batch.step))

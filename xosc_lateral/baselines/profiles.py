@@ -48,7 +48,7 @@ class ProfileModel:
 
     @property
     def settings(self) -> Mapping[str, float]:
-        """Counts of what the profile holds; its file has the numbers."""
+        """Counts of what the profile contains [-]; its file has the numbers."""
         return {"effects": float(len(self.profile.effects))}
 
 

@@ -78,5 +78,5 @@ class SloppyDriver(SimulatedModel):
 
     @property
     def settings(self) -> Mapping[str, float]:
-        """The fitted number."""
+        """The fitted number. [-]"""
         return {"sloppiness": self.sloppiness}

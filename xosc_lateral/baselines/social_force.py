@@ -61,7 +61,7 @@ class SocialForce(SimulatedModel):
         return calibrate(lambda values: cls(driver_means=driver_means, shift=shift, **values), bounds, runs)
 
     def force(self, offset: FloatArray, lane_width: FloatArray, beside: FloatArray) -> FloatArray:
-        """Acceleration at rest. [m/s2]"""
+        """Acceleration at rest. [m/s2] Shape (n,) each."""
         return np.asarray(-self.stiffness * (offset + self.shift * beside))
 
     def simulate(self, batch: Batch, rng: np.random.Generator) -> FloatArray:
@@ -70,7 +70,7 @@ class SocialForce(SimulatedModel):
 
     @property
     def settings(self) -> Mapping[str, float]:
-        """Fitted numbers."""
+        """Fitted numbers; [m], [1/s2], [-] as in their names."""
         return {
             "stiffness_per_s2": self.stiffness,
             "friction_per_s": self.friction,

@@ -87,7 +87,7 @@ class StripBased(SimulatedModel):
 
     @property
     def settings(self) -> Mapping[str, float]:
-        """Fitted numbers."""
+        """Fitted numbers; [m], [s], [-] as in their names."""
         return {
             "strip_width_m": self.strip_width,
             "interval_s": self.interval,

@@ -87,7 +87,7 @@ class SumoRun:
 
     @property
     def settings(self) -> Mapping[str, float]:
-        """The fitted number."""
+        """The fitted number. [-]"""
         return {"sigma": self.sigma}
 
 

@@ -138,7 +138,7 @@ def sample_half(model: LateralModel, half: Half, rng: np.random.Generator) -> Sa
 
 
 def run_names(half: Half) -> NDArray[np.str_]:
-    """Run of each of the shortest windows: a free run is one driver."""
+    """Run of each of the shortest windows: a free run is one driver. Shape (n,). [-]"""
     return np.array([str(number) for number, _ in half.windows[min(half.windows)].place])
 
 
@@ -151,7 +151,7 @@ def sample_same_start(model: LateralModel, windows: Snippets, rng: np.random.Gen
 
 
 def floors(half: Half, condition: Condition) -> Mapping[str, float]:
-    """Real against real under a condition, by family."""
+    """Real against real under a condition, by family. [unit of the family]"""
     real, donors = half.features[condition.seconds], half.donor_features[condition.seconds]
     rows, others = np.arange(len(real)), np.arange(len(donors))
     chosen = half.stand_ins[condition.seconds][:, :FLOOR_DRAWS] if condition.same_start else None
@@ -159,6 +159,6 @@ def floors(half: Half, condition: Condition) -> Mapping[str, float]:
 
 
 def pooled(values: Sequence[Mapping[str, float]]) -> dict[str, float]:
-    """Mean over the halves, of what all of them have."""
+    """Mean over the halves, of what all of them have. [-]"""
     common = [name for name in values[0] if all(name in other for other in values)]
     return {name: float(np.mean([other[name] for other in values])) for name in common}

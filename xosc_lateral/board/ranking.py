@@ -96,7 +96,7 @@ def bootstrap(
 
 
 def ranks(scores: Mapping[str, FloatArray]) -> dict[str, IntArray]:
-    """Place of each model in each resample, 1 the best."""
+    """Place of each model in each resample, 1 the best. Shape (resamples,) each. [-]"""
     table = np.array(list(scores.values()))
     places = table.argsort(axis=0).argsort(axis=0) + 1
     return dict(zip(scores, places, strict=True))

@@ -274,7 +274,7 @@ def _loop(aim, aim_rate, path, curvature, speed, tolerance, gain, care, attentio
 
 
 def sample_times(duration: float, rate: float | None, rng: np.random.Generator) -> np.ndarray:
-    """Time stamps of the log [s]: jittered, to the millisecond, and now and then some rows are lost."""
+    """Time stamps of the log [s]: jittered, to the millisecond, and now and then some rows are lost. Shape (n,)."""
     rate = float(rng.choice([18.0, 20.0, 25.0])) if rate is None else rate
     regular = np.arange(0.0, duration - 2.0 / rate, 1.0 / rate)
     jittered = np.maximum(regular + rng.normal(scale=0.12 / rate, size=len(regular)), 0.0)
@@ -284,7 +284,10 @@ def sample_times(duration: float, rate: float | None, rng: np.random.Generator) 
 
 
 def measure(time: np.ndarray, offset: np.ndarray, context: Context, rng: np.random.Generator) -> pd.DataFrame:
-    """What the sensors log at the given times: noise, and the resolution of each signal."""
+    """What the sensors log at the given times: noise, and the resolution of each signal.
+
+    `time` [s] and `offset` [m] of shape (n,).
+    """
     nearest = np.minimum(np.rint(time / STEP).astype(int), len(offset) - 1)
     grid = STEP * np.arange(len(offset))
 

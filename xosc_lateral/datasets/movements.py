@@ -60,17 +60,20 @@ def record_movement(
 
 
 def wandering(n: int, rng: np.random.Generator) -> np.ndarray:
-    """Ornstein-Uhlenbeck wander of seconds about a mood of a minute."""
+    """Ornstein-Uhlenbeck wander of seconds about a mood of a minute. Shape (n,). [m]"""
     return 0.15 * _smooth(_wander(n, rng, 4.0)) + 0.12 * _wander(n, rng, 60.0)
 
 
 def heavy_tailed(n: int, rng: np.random.Generator) -> np.ndarray:
-    """Pushed by Student's t with three degrees of freedom: now and then by a lot."""
+    """Pushed by Student's t with three degrees of freedom: now and then by a lot. Shape (n,). [m]"""
     return 0.2 * _scaled(_smooth(_filtered(rng.standard_t(3.0, size=n), 5.0)))
 
 
 def reflected(n: int, rng: np.random.Generator) -> np.ndarray:
-    """Diffuses within a tolerance; having left it, the car is brought back to somewhere inside in two seconds."""
+    """Diffuses within a tolerance; having left it, the car is brought back to somewhere inside in two seconds.
+
+    Shape (n,). [m]
+    """
     tolerance, length = 0.35, round(2.0 / PACE)
     done = np.arange(1, length + 1) / length
     ease = done**3 * (10.0 - 15.0 * done + 6.0 * done**2)
@@ -90,7 +93,7 @@ def reflected(n: int, rng: np.random.Generator) -> np.ndarray:
 
 
 def delayed_control(n: int, rng: np.random.Generator) -> np.ndarray:
-    """A mass that is pulled to the middle and damped, both 0.4 s late, and pushed by coloured noise."""
+    """A mass that is pulled to the middle and damped, both 0.4 s late, and pushed by coloured noise. Shape (n,). [m]"""
     late = round(0.4 / PACE)
     push = 0.1 * _wander(n, rng, 1.0)
     place, speed = np.zeros(n), np.zeros(n)
@@ -103,13 +106,13 @@ def delayed_control(n: int, rng: np.random.Generator) -> np.ndarray:
 
 
 def clustered(n: int, rng: np.random.Generator) -> np.ndarray:
-    """Loud and quiet by turns of seconds: how people correct, and no regime."""
+    """Loud and quiet by turns of seconds: how people correct, and no regime. Shape (n,). [m]"""
     loudness = np.exp(0.6 * _wander(n, rng, rng.uniform(2.0, 6.0)))
     return 0.2 * _scaled(_smooth(_filtered(loudness * rng.normal(size=n), 5.0)))
 
 
 def in_regimes(n: int, rng: np.random.Generator) -> np.ndarray:
-    """For a minute at a time, pushed 2.5 times as hard; and then quiet for two."""
+    """For a minute at a time, pushed 2.5 times as hard; and then quiet for two. Shape (n,). [m]"""
     loud = np.ones(n)
     start, on = 0, False
     while start < n:

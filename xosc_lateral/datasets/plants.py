@@ -35,7 +35,7 @@ class ShiftBy:
     kind: str = "location"
 
     def quantity(self, context: Context) -> np.ndarray:
-        """What the driver answers to."""
+        """What the driver answers to. Shape (n,). [unit of the column]"""
         product = np.ones_like(context["speed"])
         for column in self.columns:
             product = product * context[column]
@@ -47,12 +47,15 @@ class ShiftBy:
 
 
 def curve_cutting(size: float = 0.25, look_ahead: float = 1.2, lag: float = 0.0) -> ShiftBy:
-    """To the inside of the curve, before it begins: to the left where curvature is positive."""
+    """To the inside of the curve, before it begins: to the left where curvature is positive.
+
+    `size` in [m], `look_ahead` and `lag` in [s].
+    """
     return ShiftBy(("curvature",), size, Response(look_ahead=look_ahead, lag=lag))
 
 
 def truck_avoidance(size: float = 0.25, lag: float = 1.0) -> ShiftBy:
-    """To the left while a truck drives alongside on the right."""
+    """To the left while a truck drives alongside on the right. `size` in [m], `lag` in [s]."""
     return ShiftBy(("truck_right",), size, Response(lag=lag))
 
 

@@ -14,17 +14,17 @@ Shape = Callable[[np.ndarray], np.ndarray]
 
 
 def linear(quantity: np.ndarray) -> np.ndarray:
-    """As it is."""
+    """As it is. Shape (n,). [unit of the quantity]"""
     return quantity
 
 
 def saturating(scale: float) -> Shape:
-    """Linear for small values, levelling off beyond `scale`."""
+    """Linear for small values, levelling off beyond `scale`. [unit of the quantity]"""
     return lambda quantity: np.tanh(quantity / scale) * scale
 
 
 def threshold(at: float) -> Shape:
-    """Nothing below `at`, everything above."""
+    """Nothing below `at`, everything above. [unit of the quantity]"""
     return lambda quantity: (quantity > at).astype(float)
 
 
@@ -47,7 +47,10 @@ class Response:
     lag: float = 0.0
 
     def scaled(self, quantity: np.ndarray) -> np.ndarray:
-        """Answer, scaled so that it changes by 1 between the 5 % and 95 % quantile of itself, about its median."""
+        """Answer, scaled so that it changes by 1 between the 5 % and 95 % quantile of itself, about its median.
+
+        Shape (n,). [-]
+        """
         shaped = self.shape(np.nan_to_num(quantity, nan=float(np.nanmax(quantity))))
         low, middle, high = np.quantile(shaped, [0.05, 0.5, 0.95])
         if high <= low:  # an on/off quantity that is on for less than 5 % of the time
@@ -59,7 +62,7 @@ class Response:
 
 
 def lagged(values: np.ndarray, time_constant: float) -> np.ndarray:
-    """First-order lag that begins settled; `time_constant` in s."""
+    """First-order lag that begins settled; `time_constant` in s. Shape (n,). [unit of the values]"""
     if time_constant <= 0.0:
         return values
     keep = np.exp(-STEP / time_constant)

@@ -89,12 +89,15 @@ class Bound:
 
 
 def comfort(speed: FloatArray) -> FloatArray:
-    """Lateral acceleration at which drivers begin to feel discomfort. [m/s2]"""
+    """Lateral acceleration at which drivers begin to feel discomfort. [m/s2] Shape as `speed` [m/s]."""
     return np.asarray(GRAVITY * np.interp(np.abs(speed), _SPEED, _FRICTION))
 
 
 def strain(offset: FloatArray, step: float, speed: FloatArray) -> Strain:
-    """Strain of a path, from its offsets at an even step and the speed there."""
+    """Strain of a path, from its offsets at an even step and the speed there.
+
+    `offset` [m] and `speed` [m/s] of shape (n,); `step` in [s].
+    """
     if len(offset) < 4:
         return Strain(0.0, 0.0, 0.0, 0.0)
     acceleration = np.abs(np.diff(offset, 2)) / step**2

@@ -84,7 +84,7 @@ def implausible(name: str, value: float) -> str | None:
 
 
 def first_implausible(name: str, values: FloatArray) -> int | None:
-    """Row of the first context value that can't be."""
+    """Row of the first context value that can't be. `values` of shape (n,). [unit of the column]"""
     believed = context_range(name)
     wrong = np.flatnonzero((values < believed.low) | (values > believed.high))
     return int(wrong[0]) if len(wrong) else None

@@ -111,7 +111,7 @@ def lane_change_rows(drive: Drive, rules: CutRules = PAPER_RULES) -> BoolArray:
 
 
 def slow_rows(drive: Drive, rules: CutRules = PAPER_RULES) -> BoolArray:
-    """Rows below the least speed; none when no speed was recorded. Shape (n,)."""
+    """Rows below the least speed; none when no speed was recorded. Shape (n,). [-]"""
     if drive.speed is None:
         return np.zeros(len(drive), dtype=np.bool_)
     return np.asarray(drive.speed < rules.min_speed)

@@ -1,4 +1,9 @@
-"""Can a classifier tell sampled snippets from real ones? The strictest of the scores, since it looks at everything."""
+"""Can a classifier tell sampled snippets from real ones? The strictest of the scores, since it looks at everything.
+
+References
+----------
+D. Lopez-Paz, M. Oquab, "Revisiting classifier two-sample tests", ICLR 2017.
+"""
 
 from __future__ import annotations
 
@@ -195,7 +200,7 @@ def _by_convolutions(real: FloatArray, other: FloatArray, seed: int) -> tuple[Fl
 
 
 def spread_out(count: int) -> NDArray[np.int64]:
-    """At most `MOST` of so many rows, evenly."""
+    """At most `MOST` of so many rows, evenly. Shape (k,), k <= `MOST`. [-]"""
     return np.unique(np.linspace(0, count - 1, min(count, MOST)).astype(np.int64))
 
 
@@ -212,7 +217,10 @@ def _judged(chance: FloatArray, label: NDArray[np.bool_], groups: NDArray[np.gen
 
 
 def area_under_roc(score: FloatArray, label: NDArray[np.bool_], weight: FloatArray) -> float:
-    """Probability that a weighted draw of the labelled scores above one of the others; equal scores count half. [-]"""
+    """Probability that a weighted draw of the labelled scores above one of the others; equal scores count half. [-]
+
+    All of shape (n,).
+    """
     values, place = np.unique(score, return_inverse=True)
     yes = np.bincount(place, weight * label, minlength=len(values))
     no = np.bincount(place, weight * ~label, minlength=len(values))

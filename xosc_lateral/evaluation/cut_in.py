@@ -115,11 +115,11 @@ CRITERIA: Mapping[str, Callable[[Encounter], BoolArray]] = {
 
 
 def alarms(flags: BoolArray) -> NDArray[np.int64]:
-    """How often each row goes from quiet to alarm, shape (...,)."""
+    """How often each row goes from quiet to alarm, shape (...,). [-]"""
     begins = flags[..., 1:] & ~flags[..., :-1]
     return np.asarray(begins.sum(axis=-1) + flags[..., 0].astype(np.int64))
 
 
 def first_alarm(flags: BoolArray, step: float) -> FloatArray:
-    """Time of each row's first alarm, NaN where there is none. [s]"""
+    """Time of each row's first alarm, NaN where there is none. [s] `flags` of shape (n, m), times of shape (n,)."""
     return np.where(flags.any(axis=-1), flags.argmax(axis=-1) * step, np.nan)

@@ -1,4 +1,10 @@
-"""How far two sets of snippets lie apart, metric by metric, and how far real data lies from itself."""
+"""How far two sets of snippets lie apart, metric by metric, and how far real data lies from itself.
+
+References
+----------
+S. S. Vallender, "Calculation of the Wasserstein distance between probability distributions on the line", Theory of
+Probability and its Applications 18, 1974, pp. 784-786.
+"""
 
 from __future__ import annotations
 
@@ -21,7 +27,7 @@ class Distances:
 
     @property
     def mean(self) -> float:
-        """Over the ten metrics."""
+        """Over the ten metrics. [-]"""
         return float(np.mean(list(self.by_metric.values())))
 
     @property
@@ -65,7 +71,10 @@ def metric_distances(real: FloatArray, other: FloatArray) -> Distances:
 
 
 def snippet_distances(real: FloatArray, other: FloatArray) -> Distances:
-    """Distance of two sets of snippets, shape (n, length) and (m, length)."""
+    """Distance of two sets of snippets, shape (n, length) and (m, length).
+
+    In standard deviations of the real ones. [-]
+    """
     return metric_distances(snippet_metrics(real), snippet_metrics(other))
 
 

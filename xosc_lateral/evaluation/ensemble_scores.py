@@ -72,7 +72,10 @@ def variogram_score(real: FloatArray, ensemble: FloatArray, *, every: int = 5) -
 
 
 def proper_scores(real: FloatArray, ensemble: FloatArray) -> dict[str, float]:
-    """Mean of each score in `PROPER` over the windows; empty without the extra `board`. [m]"""
+    """Mean of each score in `PROPER` over the windows; empty without the extra `board`. [m]
+
+    `real` of shape (n, m), `ensemble` of shape (n, members, m).
+    """
     try:
         scores = energy_score(real, ensemble), variogram_score(real, ensemble)
     except ImportError:

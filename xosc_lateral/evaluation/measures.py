@@ -57,7 +57,7 @@ class Features:
         return len(self.metrics)
 
     def take(self, rows: IntArray) -> Features:
-        """Of some of the windows."""
+        """Of some of the windows. `rows` of shape (k,). [-]"""
         return Features(
             self.metrics[rows], self.indicators[rows], self.power[rows], self.products[rows], self.moments[rows]
         )
@@ -80,7 +80,10 @@ def features_of(
 
 
 def band_power(offset: FloatArray, step: float, *, highest: float = float(BANDS[-1])) -> FloatArray:
-    """Power density of each window in the bands that it can resolve (straight line removed, Hann window). [m2/Hz]"""
+    """Power density of each window in the bands that it can resolve (straight line removed, Hann window). [m2/Hz]
+
+    Shape (n, bands).
+    """
     m = offset.shape[1]
     line = np.linspace(0.0, 1.0, m)
     ramp = offset[:, :1] + line * (offset[:, -1:] - offset[:, :1])
@@ -124,14 +127,14 @@ def differences(real: Features, other: Features, rows: IntArray, other_rows: Int
 
 
 def column_distances(real: FloatArray, other: FloatArray) -> list[float]:
-    """Wasserstein distance of each column, in standard deviations of the real one. [sd]"""
+    """Wasserstein distance of each column, in standard deviations of the real one. [sd] Shapes (n, k) and (m, k)."""
     spread = real.std(axis=0)
     spread = np.where(spread > 0.0, spread, 1.0)
     return [wasserstein(real[:, k], other[:, k]) / float(spread[k]) for k in range(real.shape[1])]
 
 
 def autocorrelation_of(features: Features, rows: IntArray) -> FloatArray:
-    """About the mean of all windows; no movement at all: 1, it stays as it is."""
+    """About the mean of all windows; no movement at all: 1, it stays as it is. Shape (lags,). [-]"""
     mean, square = features.moments[rows].mean(axis=0)
     variance = square - mean**2
     if variance < 1e-12:
@@ -147,6 +150,6 @@ def named_distances(real: Features, other: Features) -> Mapping[str, float]:
 
 
 def named_means(real: Features, other: Features) -> Mapping[str, tuple[float, float]]:
-    """Mean of each lane-keeping indicator, real and other; units in `lane_keeping.UNITS`."""
+    """Mean of each lane-keeping indicator, real and other; units in `lane_keeping.UNITS`. [m], [s], [-]"""
     means = real.indicators.mean(axis=0).tolist(), other.indicators.mean(axis=0).tolist()
     return {name: (means[0][k], means[1][k]) for k, name in enumerate(INDICATORS)}

@@ -67,6 +67,6 @@ def _quantile(ordered: FloatArray, q: float) -> FloatArray:
 
 
 def cut_snippets(series: FloatArray, length: int) -> FloatArray:
-    """Whole snippets one after the other, shape (len(series) // length, length); the rest is left over."""
+    """Whole snippets one after the other, shape (len(series) // length, length); the rest is left over. [m]"""
     count = len(series) // length
     return np.asarray(series[: count * length].reshape(count, length))

@@ -56,7 +56,7 @@ class Traffic:
 
     @property
     def lateral_speed(self) -> FloatArray:
-        """Positive towards the ego lane. [m/s]"""
+        """Positive towards the ego lane. [m/s] Shape (n,)."""
         return np.gradient(self.towards, self.step, axis=1)
 
 
@@ -107,7 +107,7 @@ class SafetyModel(Protocol):
 
     @property
     def noticed(self) -> BoolArray:
-        """Whether a danger has been seen so far, shape (n,)."""
+        """Whether a danger has been seen so far, shape (n,). [-]"""
         ...
 
 
@@ -135,7 +135,7 @@ def evaluate_braking(model: SafetyModel, traffic: Traffic, ego: Ego) -> Outcome:
 def see(
     traffic: Traffic, k: int, place: FloatArray, speed: FloatArray, ego: Ego, lateral_speed: FloatArray
 ) -> Encounter:
-    """What the ego sees at moment k, shape (n,)."""
+    """What the ego sees at moment k, shape (n,). [m], [m/s]"""
     return Encounter(
         towards=traffic.towards[:, k],
         lateral_speed=lateral_speed,
@@ -261,7 +261,10 @@ class FuzzySafetyModel:
 
 
 def proactive_metric(gap: FloatArray, ego: FloatArray, target: FloatArray) -> FloatArray:
-    """PFS: 0 where the ego could stop comfortably behind a vehicle that brakes hard, 1 where even its hardest fails."""
+    """PFS: 0 where the ego could stop comfortably behind a vehicle that brakes hard, 1 where even its hardest fails.
+
+    Shape (n,) each; [m], [m/s], [m/s]. [-]
+    """
     room = gap - FSM_DISTANCE
     common = ego * FSM_REACTION - target**2 / (2.0 * FSM_LEADER)
     safe = common + ego**2 / (2.0 * FSM_COMFORT) + FSM_DISTANCE
@@ -270,7 +273,10 @@ def proactive_metric(gap: FloatArray, ego: FloatArray, target: FloatArray) -> Fl
 
 
 def critical_metric(gap: FloatArray, ego: FloatArray, target: FloatArray, acceleration: FloatArray) -> FloatArray:
-    """CFS: 0 where comfortable braking in time avoids a vehicle that keeps its speed, 1 where the hardest does not."""
+    """CFS: 0 where comfortable braking in time avoids a vehicle that keeps its speed, 1 where the hardest does not.
+
+    Shape (n,) each; [m], [m/s], [m/s], [m/s2]. [-]
+    """
     own = np.maximum(acceleration, -FSM_COMFORT)
     later = ego + FSM_REACTION * own - target
     way = (ego + own * FSM_REACTION / 2.0 - target) * FSM_REACTION

@@ -92,7 +92,7 @@ class SnippetScores:
 
     @property
     def worst_ratio(self) -> tuple[str, float]:
-        """Metric with the largest ratio, and that."""
+        """Metric with the largest ratio, and that. [-]"""
         ratios = {name: self.distances.by_metric[name] / self.floor.by_metric[name] for name in METRICS}
         worst = max(ratios, key=ratios.__getitem__)
         return worst, ratios[worst]
@@ -163,7 +163,10 @@ class ProfileScores:
 
     @property
     def classifier_auc(self) -> float | None:
-        """Area under the ROC curve between real and sampled snippets of 10 s with the same start; None: not trained."""
+        """Area under the ROC curve between real and sampled snippets of 10 s with the same start; None: not trained.
+
+        [-]
+        """
         shared = self.realism.of(Condition(SNIPPET, True))
         return None if shared is None or shared.alone is None else shared.alone.auc
 
@@ -263,7 +266,7 @@ def score_snippets(
 def evaluate_parts(
     profile: DriverProfile, snippets: Snippets, sampled: FloatArray, *, seed: int
 ) -> tuple[PartEvaluation, ...]:
-    """Run the paper's four evaluations; (4) takes `sampled`, effects included."""
+    """Run the paper's four evaluations; (4) takes `sampled`, effects included. `sampled` of shape (n, m). [m]"""
     coarse_real, fine_real = _real_parts(snippets)
     coarse, fine = sample_parts(profile, snippets, seed)
     shifted = np.roll(fine_real, round(FINE_SHIFT / profile.model.step), axis=1)

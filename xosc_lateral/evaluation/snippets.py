@@ -54,7 +54,7 @@ class Snippets:
         return len(self.items)
 
     def take(self, rows: NDArray[np.int64]) -> Snippets:
-        """Some of them."""
+        """Some of them. `rows` of shape (k,). [-]"""
         chosen = rows.tolist()
         return Snippets(
             self.seconds,
@@ -116,7 +116,7 @@ def sample_snippets(profile: DriverProfile, snippets: Snippets, seed: int, *, wi
 
 
 def sample_parts(profile: DriverProfile, snippets: Snippets, seed: int) -> tuple[FloatArray, FloatArray]:
-    """Coarse and fine part of sampled snippets, without effects, in lane widths; shape (n, m) each."""
+    """Coarse and fine part of sampled snippets, without effects, in lane widths; shape (n, m) each. [-]"""
     root = np.random.SeedSequence(seed)
     relative = snippets.offset / snippets.lane_width
     coarse, fine = np.empty_like(relative), np.empty_like(relative)
@@ -127,7 +127,10 @@ def sample_parts(profile: DriverProfile, snippets: Snippets, seed: int) -> tuple
 
 
 def sample_runs(profile: DriverProfile, runs: Sequence[Run], seed: int, *, same_start: bool = True) -> list[FloatArray]:
-    """For each run one of a new driver, of the same length and context, and the same start or any. [m]"""
+    """For each run one of a new driver, of the same length and context, and the same start or any. [m]
+
+    Shape (n_i,) each.
+    """
     root = np.random.SeedSequence(seed)
     return [
         sample_offsets(profile, segment_of(run), child(root, k), start=float(run.offset[0]) if same_start else None)
@@ -136,6 +139,6 @@ def sample_runs(profile: DriverProfile, runs: Sequence[Run], seed: int, *, same_
 
 
 def sensor_noise(profile: DriverProfile, lengths: Sequence[int], seed: int) -> list[FloatArray]:
-    """What the profile's sensor adds to runs of these lengths; zeros where it knows of none. [m]"""
+    """What the profile's sensor adds to runs of these lengths; zeros where it knows of none. [m] Shape (n_i,) each."""
     root, step = np.random.SeedSequence(seed), profile.model.step
     return [sensor_error(profile.sensor, n, step, child(root, k)) for k, n in enumerate(lengths)]

@@ -1,4 +1,10 @@
-"""What the ten metrics don't see: spectrum, autocorrelation, time near a marking, excursions."""
+"""What the ten metrics don't see: spectrum, autocorrelation, time near a marking, excursions.
+
+References
+----------
+P. D. Welch, "The use of fast Fourier transform for the estimation of power spectra", IEEE Trans. Audio and
+Electroacoustics 15, 1967, pp. 70-73.
+"""
 
 from __future__ import annotations
 
@@ -170,7 +176,10 @@ class Margins:
 
 
 def margins(offsets: Sequence[FloatArray], lane_widths: Sequence[FloatArray], step: float) -> Margins:
-    """Time near a marking and rate of excursions over several runs (offset and lane width [m] at an even step [s])."""
+    """Time near a marking and rate of excursions over several runs (offset and lane width [m] at an even step [s]).
+
+    Shape (n_i,) each.
+    """
     near = [np.abs(x) > 0.5 * w - NEAR_MARKING for x, w in zip(offsets, lane_widths, strict=True)]
     rows = sum(len(one) for one in near)
     entries = sum(int((one[1:] & ~one[:-1]).sum()) for one in near)

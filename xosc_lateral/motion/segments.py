@@ -118,7 +118,10 @@ def cut_stretches(motion: EntityMotion, network: RoadNetwork, *, is_trailer: boo
 
 
 def row_kinds(motion: EntityMotion, network: RoadNetwork, *, is_trailer: bool = False) -> NDArray[np.int64]:
-    """Kind of every row, as its index in `StretchKind`; the first reason that applies, in the enum's order."""
+    """Kind of every row, as its index in `StretchKind`; the first reason that applies, in the enum's order.
+
+    Shape (n,). [-]
+    """
     entity, activity = motion.entity, motion.activity
     n = len(motion.time)
     on_road = (motion.road >= 0) & ((activity & Activity.OFF_ROAD) == 0)

@@ -27,7 +27,7 @@ class Element(Protocol):
     """One element of a reference line."""
 
     def at(self, ds: float) -> tuple[float, float, float]:
-        """x, y, heading at ds."""
+        """x, y, heading at ds. Everything in [m], [rad]."""
 
     def curvature_at(self, ds: float) -> float:
         """Curvature at ds, positive to the left. [1/m]"""
@@ -109,7 +109,7 @@ def _horner(series: list[complex], u: float) -> complex:
 
 @dataclass(frozen=True, slots=True)
 class Line:
-    """A straight line."""
+    """A straight line from (x, y); [m], heading in [rad]."""
 
     x: float
     y: float
@@ -120,15 +120,15 @@ class Line:
 
     @classmethod
     def of(cls, x: float, y: float, heading: float, length: float) -> Line:
-        """A line from (x, y)."""
+        """A line from (x, y). Lengths in [m], heading in [rad], curvature in [1/m]."""
         return cls(x, y, heading, length, cos(heading), sin(heading))
 
     def at(self, ds: float) -> tuple[float, float, float]:
-        """x, y, heading at ds."""
+        """x, y, heading at ds. Everything in [m], [rad]."""
         return self.x + ds * self.cos_heading, self.y + ds * self.sin_heading, self.heading
 
     def curvature_at(self, ds: float) -> float:
-        """Zero."""
+        """Zero. [1/m]"""
         return 0.0
 
     def pieces(self) -> tuple[ClothoidPiece, ...]:
@@ -138,7 +138,7 @@ class Line:
 
 @dataclass(frozen=True, slots=True)
 class Arc:
-    """A circular arc."""
+    """A circular arc from (x, y); [m], heading in [rad], curvature in [1/m]."""
 
     x: float
     y: float
@@ -147,7 +147,10 @@ class Arc:
     curvature: float
 
     def at(self, ds: float) -> tuple[float, float, float]:
-        """x, y, heading at ds, along the chord: exact for any curvature, also one near zero."""
+        """x, y, heading at ds, along the chord: exact for any curvature, also one near zero.
+
+        Everything in [m], [rad].
+        """
         half = 0.5 * self.curvature * ds
         # sin(h) / h loses nothing above 1e-8 and is 1 to the last bit below
         chord = ds * sin(half) / half if abs(half) > 1e-8 else ds
@@ -155,7 +158,7 @@ class Arc:
         return self.x + chord * cos(direction), self.y + chord * sin(direction), direction + half
 
     def curvature_at(self, ds: float) -> float:
-        """Constant."""
+        """Constant. [1/m]"""
         return self.curvature
 
     def pieces(self) -> tuple[ClothoidPiece, ...]:
@@ -165,7 +168,7 @@ class Arc:
 
 @dataclass(frozen=True, slots=True)
 class Spiral:
-    """A clothoid: curvature changes linearly along it."""
+    """A clothoid: curvature [1/m] changes linearly along it; lengths in [m], heading in [rad]."""
 
     heading: float
     curvature: float
@@ -175,13 +178,13 @@ class Spiral:
 
     @classmethod
     def of(cls, x: float, y: float, heading: float, length: float, start: float, end: float) -> Spiral:
-        """A clothoid from curvature `start` to `end`."""
+        """A clothoid from curvature `start` to `end`. Lengths in [m], heading in [rad], curvature in [1/m]."""
         sharpness = (end - start) / length
         parts = clothoid_pieces(x, y, heading, length, start, sharpness)
         return cls(heading, start, sharpness, len(parts) / length, parts)
 
     def at(self, ds: float) -> tuple[float, float, float]:
-        """x, y, heading at ds."""
+        """x, y, heading at ds. Everything in [m], [rad]."""
         i = int(ds * self.pieces_per_metre)
         part = self.parts[0 if i < 0 else i if i < len(self.parts) else -1]
         u = ds - part.middle
@@ -196,7 +199,7 @@ class Spiral:
         )
 
     def curvature_at(self, ds: float) -> float:
-        """Linear in ds."""
+        """Linear in ds. [1/m]"""
         return self.curvature + self.sharpness * ds
 
     def pieces(self) -> tuple[ClothoidPiece, ...]:
@@ -232,7 +235,7 @@ class ParamCubic:
         return a + ds * (b + ds * (c + ds * d))
 
     def at(self, ds: float) -> tuple[float, float, float]:
-        """x, y, heading at ds."""
+        """x, y, heading at ds. Everything in [m], [rad]."""
         p = self._parameter_at(ds)
         x0, x1, x2, x3 = self.x
         y0, y1, y2, y3 = self.y
@@ -243,7 +246,7 @@ class ParamCubic:
         )
 
     def curvature_at(self, ds: float) -> float:
-        """Curvature of the curve itself, whatever its parameter."""
+        """Curvature of the curve itself, whatever its parameter. [1/m]"""
         p = self._parameter_at(ds)
         _, x1, x2, x3 = self.x
         _, y1, y2, y3 = self.y

@@ -38,7 +38,10 @@ class HeaderOffset:
     def apply(
         self, x: FloatArray, y: FloatArray, z: FloatArray, heading: FloatArray
     ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-        """Inertial x, y, z [m] and heading in [0, 2 pi) [rad] of places in the coordinates of the file."""
+        """Inertial x, y, z [m] and heading in [0, 2 pi) [rad] of places in the coordinates of the file.
+
+        Shape (n,) each.
+        """
         c, s = cos(self.heading), sin(self.heading)
         x, y = x + self.x, y + self.y
         return c * x - s * y, s * x + c * y, z + self.z, (heading + self.heading) % (2.0 * np.pi)

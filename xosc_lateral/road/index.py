@@ -120,7 +120,7 @@ class SurfaceIndex:
         near: tuple[int, float] | None,
         lane_types: Collection[str] | None,
     ) -> LanePosition:
-        """Nearest lane of one point (see `RoadNetwork.world_to_lane_at`)."""
+        """Nearest lane of one point (see `RoadNetwork.world_to_lane_at`). [m], [rad]"""
         if near is not None and near[0] >= 0:
             road = self._tables.roads[near[0]]
             s, t, ahead = project_at(road, x, y, near[1])

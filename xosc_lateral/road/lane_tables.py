@@ -64,11 +64,11 @@ class LaneTables:
         ).T.copy()
 
     def section_of(self, road: IndexLike, s: FloatArray) -> IndexLike:
-        """Index of the lane section, counted over all roads."""
+        """Index of the lane section, counted over all roads. Shape as `s` [m]."""
         return self._sections.find(road, s)
 
     def row_of(self, road: IndexLike, lane: IndexLike, s: FloatArray) -> IndexLike:
-        """Row in the lane table; raises `PlaybackError` for the first lane that is not there."""
+        """Row in the lane table; raises `PlaybackError` for the first lane that is not there. Shape as `s` [m]."""
         section = self.section_of(road, s)
         slot = lane - self._lowest
         outside = (slot < 0) | (slot >= self._slots)
@@ -91,7 +91,7 @@ class LaneTables:
         )
 
     def profile_of(self, row: IndexLike, s: FloatArray) -> LaneProfile:
-        """Centre, slope and width of rows of the lane table."""
+        """Centre, slope and width of rows of the lane table. Shape as `s`; [m], [-], [m]."""
         piece = self._lane_lookup.find(row, s)
         ds = s - self._lane_lookup.starts[piece]
         a, b, c, d, e, f, g, h = (values[piece] for values in self._lane_table)
@@ -114,29 +114,32 @@ class LaneTables:
         return LaneProfile(row.astype(np.int32), centre, slope, width, direction.astype(np.int32))
 
     def travel_directions(self, road: ArrayLike, lane: ArrayLike) -> IntArray:
-        """+1 along s, -1 against s."""
+        """+1 along s, -1 against s. Shape as the arguments. [-]"""
         road_, lane_ = np.broadcast_arrays(np.asarray(road, dtype=np.int32), np.asarray(lane, dtype=np.int32))
         pairs, inverse = np.unique(np.stack([road_.ravel(), lane_.ravel()]), axis=1, return_inverse=True)
         found = [self.roads[r].directions.get(n, 1) for r, n in pairs.T.tolist()]
         return np.array(found, dtype=np.int32)[inverse.ravel()].reshape(road_.shape)
 
     def offset_to_t(self, road: ArrayLike, lane: ArrayLike, s: ArrayLike, offset: ArrayLike) -> FloatArray:
-        """Left of travel -> left of the reference line."""
+        """Left of travel -> left of the reference line. Shape as the arguments. [m]"""
         profile = self.lane_profile(road, lane, s)
         return np.asarray(profile.centre + profile.direction * np.asarray(offset, dtype=np.float64))
 
     def t_to_offset(self, road: ArrayLike, lane: ArrayLike, s: ArrayLike, t: ArrayLike) -> FloatArray:
-        """Left of the reference line -> left of travel."""
+        """Left of the reference line -> left of travel. Shape as the arguments. [m]"""
         profile = self.lane_profile(road, lane, s)
         return np.asarray(profile.direction * (np.asarray(t, dtype=np.float64) - profile.centre))
 
     def lane_edges(self, road: ArrayLike, lane: ArrayLike, s: ArrayLike) -> tuple[FloatArray, FloatArray]:
-        """T of the edges to the left and right of travel."""
+        """T of the edges to the left and right of travel. Shape as the arguments. [m]"""
         _, centre, _, width, direction = self.lane_profile(road, lane, s)
         return centre + 0.5 * direction * width, centre - 0.5 * direction * width
 
     def lane_index(self, road: ArrayLike, lane: ArrayLike, s: ArrayLike) -> tuple[IntArray, IntArray]:
-        """Index from the right in travel direction among driving lanes of one direction, and their count."""
+        """Index from the right in travel direction among driving lanes of one direction, and their count.
+
+        Shape as the arguments. [-]
+        """
 
         def evaluate(road: IndexLike, s: FloatArray, lane: IndexLike) -> tuple[FloatArray, ...]:
             own = np.broadcast_to(self.row_of(road, lane, s), s.shape)
@@ -166,7 +169,7 @@ class LaneTables:
         return np.where(is_driving, index, -1.0), count
 
     def speed_limit(self, road: ArrayLike, lane: ArrayLike, s: ArrayLike) -> FloatArray:
-        """Of the lane, else of the road; inf: none."""
+        """Of the lane, else of the road; inf: none. Shape as the arguments. [m/s]"""
 
         def evaluate(road: IndexLike, s: FloatArray, lane: IndexLike) -> tuple[FloatArray, ...]:
             rows = np.broadcast_to(self.row_of(road, lane, s), s.shape)

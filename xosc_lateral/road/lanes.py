@@ -71,7 +71,7 @@ class Lane:
     successors: tuple[int, ...]
 
     def state_at(self, s: float) -> LaneState:
-        """Centre t, its slope and the width at s."""
+        """Centre t, its slope and the width at s. [m], [-], [m]"""
         i = bisect_right(self.starts, s) - 1
         if i < 0:
             i = 0
@@ -134,7 +134,7 @@ def build_section(
     directions: Mapping[int, int],
     centre_marks: tuple[RoadMark, ...] = (),
 ) -> LaneSection:
-    """Evaluate the lanes of one section, outwards from the centre lane on either side."""
+    """Evaluate the lanes of one section, outwards from the centre lane on either side. `start`, `end` in [m]."""
     centre = lane_offset.restricted(start, end)
     lanes: list[Lane] = []
     for side in (1, -1):

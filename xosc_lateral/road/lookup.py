@@ -39,7 +39,7 @@ class Lookup:
         self._keys = self.starts + np.repeat(self._shift, counts)
 
     def find(self, owner: IndexLike, s: FloatArray) -> IndexLike:
-        """Index of the piece that holds at s; before an owner's first start its first piece."""
+        """Index of the piece that holds at s; before an owner's first start its first piece. Shape as `s` [m]."""
         if self._single:
             return int(self.first[owner]) if isinstance(owner, int) else self.first[owner]
         if isinstance(owner, int):

@@ -28,7 +28,7 @@ def advance(
     choose: Chooser | None = None,
     direction: int | None = None,
 ) -> Advance:
-    """Move along s, following lane links (see `RoadNetwork.advance`)."""
+    """Move along s, following lane links (see `RoadNetwork.advance`). `s` and `distance` in [m]."""
     way = links.roads[road].directions.get(lane, 1) if direction is None else direction
     if distance < 0.0:
         way, distance = -way, -distance

@@ -107,19 +107,19 @@ class RoadNetwork:
         return self.roads[road].directions.get(lane, 1)
 
     def travel_directions(self, road: ArrayLike, lane: ArrayLike) -> IntArray:
-        """`travel_direction` for arrays."""
+        """`travel_direction` for arrays. Shape as the arguments. [-]"""
         return self._tables.travel_directions(road, lane)
 
     def offset_to_t(self, road: ArrayLike, lane: ArrayLike, s: ArrayLike, offset: ArrayLike) -> FloatArray:
-        """Offset to the left of travel -> t from the reference line. [m]"""
+        """Offset to the left of travel -> t from the reference line. [m] Shape as the arguments."""
         return self._tables.offset_to_t(road, lane, s, offset)
 
     def t_to_offset(self, road: ArrayLike, lane: ArrayLike, s: ArrayLike, t: ArrayLike) -> FloatArray:
-        """Inverse of `offset_to_t`."""
+        """Inverse of `offset_to_t`. Shape as the arguments. [m]"""
         return self._tables.t_to_offset(road, lane, s, t)
 
     def offset_from_offset_t(self, road: int, lane: int, offset_t: float) -> float:
-        """OpenSCENARIO's LanePosition offset (along +t) -> offset (left of travel); its own inverse."""
+        """OpenSCENARIO's LanePosition offset (along +t) -> offset (left of travel); its own inverse. [m]"""
         return self.travel_direction(road, lane) * offset_t
 
     # ---- batch: road and lane to world -------------------------------------------------------------------------------
@@ -166,23 +166,26 @@ class RoadNetwork:
 
     # ---- batch: what a lane is like ----------------------------------------------------------------------------------
     def lane_centre_t(self, road: ArrayLike, lane: ArrayLike, s: ArrayLike) -> FloatArray:
-        """T of the lane centre. [m]"""
+        """T of the lane centre. [m] Shape as the arguments."""
         return self._tables.lane_profile(road, lane, s).centre
 
     def lane_width(self, road: ArrayLike, lane: ArrayLike, s: ArrayLike) -> FloatArray:
-        """Width of the lane. [m]"""
+        """Width of the lane. [m] Shape as the arguments."""
         return self._tables.lane_profile(road, lane, s).width
 
     def lane_edges_t(self, road: ArrayLike, lane: ArrayLike, s: ArrayLike) -> tuple[FloatArray, FloatArray]:
-        """T of the lane's edges to the left and to the right of TRAVEL. [m]"""
+        """T of the lane's edges to the left and to the right of TRAVEL. [m] Shape as the arguments."""
         return self._tables.lane_edges(road, lane, s)
 
     def curvature(self, road: ArrayLike, s: ArrayLike) -> FloatArray:
-        """Curvature of the reference line along +s, positive in left turns. [1/m]"""
+        """Curvature of the reference line along +s, positive in left turns. [1/m] Shape as the arguments."""
         return self._tables.curvature(road, s)
 
     def lane_curvature(self, road: ArrayLike, lane: ArrayLike, s: ArrayLike, offset: ArrayLike = 0.0) -> FloatArray:
-        """Curvature of the driven path parallel to the reference line, positive turning left in TRAVEL. [1/m]"""
+        """Curvature of the driven path parallel to the reference line, positive turning left in TRAVEL. [1/m]
+
+        Shape as the arguments.
+        """
         return self._tables.lane_curvature(road, lane, s, offset)
 
     def lane_index(self, road: ArrayLike, lane: ArrayLike, s: ArrayLike) -> tuple[IntArray, IntArray]:
@@ -193,24 +196,27 @@ class RoadNetwork:
         return self._tables.lane_index(road, lane, s)
 
     def crossfall(self, road: ArrayLike, lane: ArrayLike, s: ArrayLike) -> FloatArray:
-        """Cross slope seen in travel direction, positive when the road falls to the RIGHT. [%]"""
+        """Cross slope seen in travel direction, positive when the road falls to the RIGHT. [%]
+
+        Shape as the arguments.
+        """
         return self._tables.lean(road, lane, s)[0]
 
     def grade(self, road: ArrayLike, lane: ArrayLike, s: ArrayLike) -> FloatArray:
-        """Slope along travel, positive uphill. [%]"""
+        """Slope along travel, positive uphill. [%] Shape as the arguments."""
         return self._tables.lean(road, lane, s)[1]
 
     def speed_limit(self, road: ArrayLike, lane: ArrayLike, s: ArrayLike) -> FloatArray:
-        """Speed limit of the lane, else of the road; inf where none is given. [m/s]"""
+        """Speed limit of the lane, else of the road; inf where none is given. [m/s] Shape as the arguments."""
         return self._tables.speed_limit(road, lane, s)
 
     # ---- one place at a time, fast -----------------------------------------------------------------------------------
     def pose_at(self, road: int, lane: int, s: float, offset: float = 0.0) -> Pose:
-        """`lane_to_world` of one place."""
+        """`lane_to_world` of one place. [m], [rad]"""
         return lane_pose(self.roads[road], lane, s, offset)
 
     def road_pose_at(self, road: int, s: float, t: float = 0.0) -> Pose:
-        """`road_to_world` of one place."""
+        """`road_to_world` of one place. [m], [rad]"""
         return surface_pose(self.roads[road], s, t)
 
     def curvature_at(self, road: int, s: float) -> float:
@@ -218,25 +224,34 @@ class RoadNetwork:
         return self.roads[road].curvature_at(s)
 
     def lane_state_at(self, road: int, lane: int, s: float) -> LaneState:
-        """Centre t, its slope along s, and width of a lane; raises `PlaybackError` for a lane that is not there."""
+        """Centre t, its slope along s, and width of a lane; raises `PlaybackError` for a lane that is not there.
+
+        [m], [-], [m]
+        """
         road_ = self.roads[road]
         found = road_.section_at(s).by_id.get(lane)
         return (found or find_lane(road_, lane, s)).state_at(s)
 
     def lanes_at(self, road: int, s: float) -> tuple[LaneInfo, ...]:
-        """All lanes of the cross-section but the centre lane 0, from left to right looking along s."""
+        """All lanes of the cross-section but the centre lane 0, from left to right looking along s. `s` in [m]."""
         return cross_section(self.roads[road], s)
 
     def has_lane_at(self, road: int, lane: int, s: float) -> bool:
-        """Whether the lane exists there."""
+        """Whether the lane exists there. `s` in [m]."""
         return lane in self.roads[road].section_at(s).by_id
 
     def lane_type_at(self, road: int, lane: int, s: float) -> str:
-        """The lane's type in the words of OpenDRIVE; raises `PlaybackError` for a lane that is not there."""
+        """The lane's type in the words of OpenDRIVE; raises `PlaybackError` for a lane that is not there.
+
+        `s` in [m].
+        """
         return find_lane(self.roads[road], lane, s).type
 
     def lane_at(self, road: int, s: float, t: float, *, lane_types: Collection[str] | None = DRIVING) -> LanePosition:
-        """The lane of these types that holds `t`, else the nearest one; lane 0 if the road has none of them there."""
+        """The lane of these types that holds `t`, else the nearest one; lane 0 if the road has none of them there.
+
+        `s`, `t` in [m].
+        """
         return lane_at(self.roads[road], road, s, t, lane_types)
 
     def section_at(self, road: int, s: float) -> tuple[float, float]:
@@ -254,7 +269,7 @@ class RoadNetwork:
         near: tuple[int, float] | None = None,
         lane_types: Collection[str] | None = DRIVING,
     ) -> LanePosition:
-        """`world_to_lane` of one point; `near` = (road, s) where it was a moment ago makes it cheap."""
+        """`world_to_lane` of one point; `near` = (road, s) where it was a moment ago makes it cheap. [m], [rad]"""
         return self._index.world_to_lane_at(x, y, z, heading, near=near, lane_types=lane_types)
 
     # ---- where lanes lead --------------------------------------------------------------------------------------------
@@ -316,7 +331,7 @@ class RoadNetwork:
         return road_marks(self.roads[road])
 
     def mark_line(self, road: int, mark: RoadMark, *, step: float = 2.0) -> tuple[FloatArray, FloatArray]:
-        """Polyline x, y of a marking, for plots. [m]"""
+        """Polyline x, y of a marking, for plots. [m] Shape (n,) each."""
         return self._tables.mark_line(road, mark, step)
 
 

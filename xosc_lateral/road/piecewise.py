@@ -13,7 +13,7 @@ ZERO: Cubic = (0.0, 0.0, 0.0, 0.0)
 
 
 def shift(cubic: Cubic, ds: float) -> Cubic:
-    """The same cubic about a point `ds` further on (Taylor)."""
+    """The same cubic about a point `ds` further on (Taylor). `ds` in [m]."""
     if ds == 0.0:
         return cubic
     a, b, c, d = cubic
@@ -37,7 +37,10 @@ class Piecewise:
 
     @classmethod
     def from_records(cls, records: Iterable[tuple[float, Cubic]], *, begin: float, before: Cubic = ZERO) -> Piecewise:
-        """From (s, cubic) records in any order; the later of two at the same s counts; before the first: `before`."""
+        """From (s, cubic) records in any order; the later of two at the same s counts; before the first: `before`.
+
+        `s` in [m].
+        """
         ordered = dict(sorted(records, key=lambda record: record[0]))
         if not ordered or min(ordered) > begin:
             ordered = {begin: before, **ordered}
@@ -49,7 +52,7 @@ class Piecewise:
         return not any(any(cubic) for cubic in self.cubics)
 
     def at(self, s: float) -> float:
-        """Value at s."""
+        """Value at s. s in [m]."""
         i = bisect_right(self.starts, s) - 1
         if i < 0:
             i = 0
@@ -58,7 +61,7 @@ class Piecewise:
         return a + s * (b + s * (c + s * d))
 
     def with_slope_at(self, s: float) -> tuple[float, float]:
-        """Value and derivative at s."""
+        """Value and derivative at s. s in [m]."""
         i = bisect_right(self.starts, s) - 1
         if i < 0:
             i = 0
@@ -67,17 +70,17 @@ class Piecewise:
         return a + s * (b + s * (c + s * d)), b + s * (2.0 * c + 3.0 * s * d)
 
     def cubic_at(self, s: float) -> Cubic:
-        """The cubic that holds at s, about s."""
+        """The cubic that holds at s, about s. s in [m]."""
         i = max(bisect_right(self.starts, s) - 1, 0)
         return shift(self.cubics[i], s - self.starts[i])
 
     def restricted(self, begin: float, end: float) -> Piecewise:
-        """The same function with pieces for [begin, end) only."""
+        """The same function with pieces for [begin, end) only. Bounds in [m]."""
         starts = (begin, *(s for s in self.starts if begin < s < end))
         return Piecewise(starts, tuple(self.cubic_at(s) for s in starts))
 
     def plus(self, other: Piecewise, factor: float = 1.0) -> Piecewise:
-        """``self + factor * other``, with the breakpoints of both."""
+        """``self + factor * other``, with the breakpoints of both. `factor` [-]."""
         starts = tuple(sorted({*self.starts, *other.starts}))
         cubics = []
         for s in starts:

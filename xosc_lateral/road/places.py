@@ -14,14 +14,14 @@ TWO_PI = 2.0 * pi
 
 
 def normal_angle(angle: float) -> float:
-    """The angle in (-pi, pi]."""
+    """The angle in (-pi, pi]. [rad]"""
     if -pi < angle <= pi:
         return angle
     return angle - TWO_PI * ceil((angle - pi) / TWO_PI)
 
 
 def find_lane(road: Road, lane: int, s: float) -> Lane:
-    """A lane at s; raises `PlaybackError` naming the road, the lane and the lanes that are there."""
+    """A lane at s; raises `PlaybackError` naming the road, the lane and the lanes that are there. `s` in [m]."""
     section = road.section_at(s)
     found = section.by_id.get(lane)
     if found is None:
@@ -31,7 +31,7 @@ def find_lane(road: Road, lane: int, s: float) -> Lane:
 
 
 def lane_pose(road: Road, lane: int, s: float, offset: float) -> Pose:
-    """Pose of driving along a lane; `offset` positive to the left of travel."""
+    """Pose of driving along a lane; `offset` positive to the left of travel. [m], [rad]"""
     s = 0.0 if s < 0.0 else s if s < road.length else road.length
     found = road.section_at(s).by_id.get(lane) or find_lane(road, lane, s)
     centre, slope, width = found.state_at(s)
@@ -49,7 +49,7 @@ def surface_pose(
     centre: float = 0.0,
     width: float = 0.0,
 ) -> Pose:
-    """Pose at (s, t), heading along (+1) or against (-1) s, turned by the slope of what is followed."""
+    """Pose at (s, t), heading along (+1) or against (-1) s, turned by the slope of what is followed. [m], [rad]"""
     x, y, heading = road.reference_at(s)
     z = pitch = roll = 0.0
     from_line = t
@@ -91,13 +91,16 @@ def turned_in_surface(turn: float, pitch: float, roll: float) -> tuple[float, fl
 
 
 def turn_for_heading(change: float, pitch: float, roll: float) -> float:
-    """Turn within a surface that pitches and rolls, for a change of heading: the reverse of `turned_in_surface`."""
+    """Turn within a surface that pitches and rolls, for a change of heading: the reverse of `turned_in_surface`.
+
+    [rad]
+    """
     sideways, ahead = sin(change), cos(change)
     return atan2(cos(pitch) * sideways, cos(roll) * ahead - sin(pitch) * sin(roll) * sideways)
 
 
 def across_lane(lane: Lane, t: float, centre: float, width: float) -> float:
-    """How far across a lane t lies, from its inner (0) to its outer edge (1)."""
+    """How far across a lane t lies, from its inner (0) to its outer edge (1). [-]"""
     if width <= 0.0:
         return 0.0
     outwards = (t - centre) / width if lane.id > 0 else (centre - t) / width
@@ -105,7 +108,7 @@ def across_lane(lane: Lane, t: float, centre: float, width: float) -> float:
 
 
 def cross_section(road: Road, s: float) -> tuple[LaneInfo, ...]:
-    """All lanes but lane 0, from left to right looking along s."""
+    """All lanes but lane 0, from left to right looking along s. `s` in [m]."""
     infos = []
     for lane in road.section_at(s).lanes:
         centre, _, width = lane.state_at(s)
@@ -114,7 +117,10 @@ def cross_section(road: Road, s: float) -> tuple[LaneInfo, ...]:
 
 
 def lane_at(road: Road, index: int, s: float, t: float, lane_types: Collection[str] | None) -> LanePosition:
-    """The lane of these types that holds t, else the nearest; lanes of no width only where there is nothing else."""
+    """The lane of these types that holds t, else the nearest; lanes of no width only where there is nothing else.
+
+    `s`, `t` in [m].
+    """
     best: tuple[float, float, float] | None = None
     found: tuple[Lane, float] | None = None
     for lane in road.section_at(s).lanes:

@@ -22,7 +22,7 @@ class Cubics:
         self.is_zero = not self._table.any()
 
     def at(self, owner: IndexLike, s: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Values and derivatives."""
+        """Values and derivatives. Shape as `s`. [m]"""
         piece = self._lookup.find(owner, s)
         ds = s - self._lookup.starts[piece]
         a, b, c, d = (values[piece] for values in self._table)
@@ -42,7 +42,7 @@ class HeightTable:
     def at(
         self, row: IndexLike, s: FloatArray, from_centre: FloatArray, width: FloatArray, lane: IndexLike
     ) -> FloatArray:
-        """Height `from_centre` (along t) of lanes of this width and id, linear across the lane."""
+        """Height `from_centre` (along t) of lanes of this width and id, linear across the lane. Shape as `s`. [m]"""
         piece = self._lookup.find(row, s)
         ds = np.maximum(s - self._lookup.starts[piece], 0.0)
         inner, inner_slope, outer, outer_slope = (values[piece] for values in self._table)

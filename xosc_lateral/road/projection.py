@@ -35,7 +35,7 @@ class Feet(NamedTuple):
 
 
 def project(tables: NetworkTables, road: IntArray, x: FloatArray, y: FloatArray, guess: FloatArray) -> Feet:
-    """Feet on the given roads, from guesses of s; arrays of one length."""
+    """Feet on the given roads, from guesses of s; arrays of one length. Shape (n,). [m]"""
     parts = [
         _project(tables, road[part], x[part], y[part], guess[part])
         for part in (slice(begin, begin + CHUNK) for begin in range(0, len(x), CHUNK))
@@ -84,7 +84,7 @@ def _feet(tables: NetworkTables, road: IntArray, x: FloatArray, y: FloatArray, s
 
 
 def project_at(road: Road, x: float, y: float, guess: float) -> tuple[float, float, float]:
-    """`project` of one point in plain floats: s, t, ahead."""
+    """`project` of one point in plain floats: s, t, ahead. [m]"""
     length = road.length
     s = min(max(guess, 0.0), length)
     low, high = -1.0, length + 1.0

@@ -102,12 +102,12 @@ class Road:
         object.__setattr__(self, "is_flat", self.surface.is_flat and not heights)
 
     def section_at(self, s: float) -> LaneSection:
-        """The lane section at s; beyond the ends the first or last one."""
+        """The lane section at s; beyond the ends the first or last one. `s` in [m]."""
         i = bisect_right(self.section_starts, s) - 1
         return self.sections[i if i > 0 else 0]
 
     def reference_at(self, s: float) -> tuple[float, float, float]:
-        """x, y, heading of the reference line."""
+        """x, y, heading of the reference line. [m], [rad]"""
         i = bisect_right(self.starts, s) - 1
         if i < 0:
             i = 0

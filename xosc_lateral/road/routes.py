@@ -15,7 +15,7 @@ from xosc_lateral.road.positions import RoadPath, RouteStep
 def path_between(
     links: Links, start: tuple[int, float], end: tuple[int, float], *, direction: int = 1, limit: float = inf
 ) -> RoadPath | None:
-    """Shortest way along reference lines (see `RoadNetwork.path_between`)."""
+    """Shortest way along reference lines (see `RoadNetwork.path_between`). Distances in [m]."""
     best: RoadPath | None = None
     (road, s), (target, target_s) = start, end
     if road == target:
@@ -62,7 +62,7 @@ def route(
     *,
     via: Sequence[tuple[int, int, float]] = (),
 ) -> tuple[RouteStep, ...] | None:
-    """Shortest drivable way (see `RoadNetwork.route`)."""
+    """Shortest drivable way (see `RoadNetwork.route`). Distances in [m]."""
     steps: list[RouteStep] = []
     stops = [start, *via, end]
     way = links.roads[start[0]].directions.get(start[1], 1)

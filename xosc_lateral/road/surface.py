@@ -28,7 +28,7 @@ class Shape:
     profiles: tuple[Piecewise, ...]
 
     def at(self, s: float, t: float) -> tuple[float, float, float]:
-        """Height, its slope along s, its slope along t."""
+        """Height, its slope along s, its slope along t. [m], [-], [-]"""
         i = bisect_right(self.stations, s) - 1
         if i < 0 or i == len(self.stations) - 1:
             height, across = self.profiles[max(i, 0)].with_slope_at(t)
@@ -117,14 +117,14 @@ class Surface:
         return -across * tan(angle) * grade / sqrt(1.0 + grade * grade) if angle and grade else 0.0
 
     def slopes_at(self, s: float, t: float) -> tuple[float, float]:
-        """Climb along +s and angle about s (positive falling to the right)."""
+        """Climb along +s and angle about s (positive falling to the right). [-], [rad]"""
         _, grade = self.elevation.with_slope_at(s)
         angle, twist = self.superelevation.with_slope_at(s)
         _, lift_along, lean = self.profile_at(s, t)
         return grade + t * cos(angle) * twist + lift_along, angle + atan(lean)
 
     def profile_at(self, s: float, t: float) -> tuple[float, float, float]:
-        """What crossfall and shape add: height, its slope along s, its slope along t."""
+        """What crossfall and shape add: height, its slope along s, its slope along t. [m], [-], [-]"""
         height = along = lean = 0.0
         if self.crossfall is not None:
             fall, fall_slope = self.crossfall[0 if t >= 0.0 else 1].with_slope_at(s)

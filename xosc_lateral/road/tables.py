@@ -108,18 +108,21 @@ class NetworkTables(LaneTables):
         return height, pitch, roll, shrink, drift, lead
 
     def lead(self, road: IndexLike, s: FloatArray, across: FloatArray) -> FloatArray | None:
-        """How far along s places lie from the feet of their s, `across` the line; None: nothing leans on a grade."""
+        """How far along s places lie from the feet of their s, `across` the line; None: nothing leans on a grade.
+
+        Shape as `s`. [m]
+        """
         if self._superelevation.is_zero or self._elevation.is_zero:
             return None
         angle, grade = self._superelevation.at(road, s)[0], self._elevation.at(road, s)[1]
         return np.asarray(-across * np.tan(angle) * grade / np.sqrt(1.0 + grade * grade))
 
     def shrink(self, road: IndexLike, s: FloatArray) -> FloatArray:
-        """How t shrinks seen from above: cos(superelevation)."""
+        """How t shrinks seen from above: cos(superelevation). Shape as `s`. [-]"""
         return np.ones(len(s)) if self._superelevation.is_zero else np.cos(self._superelevation.at(road, s)[0])
 
     def height(self, road: IndexLike, s: FloatArray, t: FloatArray) -> FloatArray:
-        """Height of the road surface, without kerbs. [m]"""
+        """Height of the road surface, without kerbs. [m] Shape as `s`."""
         return self._surface(road, s, t)[0]
 
     def _shaped(self, road: IndexLike, s: FloatArray, t: FloatArray) -> FloatArray:
@@ -134,7 +137,7 @@ class NetworkTables(LaneTables):
 
     # ---- curvature, lean --------------------------------------------------------------------------------------------
     def curvature(self, road: ArrayLike, s: ArrayLike) -> FloatArray:
-        """Of reference lines, along +s."""
+        """Of reference lines, along +s. Shape as the arguments. [1/m]"""
 
         def evaluate(road: IndexLike, s: FloatArray) -> tuple[FloatArray, ...]:
             return (self.frame(road, s).curvature,)
@@ -142,7 +145,7 @@ class NetworkTables(LaneTables):
         return self._batch(evaluate, 1, road, s)[0]
 
     def frame(self, road: IndexLike, s: FloatArray) -> Frame:
-        """Reference line with derivatives."""
+        """Reference line with derivatives. Shape as `s`. [m], [rad], [1/m]"""
         return self.lines.at(road, s, derivatives=True)
 
     def lane_curvature(self, road: ArrayLike, lane: ArrayLike, s: ArrayLike, offset: ArrayLike) -> FloatArray:
@@ -167,7 +170,10 @@ class NetworkTables(LaneTables):
         return self._batch(evaluate, 1, road, s, lane=lane, offset=offset)[0]
 
     def lean(self, road: ArrayLike, lane: ArrayLike, s: ArrayLike) -> tuple[FloatArray, FloatArray]:
-        """Crossfall (positive falling to the right of travel) and grade (positive uphill), both in percent."""
+        """Crossfall (positive falling to the right of travel) and grade (positive uphill), both in percent.
+
+        Shape as the arguments. [%]
+        """
 
         def evaluate(road: IndexLike, s: FloatArray, lane: IndexLike) -> tuple[FloatArray, ...]:
             s = self._clamped(road, s)
@@ -187,7 +193,7 @@ class NetworkTables(LaneTables):
         return angle + np.arctan(lean), grade + t * np.cos(angle) * twist + lift_along
 
     def mark_line(self, road: int, mark: RoadMark, step: float) -> tuple[FloatArray, FloatArray]:
-        """Polyline of a marking: the lane's outer edge, or the lane offset for lane 0."""
+        """Polyline of a marking: the lane's outer edge, or the lane offset for lane 0. Shape (n,) each. [m]"""
         n = max(2, int(np.ceil((mark.s_end - mark.s_start) / step)) + 1)
         s = np.linspace(mark.s_start, mark.s_end, n)
         # the end of a section belongs to the next one, which may not have the lane
@@ -200,7 +206,7 @@ class NetworkTables(LaneTables):
 def turned_in_surface(
     turn: FloatArray, pitch: FloatArray, roll: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """`places.turned_in_surface` for arrays."""
+    """`places.turned_in_surface` for arrays. Shape (n,) each. [rad]"""
     cos_turn, sin_turn, cos_pitch, sin_pitch = np.cos(turn), np.sin(turn), np.cos(pitch), np.sin(pitch)
     cos_roll, sin_roll = np.cos(roll), np.sin(roll)
     forward_x = cos_pitch * cos_turn + sin_pitch * sin_roll * sin_turn

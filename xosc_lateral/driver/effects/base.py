@@ -40,7 +40,7 @@ class EffectTerms:
     fine: FloatArray | None = None
 
     def rows(self, rows: slice | NDArray[np.int64]) -> EffectTerms:
-        """The same at some rows."""
+        """The same at some rows. Shape of `rows` each. [m], [-]"""
         values = (self.location, self.spread, self.rate, self.fine)
         return EffectTerms(*(None if value is None else value[rows] for value in values))
 

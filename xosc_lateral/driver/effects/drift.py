@@ -1,4 +1,10 @@
-"""Slow drift: what is held for the middle of the lane wanders over minutes."""
+"""Slow drift: what is held for the middle of the lane wanders over minutes.
+
+References
+----------
+D. T. Gillespie, "Exact numerical simulation of the Ornstein-Uhlenbeck process and its integral", Physical Review E 54,
+1996, pp. 2084-2091.
+"""
 
 from __future__ import annotations
 

@@ -20,7 +20,7 @@ class Levels(ColumnEffect, frozen=True, kw_only=True):
     column : str
         Column of whole numbers.
     levels : tuple of float
-        Those that differ from the rest.
+        Those that differ from the rest. [unit of the column]
     """
 
     column: str

@@ -21,6 +21,7 @@ class Nearness(ColumnEffect, frozen=True, kw_only=True):
         A distance; NaN: there is none.
     scale : float
         In the column's unit. Infinite is not allowed; a very large one makes it "there is one" (see `presence`).
+        [unit of the column]
     presence : bool
         True: 1 wherever there is one, at whatever distance.
     """

@@ -23,7 +23,7 @@ class Piecewise(ColumnEffect, frozen=True, kw_only=True):
     column : str
         Where it is NaN ("there is none"), nothing changes.
     knots : tuple of float
-        Increasing, in the column's unit.
+        Increasing. [unit of the column]
     """
 
     column: str

@@ -21,7 +21,7 @@ class Proximity(ColumnEffect, frozen=True, kw_only=True):
     column : str
         A distance, of either sign; NaN: there is none.
     scale : float
-        Distance over which the influence falls to 37 %, in the column's unit; > 0.
+        Distance over which the influence falls to 37 %; > 0. [unit of the column]
     """
 
     column: str

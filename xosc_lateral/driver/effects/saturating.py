@@ -21,7 +21,7 @@ class Saturating(ColumnEffect, frozen=True, kw_only=True):
     column : str
         Where it is NaN ("there is none"), nothing changes.
     middle, scale : float
-        In the column's unit; scale > 0.
+        scale > 0. [unit of the column]
     """
 
     column: str

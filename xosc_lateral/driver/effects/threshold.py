@@ -20,7 +20,7 @@ class Threshold(ColumnEffect, frozen=True, kw_only=True):
     column : str
         Where it is NaN ("there is none"), it counts as on the side that does not act.
     at : float
-        The limit, in the column's unit.
+        The limit. [unit of the column]
     above : bool
         Whether it acts above the limit, or below.
     jump : bool

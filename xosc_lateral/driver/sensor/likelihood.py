@@ -42,7 +42,7 @@ class Colour:
     corner: float = 1.0
 
     def shape(self, frequency: FloatArray) -> FloatArray:
-        """Density over that at frequency 0."""
+        """Density over that at frequency 0. Shape as `frequency` [Hz]. [-]"""
         return np.asarray(1.0 / (1.0 + (frequency / self.corner) ** (2 * self.order)))
 
     @property

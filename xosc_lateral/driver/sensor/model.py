@@ -92,7 +92,7 @@ class SensorModel(Record, frozen=True):
         )
 
     def density(self, frequency: FloatArray) -> FloatArray:
-        """One-sided power density of the noise, without rounding. [m2/Hz]"""
+        """One-sided power density of the noise, without rounding. [m2/Hz] Shape as `frequency` [Hz]."""
         total: FloatArray = np.full(np.shape(frequency), self.white)
         if self.order:
             total = total + self.coloured * Colour(self.order, self.corner).shape(frequency)
@@ -112,7 +112,7 @@ class SensorModel(Record, frozen=True):
         return error * wandering_level(self.wanders, self.lasts, n, step, rng) if self.wanders else error
 
     def in_runs(self, frequency: FloatArray) -> FloatArray:
-        """One-sided power density of the error in runs at 5 Hz. [m2/Hz]"""
+        """One-sided power density of the error in runs at 5 Hz. [m2/Hz] Shape as `frequency` [Hz]."""
         if not self.frequencies:
             return np.asarray(self.density(frequency) * (frequency <= HIGHEST))
         table = np.log(np.array(self.densities) + FAINTEST)

@@ -80,7 +80,10 @@ def windows_of(runs: Sequence[FloatArray], step: float) -> tuple[FloatArray, Flo
 
 
 def periodogram(frequency: FloatArray, windows: FloatArray) -> Periodogram:
-    """Mean over windows, binned, from the second frequency (Hann smears the mean into the first) to `PASSED`."""
+    """Mean over windows, binned, from the second frequency (Hann smears the mean into the first) to `PASSED`.
+
+    `frequency` [Hz] of shape (n,), `windows` [m2/Hz] of shape (k, n).
+    """
     use = (frequency > 1.5 * frequency[1]) & (frequency <= PASSED)
     known, density = frequency[use], windows[:, use].mean(axis=0)
     edges = [int(k) for k in np.flatnonzero(known < BINS_FROM)]

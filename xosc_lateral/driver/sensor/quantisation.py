@@ -23,7 +23,10 @@ def is_too_coarse(step: float, variance: float) -> bool:
 
 
 def quantisation_step(values: FloatArray) -> float:
-    """Step of the lattice that all values lie on, 0 if there is none of at least `LEAST_STEP`. [m]"""
+    """Step of the lattice that all values lie on, 0 if there is none of at least `LEAST_STEP`. [m]
+
+    `values` of shape (n,).
+    """
     levels = np.unique(np.round(values, 7))
     if len(levels) < 3 or len(levels) > 0.2 * len(values):
         return 0.0

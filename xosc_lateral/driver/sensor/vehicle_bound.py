@@ -49,7 +49,10 @@ N_KNOTS = len(KNOTS)
 
 
 def expected_slope(frequency: FloatArray) -> FloatArray:
-    """Mean of the prior on the slope of log power over log frequency, above `FREE_BELOW`."""
+    """Mean of the prior on the slope of log power over log frequency, above `FREE_BELOW`.
+
+    Shape as `frequency` [Hz]. [-]
+    """
     rising = np.clip(np.log(frequency / FREE_BELOW) / np.log(CORRECTIONS / FREE_BELOW), 0.0, 1.0)
     lags = (frequency / LAGS) ** 2 / (1.0 + (frequency / LAGS) ** 2)
     return np.where(frequency < CORRECTIONS, -1.0 - 2.5 * rising, -5.5 - 3.0 * lags)
@@ -98,7 +101,7 @@ def interpolation(frequency: FloatArray) -> FloatArray:
 
 
 def density(knots: FloatArray, frequency: FloatArray) -> FloatArray:
-    """Driver's power density from the logarithms at the knots. [m2/Hz]"""
+    """Driver's power density from the logarithms at the knots. [m2/Hz] Shape as `frequency` [Hz]."""
     beyond = np.maximum(np.log(np.maximum(frequency, 1e-9)) - _LOG[-1], 0.0)
     last = min(float((SLOPES @ knots)[-1]), STEEPEST_KNOWN)
     return np.asarray(np.exp(interpolation(frequency) @ knots + last * beyond))

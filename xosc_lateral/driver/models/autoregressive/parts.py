@@ -45,7 +45,7 @@ class CoarseState(QueueState):
 
     @classmethod
     def begin(cls, rng: np.random.Generator, past: FloatArray, skip: IntArray) -> Self:
-        """Nothing made yet."""
+        """Nothing made yet. `past` of shape (n, drivers), `skip` of shape (drivers,). [-]"""
         nothing = np.empty((0, past.shape[1]))
         return cls(made=nothing, skip=skip, bridge=nothing, rng=rng, past=past, held=nothing)
 
@@ -59,7 +59,7 @@ class FineState(QueueState):
 
     @classmethod
     def begin(cls, rng: np.random.Generator, skip: IntArray) -> Self:
-        """Nothing made yet."""
+        """Nothing made yet. `skip` of shape (drivers,). [-]"""
         nothing = np.empty((0, len(skip)))
         return cls(made=nothing, skip=skip, bridge=nothing, rng=rng, last_factor=nothing, noise=nothing)
 

@@ -65,7 +65,7 @@ class AutoregressiveStream:
 
     @property
     def mean(self) -> FloatArray | float:
-        """What each driver's coarse part moves about. [-]"""
+        """What each driver's coarse part moves about. [-] Shape (drivers,)."""
         mean = self.state.driver.mean
         return float(mean[0]) if self.state.single else mean
 

@@ -5,6 +5,10 @@ one that wanders over seconds (both first-order autoregressions). Factors are sc
 
 One drive alone can't tell what its driver keeps from what wanders slowly: all that lasts longer than the lags looked at
 counts as slow wander there, and as a difference between drivers where there are several.
+
+References
+----------
+S. J. Taylor, "Modelling Financial Time Series", Wiley 1986: stochastic volatility.
 """
 
 from __future__ import annotations

@@ -75,7 +75,7 @@ class MarkovChain:
 
     @property
     def support(self) -> NDArray[np.bool_]:
-        """Bins that were visited, shape (n_bins,)."""
+        """Bins that were visited, shape (n_bins,). [-]"""
         return np.asarray((self.counts.sum(axis=0) + self.counts.sum(axis=1)) > 0)
 
     @cached_property
@@ -128,7 +128,7 @@ def fit_markov_chain(rel_offsets: Sequence[FloatArray], *, n_bins: int = N_BINS)
 
 
 def open_traps(counts: IntArray) -> IntArray:
-    """Counts with a way out of every bin that has none; see the module. Shape as `counts`."""
+    """Counts with a way out of every bin that has none; see the module. Shape as `counts`. [-]"""
     bins = np.arange(len(counts))
     visited = (counts.sum(axis=0) + counts.sum(axis=1)) > 0
     main = _main_part(counts)
