@@ -91,7 +91,7 @@ def test_files_of_other_scenarios_are_no_variants(folder: Path, tmp_path: Path) 
     source = tmp_path / "braking-leader.xosc"
     other = xl.convert(source, folder / "out" / "other.xosc", time_limit=3.0).output
     assert other is not None
-    with pytest.raises(xl.FormatError, match="no variant of the same scenario"):
+    with pytest.raises(xl.FormatError, match="not a variant of the same scenario"):
         xl.variant_set([folder / "out" / "x_01.xosc", other], folder / "out" / "z.xosc", source=source)
     assert not (folder / "out" / "z_set.xosc").exists()
     other.unlink()
