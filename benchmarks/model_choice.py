@@ -131,7 +131,7 @@ def score(runs: Sequence[Run], fit: Callable[[Sequence[Run]], Sampler], splits: 
         ratio = model[name] / floor[name]
         worst = int(np.argmax(ratio))
         cells += [f"{model[name].mean() / floor[name].mean():.2f}", f"{ratio[worst]:.2f} ({METRICS[worst]})"]
-    return [*cells, "" if auc is None else f"{auc:.3f}"]
+    return [*cells, "" if auc is None else f"{auc.auc:.3f}"]
 
 
 def main() -> None:
