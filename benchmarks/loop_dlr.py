@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 from xosc_lateral.formats.atomic import write_atomically
 from xosc_lateral.formats.drives import read_drives
 from xosc_lateral.identification.close import LoopResult
-from xosc_lateral.identification.leftover import Leftover, leftover_of
+from xosc_lateral.identification.lack_of_fit import LackOfFit, lack_of_fit_of
 from xosc_lateral.pipeline.refined import refine_population
 from xosc_lateral.report.figures import PAPER
 from xosc_lateral.report.loop import loop_text
@@ -42,27 +42,27 @@ def main() -> None:
     started = time.perf_counter()
     result = refine_population(read_drives([args.table]), args.seed)
     took = time.perf_counter() - started
-    leftover = leftover_of(result)
-    text = f"```\n{loop_text(result, leftover)}\n```\n\nIn {took:.0f} s.\n\n{group_table(leftover)}"
+    lack_of_fit = lack_of_fit_of(result)
+    text = f"```\n{loop_text(result, lack_of_fit)}\n```\n\nIn {took:.0f} s.\n\n{group_table(lack_of_fit)}"
     print(text)
     if args.write is not None:
         page = args.write.read_text(encoding="utf-8")
         marked = re.compile(r"(<!-- loop-dlr: begin -->\n).*(<!-- loop-dlr: end -->)", re.DOTALL)
         write_atomically(args.write, marked.sub(lambda match: f"{match[1]}{text}\n{match[2]}", page))
     if args.figures is not None:
-        draw(result, leftover, args.figures)
+        draw(result, lack_of_fit, args.figures)
 
 
-def group_table(leftover: Leftover) -> str:
+def group_table(lack_of_fit: LackOfFit) -> str:
     """Every group of cells, most left unexplained first."""
     rows = ["| cells | before [mm] | after [mm] | floor [mm] | after / floor |", "|---|---|---|---|---|"]
-    for group in sorted(leftover.groups, key=lambda group: -group.unexplained):
+    for group in sorted(lack_of_fit.groups, key=lambda group: -group.unexplained):
         numbers = f"{1e3 * group.before:.1f} | {1e3 * group.after:.1f} | {1e3 * group.floor:.1f}"
         rows.append(f"| {group.name} | {numbers} | {group.after / group.floor:.2f} |")
     return "\n".join(rows)
 
 
-def draw(result: LoopResult, leftover: Leftover, folder: Path) -> None:
+def draw(result: LoopResult, lack_of_fit: LackOfFit, folder: Path) -> None:
     """Figures on white, which light and dark pages show alike."""
     folder.mkdir(parents=True, exist_ok=True)
     for finding in result.findings:
@@ -72,7 +72,7 @@ def draw(result: LoopResult, leftover: Leftover, folder: Path) -> None:
             figure, _ = DRAWINGS[finding.kind]
             _save(figure(result, finding), folder / f"loop_dlr_{finding.kind}.png")
     _save(spectrum_figure(result), folder / "loop_dlr_spectrum.png")
-    _save(residual_figure(result, leftover, "mean"), folder / "loop_dlr_residual.png")
+    _save(residual_figure(result, lack_of_fit, "mean"), folder / "loop_dlr_residual.png")
 
 
 def _save(figure: Figure, path: Path) -> None:

@@ -36,15 +36,15 @@ from xosc_lateral.driver.effects import (
 )
 from xosc_lateral.formats.drives import read_drives
 from xosc_lateral.identification.close import LoopResult, close_loop
-from xosc_lateral.identification.course import by_drive, spread_course
 from xosc_lateral.identification.findings import Finding
-from xosc_lateral.identification.leftover import Leftover, leftover_of
+from xosc_lateral.identification.lack_of_fit import LackOfFit, lack_of_fit_of
+from xosc_lateral.identification.moving_statistics import by_drive, moving_spread
 from xosc_lateral.identification.partial import curve_of
 from xosc_lateral.report.loop import loop_page, loop_text
 from xosc_lateral.report.loop_figures import DRIVES, effect_figure, residual_figure
 from xosc_lateral.report.loop_hidden_figures import DRAWINGS
 from xosc_lateral.report.loop_json import loop_json
-from xosc_lateral.report.loop_words import leftover_words, meaning, p_value_words, size_words
+from xosc_lateral.report.loop_words import lack_of_fit_words, meaning, p_value_words, size_words
 
 SHIFT = 0.4  # [m]
 
@@ -86,13 +86,13 @@ def result(table: Path) -> LoopResult:
 
 
 @pytest.fixture(scope="module")
-def leftover(result: LoopResult) -> Leftover:
-    return leftover_of(result)
+def lack_of_fit(result: LoopResult) -> LackOfFit:
+    return lack_of_fit_of(result)
 
 
 @pytest.fixture(scope="module")
-def page(result: LoopResult, leftover: Leftover, table: Path) -> str:
-    return loop_page(result, leftover, [table])
+def page(result: LoopResult, lack_of_fit: LackOfFit, table: Path) -> str:
+    return loop_page(result, lack_of_fit, [table])
 
 
 def hidden(result: LoopResult, effect: Effect | None, kind: str, cell: str = "movement by band") -> Finding:
@@ -123,8 +123,8 @@ def test_the_page_has_every_part_that_a_reader_needs(page: str) -> None:
     assert "**" not in page.split("<script>")[0]
 
 
-def test_same_result_same_page(page: str, result: LoopResult, leftover: Leftover, table: Path) -> None:
-    assert loop_page(result, leftover, [table]) == page
+def test_same_result_same_page(page: str, result: LoopResult, lack_of_fit: LackOfFit, table: Path) -> None:
+    assert loop_page(result, lack_of_fit, [table]) == page
 
 
 def test_the_effect_curve_goes_through_the_points_measured_without_other_effects(result: LoopResult) -> None:
@@ -145,25 +145,25 @@ def test_a_spread_effect_is_drawn_as_factors_over_measured_ones(result: LoopResu
     assert np.all(curve.measured_error > 0.0)
 
 
-def test_the_residual_stands_out_of_the_band_before_and_not_after(result: LoopResult, leftover: Leftover) -> None:
-    group = next(group for group in leftover.groups if group.name == "mean by grade")
+def test_the_residual_stands_out_of_the_band_before_and_not_after(result: LoopResult, lack_of_fit: LackOfFit) -> None:
+    group = next(group for group in lack_of_fit.groups if group.name == "mean by grade")
     assert group.before > 1.5 * group.floor
     assert group.after < 0.6 * group.before
-    figure = residual_figure(result, leftover, "mean")
+    figure = residual_figure(result, lack_of_fit, "mean")
     assert figure.axes[0].get_title(loc="left") == "grade [%]"  # columns of the effects come first
 
 
 def test_an_error_clearly_above_the_floor_is_called_unexplained(
-    result: LoopResult, leftover: Leftover, table: Path
+    result: LoopResult, lack_of_fit: LackOfFit, table: Path
 ) -> None:
     # the base in the place of the refined profile: the effect is in the drives, and nobody has explained it
     worse = replace(
         result, findings=(), after=result.before, error_after=3.0 * result.floor, runs_after=result.runs_before
     )
-    left = leftover_of(worse)
+    left = lack_of_fit_of(worse)
     assert left.clear
     assert left.unexplained == pytest.approx(np.sqrt(8.0) * result.floor)
-    sentence = leftover_words(worse, left)
+    sentence = lack_of_fit_words(worse, left)
     assert sentence.startswith(f"Unexplained residual of {1000 * left.unexplained:.0f}\N{NO-BREAK SPACE}mm")
     record = json.loads(loop_json(worse, left, [table]))
     assert record["unexplained"]["clear"] is True
@@ -173,13 +173,15 @@ def test_an_error_clearly_above_the_floor_is_called_unexplained(
 
 
 def test_an_error_at_the_floor_is_not_called_unexplained(result: LoopResult) -> None:
-    at_floor = leftover_of(replace(result, error_after=result.floor))
+    at_floor = lack_of_fit_of(replace(result, error_after=result.floor))
     assert not at_floor.clear
-    assert "No residual is left" in leftover_words(result, at_floor)
+    assert "No residual is left" in lack_of_fit_words(result, at_floor)
 
 
-def test_the_json_keeps_to_the_schema_and_adds_the_meaning(result: LoopResult, leftover: Leftover, table: Path) -> None:
-    record = json.loads(loop_json(result, leftover, [table]))
+def test_the_json_keeps_to_the_schema_and_adds_the_meaning(
+    result: LoopResult, lack_of_fit: LackOfFit, table: Path
+) -> None:
+    record = json.loads(loop_json(result, lack_of_fit, [table]))
     assert {"drives", "base_profile", "held_out", "findings", "consequences", "rejected", "error", "metrics"} <= set(
         record
     )
@@ -187,7 +189,7 @@ def test_the_json_keeps_to_the_schema_and_adds_the_meaning(result: LoopResult, l
     assert finding["kind"] == "location"
     assert "grade" in finding["meaning"]
     assert {row["group"] for row in record["residual"]} == set(result.real)
-    assert record["unexplained"]["clear"] is leftover.clear
+    assert record["unexplained"]["clear"] is lack_of_fit.clear
 
 
 @pytest.mark.parametrize("effect", HIDDEN, ids=lambda effect: effect.kind)
@@ -229,7 +231,7 @@ def test_a_p_value_is_told_as_one_in_so_many_tables() -> None:
 
 
 def test_courses_leave_out_what_is_cut(result: LoopResult) -> None:
-    course = spread_course(result, 240.0)
+    course = moving_spread(result, 240.0)
     assert len(course.time) == result.coarse.valid.sum()
     assert np.all(course.measured > 0.0)
 

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
     from xosc_lateral.driver.profile import DriverProfile
     from xosc_lateral.identification.close import LoopResult
-    from xosc_lateral.identification.leftover import Leftover
+    from xosc_lateral.identification.lack_of_fit import LackOfFit
 
 
 def close_loop(
@@ -65,7 +65,7 @@ def close_loop(
     """
     from xosc_lateral.driver.profile import Provenance
     from xosc_lateral.identification import close
-    from xosc_lateral.identification.leftover import leftover_of
+    from xosc_lateral.identification.lack_of_fit import lack_of_fit_of
 
     base = None if profile is None else given_profile(profile, library)
     given = given_drives(drives, columns)
@@ -79,7 +79,7 @@ def close_loop(
             excluded=list(leave_out),
             progress=progress or (lambda share, what: None),
         )
-    return ClosedLoop(result, leftover_of(result), given)
+    return ClosedLoop(result, lack_of_fit_of(result), given)
 
 
 class ClosedLoop(Result):
@@ -87,8 +87,8 @@ class ClosedLoop(Result):
 
     __slots__ = ("_given", "_leftover", "_result")
 
-    def __init__(self, result: LoopResult, leftover: Leftover, given: GivenDrives) -> None:
-        self._result, self._leftover, self._given = result, leftover, given
+    def __init__(self, result: LoopResult, lack_of_fit: LackOfFit, given: GivenDrives) -> None:
+        self._result, self._leftover, self._given = result, lack_of_fit, given
 
     @property
     def profile(self) -> DriverProfile:

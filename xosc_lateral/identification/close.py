@@ -22,7 +22,7 @@ from xosc_lateral.identification.nested import Gain
 from xosc_lateral.identification.population import Population, test_population
 from xosc_lateral.identification.regression import Coarse, Fitted, fit_model
 from xosc_lateral.identification.removal import Estimates, estimate_all, removal_of
-from xosc_lateral.identification.residual import Cells, floor_of
+from xosc_lateral.identification.residual import SummaryStatistics, floor_of
 from xosc_lateral.identification.scorecard import Scorecard, score_runs
 from xosc_lateral.identification.selection import Rejected, Selection
 from xosc_lateral.identification.terms.between import between_shift
@@ -67,7 +67,7 @@ class LoopResult:
         How much the drives differ; None with too few of them.
     held_out : str
         What was held out, in words.
-    cells : Cells
+    cells : SummaryStatistics
     unmoved : array, shape (n,)
         Measured offsets less the effects on the mean. [m]
     real, before, after : mapping of str to array
@@ -97,7 +97,7 @@ class LoopResult:
     memory: Memory
     population: Population | None
     held_out: str
-    cells: Cells
+    cells: SummaryStatistics
     unmoved: FloatArray
     real: dict[str, FloatArray]
     before: dict[str, FloatArray]

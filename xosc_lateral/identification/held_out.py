@@ -19,7 +19,13 @@ from xosc_lateral.identification.columns import Column
 from xosc_lateral.identification.nested import Nested
 from xosc_lateral.identification.regression import Coarse, Fitted, fit_model
 from xosc_lateral.identification.removal import Estimates, bare_runs, estimate_all, removal_of
-from xosc_lateral.identification.residual import Cells, cells_of, error_between, expected, own_runs
+from xosc_lateral.identification.residual import (
+    SummaryStatistics,
+    error_between,
+    expected,
+    simulated_runs,
+    statistics_of,
+)
 from xosc_lateral.identification.selection import Selection
 from xosc_lateral.identification.terms.base import Term
 from xosc_lateral.identification.terms.cycle import Cycle
@@ -48,7 +54,7 @@ class Setting:
 class HeldOut:
     """Summary statistics on held-out blocks."""
 
-    cells: Cells
+    cells: SummaryStatistics
     real: dict[str, FloatArray]
     before: dict[str, FloatArray]
     after: dict[str, FloatArray]
@@ -66,7 +72,7 @@ def score_held_out(
 ) -> HeldOut:
     """Describe measured offsets and both profiles' runs; `nested` None: nothing is kept."""
     timeline = setting.coarse.timeline
-    cells = cells_of(timeline, _quantities(selection, columns), _frequency(selection.final))
+    cells = statistics_of(timeline, _quantities(selection, columns), _frequency(selection.final))
     kept = tuple(one.term for one in selection.accepted)
     runs_before, runs_after = _held_out_runs(setting, nested, kept, selection.start, progress)
     real = cells.describe(timeline.offset, timeline.valid)
@@ -97,7 +103,7 @@ def _held_out_runs(
         for side, profile in enumerate(profiles):
             # the same luck for both sides and all folds: what differs is the profile, and runs go on from fold to fold
             seed = np.random.SeedSequence(setting.root.entropy, spawn_key=(5,))
-            runs = own_runs(profile, coarse.timeline, seed, held=held)
+            runs = simulated_runs(profile, coarse.timeline, seed, held=held)
             whole = sides[side]
             if whole is None:
                 whole = sides[side] = np.zeros_like(runs)

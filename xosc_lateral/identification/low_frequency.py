@@ -60,7 +60,7 @@ SLOW_BAND = (50.0, 600.0)
 SHORTEST_S = 12.0
 """Drifts and steps are scored at periods from here on. [s]"""
 
-MOODS_S = np.array([20.0, 40.0, 70.0, 110.0, 160.0])
+ORDINARY_S = np.array([20.0, 40.0, 70.0, 110.0, 160.0])
 """Correlation times of a wander that counts as ordinary. [s]"""
 
 DRIFT_SIZES = (1, 2, 4, 8)
@@ -68,7 +68,7 @@ DRIFT_SIZES = (1, 2, 4, 8)
 
 
 @dataclass(frozen=True, slots=True)
-class Wander:
+class LowFrequency:
     """Slow change of the mean: which of drift and step, and how sure.
 
     Parameters
@@ -92,7 +92,7 @@ class Wander:
         return self.step >= self.drift
 
 
-def find_wander(coarse: Coarse, fitted: Fitted, rng: np.random.Generator) -> Wander | None:
+def find_low_frequency(coarse: Coarse, fitted: Fitted, rng: np.random.Generator) -> LowFrequency | None:
     """Drift and step at once; None when no drive is long enough."""
     drift = half_cosines(coarse)
     if drift.shape[1] == 0:
@@ -114,7 +114,7 @@ def find_wander(coarse: Coarse, fitted: Fitted, rng: np.random.Generator) -> Wan
         nulls = (_simulated(rows, whitener, rng), _resigned(rows, whitener, rng))
         p_value = max(_probability(score, (max(scores(one)[:2]) for one in null)) for null in nulls)
         at = _moment(coarse, whitener, rows, at)
-    return Wander(drift_score, step_score, at, p_value)
+    return LowFrequency(drift_score, step_score, at, p_value)
 
 
 def _probability(score: float, null: Iterator[float]) -> float:
@@ -147,7 +147,7 @@ class _Scores:
         """Best scores of a drift and of a step [chi-square], and which step."""
         response = self._transform(rows)
         # each frequency stands for itself and its mirror image
-        weight = 2.0 / self._n / _Moods.of(rows).typical()[self._kept]
+        weight = 2.0 / self._n / _OrdinaryDrift.of(rows).typical()[self._kept]
         weighed = np.conj(self._drift) * weight[:, None]
         gram, moments = (weighed.T @ self._drift).real, (weighed.T @ response).real
         best = 0.0
@@ -168,10 +168,10 @@ class _Scores:
 
 def _simulated(rows: FloatArray, whitener: Whitener, rng: np.random.Generator) -> Iterator[FloatArray]:
     """Rows with an ordinary wander, each with one drawn by how likely it is."""
-    moods = _Moods.of(rows)
-    for drawn in rng.choice(len(moods.share), size=N_NULL, p=moods.share):
+    ordinary = _OrdinaryDrift.of(rows)
+    for drawn in rng.choice(len(ordinary.share), size=N_NULL, p=ordinary.share):
         white = np.where(whitener.valid, rng.normal(size=len(rows)), 0.0)
-        slow = np.fft.irfft(np.fft.rfft(white) * np.sqrt(moods.levels[drawn]), len(rows))
+        slow = np.fft.irfft(np.fft.rfft(white) * np.sqrt(ordinary.levels[drawn]), len(rows))
         yield whitener.without_levels(np.where(whitener.valid, slow, 0.0))
 
 
@@ -184,7 +184,7 @@ def _resigned(rows: FloatArray, whitener: Whitener, rng: np.random.Generator) ->
 
 
 @dataclass(frozen=True, eq=False)
-class _Moods:
+class _OrdinaryDrift:
     """What ordinary wanders would add to the spectrum of rows, and how likely each of them is.
 
     Parameters
@@ -199,7 +199,7 @@ class _Moods:
     share: FloatArray
 
     @classmethod
-    def of(cls, rows: FloatArray) -> _Moods:
+    def of(cls, rows: FloatArray) -> _OrdinaryDrift:
         """Judge by the rows' spectrum on `SLOW_BAND`."""
         frequency = np.fft.rfftfreq(len(rows))
         power = np.square(np.abs(np.fft.rfft(rows))) / max(float(rows @ rows), 1e-30)
@@ -217,9 +217,9 @@ class _Moods:
 
 @lru_cache(maxsize=2)
 def _levels(n: int) -> FloatArray:
-    shapes = 1.0 / (1.0 + np.square(2.0 * np.pi * np.outer(MOODS_S, np.fft.rfftfreq(n))))
+    shapes = 1.0 / (1.0 + np.square(2.0 * np.pi * np.outer(ORDINARY_S, np.fft.rfftfreq(n))))
     sizes = np.concatenate([[0.0], np.geomspace(0.1, 60.0, 40)])
-    return np.asarray((1.0 + sizes[:, None, None] * shapes).reshape(len(sizes) * len(MOODS_S), -1))
+    return np.asarray((1.0 + sizes[:, None, None] * shapes).reshape(len(sizes) * len(ORDINARY_S), -1))
 
 
 def _moment(coarse: Coarse, whitener: Whitener, rows: FloatArray, at: int) -> int:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.driver.profile import DriverProfile
-from xosc_lateral.identification.residual import own_runs
+from xosc_lateral.identification.residual import simulated_runs
 from xosc_lateral.identification.significance import LEAST
 from xosc_lateral.identification.timeline import Timeline, local_mean
 
@@ -59,7 +59,7 @@ def test_memory(profile: DriverProfile, timeline: Timeline, seed: np.random.Seed
     """Compare a profile's free runs with the drives, block by block."""
     from scipy.stats import f
 
-    runs = own_runs(profile, timeline, np.random.SeedSequence(seed.entropy, spawn_key=(7,)), runs=N_RUNS)
+    runs = simulated_runs(profile, timeline, np.random.SeedSequence(seed.entropy, spawn_key=(7,)), runs=N_RUNS)
     real = _shapes(timeline.offset, timeline)
     own = np.concatenate([_shapes(run, timeline) for run in runs])
     if len(real) < 2 * len(TIMES_S) + 4:

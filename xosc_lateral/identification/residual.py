@@ -36,7 +36,7 @@ ANSWER_S = 2.0
 BANDS_S = (1.0, 3.0, 8.0, 20.0, 60.0, 200.0)
 """Averaging times between which the bands of the movement lie. [s]"""
 
-SWING, SWING_WIDTH = "movement at the weave's period", 2
+OSCILLATION, SWING_WIDTH = "movement at the weave's period", 2
 """Name of that group, and frequencies to each side that belong to it. [-]"""
 
 LOCAL_QUANTILES = (0.1, 0.3, 0.5, 0.7, 0.9)
@@ -52,7 +52,7 @@ SPARE_ROWS = 75
 
 
 @dataclass(frozen=True, eq=False)
-class Cells:
+class SummaryStatistics:
     """What is compared, once for measured and sampled offsets alike.
 
     Parameters
@@ -63,17 +63,17 @@ class Cells:
         Bin of every row in each group, -1: none.
     middles : mapping of str to array
         Mean of the quantity per bin, for curves.
-    swing : float, optional
+    oscillation : float, optional
         Frequency of a weave that was found. [1/s]
     """
 
     timeline: Timeline
     labels: Mapping[str, IntArray]
     middles: Mapping[str, FloatArray]
-    swing: float | None = None
+    oscillation: float | None = None
 
     def describe(self, offset: FloatArray, used: BoolArray) -> dict[str, FloatArray]:
-        """Cells of one series of offsets on the grid, by group. [m]"""
+        """SummaryStatistics of one series of offsets on the grid, by group. [m]"""
         timeline = self.timeline
         used = used & timeline.valid
         slow = local_mean(offset, timeline.valid, LOCAL_S, timeline.step)
@@ -85,8 +85,8 @@ class Cells:
                 found[f"mean by {name}"] = mean
             found[f"spread by {name}"] = spread
         found["movement by band"] = _bands(offset, used, timeline)
-        if self.swing is not None:
-            found[SWING] = np.array([_amplitude(offset, used, timeline, self.swing)])
+        if self.oscillation is not None:
+            found[OSCILLATION] = np.array([_amplitude(offset, used, timeline, self.oscillation)])
         local = np.sqrt(local_mean(fast**2, timeline.valid, LOCAL_S, timeline.step))
         inside = local[used]
         found["quantiles of local spread"] = (
@@ -106,14 +106,16 @@ class Cells:
             share = np.bincount(label[inside & half], minlength=size) / total
             found[f"mean by {name}"] = found[f"spread by {name}"] = np.sqrt(share * (1.0 - share))
         found["movement by band"] = np.full(len(BANDS_S) + 1, overall)
-        if self.swing is not None:
-            found[SWING] = np.array([overall])
+        if self.oscillation is not None:
+            found[OSCILLATION] = np.array([overall])
         found["quantiles of local spread"] = np.full(len(LOCAL_QUANTILES), overall)
         return found
 
 
-def cells_of(timeline: Timeline, quantities: Mapping[str, FloatArray], swing: float | None = None) -> Cells:
-    """Bins for every quantity, shape (n,) each on the grid, and for time; a weave's frequency [1/s] if there is one."""
+def statistics_of(
+    timeline: Timeline, quantities: Mapping[str, FloatArray], oscillation: float | None = None
+) -> SummaryStatistics:
+    """Bins for every quantity, shape (n,) each on the grid, and for time; an oscillation's frequency [1/s], if any."""
     labels, middles = {}, {}
     for name, values in quantities.items():
         smooth = respond(_filled(values, timeline.valid), timeline.step, 0.0, ANSWER_S)
@@ -121,10 +123,10 @@ def cells_of(timeline: Timeline, quantities: Mapping[str, FloatArray], swing: fl
         if len(middle) > 1:
             labels[name], middles[name] = label, middle
     labels["time"], middles["time"] = _time_bins(timeline)
-    return Cells(timeline, labels, middles, swing)
+    return SummaryStatistics(timeline, labels, middles, oscillation)
 
 
-def own_runs(
+def simulated_runs(
     profile: DriverProfile,
     timeline: Timeline,
     seed: np.random.SeedSequence,
@@ -159,7 +161,7 @@ def own_runs(
     return result
 
 
-def expected(cells: Cells, runs: FloatArray, used: BoolArray) -> dict[str, FloatArray]:
+def expected(cells: SummaryStatistics, runs: FloatArray, used: BoolArray) -> dict[str, FloatArray]:
     """Mean of the cells over a profile's runs."""
     several = [cells.describe(run, used) for run in runs]
     return {name: np.mean([one[name] for one in several], axis=0) for name in several[0]}
@@ -171,7 +173,7 @@ def error_between(first: Mapping[str, FloatArray], second: Mapping[str, FloatArr
 
 
 def split_differences(
-    cells: Cells, offset: FloatArray, blocks: IntArray, rng: np.random.Generator, splits: int
+    cells: SummaryStatistics, offset: FloatArray, blocks: IntArray, rng: np.random.Generator, splits: int
 ) -> list[dict[str, FloatArray]]:
     """What measured data differs from itself: cells of random halves of the blocks against each other; NaN: no rows.
 
@@ -200,7 +202,9 @@ def size_of(differences: Mapping[str, FloatArray]) -> float:
     return float(np.sqrt(np.mean(squares))) if squares else 0.0
 
 
-def floor_of(cells: Cells, offset: FloatArray, blocks: IntArray, rng: np.random.Generator, splits: int = 8) -> float:
+def floor_of(
+    cells: SummaryStatistics, offset: FloatArray, blocks: IntArray, rng: np.random.Generator, splits: int = 8
+) -> float:
     """Mean size of `split_differences`. [m]"""
     return float(np.mean([size_of(split) for split in split_differences(cells, offset, blocks, rng, splits)]))
 
@@ -223,7 +227,7 @@ def _bands(offset: FloatArray, used: BoolArray, timeline: Timeline) -> FloatArra
 
 
 def _amplitude(offset: FloatArray, used: BoolArray, timeline: Timeline, frequency: float) -> float:
-    """Amplitude of a swing of about that frequency: root mean square over drives of that of the lines around it."""
+    """Amplitude of an oscillation of about that frequency: root mean square over drives, of the lines around it. [m]"""
     squares, rows = 0.0, 0
     for span in timeline.spans:
         inside = span.start + np.flatnonzero(used[span])

@@ -14,7 +14,7 @@ from xosc_lateral.evaluation.spectra import gapped_spectrum
 from xosc_lateral.identification.blocks import hold_out_blocks
 from xosc_lateral.identification.close import LoopResult
 from xosc_lateral.identification.findings import Finding
-from xosc_lateral.identification.leftover import Leftover
+from xosc_lateral.identification.lack_of_fit import LackOfFit
 from xosc_lateral.identification.partial import curve_of
 from xosc_lateral.report.evaluation_figures import LABELS, density_over
 from xosc_lateral.report.figures import BLUE, GRID, MUTED, VERMILLION, figure_style, new_figure, new_panels
@@ -46,7 +46,7 @@ PANELS = 4
 
 
 @figure_style()
-def residual_figure(result: LoopResult, leftover: Leftover, what: str) -> Figure:
+def residual_figure(result: LoopResult, lack_of_fit: LackOfFit, what: str) -> Figure:
     """Measured minus expected by every column's fifths, before and after; `what` is "mean" or "spread"."""
     names = _shown(result, what)
     rows = -(-len(names) // PANELS)
@@ -54,7 +54,7 @@ def residual_figure(result: LoopResult, leftover: Leftover, what: str) -> Figure
     for axis, name in zip(axes.ravel(), names, strict=False):
         group = f"{what} by {name}"
         place = np.arange(len(result.real[group]))
-        floor = 100.0 * TWO_ERRORS * leftover.floors[group]
+        floor = 100.0 * TWO_ERRORS * lack_of_fit.floors[group]
         axis.fill_between(place, -floor, floor, color=MUTED, alpha=0.2, linewidth=0, label="sampling error")
         axis.axhline(0.0, color=MUTED, linewidth=0.6)
         for cells, color, label in ((result.before, BEFORE, "before"), (result.after, AFTER, "after")):

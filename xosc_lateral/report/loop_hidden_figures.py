@@ -11,15 +11,15 @@ from numpy.typing import NDArray
 
 from xosc_lateral.driver.effects import Drift, GrowingSpread, Regimes, Step, Weave
 from xosc_lateral.identification.close import LoopResult
-from xosc_lateral.identification.course import (
-    Course,
+from xosc_lateral.identification.findings import Finding
+from xosc_lateral.identification.moving_statistics import (
+    MovingStatistic,
     by_drive,
     hidden_mean,
-    mean_course,
+    moving_mean,
+    moving_spread,
     regime_probability,
-    spread_course,
 )
-from xosc_lateral.identification.findings import Finding
 from xosc_lateral.report.figures import MUTED, ORANGE, figure_style, new_figure
 from xosc_lateral.report.loop_figures import AFTER, BEFORE, DRIVES, TWO_ERRORS, draw_spectra
 
@@ -74,7 +74,7 @@ def spread_figure(result: LoopResult, finding: Finding) -> Figure:
     """Spread over time, with the fitted course."""
     effect = finding.effects[0]
     assert isinstance(effect, GrowingSpread)
-    course = spread_course(result, SPREAD_S)
+    course = moving_spread(result, SPREAD_S)
     share = np.clip((course.time - effect.from_s) / max(effect.to_s - effect.from_s, 1e-9), 0.0, 1.0) - 0.5
 
     def fitted(factor: float) -> FloatArray:
@@ -83,7 +83,7 @@ def spread_figure(result: LoopResult, finding: Finding) -> Figure:
 
     figure, axes = new_figure(height=3.2)
     axis = axes[0, 0]
-    _draw_course(axis, course)
+    _draw_statistic(axis, course)
     low, high = (fitted(effect.factor + sign * TWO_ERRORS * effect.factor_error) for sign in (-1.0, 1.0))
     axis.fill_between(course.time, low, high, color=ORANGE, alpha=0.25, linewidth=0)
     axis.plot(
@@ -99,7 +99,7 @@ def spread_figure(result: LoopResult, finding: Finding) -> Figure:
 def regime_figure(result: LoopResult, finding: Finding) -> Figure:
     """Local spread over time with the probability of the loud regime, and how often which spread occurs."""
     figure, axes = new_figure(2, 1, height=4.8, sharex=True, height_ratios=[2.2, 1.0])
-    course, on = spread_course(result, REGIME_S), regime_probability(result)
+    course, on = moving_spread(result, REGIME_S), regime_probability(result)
     axis = axes[0, 0]
     axis.plot(course.time, _gapped(course, course.measured), color=DRIVES, linewidth=0.8, label="measured")
     loud = on > 0.5
@@ -128,11 +128,11 @@ def regime_figure(result: LoopResult, finding: Finding) -> Figure:
 @figure_style()
 def mean_figure(result: LoopResult, finding: Finding) -> Figure:
     """Moving mean with the fitted step or drift."""
-    course = mean_course(result, MEAN_S)
+    course = moving_mean(result, MEAN_S)
     hidden = hidden_mean(result)
     figure, axes = new_figure(height=3.2)
     axis = axes[0, 0]
-    _draw_course(axis, course)
+    _draw_statistic(axis, course)
     word = "step" if isinstance(finding.effects[0], Step) else "drift"
     axis.plot(course.time, hidden + course.measured.mean(), color=ORANGE, linewidth=2.0, label=f"fitted {word}")
     axis.set_ylabel(f"mean over {MEAN_S / 60:.0f} min [m], positive to the left")
@@ -224,7 +224,7 @@ DRAWINGS: Mapping[str, tuple[Callable[[LoopResult, Finding], Figure], str]] = Ma
 """By kind of effect, or of finding: what draws it, and the caption."""
 
 
-def _draw_course(axis: Axes, course: Course) -> None:
+def _draw_statistic(axis: Axes, course: MovingStatistic) -> None:
     for values, color, style, label in (
         (course.measured, DRIVES, "-", "measured"),
         (course.before, BEFORE, "-", "profile before, all runs"),
@@ -235,7 +235,7 @@ def _draw_course(axis: Axes, course: Course) -> None:
     axis.set_xlabel("time [s]")
 
 
-def _gapped(course: Course, values: FloatArray) -> FloatArray:
+def _gapped(course: MovingStatistic, values: FloatArray) -> FloatArray:
     """NaN at the first second after a gap, so that no line is drawn across it."""
     return np.where(np.diff(course.time, prepend=course.time[:1]) > GAP_S, np.nan, values)
 

@@ -13,9 +13,9 @@ from xosc_lateral.formats.hashes import parsed_hash
 from xosc_lateral.formats.profiles import canonical_json, profile_hash
 from xosc_lateral.identification.close import LoopResult
 from xosc_lateral.identification.findings import Finding
-from xosc_lateral.identification.leftover import Leftover
+from xosc_lateral.identification.lack_of_fit import LackOfFit
 from xosc_lateral.identification.nested import Gain
-from xosc_lateral.report.loop_words import feedback_words, leftover_words, meaning
+from xosc_lateral.report.loop_words import feedback_words, lack_of_fit_words, meaning
 from xosc_lateral.version import __version__
 
 MEASURE = (
@@ -24,12 +24,12 @@ MEASURE = (
 )
 
 
-def loop_json(result: LoopResult, leftover: Leftover, tables: Sequence[Path]) -> str:
+def loop_json(result: LoopResult, lack_of_fit: LackOfFit, tables: Sequence[Path]) -> str:
     """`report.json`: what people and machines ask of a closed loop, and the provenance."""
-    return canonical_json(finite(loop_record(result, leftover, tables))) + "\n"
+    return canonical_json(finite(loop_record(result, lack_of_fit, tables))) + "\n"
 
 
-def loop_record(result: LoopResult, leftover: Leftover, tables: Sequence[Path]) -> dict[str, Any]:
+def loop_record(result: LoopResult, lack_of_fit: LackOfFit, tables: Sequence[Path]) -> dict[str, Any]:
     """The same as plain values."""
     error = {"before": result.error_before, "after": result.error_after, "floor": result.floor}
     scores = result.scores
@@ -59,15 +59,15 @@ def loop_record(result: LoopResult, leftover: Leftover, tables: Sequence[Path]) 
         "returned_base": result.returned_base or None,
         "unexplained": {
             "measure": "root of error after squared minus floor squared, m",
-            "size_m": leftover.unexplained,
-            "p_value": leftover.p_value,
-            "clear": leftover.clear,
-            "where": [group.name for group in leftover.where] if leftover.clear else [],
-            "sentence": leftover_words(result, leftover),
+            "size_m": lack_of_fit.unexplained,
+            "p_value": lack_of_fit.p_value,
+            "clear": lack_of_fit.clear,
+            "where": [group.name for group in lack_of_fit.where] if lack_of_fit.clear else [],
+            "sentence": lack_of_fit_words(result, lack_of_fit),
         },
         "residual": [
             {"group": group.name, "before": group.before, "after": group.after, "floor": group.floor}
-            for group in leftover.groups
+            for group in lack_of_fit.groups
         ],
         "metrics": {
             "before": _metrics(scores.before),

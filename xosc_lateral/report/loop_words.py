@@ -11,7 +11,7 @@ from xosc_lateral.driver.effects import Acts, Angular, ColumnEffect, Levels, Mag
 from xosc_lateral.identification.close import LoopResult
 from xosc_lateral.identification.feedback import BAND, Feedback
 from xosc_lateral.identification.findings import Finding
-from xosc_lateral.identification.leftover import GroupError, Leftover
+from xosc_lateral.identification.lack_of_fit import GroupError, LackOfFit
 from xosc_lateral.segment import CONTEXT_UNITS
 
 CERTAIN = 1e-4
@@ -161,28 +161,29 @@ def outcome(result: LoopResult) -> str:
     return f"{len(result.findings)} effect{'s' * several} found and added to the profile: {names}."
 
 
-def leftover_words(result: LoopResult, leftover: Leftover) -> str:
+def lack_of_fit_words(result: LoopResult, lack_of_fit: LackOfFit) -> str:
     """What is left unexplained, in a sentence."""
-    if leftover.unexplained == 0.0:
+    if lack_of_fit.unexplained == 0.0:
         return "No residual is left above the floor: what the profile still misses cannot be measured on these drives."
-    if not leftover.clear:
+    if not lack_of_fit.clear:
         return (
             "The remaining residual is not significant: the error after is above the floor, but in "
-            f"{100 * leftover.p_value:.0f}{GAP}% of random splits the two halves of these drives differ as much."
+            f"{100 * lack_of_fit.p_value:.0f}{GAP}% of random splits the two halves of these drives differ as much."
         )
     where = ", ".join(
-        f"{group_words(group.name, result)} ({_mm(group.after)}, floor {_mm(group.floor)})" for group in most(leftover)
+        f"{group_words(group.name, result)} ({_mm(group.after)}, floor {_mm(group.floor)})"
+        for group in most(lack_of_fit)
     )
     most_of_it = f" It stands out in: {where}." if where else ""
     return (
-        f"Unexplained residual of {_mm(leftover.unexplained)}: the error after ({_mm(result.error_after)}) lies "
+        f"Unexplained residual of {_mm(lack_of_fit.unexplained)}: the error after ({_mm(result.error_after)}) lies "
         f"clearly above the floor ({_mm(result.floor)}), and no effect was found that explains the rest.{most_of_it}"
     )
 
 
-def most(leftover: Leftover, number: int = 4) -> tuple[GroupError, ...]:
+def most(lack_of_fit: LackOfFit, number: int = 4) -> tuple[GroupError, ...]:
     """The groups with the most left unexplained, a few."""
-    return leftover.where[:number]
+    return lack_of_fit.where[:number]
 
 
 def group_words(name: str, result: LoopResult) -> str:

@@ -95,7 +95,7 @@ class Cycle(Term):
 
     def remove(self, fitted: Fitted, effects: tuple[Effect, ...], removal: Removal) -> None:
         """As fitted."""
-        removal.location += on_fine_grid(centred(course(self, fitted), fitted.coarse), fitted.coarse)
+        removal.location += on_fine_grid(centred(latent_path(self, fitted), fitted.coarse), fitted.coarse)
 
     def describe(self, fitted: Fitted, effects: tuple[Effect, ...], key: str) -> Description:
         """Amplitude and period."""
@@ -105,7 +105,7 @@ class Cycle(Term):
         return Description("weave", shape, effect.amplitude, effect.amplitude_error, CELL, CELL)
 
 
-def course(term: Term, fitted: Fitted) -> FloatArray:
+def latent_path(term: Term, fitted: Fitted) -> FloatArray:
     """A term's part of the mean as fitted, shape (n,). [m]"""
     return np.asarray(term.mean_columns(fitted.coarse) @ fitted.sizes[fitted.mean_part(term)])
 

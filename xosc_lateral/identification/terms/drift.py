@@ -12,7 +12,7 @@ from xosc_lateral.driver.effects import Drift, Effect
 from xosc_lateral.identification.low_frequency import DRIFT_TERMS, half_cosines
 from xosc_lateral.identification.regression import Coarse, Fitted
 from xosc_lateral.identification.terms.base import Description, Outcome, Removal, Term, centred, on_fine_grid
-from xosc_lateral.identification.terms.cycle import course
+from xosc_lateral.identification.terms.cycle import latent_path
 
 if TYPE_CHECKING:
     from xosc_lateral.identification.search import Search
@@ -61,7 +61,7 @@ class DriftTerm(Term):
 
     def remove(self, fitted: Fitted, effects: tuple[Effect, ...], removal: Removal) -> None:
         """As fitted."""
-        removal.location += on_fine_grid(centred(course(self, fitted), fitted.coarse), fitted.coarse)
+        removal.location += on_fine_grid(centred(latent_path(self, fitted), fitted.coarse), fitted.coarse)
 
     def describe(self, fitted: Fitted, effects: tuple[Effect, ...], key: str) -> Description:
         """Standard deviation and correlation time."""

@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.driver.effects import Effect, Step
-from xosc_lateral.identification.low_frequency import find_wander
+from xosc_lateral.identification.low_frequency import find_low_frequency
 from xosc_lateral.identification.regression import Coarse, Fitted
 from xosc_lateral.identification.terms.base import Description, Outcome, Removal, Term, centred, on_fine_grid
-from xosc_lateral.identification.terms.cycle import course
+from xosc_lateral.identification.terms.cycle import latent_path
 from xosc_lateral.identification.terms.drift import DriftTerm
 
 if TYPE_CHECKING:
@@ -48,7 +48,7 @@ class StepTerm(Term):
         """Step or drift, whichever explains more, beyond what ordinary wander continues to."""
         if any(isinstance(term, StepTerm | DriftTerm) for term in fitted.terms):
             return None
-        wander = find_wander(fitted.coarse, fitted, search.rng(4))
+        wander = find_low_frequency(fitted.coarse, fitted, search.rng(4))
         if wander is None:
             return None
         term: Term = cls(wander.at) if wander.is_step else DriftTerm()
@@ -73,7 +73,7 @@ class StepTerm(Term):
 
     def remove(self, fitted: Fitted, effects: tuple[Effect, ...], removal: Removal) -> None:
         """As fitted."""
-        removal.location += on_fine_grid(centred(course(self, fitted), fitted.coarse), fitted.coarse)
+        removal.location += on_fine_grid(centred(latent_path(self, fitted), fitted.coarse), fitted.coarse)
 
     def describe(self, fitted: Fitted, effects: tuple[Effect, ...], key: str) -> Description:
         """Height and moment."""

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.identification.close import LoopResult
-from xosc_lateral.identification.terms.cycle import Cycle, course
+from xosc_lateral.identification.terms.cycle import Cycle, latent_path
 from xosc_lateral.identification.terms.drift import DriftTerm
 from xosc_lateral.identification.terms.regimes import RegimesTerm
 from xosc_lateral.identification.terms.step import StepTerm
@@ -19,7 +19,7 @@ BoolArray = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Course:
+class MovingStatistic:
     """A quantity of the longest drive over time, at 1 Hz, shape (n,) each; road-following seconds only.
 
     Parameters
@@ -36,17 +36,17 @@ class Course:
     after: FloatArray
 
 
-def mean_course(result: LoopResult, seconds: float) -> Course:
+def moving_mean(result: LoopResult, seconds: float) -> MovingStatistic:
     """Moving mean of the offset over so many seconds."""
     timeline = result.cells.timeline
 
     def mean(offset: FloatArray) -> FloatArray:
         return coarse_mean(local_mean(offset, timeline.valid, seconds, timeline.step))
 
-    return _course(result, mean(timeline.offset), *(mean(runs.mean(axis=0)) for runs in _runs(result)))
+    return _statistic(result, mean(timeline.offset), *(mean(runs.mean(axis=0)) for runs in _runs(result)))
 
 
-def spread_course(result: LoopResult, seconds: float) -> Course:
+def moving_spread(result: LoopResult, seconds: float) -> MovingStatistic:
     """Root mean square of the movement faster than 20 s, over so many seconds."""
     timeline = result.cells.timeline
 
@@ -57,19 +57,19 @@ def spread_course(result: LoopResult, seconds: float) -> Course:
     def spread(runs: FloatArray) -> FloatArray:
         return coarse_mean(np.sqrt(np.mean([squares(run) for run in runs], axis=0)))
 
-    return _course(result, spread(timeline.offset[None]), *(spread(runs) for runs in _runs(result)))
+    return _statistic(result, spread(timeline.offset[None]), *(spread(runs) for runs in _runs(result)))
 
 
 def hidden_mean(result: LoopResult) -> FloatArray:
-    """Step, drift and weave as fitted, about their mean, on the seconds of a `Course`; 0 where none was. [m]"""
+    """Step, drift and oscillation as fitted, about their mean, at the times of a `MovingStatistic`; 0: none. [m]"""
     coarse, fitted = result.coarse, result.final
     own = [term for term in fitted.terms if isinstance(term, Cycle | StepTerm | DriftTerm)]
-    hidden = np.sum([np.zeros(len(coarse)), *(course(term, fitted) for term in own)], axis=0)
+    hidden = np.sum([np.zeros(len(coarse)), *(latent_path(term, fitted) for term in own)], axis=0)
     return np.asarray((hidden - hidden[coarse.valid].mean())[_longest(result)])
 
 
 def regime_probability(result: LoopResult) -> FloatArray:
-    """Probability that the loud regime is on, given all of the drive, on the seconds of a `Course`; 0: no regimes."""
+    """Probability of the regime of large spread, at the times of a `MovingStatistic`; 0: no regimes. [-]"""
     fits = [term.fit.on for term in result.final.terms if isinstance(term, RegimesTerm)]
     on = fits[0] if fits else np.zeros(len(result.coarse))
     return np.asarray(on[_longest(result)])
@@ -103,8 +103,8 @@ def _longest(result: LoopResult) -> BoolArray:
     return np.asarray(coarse.valid & (coarse.drive == int(np.argmax(seconds))))
 
 
-def _course(result: LoopResult, measured: FloatArray, before: FloatArray, after: FloatArray) -> Course:
+def _statistic(result: LoopResult, measured: FloatArray, before: FloatArray, after: FloatArray) -> MovingStatistic:
     shown = _longest(result)
     n = len(result.coarse)
     time = coarse_middle(result.cells.timeline.time)[:n]
-    return Course(time[shown], measured[shown], before[shown], after[shown])
+    return MovingStatistic(time[shown], measured[shown], before[shown], after[shown])

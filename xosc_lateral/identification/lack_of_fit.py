@@ -33,7 +33,7 @@ class GroupError:
     Parameters
     ----------
     name : str
-        Group, as in `Cells.describe`.
+        Group, as in `SummaryStatistics.describe`.
     before, after : float
         Measured minus expected.
     floor : float
@@ -52,7 +52,7 @@ class GroupError:
 
 
 @dataclass(frozen=True, eq=False)
-class Leftover:
+class LackOfFit:
     """What is left after the loop.
 
     Parameters
@@ -84,7 +84,7 @@ class Leftover:
         return tuple(sorted(standing, key=lambda group: -group.unexplained))
 
 
-def leftover_of(result: LoopResult) -> Leftover:
+def lack_of_fit_of(result: LoopResult) -> LackOfFit:
     """Compare every group of cells, and all of them, with what the drives differ from themselves by (seeded)."""
     timeline = result.cells.timeline
     rng = np.random.default_rng(np.random.SeedSequence(result.seed, spawn_key=(11,)))
@@ -101,7 +101,7 @@ def leftover_of(result: LoopResult) -> Leftover:
     )
     as_far = sum(size_of(split) >= result.error_after for split in splits)
     p_value = (1.0 + as_far) / (1.0 + len(splits))
-    return Leftover(floors, groups, _beyond(result.error_after, result.floor), p_value)
+    return LackOfFit(floors, groups, _beyond(result.error_after, result.floor), p_value)
 
 
 def _beyond(error: float, floor: float) -> float:
