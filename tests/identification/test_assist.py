@@ -46,9 +46,7 @@ def test_the_loop_names_the_assist_and_not_what_follows_from_steering(log: Path,
     report = json.loads((tmp_path / "report.json").read_text())
     found = {tuple(one["columns"]): one for one in report["findings"]}
     assert set(found) == {(FLAG,)}
-    assert found[FLAG,]["size_m"] == pytest.approx(
-        PLACE, abs=0.1
-    )  # slow drift over a minute: 0.11 m over 15 spells
+    assert found[FLAG,]["size_m"] == pytest.approx(PLACE, abs=0.1)  # slow drift over a minute: 0.11 m over 15 spells
     assert {one["column"] for one in report["consequences"]} >= {"op_curvature_actual", "op_state_steer_angle"}
     assert report["error"]["after"] < 0.75 * report["error"]["before"]
 

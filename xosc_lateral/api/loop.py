@@ -85,10 +85,10 @@ def close_loop(
 class ClosedLoop(Result):
     """What was missing, how sure and how big; the refined profile; the error before and after."""
 
-    __slots__ = ("_given", "_leftover", "_result")
+    __slots__ = ("_given", "_lack_of_fit", "_result")
 
     def __init__(self, result: LoopResult, lack_of_fit: LackOfFit, given: GivenDrives) -> None:
-        self._result, self._leftover, self._given = result, lack_of_fit, given
+        self._result, self._lack_of_fit, self._given = result, lack_of_fit, given
 
     @property
     def profile(self) -> DriverProfile:
@@ -128,7 +128,7 @@ class ClosedLoop(Result):
     def __str__(self) -> str:
         from xosc_lateral.report.loop import loop_text
 
-        return loop_text(self._result, self._leftover)
+        return loop_text(self._result, self._lack_of_fit)
 
     def to_frame(self) -> pd.DataFrame:
         """One row per finding: `effect`, `kind`, `columns`, `lag_s`, `response_s`, `shape`, `size_m`, `p_value`, ..."""
@@ -141,7 +141,7 @@ class ClosedLoop(Result):
         """`report.json`: plain values, as ``--json`` prints them."""
         from xosc_lateral.report.loop_json import finite, loop_record
 
-        record: dict[str, Any] = finite(loop_record(self._result, self._leftover, self._given.files))
+        record: dict[str, Any] = finite(loop_record(self._result, self._lack_of_fit, self._given.files))
         record["provenance"]["inputs"] = dict(self._given.inputs)
         return record
 
@@ -149,7 +149,7 @@ class ClosedLoop(Result):
         """Residual by context, before and after."""
         from xosc_lateral.report.loop_figures import residual_figure
 
-        return residual_figure(self._result, self._leftover, "mean")
+        return residual_figure(self._result, self._lack_of_fit, "mean")
 
     def write_report(self, folder: PathLike, *, force: bool = False) -> Path:
         """Write `report.html` and `report.json` into a folder."""
@@ -160,7 +160,7 @@ class ClosedLoop(Result):
         target = folder_target(folder)
         claim(self.report_files(target), self._given.files, force=force)
         write_atomically(target / "report.json", canonical_json(self.to_dict()) + "\n")
-        write_atomically(target / "report.html", loop_page(self._result, self._leftover, self._given.files))
+        write_atomically(target / "report.html", loop_page(self._result, self._lack_of_fit, self._given.files))
         return target
 
     @staticmethod
