@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.linalg import toeplitz
 
-from xosc_lateral.identification.autocorrelation import Whitener, fit_autoregression, positions_in_run
+from xosc_lateral.identification.autocorrelation import Whitener, fit_autoregression, positions_in_run, unbiased
 
 
 def second_order(n: int, seed: int) -> np.ndarray:
@@ -79,3 +79,22 @@ def test_intercepts_of_drives_are_taken_out() -> None:
 def test_positions_count_within_stretches() -> None:
     valid = np.array([True, True, False, True, True, True])
     assert positions_in_run(valid).tolist() == [0, 1, -1, 0, 1, 2]
+
+
+def test_levels_of_short_drives_do_not_make_the_process_look_forgetful() -> None:
+    """An AR(1) seen for a minute at a time with a level of its own: Nickell's bias, and what is left of it."""
+    drives, seconds, rho = 240, 60, 0.9
+    rng = np.random.default_rng(4)
+    values = np.zeros((drives, seconds + 200))
+    for t in range(1, values.shape[1]):
+        values[:, t] = rho * values[:, t - 1] + rng.normal(size=drives)
+    valid = np.tile(np.arange(seconds + 40) < seconds, drives)
+    drive = np.repeat(np.arange(drives), seconds + 40)
+    seen = np.zeros((drives, seconds + 40))
+    seen[:, :seconds] = values[:, -seconds:] - values[:, -seconds:].mean(axis=1, keepdims=True)
+    biased = fit_autoregression(seen.ravel(), valid, 1)
+    better = unbiased(biased, valid, drive, 1)
+    chance = np.sqrt((1 - rho**2) / (drives * seconds))
+    assert biased.lags[-1][0] < rho - 5 * chance
+    assert better.lags[-1][0] == pytest.approx(rho, abs=3 * chance)
+    assert better.deviations[-1] == pytest.approx(1.0, rel=0.03)

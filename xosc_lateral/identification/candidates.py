@@ -13,7 +13,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import combinations
+from enum import StrEnum
+from itertools import chain, combinations
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,6 +29,7 @@ from xosc_lateral.driver.effects import (
     Linear,
     Magnitude,
     Nearness,
+    Piecewise,
     Product,
     Proximity,
     Saturating,
@@ -41,11 +43,28 @@ FloatArray = NDArray[np.float64]
 LIMITS = (0.1, 0.25, 0.5, 0.75, 0.9)
 """Quantiles at which limits are tried first; refined later. [-]"""
 
+FINE_LIMITS = tuple(np.linspace(0.05, 0.95, 37).tolist())
+"""The quantiles at which they are refined. [-]"""
+
+KNOTS = (0.1, 0.3, 0.5, 0.7, 0.9)
+"""Quantiles at which a curve may bend. [-]"""
+
 SCALES = (0.25, 0.5, 0.75)
 """Quantiles of a distance that are tried as scale of its influence. [-]"""
 
+FINE_SCALES = (0.35, 0.5, 0.7, 1.0, 1.4, 2.0)
+"""Scales that refinement tries, alone and in products, as shares of the median distance. [-]"""
+
 PHASES = np.pi * np.arange(4) / 4.0
 """Directions that an angle is projected on: at most 8 % of a score is lost between two of them. [rad]"""
+
+
+class Family(StrEnum):
+    """Candidates that share one prior weight."""
+
+    PLAIN = "plain"
+    BENT = "bent"
+    PRODUCT = "product"
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -56,6 +75,7 @@ class Candidate:
     ----------
     effect : ColumnEffect
         Without coefficients.
+    family : Family
     cost : float
         What its family's size takes from its score. [squared score]
     contrast : tuple of float
@@ -63,6 +83,7 @@ class Candidate:
     """
 
     effect: ColumnEffect
+    family: Family
     cost: float
     contrast: tuple[float, ...] = (1.0,)
 
@@ -90,21 +111,59 @@ def candidates_of(columns: Sequence[Column], context: Mapping[str, FloatArray], 
         if len(columns) <= most or {first.role, second.role} & {Role.LEVELS, Role.SWITCH}
         for pair in _pairs(first, second, factors)
     ]
+    families = {Family.PLAIN: plain, Family.BENT: bent, Family.PRODUCT: pairs}
     return [
-        Candidate(effect, 2.0 * float(np.log(max(1, len(family)))), contrast)
-        for family in (plain, bent, pairs)
-        for effect, contrast in family
+        Candidate(effect, family, 2.0 * float(np.log(len(members))), contrast)
+        for family, members in families.items()
+        for effect, contrast in members
     ]
 
 
-def shapes_of(column: Column, values: FloatArray) -> list[Candidate]:
-    """Every shape of one column, with a fine choice of limits, for refinement; costs as if each were the only one."""
-    many = tuple(np.linspace(0.05, 0.95, 37))
-    effects = [effect for effect, _ in (*_plain(column, values), *_bent(column, values, many))]
-    unique = {repr(effect): effect for effect in effects}
+@dataclass(frozen=True, slots=True)
+class Shapes:
+    """Shapes of one column for refinement.
+
+    Parameters
+    ----------
+    plain, bent : list of ColumnEffect
+        Bent ones with a fine choice of limits and scales.
+    finer : float
+        How many times as many bent ones as the dictionary has. [-]
+    """
+
+    plain: list[ColumnEffect]
+    bent: list[ColumnEffect]
+    finer: float
+
+
+def shapes_of(column: Column, values: FloatArray, *, curves: bool) -> Shapes:
+    """Every shape of one column; `values` on the road-following rows alone."""
+    plain = _unique(_plain(column, values))
+    looked_at = _unique(_bent(column, values))
+    bent = _unique(chain(_bent(column, values, FINE_LIMITS), _fading(column, values)))
+    bent += _curves(column, values) if curves else []
+    return Shapes(plain, bent, len(bent) / max(1, len(looked_at)))
+
+
+def _fading(column: Column, values: FloatArray) -> Iterator[tuple[ColumnEffect, tuple[float, ...]]]:
+    if column.gaps and column.role is Role.NUMBER and (scale := _scale(values, 0.5)) > 0.0:
+        for share in FINE_SCALES:
+            yield Proximity(acts=Acts.LOCATION, column=column.name, scale=share * scale), (1.0,)
+
+
+def _unique(shapes: Iterator[tuple[ColumnEffect, tuple[float, ...]]]) -> list[ColumnEffect]:
+    return list({repr(effect): effect for effect, _ in shapes}.values())
+
+
+def _curves(column: Column, values: FloatArray) -> list[ColumnEffect]:
+    """Curves with one or two bends; a neighbour that is not there is far away, which a curve does not say."""
+    if column.role is not Role.NUMBER or column.gaps:
+        return []
+    knots = np.unique(np.quantile(values[np.isfinite(values)], KNOTS)).tolist()
     return [
-        Candidate(effect, 0.0, (1.0,) * len(effect.quantity({column.name: values[:2]})[0]))
-        for effect in unique.values()
+        Piecewise(acts=Acts.LOCATION, column=column.name, knots=some)
+        for number in (1, 2)
+        for some in combinations(knots, number)
     ]
 
 

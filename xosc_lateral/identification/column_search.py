@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass
 from typing import ClassVar, Protocol, Self
 
 import numpy as np
@@ -10,8 +11,11 @@ from numpy.typing import NDArray
 
 from xosc_lateral.driver.effects import ColumnEffect
 from xosc_lateral.identification.dictionary import (
+    CROSS_BASIS,
+    NULL_DRAWS,
     Dictionary,
     Scores,
+    build_dictionary,
     orthonormal,
     score_entries,
 )
@@ -37,6 +41,10 @@ WITHIN = 12.0
 ALIKE = 1.0
 """A set of columns whose refined score differs by less can't be told from the best. [squared score]"""
 
+HEREDITY = 3.84
+"""A product is preferred to one of its columns alone if it scores higher by more than this: what a factor that does
+nothing gives in one table of twenty (chi-square, one degree of freedom). [squared score]"""
+
 STRETCH_S = 120
 """Stretches that count as independent where movement with and without a term is compared: longer than the memory of a
 minute and a half. [s]"""
@@ -49,8 +57,8 @@ ROUNDING = 1e-6
 """A term may lower the likelihood of the rows that it is fitted to by so much. More, and the model contradicts it: a
 factor on the movement that changes faster than the movement does, say, which its innovations alone allow. [nat]"""
 
-CROSS_BASIS = 0.01
-"""Directions of a column's cross-basis with less than this share of the largest variance are left in. [-]"""
+SECOND_LOOKS = 2
+"""Times that what acts is looked for again beside what was found; the first changes most."""
 
 
 class ColumnKind(ModelTerm, Protocol):
@@ -74,6 +82,11 @@ class ColumnKind(ModelTerm, Protocol):
         ...
 
     @classmethod
+    def reweighted(cls, fitted: Fitted, after: Fitted) -> Problem | None:
+        """The regression beside `fitted`, weighted by the noise that is left in `after`; None: it is the same."""
+        ...
+
+    @classmethod
     def barred(cls, fitted: Fitted) -> frozenset[str]:
         """Columns that it may not take up."""
         ...
@@ -92,26 +105,79 @@ def find_column(search: Search, kind: type[ColumnKind], fitted: Fitted) -> Outco
     """
     problem = kind.problem(fitted)
     dictionary = search.dictionary(kind, fitted, problem)
-    barred = _barred(dictionary, kind, fitted)
-    if len(dictionary) == 0 or barred.all():
-        return None
-    own = [term for term in fitted.terms if isinstance(term, kind)]
-    known = _known(problem, dictionary, own)
+    refused: set[tuple[str, ...]] = set()
     while True:
-        scores = _scored(search, dictionary, problem, known, barred)
-        columns = dictionary.candidates[scores.best].columns
-        p_value = upper_tail(float(scores.scores[scores.best]), scores.maxima)
+        look = _look(search, kind, fitted, problem, dictionary, refused, draws=NULL_DRAWS)
+        if look is None:
+            return Outcome(None, min(refused), 1.0) if refused else None
+        p_value = upper_tail(float(look.scores.scores[look.scores.best]), look.scores.maxima)
         if p_value > HOPELESS:
-            return Outcome(None, columns, p_value)
-        refined, alike = _refine(search, kind, problem, known, dictionary, scores)
-        term = kind.of(refined.effect, alike)
-        after = fit_model(fitted.coarse, (*fitted.terms, term))
+            return Outcome(None, dictionary.candidates[look.scores.best].columns, p_value)
+        term, after = _best(search, kind, fitted, look, refused)
         if not _grows(fitted, after) and after.log_likelihood >= fitted.log_likelihood - ROUNDING:
             assert isinstance(term, Term)
             return Outcome(term, term.columns, p_value, after)
-        barred = barred | np.array([one.columns == term.columns for one in dictionary.candidates], dtype=np.bool_)
-        if barred.all():
-            return Outcome(None, term.columns, 1.0)
+        refused.add(term.columns)
+
+
+@dataclass(frozen=True, eq=False)
+class _Look:
+    """One look at all candidates."""
+
+    problem: Problem
+    dictionary: Dictionary
+    known: FloatArray
+    scores: Scores
+
+
+def _look(
+    search: Search,
+    kind: type[ColumnKind],
+    fitted: Fitted,
+    problem: Problem,
+    dictionary: Dictionary,
+    refused: Collection[tuple[str, ...]],
+    *,
+    draws: int,
+) -> _Look | None:
+    """Score what is not barred or refused; None: nothing is left."""
+    barred = _barred(dictionary, kind, fitted, refused)
+    if len(dictionary) == 0 or barred.all():
+        return None
+    known = _known(problem, dictionary, [term for term in fitted.terms if isinstance(term, kind)])
+    drive = search.coarse.drive[problem.valid]
+    scores = score_entries(dictionary, problem.response, known, barred, drive, search.rng(0), draws=draws)
+    return _Look(problem, dictionary, known, scores)
+
+
+def _best(
+    search: Search, kind: type[ColumnKind], fitted: Fitted, look: _Look, refused: Collection[tuple[str, ...]]
+) -> tuple[ColumnKind, Fitted]:
+    """The term that the best candidate becomes, and the fit with it.
+
+    *That* something acts is tested with the noise that is left without it, for data and null alike. *What* acts is
+    looked for once more with the noise that is left beside what was found: a strong slow effect makes the noise look
+    slow, and against slow noise a quicker look-alike stands out better than the effect itself.
+    """
+    refined, term = _refined(search, kind, look)
+    after = fit_model(fitted.coarse, (*fitted.terms, term))
+    for _ in range(SECOND_LOOKS):
+        problem = kind.reweighted(fitted, after)
+        if problem is None:
+            break
+        dictionary = build_dictionary(search.quantities, problem.whitener)
+        again = _look(search, kind, fitted, problem, dictionary, refused, draws=0)
+        if again is None:
+            break
+        other, other_term = _refined(search, kind, again)
+        other_after = fit_model(fitted.coarse, (*fitted.terms, other_term))
+        if 2.0 * other_after.log_likelihood - other.price <= 2.0 * after.log_likelihood - refined.price:
+            break
+        same = other_term.columns == term.columns
+        refined, term, after = other, other_term, other_after
+        if same:
+            break
+    return term, after
 
 
 def _grows(before: Fitted, after: Fitted) -> bool:
@@ -133,11 +199,6 @@ def _grows(before: Fitted, after: Fitted) -> bool:
     return len(sums) > 1 and float(sums.sum()) < -GROWN * float(np.std(sums, ddof=1)) * np.sqrt(len(sums))
 
 
-def _scored(search: Search, dictionary: Dictionary, problem: Problem, known: FloatArray, barred: BoolArray) -> Scores:
-    drive = search.coarse.drive[problem.valid]
-    return score_entries(dictionary, problem.response, known, barred, drive, search.rng(0))
-
-
 def _known(problem: Problem, dictionary: Dictionary, own: Sequence[ColumnKind]) -> FloatArray:
     """What the model has already, and the whole cross-basis of its columns: nothing may be blamed on their likes."""
     known = problem.known
@@ -151,38 +212,52 @@ def _known(problem: Problem, dictionary: Dictionary, own: Sequence[ColumnKind]) 
     return orthonormal(np.concatenate(blocks, axis=1), 1e-6)
 
 
-def _refine(
-    search: Search,
-    kind: type[ColumnKind],
-    problem: Problem,
-    known: FloatArray,
-    dictionary: Dictionary,
-    scores: Scores,
-) -> tuple[Refined, tuple[str, ...]]:
-    """Refine the best sets of columns; the best of them, and which others explain as much."""
-    refinement = Refinement(search.coarse, problem, known, single=kind.single)
+def _refined(search: Search, kind: type[ColumnKind], look: _Look) -> tuple[Refined, ColumnKind]:
+    """Refine the best sets of columns; the best of them, which knows what others explain as much."""
+    candidates = look.dictionary.candidates
+    costs = {candidate.family: candidate.cost for candidate in candidates}
+    refinement = Refinement(search.coarse, look.problem, look.known, costs, single=kind.single)
+    outcomes = [
+        refinement.refine(look.dictionary.timed(index), candidates[index].cost, search.columns)
+        for index in _contenders(look.dictionary, look.scores)
+    ]
+    outcomes.sort(key=lambda outcome: -outcome.score)
+    parts = {(column,) for column in outcomes[0].effect.columns}
+    simpler = [one for one in outcomes if one.effect.columns in parts and one.score > outcomes[0].score - HEREDITY]
+    best = simpler[0] if simpler else outcomes[0]
+    close = [outcome.effect.columns for outcome in outcomes if outcome.score > best.score - ALIKE]
+    alike = {name for columns in close for name in columns} - set(best.effect.columns)
+    return best, kind.of(best.effect, tuple(sorted(alike)))
+
+
+def _contenders(dictionary: Dictionary, scores: Scores) -> list[int]:
+    """Best entry of each of the best sets of columns, and of each single column in the best of them.
+
+    A product of a column and what is nearly constant wherever it acts is that column: refined, the cheaper one wins.
+    """
+    order = np.argsort(-scores.scores)
     best: dict[tuple[str, ...], int] = {}
-    for index in np.argsort(-scores.scores):
+    for index in order:
         if scores.scores[index] < scores.scores[scores.best] - WITHIN or len(best) == CONTENDERS:
             break
         best.setdefault(dictionary.candidates[index].columns, int(index))
-    outcomes: list[tuple[float, Refined]] = []
-    for index in best.values():
-        candidate = dictionary.candidates[index]
-        start = dictionary.timed(index)
-        refined = refinement.refine(start, search.columns)
-        outcomes.append((refined.score - candidate.cost, refined))
-    outcomes.sort(key=lambda outcome: -outcome[0])
-    first = set(outcomes[0][1].effect.columns)
-    close = [o.effect.columns for score, o in outcomes[1:] if score > outcomes[0][0] - ALIKE]
-    alike = tuple(sorted({name for columns in close for name in columns} - first))
-    return outcomes[0][1], alike
+    parts = {(column,) for column in dictionary.candidates[scores.best].columns}
+    for index in order[np.isfinite(scores.scores[order])]:
+        if dictionary.candidates[index].columns in parts:
+            best.setdefault(dictionary.candidates[index].columns, int(index))
+    return list(best.values())
 
 
-def _barred(dictionary: Dictionary, kind: type[ColumnKind], fitted: Fitted) -> BoolArray:
+def _barred(
+    dictionary: Dictionary, kind: type[ColumnKind], fitted: Fitted, refused: Collection[tuple[str, ...]]
+) -> BoolArray:
     """Entries that this kind may not take up."""
     columns = kind.barred(fitted)
     most = 1 if kind.single else 2
     return np.array(
-        [bool(columns & set(one.columns)) or len(one.contrast) > most for one in dictionary.candidates], dtype=np.bool_
+        [
+            bool(columns & set(one.columns)) or len(one.contrast) > most or one.columns in refused
+            for one in dictionary.candidates
+        ],
+        dtype=np.bool_,
     )

@@ -44,6 +44,9 @@ MIN_SUPPORT_S = 45.0
 LEFT_OVER = 0.05
 """A candidate of which less than this share is left beside what is known is not looked at. [-]"""
 
+CROSS_BASIS = 0.01
+"""Directions of a column's cross-basis with less than this share of the largest variance are left in. [-]"""
+
 CHUNK = 192
 """Candidates that are whitened at once."""
 
@@ -76,7 +79,8 @@ class Quantities:
                 values = np.where(missing, there.mean() if len(there) else 0.0, values)
             second = coarse_mean(values)
             deviation = float(second[valid].std())
-            if deviation > 1e-9 * max(float(np.abs(second[valid]).max()), 1e-300):
+            # beside all that it ever is: a product may be zero but for rounding wherever the car follows the road
+            if deviation > 1e-9 * max(float(np.abs(second).max()), 1e-300):
                 kept.append(candidate)
                 rows.append(((second - second[valid].mean()) / deviation).astype(np.float32))
         return cls(kept, np.stack(rows) if rows else np.zeros((0, len(valid)), dtype=np.float32))
@@ -139,7 +143,7 @@ def build_dictionary(quantities: Quantities, whitener: Whitener) -> Dictionary:
                 for lag in lags:
                     # drives are padded by more than any lag
                     moved = answer[np.clip(seconds - lag, 0, len(answer) - 1)]
-                    rows, support, kept = _unit_rows(compact.rows(moved))
+                    rows, support, kept = _unit_rows(compact.rows(moved), moved)
                     kept &= support >= MIN_SUPPORT_S
                     blocks.append(rows[:, kept].T.astype(np.float32))
                     entries += [(quantities.candidates[chunk[i]], float(lag), response) for i in np.flatnonzero(kept)]
@@ -164,11 +168,11 @@ def respond_by_second(values: FloatArray, response: float) -> FloatArray:
     return np.asarray(lfilter([1.0 - late, late - keep], [1.0, -keep], values, axis=0, zi=late * values[:1])[0])
 
 
-def _unit_rows(rows: FloatArray) -> tuple[FloatArray, FloatArray, BoolArray]:
-    """Rows of length one, the seconds that each rests on, and which of them vary at all."""
+def _unit_rows(rows: FloatArray, before: FloatArray) -> tuple[FloatArray, FloatArray, BoolArray]:
+    """Rows of length one, the seconds that each rests on, and which vary within drives at all; `before` whitening."""
     squares = np.square(rows)
     power = squares.sum(axis=0)
-    kept = power > 1e-9 * max(float(power.max(initial=0.0)), 1e-300)
+    kept = power > 1e-9 * np.maximum(np.square(before).sum(axis=0), 1e-300)
     support = power**2 / np.maximum(np.square(squares).sum(axis=0), 1e-300)
     return rows / np.sqrt(np.maximum(power, 1e-300)), support, kept
 
@@ -200,6 +204,8 @@ def score_entries(
     barred: BoolArray,
     drive: IntArray,
     rng: np.random.Generator,
+    *,
+    draws: int = NULL_DRAWS,
 ) -> Scores:
     """Score every entry, and all of them against the null's residuals.
 
@@ -212,12 +218,14 @@ def score_entries(
     barred : bool array, shape (entries,)
     drive : int array, shape (seconds,)
         Drive that each row is of.
+    draws : int
+        Of the null; without any, no maxima.
     """
     left = residual - known @ (known.T @ residual)
     left = left / max(float(np.sqrt(np.mean(left**2))), 1e-300)
     if len(dictionary) == 0 or barred.all():
         return Scores(np.full(len(dictionary), -np.inf), np.zeros(0))
-    rotated = np.concatenate([left[:, None], draw_null(left, drive, rng)], axis=1)
+    rotated = np.concatenate([left[:, None], draw_null(left, drive, rng, draws)], axis=1)
     rotated = (rotated - known @ (known.T @ rotated)).astype(np.float32)
     basis = known.astype(np.float32)
     squared = np.empty((len(dictionary), rotated.shape[1]), dtype=np.float32)
@@ -235,8 +243,8 @@ def score_entries(
     return Scores(squared[:, 0].astype(np.float64), largest[1:] if np.isfinite(largest).all() else np.zeros(0))
 
 
-def draw_null(residual: FloatArray, drive: IntArray, rng: np.random.Generator) -> FloatArray:
-    """Residuals whose tie to the columns is broken, shape (seconds, NULL_DRAWS).
+def draw_null(residual: FloatArray, drive: IntArray, rng: np.random.Generator, draws: int = NULL_DRAWS) -> FloatArray:
+    """Residuals whose tie to the columns is broken, shape (seconds, draws).
 
     Few long drives: rotated by at least `LEAST_SHIFT_S`. Many short ones: the sign of each whole drive drawn anew
     (a wild cluster bootstrap [1]_). Drives are independent, and what an autoregression fitted to runs of a minute
@@ -251,11 +259,12 @@ def draw_null(residual: FloatArray, drive: IntArray, rng: np.random.Generator) -
     seconds = len(residual)
     names, own = np.unique(drive, return_inverse=True)
     if len(names) >= MANY_DRIVES:
-        return np.asarray(residual[:, None] * rng.choice([-1.0, 1.0], size=(len(names), NULL_DRAWS))[own])
+        return np.asarray(residual[:, None] * rng.choice([-1.0, 1.0], size=(len(names), draws))[own])
     low = min(LEAST_SHIFT_S, seconds // 4)
-    shifts = rng.integers(low, max(low + 1, seconds - low), size=NULL_DRAWS)
+    shifts = rng.integers(low, max(low + 1, seconds - low), size=draws)
     doubled = np.concatenate([residual, residual])
-    return np.stack([doubled[shift : shift + seconds] for shift in shifts], axis=1)
+    rotated = [doubled[shift : shift + seconds] for shift in shifts]
+    return np.stack(rotated, axis=1) if rotated else np.zeros((seconds, 0))
 
 
 def orthonormal(columns: FloatArray, share: float = 1e-6) -> FloatArray:

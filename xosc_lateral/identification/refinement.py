@@ -4,17 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import combinations
 
 import numpy as np
 from msgspec import structs
 from numpy.typing import NDArray
 
-from xosc_lateral.driver.effects import ColumnEffect, Linear, Piecewise, Product, Proximity, Saturating, Threshold
+from xosc_lateral.driver.effects import ColumnEffect, Product
 from xosc_lateral.driver.effects.product import Form
 from xosc_lateral.driver.effects.response import respond
-from xosc_lateral.identification.candidates import shapes_of
-from xosc_lateral.identification.columns import Column, Role
+from xosc_lateral.identification.candidates import FINE_SCALES, Family, shapes_of
+from xosc_lateral.identification.columns import Column
 from xosc_lateral.identification.dictionary import orthonormal
 from xosc_lateral.identification.problem import Problem
 from xosc_lateral.identification.regression import Coarse
@@ -25,14 +24,14 @@ FloatArray = NDArray[np.float64]
 RESPONSES = (0.3, 0.6, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0)
 """Time constants that are tried. [s]"""
 
+FINE_RESPONSES = tuple(np.round(np.geomspace(0.3, 8.0, 19), 2).tolist())
+"""And in the end, a fifth apart: with a time constant half as long again the size is 15 % off. [s]"""
+
 LAG_STEPS = (1.0, 0.4, 0.2)
 """Lags are searched in steps that get finer. [s]"""
 
 LAG_LIMIT = 5.0
 """Longest lag either way. [s]"""
-
-KNOTS = (0.1, 0.3, 0.5, 0.7, 0.9)
-"""Quantiles at which a curve may bend. [-]"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,12 +43,14 @@ class Refined:
     effect : ColumnEffect
         Without coefficients.
     score : float
-        Squared score of all its coefficients, less log n for each beyond the first (Schwarz) and less what the choice
-        of a shape costs.
+        Squared score of all its coefficients, less log n for each beyond the first (Schwarz) and less its price.
+    price : float
+        Of its family, and of a finer choice within it than the dictionary has.
     """
 
     effect: ColumnEffect
     score: float
+    price: float
 
 
 class Refinement:
@@ -61,28 +62,38 @@ class Refinement:
     problem : Problem
     known : array, shape (seconds, k)
         Orthonormal; partialled out.
+    costs : mapping of Family to float
+        What a member of each family costs.
     single : bool
         Only shapes with one coefficient will do.
     """
 
-    def __init__(self, coarse: Coarse, problem: Problem, known: FloatArray, *, single: bool = False) -> None:
-        self._coarse, self._problem, self._single = coarse, problem, single
+    def __init__(
+        self,
+        coarse: Coarse,
+        problem: Problem,
+        known: FloatArray,
+        costs: Mapping[Family, float],
+        *,
+        single: bool = False,
+    ) -> None:
+        self._coarse, self._problem, self._costs, self._single = coarse, problem, costs, single
         self._basis = known
         left = problem.response
         left = left - known @ (known.T @ left)
         self._left = left / max(float(np.sqrt(np.mean(left**2))), 1e-300)
-        self._shape_cost = 0.0
         self._quantities: dict[ColumnEffect, FloatArray] = {}
         self._responses: dict[tuple[ColumnEffect, float], FloatArray] = {}
 
-    def refine(self, effect: ColumnEffect, columns: Mapping[str, Column]) -> Refined:
+    def refine(self, effect: ColumnEffect, price: float, columns: Mapping[str, Column]) -> Refined:
         """Shape, timing, shape again, timing again, each time in finer steps."""
-        best = Refined(effect, self.scores([effect])[0])
+        best = Refined(effect, self.scores([effect])[0] - price, price)
         best = self._best(best, self._shapes(best.effect, columns))
         for step in LAG_STEPS:
-            best = self._best(best, self._timings(best.effect, step, 2.0 * step))
-        best = self._best(best, self._shapes(best.effect, columns))
-        return best
+            responses = RESPONSES if step > LAG_STEPS[-1] else FINE_RESPONSES
+            timings = _timings(best.effect, step, 2.0 * step, responses)
+            best = self._best(best, ((timed, best.price) for timed in timings))
+        return self._best(best, self._shapes(best.effect, columns))
 
     def scores(self, effects: Sequence[ColumnEffect]) -> list[float]:
         """Squared score of each effect, all its coefficients free, less log n for each beyond the first."""
@@ -122,44 +133,45 @@ class Refinement:
         if key not in self._responses:
             responded = respond(self._quantities[shape], step, 0.0, effect.response_s)
             self._responses[key] = np.cumsum(np.pad(responded, ((1, 0), (0, 0))), axis=0)
-        return _means_by_second(self._responses[key], round(effect.lag_s / step))
+        return means_by_second(self._responses[key], round(effect.lag_s / step))
 
     def _best(self, best: Refined, others: Iterable[tuple[ColumnEffect, float]]) -> Refined:
         several = list(others)
         if not several:
             return best
-        scores = np.asarray(self.scores([effect for effect, _ in several])) - [cost for _, cost in several]
+        scores = np.asarray(self.scores([effect for effect, _ in several])) - [price for _, price in several]
         at = int(np.argmax(scores))
-        return Refined(several[at][0], float(scores[at])) if scores[at] > best.score else best
-
-    def _timings(self, effect: ColumnEffect, step: float, reach: float) -> Iterator[tuple[ColumnEffect, float]]:
-        paid = self._paid(effect)
-        lags = effect.lag_s + np.arange(-reach, reach + 0.5 * step, step)
-        near = sorted(RESPONSES, key=lambda response: abs(np.log(response / max(effect.response_s, 0.1))))[:5]
-        for lag in lags[np.abs(lags) <= LAG_LIMIT]:
-            for response in near:
-                yield structs.replace(effect, lag_s=round(float(lag), 1), response_s=response), paid
+        return Refined(several[at][0], float(scores[at]), several[at][1]) if scores[at] > best.score else best
 
     def _shapes(self, effect: ColumnEffect, columns: Mapping[str, Column]) -> Iterator[tuple[ColumnEffect, float]]:
-        """Other shapes of the same column, and other scales of a product's proximities."""
+        """Other shapes of the same column, and other scales of a product's proximities, with what each costs.
+
+        A finer choice than the dictionary's makes the family as many times as large.
+        """
         timing = {"lag_s": effect.lag_s, "response_s": effect.response_s}
         if isinstance(effect, Product):
-            yield from ((structs.replace(other, **timing), 0.0) for other in _scaled(effect))
+            others = list(_scaled(effect))
+            price = self._costs.get(Family.PRODUCT, 0.0) + 2.0 * float(np.log(max(1, len(others))))
+            yield from ((structs.replace(other, **timing), price) for other in others)
             return
         column = columns[effect.columns[0]]
         seen = self._coarse.context[column.name][self._coarse.timeline.valid]
-        shapes = [shape.effect for shape in shapes_of(column, seen)]
-        shapes += [] if self._single else list(_curves(column, seen))
-        cost = self._shape_cost = 2.0 * float(np.log(max(1, len(shapes))))
-        for shape in shapes:
-            yield structs.replace(shape, **timing), 0.0 if _is_plain(shape) else cost
-
-    def _paid(self, effect: ColumnEffect) -> float:
-        """What the shape of an effect has cost already is paid by its variants too."""
-        return 0.0 if _is_plain(effect) or isinstance(effect, Product) else self._shape_cost
+        shapes = shapes_of(column, seen, curves=not self._single)
+        plain = self._costs.get(Family.PLAIN, 0.0)
+        bent = self._costs.get(Family.BENT, plain) + 2.0 * float(np.log(max(1.0, shapes.finer)))
+        yield from ((structs.replace(shape, **timing), plain) for shape in shapes.plain)
+        yield from ((structs.replace(shape, **timing), bent) for shape in shapes.bent)
 
 
-def _means_by_second(sums: FloatArray, late: int) -> FloatArray:
+def _timings(effect: ColumnEffect, step: float, reach: float, responses: Sequence[float]) -> Iterator[ColumnEffect]:
+    lags = effect.lag_s + np.arange(-reach, reach + 0.5 * step, step)
+    near = sorted(responses, key=lambda response: abs(np.log(response / max(effect.response_s, 0.1))))[:5]
+    for lag in lags[np.abs(lags) <= LAG_LIMIT]:
+        for response in near:
+            yield structs.replace(effect, lag_s=round(float(lag), 1), response_s=response)
+
+
+def means_by_second(sums: FloatArray, late: int) -> FloatArray:
     """Means over each second of a series that comes `late` samples later, from its running sums; the ends stay."""
     last = len(sums) - 1
     first = np.arange(0, last - COARSE + 1, COARSE)
@@ -167,26 +179,11 @@ def _means_by_second(sums: FloatArray, late: int) -> FloatArray:
     return np.asarray((sums[stop] - sums[start]) / np.maximum(stop - start, 1)[:, None])
 
 
-def _is_plain(effect: ColumnEffect) -> bool:
-    return not isinstance(effect, Threshold | Saturating | Piecewise | Proximity)
-
-
-def _curves(column: Column, seen: FloatArray) -> Iterator[ColumnEffect]:
-    """Curves with one or two bends; a neighbour that is not there is far away, which a curve does not say."""
-    if column.role is not Role.NUMBER or column.gaps:
-        return
-    values = np.unique(np.quantile(seen[np.isfinite(seen)], KNOTS))
-    template = Linear(acts="location", column=column.name)  # type: ignore[arg-type]
-    for number in (1, 2):
-        for knots in combinations(values.tolist(), number):
-            yield Piecewise(acts=template.acts, column=column.name, knots=knots)
-
-
 def _scaled(effect: Product) -> Iterator[Product]:
     for index, factor in enumerate(effect.factors):
         if factor.form is not Form.PROXIMITY:
             continue
-        for share in (0.35, 0.5, 0.7, 1.4, 2.0):
+        for share in FINE_SCALES:
             factors = list(effect.factors)
             factors[index] = structs.replace(factor, at=factor.at * share)
             yield structs.replace(effect, factors=(factors[0], factors[1]))

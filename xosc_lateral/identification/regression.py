@@ -20,7 +20,7 @@ from msgspec import structs
 from numpy.typing import NDArray
 
 from xosc_lateral.driver.effects import Acts, ColumnEffect
-from xosc_lateral.identification.autocorrelation import Whitener, fit_autoregression
+from xosc_lateral.identification.autocorrelation import Whitener, fit_autoregression, start_factors, unbiased
 from xosc_lateral.identification.timeline import Timeline, coarse_all, coarse_mean, coarse_middle
 
 FloatArray = NDArray[np.float64]
@@ -136,6 +136,10 @@ class ModelTerm(Protocol):
         """Columns of the mean, shape (n, k)."""
         ...
 
+    def fine_mean_columns(self, coarse: Coarse) -> FloatArray:
+        """The same on the 0.2 s grid, shape (fine n, k)."""
+        ...
+
     def scale_columns(self, coarse: Coarse) -> FloatArray:
         """Columns of the log scale, shape (n, j)."""
         ...
@@ -168,6 +172,8 @@ class Fitted:
         Whitened residual, variance 1, 0 where invalid.
     movement : array, shape (n,)
         Offset less level and mean terms, over the scale; 0 where invalid. [m]
+    starts : array, shape (order + 1,)
+        Factor on the errors of the first rows of runs, for the likelihood.
     log_likelihood : float
         Gaussian, of the valid rows.
     """
@@ -184,12 +190,20 @@ class Fitted:
     log_covariance: FloatArray
     rows: FloatArray
     movement: FloatArray
+    starts: FloatArray
     log_likelihood: float
 
     @property
     def scale(self) -> FloatArray:
         """Factor on the movement, shape (n,)."""
         return self.whitener.scale
+
+    @property
+    def explained(self) -> FloatArray:
+        """Levels and mean terms on the 0.2 s grid, shape (fine n,). [m]"""
+        timeline = self.coarse.timeline
+        columns = _joined([term.fine_mean_columns(self.coarse) for term in self.terms], len(timeline))
+        return columns @ self.sizes + self.levels[timeline.drive]
 
     def mean_part(self, term: ModelTerm) -> slice:
         """Where a term's coefficients of the mean are."""
@@ -218,6 +232,8 @@ def fit_model(coarse: Coarse, terms: Sequence[ModelTerm]) -> Fitted:
         left = coarse.offset - columns @ sizes - levels[coarse.drive]
         movement = np.where(coarse.valid, left / scale, 0.0)
         process = fit_autoregression(movement, coarse.valid, ORDER, longest=LONGEST)
+        if not coarse.lasts:
+            process = unbiased(process, coarse.valid, coarse.drive, ORDER, longest=LONGEST)
         whitener = Whitener(process, coarse.valid, coarse.drive, scale)
         response, design = whitener.rows(coarse.offset), whitener.rows(columns)
         sizes, covariance = _least_squares(design, response)
@@ -229,10 +245,11 @@ def fit_model(coarse: Coarse, terms: Sequence[ModelTerm]) -> Fitted:
     n = int(coarse.valid.sum())
     variance = float(rows @ rows) / max(1, n - len(sizes))
     left = np.where(coarse.valid, coarse.offset - columns @ sizes - levels[coarse.drive], 0.0)
+    starts = start_factors(rows, coarse.valid, process.order)
     return Fitted(
         coarse, tuple(terms), whitener, columns, sizes, covariance * variance, levels, scales, log_sizes,
-        _scale_covariance(scales, rows, coarse), rows / np.sqrt(variance), left / scale,
-        _log_likelihood(rows, whitener),
+        _scale_covariance(scales, rows, coarse), rows / np.sqrt(variance), left / scale, starts,
+        _log_likelihood(rows, whitener, starts),
     )  # fmt: skip
 
 
@@ -255,8 +272,9 @@ def held_out_likelihood(fitted: Fitted, coarse: Coarse, held: BoolArray) -> Floa
     typical = max(float(squares[rows].mean()), 1e-300) if rows.any() else 1.0
     level = own_levels(np.minimum(squares, CLIP * typical), rows, coarse.drive) * typical
     own = level[coarse.drive]
-    variance = own * np.square(scale * fitted.whitener.process.deviations[-1])
-    return np.where(rows, -0.5 * (np.minimum(squares / own, CLIP) + np.log(variance)), 0.0)
+    factor = bare.by_position(fitted.starts)
+    deviation = np.sqrt(own) * factor * bare.deviations
+    return np.where(rows, -0.5 * np.minimum(squares / (own * factor**2), CLIP) - np.log(deviation), 0.0)
 
 
 def elapsed(coarse: Coarse) -> FloatArray:
@@ -302,10 +320,10 @@ def _known_scale(coarse: Coarse, terms: Sequence[ModelTerm]) -> FloatArray:
     return np.sum(known, axis=0) if known else np.zeros(len(coarse))
 
 
-def _log_likelihood(rows: FloatArray, whitener: Whitener) -> float:
-    valid = whitener.valid
-    volume = valid.sum() * np.log(whitener.process.deviations[-1]) + np.log(whitener.scale[valid]).sum()
-    return float(-0.5 * rows @ rows - volume)
+def _log_likelihood(rows: FloatArray, whitener: Whitener, starts: FloatArray) -> float:
+    factor = whitener.by_position(starts)
+    squares = np.square(rows / factor)
+    return float(np.sum((-0.5 * squares - np.log(factor * whitener.deviations))[whitener.valid]))
 
 
 def _least_squares(design: FloatArray, response: FloatArray) -> tuple[FloatArray, FloatArray]:

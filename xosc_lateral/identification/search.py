@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -10,10 +10,20 @@ from numpy.typing import NDArray
 
 from xosc_lateral.identification.candidates import candidates_of
 from xosc_lateral.identification.columns import Column
-from xosc_lateral.identification.dictionary import Dictionary, Quantities, build_dictionary
+from xosc_lateral.identification.dictionary import (
+    CROSS_BASIS,
+    LAGS,
+    RESPONSES,
+    Dictionary,
+    Quantities,
+    build_dictionary,
+    orthonormal,
+    respond_by_second,
+)
 from xosc_lateral.identification.problem import Problem
 from xosc_lateral.identification.regression import Coarse
 
+FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
 
 MAX_PRODUCT_COLUMNS = 24
@@ -67,6 +77,18 @@ class Search:
         del self._built[:-1]
         self._built.append((kind, fitted, dictionary))
         return dictionary
+
+    def cross_basis(self, columns: Collection[str]) -> FloatArray:
+        """What columns can do in any shape, at any lag and response, at 1 Hz, orthonormal, shape (n, rank)."""
+        own = [i for i, one in enumerate(self.quantities.candidates) if set(one.columns) <= set(columns)]
+        values = self.quantities.values[own].astype(np.float64).T
+        seconds, valid = np.arange(len(self.coarse)), self.coarse.valid[:, None]
+        blocks = [
+            respond_by_second(values, response)[np.clip(seconds - lag, 0, len(seconds) - 1)] * valid
+            for response in RESPONSES
+            for lag in LAGS
+        ]
+        return orthonormal(np.concatenate(blocks, axis=1), CROSS_BASIS)
 
     def rng(self, *key: int) -> np.random.Generator:
         """Independent stream by purpose."""

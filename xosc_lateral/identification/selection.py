@@ -111,7 +111,44 @@ def select(search: Search, initial: Sequence[Term] = (), *, only: frozenset[str]
             assert best.term is not None
             accepted.append(Accepted(best.term, best.p_value))
             fitted = best.after or fit_model(search.coarse, (*fitted.terms, best.term))
-    return Selection(tuple(accepted), tuple(rejected.values()), start, fitted)
+    selection = Selection(tuple(accepted), tuple(rejected.values()), start, fitted)
+    for one in accepted:
+        selection = _tested_again(search, selection, one)
+    return selection
+
+
+def _tested_again(search: Search, selection: Selection, one: Accepted) -> Selection:
+    """The same without a term that no longer stands beside what was found after it.
+
+    Rotations keep how loud the movement is, not where: a column that goes along with loud stretches scores on the mean.
+    And what no column explained may be explained by one that was found later.
+    """
+    if not any(accepted.term is one.term for accepted in selection.accepted):
+        return selection
+    later = [other.term for other in selection.accepted[_place(selection, one.term) + 1 :]]
+    if one.term.component == "mean":
+        explains = [term for term in later if _changes_scale(term, search)]
+    else:
+        explains = [term for term in later if term.columns and not one.term.columns]
+    if not explains:
+        return selection
+    without = selection.without([one.term], "what was found after it explains it")
+    test = _asked(search, type(one.term), without.final)
+    stands = (
+        test is not None
+        and test.term is not None
+        and test.term.columns == one.term.columns
+        and test.p_value <= level_of(one.term.component)
+    )
+    return selection if stands else without
+
+
+def _place(selection: Selection, term: Term) -> int:
+    return next(at for at, one in enumerate(selection.accepted) if one.term is term)
+
+
+def _changes_scale(term: Term, search: Search) -> bool:
+    return bool(term.scale_columns(search.coarse).shape[1]) or term.known_scale(search.coarse) is not None
 
 
 def _asked(search: Search, kind: type[Term], fitted: Fitted) -> Outcome | None:

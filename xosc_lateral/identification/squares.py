@@ -48,9 +48,7 @@ class Squares:
 def fine_squares(fitted: Fitted) -> Squares:
     """Squared innovations of the 0.2 s grid, averaged to 1 Hz; drives are each compared with themselves."""
     coarse, timeline = fitted.coarse, fitted.coarse.timeline
-    explained = fitted.columns @ fitted.sizes + fitted.levels[coarse.drive]
-    n = len(timeline)
-    on_grid = np.interp(np.arange(n), np.arange(len(coarse)) * COARSE + 0.5 * (COARSE - 1), explained)
+    on_grid, n = fitted.explained, len(timeline)
     valid = timeline.valid & np.repeat(coarse.valid, COARSE)[:n] if len(coarse) * COARSE >= n else timeline.valid
     moved = np.where(valid, timeline.offset - on_grid, 0.0)
     process = fit_autoregression(moved, valid, FINE_ORDER)

@@ -146,6 +146,15 @@ def coarse_all(mask: BoolArray) -> BoolArray:
     return np.asarray(mask[: n * COARSE].reshape(n, COARSE).all(axis=1))
 
 
+def on_fine_grid(values: FloatArray, timeline: Timeline) -> FloatArray:
+    """From the middles of the seconds, shape (n // 5, ...), to the 0.2 s grid: steps of a second would be noise."""
+    n = len(timeline)
+    at = np.clip((np.arange(n) - 0.5 * (COARSE - 1)) / COARSE, 0.0, len(values) - 1.0)
+    low = np.minimum(at.astype(np.intp), max(0, len(values) - 2))
+    share = (at - low).reshape(-1, *[1] * (values.ndim - 1))
+    return np.asarray(values[low] * (1.0 - share) + values[np.minimum(low + 1, len(values) - 1)] * share)
+
+
 def local_mean(values: FloatArray, valid: BoolArray, seconds: float, step: float) -> FloatArray:
     """Moving average over the valid rows within `seconds`, shape (n,); 0 where there are none."""
     half = max(1, round(0.5 * seconds / step))

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from xosc_lateral.driver.effects import Effect
 from xosc_lateral.identification.regression import Coarse, Fitted
+from xosc_lateral.identification.timeline import on_fine_grid
 
 if TYPE_CHECKING:
     from xosc_lateral.identification.search import Search
@@ -122,6 +123,10 @@ class Term(ABC):
         """Columns of the mean, shape (n, k)."""
         return np.zeros((len(coarse), 0))
 
+    def fine_mean_columns(self, coarse: Coarse) -> FloatArray:
+        """The same columns of the mean on the 0.2 s grid, shape (fine n, k)."""
+        return on_fine_grid(self.mean_columns(coarse), coarse.timeline)
+
     def scale_columns(self, coarse: Coarse) -> FloatArray:
         """Columns of the log scale, shape (n, j)."""
         return np.zeros((len(coarse), 0))
@@ -154,14 +159,6 @@ class Term(ABC):
     def matches(self, other: Self) -> bool:
         """Whether another fit's term is the same finding."""
         return type(self) is type(other) and self.columns == other.columns
-
-
-def on_fine_grid(values: FloatArray, coarse: Coarse) -> FloatArray:
-    """From the middles of the seconds to the 0.2 s grid: steps of a second would look like fine movement."""
-    from xosc_lateral.identification.timeline import COARSE
-
-    n = len(coarse.timeline)
-    return np.interp(np.arange(n), np.arange(len(values)) * COARSE + 0.5 * (COARSE - 1), values)
 
 
 def centred(values: FloatArray, coarse: Coarse) -> FloatArray:

@@ -64,6 +64,11 @@ class ColumnTerm(Term):
         """Regression in which a column of this kind is looked for, with the terms fitted already."""
 
     @classmethod
+    def reweighted(cls, fitted: Fitted, after: Fitted) -> Problem | None:
+        """The same regression beside `fitted`, weighted by the noise that is left in `after`; None: no other."""
+        return None
+
+    @classmethod
     def barred(cls, fitted: Fitted) -> frozenset[str]:
         """Columns that this kind may not take up beside the terms fitted."""
         return frozenset()

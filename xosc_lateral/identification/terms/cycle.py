@@ -11,10 +11,11 @@ from numpy.typing import NDArray
 from xosc_lateral.driver.effects import Effect, Weave
 from xosc_lateral.identification.regression import MIN_DRIFT_S, Coarse, Fitted
 from xosc_lateral.identification.significance import LEAST
-from xosc_lateral.identification.terms.base import Description, Outcome, Removal, Term, centred, on_fine_grid
+from xosc_lateral.identification.terms.base import Description, Outcome, Removal, Term, centred
 
 if TYPE_CHECKING:
     from xosc_lateral.identification.search import Search
+from xosc_lateral.identification.timeline import on_fine_grid
 
 FloatArray = NDArray[np.float64]
 
@@ -95,7 +96,7 @@ class Cycle(Term):
 
     def remove(self, fitted: Fitted, effects: tuple[Effect, ...], removal: Removal) -> None:
         """As fitted."""
-        removal.location += on_fine_grid(centred(latent_path(self, fitted), fitted.coarse), fitted.coarse)
+        removal.location += on_fine_grid(centred(latent_path(self, fitted), fitted.coarse), fitted.coarse.timeline)
 
     def describe(self, fitted: Fitted, effects: tuple[Effect, ...], key: str) -> Description:
         """Amplitude and period."""

@@ -29,11 +29,17 @@ class FineNoiseTerm(ColumnTerm):
 
     @classmethod
     def problem(cls, fitted: Fitted) -> Problem:
-        """Squared innovations at 5 Hz; an effect on the mean is followed with errors that grow with it."""
+        """Squared innovations at 5 Hz.
+
+        An effect on the mean is followed with errors: they grow with it where its size is a little wrong, and with its
+        rate of change where its timing is.
+        """
         squares = fine_squares(fitted)
-        moved = np.abs(answers(fitted, MeanTerm))
-        known = np.concatenate([known_log_scale(fitted), answers(fitted, cls), moved], axis=1)
-        return of_squares(fitted.coarse, squares.standardised, squares.valid, known)
+        moved = answers(fitted, MeanTerm)
+        known = [known_log_scale(fitted), answers(fitted, cls), np.abs(moved)]
+        if moved.shape[1]:
+            known.append(np.abs(np.gradient(moved, axis=0)))
+        return of_squares(fitted.coarse, squares.standardised, squares.valid, np.concatenate(known, axis=1))
 
     @classmethod
     def barred(cls, fitted: Fitted) -> frozenset[str]:

@@ -14,6 +14,8 @@ from xosc_lateral.identification.problem import Problem
 from xosc_lateral.identification.random_slopes import slope_deviation
 from xosc_lateral.identification.regression import Coarse, Fitted
 from xosc_lateral.identification.terms.column import ColumnTerm
+from xosc_lateral.identification.timeline import coarse_mean
+from xosc_lateral.identification.timing import widening
 
 FloatArray = NDArray[np.float64]
 
@@ -32,15 +34,26 @@ class MeanTerm(ColumnTerm):
         """The answer."""
         return coarse.answer(self.effect, keep=True)
 
+    def fine_mean_columns(self, coarse: Coarse) -> FloatArray:
+        """The answer as the profile gives it: steps of a second would be noise."""
+        answer = self.effect.answer(coarse.timeline.step, coarse.context)
+        return np.asarray(answer - coarse_mean(answer)[coarse.valid].mean(axis=0))
+
     @classmethod
     def problem(cls, fitted: Fitted) -> Problem:
         """Whitened offsets."""
         return Problem(fitted.whitener, fitted.coarse.offset, fitted.columns)
 
+    @classmethod
+    def reweighted(cls, fitted: Fitted, after: Fitted) -> Problem:
+        """Whitened by what is left in `after`: an effect that is still in the offsets looks like memory."""
+        return Problem(after.whitener, fitted.coarse.offset, fitted.columns)
+
     def estimate(self, fitted: Fitted) -> tuple[Effect, ...]:
-        """From the joint fit."""
+        """From the joint fit; shrunk as if the timing were known, with errors for one that is not."""
         part = fitted.mean_part(self)
         errors = np.sqrt(np.maximum(np.diag(fitted.covariance)[part], 0.0))
         effect = self.sized(fitted.coarse, Acts.LOCATION, fitted.sizes[part], errors)
+        effect = structs.replace(effect, errors=tuple(widening(fitted, effect, part) * errors))
         deviation = slope_deviation(fitted, self)
         return (structs.replace(effect, between_drivers=(deviation,)) if deviation else effect,)

@@ -13,11 +13,13 @@ from xosc_lateral.identification.markov_switching import RegimeFit, fit_regimes
 from xosc_lateral.identification.regression import Coarse, Fitted, squared_innovations
 from xosc_lateral.identification.significance import upper_tail
 from xosc_lateral.identification.squares import SLOW_S, fine_squares, log_sizes, slow_squares
-from xosc_lateral.identification.terms.base import Description, Outcome, Removal, Term, on_fine_grid
+from xosc_lateral.identification.terms.base import Description, Outcome, Removal, Term
+from xosc_lateral.identification.terms.column import columns_on_size
 from xosc_lateral.identification.terms.spread import known_log_scale
 
 if TYPE_CHECKING:
     from xosc_lateral.identification.search import Search
+from xosc_lateral.identification.timeline import on_fine_grid
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
@@ -58,7 +60,9 @@ class RegimesTerm(Term):
         coarse = fitted.coarse
         if not coarse.lasts or any(isinstance(term, cls) for term in fitted.terms):
             return None
-        p_value = _probability(fitted, search.rng(3))
+        # what a column does to the size in another shape than the one that was found is no regime either
+        known = [known_log_scale(fitted), search.cross_basis(columns_on_size(fitted))]
+        p_value = _probability(fitted, np.concatenate(known, axis=1), search.rng(3))
         return Outcome(cls(fit_regimes(fitted.rows, coarse.valid)), (), p_value)
 
     def estimate(self, fitted: Fitted) -> tuple[Effect, ...]:
@@ -77,7 +81,7 @@ class RegimesTerm(Term):
         """By the probability that the loud regime is on."""
         effect = effects[0]
         assert isinstance(effect, Regimes)
-        on = on_fine_grid(self.fit.on, fitted.coarse)
+        on = on_fine_grid(self.fit.on, fitted.coarse.timeline)
         removal.spread += on * np.log(effect.factor)
         removal.fine += on * np.log(effect.fine_factor)
 
@@ -90,10 +94,9 @@ class RegimesTerm(Term):
         return Description("on/off regimes", shape, effect.factor, effect.factor_error, cell, cell)
 
 
-def _probability(fitted: Fitted, rng: np.random.Generator) -> float:
+def _probability(fitted: Fitted, known: FloatArray, rng: np.random.Generator) -> float:
     coarse = fitted.coarse
     squares = squared_innovations(fitted.rows, coarse.valid)
-    known = known_log_scale(fitted)
     if known.shape[1]:
         basis = np.linalg.qr((known - known[coarse.valid].mean(axis=0)) * coarse.valid[:, None])[0]
         squares = squares - basis @ (basis.T @ squares)

@@ -11,12 +11,13 @@ from numpy.typing import NDArray
 from xosc_lateral.driver.effects import Effect, Step
 from xosc_lateral.identification.low_frequency import find_low_frequency
 from xosc_lateral.identification.regression import Coarse, Fitted
-from xosc_lateral.identification.terms.base import Description, Outcome, Removal, Term, centred, on_fine_grid
+from xosc_lateral.identification.terms.base import Description, Outcome, Removal, Term, centred
 from xosc_lateral.identification.terms.cycle import latent_path
 from xosc_lateral.identification.terms.drift import DriftTerm
 
 if TYPE_CHECKING:
     from xosc_lateral.identification.search import Search
+from xosc_lateral.identification.timeline import on_fine_grid
 
 FloatArray = NDArray[np.float64]
 
@@ -73,7 +74,7 @@ class StepTerm(Term):
 
     def remove(self, fitted: Fitted, effects: tuple[Effect, ...], removal: Removal) -> None:
         """As fitted."""
-        removal.location += on_fine_grid(centred(latent_path(self, fitted), fitted.coarse), fitted.coarse)
+        removal.location += on_fine_grid(centred(latent_path(self, fitted), fitted.coarse), fitted.coarse.timeline)
 
     def describe(self, fitted: Fitted, effects: tuple[Effect, ...], key: str) -> Description:
         """Height and moment."""

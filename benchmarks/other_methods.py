@@ -1,0 +1,252 @@
+"""Other ways to find what moves a driver, on the same drives as the loop.
+
+    python -m benchmarks.other_methods --set test [--share 0.25] -o OUT.jsonl
+    python -m benchmarks.other_methods --table OUT.jsonl --loop LOOP.jsonl
+
+Each method names columns at its own usual level (0.05 for the whole table, where it has p-values). Needs tigramite and
+statsmodels, which nothing else here needs: `pip install tigramite statsmodels`.
+
+PCMCI+ and J-PCMCI+ (every drive of its own space context) [1]_ [2]_: partial correlation, lags up to 4 s, Benjamini and
+Hochberg's correction; named is what has a link into the offset. Additive model: cubic splines of every column, whitened
+with the offset by an autoregression of 12 s, F test per column, Holm's correction [3]_. Boosting: gradient-boosted
+trees on columns now and 2 and 4 s ago, permutation importance on held-out blocks of 150 s or whole vehicles; named is
+what is above zero by two standard errors over the folds [4]_.
+
+References
+----------
+.. [1] J. Runge, "Discovering contemporaneous and lagged causal relations in autocorrelated nonlinear time series
+   datasets", UAI 2020.
+.. [2] W. Guenther, U. Ninad, J. Runge, "Causal discovery for time series from multiple datasets with latent contexts",
+   UAI 2023.
+.. [3] S. Wood, "Generalized Additive Models", 2017, chapter 6.
+.. [4] L. Breiman, "Random forests", Machine Learning 45, 2001.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import time
+import tomllib
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from benchmarks.identification_drives import long_drive, offset_of, short_drives, with_mean
+from benchmarks.identification_study import PROTOCOL, cases, right
+
+Values = np.ndarray
+LAGS_S = 4
+FAR = 200.0
+"""Distance that stands for "there is none": none of the methods knows missing values. [m]"""
+
+
+def by_second(table: pd.DataFrame) -> tuple[Values, dict[str, Values], Values]:
+    """Offset, columns and drive at 1 Hz; angles as sine and cosine."""
+    drive = table["drive"].astype("category").cat.codes.to_numpy() if "drive" in table else np.zeros(len(table), int)
+    offset = table["offset"].to_numpy() if "offset" in table else offset_of(table)
+    group = pd.Series(drive).astype(str) + "/" + np.floor(table["time"].to_numpy()).astype(int).astype(str)
+    keys = group.factorize()[0]
+    skipped = ("drive", "time", "offset", "distance_left", "distance_right", "lane_change", "lateral_velocity")
+    columns = {name: table[name].to_numpy(dtype=float) for name in table if name not in skipped}
+    for name in [one for one in columns if one.endswith("direction")]:
+        angle = np.radians(columns.pop(name))
+        columns |= {f"{name} sine": np.sin(angle), f"{name} cosine": np.cos(angle)}
+    count = np.bincount(keys)
+    mean = {name: np.bincount(keys, np.nan_to_num(values, nan=FAR)) / count for name, values in columns.items()}
+    own = np.bincount(keys, drive) / count
+    return np.bincount(keys, offset) / count, {k: v for k, v in mean.items() if np.ptp(v) > 0}, own.astype(int)
+
+
+def pcmci_plus(offset: Values, columns: dict[str, Values], drive: Values) -> list[str]:
+    """PCMCI+ on one long drive, J-PCMCI+ on many short ones."""
+    from tigramite.data_processing import DataFrame
+    from tigramite.independence_tests.parcorr import ParCorr
+
+    names = list(columns)
+    data = np.stack([offset, *columns.values()], axis=1)
+    noise = 1e-6 * np.random.default_rng(1).normal(size=data.shape) * data.std(axis=0)
+    data = data + noise  # a constant stretch has no partial correlation
+    settings: dict[str, Any] = {"tau_max": LAGS_S, "pc_alpha": 0.01, "fdr_method": "fdr_bh"}
+    drives = np.unique(drive)
+    if len(drives) == 1:
+        from tigramite.pcmci import PCMCI
+
+        found = PCMCI(DataFrame(data), ParCorr(), verbosity=0).run_pcmciplus(**settings)
+    else:
+        from tigramite.jpcmciplus import JPCMCIplus
+
+        sets = {index: data[drive == one] for index, one in enumerate(drives)}
+        length = min(len(one) for one in sets.values())
+        space = {index: np.eye(len(drives))[[index] * length] for index in sets}
+        both = {index: np.concatenate([one[:length], space[index]], axis=1) for index, one in sets.items()}
+        kinds = dict.fromkeys(range(data.shape[1]), "system") | {data.shape[1]: "space_dummy"}
+        vectors = {i: [(i, 0)] for i in range(data.shape[1])}
+        vectors[data.shape[1]] = [(data.shape[1] + k, 0) for k in range(len(drives))]
+        frame = DataFrame(both, analysis_mode="multiple", vector_vars=vectors)
+        test = ParCorr()
+        from tigramite.independence_tests.parcorr_mult import ParCorrMult
+
+        test = ParCorrMult()
+        found = JPCMCIplus(dataframe=frame, cond_ind_test=test, node_classification=kinds, verbosity=0).run_jpcmciplus(
+            **settings
+        )
+    graph = found["graph"]
+    return [name for at, name in enumerate(names, 1) if any(one in ("-->", "o-o", "o->") for one in graph[at, 0])]
+
+
+def additive(offset: Values, columns: dict[str, Values], drive: Values) -> list[str]:
+    """Additive model, whitened."""
+    from scipy.stats import f as f_distribution
+    from statsmodels.gam.api import BSplines
+    from statsmodels.stats.multitest import multipletests
+
+    from xosc_lateral.identification.autocorrelation import Whitener, fit_autoregression
+
+    valid = np.concatenate([[True], np.diff(drive) == 0])  # one second between drives
+    level = np.bincount(drive, offset) / np.bincount(drive)
+    process = fit_autoregression(np.where(valid, offset - level[drive], 0.0), valid, 12)
+    whitener = Whitener(process, valid, drive, np.ones(len(offset)))
+    bases = {}
+    for name, values in columns.items():
+        few = len(np.unique(values)) < 8
+        basis = values[:, None] if few else BSplines(values[:, None], df=[5], degree=[3]).basis
+        bases[name] = whitener.rows(basis - basis.mean(axis=0))
+    response = whitener.rows(offset)
+    everything = np.concatenate(list(bases.values()), axis=1)
+
+    def squares(design: Values) -> tuple[float, int]:
+        fitted = np.linalg.lstsq(design, response, rcond=1e-8)
+        return float(np.square(response - design @ fitted[0]).sum()), int(fitted[2])
+
+    full, rank = squares(everything)
+    freedom = int(valid.sum()) - rank
+    p_values = []
+    for name in columns:
+        rest, less = squares(np.concatenate([one for other, one in bases.items() if other != name], axis=1))
+        extra = max(1, rank - less)
+        p_values.append(float(f_distribution.sf((rest - full) / extra / (full / freedom), extra, freedom)))
+    named = multipletests(p_values, 0.05, method="holm")[0]
+    return [name for name, one in zip(columns, named, strict=True) if one]
+
+
+def boosting(offset: Values, columns: dict[str, Values], drive: Values) -> list[str]:
+    """Boosted trees with permutation importance under blocked cross-validation."""
+    from sklearn.ensemble import HistGradientBoostingRegressor
+    from sklearn.inspection import permutation_importance
+
+    lags = (0, 2, 4)
+    design = np.concatenate([np.stack([np.roll(v, lag) for lag in lags], axis=1) for v in columns.values()], axis=1)
+    many = len(np.unique(drive)) > 1
+    fold = (drive if many else np.arange(len(offset)) // 150) % 5
+    gains = []
+    for one in range(5):
+        held = fold == one
+        model = HistGradientBoostingRegressor(max_iter=100, learning_rate=0.05, min_samples_leaf=60, random_state=1)
+        model.fit(design[~held], offset[~held])
+        seen = permutation_importance(model, design[held], offset[held], n_repeats=3, random_state=1)
+        gains.append(seen.importances_mean.reshape(len(columns), len(lags)).sum(axis=1))
+    mean, error = np.mean(gains, axis=0), np.std(gains, axis=0, ddof=1) / np.sqrt(5)
+    return [name for name, m, e in zip(columns, mean, error, strict=True) if m > 2.0 * e and m > 0.0]
+
+
+METHODS: dict[str, Callable[[Values, dict[str, Values], Values], list[str]]] = {
+    "PCMCI+ / J-PCMCI+": pcmci_plus,
+    "additive model": additive,
+    "boosting": boosting,
+}
+
+
+def judged(case: dict[str, Any], named: list[str]) -> tuple[bool | None, list[str]]:
+    """Whether all planted columns are named, and what else is; products are sets of columns here."""
+    plain = sorted({name.split(" ")[0] for name in named})
+    if "accepted" not in case:
+        return None, plain
+    allowed = {column for one in case["accepted"] for column in one}
+    return any(set(one) <= set(plain) for one in case["accepted"]), [one for one in plain if one not in allowed]
+
+
+def run(case: dict[str, Any], protocol: dict[str, Any]) -> dict[str, Any]:
+    """All methods on one drive."""
+    drives, seed = protocol["drives"], case["seed"]
+    if case["type"].endswith("short"):
+        table = short_drives(drives["short_drives"], tuple(drives["short_s"]), seed)
+    else:
+        table = long_drive(case["movement"], drives["long_s"], seed)
+    if "size" in case:
+        table = with_mean(table, case["name"], case["size"], seed)
+    series = by_second(table)
+    outcome = dict(case)
+    for name, method in METHODS.items():
+        started = time.process_time()
+        named = method(*series)
+        correct, false = judged(case, named)
+        outcome[name] = {"right": correct, "false": false, "cpu_s": round(time.process_time() - started, 1)}
+    return outcome
+
+
+def table_of(outcomes: list[dict[str, Any]], loop: dict[int, dict[str, Any]]) -> str:
+    """Markdown: right, missed, tables with something false, seconds; by method."""
+    lines = ["| method | drives | effects | right | missed | false | seconds |", "|---|---|---|---|---|---|---|"]
+    for short in (False, True):
+        own = [one for one in outcomes if one["type"].endswith("short") == short and one["seed"] in loop]
+        planted = [one for one in own if "accepted" in one]
+        what = "many short" if short else "one long"
+        for name in METHODS:
+            hits = sum(one[name]["right"] for one in planted)
+            wrong = sum(bool(one[name]["false"]) for one in own)
+            seconds = np.median([one[name]["cpu_s"] for one in own])
+            lines.append(_line(name, f"{len(own)}, {what}", len(planted), hits, wrong, seconds))
+        mine = [loop[one["seed"]] for one in own]
+        hits = sum(right(one) for one in mine if "accepted" in one)
+        wrong = sum(bool(_loop_false(one)) for one in mine)
+        seconds = np.median([one["cpu_s"] for one in mine])
+        lines.append(_line("this loop", f"{len(own)}, {what}", len(planted), hits, wrong, seconds))
+    return "\n".join(lines)
+
+
+def _line(method: str, drives: str, planted: int, hits: int, wrong: int, seconds: float) -> str:
+    return f"| {method} | {drives} | {planted} | {hits} | {planted - hits} | {wrong} | {seconds:.1f} |"
+
+
+def _loop_false(one: dict[str, Any]) -> list[Any]:
+    from benchmarks.identification_study import false
+
+    return false(one)
+
+
+def main() -> None:
+    """Run, or print the table."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--set", default="design", choices=("design", "validation", "test"))
+    parser.add_argument("--every", type=int, default=1, help="every N-th drive of the set")
+    parser.add_argument("-o", "--output", type=Path)
+    parser.add_argument("--table", type=Path)
+    parser.add_argument("--loop", type=Path, help="what identification_study wrote for the same set")
+    args = parser.parse_args()
+    if args.table is not None:
+        read = [json.loads(line) for line in args.table.read_text(encoding="utf-8").splitlines()]
+        loop = [json.loads(line) for line in args.loop.read_text(encoding="utf-8").splitlines()]
+        print(table_of(read, {one["seed"]: one for one in loop}))
+        return
+    protocol = tomllib.loads(PROTOCOL.read_text(encoding="utf-8"))
+    chosen = [
+        case
+        for case in cases(protocol, args.set, 1.0)
+        if case["type"] in ("null", "null_short", "effect", "effect_short")
+        and "factor" not in case
+        and not case["name"].startswith("slow vehicles")
+    ]
+    for case in chosen[:: args.every]:
+        outcome = run(case, protocol)
+        print(case["name"], case.get("size", ""), case["seed"], {name: outcome[name] for name in METHODS}, flush=True)
+        if args.output is not None:
+            with args.output.open("a", encoding="utf-8") as file:
+                file.write(json.dumps(outcome) + "\n")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,90 @@
+"""How unsure a size is because its lag and time constant were estimated with it."""
+
+from __future__ import annotations
+
+import numpy as np
+from msgspec import structs
+from numpy.typing import NDArray
+
+from xosc_lateral.driver.effects import ColumnEffect
+from xosc_lateral.driver.effects.response import respond
+from xosc_lateral.identification.ranges import driving_range
+from xosc_lateral.identification.refinement import FINE_RESPONSES, LAG_LIMIT, LAG_STEPS, means_by_second
+from xosc_lateral.identification.regression import Fitted
+
+FloatArray = NDArray[np.float64]
+
+NEAR_S = 2.0
+"""Lags that differ from the estimate by up to this are looked at. [s]"""
+
+CHI_SQUARE = 3.84
+"""95 % quantile of chi-square with one degree of freedom: the interval gives up half as much log-likelihood. [-]"""
+
+
+def widening(fitted: Fitted, effect: ColumnEffect, part: slice) -> float:
+    """Factor on the standard errors of an effect on the mean, at least 1.
+
+    Half the width of the profile-likelihood interval [1]_ of the change over the driving range, lag and time constant
+    free, over that of the interval with both told.
+
+    Parameters
+    ----------
+    fitted : Fitted
+    effect : ColumnEffect
+        With coefficients.
+    part : slice
+        Its columns of the mean.
+
+    References
+    ----------
+    .. [1] D. Venzon, S. Moolgavkar, "A method for computing profile-likelihood-based confidence intervals", Applied
+       Statistics 37, 1988.
+    """
+    low, high = driving_range(fitted.coarse, effect)
+    contrast = high - low
+    white = fitted.whitener.rows
+    others, _ = np.linalg.qr(white(np.delete(fitted.columns, np.r_[part], axis=1)))
+    left = _beside(others, white(fitted.coarse.offset))
+    told = _profile(_beside(others, white(fitted.columns[:, part])), left, contrast)
+    found = [told]
+    for answer in _timed(fitted, effect):
+        rows = _beside(others, white(answer.reshape(len(answer), -1)))
+        width = len(contrast)
+        found += [_profile(rows[:, at : at + width], left, contrast) for at in range(0, rows.shape[1], width)]
+    gain, size, variance = np.asarray(found).T
+    noise = float(left @ left - gain.max()) / max(1, int(fitted.coarse.valid.sum()))
+    room = CHI_SQUARE - (gain.max() - gain) / noise
+    inside = room > 0.0
+    half = np.sqrt(noise * variance[inside] * room[inside])
+    least, most = (size[inside] - half).min(), (size[inside] + half).max()
+    alone = np.sqrt(CHI_SQUARE * noise * told[2])
+    return float(max(1.0, 0.5 * (most - least) / max(alone, 1e-300)))
+
+
+def _timed(fitted: Fitted, effect: ColumnEffect) -> list[FloatArray]:
+    """Answers at 1 Hz per time constant, shape (n, lags, k)."""
+    step, finest = fitted.coarse.timeline.step, LAG_STEPS[-1]
+    lags = effect.lag_s + np.arange(-NEAR_S, NEAR_S + 0.5 * finest, finest)
+    late = [round(float(lag) / step) for lag in lags[np.abs(lags) <= LAG_LIMIT]]
+    bare = structs.replace(effect, lag_s=0.0, response_s=0.0, answer_range=())
+    quantity = bare.answer(step, fitted.coarse.context)
+    answers = []
+    for response in FINE_RESPONSES:
+        sums = np.cumsum(np.pad(respond(quantity, step, 0.0, response), ((1, 0), (0, 0))), axis=0)
+        answers.append(np.stack([means_by_second(sums, one) for one in late], axis=1))
+    return answers
+
+
+def _beside(others: FloatArray, rows: FloatArray) -> FloatArray:
+    return np.asarray(rows - others @ (others.T @ rows))
+
+
+def _profile(rows: FloatArray, left: FloatArray, contrast: FloatArray) -> tuple[float, float, float]:
+    """Squares explained, the contrast's size, and its variance for noise of variance 1."""
+    inverse = np.linalg.pinv(rows.T @ rows)
+    products = rows.T @ left
+    return (
+        float(products @ inverse @ products),
+        float(contrast @ inverse @ products),
+        float(contrast @ inverse @ contrast),
+    )
