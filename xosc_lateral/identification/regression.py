@@ -247,7 +247,7 @@ def fit_model(coarse: Coarse, terms: Sequence[ModelTerm]) -> Fitted:
     left = np.where(coarse.valid, coarse.offset - columns @ sizes - levels[coarse.drive], 0.0)
     starts = start_factors(rows, coarse.valid, process.order)
     return Fitted(
-        coarse, tuple(terms), whitener, columns, sizes, covariance * variance, levels, scales, log_sizes,
+        coarse, tuple(terms), whitener, columns, sizes, covariance, levels, scales, log_sizes,
         _scale_covariance(scales, rows, coarse), rows / np.sqrt(variance), left / scale, starts,
         _log_likelihood(rows, whitener, starts),
     )  # fmt: skip
@@ -327,10 +327,19 @@ def _log_likelihood(rows: FloatArray, whitener: Whitener, starts: FloatArray) ->
 
 
 def _least_squares(design: FloatArray, response: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Sizes, and a sandwich for their covariance [1]_: loud seconds come together, and a column may come with them.
+
+    References
+    ----------
+    .. [1] H. White, "A heteroskedasticity-consistent covariance matrix estimator", Econometrica 48, 1980.
+    """
     if design.shape[1] == 0:
         return np.zeros(0), np.zeros((0, 0))
     inverse = np.linalg.pinv(design.T @ design)
-    return inverse @ (design.T @ response), np.asarray(inverse, dtype=np.float64)
+    sizes = inverse @ (design.T @ response)
+    scores = design * (response - design @ sizes)[:, None]
+    freedom = len(response) / max(1, len(response) - design.shape[1])
+    return sizes, np.asarray(inverse @ (scores.T @ scores) @ inverse * freedom, dtype=np.float64)
 
 
 def _clipped_squares(rows: FloatArray, valid: BoolArray) -> FloatArray:
