@@ -14,7 +14,7 @@ from xosc_lateral.identification.candidates import FINE_SCALES, Family, candidat
 from xosc_lateral.identification.columns import Column, Role
 from xosc_lateral.identification.refinement import Refinement
 from xosc_lateral.identification.regression import Coarse, Fitted, fit_model
-from xosc_lateral.identification.terms import MeanTerm
+from xosc_lateral.identification.terms.mean import MeanTerm
 from xosc_lateral.identification.timeline import join_drives, on_fine_grid
 
 LAG, RESPONSE, SIZE = -0.6, 1.7, 0.25
