@@ -7,10 +7,10 @@ Each method names columns at its own usual level (0.05 for the whole table, wher
 statsmodels, which nothing else here needs: `pip install tigramite statsmodels`.
 
 PCMCI+ [1]_, and J-PCMCI+ on the first 40 drives of a table of many [2]_: partial correlation, lags up to 4 s, at most
-three conditions, Benjamini and Hochberg's correction; named is what has a link into the offset. Additive model: cubic splines of every column, whitened
-with the offset by an autoregression of 12 s, F test per column, Holm's correction [3]_. Boosting: gradient-boosted
-trees on columns now and 2 and 4 s ago, permutation importance on held-out blocks of 150 s or whole vehicles; named is
-what is above zero by two standard errors over the folds [4]_.
+three conditions, Benjamini and Hochberg's correction; named is what has a link into the offset. Additive model: cubic
+splines of every column, whitened with the offset by an autoregression of 12 s, F test per column, Holm's correction
+[3]_. Boosting: gradient-boosted trees on columns now and 2 and 4 s ago, permutation importance on held-out blocks of
+150 s or whole vehicles; named is what is above zero by two standard errors over the folds [4]_.
 
 References
 ----------
