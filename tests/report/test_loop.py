@@ -175,7 +175,7 @@ def test_an_error_clearly_above_the_floor_is_called_unexplained(
 def test_an_error_at_the_floor_is_not_called_unexplained(result: LoopResult) -> None:
     at_floor = lack_of_fit_of(replace(result, error_after=result.floor))
     assert not at_floor.clear
-    assert "No residual is left" in lack_of_fit_words(result, at_floor)
+    assert "do not exceed the floor" in lack_of_fit_words(result, at_floor)
 
 
 def test_the_json_keeps_to_the_schema_and_adds_the_meaning(

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.driver.profile import DriverProfile
-from xosc_lateral.evaluation.comparison import free_runs, summarise
+from xosc_lateral.evaluation.comparison import DURATION, free_runs, summarise
 from xosc_lateral.evaluation.spectra import Spectrum, spectrum
 from xosc_lateral.formats.profiles import profile_hash
 from xosc_lateral.report.cards import amount, effect_line, provenance_items
@@ -40,7 +40,7 @@ def card_page(profile: DriverProfile, seed: int = 0) -> str:
     summary = summarise(runs, step)
     known = profile.provenance
     side = "left" if summary.mean_offset > 0 else "right"
-    within = "" if known.drives == 1 else f"one driver over 5 min: {summary.spread_within:.2f} m"
+    within = "" if known.drives == 1 else f"one driver over {DURATION / 60:g} min: {summary.spread_within:.2f} m"
     return render_page(
         "card.html",
         title=f"Driver profile {profile.name}",
@@ -55,7 +55,9 @@ def card_page(profile: DriverProfile, seed: int = 0) -> str:
             KeyFigure(f"{abs(summary.mean_offset):.2f} m", f"mean offset, to the {side}"),
             KeyFigure(f"{summary.spread:.2f} m", "standard deviation over all drivers", within),
             KeyFigure(
-                f"{summary.low:+.2f} to {summary.high:+.2f} m", "5 % to 95 %", "positive: left of the lane centre"
+                f"{summary.low:+.2f} to {summary.high:+.2f}\N{NO-BREAK SPACE}m",
+                "5 % to 95 %",
+                "positive: left of the lane centre",
             ),
             KeyFigure(f"{summary.lateral_speed:.3f} m/s", "lateral speed", "root mean square"),
         ],

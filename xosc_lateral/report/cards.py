@@ -8,7 +8,7 @@ from typing import Any
 
 from xosc_lateral.driver.effects import Acts, ColumnEffect, Effect
 from xosc_lateral.driver.profile import DriverProfile, Provenance
-from xosc_lateral.evaluation.comparison import MovementSummary, summary_of
+from xosc_lateral.evaluation.comparison import DURATION, MovementSummary, summary_of
 from xosc_lateral.formats.library import FIELDS, Entry, facts_of
 from xosc_lateral.formats.profiles import profile_hash
 from xosc_lateral.report.render import render_text
@@ -192,7 +192,8 @@ def amount(profile: DriverProfile) -> str:
 def _spread(profile: DriverProfile, summary: MovementSummary) -> str:
     if profile.provenance.drives == 1:
         return f"{summary.spread:.2f} m"
-    return f"{summary.spread:.2f} m over all drivers, {summary.spread_within:.2f} m within one driver over 5 min"
+    within = f"{summary.spread_within:.2f} m within one driver over {DURATION / 60:g} min"
+    return f"{summary.spread:.2f} m over all drivers, {within}"
 
 
 def effect_line(effect: Effect) -> str:

@@ -120,7 +120,8 @@ def comparison_text(compared: Compared) -> str:
     lines += ["  ".join(f"{text:<{width}}" for text, width in zip(row.values(), widths, strict=True)) for row in rows]
     distance = compared.distance
     lines.append(
-        "mean distance of ten metrics of 10 s snippets, in standard deviations (diagonal: two halves of its drivers):"
+        f"mean distance of ten metrics of {SNIPPET:g} s snippets, in standard deviations "
+        "(diagonal: two halves of its drivers):"
     )
     width = max(map(len, names))
     for number, name in enumerate(names):

@@ -10,7 +10,7 @@ from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.evaluation.metrics import METRICS
 from xosc_lateral.evaluation.realism import Realism
 from xosc_lateral.evaluation.record import scores_to_dict
-from xosc_lateral.evaluation.scores import PartEvaluation, ProfileScores, SnippetScores
+from xosc_lateral.evaluation.scores import SNIPPET, PartEvaluation, ProfileScores, SnippetScores
 from xosc_lateral.evaluation.spectra import NEAR_MARKING, Margins
 from xosc_lateral.formats.profiles import profile_hash
 from xosc_lateral.report import evaluation_figures as figures
@@ -91,6 +91,7 @@ def evaluation_page(scores: ProfileScores, profile: DriverProfile, inputs: Mappi
         start_fade=start_fade_note(profile),
         metric_table=_metric_table,
         near_marking=f"{NEAR_MARKING:g}",
+        snippet=f"{SNIPPET:g}",
         part_rows=[_part_row(one) for one in scores.evaluations],
         margin_rows=[_margin_row("measured", scores.margins_real), _margin_row("sampled", scores.margins_sampled)],
         figures=figures,

@@ -16,6 +16,7 @@ from xosc_lateral.identification.scorecard import SNIPPET_ROWS
 from xosc_lateral.report.loop_words import (
     CERTAIN,
     LOOKS,
+    SPREAD,
     feedback_words,
     group_words,
     lack_of_fit_words,
@@ -176,7 +177,7 @@ def _residuals(result: LoopResult, lack_of_fit: LackOfFit) -> list[tuple[str, Fi
 
     return [
         (words, residual_figure(result, lack_of_fit, what))
-        for what, words in (("mean", "mean offset"), ("spread", "spread within 20 s"))
+        for what, words in (("mean", "mean offset"), ("spread", SPREAD))
         if any(name.startswith(f"{what} by ") and " by effect: " not in name for name in result.real)
     ]
 

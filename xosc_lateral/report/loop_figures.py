@@ -18,7 +18,7 @@ from xosc_lateral.identification.lack_of_fit import LackOfFit
 from xosc_lateral.identification.partial import curve_of
 from xosc_lateral.report.evaluation_figures import LABELS, density_over
 from xosc_lateral.report.figures import BLUE, GRID, MUTED, VERMILLION, figure_style, new_figure, new_panels
-from xosc_lateral.report.loop_words import column_label, product_label
+from xosc_lateral.report.loop_words import SPREAD, column_label, product_label
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -90,7 +90,7 @@ def effect_figure(result: LoopResult, finding: Finding) -> Figure:
     on_mean = effect.acts is Acts.LOCATION
     axis.set_title("Held-out blocks")
     axis.set_xlabel("shift by the effect [m]" if on_mean else "factor by the effect [-]")
-    axis.set_ylabel("mean offset [m]" if on_mean else "spread within 20 s [m]")
+    axis.set_ylabel("mean offset [m]" if on_mean else f"{SPREAD} [m]")
     axis.legend()
     return figure
 

@@ -22,6 +22,7 @@ from xosc_lateral.identification.moving_statistics import (
 )
 from xosc_lateral.report.figures import MUTED, ORANGE, figure_style, new_figure
 from xosc_lateral.report.loop_figures import AFTER, BEFORE, DRIVES, TWO_ERRORS, draw_spectra
+from xosc_lateral.report.loop_words import SPREAD
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -192,7 +193,7 @@ def quantiles_figure(result: LoopResult) -> Figure:
     ):
         axis.plot(100.0 * np.asarray(QUANTILES), cells["quantiles of local spread"], "o-", color=color, label=label)
     axis.set_xlabel("share of the time with less spread [%]")
-    axis.set_ylabel("spread within 20 s [m]")
+    axis.set_ylabel(f"{SPREAD} [m]")
     axis.set_ylim(bottom=0.0)
     axis.legend()
     return figure

@@ -12,6 +12,7 @@ from xosc_lateral.identification.close import LoopResult
 from xosc_lateral.identification.feedback import BAND, Feedback
 from xosc_lateral.identification.findings import Finding
 from xosc_lateral.identification.lack_of_fit import GroupError, LackOfFit
+from xosc_lateral.identification.timeline import LOCAL_S
 from xosc_lateral.segment import CONTEXT_UNITS
 
 CERTAIN = 1e-4
@@ -19,6 +20,9 @@ CERTAIN = 1e-4
 
 GAP = "\N{NO-BREAK SPACE}"
 """Between a number and its unit: they stay on one line."""
+
+SPREAD = f"spread within {LOCAL_S:g}{GAP}s"
+"""What the local standard deviation is called in figures."""
 
 HINTS: Mapping[str, str] = MappingProxyType(
     {
@@ -164,7 +168,10 @@ def outcome(result: LoopResult) -> str:
 def lack_of_fit_words(result: LoopResult, lack_of_fit: LackOfFit) -> str:
     """What is left unexplained, in a sentence."""
     if lack_of_fit.unexplained == 0.0:
-        return "No residual is left above the floor: what the profile still misses cannot be measured on these drives."
+        return (
+            "Taken together, the residuals do not exceed the floor: what the profile still misses cannot be told from "
+            "chance on these drives."
+        )
     if not lack_of_fit.clear:
         return (
             "The remaining residual is not significant: the error after is above the floor, but in "
