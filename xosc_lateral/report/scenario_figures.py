@@ -329,7 +329,8 @@ def gaps_before_and_after(pairs: Sequence[tuple[Gap | None, Gap | None]]) -> Fig
                 (drawn[label],) = ax.plot(gap.distance, number, "o", color=color, label=said, zorder=2)
     ax.set_yticks(range(len(pairs)), names)
     ax.set_ylim(len(pairs) - 0.4, -0.6)
-    ax.set_xlim(left=min(0.0, ax.get_xlim()[0]))
+    left, right = min(0.0, ax.get_xlim()[0]), ax.get_xlim()[1]
+    ax.set_xlim(left, right + 0.02 * (right - left))  # room for the last marker, however close all gaps are
     ax.set_xlabel("smallest free space [m]")
     figure.legend(drawn.values(), drawn.keys(), ncols=2, loc="outside upper right")
     return figure
