@@ -14,12 +14,11 @@ from xosc_lateral.driver.plausibility import check_offsets
 from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.driver.sampling import OffsetSampler
 from xosc_lateral.driver.sensor.error import known_sensor, sensor_error
+from xosc_lateral.enrich.consequences import gaps_of, lane_departures
 from xosc_lateral.enrich.give_way import Sampled, give_way
-from xosc_lateral.enrich.result import Enriched, EntityResult, LaneDeparture, SampledSegment
-from xosc_lateral.mask import stretches_of
+from xosc_lateral.enrich.result import Enriched, EntityResult, SampledSegment
 from xosc_lateral.motion.context import entity_context
 from xosc_lateral.motion.deviation import SETTLING_TIME, SampledStretch, deviation_through
-from xosc_lateral.motion.gaps import BoxPath, Gap, smallest_gaps
 from xosc_lateral.motion.nominal import Activity, EntityMotion, NominalMotion
 from xosc_lateral.motion.segments import Stretch, cut_stretches
 from xosc_lateral.motion.trajectory import Trajectory, displace, distance_driven
@@ -39,9 +38,6 @@ NEIGHBOURS = frozenset(
     f"{side}_{what}" for side in ("left", "right") for what in ("distance", "is_truck", "truck", "car")
 ) | {"truck_left", "truck_right", "car_left", "car_right"}
 """Columns by which a profile answers to neighbours by itself."""
-
-GAP_STEP = 0.1
-"""Rows that gaps are looked for on. [s]"""
 
 Drivers = Mapping[str, DriverProfile | str]
 """Per entity the profile that drives it, or the reason why it gets none."""
@@ -96,7 +92,7 @@ def enrich(
     stretches = {
         entity.name: cut_stretches(entity, network, is_trailer=entity.name in trailers) for entity in motion.entities
     }
-    gaps_before = _gaps(motion, [_nominal(entity) for entity in motion.entities])
+    gaps_before = gaps_of(motion, [_nominal(entity) for entity in motion.entities])
     best: Enriched | None = None
     for attempt in range(max(1, attempts)):
         drawn = [
@@ -114,8 +110,8 @@ def enrich(
         ]
         entities = tuple(_result(one, network) for one in (_apart(drawn, motion, network) if joint else drawn))
         entities = _with_trailers(entities, network, trailers)
-        gaps_after = _gaps(motion, [entity.trajectory for entity in entities])
-        departures = tuple(found for entity in entities for found in _departures(entity, network))
+        gaps_after = gaps_of(motion, [entity.trajectory for entity in entities])
+        departures = tuple(found for entity in entities for found in lane_departures(entity, network))
         result = Enriched(motion, network, entities, gaps_before, gaps_after, departures, seed, variant, attempt)
         if best is None or _trouble(result) < _trouble(best):
             best = result
@@ -314,47 +310,3 @@ def _filled(values: FloatArray, inside: slice) -> FloatArray:
 
 def _unknown(driver: DriverProfile, segment: Segment) -> set[str]:
     return {column for effect in driver.effects for column in effect.columns if column not in segment.context}
-
-
-def _departures(entity: EntityResult, network: RoadNetwork) -> list[LaneDeparture]:
-    """Where the enriched reference point is outside the nominal lane although the nominal one is inside: worst row."""
-    found = []
-    motion = entity.motion
-    stretches = [(segment.stretch.first, segment.stretch.last) for segment in entity.segments]
-    for first, last in stretches + _lateral_within_a_lane(motion):
-        rows = slice(first, last + 1)
-        half = 0.5 * network.lane_width(motion.road[rows], motion.lane[rows], motion.s[rows])
-        beyond = np.abs(motion.offset[rows] + entity.deviation[rows]) - half
-        left = (beyond > 0.0) & (np.abs(motion.offset[rows]) <= half)
-        if left.any():
-            worst = int(np.argmax(np.where(left, beyond, -np.inf)))
-            found.append(LaneDeparture(entity.name, float(motion.time[rows][worst]), float(beyond[worst])))
-    return found
-
-
-def _lateral_within_a_lane(motion: EntityMotion) -> list[tuple[int, int]]:
-    """First and last row of lateral actions that keep to one lane: distances kept beside others, offsets in the lane.
-
-    Lane changes cross markings anyway.
-    """
-    lateral = (
-        ((motion.activity & Activity.LATERAL) != 0) & ((motion.activity & Activity.ACTIVE) != 0) & (motion.road >= 0)
-    )
-    return [(part.start, part.stop - 1) for part in stretches_of(lateral) if len(set(motion.lane[part].tolist())) == 1]
-
-
-def _gaps(motion: NominalMotion, trajectories: Sequence[Trajectory]) -> tuple[Gap, ...]:
-    every = max(1, round(GAP_STEP / motion.step))
-    paths = []
-    for entity, path in zip(motion.entities, trajectories, strict=True):
-        if not entity.entity.is_vehicle:
-            continue
-        box = entity.entity.bounding_box
-        absent = ((entity.activity & Activity.ACTIVE) == 0)[::every]
-        x = np.where(absent, np.nan, path.x[::every])
-        paths.append(
-            BoxPath(entity.name, x, path.y[::every], path.heading[::every], box.length, box.width, box.center_x)
-        )
-    if not paths:
-        return ()
-    return smallest_gaps(motion.entities[0].time[::every], paths)

@@ -21,6 +21,14 @@ from numpy.typing import NDArray
 
 from xosc_lateral.driver.effects import Acts, ColumnEffect
 from xosc_lateral.identification.autocorrelation import Whitener, fit_autoregression, start_factors, unbiased
+from xosc_lateral.identification.log_scale import (
+    CLIP,
+    bounded,
+    clipped_squares,
+    covariance_of_log_sizes,
+    own_levels,
+    scoring_step,
+)
 from xosc_lateral.identification.timeline import Timeline, coarse_all, coarse_mean, coarse_middle
 
 FloatArray = NDArray[np.float64]
@@ -35,19 +43,6 @@ LONGEST = 96
 
 ROUNDS = 4
 """Turns of sizes, autoregression and scale; they settle in three."""
-
-CLIP = 9.0
-"""Squared innovations (variance 1) beyond this count as this: three standard deviations. [-]"""
-
-MOST_LOG_SCALE = 3.0
-"""Scale terms together change the movement by at most this factor's logarithm, 20 either way: scoring steps of a factor
-that the movement contradicts grow without end. [-]"""
-
-CLUSTER_S = 60
-"""Length of the stretches whose squares count as one cluster in errors of the log scale. [s]"""
-
-OWN_LEVEL_S = 30.0
-"""A drive's level of the scale is its own as far as it lasts longer than this. [s]"""
 
 MIN_DRIFT_S = 600.0
 """A shorter drive tells nothing about drift or a trend of the variance. [s]"""
@@ -227,6 +222,7 @@ def fit_model(coarse: Coarse, terms: Sequence[ModelTerm]) -> Fitted:
     sizes, log_sizes = np.zeros(columns.shape[1]), np.zeros(scales.shape[1])
     covariance = np.zeros((len(sizes), len(sizes)))
     levels, spread = coarse.by_drive(coarse.offset), np.ones(coarse.drives)
+    valid, drive = coarse.valid, coarse.drive
     for _ in range(ROUNDS):
         scale = np.exp(scales @ log_sizes + known) * spread[coarse.drive]
         left = coarse.offset - columns @ sizes - levels[coarse.drive]
@@ -240,15 +236,15 @@ def fit_model(coarse: Coarse, terms: Sequence[ModelTerm]) -> Fitted:
         rows = response - design @ sizes
         levels = whitener.levels(coarse.offset - columns @ sizes)
         if scales.shape[1]:
-            log_sizes = _bounded(log_sizes + _log_scale_step(scales, rows, coarse), scales[coarse.valid])
-        spread = spread * np.sqrt(own_levels(_clipped_squares(rows, coarse.valid), coarse.valid, coarse.drive))
+            log_sizes = bounded(log_sizes + scoring_step(scales, rows, valid, drive), scales[valid])
+        spread = spread * np.sqrt(own_levels(clipped_squares(rows, valid), valid, drive))
     n = int(coarse.valid.sum())
     variance = float(rows @ rows) / max(1, n - len(sizes))
     left = np.where(coarse.valid, coarse.offset - columns @ sizes - levels[coarse.drive], 0.0)
     starts = start_factors(rows, coarse.valid, process.order)
     return Fitted(
         coarse, tuple(terms), whitener, columns, sizes, covariance, levels, scales, log_sizes,
-        _scale_covariance(scales, rows, coarse), rows / np.sqrt(variance), left / scale, starts,
+        covariance_of_log_sizes(scales, rows, valid, drive), rows / np.sqrt(variance), left / scale, starts,
         _log_likelihood(rows, whitener, starts),
     )  # fmt: skip
 
@@ -288,24 +284,6 @@ def elapsed(coarse: Coarse) -> FloatArray:
     return share
 
 
-def squared_innovations(rows: FloatArray, valid: BoolArray) -> FloatArray:
-    """Clipped squares, standardised over the valid rows; 0 elsewhere."""
-    squares = np.minimum(rows**2, CLIP)
-    mean, deviation = squares[valid].mean(), squares[valid].std()
-    return np.where(valid, (squares - mean) / max(deviation, 1e-12), 0.0)
-
-
-def own_levels(squares: FloatArray, valid: BoolArray, drive: IntArray) -> FloatArray:
-    """Mean square of every drive over that of all, shape (drives,); 1 for a single drive, near 1 for short ones."""
-    groups = int(drive.max()) + 1
-    if groups == 1 or not valid.any():
-        return np.ones(groups)
-    relative = squares / max(float(squares[valid].mean()), 1e-300)
-    seconds = np.bincount(drive, valid.astype(float), minlength=groups)
-    sums = np.bincount(drive, np.where(valid, relative, 0.0), minlength=groups)
-    return np.asarray((sums + OWN_LEVEL_S) / (seconds + OWN_LEVEL_S))
-
-
 def _within(values: FloatArray, valid: BoolArray) -> FloatArray:
     seen = values[valid & np.isfinite(values)]
     return np.clip(values, seen.min(), seen.max()) if len(seen) else values
@@ -340,44 +318,3 @@ def _least_squares(design: FloatArray, response: FloatArray) -> tuple[FloatArray
     scores = design * (response - design @ sizes)[:, None]
     freedom = len(response) / max(1, len(response) - design.shape[1])
     return sizes, np.asarray(inverse @ (scores.T @ scores) @ inverse * freedom, dtype=np.float64)
-
-
-def _clipped_squares(rows: FloatArray, valid: BoolArray) -> FloatArray:
-    return np.asarray(np.minimum(np.square(rows) / np.mean(rows[valid] ** 2), CLIP))
-
-
-def _within_drives(scales: FloatArray, coarse: Coarse) -> FloatArray:
-    """Valid rows of the scale's columns about their drive's mean."""
-    means = np.stack([coarse.by_drive(column) for column in scales.T], axis=1)
-    return np.asarray((scales - means[coarse.drive])[coarse.valid])
-
-
-def _log_scale_step(scales: FloatArray, rows: FloatArray, coarse: Coarse) -> FloatArray:
-    """One Fisher-scoring step for log sd = scales . sizes (variance of a squared normal is 2)."""
-    variance = np.minimum(rows[coarse.valid] ** 2, CLIP * float(np.mean(rows[coarse.valid] ** 2)))
-    design = _within_drives(scales, coarse)
-    return np.asarray(np.linalg.pinv(2.0 * design.T @ design) @ (design.T @ (variance / variance.mean() - 1.0)))
-
-
-def _bounded(log_sizes: FloatArray, scales: FloatArray) -> FloatArray:
-    reach = float(np.max(np.abs(scales @ log_sizes), initial=0.0))
-    return log_sizes * min(1.0, MOST_LOG_SCALE / max(reach, 1e-300))
-
-
-def _scale_covariance(scales: FloatArray, rows: FloatArray, coarse: Coarse) -> FloatArray:
-    """Sandwich with stretches as clusters [1]_: squares have heavy tails and come in clusters.
-
-    References
-    ----------
-    .. [1] K.-Y. Liang, S. Zeger, "Longitudinal data analysis using generalized linear models", Biometrika 73, 1986.
-    """
-    if scales.shape[1] == 0:
-        return np.zeros((0, 0))
-    design = _within_drives(scales, coarse)
-    bread = np.linalg.pinv(2.0 * design.T @ design)
-    squares = _clipped_squares(rows, coarse.valid)[coarse.valid]
-    scores = design * (squares / squares.mean() - 1.0)[:, None]
-    stretch = np.flatnonzero(coarse.valid) // CLUSTER_S
-    edges = np.flatnonzero(np.diff(stretch, prepend=-1))
-    sums = np.add.reduceat(scores, edges, axis=0)
-    return np.asarray(bread @ (sums.T @ sums) @ bread * len(sums) / max(1, len(sums) - 1))

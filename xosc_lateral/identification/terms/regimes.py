@@ -9,8 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.driver.effects import Effect, Regimes
+from xosc_lateral.identification.log_scale import squared_innovations
 from xosc_lateral.identification.markov_switching import RegimeFit, fit_regimes
-from xosc_lateral.identification.regression import Coarse, Fitted, squared_innovations
+from xosc_lateral.identification.regression import Coarse, Fitted
 from xosc_lateral.identification.significance import upper_tail
 from xosc_lateral.identification.squares import SLOW_S, fine_squares, log_sizes, slow_squares
 from xosc_lateral.identification.terms.base import Description, Outcome, Removal, Term

@@ -9,8 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.driver.effects import Acts, ColumnEffect, Effect
+from xosc_lateral.identification.log_scale import squared_innovations
 from xosc_lateral.identification.problem import Problem, of_squares
-from xosc_lateral.identification.regression import Coarse, Fitted, squared_innovations
+from xosc_lateral.identification.regression import Coarse, Fitted
 from xosc_lateral.identification.squares import fine_squares, log_sizes
 from xosc_lateral.identification.terms.base import Term
 from xosc_lateral.identification.terms.column import ColumnTerm, columns_on_size

@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.driver.effects import Effect, GrowingSpread
-from xosc_lateral.identification.regression import Coarse, Fitted, elapsed, squared_innovations
+from xosc_lateral.identification.log_scale import squared_innovations
+from xosc_lateral.identification.regression import Coarse, Fitted, elapsed
 from xosc_lateral.identification.significance import LEAST
 from xosc_lateral.identification.squares import SLOW_S, fine_squares, log_sizes, slow_squares
 from xosc_lateral.identification.terms.base import Description, Outcome, Removal, Term
