@@ -67,7 +67,7 @@ format: $(DEV_STAMP)
 # The documentation site, into out/site: references from the code, pages from docs/. A warning is an error.
 docs: $(DOCS_STAMP)
 	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --strict --quiet
-	@echo "Open out/site/index.html"
+	@echo "Open out/site/index.html; its search needs a server: python3 -m http.server -d out/site"
 
 # JSON Schema of profile files, from the types.
 schema: $(STAMP)
