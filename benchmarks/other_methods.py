@@ -36,7 +36,7 @@ import numpy as np
 import pandas as pd
 
 from benchmarks.identification_drives import long_drive, offset_of, short_drives, with_mean
-from benchmarks.identification_study import PROTOCOL, cases, right
+from benchmarks.identification_study import PROTOCOL, cases, false, right
 
 Values = np.ndarray
 LAGS_S = 4
@@ -198,8 +198,8 @@ def run(case: dict[str, Any], protocol: dict[str, Any]) -> dict[str, Any]:
             continue
         started = time.process_time()
         named = method(*series)
-        correct, false = judged(case, named)
-        outcome[name] = {"right": correct, "false": false, "cpu_s": round(time.process_time() - started, 1)}
+        correct, other = judged(case, named)
+        outcome[name] = {"right": correct, "false": other, "cpu_s": round(time.process_time() - started, 1)}
     return outcome
 
 
@@ -217,7 +217,7 @@ def table_of(outcomes: list[dict[str, Any]], loop: dict[int, dict[str, Any]]) ->
             lines.append(_line(name, f"{len(own)}, {what}", len(planted), hits, wrong, seconds))
         mine = [loop[one["seed"]] for one in own]
         hits = sum(right(one) for one in mine if "accepted" in one)
-        wrong = sum(bool(_loop_false(one)) for one in mine)
+        wrong = sum(bool(false(one)) for one in mine)
         seconds = np.median([one["cpu_s"] for one in mine])
         lines.append(_line("this loop", f"{len(own)}, {what}", len(planted), hits, wrong, seconds))
     return "\n".join(lines)
@@ -225,12 +225,6 @@ def table_of(outcomes: list[dict[str, Any]], loop: dict[int, dict[str, Any]]) ->
 
 def _line(method: str, drives: str, planted: int, hits: int, wrong: int, seconds: float) -> str:
     return f"| {method} | {drives} | {planted} | {hits} | {planted - hits} | {wrong} | {seconds:.1f} |"
-
-
-def _loop_false(one: dict[str, Any]) -> list[Any]:
-    from benchmarks.identification_study import false
-
-    return false(one)
 
 
 def main() -> None:

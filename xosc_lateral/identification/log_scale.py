@@ -13,6 +13,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from xosc_lateral.identification.timeline import means_by_drive
+
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
 IntArray = NDArray[np.intp]
@@ -56,8 +58,7 @@ def clipped_squares(rows: FloatArray, valid: BoolArray) -> FloatArray:
 
 def _within_drives(scales: FloatArray, valid: BoolArray, drive: IntArray) -> FloatArray:
     """Valid rows of the scale's columns about their drive's mean."""
-    count = np.maximum(np.bincount(drive, valid.astype(float)), 1.0)
-    means = np.stack([np.bincount(drive, np.where(valid, column, 0.0)) / count for column in scales.T], axis=1)
+    means = np.stack([means_by_drive(column, valid, drive) for column in scales.T], axis=1)
     return np.asarray((scales - means[drive])[valid])
 
 

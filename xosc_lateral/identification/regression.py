@@ -29,7 +29,7 @@ from xosc_lateral.identification.log_scale import (
     own_levels,
     scoring_step,
 )
-from xosc_lateral.identification.timeline import Timeline, coarse_all, coarse_mean, coarse_middle
+from xosc_lateral.identification.timeline import Timeline, coarse_all, coarse_mean, coarse_middle, means_by_drive
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
@@ -119,9 +119,7 @@ class Coarse:
 
     def by_drive(self, values: FloatArray) -> FloatArray:
         """Mean over the valid rows of each drive, shape (drives,); 0 where there are none."""
-        count = np.bincount(self.drive, self.valid.astype(float), minlength=self.drives)
-        sums = np.bincount(self.drive, np.where(self.valid, values, 0.0), minlength=self.drives)
-        return np.asarray(sums / np.maximum(count, 1.0))
+        return means_by_drive(values, self.valid, self.drive)
 
 
 class ModelTerm(Protocol):

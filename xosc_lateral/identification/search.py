@@ -80,14 +80,12 @@ class Search:
 
     def cross_basis(self, columns: Collection[str]) -> FloatArray:
         """What columns can do in any shape, at any lag and response, at 1 Hz, orthonormal, shape (n, rank)."""
-        own = [i for i, one in enumerate(self.quantities.candidates) if set(one.columns) <= set(columns)]
+        known = frozenset(columns)
+        own = [i for i, one in enumerate(self.quantities.candidates) if known.issuperset(one.columns)]
         values = self.quantities.values[own].astype(np.float64).T
         seconds, valid = np.arange(len(self.coarse)), self.coarse.valid[:, None]
-        blocks = [
-            respond_by_second(values, response)[np.clip(seconds - lag, 0, len(seconds) - 1)] * valid
-            for response in RESPONSES
-            for lag in LAGS
-        ]
+        answers = [respond_by_second(values, response) for response in RESPONSES]
+        blocks = [answer[np.clip(seconds - lag, 0, len(seconds) - 1)] * valid for answer in answers for lag in LAGS]
         return orthonormal(np.concatenate(blocks, axis=1), CROSS_BASIS)
 
     def rng(self, *key: int) -> np.random.Generator:

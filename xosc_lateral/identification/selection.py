@@ -123,9 +123,9 @@ def _tested_again(search: Search, selection: Selection, one: Accepted) -> Select
     Rotations keep how loud the movement is, not where: a column that goes along with loud stretches scores on the mean.
     And what no column explained may be explained by one that was found later.
     """
-    if not any(accepted.term is one.term for accepted in selection.accepted):
+    if one not in selection.accepted:
         return selection
-    later = [other.term for other in selection.accepted[_place(selection, one.term) + 1 :]]
+    later = [other.term for other in selection.accepted[selection.accepted.index(one) + 1 :]]
     if one.term.component == "mean":
         explains = [term for term in later if _changes_scale(term, search)]
     else:
@@ -141,10 +141,6 @@ def _tested_again(search: Search, selection: Selection, one: Accepted) -> Select
         and test.p_value <= level_of(one.term.component)
     )
     return selection if stands else without
-
-
-def _place(selection: Selection, term: Term) -> int:
-    return next(at for at, one in enumerate(selection.accepted) if one.term is term)
 
 
 def _changes_scale(term: Term, search: Search) -> bool:

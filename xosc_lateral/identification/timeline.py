@@ -146,6 +146,14 @@ def coarse_all(mask: BoolArray) -> BoolArray:
     return np.asarray(mask[: n * COARSE].reshape(n, COARSE).all(axis=1))
 
 
+def means_by_drive(values: FloatArray, valid: BoolArray, drive: IntArray) -> FloatArray:
+    """Mean over the valid rows of each drive, shape (drives,); 0 where there are none."""
+    drives = int(drive.max()) + 1
+    count = np.bincount(drive, valid.astype(float), minlength=drives)
+    sums = np.bincount(drive, np.where(valid, values, 0.0), minlength=drives)
+    return np.asarray(sums / np.maximum(count, 1.0))
+
+
 def on_fine_grid(values: FloatArray, timeline: Timeline) -> FloatArray:
     """From the middles of the seconds, shape (n // 5, ...), to the 0.2 s grid: steps of a second would be noise."""
     n = len(timeline)
