@@ -23,8 +23,8 @@ def rounded_number(value: float, digits: int = DIGITS) -> float:
 
 def rounded_effect(effect: E) -> E:
     """The same effect with every number that is not whole rounded to `DIGITS` significant digits."""
-    fields = {field.name: getattr(effect, field.name) for field in msgspec.structs.fields(effect)}
-    return msgspec.structs.replace(effect, **{name: _rounded(value) for name, value in fields.items()})
+    rounded: E = _rounded(effect)
+    return rounded
 
 
 def _rounded(value: Any) -> Any:
