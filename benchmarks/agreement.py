@@ -48,10 +48,10 @@ def reference_rows(
         log = Path(folder) / "log.csv"
         command = [str(esmini), "--osc", str(scenario.resolve()), "--headless", "--fixed_timestep", str(step)]
         command += ["--disable_controllers", "--disable_stdout", "--seed", str(seed), "--csv_logger", str(log)]
-        command += ["--logfile_path", str(Path(folder) / "log.txt"), *(f"--{name}" for name in switches)]
+        command += ["--logfile_path", str(Path(folder) / "log.txt"), *_options(switches)]
         player = subprocess.Popen(command, cwd=folder, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
         _wait(player, log, limit)
-        rows = _logged(log, limit)
+        rows = _logged(_written(log), limit)
     return pd.DataFrame(rows, columns=["time", "name", "x", "y", "speed"])
 
 
@@ -62,10 +62,20 @@ def _wait(player: subprocess.Popen[bytes], log: Path, limit: float) -> None:
             player.wait(0.2)
             return
         except subprocess.TimeoutExpired:
-            if _last_time(log) > limit:
+            if _last_time(_written(log)) > limit:
                 break
     player.kill()
     player.wait()
+
+
+def _options(words: Sequence[str]) -> list[str]:
+    """Names of switches, as words of the command line; other words are values."""
+    return [word if word.startswith("--") or word.isdecimal() else f"--{word}" for word in words]
+
+
+def _written(log: Path) -> Path:
+    """The log: one that is drawn from a distribution has its number in its name."""
+    return next(log.parent.glob(f"{log.stem}_*_of_*{log.suffix}"), log)
 
 
 def _last_time(log: Path) -> float:

@@ -204,7 +204,7 @@ def _convert_one(
         outputs = [numbered(target, variant, variants) for variant in range(variants)]
         pages = [None if page is None else numbered(page, variant, variants) for variant in range(variants)]
         files = variant_files(target, variants, settings["mode"], settings["player"])
-        claim([*outputs, *pages, *(files or ())], [source], force=settings["force"])
+        claim([*outputs, *pages, *(files.all(variants) if files else ())], [source], force=settings["force"])
         unclean = False
         for variant, (path, its_page) in enumerate(zip(outputs, pages, strict=True)):
             result = convert(source, path, variant=variant, report=its_page, **settings)

@@ -10,7 +10,7 @@ from pathlib import Path
 from xosc_lateral.errors import FormatError, XoscLateralError
 from xosc_lateral.formats.openscenario.distribution import read_distribution
 from xosc_lateral.formats.openscenario.references import Boundary, allowed_roots
-from xosc_lateral.formats.openscenario.write import source_of_set
+from xosc_lateral.formats.openscenario.write import source_of_set, variant_index
 from xosc_lateral.limits import PARAMETER_SETS
 from xosc_lateral.pipeline.request import DISTRIBUTIONS, DocumentKind, Request
 from xosc_lateral.pipeline.settings import ConvertSettings
@@ -72,11 +72,12 @@ def _one(request: Request, scenario: Path, index: int, values: ParameterSet) -> 
         parameters = {**values, **request.settings.parameters}
         return Concrete(scenario, suffix, replace(request.settings, parameters=parameters))
     source, parameter = found
-    number = values.get(parameter, "")
-    if not number.isdecimal() or int(number) < 1:
-        raise FormatError(f"{parameter} '{number[:20]}' is not a whole number from 1 on", path=request.scenario)
+    name = values.get(parameter, "")
+    variant = variant_index(name)
+    if variant is None:
+        raise FormatError(f"{parameter} '{name[:20]}' names no variant ('variant_1' would)", path=request.scenario)
     boundary = Boundary(scenario.parent, allowed_roots(scenario, request.settings.allowed))
     path = boundary.inside(source, Place(str(scenario), None, "provenance"))
     if not path.is_file():
         raise FormatError(f"its scenario '{source}' is not there", path=scenario)
-    return Concrete(path, suffix, request.settings, variant=int(number) - 1)
+    return Concrete(path, suffix, request.settings, variant=variant)

@@ -1,17 +1,18 @@
-"""Variants of one scenario as a logical scenario: one file in which parameters choose, and a distribution of them.
+"""Variants of one scenario as a logical scenario: one parameter chooses among them, and distributions of its value.
 
-What differs between converted variants is taken out: trajectories become entries of a catalog, numbers (where a car
-starts) become parameters. Any tool that reads parameter value distributions can then draw a variant and play it.
+Whoever draws from a stochastic distribution draws every parameter by itself. So what belongs together has to hang on
+one: its value is the name of a catalog, which holds all trajectories of that variant and, as trajectories to stand at
+the beginning of, the places where vehicles are put. A `CatalogReference` takes a parameter as its `catalogName` in
+every version of the standard, and a `TrajectoryPosition` is a position since 1.1, the first version with distributions.
 """
 
 from __future__ import annotations
 
 import copy
-import re
-from collections.abc import Mapping, Sequence
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 from lxml import etree
 
@@ -19,59 +20,45 @@ from xosc_lateral.errors import FormatError
 from xosc_lateral.formats.atomic import write_atomically
 from xosc_lateral.formats.openscenario.element import local_name
 from xosc_lateral.formats.openscenario.provenance import HEADER_MARK, mark, provenance_of
-from xosc_lateral.formats.openscenario.write import build
+from xosc_lateral.formats.openscenario.write import build, distributions
+from xosc_lateral.formats.openscenario.write.distributions import VariantFiles, variant_name
 from xosc_lateral.formats.xml import read_document
 
 VARIANT = "variant"
-"""Parameter that says which variant it is, from 1; with a number where the scenario has one of that name."""
+"""Parameter that says which variant it is; with a number where the scenario has one of that name."""
 SOURCE = "source"
 """In the provenance of a set: where the scenario lies that it was made from, and the parameter of the variant."""
-_POSE = frozenset("xyzhpr")
 _FIRST_WITH_DISTRIBUTIONS = (1, 1)
-
-
-@dataclass(frozen=True, slots=True)
-class VariantFiles:
-    """Names of the files of a set."""
-
-    logical: Path
-    catalog: Path
-    distribution: Path
-
-    @classmethod
-    def beside(cls, output: Path) -> VariantFiles:
-        """For variants that are called like an output, with numbers."""
-        names = (f"{output.stem}_{part}.xosc" for part in ("set", "trajectories", "distribution"))
-        return cls(*(output.with_name(name) for name in names))
-
-    def __iter__(self) -> Any:
-        """One after another."""
-        return iter((self.logical, self.catalog, self.distribution))
 
 
 @dataclass(slots=True)
 class _Difference:
     """What differs between variants, collected on the way through all of them at once."""
 
-    catalog_name: str
-    taken: set[str] = field(default_factory=set)  # names of the scenario's own parameters
-    entries: list[etree._Element] = field(default_factory=list)
-    values: dict[str, tuple[str, list[str]]] = field(default_factory=dict)  # name -> type, a value per variant
+    parameter: str
+    catalogs: list[list[etree._Element]]  # trajectories of each variant
+    places: int = 0
+    _names: set[str] = field(default_factory=set)
 
-    def parameter(self, name: str, kind: str, values: list[str]) -> str:
-        """Declare one, under a name that is free."""
-        name = re.sub(r"\W", "_", name, flags=re.ASCII)
-        name = f"_{name}" if name[:1].isdigit() else name
-        unique, number = name, 1
-        while unique in self.values or unique in self.taken:
+    def reference(self, entries: Sequence[etree._Element]) -> etree._Element:
+        """Put an entry into each variant's catalog, all of one name; a reference to the one that is chosen."""
+        name = unique = str(entries[0].get("name"))
+        number = 1
+        while unique in self._names:
             number += 1
-            unique = f"{name}_{number}"
-        self.values[unique] = kind, values
-        return f"${unique}"
+            unique = f"{name} ({number})"
+        self._names.add(unique)
+        for catalog, entry in zip(self.catalogs, entries, strict=True):
+            entry.set("name", unique)
+            entry.tail = None
+            catalog.append(entry)
+        return etree.Element("CatalogReference", {"catalogName": f"${self.parameter}", "entryName": unique})
 
 
-def write_variant_set(variants: Sequence[Path], files: VariantFiles, source: str) -> None:
-    """Write the logical scenario, its catalog of trajectories and the distribution.
+def write_variant_set(
+    variants: Sequence[Path], files: VariantFiles, source: str, *, weights: Sequence[float] | None = None
+) -> None:
+    """Write the logical scenario, a catalog of trajectories per variant, and the distributions.
 
     Parameters
     ----------
@@ -81,6 +68,8 @@ def write_variant_set(variants: Sequence[Path], files: VariantFiles, source: str
         In the variants' folder: references are taken over.
     source : str
         Where the scenario lies that they were made from, as seen from there.
+    weights : sequence of float, optional
+        How probable each variant is, in any unit; alike by default, since each was sampled as probable as it is.
 
     Raises
     ------
@@ -91,26 +80,31 @@ def write_variant_set(variants: Sequence[Path], files: VariantFiles, source: str
     root = copy.deepcopy(roots[0])
     header = root.find("{*}FileHeader")
     assert header is not None
-    version = int(header.get("revMajor") or 1), int(header.get("revMinor") or 0)
-    whole = "integer" if version < (1, 2) else "int"
-    declared = (item for item in root.iterfind("{*}ParameterDeclarations/{*}ParameterDeclaration"))
-    difference = _Difference(files.catalog.stem, {str(item.get("name")) for item in declared})
-    number = difference.parameter(VARIANT, whole, [str(k + 1) for k in range(len(roots))]).removeprefix("$")
+    version = max((int(header.get("revMajor") or 1), int(header.get("revMinor") or 0)), _FIRST_WITH_DISTRIBUTIONS)
+    header.set("revMinor", str(version[1]))
+    difference = _Difference(_free_name(root), [[] for _ in roots])
     try:
         _compare(root, roots, difference)
     except _NotAlikeError as error:
         raise FormatError(f"is not a variant of the same scenario ({error})", path=variants[0]) from error
     facts = dict(provenance_of(roots[0]) or {})
-    facts |= {"variant": None, "variants": len(roots), SOURCE: [source, number]}
+    facts |= {"variant": None, "variants": len(roots), SOURCE: [source, difference.parameter]}
     _unmark(root, header)
     summary = f"set of {len(roots)} variants, seed {facts.get('seed')}"
-    _declare(root, header, difference)
-    if difference.entries:
-        _locate(root, header, files.logical)
+    names = [variant_name(k, len(roots)) for k in range(len(roots))]
+    _declare(root, header, difference.parameter, names[0])
+    if any(difference.catalogs):
+        _locate(root, header, files, difference.parameter)
     mark(root, facts, summary)
-    write_atomically(files.catalog, _catalog(difference, version, summary))
+    for name, catalog in zip(names, difference.catalogs, strict=True):
+        if catalog:
+            write_atomically(files.catalog(name), distributions.catalog(name, catalog, version, summary))
     write_atomically(files.logical, build.document(root))
-    write_atomically(files.distribution, _distribution(difference, files.logical.name, version, summary))
+    seed = facts.get("seed")
+    drawn = distributions.Drawn(difference.parameter, names, files.logical.name, version, summary)
+    write_atomically(files.distribution, drawn.one_after_another())
+    runs = drawn.at_random(weights or [1.0] * len(names), seed if isinstance(seed, int) else 0)
+    write_atomically(files.stochastic, runs)
 
 
 def source_of_set(path: Path) -> tuple[str, str] | None:
@@ -126,57 +120,82 @@ def source_of_set(path: Path) -> tuple[str, str] | None:
 
 
 class _NotAlikeError(Exception):
-    """Something other than a trajectory or a value differs."""
+    """Something other than a trajectory, a place or a speed to begin with differs."""
 
 
 def _compare(item: etree._Element, others: Sequence[etree._Element], difference: _Difference) -> None:
     if any(other.tag != item.tag for other in others):
         raise _NotAlikeError(f"{local_name(item)} is not in all of them")
-    if local_name(item) == "FileHeader":
+    tag = local_name(item)
+    if tag == "FileHeader":
         return  # says which variant it is
-    if local_name(item) == "Trajectory":
-        _into_catalog(item, others, difference)
+    if tag in ("Trajectory", "WorldPosition") and len({etree.tostring(other, with_tail=False) for other in others}) > 1:
+        _into_catalogs(item, others, difference)
         return
-    for name in sorted({str(name) for other in others for name in other.attrib}):
-        values = [other.get(name) for other in others]
-        if len(set(values)) > 1:
-            if not all(values):
-                raise _NotAlikeError(f"{local_name(item)}/@{name}")
-            what = name if name in _POSE else local_name(item)
-            item.set(name, difference.parameter(f"{_owner(item)}_{what}", "double", [str(value) for value in values]))
+    if not _begins_with_a_speed(item):
+        for name in sorted({str(name) for other in others for name in other.attrib}):
+            if len({other.get(name) for other in others}) > 1:
+                raise _NotAlikeError(f"{tag}/@{name}")
     children = [[child for child in other if isinstance(child.tag, str)] for other in others]
     own = [child for child in item if isinstance(child.tag, str)]
     if len({len(items) for items in children}) > 1:
-        raise _NotAlikeError(f"what {local_name(item)} holds")
+        raise _NotAlikeError(f"what {tag} holds")
     for child, *rest in zip(own, *children, strict=True):
         _compare(child, rest, difference)
 
 
-def _into_catalog(item: etree._Element, others: Sequence[etree._Element], difference: _Difference) -> None:
-    texts = {etree.tostring(other, with_tail=False) for other in others}
+def _begins_with_a_speed(item: etree._Element) -> bool:
+    """A vehicle's speed along its path at time 0 counts until its trajectory does: in the same frame."""
+    return local_name(item) == "AbsoluteTargetSpeed" and any(
+        local_name(above) == "Init" for above in item.iterancestors()
+    )
+
+
+def _into_catalogs(item: etree._Element, others: Sequence[etree._Element], difference: _Difference) -> None:
     parent = item.getparent()
-    if len(texts) == 1 or parent is None:
-        return
-    digits = len(str(len(others)))
-    names = [f"{item.get('name')}, variant {k + 1:0{digits}d}" for k in range(len(others))]
-    for name, other in zip(names, others, strict=True):
-        entry = copy.deepcopy(other)
-        entry.set("name", name)
-        entry.tail = None
-        difference.entries.append(entry)
-    chosen = difference.parameter(str(item.get("name")), "string", names)
-    reference = etree.Element("CatalogReference", {"catalogName": difference.catalog_name, "entryName": chosen})
-    reference.tail = item.tail
-    parent.replace(item, reference)
+    assert parent is not None
+    if local_name(item) == "Trajectory":
+        chosen = difference.reference([copy.deepcopy(other) for other in others])
+    else:
+        if not any(local_name(above) == "TeleportAction" for above in item.iterancestors()):
+            raise _NotAlikeError("a WorldPosition")
+        difference.places += 1
+        chosen = etree.Element("TrajectoryPosition", {"s": "0", "t": "0"})
+        name = f"{_owner(item)} is put here, {difference.places}"
+        build.sub(chosen, "TrajectoryRef").append(difference.reference([_standing(other, name) for other in others]))
+    index = parent.index(item)
+    parent.remove(item)
+    build.insert_indented(parent, index, chosen)
+
+
+def _standing(place: etree._Element, name: str) -> etree._Element:
+    """A place as the beginning of a trajectory of one metre, along the heading."""
+    trajectory = etree.Element("Trajectory", {"name": name, "closed": "false"})
+    line = build.sub(build.sub(trajectory, "Shape"), "Polyline")
+    heading = float(place.get("h") or 0.0)
+    for metres in (0.0, 1.0):
+        there = copy.deepcopy(place)
+        there.tail = None
+        if metres:
+            there.set("x", build.decimal(float(place.get("x") or 0.0) + metres * math.cos(heading), 5))
+            there.set("y", build.decimal(float(place.get("y") or 0.0) + metres * math.sin(heading), 5))
+        build.sub(build.sub(line, "Vertex", time=build.decimal(metres, 0)), "Position").append(there)
+    return trajectory
 
 
 def _owner(item: etree._Element) -> str:
-    """Whom or what a value belongs to, for its parameter's name."""
-    for above in item.iterancestors():
-        name = above.get("entityRef") or (above.get("name") if local_name(above) in ("Event", "Act") else None)
-        if name:
-            return name
-    return local_name(item)
+    """Whom a place belongs to."""
+    return next(name for above in item.iterancestors() if (name := above.get("entityRef") or above.get("name")))
+
+
+def _free_name(root: etree._Element) -> str:
+    """Of a parameter, that the scenario does not have."""
+    declared = {str(item.get("name")) for item in root.iterfind("{*}ParameterDeclarations/{*}ParameterDeclaration")}
+    name, number = VARIANT, 1
+    while name in declared:
+        number += 1
+        name = f"{VARIANT}_{number}"
+    return name
 
 
 def _unmark(root: etree._Element, header: etree._Element) -> None:
@@ -186,54 +205,42 @@ def _unmark(root: etree._Element, header: etree._Element) -> None:
     header.set("description", (header.get("description") or "").partition(HEADER_MARK)[0].rstrip())
 
 
-def _declare(root: etree._Element, header: etree._Element, difference: _Difference) -> None:
+def _declare(root: etree._Element, header: etree._Element, name: str, value: str) -> None:
     owner = next((item for item in root if local_name(item) == "ParameterDeclarations"), None)
     if owner is None:
         owner = etree.Element("ParameterDeclarations")
         build.insert_indented(root, root.index(header) + 1, owner)
-    for name, (kind, values) in difference.values.items():
-        attributes = {"name": name, "parameterType": kind, "value": values[0]}
-        build.insert_indented(owner, len(owner), etree.Element("ParameterDeclaration", attributes))
+    attributes = {"name": name, "parameterType": "string", "value": value}
+    build.insert_indented(owner, len(owner), etree.Element("ParameterDeclaration", attributes))
 
 
-def _locate(root: etree._Element, header: etree._Element, logical: Path) -> None:
-    """Say where the catalog lies: beside the scenario."""
+def _locate(root: etree._Element, header: etree._Element, files: VariantFiles, parameter: str) -> None:
+    """Say where the catalogs lie: in a folder beside the scenario, with those that others still follow."""
     locations = next((item for item in root if local_name(item) == "CatalogLocations"), None)
     if locations is None:
         locations = etree.Element("CatalogLocations")
         build.insert_indented(root, root.index(header) + 2, locations)
+    needed = _still_needed(root, parameter)
     for old in [item for item in locations if local_name(item) == "TrajectoryCatalog"]:
-        locations.remove(old)  # of trajectories that were played out
+        for name in needed:
+            there = files.logical.parent / old[0].get("path", "") / f"{name}.xosc"
+            if not there.is_file():
+                raise FormatError(
+                    f"trajectories of catalog '{name}' are needed (looked for {there})", path=files.logical
+                )
+            write_atomically(files.catalog(name), there.read_bytes())
+        locations.remove(old)  # a scenario has one folder of trajectories
     place = etree.Element("TrajectoryCatalog")
-    build.sub(place, "Directory", path=".")
+    build.sub(place, "Directory", path=files.folder.name)
     build.insert_indented(locations, len(locations), place)
 
 
-def _catalog(difference: _Difference, version: build.Version, summary: str) -> bytes:
-    root = _file(version, "trajectories", summary)
-    catalog = build.sub(root, "Catalog", name=difference.catalog_name)
-    catalog.extend(difference.entries)
-    etree.indent(root)
-    return build.document(root)
-
-
-def _distribution(difference: _Difference, logical: str, version: build.Version, summary: str) -> bytes:
-    root = _file(max(version, _FIRST_WITH_DISTRIBUTIONS), "distribution", summary)
-    owner = build.sub(root, "ParameterValueDistribution")
-    build.sub(owner, "ScenarioFile", filepath=logical)
-    several = build.sub(build.sub(owner, "Deterministic"), "DeterministicMultiParameterDistribution")
-    sets = build.sub(several, "ValueSetDistribution")
-    for k in range(len(next(iter(difference.values.values()))[1])):
-        one = build.sub(sets, "ParameterValueSet")
-        for name, (_, values) in difference.values.items():
-            build.sub(one, "ParameterAssignment", parameterRef=name, value=values[k])
-    etree.indent(root)
-    return build.document(root)
-
-
-def _file(version: build.Version, what: str, summary: str) -> etree._Element:
-    root = etree.Element("OpenSCENARIO")
-    facts: Mapping[str, str] = {"revMajor": str(version[0]), "revMinor": str(version[1])}
-    description = f"{what} {HEADER_MARK}{summary}]"
-    build.sub(root, "FileHeader", **facts, date="1970-01-01T00:00:00", description=description, author="xosc-lateral")
-    return root
+def _still_needed(root: etree._Element, parameter: str) -> list[str]:
+    """Catalogs of trajectories that vehicles without offsets follow."""
+    references = root.iterfind(".//{*}CatalogReference")
+    found = {
+        str(item.get("catalogName"))
+        for item in references
+        if any(local_name(above) in ("TrajectoryRef", "FollowTrajectoryAction") for above in item.iterancestors())
+    }
+    return sorted(found - {f"${parameter}"})
