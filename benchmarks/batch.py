@@ -18,7 +18,7 @@ from pathlib import Path
 
 from lxml import etree
 
-from xosc_lateral.pipeline.batch import State, convert_many
+from xosc_lateral.pipeline.batch import JobState, convert_many
 from xosc_lateral.pipeline.jobs import Batch, plan_batch
 from xosc_lateral.pipeline.settings import AUTO, ConvertSettings
 
@@ -52,7 +52,7 @@ def main() -> None:
 def convertible(batch: Batch, jobs: int) -> Batch:
     outcomes = list(convert_many(batch, workers=jobs))
     print(dict(Counter(outcome.state.value for outcome in outcomes)))
-    written = {outcome.row.output for outcome in outcomes if outcome.state is State.WRITTEN}
+    written = {outcome.row.output for outcome in outcomes if outcome.state is JobState.WRITTEN}
     return replace(batch, jobs=tuple(job for job in batch.jobs if job.name in written))
 
 

@@ -22,7 +22,7 @@ from xosc_lateral.pipeline.convert import convert_scenario
 from xosc_lateral.pipeline.settings import ConvertSettings
 from xosc_lateral.templates.motorway import Bend, Motorway, Straight
 from xosc_lateral.templates.parameter import Settings
-from xosc_lateral.templates.storyboard import Actor, Plot, Step, Vehicle, at_time, lane_change
+from xosc_lateral.templates.storyboard import Actor, PlannedEvent, Plot, Vehicle, at_time, lane_change
 from xosc_lateral.templates.template import Template
 
 GAP = 35.0
@@ -85,7 +85,7 @@ def write(folder: Path, number: int, seconds: float, speeds: Sequence[float]) ->
             for k, lane in enumerate(lanes)
         )
         steps = tuple(
-            Step(f"Car{k}", f"Change{k}", lane_change(motorway.lane(1), 5), at_time(round(5.0 + 0.05 * k, 2)))
+            PlannedEvent(f"Car{k}", f"Change{k}", lane_change(motorway.lane(1), 5), at_time(round(5.0 + 0.05 * k, 2)))
             for k in range(0, number, 10)
             if len(speeds) > 1 and lanes[k] != 1
         )

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from xosc_lateral.evaluation.r157 import (
     CompetentDriver,
     Ego,
+    EncounterOutcome,
     FuzzySafetyModel,
-    Outcome,
     Traffic,
     evaluate_braking,
     required_by_reaction_time,
@@ -80,7 +80,7 @@ def verdicts_of(target: Target) -> Verdicts:
     first = max(begin - round(3.0 / target.step), 0)  # 3 s before the lane change, so that an early alarm can act
     rows = slice(first, None)
     runs = len(target.towards)
-    results: dict[str, list[Outcome]] = {name: [] for name in MODELS}
+    results: dict[str, list[EncounterOutcome]] = {name: [] for name in MODELS}
     for gap in GAPS:
         # The ego holds its speed until a model brakes; it is put so that the gap at `begin` is the one wanted.
         ego = Ego(

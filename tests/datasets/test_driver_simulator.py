@@ -11,17 +11,17 @@ import pytest
 from xosc_lateral.datasets import (
     CameraStep,
     Companion,
+    CyclicTarget,
     Distraction,
-    Drive,
     Fatigue,
-    LaneHabit,
+    LanePreference,
     RestoringBy,
     SensorDrift,
     ShiftBy,
     SideWind,
+    SimulatedDrive,
     SpreadBy,
     TargetWander,
-    Weave,
     curve_cutting,
     simulate_drive,
     simulate_population,
@@ -31,7 +31,7 @@ from xosc_lateral.datasets import (
 MINUTE = 60.0
 
 
-def spread(drive: Drive, where: np.ndarray) -> float:
+def spread(drive: SimulatedDrive, where: np.ndarray) -> float:
     return float(drive.truth.offset[where & ~drive.truth.lane_change].std())
 
 
@@ -98,7 +98,7 @@ def _bands(table: pd.DataFrame) -> np.ndarray:
 
 @pytest.mark.parametrize(
     "plant",
-    [curve_cutting(0.25), truck_avoidance(0.25), SideWind(0.25), LaneHabit(), ShiftBy(("speed",), 0.25)],
+    [curve_cutting(0.25), truck_avoidance(0.25), SideWind(0.25), LanePreference(), ShiftBy(("speed",), 0.25)],
     ids=lambda plant: plant.columns[0],
 )
 def test_a_shift_of_the_target_moves_the_car_by_as_much(plant):
@@ -135,7 +135,7 @@ def test_curves_are_cut_ahead_of_the_curve():
 
 @pytest.mark.parametrize("plant", [SpreadBy("speed", 2.0), RestoringBy("speed", 0.25)], ids=["spread", "restoring"])
 def test_spread_and_restoring_effects_change_the_spread_where_the_column_is_high(plant):
-    def ratio(drive: Drive) -> float:
+    def ratio(drive: SimulatedDrive) -> float:
         low, high = np.quantile(drive.table["speed"], [0.25, 0.75])
         return spread(drive, (drive.table["speed"] > high).to_numpy()) / spread(
             drive, (drive.table["speed"] < low).to_numpy()
@@ -147,7 +147,7 @@ def test_spread_and_restoring_effects_change_the_spread_where_the_column_is_high
 
 
 def test_fatigue_spreads_the_second_half():
-    def ratio(drive: Drive) -> float:
+    def ratio(drive: SimulatedDrive) -> float:
         late = drive.truth.time > 15 * MINUTE
         return spread(drive, late) / spread(drive, ~late)
 
@@ -156,7 +156,9 @@ def test_fatigue_spreads_the_second_half():
     assert np.mean(tired) > 1.3 * np.mean(fresh)
 
 
-@pytest.mark.parametrize("plant", [Distraction(), Weave(0.3), TargetWander(0.3)], ids=["regime", "weave", "wander"])
+@pytest.mark.parametrize(
+    "plant", [Distraction(), CyclicTarget(0.3), TargetWander(0.3)], ids=["regime", "weave", "wander"]
+)
 def test_hidden_effects_widen_the_spread(plant):
     everywhere = [
         [

@@ -10,7 +10,7 @@ import pytest
 from tests.motion.made_motion import LANE_WIDTH, drive, entity, together, two_roads
 from tests.profiles import simulated_profile
 from xosc_lateral.enrich.enrich import enrich
-from xosc_lateral.enrich.give_way import GAPS, OVERTAKING_SHARE, Sampled, give_way
+from xosc_lateral.enrich.give_way import GAPS, OVERTAKING_SHARE, SampledVehicle, give_way
 
 ROWS = np.arange(0, 501, 10)
 
@@ -19,7 +19,7 @@ def moved(network, *vehicles):
     """What `give_way` moves vehicles of (motion, deviation) by in the middle of the drive."""
     motion = together(*(motion for motion, _ in vehicles))
     sampled = [
-        Sampled(one, np.full(len(one.time), deviation), np.ones(len(one.time), dtype=bool))
+        SampledVehicle(one, np.full(len(one.time), deviation), np.ones(len(one.time), dtype=bool))
         for one, deviation in vehicles
     ]
     return [0.0 if move is None else float(move[250]) for move in give_way(motion, network, sampled, ROWS)]
@@ -54,8 +54,8 @@ def test_whoever_can_not_move_leaves_it_to_the_other(tmp_path: Path) -> None:
     right, left = (drive(network, entity(str(k)), lane=k, start=100.0) for k in (-2, -1))
     rows = len(right.time)
     sampled = [
-        Sampled(right, np.full(rows, 0.5), np.zeros(rows, dtype=bool)),
-        Sampled(left, np.full(rows, -0.5), np.ones(rows, dtype=bool)),
+        SampledVehicle(right, np.full(rows, 0.5), np.zeros(rows, dtype=bool)),
+        SampledVehicle(left, np.full(rows, -0.5), np.ones(rows, dtype=bool)),
     ]
     stays, moves = give_way(together(right, left), network, sampled, ROWS)
     assert stays is None and moves is not None

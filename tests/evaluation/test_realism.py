@@ -12,14 +12,14 @@ from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.driver.sensor.model import SensorModel
 from xosc_lateral.drives.drive import Run
 from xosc_lateral.drives.resampling import STEP
-from xosc_lateral.evaluation.condition import Condition
+from xosc_lateral.evaluation.condition import SnippetCondition
 from xosc_lateral.evaluation.filters import below_half_hertz
 from xosc_lateral.evaluation.realism import Beside, Realism, score_realism
 from xosc_lateral.evaluation.snippets import sample_runs, sensor_noise, snippets_of
 from xosc_lateral.report.realism import realism_lines, start_fade_note
 
-SHORT = Condition(10.0, False)
-SLOW = Condition(10.0, False, slow=True)
+SHORT = SnippetCondition(10.0, False)
+SLOW = SnippetCondition(10.0, False, slow=True)
 
 
 @pytest.fixture(scope="module")
@@ -81,7 +81,7 @@ def test_a_foreign_place_shows_in_free_runs_and_less_from_the_same_start(profile
     moved = [Run(one.drive, 0, one.time, one.offset + 0.5, one.lane_width, one.context) for one in own]
     scores = score_realism(profile, moved, seed=1, classify=False)
     free = scores.of(SHORT).families["metrics"]
-    same = scores.of(Condition(10.0, True)).families["metrics"]
+    same = scores.of(SnippetCondition(10.0, True)).families["metrics"]
     assert free.ratio > 2.5
     assert same.value < free.value
 

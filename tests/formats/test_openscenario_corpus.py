@@ -14,7 +14,7 @@ from xosc_lateral.errors import FormatError
 from xosc_lateral.formats.openscenario import is_distribution, read_distribution, read_scenario
 from xosc_lateral.formats.openscenario.write import write_trajectory_scenario
 from xosc_lateral.motion.nominal import Activity, EntityMotion, NominalMotion, PlayedAction
-from xosc_lateral.motion.trajectory import Trajectory
+from xosc_lateral.motion.trajectory import WorldTrajectory
 from xosc_lateral.scenario import Scenario
 
 XSD = Path(__file__).parents[1] / "data" / "xsd"
@@ -47,7 +47,7 @@ def test_every_corpus_distribution_gives_sets_that_load(shared: Path) -> None:
     assert found >= 16
 
 
-def logged_motion(scenario: Scenario, log: Path) -> tuple[NominalMotion, dict[str, Trajectory]]:
+def logged_motion(scenario: Scenario, log: Path) -> tuple[NominalMotion, dict[str, WorldTrajectory]]:
     """Motion from the reference player's 10 Hz log; each event's actions are taken to start half a second apart."""
     rows = defaultdict(dict)
     with gzip.open(log, "rt") as file:
@@ -73,7 +73,7 @@ def logged_motion(scenario: Scenario, log: Path) -> tuple[NominalMotion, dict[st
                 entity, time, x, y, z, heading, zero, zero, speed, nowhere, nowhere, zero, zero, zero, activity
             )
         )
-        trajectories[entity.name] = Trajectory(time, x, y, z, heading, zero, zero, speed)
+        trajectories[entity.name] = WorldTrajectory(time, x, y, z, heading, zero, zero, speed)
     return NominalMotion(0.1, tuple(entities), _actions(scenario), float(time[-1]), "stop trigger", ()), trajectories
 
 

@@ -31,7 +31,7 @@ from xosc_lateral.errors import FormatError, XoscLateralError
 from xosc_lateral.formats.opendrive import read_opendrive
 from xosc_lateral.formats.openscenario import read_distribution, read_scenario
 from xosc_lateral.formats.openscenario.write import write_trajectory_scenario
-from xosc_lateral.motion.trajectory import Trajectory
+from xosc_lateral.motion.trajectory import WorldTrajectory
 from xosc_lateral.playback.player import play
 
 DATA = Path(__file__).parents[1] / "data" / "xosc"
@@ -179,7 +179,7 @@ def test_mutated_scenarios_that_load_are_played_and_written_or_refused(folder: P
             return
         motion = play(scenario, read_opendrive(scenario.road_file), step=0.02, time_limit=2.0)
         paths = {
-            e.name: Trajectory(e.time, e.x, e.y, e.z, e.heading, e.pitch, e.roll, e.speed) for e in motion.entities
+            e.name: WorldTrajectory(e.time, e.x, e.y, e.z, e.heading, e.pitch, e.roll, e.speed) for e in motion.entities
         }
         write_trajectory_scenario(scenario, motion, paths, output, provenance={}, summary="fuzz")
     except XoscLateralError as error:

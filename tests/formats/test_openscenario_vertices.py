@@ -7,7 +7,7 @@ import pytest
 from lxml import etree
 
 from xosc_lateral.formats.openscenario.write import build
-from xosc_lateral.formats.openscenario.write.vertices import BLOCK, Polyline, Vertices
+from xosc_lateral.formats.openscenario.write.vertices import BLOCK, TimedVertices, Vertices
 
 SOURCE = b"<?xml version='1.0' encoding='UTF-8'?>\n<Root>\n   <A/>\n   <B/>\n</Root>\n"
 
@@ -19,8 +19,12 @@ def test_the_text_is_what_elements_would_be(motion: bool) -> None:
     columns = [rng.normal(size=n) for _ in range(9)]
     root, vertices = etree.fromstring(SOURCE), Vertices(SOURCE)
     holder = etree.Element("Holder")
-    vertices.add(build.sub(holder, "Polyline"), Polyline(columns[0], columns[1:7], columns[7:] if motion else None))
-    vertices.add(build.sub(holder, "Polyline"), Polyline(columns[0][:2], [values[:2] for values in columns[1:7]], None))
+    vertices.add(
+        build.sub(holder, "Polyline"), TimedVertices(columns[0], columns[1:7], columns[7:] if motion else None)
+    )
+    vertices.add(
+        build.sub(holder, "Polyline"), TimedVertices(columns[0][:2], [values[:2] for values in columns[1:7]], None)
+    )
     build.insert_indented(root, 1, holder)
     pieces = list(vertices.document(root))
     assert max(map(len, pieces)) < 600 * BLOCK  # no piece holds more than a block

@@ -39,7 +39,7 @@ from xosc_lateral.formats.openscenario.write import (
 )
 from xosc_lateral.formats.openscenario.write.offset_chain import MOST_TURNING, TOLERANCE, ramps
 from xosc_lateral.motion.nominal import NominalMotion
-from xosc_lateral.motion.trajectory import Trajectory
+from xosc_lateral.motion.trajectory import WorldTrajectory
 from xosc_lateral.playback.player import play
 from xosc_lateral.scenario import Scenario
 from xosc_lateral.scenario.actions import FollowTrajectoryAction
@@ -68,8 +68,10 @@ def played(scenario: Scenario, limit: float = 20.0) -> NominalMotion:
     return play(scenario, read_opendrive(scenario.road_file), step=STEP, time_limit=limit)
 
 
-def nominal(motion: NominalMotion) -> dict[str, Trajectory]:
-    return {e.name: Trajectory(e.time, e.x, e.y, e.z, e.heading, e.pitch, e.roll, e.speed) for e in motion.entities}
+def nominal(motion: NominalMotion) -> dict[str, WorldTrajectory]:
+    return {
+        e.name: WorldTrajectory(e.time, e.x, e.y, e.z, e.heading, e.pitch, e.roll, e.speed) for e in motion.entities
+    }
 
 
 def provenance(scenario: Scenario) -> dict[str, Any]:
@@ -317,7 +319,7 @@ def test_a_trajectory_with_nan_is_a_wrong_call(tmp_path: Path) -> None:
     motion = played(scenario)
     trajectory = nominal(motion)["Ego"]
     trajectory.x.setflags(write=True)
-    broken = Trajectory(
+    broken = WorldTrajectory(
         trajectory.time,
         np.where(trajectory.time > 1, np.nan, trajectory.x),
         *(getattr(trajectory, name) for name in ("y", "z", "heading", "pitch", "roll", "speed")),

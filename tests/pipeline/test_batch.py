@@ -15,7 +15,7 @@ from pathlib import Path
 import pytest
 
 from tests.pipeline.fake_converter import convert, convert_and_log
-from xosc_lateral.pipeline.batch import STATE, BatchStoppedError, Outcome, State, convert_many
+from xosc_lateral.pipeline.batch import STATE, BatchStoppedError, JobOutcome, JobState, convert_many
 from xosc_lateral.pipeline.guard import JobLimits
 from xosc_lateral.pipeline.jobs import plan_batch
 from xosc_lateral.pipeline.lock import FolderInUseError, folder_lock
@@ -37,7 +37,7 @@ def make_inputs(folder: Path, count: int = 12, **special: str) -> Path:
 
 def run(
     inputs: Path, folder: Path, converter=convert, workers: int = 0, variants: int = 1, **settings
-) -> list[Outcome]:
+) -> list[JobOutcome]:
     batch = plan_batch([inputs], folder, ConvertSettings(**settings), variants=variants)
     return list(convert_many(batch, workers=workers, converter=converter))
 
@@ -51,7 +51,7 @@ def tree(folder: Path) -> dict[str, bytes]:
     }
 
 
-def states(outcomes: list[Outcome]) -> dict[str, State]:
+def states(outcomes: list[JobOutcome]) -> dict[str, JobState]:
     return {outcome.row.output: outcome.state for outcome in outcomes}
 
 
@@ -69,7 +69,7 @@ def test_a_second_run_converts_nothing_and_touches_nothing(tmp_path: Path) -> No
     run(inputs, tmp_path / "out", convert_and_log)
     before = {path: path.stat().st_mtime_ns for path in (tmp_path / "out").iterdir()}
     outcomes = run(inputs, tmp_path / "out", convert_and_log)
-    assert set(states(outcomes).values()) == {State.UP_TO_DATE}
+    assert set(states(outcomes).values()) == {JobState.UP_TO_DATE}
     assert {path: path.stat().st_mtime_ns for path in (tmp_path / "out").iterdir()} == before
     assert len((inputs / "log.txt").read_text().splitlines()) == 3
 
@@ -80,17 +80,17 @@ def test_what_has_changed_is_converted_again(tmp_path: Path) -> None:
     (inputs / "001.xosc").write_text("<OpenSCENARIO><Storyboard id='new'/></OpenSCENARIO>")
     (out / "002.xosc").write_text("damaged")
     again = states(run(inputs, out))
-    assert again == {"000.xosc": State.UP_TO_DATE, "001.xosc": State.WRITTEN, "002.xosc": State.WRITTEN}
+    assert again == {"000.xosc": JobState.UP_TO_DATE, "001.xosc": JobState.WRITTEN, "002.xosc": JobState.WRITTEN}
     (inputs / "road.xodr").write_text("<OpenDRIVE new='1'/>")
-    assert set(states(run(inputs, out)).values()) == {State.WRITTEN}
-    assert set(states(run(inputs, out, seed=1)).values()) == {State.WRITTEN}
+    assert set(states(run(inputs, out)).values()) == {JobState.WRITTEN}
+    assert set(states(run(inputs, out, seed=1)).values()) == {JobState.WRITTEN}
     run(inputs, tmp_path / "fresh", seed=1)
     assert tree(out) == tree(tmp_path / "fresh")
 
 
 def test_one_bad_scenario_costs_one_row(tmp_path: Path) -> None:
     outcomes = run(make_inputs(tmp_path / "in", 2, broken="bad", odd="bug"), tmp_path / "out")
-    errors = {outcome.row.output: outcome.row.error for outcome in outcomes if outcome.state is State.FAILED}
+    errors = {outcome.row.output: outcome.row.error for outcome in outcomes if outcome.state is JobState.FAILED}
     assert errors["broken.xosc"] == f"{tmp_path}/in/broken.xosc:1: nothing to play"
     assert "internal error: ZeroDivisionError: by nought (fake_converter.py:" in errors["odd.xosc"]
     rows = {row.output: row for row in read_manifest(tmp_path / "out" / MANIFEST)}
@@ -106,13 +106,13 @@ def test_a_failed_scenario_keeps_its_old_output_which_is_said_to_be_stale(tmp_pa
     good = (inputs / "000.xosc").read_text()
     (inputs / "000.xosc").write_text(good + "<!-- bad -->")
     for _ in range(2):
-        assert states(run(inputs, out)) == {"000.xosc": State.FAILED, "001.xosc": State.UP_TO_DATE}
+        assert states(run(inputs, out)) == {"000.xosc": JobState.FAILED, "001.xosc": JobState.UP_TO_DATE}
         row = next(iter(read_manifest(out / MANIFEST)))
         assert row.stale and "nothing to play" in row.error
         assert row.output_sha256 == hashlib.sha256((out / "000.xosc").read_bytes()).hexdigest()
         assert row.scenario_sha256 == hashlib.sha256(good.encode()).hexdigest()  # of what the old output was made from
     (inputs / "000.xosc").write_text(good)
-    assert states(run(inputs, out)) == {"000.xosc": State.UP_TO_DATE, "001.xosc": State.UP_TO_DATE}
+    assert states(run(inputs, out)) == {"000.xosc": JobState.UP_TO_DATE, "001.xosc": JobState.UP_TO_DATE}
     assert tree(out) == calm
 
 
@@ -121,7 +121,7 @@ def test_a_road_folder_that_is_not_mounted_costs_no_output(tmp_path: Path) -> No
     run(inputs, out)
     calm = tree(out)
     (inputs / "road.xodr").rename(tmp_path / "away")
-    assert set(states(run(inputs, out)).values()) == {State.FAILED}
+    assert set(states(run(inputs, out)).values()) == {JobState.FAILED}
     assert {name for name in tree(out) if name != MANIFEST} == {name for name in calm if name != MANIFEST}
     (tmp_path / "away").rename(inputs / "road.xodr")
     run(inputs, out)
@@ -190,12 +190,12 @@ def test_a_worker_of_another_version_stops_the_run_before_it_costs_rows(tmp_path
     old = replace(batch, jobs=tuple(replace(job, package_version="0.0.1") for job in batch.jobs))
     with pytest.raises(BatchStoppedError, match=r"planned by 0\.0\.1"):
         list(convert_many(old, workers=0, converter=convert))
-    assert set(states(run(inputs, out)).values()) == {State.WRITTEN}
+    assert set(states(run(inputs, out)).values()) == {JobState.WRITTEN}
 
 
 def test_a_scenario_that_kills_its_worker_costs_one_row(tmp_path: Path) -> None:
     outcomes = run(make_inputs(tmp_path / "in", 8, killer="crash"), tmp_path / "out", workers=2)
-    failed = [outcome.row for outcome in outcomes if outcome.state is State.FAILED]
+    failed = [outcome.row for outcome in outcomes if outcome.state is JobState.FAILED]
     assert [row.output for row in failed] == ["killer.xosc"]
     assert "worker process died" in failed[0].error
     assert len(outcomes) == 9
@@ -212,7 +212,7 @@ def test_a_worker_killed_from_outside_costs_nothing(tmp_path: Path) -> None:
             os.kill(int((inputs / "log.txt").read_text().splitlines()[-1].split()[0]), signal.SIGKILL)
             killed += 1
     assert killed == 2
-    assert {outcome.state for outcome in outcomes} == {State.WRITTEN}
+    assert {outcome.state for outcome in outcomes} == {JobState.WRITTEN}
     run(inputs, tmp_path / "calm")
     assert tree(tmp_path / "out") == tree(tmp_path / "calm")
 
@@ -244,7 +244,7 @@ def test_killed_three_times_the_outputs_are_those_of_a_calm_run(tmp_path: Path, 
     assert (out / STATE / "lock").exists()
     (inputs / "go").touch()
     outcomes = run(inputs, out, workers=workers)
-    assert State.UP_TO_DATE in {outcome.state for outcome in outcomes}
+    assert JobState.UP_TO_DATE in {outcome.state for outcome in outcomes}
     run(inputs, tmp_path / "calm")
     assert tree(out) == tree(tmp_path / "calm")
 
@@ -272,7 +272,7 @@ def test_a_run_stopped_by_its_user_goes_on_where_it_was(tmp_path: Path) -> None:
     first = {next(outcomes).row.output for _ in range(2)}
     outcomes.close()  # type: ignore[attr-defined]
     again = states(run(inputs, tmp_path / "out"))
-    assert {name for name, state in again.items() if state is State.UP_TO_DATE} == first
+    assert {name for name, state in again.items() if state is JobState.UP_TO_DATE} == first
 
 
 def test_a_full_disk_stops_the_run_and_loses_nothing(tmp_path: Path) -> None:
@@ -281,10 +281,10 @@ def test_a_full_disk_stops_the_run_and_loses_nothing(tmp_path: Path) -> None:
         run(inputs, out)
     (inputs / "zz.xosc").write_text("<OpenSCENARIO/>")
     assert states(run(inputs, out)) == {
-        "000.xosc": State.UP_TO_DATE,
-        "001.xosc": State.UP_TO_DATE,
-        "002.xosc": State.UP_TO_DATE,
-        "zz.xosc": State.WRITTEN,
+        "000.xosc": JobState.UP_TO_DATE,
+        "001.xosc": JobState.UP_TO_DATE,
+        "002.xosc": JobState.UP_TO_DATE,
+        "zz.xosc": JobState.WRITTEN,
     }
 
 
@@ -303,7 +303,7 @@ def test_a_journal_that_can_not_grow_says_so_and_keeps_its_rows(tmp_path: Path) 
         resource.setrlimit(resource.RLIMIT_FSIZE, limits)
         signal.signal(signal.SIGXFSZ, handler)
     again = list(states(run(inputs, out)).values())
-    assert 5 < again.count(State.UP_TO_DATE) < 30
+    assert 5 < again.count(JobState.UP_TO_DATE) < 30
     run(inputs, tmp_path / "calm")
     assert tree(out) == tree(tmp_path / "calm")
 

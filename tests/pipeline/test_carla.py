@@ -14,7 +14,7 @@ from xosc_lateral.errors import FormatError
 from xosc_lateral.formats.openscenario.read import RoadSearch
 from xosc_lateral.pipeline.convert import convert_scenario
 from xosc_lateral.pipeline.load import Played, play_scenario
-from xosc_lateral.pipeline.settings import ConvertSettings, Mode
+from xosc_lateral.pipeline.settings import ConvertSettings, OutputMode
 
 SCENARIO = """<?xml version="1.0"?>
 <OpenSCENARIO>
@@ -143,7 +143,7 @@ def test_a_town_that_is_not_there_costs_one_line(tmp_path: Path, maps: RoadSearc
 
 def test_lane_offset_mode_is_refused(tmp_path: Path, maps: RoadSearch) -> None:
     source = _scenario(tmp_path, WORLD.format(y=18.0, h=0.3))
-    settings = ConvertSettings(profile=simulated_profile(), mode=Mode.LANE_OFFSET, roads=maps)
+    settings = ConvertSettings(profile=simulated_profile(), mode=OutputMode.LANE_OFFSET, roads=maps)
     with pytest.raises(FormatError, match="CARLA"):
         convert_scenario(source, tmp_path / "out.xosc", settings)
     assert not (tmp_path / "out.xosc").exists()

@@ -13,7 +13,7 @@ import pytest
 from tests.pipeline.fake_converter import convert, convert_and_log
 from tests.pipeline.test_batch import make_inputs, run, states, tree
 from xosc_lateral.pipeline import cluster as dask_cluster
-from xosc_lateral.pipeline.batch import State, convert_many
+from xosc_lateral.pipeline.batch import JobState, convert_many
 from xosc_lateral.pipeline.jobs import plan_batch
 from xosc_lateral.pipeline.tasks import ClusterError
 
@@ -42,7 +42,7 @@ def test_a_cluster_leaves_the_same_bytes_although_a_worker_is_killed(tmp_path: P
         if len(outcomes) == 8:
             os.kill(int((inputs / "log.txt").read_text().splitlines()[-1].split()[0]), signal.SIGKILL)
     assert len({line.split()[0] for line in (inputs / "log.txt").read_text().splitlines()}) >= 2
-    assert [name for name, state in states(outcomes).items() if state is State.FAILED] == ["broken.xosc"]
+    assert [name for name, state in states(outcomes).items() if state is JobState.FAILED] == ["broken.xosc"]
     run(inputs, tmp_path / "calm", convert)
     assert tree(tmp_path / "out") == tree(tmp_path / "calm")
 
@@ -50,7 +50,7 @@ def test_a_cluster_leaves_the_same_bytes_although_a_worker_is_killed(tmp_path: P
 def test_a_scenario_that_kills_every_worker_costs_one_row(tmp_path: Path, cluster: str) -> None:
     inputs = make_inputs(tmp_path / "in", 4, killer="crash")
     outcomes = list(convert_many(plan_batch([inputs], tmp_path / "out"), cluster=cluster, converter=convert))
-    assert [name for name, state in states(outcomes).items() if state is State.FAILED] == ["killer.xosc"]
+    assert [name for name, state in states(outcomes).items() if state is JobState.FAILED] == ["killer.xosc"]
     assert len(outcomes) == 5
 
 

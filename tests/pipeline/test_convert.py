@@ -11,7 +11,7 @@ import pytest
 
 from tests.profiles import simulated_profile
 from xosc_lateral.cli import main
-from xosc_lateral.enrich.conversion import Conversion
+from xosc_lateral.enrich.conversion import ConvertedScenario
 from xosc_lateral.errors import FormatError
 from xosc_lateral.formats.profiles import write_profile
 from xosc_lateral.motion.nominal import Activity
@@ -34,7 +34,7 @@ def _template(folder: Path, name: str, **settings: str) -> Path:
     return folder / f"{name}.xosc"
 
 
-def _convert(folder: Path, name: str, profile: str, **settings: str) -> Conversion:
+def _convert(folder: Path, name: str, profile: str, **settings: str) -> ConvertedScenario:
     source = _template(folder, name, **settings)
     return convert_scenario(source, folder / "out.xosc", ConvertSettings(profile=profile, seed=7))
 

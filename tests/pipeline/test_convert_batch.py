@@ -17,7 +17,7 @@ from xosc_lateral.cli import main
 from xosc_lateral.errors import FormatError
 from xosc_lateral.formats.hashes import file_hash
 from xosc_lateral.formats.profiles import write_profile
-from xosc_lateral.pipeline.batch import State, convert_many
+from xosc_lateral.pipeline.batch import JobState, convert_many
 from xosc_lateral.pipeline.jobs import plan_batch
 from xosc_lateral.pipeline.manifest import MANIFEST
 from xosc_lateral.pipeline.settings import ConvertSettings
@@ -121,15 +121,15 @@ def test_a_variant_is_what_the_single_conversion_writes(database: Path, tmp_path
 
 
 def test_changed_roads_and_catalogs_are_noticed(database: Path, tmp_path: Path, profile: str) -> None:
-    def states() -> list[State]:
+    def states() -> list[JobState]:
         batch = plan_batch([database / "cut-in"], tmp_path / "out", ConvertSettings(profile=profile))
         return [outcome.state for outcome in convert_many(batch, workers=0)]
 
-    assert states() == [State.WRITTEN]
-    assert states() == [State.UP_TO_DATE]
+    assert states() == [JobState.WRITTEN]
+    assert states() == [JobState.UP_TO_DATE]
     road = next((database / "cut-in").glob("*.xodr"))
     road.write_text(road.read_text() + "<!-- surveyed again -->")
-    assert states() == [State.WRITTEN]
+    assert states() == [JobState.WRITTEN]
 
 
 def test_the_log_is_json_and_wrong_usage_is_2(database: Path, tmp_path: Path, run) -> None:
@@ -166,7 +166,7 @@ def test_inputs_that_change_during_a_run_are_stated_as_they_were_read(tmp_path: 
     before = file_hash(road), file_hash(source / "a.xosc")
     outcomes = convert_many(plan_batch([source], out, settings), workers=0)
     for number, outcome in enumerate(outcomes):
-        assert outcome.state is State.WRITTEN
+        assert outcome.state is JobState.WRITTEN
         if number == 0:  # others look at the same road, and at a scenario that was planned as it was
             road.write_text(road.read_text().replace("<header", "<!-- moved --><header"))
             (source / "c.xosc").write_text(
@@ -177,7 +177,7 @@ def test_inputs_that_change_during_a_run_are_stated_as_they_were_read(tmp_path: 
     assert rows.road_sha256["b.xosc"] == rows.road_sha256["c.xosc"] == file_hash(road) != before[0]
     assert rows.scenario_sha256["c.xosc"] == file_hash(source / "c.xosc")
     again = {one.row.output: one.state for one in convert_many(plan_batch([source], out, settings), workers=0)}
-    assert again == {"a.xosc": State.WRITTEN, "b.xosc": State.UP_TO_DATE, "c.xosc": State.UP_TO_DATE}
+    assert again == {"a.xosc": JobState.WRITTEN, "b.xosc": JobState.UP_TO_DATE, "c.xosc": JobState.UP_TO_DATE}
 
 
 def test_a_result_reads_its_rows_from_the_manifest(database: Path, tmp_path: Path, profile: str) -> None:

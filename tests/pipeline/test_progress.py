@@ -9,13 +9,13 @@ from dataclasses import replace
 import pytest
 
 from tests.pipeline.test_manifest import FAILED, ROW
-from xosc_lateral.pipeline.batch import Outcome, State
+from xosc_lateral.pipeline.batch import JobOutcome, JobState
 from xosc_lateral.pipeline.progress import Display, Summary, follow
 
 OUTCOMES = [
-    Outcome(State.UP_TO_DATE, ROW, 0.0),
-    Outcome(State.WRITTEN, replace(ROW, output="c.xosc"), 0.25),
-    Outcome(State.FAILED, FAILED, 0.1),
+    JobOutcome(JobState.UP_TO_DATE, ROW, 0.0),
+    JobOutcome(JobState.WRITTEN, replace(ROW, output="c.xosc"), 0.25),
+    JobOutcome(JobState.FAILED, FAILED, 0.1),
 ]
 
 

@@ -28,7 +28,7 @@ from tests.playback.stage import (
 )
 from xosc_lateral.errors import PlaybackError
 from xosc_lateral.motion.nominal import Activity
-from xosc_lateral.playback.paths.clothoid import ClothoidPath, ClothoidPiece
+from xosc_lateral.playback.paths.clothoid import ClothoidPath, TimedClothoid
 from xosc_lateral.playback.paths.nurbs import Control, NurbsPath, clamped_knots
 from xosc_lateral.playback.paths.polyline import Corner, PolylinePath, fill_times, merge_close
 
@@ -149,7 +149,7 @@ def test_a_path_of_one_corner_is_a_place() -> None:
 
 # ---- clothoids -------------------------------------------------------------------------------------------------------
 def test_a_clothoid_of_constant_curvature_is_a_circle() -> None:
-    path = ClothoidPath([ClothoidPiece(1.0, 2.0, 0.3, 0.02, 0.02, 200.0)])
+    path = ClothoidPath([TimedClothoid(1.0, 2.0, 0.3, 0.02, 0.02, 200.0)])
     for s in (0.0, 50.0, 123.4, 200.0):
         point = path.at(s)
         assert point.x == pytest.approx(1.0 + 50.0 * (sin(0.3 + 0.02 * s) - sin(0.3)), abs=1e-9)
@@ -157,7 +157,7 @@ def test_a_clothoid_of_constant_curvature_is_a_circle() -> None:
 
 
 def test_a_clothoid_is_the_integral_of_its_heading() -> None:
-    piece = ClothoidPiece(0.0, 0.0, -0.2, 0.01, -0.03, 150.0)
+    piece = TimedClothoid(0.0, 0.0, -0.2, 0.01, -0.03, 150.0)
     u = np.linspace(0.0, 150.0, 200_001)
     heading = -0.2 + u * (0.01 + 0.5 * (-0.04 / 150.0) * u)
     x, y, end = piece.at(150.0)

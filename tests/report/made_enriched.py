@@ -11,7 +11,7 @@ from xosc_lateral.enrich.result import Enriched, EntityResult, SampledSegment
 from xosc_lateral.motion.gaps import BoxPath, Gap, smallest_gaps
 from xosc_lateral.motion.nominal import Activity, EntityMotion, Note
 from xosc_lateral.motion.segments import cut_stretches
-from xosc_lateral.motion.trajectory import Trajectory, displace
+from xosc_lateral.motion.trajectory import WorldTrajectory, displace
 from xosc_lateral.road import RoadNetwork
 
 DURATION = 30.0
@@ -97,12 +97,12 @@ def _untouched(motion: EntityMotion, network: RoadNetwork) -> EntityResult:
     )
 
 
-def _nominal(motion: EntityMotion) -> Trajectory:
-    return Trajectory(
+def _nominal(motion: EntityMotion) -> WorldTrajectory:
+    return WorldTrajectory(
         motion.time, motion.x, motion.y, motion.z, motion.heading, motion.pitch, motion.roll, motion.speed
     )
 
 
-def _gaps(paths: list[tuple[EntityMotion, Trajectory]]) -> tuple[Gap, ...]:
+def _gaps(paths: list[tuple[EntityMotion, WorldTrajectory]]) -> tuple[Gap, ...]:
     boxes = [BoxPath(motion.name, path.x[::5], path.y[::5], path.heading[::5], 5.0, 2.0, 1.4) for motion, path in paths]
     return smallest_gaps(paths[0][0].time[::5], boxes)

@@ -12,7 +12,7 @@ import pytest
 
 from xosc_lateral.datasets.driver_simulator import simulate_drive
 from xosc_lateral.datasets.plants import ShiftBy
-from xosc_lateral.datasets.response import Response
+from xosc_lateral.datasets.response import SimulatedResponse
 from xosc_lateral.driver.effects import (
     Acts,
     Angular,
@@ -76,7 +76,7 @@ SHAPES: tuple[ColumnEffect, ...] = (
 @pytest.fixture(scope="module")
 def table(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("loop") / "hills.parquet"
-    simulate_drive(2400.0, 5, effects=[ShiftBy(("grade",), SHIFT, Response(lag=1.0))]).table.to_parquet(path)
+    simulate_drive(2400.0, 5, effects=[ShiftBy(("grade",), SHIFT, SimulatedResponse(lag=1.0))]).table.to_parquet(path)
     return path
 
 

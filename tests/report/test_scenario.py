@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from tests.report.made_enriched import made_enriched
-from xosc_lateral.enrich.conversion import Conversion, ConversionProvenance
+from xosc_lateral.enrich.conversion import ConversionProvenance, ConvertedScenario
 from xosc_lateral.motion.gaps import Gap
 from xosc_lateral.motion.nominal import Activity, Note
 from xosc_lateral.report import scenario_figures as figures
@@ -86,7 +86,9 @@ def test_a_scenario_in_which_nothing_was_enriched_gets_a_page_that_says_so(enric
 
 def test_provenance_is_in_the_footer(enriched):
     made = ConversionProvenance("0.1", {"cut-in.xosc": "a" * 64}, {"Ego": ("calm", "b" * 64)}, 7, 2, {"speed": "30"})
-    conversion = Conversion(Path("in/cut-in.xosc"), Path("out/lively.xosc"), "c" * 64, enriched, made, ("mind this",))
+    conversion = ConvertedScenario(
+        Path("in/cut-in.xosc"), Path("out/lively.xosc"), "c" * 64, enriched, made, ("mind this",)
+    )
     footer = text(conversion_page(conversion).split("<footer>")[1].join(["<body>", ""]))
     for fact in ("seed 7", "variant 2", "speed = 30", f"Ego: calm ({'b' * 12})", f"cut-in.xosc ({'a' * 12})", "c" * 64):
         assert fact in footer

@@ -14,7 +14,7 @@ import pytest
 from tests.road.places import VALID, hand_written, random_places, wrapped
 from xosc_lateral.errors import PlaybackError
 from xosc_lateral.formats.opendrive import read_opendrive
-from xosc_lateral.road.piecewise import Piecewise
+from xosc_lateral.road.piecewise import PiecewiseCubic
 from xosc_lateral.road.surface import Surface
 
 NAMES = sorted(path.stem for path in VALID.glob("*.xodr"))
@@ -249,8 +249,8 @@ def test_a_lean_on_a_grade_leads_along_s_and_finds_back():
     """Ry(pitch) Rx(roll) (0, t, 0): t sin(pitch) sin(roll) ahead, t cos(roll) aside, t cos(pitch) sin(roll) up."""
     grade, lean, t = -1.0, 0.5, -6.0
     surface = Surface(
-        elevation=Piecewise((0.0,), ((0.0, grade, 0.0, 0.0),)),
-        superelevation=Piecewise((0.0,), ((lean, 0.0, 0.0, 0.0),)),
+        elevation=PiecewiseCubic((0.0,), ((0.0, grade, 0.0, 0.0),)),
+        superelevation=PiecewiseCubic((0.0,), ((lean, 0.0, 0.0, 0.0),)),
     )
     pitch = -atan(grade)
     height, _, _, shrink, _, lead = surface.at(10.0, t)

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from xosc_lateral.road.piecewise import Piecewise, shift
+from xosc_lateral.road.piecewise import PiecewiseCubic, shift
 
 coefficient = st.floats(-2.0, 2.0)
 cubic = st.tuples(coefficient, coefficient, coefficient, coefficient)
@@ -24,14 +24,14 @@ def test_a_shifted_cubic_has_the_same_values(c, by, x):
 
 @given(records, records, st.floats(0.0, 12.0))
 def test_a_sum_has_the_sum_of_values_everywhere(one, other, s):
-    first, second = (Piecewise.from_records(r, begin=0.0) for r in (one, other))
+    first, second = (PiecewiseCubic.from_records(r, begin=0.0) for r in (one, other))
     total = first.plus(second, -0.5)
     assert total.at(s) == pytest.approx(first.at(s) - 0.5 * second.at(s), abs=1e-8)
 
 
 @given(records, st.floats(0.0, 12.0))
 def test_a_restriction_changes_no_value_inside(one, s):
-    whole = Piecewise.from_records(one, begin=0.0)
+    whole = PiecewiseCubic.from_records(one, begin=0.0)
     part = whole.restricted(2.0, 8.0)
     if 2.0 <= s < 8.0:
         assert part.at(s) == pytest.approx(whole.at(s), abs=1e-8)
@@ -41,7 +41,7 @@ def test_a_restriction_changes_no_value_inside(one, s):
 
 @given(records, st.floats(0.001, 12.0))
 def test_the_slope_is_the_derivative(one, s):
-    function = Piecewise.from_records(one, begin=0.0)
+    function = PiecewiseCubic.from_records(one, begin=0.0)
     inside = all(abs(s - start) > 1e-3 for start in function.starts)
     h = 1e-5
     if inside:
@@ -50,13 +50,13 @@ def test_the_slope_is_the_derivative(one, s):
 
 
 def test_records_may_come_in_any_order_and_the_last_of_equals_counts():
-    function = Piecewise.from_records(
+    function = PiecewiseCubic.from_records(
         [(5.0, (2.0, 0.0, 0.0, 0.0)), (0.0, (1.0, 0.0, 0.0, 0.0)), (5.0, (3.0, 0.0, 0.0, 0.0))], begin=0.0
     )
     assert (function.at(4.999), function.at(5.0)) == (1.0, 3.0)
 
 
 def test_before_the_first_record_there_is_nothing():
-    function = Piecewise.from_records([(5.0, (2.0, 0.0, 0.0, 0.0))], begin=0.0)
+    function = PiecewiseCubic.from_records([(5.0, (2.0, 0.0, 0.0, 0.0))], begin=0.0)
     assert (function.at(0.0), function.at(4.999), function.at(5.0)) == (0.0, 0.0, 2.0)
-    assert Piecewise.from_records([], begin=0.0).is_zero
+    assert PiecewiseCubic.from_records([], begin=0.0).is_zero

@@ -12,7 +12,7 @@ from xosc_lateral.api.result import Result
 from xosc_lateral.errors import FormatError
 from xosc_lateral.formats.targets import claim, folder_target
 from xosc_lateral.limits import JOB_MEMORY, JOB_TIMEOUT
-from xosc_lateral.pipeline.batch import Outcome, State
+from xosc_lateral.pipeline.batch import JobOutcome, JobState
 from xosc_lateral.pipeline.batch import convert_many as outcomes_of
 from xosc_lateral.pipeline.guard import JobLimits
 from xosc_lateral.pipeline.jobs import Batch, plan_batch
@@ -128,17 +128,17 @@ def convert_many(
     claim((job.output for job in batch.jobs if not job.output.is_dir()), force=force)
     limits = JobLimits(job_timeout, job_memory)
     outcomes = outcomes_of(batch, workers=workers, cluster=cluster, limits=limits, notify=_notifier(show))
-    became: dict[str, tuple[State, float]] = {}
+    became: dict[str, tuple[JobState, float]] = {}
     summary = follow(_noted(outcomes, became, on_outcome), len(batch), Display(show))
     index = None if report is None else write_batch_index(batch, Path(report))
     return BatchResult(batch, summary, became, index)
 
 
 def _noted(
-    outcomes: Iterator[Outcome],
-    became: dict[str, tuple[State, float]],
+    outcomes: Iterator[JobOutcome],
+    became: dict[str, tuple[JobState, float]],
     tell: Callable[[Mapping[str, Any]], None] | None,
-) -> Iterator[Outcome]:
+) -> Iterator[JobOutcome]:
     for outcome in outcomes:
         became[outcome.row.output] = outcome.state, outcome.seconds
         if tell is not None:
@@ -146,7 +146,7 @@ def _noted(
         yield outcome
 
 
-def _row(state: State, seconds: float, row: ManifestRow) -> dict[str, Any]:
+def _row(state: JobState, seconds: float, row: ManifestRow) -> dict[str, Any]:
     return {"state": state.value, "seconds": round(seconds, 4), **row.to_dict()}
 
 
@@ -162,7 +162,7 @@ class BatchResult(Result):
     __slots__ = ("_batch", "_became", "_summary", "report")
 
     def __init__(
-        self, batch: Batch, summary: Summary, became: dict[str, tuple[State, float]], report: Path | None
+        self, batch: Batch, summary: Summary, became: dict[str, tuple[JobState, float]], report: Path | None
     ) -> None:
         self._batch, self._summary, self._became = batch, summary, became
         self.report = report

@@ -12,14 +12,14 @@ from xosc_lateral.errors import FormatError
 from xosc_lateral.formats.openscenario.write.target import target
 from xosc_lateral.formats.targets import claim, file_target
 from xosc_lateral.pipeline.convert import convert_scenario
-from xosc_lateral.pipeline.settings import AUTO, TIME_LIMIT, ConvertSettings, Mode
+from xosc_lateral.pipeline.settings import AUTO, TIME_LIMIT, ConvertSettings, OutputMode
 
 if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import Figure
 
     from xosc_lateral.driver.profile import DriverProfile
-    from xosc_lateral.enrich.conversion import Conversion as Made
+    from xosc_lateral.enrich.conversion import ConvertedScenario
 
 SCENARIO_SUFFIXES = (".xosc",)
 REPORT_SUFFIXES = (".html", ".htm")
@@ -176,7 +176,7 @@ def convert_settings(
         context=None if context is None else Path(context),
         parameters={name: str(value) for name, value in (parameters or {}).items()},
         attempts=attempts,
-        mode=Mode(mode),
+        mode=OutputMode(mode),
         target=target(player, version),
         libraries=as_paths(library),
         allowed=as_paths(allow),
@@ -196,7 +196,7 @@ class Conversion(Result):
 
     __slots__ = ("_made", "report")
 
-    def __init__(self, made: Made) -> None:
+    def __init__(self, made: ConvertedScenario) -> None:
         self._made = made
         self.report: Path | None = None
         """Page that was written, if one was."""

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from xosc_lateral.driver.profile import DriverProfile
-    from xosc_lateral.driver.snippets import Sampled
+    from xosc_lateral.driver.snippets import SampledOffsets
 
 
 def sample(
@@ -100,7 +100,7 @@ class Offsets(Result):
     def __init__(
         self,
         profile: DriverProfile,
-        made: Sequence[Sampled],
+        made: Sequence[SampledOffsets],
         seed: int,
         given: GivenDrives | None,
         settings: dict[str, Any],

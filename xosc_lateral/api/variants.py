@@ -10,7 +10,7 @@ from pathlib import Path
 from xosc_lateral.api.inputs import PathLike
 from xosc_lateral.formats.openscenario.write import Player, VariantFiles, write_variant_set
 from xosc_lateral.formats.targets import claim
-from xosc_lateral.pipeline.settings import Mode
+from xosc_lateral.pipeline.settings import OutputMode
 
 
 class VariantSet:
@@ -34,7 +34,7 @@ def variant_files(output: Path, variants: int, mode: str, player: str) -> Varian
 
     Lane offset actions differ in number from variant to variant, and ScenarioRunner reads no distributions.
     """
-    if variants < 2 or mode == Mode.LANE_OFFSET.value or player == Player.CARLA.value:
+    if variants < 2 or mode == OutputMode.LANE_OFFSET.value or player == Player.CARLA.value:
         return None
     return VariantFiles.beside(output)
 

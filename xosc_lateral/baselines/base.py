@@ -68,7 +68,7 @@ class LateralModel(Protocol):
 
 
 @dataclass(frozen=True, eq=False)
-class Batch:
+class SegmentBatch:
     """Segments as arrays of one length: shorter ones are continued by their last row, and cut again afterwards.
 
     Parameters
@@ -95,18 +95,18 @@ class Batch:
         """Windows and rows."""
         return self.lane_width.shape[0], self.lane_width.shape[1]
 
-    def with_burn_in(self, rows: int) -> Batch:
+    def with_burn_in(self, rows: int) -> SegmentBatch:
         """The same with so many rows of its first row before it."""
 
         def longer(values: FloatArray) -> FloatArray:
             return np.concatenate([np.repeat(values[:, :1], rows, axis=1), values], axis=1)
 
-        return Batch(
+        return SegmentBatch(
             self.start, longer(self.lane_width), longer(self.speed), longer(self.curvature), longer(self.beside)
         )
 
 
-def batch_of(segments: Sequence[Segment], starts: FloatArray) -> Batch:
+def batch_of(segments: Sequence[Segment], starts: FloatArray) -> SegmentBatch:
     """Arrays of the longest segment's length. `starts` of shape (n,). [m]"""
     length = max(segment.lane_width[segment.inside].size for segment in segments)
 
@@ -115,7 +115,7 @@ def batch_of(segments: Sequence[Segment], starts: FloatArray) -> Batch:
 
     left = column("left_distance", np.inf) < ALONGSIDE
     right = column("right_distance", np.inf) < ALONGSIDE
-    return Batch(
+    return SegmentBatch(
         np.asarray(starts, dtype=np.float64),
         column("lane_width", np.nan),
         column("speed", MEAN_SPEED),
@@ -149,7 +149,7 @@ class SimulatedModel(ABC):
     driver_means: FloatArray = field(default_factory=lambda: np.zeros(1))
 
     @abstractmethod
-    def simulate(self, batch: Batch, rng: np.random.Generator) -> FloatArray:
+    def simulate(self, batch: SegmentBatch, rng: np.random.Generator) -> FloatArray:
         """Offsets, shape (n, m), from `batch.start` at the first row on. [m]"""
 
     def free_starts(self, n: int, rng: np.random.Generator) -> FloatArray:

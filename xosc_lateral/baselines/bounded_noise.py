@@ -9,7 +9,7 @@ from typing import ClassVar, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.baselines.base import Batch, SimulatedModel, driver_means_of
+from xosc_lateral.baselines.base import SegmentBatch, SimulatedModel, driver_means_of
 from xosc_lateral.baselines.calibration import Bounds, calibrate
 from xosc_lateral.baselines.ornstein_uhlenbeck import recursion
 from xosc_lateral.drives.drive import Run
@@ -62,7 +62,7 @@ class BoundedNoise(SimulatedModel):
         steps = np.sqrt(2.0 * step / self.memory) * rng.standard_normal((n, m))
         return np.asarray(self.bound * np.sin(phase + np.cumsum(steps, axis=1)))
 
-    def simulate(self, batch: Batch, rng: np.random.Generator) -> FloatArray:
+    def simulate(self, batch: SegmentBatch, rng: np.random.Generator) -> FloatArray:
         """See `SimulatedModel.simulate`."""
         n, m = batch.shape
         keep = float(np.exp(-batch.step / self.relaxation))

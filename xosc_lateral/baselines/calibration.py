@@ -91,7 +91,7 @@ def calibrate(
 
 
 @dataclass(frozen=True, eq=False)
-class Target:
+class CalibrationTarget:
     """Measured windows of one length and their metrics."""
 
     segments: list[Segment]
@@ -100,7 +100,7 @@ class Target:
     same_start: bool
 
 
-def targets_of(runs: Sequence[Run]) -> list[Target]:
+def targets_of(runs: Sequence[Run]) -> list[CalibrationTarget]:
     """Windows that a candidate is compared with; lengths that no run has are left out."""
     targets = []
     for seconds, same_start in LENGTHS:
@@ -110,14 +110,14 @@ def targets_of(runs: Sequence[Run]) -> list[Target]:
             if len(windows) > 1:
                 rows = np.array([window.offset for window in windows])
                 segments = [segment_of(window.run, window.rows) for window in windows]
-                targets.append(Target(segments, rows[:, 0], snippet_metrics(rows), same_start))
+                targets.append(CalibrationTarget(segments, rows[:, 0], snippet_metrics(rows), same_start))
     if not targets:
         longest = max((len(run) for run in runs), default=0) * STEP
         raise NotEnoughDataError(f"the longest run lasts {longest:.1f} s; several windows of 10 s are needed to fit")
     return targets
 
 
-def distance_to(targets: Sequence[Target], model: LateralModel, seed: int) -> float:
+def distance_to(targets: Sequence[CalibrationTarget], model: LateralModel, seed: int) -> float:
     """Mean distance over the windows of all lengths, in standard deviations of the real metrics. [-]"""
     rng = np.random.default_rng(seed)
     found = []

@@ -9,7 +9,7 @@ from typing import ClassVar, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.baselines.base import Batch, SimulatedModel, driver_means_of
+from xosc_lateral.baselines.base import SegmentBatch, SimulatedModel, driver_means_of
 from xosc_lateral.drives.drive import Run
 
 FloatArray = NDArray[np.float64]
@@ -28,7 +28,7 @@ class ConstantOffset(SimulatedModel):
         """Means of the drivers."""
         return cls(driver_means=driver_means_of(runs))
 
-    def simulate(self, batch: Batch, rng: np.random.Generator) -> FloatArray:
+    def simulate(self, batch: SegmentBatch, rng: np.random.Generator) -> FloatArray:
         """See `SimulatedModel.simulate`."""
         return np.repeat(batch.start[:, None], batch.shape[1], axis=1)
 

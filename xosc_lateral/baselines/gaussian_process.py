@@ -9,7 +9,7 @@ from typing import ClassVar, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.baselines.base import Batch, SimulatedModel
+from xosc_lateral.baselines.base import SegmentBatch, SimulatedModel
 from xosc_lateral.drives.drive import Run
 from xosc_lateral.drives.resampling import STEP
 
@@ -71,7 +71,7 @@ class GaussianProcess(SimulatedModel):
         spread = float(np.sqrt(self.covariance(np.zeros(1))[0]))
         return self.mean + spread * rng.standard_normal(n)
 
-    def simulate(self, batch: Batch, rng: np.random.Generator) -> FloatArray:
+    def simulate(self, batch: SegmentBatch, rng: np.random.Generator) -> FloatArray:
         """Free paths, then moved onto their start by Matheron's rule: exact conditional samples. Shape (n, m). [m]"""
         from scipy.linalg import toeplitz
 

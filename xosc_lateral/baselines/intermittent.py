@@ -9,7 +9,7 @@ from typing import ClassVar, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.baselines.base import Batch, SimulatedModel, driver_means_of
+from xosc_lateral.baselines.base import SegmentBatch, SimulatedModel, driver_means_of
 from xosc_lateral.baselines.calibration import Bounds, calibrate
 from xosc_lateral.drives.drive import Run
 
@@ -71,11 +71,11 @@ class Intermittent(SimulatedModel):
         }
         return calibrate(lambda values: cls(driver_means=driver_means, **values), bounds, runs)
 
-    def simulate(self, batch: Batch, rng: np.random.Generator) -> FloatArray:
+    def simulate(self, batch: SegmentBatch, rng: np.random.Generator) -> FloatArray:
         """See `SimulatedModel.simulate`."""
         return self.drive(batch, rng)[0]
 
-    def drive(self, batch: Batch, rng: np.random.Generator) -> tuple[FloatArray, FloatArray]:
+    def drive(self, batch: SegmentBatch, rng: np.random.Generator) -> tuple[FloatArray, FloatArray]:
         """Offsets and the driver's lateral acceleration, shape (n, m) each. [m], [m/s2]"""
         n, m = batch.shape
         step, parts = batch.step, round(ADJUSTMENT / batch.step)

@@ -9,7 +9,7 @@ from typing import ClassVar, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.baselines.base import Batch, SimulatedModel, driver_means_of
+from xosc_lateral.baselines.base import SegmentBatch, SimulatedModel, driver_means_of
 from xosc_lateral.baselines.calibration import Bounds, calibrate
 from xosc_lateral.baselines.ornstein_uhlenbeck import recursion
 from xosc_lateral.drives.drive import Run
@@ -48,7 +48,7 @@ class LcSigma(SimulatedModel):
         driver_means = driver_means_of(runs)
         return calibrate(lambda values: cls(driver_means=driver_means, **values), {"sigma": Bounds(0.01, 0.99)}, runs)
 
-    def simulate(self, batch: Batch, rng: np.random.Generator) -> FloatArray:
+    def simulate(self, batch: SegmentBatch, rng: np.random.Generator) -> FloatArray:
         """See `SimulatedModel.simulate`."""
         scale = LONGEST_TIME * (1.0 - self.sigma)
         kicks = self.sigma * np.sqrt(2.0 * batch.step / scale) * rng.standard_normal(batch.shape)

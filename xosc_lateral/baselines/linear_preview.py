@@ -10,7 +10,7 @@ from typing import ClassVar, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.baselines.base import Batch, SimulatedModel, driver_means_of
+from xosc_lateral.baselines.base import SegmentBatch, SimulatedModel, driver_means_of
 from xosc_lateral.drives.drive import Run
 from xosc_lateral.drives.resampling import STEP
 
@@ -66,7 +66,7 @@ class LinearPreview(SimulatedModel):
             gains[used] = np.linalg.lstsq(x[:, used] / scale[used], y, rcond=SMALLEST)[0] / scale[used]
         return cls(driver_means=driver_means_of(runs), left=gains[:3], right=gains[3:])
 
-    def simulate(self, batch: Batch, rng: np.random.Generator) -> FloatArray:
+    def simulate(self, batch: SegmentBatch, rng: np.random.Generator) -> FloatArray:
         """See `SimulatedModel.simulate`."""
         plan = np.array([self.plan(c, v) for c, v in zip(batch.curvature, batch.speed, strict=True)])
         return np.asarray(plan - plan[:, :1] + batch.start[:, None])

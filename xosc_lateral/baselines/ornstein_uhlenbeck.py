@@ -9,7 +9,7 @@ from typing import ClassVar, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.baselines.base import Batch, SimulatedModel, driver_means_of
+from xosc_lateral.baselines.base import SegmentBatch, SimulatedModel, driver_means_of
 from xosc_lateral.baselines.calibration import Bounds, calibrate
 from xosc_lateral.drives.drive import Run
 
@@ -45,7 +45,7 @@ class OrnsteinUhlenbeck(SimulatedModel):
         bounds = {"time_constant": Bounds(0.5, 100.0), "spread": Bounds(0.03, 1.0)}
         return calibrate(lambda values: cls(driver_means=driver_means, mean=mean, **values), bounds, runs)
 
-    def simulate(self, batch: Batch, rng: np.random.Generator) -> FloatArray:
+    def simulate(self, batch: SegmentBatch, rng: np.random.Generator) -> FloatArray:
         """See `SimulatedModel.simulate`."""
         keep = float(np.exp(-batch.step / self.time_constant))
         kicks = self.spread * np.sqrt(1.0 - keep**2) * rng.standard_normal(batch.shape)

@@ -9,7 +9,7 @@ from typing import ClassVar, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.baselines.base import Batch, SimulatedModel, driver_means_of
+from xosc_lateral.baselines.base import SegmentBatch, SimulatedModel, driver_means_of
 from xosc_lateral.baselines.calibration import Bounds, calibrate
 from xosc_lateral.drives.drive import Run
 
@@ -67,7 +67,7 @@ class PotentialField(SimulatedModel):
         neighbour = np.abs(beside) * np.exp(-np.maximum(lane_width - beside * offset, 0.0) / self.reach)
         return np.asarray(self.strength * (edges - beside * neighbour))
 
-    def simulate(self, batch: Batch, rng: np.random.Generator) -> FloatArray:
+    def simulate(self, batch: SegmentBatch, rng: np.random.Generator) -> FloatArray:
         """See `SimulatedModel.simulate`."""
         return move(batch, rng, self.force, self.friction, self.noise)
 
@@ -82,7 +82,7 @@ class PotentialField(SimulatedModel):
         }
 
 
-def move(batch: Batch, rng: np.random.Generator, force: object, friction: float, noise: float) -> FloatArray:
+def move(batch: SegmentBatch, rng: np.random.Generator, force: object, friction: float, noise: float) -> FloatArray:
     """Offsets under a force, linear friction and white noise: exact friction, then the step (semi-implicit Euler).
 
     Shape (n, m). [m]

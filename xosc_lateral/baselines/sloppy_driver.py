@@ -9,7 +9,7 @@ from typing import ClassVar, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.baselines.base import Batch, SimulatedModel, driver_means_of
+from xosc_lateral.baselines.base import SegmentBatch, SimulatedModel, driver_means_of
 from xosc_lateral.baselines.calibration import Bounds, calibrate
 from xosc_lateral.drives.drive import Run
 
@@ -56,12 +56,12 @@ class SloppyDriver(SimulatedModel):
             lambda values: cls(driver_means=driver_means, **values), {"sloppiness": Bounds(0.02, 1.0)}, runs
         )
 
-    def simulate(self, batch: Batch, rng: np.random.Generator) -> FloatArray:
+    def simulate(self, batch: SegmentBatch, rng: np.random.Generator) -> FloatArray:
         """See `SimulatedModel.simulate`."""
         drift = self.drift(batch.with_burn_in(round(SETTLING / batch.step)), rng)[:, -batch.shape[1] :]
         return drift - drift[:, :1] + batch.start[:, None]
 
-    def drift(self, batch: Batch, rng: np.random.Generator) -> FloatArray:
+    def drift(self, batch: SegmentBatch, rng: np.random.Generator) -> FloatArray:
         """What the controller itself adds, from activation on, shape (n, m). [m]"""
         from xosc_lateral.baselines.kernels import steer_to_targets
 

@@ -9,7 +9,7 @@ from typing import ClassVar, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.baselines.base import ALONGSIDE, Batch, SimulatedModel, driver_means_of
+from xosc_lateral.baselines.base import ALONGSIDE, SegmentBatch, SimulatedModel, driver_means_of
 from xosc_lateral.baselines.calibration import Bounds, calibrate
 from xosc_lateral.baselines.potential_field import move
 from xosc_lateral.drives.drive import Run
@@ -64,7 +64,7 @@ class SocialForce(SimulatedModel):
         """Acceleration at rest. [m/s2] Shape (n,) each."""
         return np.asarray(-self.stiffness * (offset + self.shift * beside))
 
-    def simulate(self, batch: Batch, rng: np.random.Generator) -> FloatArray:
+    def simulate(self, batch: SegmentBatch, rng: np.random.Generator) -> FloatArray:
         """See `SimulatedModel.simulate`."""
         return move(batch, rng, self.force, self.friction, self.noise)
 

@@ -9,7 +9,7 @@ from typing import ClassVar, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.baselines.base import Batch, SimulatedModel, driver_means_of
+from xosc_lateral.baselines.base import SegmentBatch, SimulatedModel, driver_means_of
 from xosc_lateral.baselines.calibration import Bounds, calibrate
 from xosc_lateral.drives.drive import Run
 
@@ -65,7 +65,7 @@ class StripBased(SimulatedModel):
         }
         return calibrate(lambda values: cls(driver_means=driver_means, **values), bounds, runs)
 
-    def simulate(self, batch: Batch, rng: np.random.Generator) -> FloatArray:
+    def simulate(self, batch: SegmentBatch, rng: np.random.Generator) -> FloatArray:
         """See `SimulatedModel.simulate`."""
         n, m = batch.shape
         offset, target = batch.start.copy(), batch.start.copy()

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.board.contestants import Contestant, contestants
-from xosc_lateral.board.half import Half, Sampled, make_half, sample_half
+from xosc_lateral.board.half import Half, SampledHalf, make_half, sample_half
 from xosc_lateral.board.numbers import floors_of, numbers_of
 from xosc_lateral.board.ranking import RESAMPLES, SHORT, bootstrap
 from xosc_lateral.board.result import Board
@@ -76,9 +76,9 @@ def benchmark_realism(
 
 def _sample_all(
     split: Sequence[Half], entries: Sequence[Contestant], seed: int, progress: Progress
-) -> tuple[dict[str, list[Sampled]], dict[str, str], dict[str, float]]:
+) -> tuple[dict[str, list[SampledHalf]], dict[str, str], dict[str, float]]:
     """Fit and sample every model in both halves; what can't be had is said, not skipped."""
-    sampled: dict[str, list[Sampled]] = {}
+    sampled: dict[str, list[SampledHalf]] = {}
     absent: dict[str, str] = {}
     seconds: dict[str, float] = {}
     for number, entry in enumerate(entries):

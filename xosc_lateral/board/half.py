@@ -12,7 +12,7 @@ from xosc_lateral.baselines.base import LateralModel
 from xosc_lateral.driver.snippets import segment_of
 from xosc_lateral.drives.drive import Run
 from xosc_lateral.drives.resampling import STEP
-from xosc_lateral.evaluation.condition import LENGTHS, Condition
+from xosc_lateral.evaluation.condition import LENGTHS, SnippetCondition
 from xosc_lateral.evaluation.lane_keeping import VarianceParts, variance_parts
 from xosc_lateral.evaluation.measures import Features, features_of
 from xosc_lateral.evaluation.same_start import FLOOR_DRAWS, real_against_real, windows_with_the_same_start
@@ -27,7 +27,7 @@ LEAST_WINDOWS = 20
 ENSEMBLE = 8
 """Sampled windows for each real one of 10 s: proper scores need several."""
 
-CONDITIONS = tuple(Condition(seconds, same_start) for seconds in LENGTHS for same_start in (True, False))
+CONDITIONS = tuple(SnippetCondition(seconds, same_start) for seconds in LENGTHS for same_start in (True, False))
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,7 +56,7 @@ class Half:
     stand_ins: Mapping[float, IntArray]
 
     @property
-    def conditions(self) -> tuple[Condition, ...]:
+    def conditions(self) -> tuple[SnippetCondition, ...]:
         """Those with enough windows."""
         return tuple(one for one in CONDITIONS if one.seconds in self.windows)
 
@@ -91,7 +91,7 @@ def make_half(train: list[Run], test: list[Run], rng: np.random.Generator) -> Ha
 
 
 @dataclass(frozen=True, eq=False)
-class Sampled:
+class SampledHalf:
     """What a model did in one half.
 
     Parameters
@@ -101,26 +101,26 @@ class Sampled:
         A free run for each of the half's runs. [m]
     ensemble : array, shape (n, 8, 51), or None
         Snippets of 10 s with the real starts. [m]
-    windows : mapping of Condition to array, shape (n, m)
+    windows : mapping of SnippetCondition to array, shape (n, m)
         [m]
-    features : mapping of Condition to Features
+    features : mapping of SnippetCondition to Features
     variance : VarianceParts
     """
 
     settings: Mapping[str, float]
     paths: list[FloatArray]
     ensemble: FloatArray
-    windows: Mapping[Condition, FloatArray]
-    features: Mapping[Condition, Features]
+    windows: Mapping[SnippetCondition, FloatArray]
+    features: Mapping[SnippetCondition, Features]
     variance: VarianceParts
 
 
-def sample_half(model: LateralModel, half: Half, rng: np.random.Generator) -> Sampled:
+def sample_half(model: LateralModel, half: Half, rng: np.random.Generator) -> SampledHalf:
     """Free runs over the half's runs, and windows with the real starts."""
     paths = model.sample([segment_of(run) for run in half.test], None, rng)
     shortest = min(half.windows)
     ensemble = sample_same_start(model, half.windows[shortest], rng, ENSEMBLE)
-    cut: dict[Condition, FloatArray] = {}
+    cut: dict[SnippetCondition, FloatArray] = {}
     for condition in half.conditions:
         own = half.windows[condition.seconds]
         if not condition.same_start:
@@ -134,7 +134,7 @@ def sample_half(model: LateralModel, half: Half, rng: np.random.Generator) -> Sa
         for condition, rows in cut.items()
     }
     free = half.windows[shortest].cut_from(paths)
-    return Sampled(model.settings, paths, ensemble, cut, features, variance_parts(free, run_names(half)))
+    return SampledHalf(model.settings, paths, ensemble, cut, features, variance_parts(free, run_names(half)))
 
 
 def run_names(half: Half) -> NDArray[np.str_]:
@@ -150,7 +150,7 @@ def sample_same_start(model: LateralModel, windows: Snippets, rng: np.random.Gen
     return rows.reshape(len(windows), members, -1)
 
 
-def floors(half: Half, condition: Condition) -> Mapping[str, float]:
+def floors(half: Half, condition: SnippetCondition) -> Mapping[str, float]:
     """Real against real under a condition, by family. [unit of the family]"""
     real, donors = half.features[condition.seconds], half.donor_features[condition.seconds]
     rows, others = np.arange(len(real)), np.arange(len(donors))

@@ -7,27 +7,29 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.board.half import Half, Sampled, floors, pooled
+from xosc_lateral.board.half import Half, SampledHalf, floors, pooled
 from xosc_lateral.board.ranking import SHORT, ranked_numbers
-from xosc_lateral.board.result import Number
+from xosc_lateral.board.result import ModelScore
 from xosc_lateral.evaluation.classifier import classifier_two_sample_test
-from xosc_lateral.evaluation.condition import Condition
+from xosc_lateral.evaluation.condition import SnippetCondition
 from xosc_lateral.evaluation.ensemble_scores import PROPER, proper_scores
 from xosc_lateral.evaluation.measures import UNITS, differences, named_distances
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
-Parts = Sequence[tuple[Half, Mapping[str, Sampled]]]
+Parts = Sequence[tuple[Half, Mapping[str, SampledHalf]]]
 
 
-def numbers_of(parts: Parts, key: str, floor: Mapping[str, float], *, classify: bool) -> tuple[Number, ...]:
+def numbers_of(parts: Parts, key: str, floor: Mapping[str, float], *, classify: bool) -> tuple[ModelScore, ...]:
     """Numbers of one model; see `floors_of` for their names."""
     values = pooled([_of_half(half, sampled[key]) for half, sampled in parts])
     if classify:
         values |= _classified(parts[0][0], parts[0][1][key])
     ranked = {f"{family}, {condition.name}" for condition, family in ranked_numbers(parts[0][0])}
     return tuple(
-        Number(name, _unit(name), value, floor[name], name in ranked) for name, value in values.items() if name in floor
+        ModelScore(name, _unit(name), value, floor[name], name in ranked)
+        for name, value in values.items()
+        if name in floor
     )
 
 
@@ -39,13 +41,13 @@ def floors_of(split: Sequence[Half], *, classify: bool) -> dict[str, float]:
     return found
 
 
-def _of_half(half: Half, sampled: Sampled) -> dict[str, float]:
+def _of_half(half: Half, sampled: SampledHalf) -> dict[str, float]:
     found: dict[str, float] = {}
     for condition in half.conditions:
         real, other = half.features[condition.seconds], sampled.features[condition]
         rows = np.arange(len(real))
         found |= {f"{family}, {condition.name}": v for family, v in differences(real, other, rows, rows).items()}
-        if condition == Condition(SHORT, True):
+        if condition == SnippetCondition(SHORT, True):
             found |= {f"{name}, {condition.name}": value for name, value in named_distances(real, other).items()}
     return found | _proper_scores(half.windows[SHORT].offset, sampled.ensemble)
 
@@ -56,7 +58,7 @@ def _floors_of_half(half: Half) -> dict[str, float]:
         found |= {f"{family}, {condition.name}": value for family, value in floors(half, condition).items()}
     stand_ins = half.stand_ins[SHORT]
     named = named_distances(half.features[SHORT], half.donor_features[SHORT].take(stand_ins[:, 0]))
-    found |= {f"{name}, {Condition(SHORT, True).name}": value for name, value in named.items()}
+    found |= {f"{name}, {SnippetCondition(SHORT, True).name}": value for name, value in named.items()}
     return found | _proper_scores(half.windows[SHORT].offset, half.donors[SHORT].offset[stand_ins])
 
 
@@ -68,7 +70,7 @@ def _proper_name(name: str) -> str:
     return f"{name.replace('_', ' ')}, {SHORT:g} s"
 
 
-def _classified(half: Half, sampled: Sampled) -> dict[str, float]:
+def _classified(half: Half, sampled: SampledHalf) -> dict[str, float]:
     found = {}
     for condition in half.conditions:
         own = half.windows[condition.seconds]

@@ -7,8 +7,8 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.board.half import Half, Sampled, floors
-from xosc_lateral.evaluation.condition import Condition
+from xosc_lateral.board.half import Half, SampledHalf, floors
+from xosc_lateral.evaluation.condition import SnippetCondition
 from xosc_lateral.evaluation.measures import differences
 
 FloatArray = NDArray[np.float64]
@@ -20,14 +20,16 @@ SHORT, LONG = 10.0, 30.0
 RESAMPLES = 200
 
 
-def ranked_numbers(half: Half) -> list[tuple[Condition, str]]:
+def ranked_numbers(half: Half) -> list[tuple[SnippetCondition, str]]:
     """What counts: ten metrics from the same start, and everything of free runs in longer windows."""
     seconds = LONG if LONG in half.windows else SHORT
-    free = [(Condition(seconds, False), family) for family in ("metrics", "lane_keeping", "spectrum", "memory")]
-    return [(Condition(SHORT, True), "metrics"), *free]
+    free = [(SnippetCondition(seconds, False), family) for family in ("metrics", "lane_keeping", "spectrum", "memory")]
+    return [(SnippetCondition(SHORT, True), "metrics"), *free]
 
 
-def score_rows(half: Half, sampled: Sampled, base: Mapping[tuple[Condition, str], float], rows: Rows) -> float:
+def score_rows(
+    half: Half, sampled: SampledHalf, base: Mapping[tuple[SnippetCondition, str], float], rows: Rows
+) -> float:
     """Geometric mean of value over floor for a choice of windows. [-]"""
     logs, found = [], {}
     for condition, family in ranked_numbers(half):
@@ -42,7 +44,7 @@ def score_rows(half: Half, sampled: Sampled, base: Mapping[tuple[Condition, str]
 Rows = Mapping[float, IntArray]
 
 
-def floor_of(half: Half) -> dict[tuple[Condition, str], float]:
+def floor_of(half: Half) -> dict[tuple[SnippetCondition, str], float]:
     """Floors of what counts."""
     by_condition = {condition: floors(half, condition) for condition, _ in ranked_numbers(half)}
     return {(condition, family): by_condition[condition][family] for condition, family in ranked_numbers(half)}
@@ -70,7 +72,7 @@ def _rows_of(unit: NDArray[np.str_], drawn: NDArray[np.str_]) -> IntArray:
 
 
 def bootstrap(
-    parts: Sequence[tuple[Half, Mapping[str, Sampled]]], rng: np.random.Generator, resamples: int
+    parts: Sequence[tuple[Half, Mapping[str, SampledHalf]]], rng: np.random.Generator, resamples: int
 ) -> tuple[dict[str, FloatArray], dict[str, FloatArray]]:
     """Scores of all models on the halves as they are, and on resampled vehicles.
 

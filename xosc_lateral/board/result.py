@@ -14,7 +14,7 @@ FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
-class Number:
+class ModelScore:
     """One number of one model.
 
     Parameters
@@ -52,7 +52,7 @@ class Row:
         See `LateralModel`; `key` is its name on the command line.
     settings : mapping of str to float
         Numbers fitted on the first half.
-    numbers : tuple of Number
+    numbers : tuple of ModelScore
     variance : VarianceParts
         Of its free runs.
     score : float
@@ -75,7 +75,7 @@ class Row:
     source: str
     departures: str
     settings: Mapping[str, float]
-    numbers: tuple[Number, ...]
+    numbers: tuple[ModelScore, ...]
     variance: VarianceParts
     score: float
     low: float
@@ -88,7 +88,7 @@ class Row:
     spectrum: FloatArray
     autocorrelation: FloatArray
 
-    def number(self, name: str) -> Number:
+    def number(self, name: str) -> ModelScore:
         """The number of that name; `KeyError` if it was not computed."""
         for one in self.numbers:
             if one.name == name:

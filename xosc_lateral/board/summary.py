@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.board.contestants import Contestant
-from xosc_lateral.board.half import Half, Sampled
+from xosc_lateral.board.half import Half, SampledHalf
 from xosc_lateral.board.ranking import SHORT, kendall_tau, ranked_numbers, ranks
-from xosc_lateral.board.result import Board, Number, Row
+from xosc_lateral.board.result import Board, ModelScore, Row
 from xosc_lateral.drives.drive import Run
 from xosc_lateral.drives.resampling import STEP
 from xosc_lateral.evaluation.lane_keeping import variance_parts
@@ -18,7 +18,7 @@ from xosc_lateral.evaluation.measures import LAGS, autocorrelation_of, resolved_
 from xosc_lateral.evaluation.snippets import BLOCK, FEW_DRIVES
 
 FloatArray = NDArray[np.float64]
-Parts = Sequence[tuple[Half, Mapping[str, Sampled]]]
+Parts = Sequence[tuple[Half, Mapping[str, SampledHalf]]]
 
 EXAMPLES = 8
 """Windows shown of each model."""
@@ -30,7 +30,7 @@ def make_board(
     runs: Sequence[Run],
     entries: Sequence[Contestant],
     parts: Parts,
-    numbers: Mapping[str, tuple[Number, ...]],
+    numbers: Mapping[str, tuple[ModelScore, ...]],
     by_half: Mapping[str, FloatArray],
     drawn: Mapping[str, FloatArray],
     absent: Mapping[str, str],

@@ -24,7 +24,7 @@ from xosc_lateral.cli.words import (
 )
 from xosc_lateral.formats.openscenario.write.target import Player
 from xosc_lateral.limits import JOB_MEMORY, JOB_TIMEOUT
-from xosc_lateral.pipeline.settings import Mode
+from xosc_lateral.pipeline.settings import OutputMode
 
 EXAMPLES = examples(
     "convert cut-in.xosc -o lifelike.xosc --seed 1 --report report.html",
@@ -76,8 +76,8 @@ def convert(
     ] = None,
     library: Library = None,
     mode: Annotated[
-        Mode, typer.Option(help="trajectory: play the maneuvers out; lane-offset: keep them reactive.")
-    ] = Mode.TRAJECTORY,
+        OutputMode, typer.Option(help="trajectory: play the maneuvers out; lane-offset: keep them reactive.")
+    ] = OutputMode.TRAJECTORY,
     player: Annotated[
         Player, typer.Option("--for", help="Who plays it: standard, or made for esmini or CARLA's ScenarioRunner.")
     ] = Player.STANDARD,
@@ -165,14 +165,14 @@ def convert(
         _convert_one(Path(scenario[0]), output, settings, variants, report, strict, quiet, as_json)
 
 
-def _check_target(player: Player, version: str | None, mode: Mode) -> None:
+def _check_target(player: Player, version: str | None, mode: OutputMode) -> None:
     from xosc_lateral.formats.openscenario.write.target import target
 
     try:
         target(player.value, version)
     except ValueError as error:
         raise typer.BadParameter(str(error), param_hint="--version") from error
-    if player is Player.CARLA and mode is Mode.LANE_OFFSET:
+    if player is Player.CARLA and mode is OutputMode.LANE_OFFSET:
         raise typer.BadParameter("CARLA's lane offsets have no shape; use --mode trajectory", param_hint="--for")
 
 

@@ -5,8 +5,8 @@ simulated driver; see `plants` and `hidden_plants` for what there is.
 """
 
 from xosc_lateral.datasets.driver_simulator import (
-    Drive,
     Driver,
+    SimulatedDrive,
     Truth,
     draw_driver,
     simulate_drive,
@@ -15,15 +15,15 @@ from xosc_lateral.datasets.driver_simulator import (
 from xosc_lateral.datasets.hidden_plants import (
     CameraStep,
     Companion,
+    CyclicTarget,
     Distraction,
     Fatigue,
     SensorDrift,
     TargetWander,
-    Weave,
 )
 from xosc_lateral.datasets.intent import Plant
 from xosc_lateral.datasets.plants import (
-    LaneHabit,
+    LanePreference,
     RestoringBy,
     ShakyCamera,
     ShiftBy,
@@ -32,28 +32,28 @@ from xosc_lateral.datasets.plants import (
     curve_cutting,
     truck_avoidance,
 )
-from xosc_lateral.datasets.response import Response, Shape, linear, saturating, threshold
+from xosc_lateral.datasets.response import Shape, SimulatedResponse, linear, saturating, threshold
 
 __all__ = [
     "CameraStep",
     "Companion",
+    "CyclicTarget",
     "Distraction",
-    "Drive",
     "Driver",
     "Fatigue",
-    "LaneHabit",
+    "LanePreference",
     "Plant",
-    "Response",
     "RestoringBy",
     "SensorDrift",
     "ShakyCamera",
     "Shape",
     "ShiftBy",
     "SideWind",
+    "SimulatedDrive",
+    "SimulatedResponse",
     "SpreadBy",
     "TargetWander",
     "Truth",
-    "Weave",
     "curve_cutting",
     "draw_driver",
     "linear",

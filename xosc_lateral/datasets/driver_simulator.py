@@ -122,7 +122,7 @@ class Truth:
 
 
 @dataclass(frozen=True, eq=False)
-class Drive:
+class SimulatedDrive:
     """A drive table with the truth behind it."""
 
     table: pd.DataFrame
@@ -148,7 +148,7 @@ def simulate_drive(
     effects: Sequence[Plant] = (),
     sensor_rate: float | None = None,
     drop: Sequence[str] = (),
-) -> Drive:
+) -> SimulatedDrive:
     """Simulate one drive.
 
     Parameters
@@ -192,7 +192,7 @@ def simulate_drive(
     rows = np.minimum(np.rint(time / STEP).astype(int), n - 1)
     target, changing = driver.bias + intent.target, way != np.rint(way)
     truth = Truth(driver, tuple(effects), time, offset[rows], target[rows], changing[rows], corrections)
-    return Drive(table.drop(columns=list(drop)), truth)
+    return SimulatedDrive(table.drop(columns=list(drop)), truth)
 
 
 def simulate_population(n_drivers: int, duration: float = 1200.0, seed: int = 0, spread: float = 0.25) -> pd.DataFrame:

@@ -52,7 +52,7 @@ class TargetWander:
 
 
 @dataclass(frozen=True)
-class Weave:
+class CyclicTarget:
     """The driver weaves: the target swings with a period.
 
     Parameters

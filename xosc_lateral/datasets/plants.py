@@ -14,7 +14,7 @@ from scipy.signal import lfilter
 
 from xosc_lateral.datasets.intent import Context, Intent
 from xosc_lateral.datasets.motorway import STEP
-from xosc_lateral.datasets.response import Response, lagged
+from xosc_lateral.datasets.response import SimulatedResponse, lagged
 
 
 @dataclass(frozen=True)
@@ -31,7 +31,7 @@ class ShiftBy:
 
     columns: tuple[str, ...]
     size: float
-    response: Response = field(default_factory=Response)
+    response: SimulatedResponse = field(default_factory=SimulatedResponse)
     kind: str = "location"
 
     def quantity(self, context: Context) -> np.ndarray:
@@ -51,12 +51,12 @@ def curve_cutting(size: float = 0.25, look_ahead: float = 1.2, lag: float = 0.0)
 
     `size` in [m], `look_ahead` and `lag` in [s].
     """
-    return ShiftBy(("curvature",), size, Response(look_ahead=look_ahead, lag=lag))
+    return ShiftBy(("curvature",), size, SimulatedResponse(look_ahead=look_ahead, lag=lag))
 
 
 def truck_avoidance(size: float = 0.25, lag: float = 1.0) -> ShiftBy:
     """To the left while a truck drives alongside on the right. `size` in [m], `lag` in [s]."""
-    return ShiftBy(("truck_right",), size, Response(lag=lag))
+    return ShiftBy(("truck_right",), size, SimulatedResponse(lag=lag))
 
 
 @dataclass(frozen=True)
@@ -71,11 +71,11 @@ class SideWind:
     def apply(self, intent: Intent, context: Context, rng: np.random.Generator) -> None:
         """Move the target; 90 deg blows towards the left of travel."""
         cross = context["wind_speed"] * np.sin(np.radians(context["wind_direction"]))
-        intent.target += self.size * Response(lag=self.lag).scaled(cross)
+        intent.target += self.size * SimulatedResponse(lag=self.lag).scaled(cross)
 
 
 @dataclass(frozen=True)
-class LaneHabit:
+class LanePreference:
     """A place of its own in every lane.
 
     Parameters
@@ -107,7 +107,7 @@ class SpreadBy:
 
     column: str
     factor: float
-    response: Response = field(default_factory=lambda: Response(lag=1.0))
+    response: SimulatedResponse = field(default_factory=lambda: SimulatedResponse(lag=1.0))
     kind: str = "scale"
 
     @property
@@ -134,7 +134,7 @@ class RestoringBy:
 
     column: str
     factor: float
-    response: Response = field(default_factory=Response)
+    response: SimulatedResponse = field(default_factory=SimulatedResponse)
     kind: str = "dynamics"
 
     @property
@@ -172,7 +172,7 @@ class ShakyCamera:
 
     def apply(self, intent: Intent, context: Context, rng: np.random.Generator) -> None:
         """Blur the measurement."""
-        strength = Response().scaled(context[self.column])
+        strength = SimulatedResponse().scaled(context[self.column])
         keep = np.exp(-STEP / self.memory)
         error = lfilter([np.sqrt(1.0 - keep**2)], [1.0, -keep], rng.normal(size=len(strength)))
         intent.camera += self.size * (strength - strength.min()) * error

@@ -29,7 +29,7 @@ def threshold(at: float) -> Shape:
 
 
 @dataclass(frozen=True)
-class Response:
+class SimulatedResponse:
     """How a driver answers to a quantity: of what shape, how early, how slowly.
 
     Parameters

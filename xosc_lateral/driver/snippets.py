@@ -51,7 +51,7 @@ class Snippet:
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Sampled:
+class SampledOffsets:
     """Sampled offsets of one snippet or drive."""
 
     drive: str
@@ -110,7 +110,7 @@ def sample_like(
     rules: CutRules = PAPER_RULES,
     *,
     with_sensor: bool = False,
-) -> Iterator[Sampled]:
+) -> Iterator[SampledOffsets]:
     """For each snippet of the measured drives a sampled one of the same length, start, lane width and context."""
     sensor = known_sensor(profile) if with_sensor else None
     numbers = {drive.name: number for number, drive in enumerate(drives)}
@@ -121,12 +121,12 @@ def sample_like(
         noise = sensor_error(sensor, len(snippet.time), STEP, own)
         offset = sample_offsets(profile, segment, own, start=float(snippet.offset[0] - noise[0])) + noise
         _check(offset, segment, profile, snippet.run.drive)
-        yield Sampled(snippet.run.drive, snippet.index, snippet.time, offset, snippet.offset)
+        yield SampledOffsets(snippet.run.drive, snippet.index, snippet.time, offset, snippet.offset)
 
 
 def sample_context(
     profile: DriverProfile, drives: Sequence[Drive], seed: int, *, with_sensor: bool = False
-) -> Iterator[Sampled]:
+) -> Iterator[SampledOffsets]:
     """One free run per measured drive, under its context from its first row to its last, lane changes included."""
     sensor = known_sensor(profile) if with_sensor else None
     root = np.random.SeedSequence(seed)
@@ -135,7 +135,7 @@ def sample_context(
         own, segment = child(root, number), segment_of(run)
         offset = sample_offsets(profile, segment, own) + sensor_error(sensor, len(run), STEP, own)
         _check(offset, segment, profile, drive.name)
-        yield Sampled(drive.name, 0, run.time, offset, None)
+        yield SampledOffsets(drive.name, 0, run.time, offset, None)
 
 
 def _check(offset: FloatArray, segment: Segment, profile: DriverProfile, drive: str) -> None:
@@ -152,7 +152,7 @@ def sample_free(
     speed: float = MEAN_SPEED,
     lane_width: float | None = None,
     with_sensor: bool = False,
-) -> Iterator[Sampled]:
+) -> Iterator[SampledOffsets]:
     """One free run in even traffic: constant speed, no other context.
 
     Parameters
@@ -174,4 +174,4 @@ def sample_free(
     offset = sample_offsets(profile, segment, own) + sensor_error(
         known_sensor(profile) if with_sensor else None, n, STEP, own
     )
-    yield Sampled(profile.name, 0, time, offset, None)
+    yield SampledOffsets(profile.name, 0, time, offset, None)

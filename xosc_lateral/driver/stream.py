@@ -79,7 +79,7 @@ class OffsetStream:
         self._start, self._time = start, time
         self._process = DriveProcess(profile, self._seed, ahead=BLOCK)
         self._process.begin_at(time)
-        self._answers = tuple(_Answer(effect, profile.model.step) for effect in self._process.columned)
+        self._answers = tuple(_ResponseStream(effect, profile.model.step) for effect in self._process.columned)
         self._ahead = max([0, *(answer.ahead for answer in self._answers)]) + (_NEIGHBOURS if self._factor > 1 else 0)
         self._known: tuple[str, ...] | None = None
         self._widths: deque[float] = deque()
@@ -281,7 +281,7 @@ class OffsetStream:
         return stream
 
 
-class _Answer:
+class _ResponseStream:
     """A driver's answer to one effect's columns, row by row."""
 
     def __init__(self, effect: ColumnEffect, step: float) -> None:

@@ -10,7 +10,7 @@ from xosc_lateral.enrich.result import EntityResult, LaneDeparture
 from xosc_lateral.mask import stretches_of
 from xosc_lateral.motion.gaps import BoxPath, Gap, smallest_gaps
 from xosc_lateral.motion.nominal import Activity, EntityMotion, NominalMotion
-from xosc_lateral.motion.trajectory import Trajectory
+from xosc_lateral.motion.trajectory import WorldTrajectory
 from xosc_lateral.road.network import RoadNetwork
 
 GAP_STEP = 0.1
@@ -44,7 +44,7 @@ def _lateral_within_a_lane(motion: EntityMotion) -> list[tuple[int, int]]:
     return [(part.start, part.stop - 1) for part in stretches_of(lateral) if len(set(motion.lane[part].tolist())) == 1]
 
 
-def gaps_of(motion: NominalMotion, trajectories: Sequence[Trajectory]) -> tuple[Gap, ...]:
+def gaps_of(motion: NominalMotion, trajectories: Sequence[WorldTrajectory]) -> tuple[Gap, ...]:
     """Smallest gap of each pair of vehicles that meet; `trajectories`: one per entity."""
     every = max(1, round(GAP_STEP / motion.step))
     paths = []

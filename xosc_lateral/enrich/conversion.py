@@ -41,7 +41,7 @@ class ConversionProvenance:
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Conversion:
+class ConvertedScenario:
     """One converted scenario.
 
     Parameters

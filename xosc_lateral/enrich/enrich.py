@@ -15,13 +15,13 @@ from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.driver.sampling import OffsetSampler
 from xosc_lateral.driver.sensor.error import known_sensor, sensor_error
 from xosc_lateral.enrich.consequences import gaps_of, lane_departures
-from xosc_lateral.enrich.give_way import Sampled, give_way
+from xosc_lateral.enrich.give_way import SampledVehicle, give_way
 from xosc_lateral.enrich.result import Enriched, EntityResult, SampledSegment
 from xosc_lateral.motion.context import entity_context
 from xosc_lateral.motion.deviation import SETTLING_TIME, SampledStretch, deviation_through
 from xosc_lateral.motion.nominal import Activity, EntityMotion, NominalMotion
 from xosc_lateral.motion.segments import Stretch, cut_stretches
-from xosc_lateral.motion.trajectory import Trajectory, displace, distance_driven
+from xosc_lateral.motion.trajectory import WorldTrajectory, displace, distance_driven
 from xosc_lateral.road.network import RoadNetwork
 from xosc_lateral.segment import Segment
 
@@ -204,7 +204,7 @@ def _apart(drawn: Sequence[_Drawn], motion: NominalMotion, network: RoadNetwork)
             for stretch, _, _ in one.segments:
                 can_move[stretch.first : stretch.last + 1] = True
         heeds = one.profile is not None and any(column in NEIGHBOURS for column in one.profile.columns)
-        sampled.append(Sampled(one.motion, deviation, can_move, heeds))
+        sampled.append(SampledVehicle(one.motion, deviation, can_move, heeds))
     every = max(1, round(SAMPLE_STEP / motion.step))
     moves = give_way(motion, network, sampled, np.arange(0, len(motion.entities[0].time), every))
     return [
@@ -264,8 +264,8 @@ def _untouched(entity: EntityMotion, stretches: tuple[Stretch, ...], why: str) -
     return EntityResult(entity, stretches, None, why, (), np.zeros(len(entity.time)), _nominal(entity))
 
 
-def _nominal(entity: EntityMotion) -> Trajectory:
-    return Trajectory(
+def _nominal(entity: EntityMotion) -> WorldTrajectory:
+    return WorldTrajectory(
         entity.time, entity.x, entity.y, entity.z, entity.heading, entity.pitch, entity.roll, entity.speed
     )
 

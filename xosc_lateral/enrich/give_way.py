@@ -44,7 +44,7 @@ ANSWER = 1.0
 
 
 @dataclass(frozen=True, eq=False)
-class Sampled:
+class SampledVehicle:
     """A vehicle and its sampled path.
 
     Parameters
@@ -66,7 +66,7 @@ class Sampled:
 
 
 def give_way(
-    motion: NominalMotion, network: RoadNetwork, sampled: Sequence[Sampled], rows: IntArray
+    motion: NominalMotion, network: RoadNetwork, sampled: Sequence[SampledVehicle], rows: IntArray
 ) -> list[FloatArray | None]:
     """By how much each vehicle moves aside, on every row of the motion, positive left; None: not at all. [m]
 
@@ -74,7 +74,7 @@ def give_way(
     ----------
     motion : NominalMotion
     network : RoadNetwork
-    sampled : sequence of Sampled
+    sampled : sequence of SampledVehicle
         All entities, in the motion's order.
     rows : array of int, shape (n,)
         Rows that are looked at, evenly spaced.
@@ -120,7 +120,7 @@ class _Frame:
     width: float
 
     @classmethod
-    def of(cls, sampled: Sampled, rows: IntArray) -> _Frame:
+    def of(cls, sampled: SampledVehicle, rows: IntArray) -> _Frame:
         motion = sampled.motion
         box = motion.entity.bounding_box
         heading = motion.heading[rows]
@@ -178,7 +178,7 @@ def _answered(values: FloatArray, width: float) -> FloatArray:
     return np.asarray(np.convolve(np.pad(values, half, mode="edge"), kernel / kernel.sum(), "valid"))
 
 
-def _left_hand(network: RoadNetwork, sampled: Sequence[Sampled], rows: IntArray) -> list[bool]:
+def _left_hand(network: RoadNetwork, sampled: Sequence[SampledVehicle], rows: IntArray) -> list[bool]:
     """Whether each vehicle drives where one keeps left: the first road that it is on says so."""
     found = []
     for one in sampled:

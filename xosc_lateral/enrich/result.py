@@ -13,7 +13,7 @@ from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.motion.gaps import Gap
 from xosc_lateral.motion.nominal import EntityMotion, NominalMotion
 from xosc_lateral.motion.segments import Stretch
-from xosc_lateral.motion.trajectory import Trajectory, leaps
+from xosc_lateral.motion.trajectory import WorldTrajectory, leaps
 from xosc_lateral.road.network import RoadNetwork
 
 FloatArray = NDArray[np.float64]
@@ -55,7 +55,7 @@ class EntityResult:
     segments : tuple of SampledSegment
     deviation : array, shape (rows,)
         Of the enriched path from the nominal one, positive left. [m]
-    trajectory : Trajectory
+    trajectory : WorldTrajectory
         The enriched path (the nominal one if not enriched).
     neutral : tuple of str
         Context columns that the profile's effects ask for and that were not known: taken as neutral.
@@ -69,7 +69,7 @@ class EntityResult:
     why: str
     segments: tuple[SampledSegment, ...]
     deviation: FloatArray
-    trajectory: Trajectory
+    trajectory: WorldTrajectory
     neutral: tuple[str, ...] = ()
     bound: Bound | None = None
 

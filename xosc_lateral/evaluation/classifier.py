@@ -35,7 +35,7 @@ RESAMPLES = 200
 
 
 @dataclass(frozen=True)
-class Separation:
+class TwoSampleResult:
     """How well two sets of snippets are told apart.
 
     Parameters
@@ -143,7 +143,7 @@ def classifier_two_sample_test(
     context: Sequence[FloatArray] | None = None,
     rocket: bool = False,
     seed: int = 0,
-) -> Separation | None:
+) -> TwoSampleResult | None:
     """Train a gradient-boosted classifier to tell two sets of snippets apart, and judge it on drives it has not seen.
 
     Parameters
@@ -204,7 +204,7 @@ def spread_out(count: int) -> NDArray[np.int64]:
     return np.unique(np.linspace(0, count - 1, min(count, MOST)).astype(np.int64))
 
 
-def _judged(chance: FloatArray, label: NDArray[np.bool_], groups: NDArray[np.generic], seed: int) -> Separation:
+def _judged(chance: FloatArray, label: NDArray[np.bool_], groups: NDArray[np.generic], seed: int) -> TwoSampleResult:
     names, member = np.unique(groups, return_inverse=True)
     rng = np.random.default_rng(seed)
     drawn = []
@@ -213,7 +213,7 @@ def _judged(chance: FloatArray, label: NDArray[np.bool_], groups: NDArray[np.gen
         if weight[label].any() and weight[~label].any():
             drawn.append(area_under_roc(chance, label, weight.astype(np.float64)))
     low, high = np.quantile(drawn, [0.025, 0.975]) if drawn else (np.nan, np.nan)
-    return Separation(area_under_roc(chance, label, np.ones(len(label))), float(low), float(high))
+    return TwoSampleResult(area_under_roc(chance, label, np.ones(len(label))), float(low), float(high))
 
 
 def area_under_roc(score: FloatArray, label: NDArray[np.bool_], weight: FloatArray) -> float:

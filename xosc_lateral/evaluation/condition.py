@@ -9,7 +9,7 @@ LENGTHS = (10.0, 30.0, 60.0)
 
 
 @dataclass(frozen=True)
-class Condition:
+class SnippetCondition:
     """What snippets that are compared have in common.
 
     Parameters

@@ -71,7 +71,7 @@ class Ego:
 
 
 @dataclass(frozen=True, eq=False)
-class Outcome:
+class EncounterOutcome:
     """What became of n encounters.
 
     Parameters
@@ -111,7 +111,7 @@ class SafetyModel(Protocol):
         ...
 
 
-def evaluate_braking(model: SafetyModel, traffic: Traffic, ego: Ego) -> Outcome:
+def evaluate_braking(model: SafetyModel, traffic: Traffic, ego: Ego) -> EncounterOutcome:
     """Drive the ego through n encounters at once (semi-implicit Euler at the traffic's step)."""
     n, m = traffic.position.shape
     model.begin(n)
@@ -129,7 +129,7 @@ def evaluate_braking(model: SafetyModel, traffic: Traffic, ego: Ego) -> Outcome:
         braking = np.where(np.isnan(braking) & (brake > COASTING), time, braking)
         speed = np.maximum(speed - brake * traffic.step, 0.0)
         place = place + speed * traffic.step
-    return Outcome(~collided, smallest, noticed, braking)
+    return EncounterOutcome(~collided, smallest, noticed, braking)
 
 
 def see(
@@ -153,7 +153,7 @@ REACTION, REQUIRED_BRAKING = 0.35, 6.0
 """Of paragraph 5.2.5.2. [s], [m/s2]"""
 
 
-def required_by_reaction_time(traffic: Traffic, ego: Ego) -> Outcome:
+def required_by_reaction_time(traffic: Traffic, ego: Ego) -> EncounterOutcome:
     """Paragraph 5.2.5.2: must be avoided if, at lane intrusion, ``TTC > v_rel / (2 * 6 m/s2) + 0.35 s``.
 
     `prevented` says that the regulation asks for it; `smallest_gap` is what full use of the formula leaves: the gap at
@@ -172,7 +172,7 @@ def required_by_reaction_time(traffic: Traffic, ego: Ego) -> Outcome:
     left = gap - closing * REACTION - closing**2 / (2.0 * REQUIRED_BRAKING)
     danger = has & slower
     noticed = np.where(has, time[first], np.nan)
-    return Outcome(~danger | (left > 0.0), np.where(danger, left, np.nan), noticed, noticed + REACTION)
+    return EncounterOutcome(~danger | (left > 0.0), np.where(danger, left, np.nan), noticed, noticed + REACTION)
 
 
 COASTING = 0.4

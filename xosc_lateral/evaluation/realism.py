@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 
 from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.drives.drive import Run
-from xosc_lateral.evaluation.classifier import Separation, classifier_two_sample_test, context_features
-from xosc_lateral.evaluation.condition import LENGTHS, Condition
+from xosc_lateral.evaluation.classifier import TwoSampleResult, classifier_two_sample_test, context_features
+from xosc_lateral.evaluation.condition import LENGTHS, SnippetCondition
 from xosc_lateral.evaluation.distances import split_groups
 from xosc_lateral.evaluation.ensemble_scores import PROPER, proper_scores
 from xosc_lateral.evaluation.filters import CUTOFF, TRANSITION, below_half_hertz, thinned
@@ -66,7 +66,7 @@ class ConditionScores:
 
     Parameters
     ----------
-    condition : Condition
+    condition : SnippetCondition
     with_sensor : bool
         Whether what was sampled holds the profile's sensor.
     count : int
@@ -78,25 +78,25 @@ class ConditionScores:
         Distance of each of the ten metrics and of each lane-keeping indicator. [sd]
     means : mapping of str to (float, float)
         Mean of each lane-keeping indicator, real and sampled; units in `lane_keeping.UNITS`.
-    alone, jointly : Separation or None
+    alone, jointly : TwoSampleResult or None
         Classifier on movement, and on context and movement jointly (below 0.5 Hz). None: not trained.
-    floor : Separation or None
+    floor : TwoSampleResult or None
         Half of the real drivers told from the others, by movement. Jointly it is 0.5: both kinds have the same
         context. With the same start it is as with any: both halves start alike.
-    convolved : Separation or None
+    convolved : TwoSampleResult or None
         Classifier on random convolutions of the movement. None: not asked for.
     """
 
-    condition: Condition
+    condition: SnippetCondition
     with_sensor: bool
     count: int
     families: Mapping[str, Beside]
     named: Mapping[str, Beside]
     means: Mapping[str, tuple[float, float]]
-    alone: Separation | None
-    jointly: Separation | None
-    floor: Separation | None
-    convolved: Separation | None = None
+    alone: TwoSampleResult | None
+    jointly: TwoSampleResult | None
+    floor: TwoSampleResult | None
+    convolved: TwoSampleResult | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,7 +115,7 @@ class Realism:
     variance_real: VarianceParts
     variance_sampled: VarianceParts
 
-    def of(self, condition: Condition) -> ConditionScores | None:
+    def of(self, condition: SnippetCondition) -> ConditionScores | None:
         """Scores under a condition, None where there were too few snippets."""
         return next((one for one in self.conditions if one.condition == condition), None)
 
@@ -148,16 +148,16 @@ def score_realism(
         same = sample_snippets(profile, cut, seed + 1, with_sensor=True)
         slow = cut.cut_from(slow_real), cut.cut_from(slow_driver)
         for condition, real, sampled in (
-            (Condition(seconds, True), cut.offset, same),
-            (Condition(seconds, False), cut.offset, cut.cut_from(recorded)),
-            (Condition(seconds, False, slow=True), *slow),
+            (SnippetCondition(seconds, True), cut.offset, same),
+            (SnippetCondition(seconds, False), cut.offset, cut.cut_from(recorded)),
+            (SnippetCondition(seconds, False, slow=True), *slow),
         ):
             with_sensor = profile.sensor is not None and not condition.slow
             asked = _Asked(seed, classify, rocket, with_sensor)
             found.append(_under(condition, cut, real, sampled, step, asked))
     short = snippets_of(runs, LENGTHS[0], step)
     whose = np.array([str(number) for number, _ in short.place])
-    if found and found[0].condition == Condition(LENGTHS[0], True):
+    if found and found[0].condition == SnippetCondition(LENGTHS[0], True):
         found[0] = _with_proper_scores(found[0], profile, short, seed)
     return Realism(tuple(found), variance_parts(short.offset, whose), variance_parts(short.cut_from(recorded), whose))
 
@@ -171,7 +171,7 @@ class _Asked:
 
 
 def _under(
-    condition: Condition, cut: Snippets, real: FloatArray, sampled: FloatArray, step: float, asked: _Asked
+    condition: SnippetCondition, cut: Snippets, real: FloatArray, sampled: FloatArray, step: float, asked: _Asked
 ) -> ConditionScores:
     seed = asked.seed
     highest = CUTOFF - 0.5 * TRANSITION if condition.slow else np.inf
@@ -196,7 +196,7 @@ def _under(
 
 
 def _distances(
-    condition: Condition, own: Features, made: Features, real: FloatArray, group: NDArray[np.str_], seed: int
+    condition: SnippetCondition, own: Features, made: Features, real: FloatArray, group: NDArray[np.str_], seed: int
 ) -> tuple[dict[str, Beside], dict[str, Beside]]:
     """Over random halves: a half beside its own sampled snippets, and beside the other half; equally many in both."""
     rng = np.random.default_rng(seed)
@@ -233,7 +233,7 @@ def _stand_ins(
     ]
 
 
-def _separated_drivers(real: FloatArray, group: NDArray[np.str_], seed: int) -> Separation | None:
+def _separated_drivers(real: FloatArray, group: NDArray[np.str_], seed: int) -> TwoSampleResult | None:
     """One random half of the drivers told from the other."""
     half = split_groups(group, np.random.default_rng(seed))
     return classifier_two_sample_test(real[half], real[~half], group[half], group[~half], seed=seed)

@@ -18,7 +18,7 @@ from xosc_lateral.driver.models.two_level.parameters import PAPER_SETTINGS
 from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.drives.drive import Run
 from xosc_lateral.errors import NotEnoughDataError
-from xosc_lateral.evaluation.condition import Condition
+from xosc_lateral.evaluation.condition import SnippetCondition
 from xosc_lateral.evaluation.distances import Distances, mean_distances, metric_distances, split_groups
 from xosc_lateral.evaluation.metrics import METRICS, snippet_metrics
 from xosc_lateral.evaluation.realism import Realism, score_realism
@@ -167,7 +167,7 @@ class ProfileScores:
 
         [-]
         """
-        shared = self.realism.of(Condition(SNIPPET, True))
+        shared = self.realism.of(SnippetCondition(SNIPPET, True))
         return None if shared is None or shared.alone is None else shared.alone.auc
 
     @property

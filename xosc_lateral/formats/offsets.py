@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from xosc_lateral.driver.snippets import Sampled
+from xosc_lateral.driver.snippets import SampledOffsets
 
 
-def offset_columns(sampled: Sequence[Sampled], *, snippets: bool) -> dict[str, Any]:
+def offset_columns(sampled: Sequence[SampledOffsets], *, snippets: bool) -> dict[str, Any]:
     """Columns ``drive, snippet, time, offset, offset_real`` of snippets, else ``drive, time, offset``. [s], [m]"""
     lengths = [len(item.time) for item in sampled]
     columns: dict[str, Any] = {"drive": [item.drive for item in sampled for _ in range(len(item.time))]}

@@ -24,7 +24,7 @@ _ASIDE = 10.0
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Trajectory:
+class WorldTrajectory:
     """A path in the world over time, on the rows of the nominal motion.
 
     Parameters
@@ -70,7 +70,7 @@ def leaps(motion: EntityMotion) -> list[tuple[float, float]]:
     return [(float(motion.time[k + 1]), float(moved[k])) for k in found]
 
 
-def displace(motion: EntityMotion, network: RoadNetwork, deviation: FloatArray) -> Trajectory:
+def displace(motion: EntityMotion, network: RoadNetwork, deviation: FloatArray) -> WorldTrajectory:
     """Shift a motion sideways in lane coordinates; headings and speeds follow from the shifted path.
 
     Parameters
@@ -95,7 +95,7 @@ def displace(motion: EntityMotion, network: RoadNetwork, deviation: FloatArray) 
         y[moved] += after.y - before.y
         z[moved] += after.z - before.z
         heading += _direction_change(motion, x, y)
-    return Trajectory(motion.time, x, y, z, heading, pitch, roll, _speed(motion, x, y))
+    return WorldTrajectory(motion.time, x, y, z, heading, pitch, roll, _speed(motion, x, y))
 
 
 def _pieces(motion: EntityMotion) -> list[slice]:

@@ -41,7 +41,7 @@ _STOPPING = frozenset(
 _KEPT = "what is finished is kept, run it again to go on"
 
 
-class State(StrEnum):
+class JobState(StrEnum):
     """What became of a job."""
 
     WRITTEN = "written"
@@ -50,19 +50,19 @@ class State(StrEnum):
 
 
 @dataclass(frozen=True, slots=True)
-class Outcome:
+class JobOutcome:
     """What became of a job.
 
     Parameters
     ----------
-    state : State
+    state : JobState
     row : ManifestRow
         As in the manifest.
     seconds : float
         The conversion took. [s]
     """
 
-    state: State
+    state: JobState
     row: ManifestRow
     seconds: float
 
@@ -80,7 +80,7 @@ def convert_many(
     converter: Converter | None = None,
     limits: JobLimits | None = None,
     notify: Callable[[str], None] | None = None,
-) -> Iterator[Outcome]:
+) -> Iterator[JobOutcome]:
     """Convert a batch and yield what became of each job as it comes: first what is up to date, then in any order.
 
     The outputs, and the manifest written at the end, do not depend on the number of workers, on the order, or on how
@@ -136,12 +136,12 @@ def _silent(_: str) -> None:
 
 def _outcomes(
     batch: Batch,
-    work: Callable[[Job], _Answer],
+    work: Callable[[Job], _Reply],
     workers: int,
     cluster: str | None,
     again: bool,
     notify: Callable[[str], None],
-) -> Iterator[Outcome]:
+) -> Iterator[JobOutcome]:
     state = batch.folder / STATE
     with folder_lock(state / "lock"):
         _sweep(batch.folder)
@@ -154,7 +154,7 @@ def _outcomes(
                 else:
                     if journal.row(job.name).stale:
                         journal.add(row, journal.seconds(job.name))
-                    yield Outcome(State.UP_TO_DATE, row, 0.0)
+                    yield JobOutcome(JobState.UP_TO_DATE, row, 0.0)
             if todo:
                 with open_pool(min(workers, len(todo)), cluster) as pool:
                     for job, answer in run_tasks(pool, work, todo):
@@ -167,7 +167,7 @@ def _outcomes(
 
 
 @dataclass(frozen=True, slots=True)
-class _Answer:
+class _Reply:
     """What comes back from a worker."""
 
     row: ManifestRow
@@ -175,37 +175,37 @@ class _Answer:
     stop: str = ""
 
 
-def _run(converter: Converter, limits: JobLimits, job: Job) -> _Answer:
+def _run(converter: Converter, limits: JobLimits, job: Job) -> _Reply:
     """One job, in a worker. Whatever goes wrong with this one scenario ends up in its row."""
     start = time.perf_counter()
     if job.package_version != __version__:  # a worker of a cluster that came later
         what = f"a worker has version {__version__}, the run was planned by {job.package_version}"
-        return _Answer(job.row(what), 0.0, what)
+        return _Reply(job.row(what), 0.0, what)
     try:
         row = job.row(job.error) if job.error else within_limits(converter, job, limits)
     except JobLimitError as error:
         row = job.row(f"{job.source}: {error}")
     except OSError as error:
         if error.errno in _STOPPING:
-            return _Answer(job.row(str(error)), 0.0, f"{job.output}: {error.strerror or error}")
+            return _Reply(job.row(str(error)), 0.0, f"{job.output}: {error.strerror or error}")
         row = job.row(_one_line(error))
     except XoscLateralError as error:
         row = job.row(_one_line(error))
     except Exception as error:  # a bug of ours must not cost the other ten thousand; the row says that it is one
         row = job.row(f"{job.source}: internal error: {type(error).__name__}: {_one_line(error)}{_origin(error)}")
-    return _Answer(row, time.perf_counter() - start)
+    return _Reply(row, time.perf_counter() - start)
 
 
-def _noted(job: Job, answer: _Answer | WorkerDiedError, journal: Journal) -> Outcome:
+def _noted(job: Job, answer: _Reply | WorkerDiedError, journal: Journal) -> JobOutcome:
     if isinstance(answer, WorkerDiedError):
-        answer = _Answer(job.row(f"{job.source}: {answer}"), 0.0)
+        answer = _Reply(job.row(f"{job.source}: {answer}"), 0.0)
     if answer.stop:
         raise BatchStoppedError(f"{answer.stop}; {_KEPT}")
     row = answer.row
     if row.error and job.name in journal:
         row = _kept(job, journal.row(job.name), row)
     journal.add(row, answer.seconds)
-    return Outcome(State.FAILED if row.error else State.WRITTEN, row, answer.seconds)
+    return JobOutcome(JobState.FAILED if row.error else JobState.WRITTEN, row, answer.seconds)
 
 
 def _kept(job: Job, former: ManifestRow, failed: ManifestRow) -> ManifestRow:

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from dataclasses import asdict
 from pathlib import Path
 
-from xosc_lateral.enrich.conversion import Conversion, ConversionProvenance
+from xosc_lateral.enrich.conversion import ConversionProvenance, ConvertedScenario
 from xosc_lateral.enrich.enrich import enrich
 from xosc_lateral.enrich.result import Enriched
 from xosc_lateral.errors import FormatError
@@ -27,7 +27,7 @@ from xosc_lateral.formats.profiles import profile_hash
 from xosc_lateral.formats.source import guarding_inputs
 from xosc_lateral.pipeline.drivers import choose_drivers
 from xosc_lateral.pipeline.load import Played, input_hashes, play_scenario
-from xosc_lateral.pipeline.settings import ConvertSettings, Mode
+from xosc_lateral.pipeline.settings import ConvertSettings, OutputMode
 from xosc_lateral.pipeline.shifted import shifted_events
 from xosc_lateral.scenario import Scenario
 from xosc_lateral.version import __version__
@@ -44,7 +44,7 @@ def convert_scenario(
     variant: int = 0,
     report: Path | None = None,
     save: bool = True,
-) -> Conversion:
+) -> ConvertedScenario:
     """Convert one scenario and write it.
 
     Parameters
@@ -74,7 +74,7 @@ def convert_scenario(
 
 def _convert(
     source: Path, output: Path, settings: ConvertSettings, variant: int, report: Path | None, save: bool
-) -> Conversion:
+) -> ConvertedScenario:
     played = play_scenario(
         source,
         parameters=settings.parameters,
@@ -111,18 +111,18 @@ def _convert(
         f"{removed.place.element}: left out ({removed.reason})" for removed in written.removed
     )
     warnings += tuple(f"'{name}' follows a trajectory, too: {why}" for name, why in sampled.items()) + written.notes
-    if settings.mode is Mode.LANE_OFFSET and save:
+    if settings.mode is OutputMode.LANE_OFFSET and save:
         warnings += tuple(_shifted(played, output, settings))
     data = b"" if save else written.data
-    return Conversion(source, output, written.sha256, enriched, provenance, warnings, data)
+    return ConvertedScenario(source, output, written.sha256, enriched, provenance, warnings, data)
 
 
 def _refuse_lane_offsets_for_carla(scenario: Scenario, settings: ConvertSettings) -> None:
-    if settings.mode is Mode.LANE_OFFSET and settings.target.player is Player.CARLA:
+    if settings.mode is OutputMode.LANE_OFFSET and settings.target.player is Player.CARLA:
         raise FormatError(
             "lane offset actions have no shape in CARLA's ScenarioRunner; use --mode trajectory", path=scenario.path
         )
-    if settings.mode is Mode.LANE_OFFSET and scenario.header.is_left_handed:
+    if settings.mode is OutputMode.LANE_OFFSET and scenario.header.is_left_handed:
         raise FormatError(
             "is written for CARLA, whose lane offsets differ from the standard's; use --mode trajectory",
             path=scenario.path,
@@ -205,7 +205,7 @@ def _write(
     summary = f"seed {provenance.seed}, variant {provenance.variant}, {', '.join(profiles) or 'no profile'}"
     summary += ", with sensor" if provenance.with_sensor else ""
     facts = asdict(provenance)
-    if settings.mode is Mode.LANE_OFFSET:
+    if settings.mode is OutputMode.LANE_OFFSET:
         chains = [
             offset_chain(entity.motion, played.network, entity.deviation, segment.stretch.first, segment.stretch.last)
             for entity in enriched.entities
@@ -240,7 +240,7 @@ def _write(
 
 def _sampled_too(played: Played, settings: ConvertSettings) -> dict[str, str]:
     """Entities that `only` leaves out, but whose maneuvers the target does not know, and why."""
-    if settings.only is None or settings.mode is Mode.LANE_OFFSET:
+    if settings.only is None or settings.mode is OutputMode.LANE_OFFSET:
         return {}
     others = [entity.name for entity in played.motion.entities if entity.name not in settings.only]
     if settings.target.player is Player.CARLA:

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from xosc_lateral.enrich.conversion import Conversion
+from xosc_lateral.enrich.conversion import ConvertedScenario
 from xosc_lateral.enrich.result import Enriched
 from xosc_lateral.errors import FormatError
 from xosc_lateral.motion.gaps import Gap
@@ -46,7 +46,7 @@ def _refuse_changes(job: Job) -> None:
         raise FormatError("profile or context table changed during the run; run it again", path=job.source)
 
 
-def describe(job: Job, conversion: Conversion) -> ManifestRow:
+def describe(job: Job, conversion: ConvertedScenario) -> ManifestRow:
     """A conversion as a row: numbers and hashes, nothing that keeps its arrays alive."""
     enriched, provenance = conversion.enriched, conversion.provenance
     inputs = _below(job.base, job.source.parent, provenance.inputs)

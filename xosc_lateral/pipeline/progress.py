@@ -11,7 +11,7 @@ from dataclasses import asdict, dataclass, field
 from enum import StrEnum
 from typing import TextIO
 
-from xosc_lateral.pipeline.batch import Outcome, State
+from xosc_lateral.pipeline.batch import JobOutcome, JobState
 from xosc_lateral.pipeline.manifest import ManifestRow
 
 LINES_EVERY = 30.0
@@ -62,11 +62,11 @@ class Summary:
     nobody_enriched: dict[str, int] = field(default_factory=dict)
     _said: set[tuple[str, str]] = field(default_factory=set, repr=False)
 
-    def count(self, outcome: Outcome) -> None:
+    def count(self, outcome: JobOutcome) -> None:
         """Take one more outcome into account."""
-        if outcome.state is State.WRITTEN:
+        if outcome.state is JobState.WRITTEN:
             self.written += 1
-        elif outcome.state is State.UP_TO_DATE:
+        elif outcome.state is JobState.UP_TO_DATE:
             self.up_to_date += 1
         else:
             self.failed += 1
@@ -78,7 +78,7 @@ class Summary:
             why = _why_nobody(outcome.row)
             self.nobody_enriched[why] = self.nobody_enriched.get(why, 0) + 1
 
-    def is_new(self, outcome: Outcome) -> bool:
+    def is_new(self, outcome: JobOutcome) -> bool:
         """Whether a failure was not met yet: one that all variants of a scenario share is one line."""
         key = (outcome.row.scenario, outcome.row.error)
         before = len(self._said)
@@ -132,13 +132,13 @@ class Summary:
 
 
 def follow(
-    outcomes: Iterable[Outcome], total: int, display: Display = Display.AUTO, stream: TextIO | None = None
+    outcomes: Iterable[JobOutcome], total: int, display: Display = Display.AUTO, stream: TextIO | None = None
 ) -> Summary:
     """Run a batch to its end and show how it goes.
 
     Parameters
     ----------
-    outcomes : iterable of Outcome
+    outcomes : iterable of JobOutcome
         From `convert_many`.
     total : int
         How many there will be.
@@ -164,7 +164,7 @@ def _why_nobody(row: ManifestRow) -> str:
     return "; ".join(reasons) or "there are no entities"
 
 
-Show = Callable[[Outcome], None]
+Show = Callable[[JobOutcome], None]
 
 
 @contextmanager
@@ -188,7 +188,7 @@ def _json_lines(summary: Summary, stream: TextIO) -> Iterator[Show]:
     def say(event: str, **values: object) -> None:
         print(json.dumps({"event": event, "time": round(time.time(), 3), **values}), file=stream, flush=True)
 
-    def show(outcome: Outcome) -> None:
+    def show(outcome: JobOutcome) -> None:
         row = outcome.row
         details = (
             {"error": row.error, "stale": row.stale}
@@ -212,8 +212,8 @@ def _bar(summary: Summary, stream: TextIO) -> Iterator[Show]:
     with Progress(*columns, console=Console(file=stream), transient=True) as progress:
         task = progress.add_task("", total=summary.total, pace="")
 
-        def show(outcome: Outcome) -> None:
-            if outcome.state is State.FAILED and summary.is_new(outcome):
+        def show(outcome: JobOutcome) -> None:
+            if outcome.state is JobState.FAILED and summary.is_new(outcome):
                 progress.console.print(_failure(outcome), markup=False, highlight=False, soft_wrap=True)
             progress.update(task, completed=summary.finished, pace=_pace(summary))
 
@@ -223,7 +223,7 @@ def _bar(summary: Summary, stream: TextIO) -> Iterator[Show]:
 def _lines(summary: Summary, stream: TextIO) -> Show:
     next_line = LINES_EVERY
 
-    def show(outcome: Outcome) -> None:
+    def show(outcome: JobOutcome) -> None:
         nonlocal next_line
         _say_failure(outcome, summary, stream)
         if summary.seconds >= next_line:
@@ -233,12 +233,12 @@ def _lines(summary: Summary, stream: TextIO) -> Show:
     return show
 
 
-def _say_failure(outcome: Outcome, summary: Summary, stream: TextIO) -> None:
-    if outcome.state is State.FAILED and summary.is_new(outcome):
+def _say_failure(outcome: JobOutcome, summary: Summary, stream: TextIO) -> None:
+    if outcome.state is JobState.FAILED and summary.is_new(outcome):
         print(_failure(outcome), file=stream, flush=True)
 
 
-def _failure(outcome: Outcome) -> str:
+def _failure(outcome: JobOutcome) -> str:
     return f"xosc-lateral: {outcome.row.error}"
 
 

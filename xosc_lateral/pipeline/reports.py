@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 from urllib.parse import quote
 
-from xosc_lateral.enrich.conversion import Conversion
+from xosc_lateral.enrich.conversion import ConvertedScenario
 from xosc_lateral.formats.atomic import write_atomically
 
 if TYPE_CHECKING:
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 INDEX = "index.html"
 
 
-def write_page_and_thumbnail(conversion: Conversion, page: Path) -> None:
+def write_page_and_thumbnail(conversion: ConvertedScenario, page: Path) -> None:
     """Write the page of one conversion of a batch, and the small picture that stands for it in the index."""
     from xosc_lateral.report.scenario import conversion_page
     from xosc_lateral.report.thumbnail import thumbnail

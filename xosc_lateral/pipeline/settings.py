@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from xosc_lateral.formats.openscenario.read import NO_ROADS, RoadSearch
-from xosc_lateral.formats.openscenario.write.target import STANDARD, Target
+from xosc_lateral.formats.openscenario.write.target import STANDARD, TargetPlayer
 
 if TYPE_CHECKING:
     from xosc_lateral.driver.profile import DriverProfile
@@ -24,7 +24,7 @@ AUTO = "auto"
 """Profile name that picks one of the shipped profiles by the vehicle's class."""
 
 
-class Mode(StrEnum):
+class OutputMode(StrEnum):
     """How offsets are written."""
 
     TRAJECTORY = "trajectory"
@@ -50,8 +50,8 @@ class ConvertSettings:
         Scenario parameters that replace those declared.
     attempts : int
         Sample anew up to so many times while vehicles touch or leave their lane that nominally don't.
-    mode : Mode
-    target : Target
+    mode : OutputMode
+    target : TargetPlayer
         Player and version of the standard to write for.
     libraries : tuple of Path
         Folders with further profiles.
@@ -74,8 +74,8 @@ class ConvertSettings:
     context: Path | None = None
     parameters: Mapping[str, str] = field(default_factory=dict)
     attempts: int = 1
-    mode: Mode = Mode.TRAJECTORY
-    target: Target = STANDARD
+    mode: OutputMode = OutputMode.TRAJECTORY
+    target: TargetPlayer = STANDARD
     libraries: tuple[Path, ...] = ()
     allowed: tuple[Path, ...] = ()
     roads: RoadSearch = NO_ROADS

@@ -18,9 +18,9 @@ from xosc_lateral.motion.nominal import Activity, NominalMotion
 from xosc_lateral.playback.drive import drive
 from xosc_lateral.playback.placement import NOWHERE
 from xosc_lateral.playback.recorder import NO_LANE, Rows
-from xosc_lateral.playback.run import Run
+from xosc_lateral.playback.simulation import Simulation
 from xosc_lateral.playback.state import EntityState
-from xosc_lateral.playback.storyboard import State
+from xosc_lateral.playback.storyboard import ElementState
 from xosc_lateral.playback.storyboard_builder import build_storyboard, init_actions
 from xosc_lateral.playback.trailers import align_trailers, connect, pull_trailers
 from xosc_lateral.playback.transition import EPSILON
@@ -65,116 +65,116 @@ def play(scenario: Scenario, network: RoadNetwork, *, step: float = 0.02, time_l
 class _Player:
     def __init__(self, scenario: Scenario, network: RoadNetwork, step: float) -> None:
         self.step_size = step
-        self.run = run = Run(scenario, network)
+        self.simulation = simulation = Simulation(scenario, network)
         if not scenario.entities:
             raise PlaybackError("has no entities: there is nothing to play", path=scenario.path)
         self._couple_trailers()
-        self.init = init_actions(scenario.storyboard.init, run)
-        self.root = build_storyboard(scenario.storyboard, run)
+        self.init = init_actions(scenario.storyboard.init, simulation)
+        self.root = build_storyboard(scenario.storyboard, simulation)
         self._leave_out_later_entities()
-        self.rows = [Rows(state) for state in run.entities]
+        self.rows = [Rows(state) for state in simulation.entities]
         self.times = array("d")
 
     def play(self, time_limit: float) -> NominalMotion:
         """Run to the end."""
-        run = self.run
-        for state in run.entities:
+        simulation = self.simulation
+        for state in simulation.entities:
             state.begin_frame()
         for element in self.init:
             element.start()
         self.root.start()
-        if run.derives_motion:
-            for state in run.entities:
-                _derive_motion(state, 0.0, height=run.derives_height)
+        if simulation.derives_motion:
+            for state in simulation.entities:
+                _derive_motion(state, 0.0, height=simulation.derives_height)
         going = self._frame(0.0)
         self._write(0.0)
         last = time_limit - 0.5 * self.step_size
-        while going and run.time < last:
-            for state in run.entities:
+        while going and simulation.time < last:
+            for state in simulation.entities:
                 state.begin_frame()
             going = self._frame(self.step_size)
             if going:
-                self._write(run.time)
+                self._write(simulation.time)
         ended_by = "time limit" if going else "stop trigger"
         if going:
-            run.note(f"still runs at the time limit of {time_limit:g} s", run.scenario.storyboard.place)
+            simulation.note(f"still runs at the time limit of {time_limit:g} s", simulation.scenario.storyboard.place)
         return self._result(ended_by)
 
     # ---- one frame ---------------------------------------------------------------------------------------------------
     def _frame(self, step: float) -> bool:
         """Play one frame; False when the storyboard has stopped, and nothing moved."""
-        run, root = self.run, self.root
-        time = run.time
-        run.stamp = time
+        simulation, root = self.simulation, self.root
+        time = simulation.time
+        simulation.stamp = time
         root.evaluate_triggers(time)
-        if root.state is not State.RUNNING:
+        if root.state is not ElementState.RUNNING:
             return False
-        run.stamp = time + step
+        simulation.stamp = time + step
         for element in self.init:
             element.step(time, step)
         root.step(time, step)
-        run.time = time + step
-        for state in run.entities:
+        simulation.time = time + step
+        for state in simulation.entities:
             if not state.active:
                 continue
             if not state.longitudinal_taken and state.tow is None and abs(state.speed) > EPSILON:
                 drive(state, state.speed * step)
-        pull_trailers(run.entities)
-        if run.derives_motion:
-            for state in run.entities:
+        pull_trailers(simulation.entities)
+        if simulation.derives_motion:
+            for state in simulation.entities:
                 if state.active:  # who is taken out keeps the speed that others may refer to
-                    _derive_motion(state, step, height=run.derives_height)
+                    _derive_motion(state, step, height=simulation.derives_height)
         else:
             self._speeds_of_moved(step)
-        if run.derives_states:
+        if simulation.derives_states:
             self._derive_states()
         return True
 
     def _speeds_of_moved(self, step: float) -> None:
         """An entity that was moved without anybody setting its speed has the speed of that movement."""
-        for state in self.run.entities:
+        for state in self.simulation.entities:
             if not state.speed_taken and state.activity & Activity.LATERAL:
                 _derive_motion(state, step)
             else:
                 state.previous = None
 
     def _derive_states(self) -> None:
-        run = self.run
-        for state in run.entities:
+        simulation = self.simulation
+        for state in simulation.entities:
             standing = -STANDING < state.speed < STANDING
-            state.standing_since = _since(state.standing_since, standing, run.time)
-            state.road_end_since = _since(state.road_end_since, state.at_road_end, run.time)
-            if run.derives_off_road:
-                state.off_road_since = _since(state.off_road_since, _is_off_road(state), run.time)
+            state.standing_since = _since(state.standing_since, standing, simulation.time)
+            state.road_end_since = _since(state.road_end_since, state.at_road_end, simulation.time)
+            if simulation.derives_off_road:
+                state.off_road_since = _since(state.off_road_since, _is_off_road(state), simulation.time)
 
     # ---- before and after --------------------------------------------------------------------------------------------
     def _couple_trailers(self) -> None:
-        for state in self.run.entities:
+        for state in self.simulation.entities:
             if state.entity.trailer is not None:
-                connect(state, self.run.entity(state.entity.trailer, state.entity.place))
-        for state in self.run.entities:
+                connect(state, self.simulation.entity(state.entity.trailer, state.entity.place))
+        for state in self.simulation.entities:
             if state.tow is None:
                 align_trailers(state)
 
     def _leave_out_later_entities(self) -> None:
         """Entities without init actions are not there until an action adds them (trailers are, with their tractor)."""
-        init = self.run.scenario.storyboard.init
+        init = self.simulation.scenario.storyboard.init
         present = {private.entity_ref for private in init.privates}
         placed = {
             private.entity_ref
             for private in init.privates
             if any(isinstance(action.content, TeleportAction | FollowTrajectoryAction) for action in private.actions)
         }
-        for state in self.run.entities:
+        for state in self.simulation.entities:
             if state.tow is not None or state.name in placed:
                 continue
             if state.name not in present:
                 state.active = False
-                self.run.note(
+                self.simulation.note(
                     f"'{state.name}' has no init actions: it is not there until it is added", state.entity.place
                 )
             else:
-                self.run.note(
+                self.simulation.note(
                     f"'{state.name}' has no initial position: it stands at the world's origin", state.entity.place
                 )
                 state.put_in_world(state.pose)
@@ -185,15 +185,15 @@ class _Player:
             rows.write(time)
 
     def _result(self, ended_by: str) -> NominalMotion:
-        run = self.run
+        simulation = self.simulation
         time = np.frombuffer(self.times, dtype=np.float64).copy()
         return NominalMotion(
             step=self.step_size,
-            entities=tuple(rows.motion(run.network, time) for rows in self.rows),
-            actions=run.played(),
+            entities=tuple(rows.motion(simulation.network, time) for rows in self.rows),
+            actions=simulation.played(),
             end_time=float(time[-1]),
             ended_by=ended_by,
-            notes=tuple(run.notes),
+            notes=tuple(simulation.notes),
         )
 
 

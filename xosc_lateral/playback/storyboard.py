@@ -11,14 +11,14 @@ from collections.abc import Iterator, Sequence
 from enum import Enum
 from typing import Protocol
 
-from xosc_lateral.playback.run import Run
+from xosc_lateral.playback.simulation import Simulation
 from xosc_lateral.playback.state import EntityState
 from xosc_lateral.playback.trigger import RunningTrigger
 from xosc_lateral.scenario import Action
 from xosc_lateral.scenario.enums import Priority, StoryboardElementType
 
 
-class State(Enum):
+class ElementState(Enum):
     """Where an element is in its life."""
 
     INIT = "init"
@@ -27,7 +27,7 @@ class State(Enum):
     COMPLETE = "complete"
 
 
-class Transition(Enum):
+class ElementTransition(Enum):
     """How it came there."""
 
     NONE = "none"
@@ -40,7 +40,7 @@ class Transition(Enum):
 class Watcher(Protocol):
     """Whoever wants to know of an element's changes."""
 
-    def register(self, state: State, transition: Transition) -> None:
+    def register(self, state: ElementState, transition: ElementTransition) -> None:
         """The element has changed."""
 
 
@@ -65,7 +65,7 @@ class Behaviour(Protocol):
         """Clean up."""
 
 
-class Element:
+class StoryboardElement:
     """One element of the tree.
 
     Parameters
@@ -73,7 +73,7 @@ class Element:
     name : str
     kind : StoryboardElementType or None
         None for the storyboard.
-    children : sequence of Element
+    children : sequence of StoryboardElement
     start_trigger, stop_trigger : RunningTrigger or None
     maximum_count : int or None
         How often it may run; None for elements that run once and cannot be run again by themselves.
@@ -97,7 +97,7 @@ class Element:
         self,
         name: str,
         kind: StoryboardElementType | None,
-        children: Sequence[Element] = (),
+        children: Sequence[StoryboardElement] = (),
         *,
         start_trigger: RunningTrigger | None = None,
         stop_trigger: RunningTrigger | None = None,
@@ -109,9 +109,9 @@ class Element:
         self.start_trigger = start_trigger
         self.stop_trigger = stop_trigger
         self.maximum_count = maximum_count
-        self.state = State.INIT
+        self.state = ElementState.INIT
         self.count = 0
-        self.parent: Element | None = None
+        self.parent: StoryboardElement | None = None
         self.path: tuple[str, ...] = ()
         self.watchers: list[Watcher] = []
         for child in self.children:
@@ -124,7 +124,7 @@ class Element:
         for child in self.children:
             child.settle(self.path)
 
-    def walk(self) -> Iterator[Element]:
+    def walk(self) -> Iterator[StoryboardElement]:
         """This element and all under it, parents first."""
         yield self
         for child in self.children:
@@ -133,11 +133,11 @@ class Element:
     # ---- life --------------------------------------------------------------------------------------------------------
     def start(self) -> None:
         """Go from init to standby (with a start trigger) or on to running, with all children."""
-        if self.state is State.INIT and self.start_trigger is not None:
-            self.change(State.STANDBY, Transition.TO_STANDBY)
+        if self.state is ElementState.INIT and self.start_trigger is not None:
+            self.change(ElementState.STANDBY, ElementTransition.TO_STANDBY)
             return
         self.count += 1
-        self.change(State.RUNNING, Transition.START)
+        self.change(ElementState.RUNNING, ElementTransition.START)
         self.start_children()
 
     def start_children(self) -> None:
@@ -147,50 +147,50 @@ class Element:
 
     def evaluate_triggers(self, time: float) -> None:
         """One pass over the triggers of this element and, when it runs, of its children."""
-        if self.state is State.RUNNING and self.stop_trigger is not None and self.stop_trigger.evaluate(time):
+        if self.state is ElementState.RUNNING and self.stop_trigger is not None and self.stop_trigger.evaluate(time):
             self.stop()
-        if self.state is State.STANDBY and (self.start_trigger is None or self.start_trigger.evaluate(time)):
+        if self.state is ElementState.STANDBY and (self.start_trigger is None or self.start_trigger.evaluate(time)):
             self.start()
-        if self.state is State.RUNNING:
+        if self.state is ElementState.RUNNING:
             for child in self.children:
                 child.evaluate_triggers(time)
 
     def step(self, time: float, step: float) -> None:
         """Let running actions move their actors."""
-        if self.state is State.RUNNING:
+        if self.state is ElementState.RUNNING:
             for child in self.children:
                 child.step(time, step)
 
     def end(self) -> None:
         """Come to a regular end, with all that still runs below; perhaps to start again."""
-        if self.state is State.COMPLETE:
+        if self.state is ElementState.COMPLETE:
             return
         for child in self.children:
-            if child.state is State.RUNNING:
+            if child.state is ElementState.RUNNING:
                 child.end()
-        if self.state in (State.RUNNING, State.STANDBY):
+        if self.state in (ElementState.RUNNING, ElementState.STANDBY):
             if self.maximum_count is not None and self.count < self.maximum_count:
                 self._reset_triggers()
-                self.change(State.STANDBY, Transition.END)
+                self.change(ElementState.STANDBY, ElementTransition.END)
                 for child in self.children:
                     child.reset()
             else:
-                self.change(State.COMPLETE, Transition.END)
+                self.change(ElementState.COMPLETE, ElementTransition.END)
         self.tell_parent()
 
     def stop(self) -> None:
         """Be cut off, with everything below."""
         for child in self.children:
             child.stop()
-        if self.state in (State.STANDBY, State.RUNNING):
-            self.change(State.COMPLETE, Transition.STOP)
+        if self.state in (ElementState.STANDBY, ElementState.RUNNING):
+            self.change(ElementState.COMPLETE, ElementTransition.STOP)
             self.tell_parent()
 
     def reset(self) -> None:
         """Back to init, to be started again by the parent; what its conditions saw before no longer counts."""
         for child in self.children:
             child.reset()
-        self.state = State.INIT
+        self.state = ElementState.INIT
         self.count = 0
         self._reset_triggers()
 
@@ -199,7 +199,7 @@ class Element:
             if trigger is not None:
                 trigger.reset()
 
-    def change(self, state: State, transition: Transition) -> None:
+    def change(self, state: ElementState, transition: ElementTransition) -> None:
         """Change the state and tell conditions that watch it."""
         if state is self.state:
             return
@@ -210,13 +210,13 @@ class Element:
     def tell_parent(self) -> None:
         """The parent ends when its last child has."""
         parent = self.parent
-        if parent is None or parent.kind is None or parent.state is State.COMPLETE:
+        if parent is None or parent.kind is None or parent.state is ElementState.COMPLETE:
             return
-        if all(child.state is State.COMPLETE for child in parent.children):
+        if all(child.state is ElementState.COMPLETE for child in parent.children):
             parent.end()
 
 
-class EventElement(Element):
+class EventElement(StoryboardElement):
     """An event: priorities among its siblings, and conflicts of its actions with others of the same actor."""
 
     __slots__ = ("priority",)
@@ -237,10 +237,10 @@ class EventElement(Element):
 
     def start(self) -> None:
         """As any element, but the priority decides what happens to events beside it, or to itself."""
-        if self.state is State.STANDBY and not self._make_room():
+        if self.state is ElementState.STANDBY and not self._make_room():
             return
         super().start()
-        if self.state is State.RUNNING and not self.children:
+        if self.state is ElementState.RUNNING and not self.children:
             self.end()
 
     def start_children(self) -> None:
@@ -252,7 +252,7 @@ class EventElement(Element):
 
     def _make_room(self) -> bool:
         siblings = () if self.parent is None else self.parent.children
-        running = [event for event in siblings if event is not self and event.state is State.RUNNING]
+        running = [event for event in siblings if event is not self and event.state is ElementState.RUNNING]
         if self.priority is Priority.SKIP:
             return not running
         if self.priority is Priority.OVERRIDE:
@@ -261,35 +261,35 @@ class EventElement(Element):
         return True
 
 
-class ActionElement(Element):
+class ActionElement(StoryboardElement):
     """An action as a leaf of the tree; what it does is in its `Behaviour`."""
 
-    __slots__ = ("_number", "action", "run")
+    __slots__ = ("_number", "action", "simulation")
 
-    def __init__(self, name: str, action: Behaviour, run: Run) -> None:
+    def __init__(self, name: str, action: Behaviour, simulation: Simulation) -> None:
         super().__init__(name, StoryboardElementType.ACTION)
         self.action = action
-        self.run = run
+        self.simulation = simulation
         self._number: int | None = None
         action.element = self
 
     def start(self) -> None:
         """Start to act."""
         actor = None if self.action.actor is None else self.action.actor.name
-        self._number = self.run.record_start(self.action.source, actor, self.path or ("Init",))
+        self._number = self.simulation.record_start(self.action.source, actor, self.path or ("Init",))
         self.count += 1
-        self.change(State.RUNNING, Transition.START)
+        self.change(ElementState.RUNNING, ElementTransition.START)
         self.action.start()
 
     def step(self, time: float, step: float) -> None:
         """Act for one frame."""
-        if self.state is State.RUNNING:
+        if self.state is ElementState.RUNNING:
             self.action.step(time, step)
 
-    def change(self, state: State, transition: Transition) -> None:
+    def change(self, state: ElementState, transition: ElementTransition) -> None:
         """As any element; the end is written down."""
-        if state is State.COMPLETE and self.state is State.RUNNING and self._number is not None:
-            self.run.record_end(self._number)
+        if state is ElementState.COMPLETE and self.state is ElementState.RUNNING and self._number is not None:
+            self.simulation.record_end(self._number)
             self.action.finish()
         super().change(state, transition)
 
@@ -300,12 +300,12 @@ class ActionElement(Element):
             return
         for other in (*actor.init_actions, *actor.event_actions):
             assert isinstance(other, ActionElement)
-            if other is not self and other.state is State.RUNNING and other.action.domains & domains:
+            if other is not self and other.state is ElementState.RUNNING and other.action.domains & domains:
                 other.end()
 
 
-def storyboard_root(stories: Sequence[Element], stop_trigger: RunningTrigger | None) -> Element:
+def storyboard_root(stories: Sequence[StoryboardElement], stop_trigger: RunningTrigger | None) -> StoryboardElement:
     """The storyboard element above the stories."""
-    root = Element("", None, stories, stop_trigger=stop_trigger)
+    root = StoryboardElement("", None, stories, stop_trigger=stop_trigger)
     root.settle()
     return root

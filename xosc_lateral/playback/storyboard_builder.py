@@ -7,33 +7,35 @@ from collections.abc import Iterator
 from xosc_lateral.playback.actions.registry import prepare_action
 from xosc_lateral.playback.conditions.registry import prepare_trigger
 from xosc_lateral.playback.positions.reference import reference_of
-from xosc_lateral.playback.run import Run
-from xosc_lateral.playback.storyboard import ActionElement, Element, EventElement, storyboard_root
+from xosc_lateral.playback.simulation import Simulation
+from xosc_lateral.playback.storyboard import ActionElement, EventElement, StoryboardElement, storyboard_root
 from xosc_lateral.playback.trigger import RunningTrigger
 from xosc_lateral.scenario import Act, Action, Event, Init, Maneuver, ManeuverGroup, Private, Story, Storyboard
 from xosc_lateral.scenario.actions import TeleportAction
 from xosc_lateral.scenario.enums import StoryboardElementType
 
 
-def build_storyboard(storyboard: Storyboard, run: Run) -> Element:
+def build_storyboard(storyboard: Storyboard, simulation: Simulation) -> StoryboardElement:
     """The tree of the storyboard; conditions that watch an element have found it."""
-    stories = [_story(story, run) for story in storyboard.stories]
+    stories = [_story(story, simulation) for story in storyboard.stories]
     stop = storyboard.stop_trigger
-    root = storyboard_root(stories, None if stop is None else prepare_trigger(stop, run, when_empty=False))
-    for look in run.when_built:
+    root = storyboard_root(stories, None if stop is None else prepare_trigger(stop, simulation, when_empty=False))
+    for look in simulation.when_built:
         look(root)
     if stop is None:
-        run.note("has no stop trigger: the run ends at the time limit", storyboard.place)
+        simulation.note("has no stop trigger: the run ends at the time limit", storyboard.place)
     return root
 
 
-def init_actions(init: Init, run: Run) -> list[ActionElement]:
+def init_actions(init: Init, simulation: Simulation) -> list[ActionElement]:
     """Init actions in the order in which they start: an entity that is placed relative to another comes after it."""
-    elements = [prepare_action(action, None, run) for action in (*init.global_actions, *init.user_defined_actions)]
+    elements = [
+        prepare_action(action, None, simulation) for action in (*init.global_actions, *init.user_defined_actions)
+    ]
     for private in _in_order(init.privates):
-        state = run.entity(private.entity_ref, private.place)
+        state = simulation.entity(private.entity_ref, private.place)
         for action in private.actions:
-            element = prepare_action(action, state, run)
+            element = prepare_action(action, state, simulation)
             state.init_actions.append(element)
             elements.append(element)
     return elements
@@ -65,45 +67,49 @@ def _references(private: Private) -> set[str]:
     return {name for name in names if name is not None}
 
 
-def _story(story: Story, run: Run) -> Element:
-    return Element(story.name, StoryboardElementType.STORY, [_act(act, run) for act in story.acts])
+def _story(story: Story, simulation: Simulation) -> StoryboardElement:
+    return StoryboardElement(story.name, StoryboardElementType.STORY, [_act(act, simulation) for act in story.acts])
 
 
-def _act(act: Act, run: Run) -> Element:
-    return Element(
+def _act(act: Act, simulation: Simulation) -> StoryboardElement:
+    return StoryboardElement(
         act.name,
         StoryboardElementType.ACT,
-        [_group(group, run) for group in act.maneuver_groups],
-        start_trigger=None if act.start_trigger is None else prepare_trigger(act.start_trigger, run, when_empty=True),
-        stop_trigger=None if act.stop_trigger is None else prepare_trigger(act.stop_trigger, run, when_empty=False),
+        [_group(group, simulation) for group in act.maneuver_groups],
+        start_trigger=None
+        if act.start_trigger is None
+        else prepare_trigger(act.start_trigger, simulation, when_empty=True),
+        stop_trigger=None
+        if act.stop_trigger is None
+        else prepare_trigger(act.stop_trigger, simulation, when_empty=False),
     )
 
 
-def _group(group: ManeuverGroup, run: Run) -> Element:
+def _group(group: ManeuverGroup, simulation: Simulation) -> StoryboardElement:
     if group.actors.select_triggering_entities:
-        run.note("the triggering entities do not join the actors", group.actors.place)
-    return Element(
+        simulation.note("the triggering entities do not join the actors", group.actors.place)
+    return StoryboardElement(
         group.name,
         StoryboardElementType.MANEUVER_GROUP,
-        [_maneuver(maneuver, group, run) for maneuver in group.maneuvers],
+        [_maneuver(maneuver, group, simulation) for maneuver in group.maneuvers],
         maximum_count=group.maximum_execution_count,
     )
 
 
-def _maneuver(maneuver: Maneuver, group: ManeuverGroup, run: Run) -> Element:
-    return Element(
-        maneuver.name, StoryboardElementType.MANEUVER, [_event(event, group, run) for event in maneuver.events]
+def _maneuver(maneuver: Maneuver, group: ManeuverGroup, simulation: Simulation) -> StoryboardElement:
+    return StoryboardElement(
+        maneuver.name, StoryboardElementType.MANEUVER, [_event(event, group, simulation) for event in maneuver.events]
     )
 
 
-def _event(event: Event, group: ManeuverGroup, run: Run) -> EventElement:
+def _event(event: Event, group: ManeuverGroup, simulation: Simulation) -> EventElement:
     actions: list[ActionElement] = []
     for action in event.actions:
-        actions += _actions(action, group, run)
+        actions += _actions(action, group, simulation)
     trigger = (
         RunningTrigger((), when_empty=True)
         if event.start_trigger is None
-        else prepare_trigger(event.start_trigger, run, when_empty=True)
+        else prepare_trigger(event.start_trigger, simulation, when_empty=True)
     )
     return EventElement(
         event.name,
@@ -114,16 +120,16 @@ def _event(event: Event, group: ManeuverGroup, run: Run) -> EventElement:
     )
 
 
-def _actions(action: Action, group: ManeuverGroup, run: Run) -> Iterator[ActionElement]:
+def _actions(action: Action, group: ManeuverGroup, simulation: Simulation) -> Iterator[ActionElement]:
     """One action for each actor, or one for all when it is not private."""
     if not action.is_private:
-        yield prepare_action(action, None, run)
+        yield prepare_action(action, None, simulation)
         return
     if not group.actors.entity_refs:
         place = group.actors.place
-        run.note(f"maneuver group '{group.name}' has no actors: its private actions are not played", place)
+        simulation.note(f"maneuver group '{group.name}' has no actors: its private actions are not played", place)
     for name in group.actors.entity_refs:
-        state = run.entity(name, group.actors.place)
-        element = prepare_action(action, state, run)
+        state = simulation.entity(name, group.actors.place)
+        element = prepare_action(action, state, simulation)
         state.event_actions.append(element)
         yield element

@@ -9,7 +9,7 @@ from xosc_lateral.report.render import KeyFigure, render_page, render_text
 from xosc_lateral.version import __version__
 
 if TYPE_CHECKING:
-    from xosc_lateral.board.result import Board, Number, Row
+    from xosc_lateral.board.result import Board, ModelScore, Row
     from xosc_lateral.evaluation.lane_keeping import VarianceParts
 
 FAMILIES = {
@@ -132,7 +132,7 @@ def _cell(row: Row, name: str) -> str:
     return "" if number is None else _value(number)
 
 
-def _value(number: Number) -> str:
+def _value(number: ModelScore) -> str:
     return f"{number.value:.3f}" if number.value < 10 else f"{number.value:.1f}"
 
 

@@ -6,11 +6,11 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from xosc_lateral.enrich.conversion import Conversion, ConversionProvenance
+from xosc_lateral.enrich.conversion import ConversionProvenance, ConvertedScenario
 from xosc_lateral.motion.gaps import Gap
 
 
-def as_text(conversion: Conversion, report: Path | None = None) -> str:
+def as_text(conversion: ConvertedScenario, report: Path | None = None) -> str:
     """What was done, what was not, what to know."""
     lines = [f"{conversion.source if conversion.data else conversion.output}"]
     for entity in conversion.enriched.entities:
@@ -30,7 +30,7 @@ def as_text(conversion: Conversion, report: Path | None = None) -> str:
     return "\n".join(lines)
 
 
-def facts(conversion: Conversion, report: Path | None = None) -> dict[str, Any]:
+def facts(conversion: ConvertedScenario, report: Path | None = None) -> dict[str, Any]:
     """Plain values about a conversion, rounded to what they are read for: a micrometre, a microsecond."""
     enriched = conversion.enriched
     return {

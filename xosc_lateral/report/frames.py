@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import Figure
 
-    from xosc_lateral.driver.snippets import Sampled
+    from xosc_lateral.driver.snippets import SampledOffsets
     from xosc_lateral.enrich.result import Enriched
 
 
@@ -50,7 +50,7 @@ def conversion_frame(enriched: Enriched) -> pd.DataFrame:
 
 
 @figure_style()
-def offsets_figure(sampled: Sequence[Sampled]) -> Figure:
+def offsets_figure(sampled: Sequence[SampledOffsets]) -> Figure:
     """Offset over time, a panel per run; what was measured beside it where it is known."""
     figure, axes = new_figure(max(1, len(sampled)), 1, height=0.6 + 1.3 * max(1, len(sampled)))
     for axis, one in zip(axes[:, 0], sampled, strict=False):

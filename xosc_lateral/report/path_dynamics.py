@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.motion.nominal import Activity, EntityMotion
-from xosc_lateral.motion.trajectory import Trajectory
+from xosc_lateral.motion.trajectory import WorldTrajectory
 
 FloatArray = NDArray[np.float64]
 
@@ -27,14 +27,14 @@ class LateralDynamics(NamedTuple):
     jerk: FloatArray
 
 
-def lateral_dynamics(motion: EntityMotion, path: Trajectory) -> LateralDynamics:
+def lateral_dynamics(motion: EntityMotion, path: WorldTrajectory) -> LateralDynamics:
     """Acceleration across the direction of travel, and its derivative.
 
     Parameters
     ----------
     motion : EntityMotion
         Says where the entity is absent or placed anew.
-    path : Trajectory
+    path : WorldTrajectory
         Nominal or enriched, on the same rows.
     """
     every = max(1, round(STEP / (motion.time[1] - motion.time[0]))) if len(motion.time) > 1 else 1

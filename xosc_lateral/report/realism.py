@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 from xosc_lateral.driver.models.kinds import ModelKind
 from xosc_lateral.driver.profile import DriverProfile
-from xosc_lateral.evaluation.classifier import Separation
+from xosc_lateral.evaluation.classifier import TwoSampleResult
 from xosc_lateral.evaluation.lane_keeping import INDICATORS, UNITS
 from xosc_lateral.evaluation.realism import ConditionScores, Realism
 
@@ -128,5 +128,5 @@ def _ratio(one: ConditionScores, family: str) -> str:
     return f"{one.families[family].ratio:.2f}" if family in one.families else ""
 
 
-def _area(area: Separation | None) -> str:
+def _area(area: TwoSampleResult | None) -> str:
     return "" if area is None else f"{area.auc:.2f} ({area.low:.2f}-{area.high:.2f})"

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from xosc_lateral.enrich.conversion import Conversion
+from xosc_lateral.enrich.conversion import ConvertedScenario
 from xosc_lateral.enrich.result import Enriched, EntityResult
 from xosc_lateral.motion.gaps import REACH, Gap
 from xosc_lateral.motion.nominal import Note
@@ -30,7 +30,7 @@ GAP_TIMES = ("at [s]", "at [s] ")
 """Headings of the times of the nominal and the enriched gap: a table's headings differ, if only by a blank."""
 
 
-def conversion_page(conversion: Conversion) -> str:
+def conversion_page(conversion: ConvertedScenario) -> str:
     """`scenario_page` of a conversion, with all its provenance."""
     made = conversion.provenance
     return scenario_page(

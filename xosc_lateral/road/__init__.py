@@ -4,9 +4,9 @@ from xosc_lateral.road.lanes import DRIVING
 from xosc_lateral.road.network import Chooser, RoadNetwork
 from xosc_lateral.road.positions import (
     Advance,
+    LaneCoordinates,
     LaneInfo,
     LaneLink,
-    LanePosition,
     LanePositions,
     LaneState,
     Pose,
@@ -19,9 +19,9 @@ __all__ = [
     "DRIVING",
     "Advance",
     "Chooser",
+    "LaneCoordinates",
     "LaneInfo",
     "LaneLink",
-    "LanePosition",
     "LanePositions",
     "LaneState",
     "Pose",

@@ -23,7 +23,7 @@ MAX_TURN = 2000.0
 """An element that turns more than this is refused by the reader. [rad]"""
 
 
-class Element(Protocol):
+class ReferenceLineElement(Protocol):
     """One element of a reference line."""
 
     def at(self, ds: float) -> tuple[float, float, float]:

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from xosc_lateral.road.places import lane_at
-from xosc_lateral.road.positions import FloatArray, IntArray, LanePosition, LanePositions
+from xosc_lateral.road.positions import FloatArray, IntArray, LaneCoordinates, LanePositions
 from xosc_lateral.road.projection import Feet, project, project_at
 from xosc_lateral.road.samples import BRUTE_FORCE, Candidates, Samples, joined
 from xosc_lateral.road.tables import NetworkTables
@@ -119,7 +119,7 @@ class SurfaceIndex:
         *,
         near: tuple[int, float] | None,
         lane_types: Collection[str] | None,
-    ) -> LanePosition:
+    ) -> LaneCoordinates:
         """Nearest lane of one point (see `RoadNetwork.world_to_lane_at`). [m], [rad]"""
         if near is not None and near[0] >= 0:
             road = self._tables.roads[near[0]]
@@ -128,7 +128,7 @@ class SurfaceIndex:
             if abs(ahead) <= TOUCHING and here.distance <= TOUCHING and here.lane != 0:
                 return here
         best = self.world_to_lane(x, y, z, heading, near=None, lane_types=lane_types)
-        return LanePosition(
+        return LaneCoordinates(
             int(best.road), int(best.lane), float(best.s), float(best.offset), float(best.t), float(best.distance)
         )
 

@@ -6,7 +6,7 @@ from bisect import bisect_right
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
-from xosc_lateral.road.piecewise import ZERO, Cubic, Piecewise
+from xosc_lateral.road.piecewise import ZERO, Cubic, PiecewiseCubic
 from xosc_lateral.road.positions import LaneState, RoadMark
 
 DRIVING: frozenset[str] = frozenset(
@@ -130,7 +130,7 @@ def build_section(
     start: float,
     end: float,
     *,
-    lane_offset: Piecewise,
+    lane_offset: PiecewiseCubic,
     directions: Mapping[int, int],
     centre_marks: tuple[RoadMark, ...] = (),
 ) -> LaneSection:
@@ -143,11 +143,11 @@ def build_section(
             outer = _outer_edge(record, inner, centre, start, end, side)
             width = outer.plus(inner, -1.0)
             if side < 0:
-                width = Piecewise(width.starts, tuple((-a, -b, -c, -d) for a, b, c, d in width.cubics))
+                width = PiecewiseCubic(width.starts, tuple((-a, -b, -c, -d) for a, b, c, d in width.cubics))
             middle = inner.plus(width, 0.5 * side)
             lanes.append(_lane(record, directions[record.id], middle, width))
             inner = outer
-    nothing = Piecewise(centre.starts, (ZERO,) * len(centre.starts))
+    nothing = PiecewiseCubic(centre.starts, (ZERO,) * len(centre.starts))
     lane_zero = LaneRecord(0, "none", True, (), (), (), (), centre_marks, (), ())
     return LaneSection(
         start, end, tuple(sorted(lanes, key=lambda lane: -lane.id)), _lane(lane_zero, 1, centre, nothing)
@@ -155,19 +155,19 @@ def build_section(
 
 
 def _outer_edge(
-    record: LaneRecord, inner: Piecewise, centre: Piecewise, start: float, end: float, side: int
-) -> Piecewise:
+    record: LaneRecord, inner: PiecewiseCubic, centre: PiecewiseCubic, start: float, end: float, side: int
+) -> PiecewiseCubic:
     """The edge away from the centre lane; widths count outwards, borders (in t) from the centre lane. Widths win."""
     records, origin, factor = (record.widths, inner, float(side)) if record.widths else (record.borders, centre, 1.0)
     if not records:
         return inner
     # Before its first record a width is taken as the record's first value: no lane begins with a jump.
     first = min(records, key=lambda item: item[0])[1]
-    profile = Piecewise.from_records(records, begin=start, before=(first[0], 0.0, 0.0, 0.0))
+    profile = PiecewiseCubic.from_records(records, begin=start, before=(first[0], 0.0, 0.0, 0.0))
     return origin.plus(profile.restricted(start, end), factor)
 
 
-def _lane(record: LaneRecord, direction: int, centre: Piecewise, width: Piecewise) -> Lane:
+def _lane(record: LaneRecord, direction: int, centre: PiecewiseCubic, width: PiecewiseCubic) -> Lane:
     return Lane(
         id=record.id,
         type=record.type,

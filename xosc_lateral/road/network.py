@@ -28,9 +28,9 @@ from xosc_lateral.road.positions import (
     Advance,
     FloatArray,
     IntArray,
+    LaneCoordinates,
     LaneInfo,
     LaneLink,
-    LanePosition,
     LanePositions,
     LaneState,
     Pose,
@@ -247,7 +247,9 @@ class RoadNetwork:
         """
         return find_lane(self.roads[road], lane, s).type
 
-    def lane_at(self, road: int, s: float, t: float, *, lane_types: Collection[str] | None = DRIVING) -> LanePosition:
+    def lane_at(
+        self, road: int, s: float, t: float, *, lane_types: Collection[str] | None = DRIVING
+    ) -> LaneCoordinates:
         """The lane of these types that holds `t`, else the nearest one; lane 0 if the road has none of them there.
 
         `s`, `t` in [m].
@@ -268,7 +270,7 @@ class RoadNetwork:
         *,
         near: tuple[int, float] | None = None,
         lane_types: Collection[str] | None = DRIVING,
-    ) -> LanePosition:
+    ) -> LaneCoordinates:
         """`world_to_lane` of one point; `near` = (road, s) where it was a moment ago makes it cheap. [m], [rad]"""
         return self._index.world_to_lane_at(x, y, z, heading, near=near, lane_types=lane_types)
 

@@ -21,7 +21,7 @@ def shift(cubic: Cubic, ds: float) -> Cubic:
 
 
 @dataclass(frozen=True, slots=True)
-class Piecewise:
+class PiecewiseCubic:
     """A function of s that is one cubic from each start to the next, about that start.
 
     Parameters
@@ -36,7 +36,9 @@ class Piecewise:
     cubics: tuple[Cubic, ...]
 
     @classmethod
-    def from_records(cls, records: Iterable[tuple[float, Cubic]], *, begin: float, before: Cubic = ZERO) -> Piecewise:
+    def from_records(
+        cls, records: Iterable[tuple[float, Cubic]], *, begin: float, before: Cubic = ZERO
+    ) -> PiecewiseCubic:
         """From (s, cubic) records in any order; the later of two at the same s counts; before the first: `before`.
 
         `s` in [m].
@@ -74,16 +76,16 @@ class Piecewise:
         i = max(bisect_right(self.starts, s) - 1, 0)
         return shift(self.cubics[i], s - self.starts[i])
 
-    def restricted(self, begin: float, end: float) -> Piecewise:
+    def restricted(self, begin: float, end: float) -> PiecewiseCubic:
         """The same function with pieces for [begin, end) only. Bounds in [m]."""
         starts = (begin, *(s for s in self.starts if begin < s < end))
-        return Piecewise(starts, tuple(self.cubic_at(s) for s in starts))
+        return PiecewiseCubic(starts, tuple(self.cubic_at(s) for s in starts))
 
-    def plus(self, other: Piecewise, factor: float = 1.0) -> Piecewise:
+    def plus(self, other: PiecewiseCubic, factor: float = 1.0) -> PiecewiseCubic:
         """``self + factor * other``, with the breakpoints of both. `factor` [-]."""
         starts = tuple(sorted({*self.starts, *other.starts}))
         cubics = []
         for s in starts:
             (a, b, c, d), (e, f, g, h) = self.cubic_at(s), other.cubic_at(s)
             cubics.append((a + factor * e, b + factor * f, c + factor * g, d + factor * h))
-        return Piecewise(starts, tuple(cubics))
+        return PiecewiseCubic(starts, tuple(cubics))

@@ -7,7 +7,7 @@ from math import asin, atan, atan2, ceil, cos, inf, pi, sin
 
 from xosc_lateral.errors import PlaybackError
 from xosc_lateral.road.lanes import Lane
-from xosc_lateral.road.positions import LaneInfo, LanePosition, Pose
+from xosc_lateral.road.positions import LaneCoordinates, LaneInfo, Pose
 from xosc_lateral.road.road import Road
 
 TWO_PI = 2.0 * pi
@@ -116,7 +116,7 @@ def cross_section(road: Road, s: float) -> tuple[LaneInfo, ...]:
     return tuple(infos)
 
 
-def lane_at(road: Road, index: int, s: float, t: float, lane_types: Collection[str] | None) -> LanePosition:
+def lane_at(road: Road, index: int, s: float, t: float, lane_types: Collection[str] | None) -> LaneCoordinates:
     """The lane of these types that holds t, else the nearest; lanes of no width only where there is nothing else.
 
     `s`, `t` in [m].
@@ -132,9 +132,9 @@ def lane_at(road: Road, index: int, s: float, t: float, lane_types: Collection[s
         if best is None or score < best:
             best, found = score, (lane, centre)
     if best is None or found is None:
-        return LanePosition(index, 0, s, t, t, inf)
+        return LaneCoordinates(index, 0, s, t, t, inf)
     lane, centre = found
-    return LanePosition(index, lane.id, s, lane.direction * (t - centre), t, max(best[1] - 0.5 * best[2], 0.0))
+    return LaneCoordinates(index, lane.id, s, lane.direction * (t - centre), t, max(best[1] - 0.5 * best[2], 0.0))
 
 
 def limit_at(speeds: tuple[tuple[float, float], ...], s: float) -> float:

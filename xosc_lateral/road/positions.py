@@ -36,7 +36,7 @@ class Poses(NamedTuple):
     roll: FloatArray
 
 
-class LanePosition(NamedTuple):
+class LaneCoordinates(NamedTuple):
     """A place on the road.
 
     `road` is an index into `RoadNetwork.road_ids`, `offset` [m] counts from the lane centre, positive to the LEFT of
@@ -53,7 +53,7 @@ class LanePosition(NamedTuple):
 
 
 class LanePositions(NamedTuple):
-    """Places on the road as arrays of one shape; fields as in `LanePosition`; lane 0 where there is none."""
+    """Places on the road as arrays of one shape; fields as in `LaneCoordinates`; lane 0 where there is none."""
 
     road: IntArray
     lane: IntArray

@@ -8,14 +8,14 @@ import numpy as np
 
 from xosc_lateral.road.lanes import Lane
 from xosc_lateral.road.lookup import IndexLike, Lookup
-from xosc_lateral.road.piecewise import Piecewise
+from xosc_lateral.road.piecewise import PiecewiseCubic
 from xosc_lateral.road.positions import FloatArray
 
 
 class Cubics:
     """Piecewise cubics of several owners."""
 
-    def __init__(self, functions: Sequence[Piecewise]) -> None:
+    def __init__(self, functions: Sequence[PiecewiseCubic]) -> None:
         """Gather the pieces."""
         self._lookup = Lookup([function.starts for function in functions])
         self._table = np.array([cubic for function in functions for cubic in function.cubics]).T.copy()

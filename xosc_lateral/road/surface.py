@@ -6,7 +6,7 @@ from bisect import bisect_right
 from dataclasses import dataclass
 from math import asin, atan, cos, sin, sqrt, tan
 
-from xosc_lateral.road.piecewise import Piecewise
+from xosc_lateral.road.piecewise import PiecewiseCubic
 
 BEND_STEP = 1e-3
 """Step of differences of the grade. [m]"""
@@ -20,12 +20,12 @@ class Shape:
     ----------
     stations : tuple of float
         Increasing s. [m]
-    profiles : tuple of Piecewise
+    profiles : tuple of PiecewiseCubic
         Height over t at each station. [m]
     """
 
     stations: tuple[float, ...]
-    profiles: tuple[Piecewise, ...]
+    profiles: tuple[PiecewiseCubic, ...]
 
     def at(self, s: float, t: float) -> tuple[float, float, float]:
         """Height, its slope along s, its slope along t. [m], [-], [-]"""
@@ -49,19 +49,19 @@ class Surface:
 
     Attributes
     ----------
-    elevation : Piecewise
+    elevation : PiecewiseCubic
         z of the reference line over s. [m]
-    superelevation : Piecewise
+    superelevation : PiecewiseCubic
         Roll about the reference line, positive when the road falls to the right looking along s. [rad]
-    crossfall : tuple of 2 Piecewise
+    crossfall : tuple of 2 PiecewiseCubic
         OpenDRIVE 1.4: angle of the surface left and right of the reference line, positive falling outwards. [rad]
     shape : Shape or None
         Height over t on top of all that.
     """
 
-    elevation: Piecewise
-    superelevation: Piecewise
-    crossfall: tuple[Piecewise, Piecewise] | None = None
+    elevation: PiecewiseCubic
+    superelevation: PiecewiseCubic
+    crossfall: tuple[PiecewiseCubic, PiecewiseCubic] | None = None
     shape: Shape | None = None
 
     @property

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from xosc_lateral.templates.motorway import Bend, Motorway, Straight
 from xosc_lateral.templates.parameter import Number, Settings
-from xosc_lateral.templates.storyboard import Actor, Plot, Step, Vehicle, after, at_time, speed_action
+from xosc_lateral.templates.storyboard import Actor, PlannedEvent, Plot, Vehicle, after, at_time, speed_action
 from xosc_lateral.templates.surroundings import is_left_hand
 from xosc_lateral.templates.template import Template
 
@@ -46,10 +46,12 @@ def plot(settings: Settings) -> Plot:
             Actor("Passing", Vehicle.CAR, 1, 20.0, round(passing, 3)),
         ),
         steps=(
-            Step("Leader", "LeaderBrakes", brake, at_time("$brake_time")),
-            Step("Leader", "LeaderRecovers", recover, after("LeaderBrakes", "$slow_time")),
-            Step("Ego", "EgoBrakes", brake, after("LeaderBrakes", "$reaction_time", state="startTransition")),
-            Step("Ego", "EgoRecovers", recover, after("LeaderRecovers", "$reaction_time", state="startTransition")),
+            PlannedEvent("Leader", "LeaderBrakes", brake, at_time("$brake_time")),
+            PlannedEvent("Leader", "LeaderRecovers", recover, after("LeaderBrakes", "$slow_time")),
+            PlannedEvent("Ego", "EgoBrakes", brake, after("LeaderBrakes", "$reaction_time", state="startTransition")),
+            PlannedEvent(
+                "Ego", "EgoRecovers", recover, after("LeaderRecovers", "$reaction_time", state="startTransition")
+            ),
         ),
         duration=duration,
         declared=(

@@ -4,7 +4,16 @@ from __future__ import annotations
 
 from xosc_lateral.templates.motorway import Bend, Motorway, Straight
 from xosc_lateral.templates.parameter import Number, Settings
-from xosc_lateral.templates.storyboard import Actor, Plot, Step, Vehicle, after, headway, lane_change, speed_action
+from xosc_lateral.templates.storyboard import (
+    Actor,
+    PlannedEvent,
+    Plot,
+    Vehicle,
+    after,
+    headway,
+    lane_change,
+    speed_action,
+)
 from xosc_lateral.templates.surroundings import is_left_hand
 from xosc_lateral.templates.template import Template
 
@@ -47,13 +56,13 @@ def plot(settings: Settings) -> Plot:
             Actor("Truck", Vehicle.TRUCK, 0, truck, _TRUCK_SPEED),
         ),
         steps=(
-            Step(
+            PlannedEvent(
                 "CutIn",
                 "CutInEvent",
                 lane_change(motorway.lane(0), "$lane_change_time"),
                 headway("Ego", "CutIn", "greaterThan", "$headway", not_before=passed),
             ),
-            Step(
+            PlannedEvent(
                 "CutIn",
                 "SlowDownEvent",
                 speed_action("$slow_speed", rate="$deceleration"),

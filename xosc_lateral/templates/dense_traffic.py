@@ -6,8 +6,8 @@ from xosc_lateral.templates.motorway import Bend, Motorway, Straight
 from xosc_lateral.templates.parameter import Number, Settings
 from xosc_lateral.templates.storyboard import (
     Actor,
+    PlannedEvent,
     Plot,
-    Step,
     Vehicle,
     after,
     at_time,
@@ -73,27 +73,33 @@ def plot(settings: Settings) -> Plot:
             place("FastThird", Vehicle.VAN, 2, -2.6),
         ),
         steps=(
-            Step("MiddleFirst", "FirstBrakes", brake, at_time(_BRAKE_TIME)),
-            Step("MiddleAhead", "SecondBrakes", brake, after("FirstBrakes", _REACTION, state="startTransition")),
-            Step("Ego", "EgoBrakes", brake, after("SecondBrakes", _REACTION, state="startTransition")),
-            Step("MiddleBehind", "LastBrakes", brake, after("EgoBrakes", _REACTION, state="startTransition")),
-            Step("MiddleFirst", "FirstRecovers", recover, after("FirstBrakes", _SLOW_TIME)),
-            Step("MiddleAhead", "SecondRecovers", recover, after("FirstRecovers", _REACTION, state="startTransition")),
-            Step("Ego", "EgoRecovers", recover, after("SecondRecovers", _REACTION, state="startTransition")),
-            Step("MiddleBehind", "LastRecovers", recover, after("EgoRecovers", _REACTION, state="startTransition")),
-            Step(
+            PlannedEvent("MiddleFirst", "FirstBrakes", brake, at_time(_BRAKE_TIME)),
+            PlannedEvent(
+                "MiddleAhead", "SecondBrakes", brake, after("FirstBrakes", _REACTION, state="startTransition")
+            ),
+            PlannedEvent("Ego", "EgoBrakes", brake, after("SecondBrakes", _REACTION, state="startTransition")),
+            PlannedEvent("MiddleBehind", "LastBrakes", brake, after("EgoBrakes", _REACTION, state="startTransition")),
+            PlannedEvent("MiddleFirst", "FirstRecovers", recover, after("FirstBrakes", _SLOW_TIME)),
+            PlannedEvent(
+                "MiddleAhead", "SecondRecovers", recover, after("FirstRecovers", _REACTION, state="startTransition")
+            ),
+            PlannedEvent("Ego", "EgoRecovers", recover, after("SecondRecovers", _REACTION, state="startTransition")),
+            PlannedEvent(
+                "MiddleBehind", "LastRecovers", recover, after("EgoRecovers", _REACTION, state="startTransition")
+            ),
+            PlannedEvent(
                 "FastFirst",
                 "FastPullsIn",
                 lane_change(motorway.lane(1), "$lane_change_time"),
                 headway("MiddleFirst", "FastFirst", "greaterThan", 2.5, not_before=16.0),
             ),
-            Step(
+            PlannedEvent(
                 "SlowThird",
                 "SlowPullsOut",
                 lane_change(motorway.lane(1), "$lane_change_time"),
                 headway("SlowThird", "MiddleBehind", "greaterThan", 1.5, not_before=recovered),
             ),
-            Step("SlowThird", "SlowSpeedsUp", catch_up, after("SlowPullsOut", 0.5, state="startTransition")),
+            PlannedEvent("SlowThird", "SlowSpeedsUp", catch_up, after("SlowPullsOut", 0.5, state="startTransition")),
         ),
         duration=duration,
         declared=(*names, "lane_change_time"),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from xosc_lateral.templates.motorway import Bend, Motorway, Straight
 from xosc_lateral.templates.parameter import Number, Settings
-from xosc_lateral.templates.storyboard import Actor, Plot, Step, Vehicle, after, closer_than, speed_action
+from xosc_lateral.templates.storyboard import Actor, PlannedEvent, Plot, Vehicle, after, closer_than, speed_action
 from xosc_lateral.templates.surroundings import is_left_hand
 from xosc_lateral.templates.template import Template
 
@@ -57,8 +57,8 @@ def plot(settings: Settings) -> Plot:
             *in_jam,
         ),
         steps=(
-            Step("Ego", "EgoBrakes", brake, closer_than("Ego", "Jam00", round(braking, 3))),
-            Step("Follower", "FollowerBrakes", brake, after("EgoBrakes", 1.0, state="startTransition")),
+            PlannedEvent("Ego", "EgoBrakes", brake, closer_than("Ego", "Jam00", round(braking, 3))),
+            PlannedEvent("Follower", "FollowerBrakes", brake, after("EgoBrakes", 1.0, state="startTransition")),
         ),
         duration=duration,
         declared=("speed", "deceleration"),

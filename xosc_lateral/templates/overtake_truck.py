@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from xosc_lateral.templates.motorway import Bend, Motorway, Straight
 from xosc_lateral.templates.parameter import Number, Settings
-from xosc_lateral.templates.storyboard import Actor, Plot, Step, Vehicle, headway, lane_change
+from xosc_lateral.templates.storyboard import Actor, PlannedEvent, Plot, Vehicle, headway, lane_change
 from xosc_lateral.templates.surroundings import is_left_hand
 from xosc_lateral.templates.template import Template
 
@@ -44,13 +44,13 @@ def plot(settings: Settings) -> Plot:
             Actor("FarAhead", Vehicle.CAR, 1, 100.0 + start_gap + _LEAD, "$ego_speed"),
         ),
         steps=(
-            Step(
+            PlannedEvent(
                 "Ego",
                 "PullOut",
                 lane_change(motorway.lane(1), "$lane_change_time"),
                 headway("Ego", "Truck", "lessThan", "$headway_before"),
             ),
-            Step(
+            PlannedEvent(
                 "Ego",
                 "PullIn",
                 lane_change(motorway.lane(0), "$lane_change_time"),

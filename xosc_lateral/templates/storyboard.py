@@ -80,7 +80,7 @@ class Actor:
 
 
 @dataclass(frozen=True, slots=True)
-class Step:
+class PlannedEvent:
     """One event of one vehicle.
 
     Parameters
@@ -109,7 +109,7 @@ class Plot:
     motorway : Motorway
     actors : tuple of Actor
         The first one is the ego vehicle.
-    steps : tuple of Step
+    steps : tuple of PlannedEvent
     duration : float
         The scenario ends then. [s]
     declared : tuple of str
@@ -119,7 +119,7 @@ class Plot:
     what: str
     motorway: Motorway
     actors: tuple[Actor, ...]
-    steps: tuple[Step, ...] = field(default=())
+    steps: tuple[PlannedEvent, ...] = field(default=())
     duration: float = 50.0
     declared: tuple[str, ...] = ()
 
@@ -180,8 +180,8 @@ class Plot:
             board.add_story(story)
         return board
 
-    def _steps_by_actor(self) -> Mapping[str, list[Step]]:
-        ordered: dict[str, list[Step]] = {}
+    def _steps_by_actor(self) -> Mapping[str, list[PlannedEvent]]:
+        ordered: dict[str, list[PlannedEvent]] = {}
         for step in self.steps:
             ordered.setdefault(step.actor, []).append(step)
         return ordered

@@ -12,7 +12,7 @@ import pytest
 from tests.motion.made_motion import drive, entity, together, two_roads
 from tests.report.made_enriched import made_enriched
 from xosc_lateral.motion.nominal import Activity
-from xosc_lateral.motion.trajectory import Trajectory
+from xosc_lateral.motion.trajectory import WorldTrajectory
 from xosc_lateral.report.player.packing import pack, simplify, unpack
 from xosc_lateral.report.player.scene import enriched_scene, nominal_scene
 from xosc_lateral.report.player.track import track_of
@@ -110,7 +110,7 @@ def test_ten_cars_for_a_minute_stay_under_a_megabyte(tmp_path):
             base.entity("Ego"),
             motion=car,
             deviation=wander,
-            trajectory=Trajectory(*(getattr(car, name) + (wander if name in "xy" else 0.0) for name in names)),
+            trajectory=WorldTrajectory(*(getattr(car, name) + (wander if name in "xy" else 0.0) for name in names)),
         )
         for car in cars
     )

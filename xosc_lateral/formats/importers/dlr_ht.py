@@ -35,7 +35,7 @@ from xosc_lateral.formats.importers.cuts import (
     name_states,
     number_runs,
 )
-from xosc_lateral.formats.importers.lanes_from_tracks import LaneCentre, fit_lane_centre
+from xosc_lateral.formats.importers.lanes_from_tracks import LaneCentreLine, fit_lane_centre
 from xosc_lateral.formats.importers.neighbours import find_neighbours
 from xosc_lateral.formats.importers.road_from_tracks import fit_reference_line
 from xosc_lateral.formats.importers.table import Imported, drop_cut, guarded, make_provenance
@@ -84,7 +84,7 @@ def import_dlr_ht(source: Path, settings: CutSettings = DEFAULT_CUTS, *, keep_cu
     height = tracks["dimension_height"].to_numpy()
     gap = long_gaps(tracks["interpolated"].to_numpy(), vehicle, STEP, settings.max_gap)
     placed = _Placed.empty(len(tracks))
-    lanes: dict[str, list[LaneCentre]] = {}
+    lanes: dict[str, list[LaneCentreLine]] = {}
     for name, mine in (("northbound", forward), ("southbound", ~forward)):
         rows = np.flatnonzero(mine)
         part, lanes[name] = _place_in_lanes(s[rows], d[rows], height[rows], vehicle[rows], gap[rows], settings)
@@ -213,12 +213,12 @@ def _place_in_lanes(
     vehicle: IntArray,
     gap: NDArray[np.bool_],
     settings: CutSettings,
-) -> tuple[_Placed, list[LaneCentre]]:
+) -> tuple[_Placed, list[LaneCentreLine]]:
     """Lane centres of one carriageway, and every row's lane and offset. Rounds, since each needs the other."""
     levels = _levels(d)
     centre = np.repeat(levels[:, None], len(s), axis=1)
     bend, width = np.full(len(d), levels.mean()), float(np.diff(levels).mean())
-    lanes: list[LaneCentre] = []
+    lanes: list[LaneCentreLine] = []
     for _ in range(3):
         lane, offset, changing = _place(d, centre, bend, width, vehicle, settings)
         lanes = []
@@ -244,7 +244,7 @@ def _place(
     return lane, offset, lane_changes(d - bend, offset, lane, vehicle, STEP, settings)
 
 
-def _lane_width(lanes: list[LaneCentre]) -> float:
+def _lane_width(lanes: list[LaneCentreLine]) -> float:
     """Median distance of neighbouring lane centres, where both are known."""
     s = np.arange(max(lane.start for lane in lanes), min(lane.end for lane in lanes), 10.0)
     return float(np.median(np.diff([lane.at(s, np.full(len(s), lane.height)) for lane in lanes], axis=0)))
@@ -306,7 +306,7 @@ def _vehicle_class(tracks: pd.DataFrame) -> NDArray[np.str_]:
     return np.asarray(np.array(CLASSES)[scores.argmax(axis=1)])
 
 
-def _describe(carriageway: str, index: int, lane: LaneCentre) -> dict[str, object]:
+def _describe(carriageway: str, index: int, lane: LaneCentreLine) -> dict[str, object]:
     error = lane.standard_error(np.arange(lane.start, lane.end, 10.0))
     return {
         "carriageway": carriageway,

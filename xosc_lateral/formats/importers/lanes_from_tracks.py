@@ -34,7 +34,7 @@ MIN_STRETCHES = 10  # per 100 m of road, below which the lane ends
 
 
 @dataclass(frozen=True, eq=False)
-class LaneCentre:
+class LaneCentreLine:
     """Lateral position of a lane's centre along a reference line, as used by its traffic.
 
     Parameters
@@ -80,7 +80,7 @@ class LaneCentre:
 
 def fit_lane_centre(
     s: FloatArray, d: FloatArray, height: FloatArray, stretch: IntArray, *, knot_spacing: float = KNOT_SPACING
-) -> LaneCentre:
+) -> LaneCentreLine:
     """Fit one lane's centre.
 
     Parameters
@@ -114,11 +114,13 @@ def fit_lane_centre(
         _whiten(design, follows), _whiten(d, follows), _pull(size), stretch
     )
     centre, tilt = coefficients[:size], coefficients[size : 2 * size]
-    lane = LaneCentre(start, end, knots, centre, tilt, mean_height, covariance[:size, :size], len(np.unique(stretch)))
+    lane = LaneCentreLine(
+        start, end, knots, centre, tilt, mean_height, covariance[:size, :size], len(np.unique(stretch))
+    )
     return _sure_part(lane)
 
 
-def _sure_part(lane: LaneCentre) -> LaneCentre:
+def _sure_part(lane: LaneCentreLine) -> LaneCentreLine:
     """The lane's longest part in which the centre is known to `MAX_ERROR`."""
     s = np.arange(lane.start, lane.end, 10.0)
     first, last = _longest(lane.standard_error(s) <= MAX_ERROR)

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Provenance:
+class ImportRecord:
     """Where a table came from and what was done to it. Lengths in m, times in s."""
 
     format: str
@@ -46,7 +46,7 @@ class Imported:
     """A drive table and its provenance."""
 
     table: pd.DataFrame
-    provenance: Provenance
+    provenance: ImportRecord
 
 
 def make_provenance(
@@ -59,9 +59,9 @@ def make_provenance(
     settings: Mapping[str, object],
     step: float,
     lanes: Sequence[Mapping[str, object]] = (),
-) -> Provenance:
+) -> ImportRecord:
     """Record of an import, from the table with its column `state` and rows `step` seconds apart."""
-    return Provenance(
+    return ImportRecord(
         format=format,
         source=", ".join(source.name for source in sources),
         sha256=hash_files(sources),
@@ -184,7 +184,7 @@ def hash_files(paths: Sequence[Path]) -> str:
     return hashlib.sha256("".join(map(parsed_hash, paths)).encode()).hexdigest()
 
 
-def describe(provenance: Provenance) -> str:
+def describe(provenance: ImportRecord) -> str:
     """What was imported, for a person."""
     rows = ", ".join(f"{count} {state}" for state, count in provenance.rows.items())
     head = f"{provenance.source}: {provenance.vehicles} vehicles, {provenance.hours:g} h kept (rows: {rows})"

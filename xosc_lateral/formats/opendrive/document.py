@@ -22,7 +22,7 @@ LARGEST = 1e12
 
 
 @dataclass(slots=True)
-class Source:
+class RoadFile:
     """One file being read: its path, the SHA-256 of its bytes, and what was noted on the way."""
 
     path: str
@@ -89,10 +89,10 @@ class Source:
         return int(value)
 
 
-def open_document(path: str | PathLike[str]) -> tuple[XmlElement, Source]:
+def open_document(path: str | PathLike[str]) -> tuple[XmlElement, RoadFile]:
     """Parse a file (no entities, no network, see `read_xml`); namespaces are dropped."""
     document = read_document(Path(path))
-    source, root = Source(fspath(path), document.sha256), document.root
+    source, root = RoadFile(fspath(path), document.sha256), document.root
     if root.tag.startswith("{"):
         root = deepcopy(root)  # the tree is shared between callers
         for element in root.iter(etree.Element):

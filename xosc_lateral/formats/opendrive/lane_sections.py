@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from xosc_lateral.formats.opendrive.document import Source, XmlElement
+from xosc_lateral.formats.opendrive.document import RoadFile, XmlElement
 from xosc_lateral.road.lanes import LaneRecord, LaneSection, build_section
-from xosc_lateral.road.piecewise import Piecewise
+from xosc_lateral.road.piecewise import PiecewiseCubic
 from xosc_lateral.road.positions import RoadMark
 
 MOST_LANES = 1000
@@ -30,11 +30,11 @@ class _Written:
 
 
 def read_sections(
-    road: XmlElement, length: float, rule: str, source: Source
+    road: XmlElement, length: float, rule: str, source: RoadFile
 ) -> tuple[tuple[LaneSection, ...], dict[int, int]]:
     """Lane sections, gapless over [0, length], and the travel direction of each lane id."""
     offset_records = [(source.number(e, "s"), source.cubic(e)) for e in road.iterfind("lanes/laneOffset")]
-    lane_offset = Piecewise.from_records(offset_records, begin=0.0)
+    lane_offset = PiecewiseCubic.from_records(offset_records, begin=0.0)
     written = _read_all(road, length, source)
     directions = _directions(road, written, rule, source)
     sections = []
@@ -49,7 +49,7 @@ def read_sections(
     return tuple(sections), directions
 
 
-def _read_all(road: XmlElement, length: float, source: Source) -> list[_Written]:
+def _read_all(road: XmlElement, length: float, source: RoadFile) -> list[_Written]:
     by_start: dict[float, _Written] = {}
     elements = sorted(road.iterfind("lanes/laneSection"), key=lambda e: source.number(e, "s"))
     for element in elements:
@@ -70,7 +70,7 @@ def _read_all(road: XmlElement, length: float, source: Source) -> list[_Written]
     return sections
 
 
-def _read_section(element: XmlElement, start: float, source: Source) -> _Written:
+def _read_section(element: XmlElement, start: float, source: RoadFile) -> _Written:
     single = element.get("singleSide", "false").lower() in ("true", "1")
     sides: dict[str, tuple[LaneRecord, ...] | None] = {}
     for side, sign in (("left", 1), ("right", -1)):
@@ -91,7 +91,7 @@ def _read_section(element: XmlElement, start: float, source: Source) -> _Written
     return _Written(start, sides["left"], sides["right"], marks)
 
 
-def _read_lane(element: XmlElement, start: float, source: Source) -> LaneRecord:
+def _read_lane(element: XmlElement, start: float, source: RoadFile) -> LaneRecord:
     widths, borders = (
         tuple((start + source.number(e, "sOffset", 0.0), source.cubic(e)) for e in element.iterfind(tag))
         for tag in ("width", "border")
@@ -127,7 +127,7 @@ def _read_lane(element: XmlElement, start: float, source: Source) -> LaneRecord:
     )
 
 
-def _read_marks(element: XmlElement, lane: int, start: float, source: Source) -> tuple[RoadMark, ...]:
+def _read_marks(element: XmlElement, lane: int, start: float, source: RoadFile) -> tuple[RoadMark, ...]:
     """Markings; each ends where the next begins, the last one at infinity until the section's end is known."""
     found = sorted((start + source.number(e, "sOffset", 0.0), i, e) for i, e in enumerate(element.iterfind("roadMark")))
     ends = [*(s for s, _, _ in found[1:]), float("inf")][: len(found)]
@@ -142,7 +142,7 @@ def _until(marks: Sequence[RoadMark], end: float) -> tuple[RoadMark, ...]:
     return tuple(mark._replace(s_end=min(mark.s_end, end)) for mark in marks if mark.s_start < end)
 
 
-def speed_limit(element: XmlElement, source: Source) -> float:
+def speed_limit(element: XmlElement, source: RoadFile) -> float:
     """``speed/@max`` in m/s; inf for ``no limit`` and ``undefined``."""
     if element.get("max", "undefined") in ("no limit", "undefined"):
         return float("inf")
@@ -152,7 +152,7 @@ def speed_limit(element: XmlElement, source: Source) -> float:
     return source.number(element, "max") * SPEED_UNITS[unit]
 
 
-def _directions(road: XmlElement, written: Sequence[_Written], rule: str, source: Source) -> dict[int, int]:
+def _directions(road: XmlElement, written: Sequence[_Written], rule: str, source: RoadFile) -> dict[int, int]:
     """Right-hand traffic drives right lanes along s and left lanes against it; left-hand traffic vice versa."""
     along = -1 if rule == "RHT" else 1
     directions = {
@@ -204,7 +204,7 @@ def _clip(lane: LaneRecord, start: float, end: float) -> LaneRecord:
     return replace(lane, marks=marks)
 
 
-def _check_lanes(road: XmlElement, sections: Sequence[LaneSection], source: Source) -> None:
+def _check_lanes(road: XmlElement, sections: Sequence[LaneSection], source: RoadFile) -> None:
     for section in sections:
         for lane in section.lanes:
             for s in (*lane.starts, section.end):

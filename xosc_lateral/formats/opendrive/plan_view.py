@@ -8,7 +8,7 @@ from math import cos, sin
 
 import numpy as np
 
-from xosc_lateral.formats.opendrive.document import Source, XmlElement
+from xosc_lateral.formats.opendrive.document import RoadFile, XmlElement
 from xosc_lateral.road.arc_length import end_parameter, parameter_pieces
 from xosc_lateral.road.geometry import MAX_TURN, Arc, Line, ParamCubic, ReferenceElement, Spiral
 from xosc_lateral.road.piecewise import Cubic
@@ -34,7 +34,7 @@ Record = tuple[float, float, ReferenceElement | CubicRecord]
 """s and length of an element, and the element."""
 
 
-def read_plan_view(road: XmlElement, source: Source) -> list[Record]:
+def read_plan_view(road: XmlElement, source: RoadFile) -> list[Record]:
     """Elements of one road in order of s."""
     records: list[Record] = []
     for geometry in road.iterfind("planView/geometry"):
@@ -48,7 +48,7 @@ def read_plan_view(road: XmlElement, source: Source) -> list[Record]:
     return sorted(records, key=lambda record: record[0])
 
 
-def _element(geometry: XmlElement, length: float, source: Source) -> ReferenceElement | CubicRecord:
+def _element(geometry: XmlElement, length: float, source: RoadFile) -> ReferenceElement | CubicRecord:
     x, y, heading = (source.number(geometry, name) for name in ("x", "y", "hdg"))
     for shape in geometry:
         match shape.tag:
@@ -74,12 +74,12 @@ def _element(geometry: XmlElement, length: float, source: Source) -> ReferenceEl
     raise source.error(f"no shape that is known ({known}); found {found}", geometry)
 
 
-def _coefficients(shape: XmlElement, axis: str, source: Source) -> Cubic:
+def _coefficients(shape: XmlElement, axis: str, source: RoadFile) -> Cubic:
     a, b, c, d = (source.number(shape, letter + axis, 0.0) for letter in "abcd")
     return (a, b, c, d)
 
 
-def _check_turn(curvature: float, length: float, shape: XmlElement, source: Source) -> None:
+def _check_turn(curvature: float, length: float, shape: XmlElement, source: RoadFile) -> None:
     turn = abs(curvature) * length
     if turn > MAX_TURN:
         raise source.error(

@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from os import PathLike
 
-from xosc_lateral.formats.opendrive.document import Source, XmlElement, open_document
+from xosc_lateral.formats.opendrive.document import RoadFile, XmlElement, open_document
 from xosc_lateral.formats.opendrive.lane_sections import read_sections, speed_limit
 from xosc_lateral.formats.opendrive.plan_view import Record, finish_elements, read_plan_view
 from xosc_lateral.road.geometry import ReferenceElement
 from xosc_lateral.road.header_offset import HeaderOffset
 from xosc_lateral.road.network import RoadNetwork
-from xosc_lateral.road.piecewise import Piecewise
+from xosc_lateral.road.piecewise import PiecewiseCubic
 from xosc_lateral.road.road import Connection, Junction, Road, RoadLink
 from xosc_lateral.road.surface import Shape, Surface
 
@@ -66,14 +66,14 @@ def read_opendrive(path: str | PathLike[str]) -> RoadNetwork:
     )
 
 
-def _read_header_offset(root: XmlElement, source: Source) -> HeaderOffset:
+def _read_header_offset(root: XmlElement, source: RoadFile) -> HeaderOffset:
     element = root.find("header/offset")
     if element is None:
         return HeaderOffset()
     return HeaderOffset(*(source.number(element, name, 0.0) for name in ("x", "y", "z", "hdg")))
 
 
-def _check_ids(elements: Sequence[XmlElement], source: Source) -> None:
+def _check_ids(elements: Sequence[XmlElement], source: RoadFile) -> None:
     seen: set[str] = set()
     for element in elements:
         road = element.get("id")
@@ -84,7 +84,9 @@ def _check_ids(elements: Sequence[XmlElement], source: Source) -> None:
         seen.add(road)
 
 
-def _read_road(element: XmlElement, plan: Sequence[Record], line: tuple[ReferenceElement, ...], source: Source) -> Road:
+def _read_road(
+    element: XmlElement, plan: Sequence[Record], line: tuple[ReferenceElement, ...], source: RoadFile
+) -> Road:
     length = _length(element, plan, source)
     rule = element.get("rule", "RHT").upper()
     if rule not in ("RHT", "LHT"):
@@ -110,7 +112,7 @@ def _read_road(element: XmlElement, plan: Sequence[Record], line: tuple[Referenc
 
 
 def _check_places(
-    element: XmlElement, plan: Sequence[Record], line: tuple[ReferenceElement, ...], source: Source
+    element: XmlElement, plan: Sequence[Record], line: tuple[ReferenceElement, ...], source: RoadFile
 ) -> None:
     for (s, length, _), part in zip(plan, line, strict=True):
         for ds in (0.0, 0.5 * length, length):
@@ -121,7 +123,7 @@ def _check_places(
                 )
 
 
-def _length(element: XmlElement, plan: Sequence[Record], source: Source) -> float:
+def _length(element: XmlElement, plan: Sequence[Record], source: RoadFile) -> float:
     """road/@length, or the end of the geometry where the attribute is absent or reaches further."""
     end = plan[-1][0] + plan[-1][1]
     length = source.number(element, "length", end)
@@ -135,15 +137,15 @@ def _length(element: XmlElement, plan: Sequence[Record], source: Source) -> floa
     return min(length, end) if length - end > LENGTH_TOLERANCE else length
 
 
-def _read_surface(element: XmlElement, source: Source) -> Surface:
+def _read_surface(element: XmlElement, source: RoadFile) -> Surface:
     crossfalls = element.findall("lateralProfile/crossfall")
     fall = [(source.number(e, "s"), source.cubic(e), e.get("side", "both")) for e in crossfalls]
     return Surface(
         elevation=_profile(element, "elevationProfile/elevation", source),
         superelevation=_profile(element, "lateralProfile/superelevation", source),
         crossfall=(
-            Piecewise.from_records([(s, c) for s, c, side in fall if side != "right"], begin=0.0),
-            Piecewise.from_records([(s, c) for s, c, side in fall if side != "left"], begin=0.0),
+            PiecewiseCubic.from_records([(s, c) for s, c, side in fall if side != "right"], begin=0.0),
+            PiecewiseCubic.from_records([(s, c) for s, c, side in fall if side != "left"], begin=0.0),
         )
         if fall
         else None,
@@ -151,23 +153,23 @@ def _read_surface(element: XmlElement, source: Source) -> Surface:
     )
 
 
-def _profile(element: XmlElement, tag: str, source: Source) -> Piecewise:
+def _profile(element: XmlElement, tag: str, source: RoadFile) -> PiecewiseCubic:
     records = [(source.number(e, "s"), source.cubic(e)) for e in element.iterfind(tag)]
-    return Piecewise.from_records(records, begin=0.0)
+    return PiecewiseCubic.from_records(records, begin=0.0)
 
 
-def _read_shape(element: XmlElement, source: Source) -> Shape | None:
+def _read_shape(element: XmlElement, source: RoadFile) -> Shape | None:
     stations: dict[float, list[tuple[float, tuple[float, float, float, float]]]] = {}
     for e in element.iterfind("lateralProfile/shape"):
         stations.setdefault(source.number(e, "s"), []).append((source.number(e, "t"), source.cubic(e)))
     if not stations:
         return None
     ordered = sorted(stations)
-    profiles = (Piecewise.from_records(stations[s], begin=min(t for t, _ in stations[s])) for s in ordered)
+    profiles = (PiecewiseCubic.from_records(stations[s], begin=min(t for t, _ in stations[s])) for s in ordered)
     return Shape(tuple(ordered), tuple(profiles))
 
 
-def _read_speeds(element: XmlElement, source: Source) -> tuple[tuple[float, float], ...]:
+def _read_speeds(element: XmlElement, source: RoadFile) -> tuple[tuple[float, float], ...]:
     speeds = []
     for kind in element.iterfind("type"):
         speed = kind.find("speed")
@@ -183,7 +185,7 @@ def _read_link(element: XmlElement, tag: str) -> RoadLink | None:
     return RoadLink(link.get("elementType", "road"), link.get("elementId", ""), contact)
 
 
-def _read_junction(element: XmlElement, source: Source) -> Junction:
+def _read_junction(element: XmlElement, source: RoadFile) -> Junction:
     connections = []
     for e in element.iterfind("connection"):
         connecting = e.get("connectingRoad") or e.get("linkedRoad")

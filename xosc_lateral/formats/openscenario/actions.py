@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 from xosc_lateral.formats.openscenario.context import Context
 from xosc_lateral.formats.openscenario.declarations import parameter_name
-from xosc_lateral.formats.openscenario.element import Element
+from xosc_lateral.formats.openscenario.element import XmlElement
 from xosc_lateral.formats.openscenario.environment import read_environment
 from xosc_lateral.formats.openscenario.positions import read_position_in
 from xosc_lateral.formats.openscenario.private_actions import PRIVATE_ACTIONS
@@ -42,7 +42,7 @@ GROUPING = {
 }
 
 
-def read_actions(owner: Element, name: str, context: Context) -> list[Action]:
+def read_actions(owner: XmlElement, name: str, context: Context) -> list[Action]:
     """Actions in a PrivateAction, GlobalAction or UserDefinedAction element: one, or more in lenient files.
 
     In version 1.0 a ControllerAction holds both an assignment and an override; the assignment comes first.
@@ -61,18 +61,18 @@ def read_actions(owner: Element, name: str, context: Context) -> list[Action]:
     return actions
 
 
-def _contents(owner: Element) -> list[Element]:
-    found: list[Element] = []
+def _contents(owner: XmlElement) -> list[XmlElement]:
+    found: list[XmlElement] = []
     for child in owner.children():
         found.extend(_contents(child) if child.tag in GROUPING else [child])
     return found
 
 
-def _environment(e: Element, context: Context) -> ActionContent:
+def _environment(e: XmlElement, context: Context) -> ActionContent:
     return EnvironmentAction(read_environment(e, context), e.place())
 
 
-def _entity(e: Element, context: Context) -> ActionContent:
+def _entity(e: XmlElement, context: Context) -> ActionContent:
     add = e.child("AddEntityAction")
     if add is not None:
         return AddEntityAction(context.entity(e), read_position_in(add, context), e.place())
@@ -80,7 +80,7 @@ def _entity(e: Element, context: Context) -> ActionContent:
     return DeleteEntityAction(context.entity(e), e.place())
 
 
-def _parameter(e: Element, _: Context) -> ActionContent:
+def _parameter(e: XmlElement, _: Context) -> ActionContent:
     name = parameter_name(e.raw("parameterRef") or e.text("parameterRef"))
     change = e.child("SetAction")
     if change is not None:
@@ -89,7 +89,7 @@ def _parameter(e: Element, _: Context) -> ActionContent:
     return ParameterModifyAction(name, operation, value, e.place())
 
 
-def _variable(e: Element, _: Context) -> ActionContent:
+def _variable(e: XmlElement, _: Context) -> ActionContent:
     name = parameter_name(e.raw("variableRef") or e.text("variableRef"))
     change = e.child("SetAction")
     if change is not None:
@@ -98,36 +98,36 @@ def _variable(e: Element, _: Context) -> ActionContent:
     return VariableModifyAction(name, operation, value, e.place())
 
 
-def _modification(e: Element) -> tuple[ModifyOperation, float]:
+def _modification(e: XmlElement) -> tuple[ModifyOperation, float]:
     rule = e.required("ModifyAction").required("Rule").required("AddValue", "MultiplyByValue")
     return ModifyOperation(rule.tag), rule.number("value")
 
 
-def _monitor(e: Element, _: Context) -> ActionContent:
+def _monitor(e: XmlElement, _: Context) -> ActionContent:
     return SetMonitorAction(e.text("monitorRef"), e.boolean("value"), e.place())
 
 
-def _signal_state(e: Element, _: Context) -> ActionContent:
+def _signal_state(e: XmlElement, _: Context) -> ActionContent:
     return TrafficSignalStateAction(e.text("name"), e.text("state"), e.place())
 
 
-def _signal_controller(e: Element, _: Context) -> ActionContent:
+def _signal_controller(e: XmlElement, _: Context) -> ActionContent:
     return TrafficSignalControllerAction(e.text("trafficSignalControllerRef"), e.text("phase"), e.place())
 
 
-def _traffic(e: Element, _: Context) -> ActionContent:
+def _traffic(e: XmlElement, _: Context) -> ActionContent:
     content = e.child()
     return TrafficAction(content.tag if content else e.tag, e.place())
 
 
-def _user_defined(e: Element, _: Context) -> ActionContent:
+def _user_defined(e: XmlElement, _: Context) -> ActionContent:
     command = e.child("CustomCommandAction")
     if command is None:
         return UserDefinedAction("", "", e.place())
     return UserDefinedAction(command.text("type", ""), (command.xml.text or "").strip(), e.place())
 
 
-GLOBAL_ACTIONS: dict[str, Callable[[Element, Context], ActionContent]] = {
+GLOBAL_ACTIONS: dict[str, Callable[[XmlElement, Context], ActionContent]] = {
     "EnvironmentAction": _environment,
     "EntityAction": _entity,
     "ParameterAction": _parameter,

@@ -11,7 +11,7 @@ from lxml import etree
 
 from xosc_lateral.errors import FormatError, MissingFileError
 from xosc_lateral.formats.openscenario.declarations import entry_scope
-from xosc_lateral.formats.openscenario.element import Element, local_name
+from xosc_lateral.formats.openscenario.element import XmlElement, local_name
 from xosc_lateral.formats.openscenario.references import Boundary
 from xosc_lateral.formats.xml import read_document, read_xml
 from xosc_lateral.scenario.parameters import Scope
@@ -43,7 +43,7 @@ class Catalogs:
     used: dict[Path, str] = field(default_factory=dict)
     _files: dict[tuple[str, str], Path] = field(default_factory=dict)
 
-    def entry(self, reference: Element) -> Element:
+    def entry(self, reference: XmlElement) -> XmlElement:
         """The element that a CatalogReference names, in the scope of its parameters and the assigned values.
 
         Raises
@@ -58,19 +58,19 @@ class Catalogs:
             reference.fail(f"catalog {path} changed while the scenario was being read")
         root = document.root
         # Names of entries are plain text: no scope is needed to find them.
-        found = next((Element(xml, path, Scope({})) for xml in _entries(root) if xml.get("name") == name), None)
+        found = next((XmlElement(xml, path, Scope({})) for xml in _entries(root) if xml.get("name") == name), None)
         if found is None:
             known = ", ".join(sorted(str(xml.get("name")) for xml in _entries(root))[:8])
             reference.fail(f"catalog '{catalog}' has no entry '{name}' (it has {known})")
         return found.within(entry_scope(found, reference))
 
-    def _file(self, catalog: str, reference: Element) -> Path:
+    def _file(self, catalog: str, reference: XmlElement) -> Path:
         kind = reference.tag
         if (kind, catalog) not in self._files:
             self._files[kind, catalog] = self._search(catalog, reference)
         return self._files[kind, catalog]
 
-    def _search(self, catalog: str, reference: Element) -> Path:
+    def _search(self, catalog: str, reference: XmlElement) -> Path:
         """By file name in every location, as the reference player does; then by the name inside; then near by."""
         if not catalog or any(separator in catalog for separator in "/\\\0"):
             reference.fail(f"'{catalog[:60]}' is not a catalog name")

@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 from xosc_lateral.formats.openscenario.context import Context
 from xosc_lateral.formats.openscenario.declarations import parameter_name
-from xosc_lateral.formats.openscenario.element import Element
+from xosc_lateral.formats.openscenario.element import XmlElement
 from xosc_lateral.formats.openscenario.environment import read_date_time
 from xosc_lateral.formats.openscenario.positions import read_position_in
 from xosc_lateral.scenario.conditions import (
@@ -61,7 +61,7 @@ DISTANCE_TYPES = {
 }
 
 
-def read_trigger(element: Element | None, context: Context) -> Trigger | None:
+def read_trigger(element: XmlElement | None, context: Context) -> Trigger | None:
     """A start or stop trigger; None where the element is missing."""
     if element is None:
         return None
@@ -72,14 +72,14 @@ def read_trigger(element: Element | None, context: Context) -> Trigger | None:
     return Trigger(groups, element.place())
 
 
-def _read_condition(element: Element, context: Context) -> Condition:
+def _read_condition(element: XmlElement, context: Context) -> Condition:
     owner = element.required("ByEntityCondition", "ByValueCondition")
     triggering: TriggeringEntities | None = None
     content: EntityCondition | ValueCondition
     if owner.tag == "ByEntityCondition":
         triggering = _triggering_entities(owner.required("TriggeringEntities"), context)
         kind = owner.required("EntityCondition").child()
-        readers: dict[str, Callable[[Element, Context], EntityCondition | ValueCondition]] = {**ENTITY_CONDITIONS}
+        readers: dict[str, Callable[[XmlElement, Context], EntityCondition | ValueCondition]] = {**ENTITY_CONDITIONS}
     else:
         kind = owner.child()
         readers = {**VALUE_CONDITIONS}
@@ -94,41 +94,41 @@ def _read_condition(element: Element, context: Context) -> Condition:
     return Condition(element.text("name", ""), delay, edge, content, triggering, element.place())
 
 
-def _triggering_entities(element: Element, context: Context) -> TriggeringEntities:
+def _triggering_entities(element: XmlElement, context: Context) -> TriggeringEntities:
     members = [name for reference in element.children("EntityRef") for name in context.members(reference)]
     rule = element.choice("triggeringEntitiesRule", TriggeringEntitiesRule, TriggeringEntitiesRule.ANY)
     return TriggeringEntities(rule, tuple(members))
 
 
-def _rule(e: Element) -> Rule:
+def _rule(e: XmlElement) -> Rule:
     return e.choice("rule", Rule)
 
 
-def _value(e: Element) -> float:
+def _value(e: XmlElement) -> float:
     return e.number("value", finite=False)
 
 
-def _system(e: Element) -> CoordinateSystem | None:
+def _system(e: XmlElement) -> CoordinateSystem | None:
     return e.optional_choice("coordinateSystem", CoordinateSystem)
 
 
-def _distance_type(e: Element) -> RelativeDistanceType | None:
+def _distance_type(e: XmlElement) -> RelativeDistanceType | None:
     return e.optional_choice("relativeDistanceType", RelativeDistanceType, DISTANCE_TYPES)
 
 
-def _routing(e: Element) -> RoutingAlgorithm | None:
+def _routing(e: XmlElement) -> RoutingAlgorithm | None:
     return e.optional_choice("routingAlgorithm", RoutingAlgorithm)
 
 
-def _direction(e: Element) -> DirectionalDimension | None:
+def _direction(e: XmlElement) -> DirectionalDimension | None:
     return e.optional_choice("direction", DirectionalDimension)
 
 
-def _end_of_road(e: Element, _: Context) -> EntityCondition:
+def _end_of_road(e: XmlElement, _: Context) -> EntityCondition:
     return EndOfRoadCondition(e.number("duration"), e.place())
 
 
-def _collision(e: Element, context: Context) -> EntityCondition:
+def _collision(e: XmlElement, context: Context) -> EntityCondition:
     reference, by_type = e.child("EntityRef"), e.child("ByType")
     if reference is None and by_type is None:
         e.fail("contains neither EntityRef nor ByType")
@@ -139,11 +139,11 @@ def _collision(e: Element, context: Context) -> EntityCondition:
     )
 
 
-def _offroad(e: Element, _: Context) -> EntityCondition:
+def _offroad(e: XmlElement, _: Context) -> EntityCondition:
     return OffroadCondition(e.number("duration"), e.place())
 
 
-def _time_headway(e: Element, context: Context) -> EntityCondition:
+def _time_headway(e: XmlElement, context: Context) -> EntityCondition:
     return TimeHeadwayCondition(
         context.entity(e),
         _value(e),
@@ -157,7 +157,7 @@ def _time_headway(e: Element, context: Context) -> EntityCondition:
     )
 
 
-def _time_to_collision(e: Element, context: Context) -> EntityCondition:
+def _time_to_collision(e: XmlElement, context: Context) -> EntityCondition:
     target = e.required("TimeToCollisionConditionTarget")
     reference = target.child("EntityRef")
     return TimeToCollisionCondition(
@@ -173,31 +173,31 @@ def _time_to_collision(e: Element, context: Context) -> EntityCondition:
     )
 
 
-def _acceleration(e: Element, _: Context) -> EntityCondition:
+def _acceleration(e: XmlElement, _: Context) -> EntityCondition:
     return AccelerationCondition(_value(e), _rule(e), e.place(), _direction(e))
 
 
-def _stand_still(e: Element, _: Context) -> EntityCondition:
+def _stand_still(e: XmlElement, _: Context) -> EntityCondition:
     return StandStillCondition(e.number("duration"), e.place())
 
 
-def _speed(e: Element, _: Context) -> EntityCondition:
+def _speed(e: XmlElement, _: Context) -> EntityCondition:
     return SpeedCondition(_value(e), _rule(e), e.place(), _direction(e))
 
 
-def _relative_speed(e: Element, context: Context) -> EntityCondition:
+def _relative_speed(e: XmlElement, context: Context) -> EntityCondition:
     return RelativeSpeedCondition(context.entity(e), _value(e), _rule(e), e.place(), _direction(e))
 
 
-def _traveled_distance(e: Element, _: Context) -> EntityCondition:
+def _traveled_distance(e: XmlElement, _: Context) -> EntityCondition:
     return TraveledDistanceCondition(_value(e), e.place())
 
 
-def _reach_position(e: Element, context: Context) -> EntityCondition:
+def _reach_position(e: XmlElement, context: Context) -> EntityCondition:
     return ReachPositionCondition(read_position_in(e, context), e.number("tolerance"), e.place())
 
 
-def _distance(e: Element, context: Context) -> EntityCondition:
+def _distance(e: XmlElement, context: Context) -> EntityCondition:
     return DistanceCondition(
         read_position_in(e, context),
         _value(e),
@@ -211,7 +211,7 @@ def _distance(e: Element, context: Context) -> EntityCondition:
     )
 
 
-def _relative_distance(e: Element, context: Context) -> EntityCondition:
+def _relative_distance(e: XmlElement, context: Context) -> EntityCondition:
     return RelativeDistanceCondition(
         context.entity(e),
         _value(e),
@@ -224,7 +224,7 @@ def _relative_distance(e: Element, context: Context) -> EntityCondition:
     )
 
 
-def _relative_clearance(e: Element, context: Context) -> EntityCondition:
+def _relative_clearance(e: XmlElement, context: Context) -> EntityCondition:
     return RelativeClearanceCondition(
         e.boolean("oppositeLanes", False),
         e.boolean("freeSpace", e.boolean("freespace", False)),
@@ -239,41 +239,41 @@ def _relative_clearance(e: Element, context: Context) -> EntityCondition:
     )
 
 
-def _angle(e: Element, _: Context) -> EntityCondition:
+def _angle(e: XmlElement, _: Context) -> EntityCondition:
     return AngleCondition(
         e.choice("angleType", AngleType), e.number("angle"), e.number("angleTolerance"), e.place(), _system(e)
     )
 
 
-def _relative_angle(e: Element, context: Context) -> EntityCondition:
+def _relative_angle(e: XmlElement, context: Context) -> EntityCondition:
     kind = e.choice("angleType", AngleType)
     return RelativeAngleCondition(
         context.entity(e), kind, e.number("angle"), e.number("angleTolerance"), e.place(), _system(e)
     )
 
 
-def _parameter(e: Element, _: Context) -> ValueCondition:
+def _parameter(e: XmlElement, _: Context) -> ValueCondition:
     name = parameter_name(e.raw("parameterRef") or e.text("parameterRef"))
     return ParameterCondition(name, e.text("value"), _rule(e), e.place())
 
 
-def _variable(e: Element, _: Context) -> ValueCondition:
+def _variable(e: XmlElement, _: Context) -> ValueCondition:
     name = parameter_name(e.raw("variableRef") or e.text("variableRef"))
     return VariableCondition(name, e.text("value"), _rule(e), e.place())
 
 
-def _simulation_time(e: Element, _: Context) -> ValueCondition:
+def _simulation_time(e: XmlElement, _: Context) -> ValueCondition:
     return SimulationTimeCondition(_value(e), _rule(e), e.place())
 
 
-def _time_of_day(e: Element, _: Context) -> ValueCondition:
+def _time_of_day(e: XmlElement, _: Context) -> ValueCondition:
     moment = read_date_time(e)
     if moment is None:
         e.fail(f"dateTime='{e.text('dateTime')}' is not a date and time")
     return TimeOfDayCondition(moment, _rule(e), e.place())
 
 
-def _element_state(e: Element, _: Context) -> ValueCondition:
+def _element_state(e: XmlElement, _: Context) -> ValueCondition:
     return StoryboardElementStateCondition(
         e.choice("storyboardElementType", StoryboardElementType),
         e.text("storyboardElementRef"),
@@ -282,19 +282,19 @@ def _element_state(e: Element, _: Context) -> ValueCondition:
     )
 
 
-def _traffic_signal(e: Element, _: Context) -> ValueCondition:
+def _traffic_signal(e: XmlElement, _: Context) -> ValueCondition:
     return TrafficSignalCondition(e.text("name"), e.text("state"), e.place())
 
 
-def _traffic_signal_controller(e: Element, _: Context) -> ValueCondition:
+def _traffic_signal_controller(e: XmlElement, _: Context) -> ValueCondition:
     return TrafficSignalControllerCondition(e.text("trafficSignalControllerRef"), e.text("phase"), e.place())
 
 
-def _user_defined(e: Element, _: Context) -> ValueCondition:
+def _user_defined(e: XmlElement, _: Context) -> ValueCondition:
     return UserDefinedValueCondition(e.text("name"), e.text("value"), _rule(e), e.place())
 
 
-ENTITY_CONDITIONS: dict[str, Callable[[Element, Context], EntityCondition]] = {
+ENTITY_CONDITIONS: dict[str, Callable[[XmlElement, Context], EntityCondition]] = {
     "EndOfRoadCondition": _end_of_road,
     "CollisionCondition": _collision,
     "OffroadCondition": _offroad,
@@ -312,7 +312,7 @@ ENTITY_CONDITIONS: dict[str, Callable[[Element, Context], EntityCondition]] = {
     "AngleCondition": _angle,
     "RelativeAngleCondition": _relative_angle,
 }
-VALUE_CONDITIONS: dict[str, Callable[[Element, Context], ValueCondition]] = {
+VALUE_CONDITIONS: dict[str, Callable[[XmlElement, Context], ValueCondition]] = {
     "ParameterCondition": _parameter,
     "VariableCondition": _variable,
     "SimulationTimeCondition": _simulation_time,

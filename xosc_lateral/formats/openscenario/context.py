@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 from xosc_lateral.errors import FormatError
 from xosc_lateral.formats.openscenario.catalogs import Catalogs
-from xosc_lateral.formats.openscenario.element import Element
+from xosc_lateral.formats.openscenario.element import XmlElement
 from xosc_lateral.scenario.place import Unsupported
 
 MAX_NESTING = 20
@@ -44,7 +44,7 @@ class Context:
     left_handed: bool = False
     _depth: int = 0
 
-    def entity(self, element: Element, name: str = "entityRef") -> str:
+    def entity(self, element: XmlElement, name: str = "entityRef") -> str:
         """Attribute naming an entity that must exist."""
         reference = element.text(name)
         if reference not in self.entities:
@@ -52,20 +52,20 @@ class Context:
             element.fail(f"{name}: no entity '{reference[:60]}' (there are {known})")
         return reference
 
-    def members(self, element: Element) -> tuple[str, ...]:
+    def members(self, element: XmlElement) -> tuple[str, ...]:
         """Entities that an EntityRef stands for: one, or those of a selection."""
         reference = element.text("entityRef")
         if reference in self.selections:
             return self.selections[reference]
         return (self.entity(element),)
 
-    def remark(self, element: Element, reason: str = "", kind: str = "") -> Unsupported:
+    def remark(self, element: XmlElement, reason: str = "", kind: str = "") -> Unsupported:
         """Note something that is read over."""
         remark = Unsupported(kind or element.tag, element.place(), reason)
         self.remarks.append(remark)
         return remark
 
-    def optional_entry(self, reference: Element) -> Element | None:
+    def optional_entry(self, reference: XmlElement) -> XmlElement | None:
         """Catalog entry that motion does not depend on: a missing one is remarked, not refused."""
         try:
             return self.catalogs.entry(reference)
@@ -73,7 +73,7 @@ class Context:
             self.remark(reference, error.what)
             return None
 
-    def enter(self, element: Element) -> None:
+    def enter(self, element: XmlElement) -> None:
         """Count nesting; `leave` again."""
         self._depth += 1
         if self._depth > MAX_NESTING:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from xosc_lateral.formats.openscenario.element import Element
+from xosc_lateral.formats.openscenario.element import XmlElement
 from xosc_lateral.scenario.enums import ParameterType, Rule
 from xosc_lateral.scenario.expressions import ExpressionError
 from xosc_lateral.scenario.parameters import Scope, satisfies
@@ -19,7 +19,7 @@ def parameter_name(text: str) -> str:
     return text[1:] if text.startswith("$") else text
 
 
-def declared_values(owner: Element) -> dict[str, str]:
+def declared_values(owner: XmlElement) -> dict[str, str]:
     """Names and values as written; of declarations with the same name the last counts, as in the reference player."""
     values = {}
     declarations = owner.child("ParameterDeclarations")
@@ -31,13 +31,13 @@ def declared_values(owner: Element) -> dict[str, str]:
     return values
 
 
-def local_scope(owner: Element) -> Scope:
+def local_scope(owner: XmlElement) -> Scope:
     """Scope inside an element that may declare parameters (Story, Maneuver, inline Vehicle, Route, Trajectory ...)."""
     values = declared_values(owner)
     return Scope(values, owner.scope) if values else owner.scope
 
 
-def entry_scope(entry: Element, reference: Element) -> Scope:
+def entry_scope(entry: XmlElement, reference: XmlElement) -> Scope:
     """Scope inside a catalog entry: its declarations, overridden by what the reference assigns.
 
     Assigned values are read in the scope of the reference. Names that the entry does not declare are looked up there,
@@ -53,7 +53,7 @@ def entry_scope(entry: Element, reference: Element) -> Scope:
 
 
 def read_declarations(
-    root: Element, overrides: Mapping[str, str], remarks: list[Unsupported]
+    root: XmlElement, overrides: Mapping[str, str], remarks: list[Unsupported]
 ) -> tuple[Scope, dict[str, Parameter]]:
     """Global scope and parameters, with overrides in place.
 
@@ -82,7 +82,7 @@ def read_declarations(
     return scope, parameters
 
 
-def read_variables(root: Element) -> dict[str, Parameter]:
+def read_variables(root: XmlElement) -> dict[str, Parameter]:
     """Variable declarations (1.2)."""
     variables = {}
     declarations = root.child("VariableDeclarations")
@@ -93,7 +93,7 @@ def read_variables(root: Element) -> dict[str, Parameter]:
     return variables
 
 
-def broken_constraint(declaration: Element, value: str) -> str | None:
+def broken_constraint(declaration: XmlElement, value: str) -> str | None:
     """Words for the constraints that a value violates; None if it satisfies one of the groups, or there is none."""
     groups = []
     for group in declaration.children("ConstraintGroup"):
@@ -104,7 +104,7 @@ def broken_constraint(declaration: Element, value: str) -> str | None:
     return " or ".join(groups) or None
 
 
-def _read_parameter(declaration: Element, type_attribute: str, scope: Scope) -> Parameter:
+def _read_parameter(declaration: XmlElement, type_attribute: str, scope: Scope) -> Parameter:
     name = parameter_name(declaration.raw("name") or "")
     try:
         value = scope.value(name)

@@ -14,7 +14,7 @@ import numpy as np
 
 from xosc_lateral.errors import FormatError
 from xosc_lateral.formats.openscenario.declarations import broken_constraint, declared_values, parameter_name
-from xosc_lateral.formats.openscenario.element import Element
+from xosc_lateral.formats.openscenario.element import XmlElement
 from xosc_lateral.formats.openscenario.read import open_scenario, read_header
 from xosc_lateral.formats.openscenario.references import Boundary, allowed_roots
 from xosc_lateral.formats.xml import read_xml
@@ -63,10 +63,10 @@ class LogicalScenario:
     scenario_file: Path
     distribution: Deterministic | Stochastic
     place: Place
-    _scenario: Element = field(repr=False)
+    _scenario: XmlElement = field(repr=False)
     discarded: int = 0
     _declared: dict[str, str] = field(init=False, repr=False)
-    _constrained: list[Element] = field(init=False, repr=False)
+    _constrained: list[XmlElement] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         """Find what the scenario declares, and which of it is constrained."""
@@ -186,7 +186,7 @@ def read_distribution(path: Path | str, *, allowed: Iterable[Path] = ()) -> Logi
     return LogicalScenario(path, scenario, distribution, content.place(), open_scenario(inner, scenario))
 
 
-def _deterministic(owner: Element) -> Deterministic:
+def _deterministic(owner: XmlElement) -> Deterministic:
     parts: list[ValueSets | SteppedRange] = []
     for item in owner.children():
         if item.tag == "DeterministicMultiParameterDistribution":
@@ -198,7 +198,7 @@ def _deterministic(owner: Element) -> Deterministic:
     return Deterministic(tuple(parts))
 
 
-def _value_sets(owner: Element) -> ValueSets:
+def _value_sets(owner: XmlElement) -> ValueSets:
     sets = tuple(
         {_name_of(a, "parameterRef"): a.text("value") for a in item.children("ParameterAssignment")}
         for item in owner.children("ParameterValueSet")
@@ -206,12 +206,12 @@ def _value_sets(owner: Element) -> ValueSets:
     return ValueSets(sets, owner.place())
 
 
-def _name_of(element: Element, attribute: str) -> str:
+def _name_of(element: XmlElement, attribute: str) -> str:
     """Name of a parameter: never a reference, even where a file writes it with a ``$``."""
     return parameter_name(element.raw(attribute) or element.text(attribute))
 
 
-def _single(item: Element) -> ValueSets | SteppedRange:
+def _single(item: XmlElement) -> ValueSets | SteppedRange:
     name = _name_of(item, "parameterName")
     content = item.required("DistributionSet", "DistributionRange", "UserDefinedDistribution")
     if content.tag == "DistributionSet":
@@ -229,7 +229,7 @@ def _single(item: Element) -> ValueSets | SteppedRange:
     return SteppedRange(name, lower, upper, step, item.place())
 
 
-def _decimal(element: Element, name: str) -> Decimal:
+def _decimal(element: XmlElement, name: str) -> Decimal:
     element.number(name)  # refuses what is no finite number, with its place
     text = element.text(name).strip()
     try:
@@ -242,7 +242,7 @@ def _decimal(element: Element, name: str) -> Decimal:
     return value
 
 
-def _stochastic(owner: Element) -> Stochastic:
+def _stochastic(owner: XmlElement) -> Stochastic:
     runs = owner.integer("numberOfTestRuns")
     if runs < 0:
         owner.fail(f"numberOfTestRuns of {runs} is negative")
@@ -253,7 +253,7 @@ def _stochastic(owner: Element) -> Stochastic:
     return Stochastic(tuple(draws), runs, _seed(owner))
 
 
-def _seed(owner: Element) -> int | None:
+def _seed(owner: XmlElement) -> int | None:
     """The file's seed is a double: whole ones as they are, others by their text."""
     value = owner.optional_number("randomSeed")
     if value is None:
@@ -261,7 +261,7 @@ def _seed(owner: Element) -> int | None:
     return int(value) if value == int(value) and value >= 0 else zlib.crc32(repr(value).encode())
 
 
-def _limits(owner: Element) -> tuple[float, float]:
+def _limits(owner: XmlElement) -> tuple[float, float]:
     element = owner.child("Range")
     if element is None:
         return -math.inf, math.inf
@@ -271,64 +271,64 @@ def _limits(owner: Element) -> tuple[float, float]:
     return lower, upper
 
 
-def _finite_limits(owner: Element) -> tuple[float, float]:
+def _finite_limits(owner: XmlElement) -> tuple[float, float]:
     limits = _limits(owner)
     if not all(map(math.isfinite, limits)):
         owner.fail("needs a finite Range")
     return limits
 
 
-def _weights(items: list[Element], owner: Element) -> tuple[float, ...]:
+def _weights(items: list[XmlElement], owner: XmlElement) -> tuple[float, ...]:
     weights = tuple(item.number("weight") for item in items)
     if not weights or min(weights) < 0 or sum(weights) <= 0:
         owner.fail("needs weights that are not negative and not all zero")
     return weights
 
 
-def _weighted(e: Element) -> Draw:
+def _weighted(e: XmlElement) -> Draw:
     items = list(e.children("Element"))
     return Weighted(tuple(item.text("value") for item in items), _weights(items, e))
 
 
-def _histogram(e: Element) -> Draw:
+def _histogram(e: XmlElement) -> Draw:
     bins = list(e.children("Bin", "HistogramBin"))
     return Histogram(tuple(_finite_limits(item) for item in bins), _weights(bins, e))
 
 
-def _uniform(e: Element) -> Draw:
+def _uniform(e: XmlElement) -> Draw:
     return Uniform(*_finite_limits(e))
 
 
-def _normal(e: Element) -> Draw:
+def _normal(e: XmlElement) -> Draw:
     return Normal(e.number("expectedValue"), _variance(e), _limits(e))
 
 
-def _log_normal(e: Element) -> Draw:
+def _log_normal(e: XmlElement) -> Draw:
     mean = e.number("expectedValue")
     if mean <= 0:
         e.fail(f"expectedValue of {mean} is not positive")
     return LogNormal(mean, _variance(e), _limits(e))
 
 
-def _variance(e: Element) -> float:
+def _variance(e: XmlElement) -> float:
     variance = e.number("variance")
     if variance < 0:
         e.fail(f"variance of {variance} is negative")
     return variance
 
 
-def _poisson(e: Element) -> Draw:
+def _poisson(e: XmlElement) -> Draw:
     mean = e.number("expectedValue")
     if not 0 <= mean <= 1e9:
         e.fail(f"expectedValue of {mean} is not within [0, 1e9]")
     return Poisson(mean, _limits(e))
 
 
-def _user_defined(e: Element) -> Draw:
+def _user_defined(e: XmlElement) -> Draw:
     e.fail("user-defined distributions can't be drawn from")
 
 
-_DRAWS: dict[str, Callable[[Element], Draw]] = {
+_DRAWS: dict[str, Callable[[XmlElement], Draw]] = {
     "ProbabilityDistributionSet": _weighted,
     "Histogram": _histogram,
     "UniformDistribution": _uniform,

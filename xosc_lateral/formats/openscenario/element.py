@@ -24,7 +24,7 @@ _TRUE = {"true", "1", "1.0000000000", "yes"}
 _FALSE = {"false", "0", "0.0000000000", "no"}
 
 
-class Element:
+class XmlElement:
     """An element of the scenario or of a catalog, in the scope that its attributes are read in.
 
     Optional attributes: `default` comes back where the attribute is missing or empty. Required ones raise.
@@ -42,26 +42,26 @@ class Element:
         """Name without namespace."""
         return local_name(self.xml)
 
-    def children(self, *tags: str) -> Iterator[Element]:
+    def children(self, *tags: str) -> Iterator[XmlElement]:
         """Child elements, of these tags or all; comments left out."""
         for child in self.xml:
             if isinstance(child.tag, str) and (not tags or local_name(child) in tags):
-                yield Element(child, self.path, self.scope)
+                yield XmlElement(child, self.path, self.scope)
 
-    def child(self, *tags: str) -> Element | None:
+    def child(self, *tags: str) -> XmlElement | None:
         """First child of one of these tags."""
         return next(self.children(*tags), None)
 
-    def required(self, *tags: str) -> Element:
+    def required(self, *tags: str) -> XmlElement:
         """First child of one of these tags; an error without."""
         found = self.child(*tags)
         if found is None:
             self.fail(f"{' or '.join(tags)} is missing")
         return found
 
-    def within(self, scope: Scope) -> Element:
+    def within(self, scope: Scope) -> XmlElement:
         """The same element in another scope."""
-        return Element(self.xml, self.path, scope)
+        return XmlElement(self.xml, self.path, scope)
 
     # --- attributes ---------------------------------------------------------------------------------------------
 

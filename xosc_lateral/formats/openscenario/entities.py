@@ -7,7 +7,7 @@ from dataclasses import replace
 from xosc_lateral.errors import FormatError, MissingFileError
 from xosc_lateral.formats.openscenario.context import Context
 from xosc_lateral.formats.openscenario.declarations import local_scope
-from xosc_lateral.formats.openscenario.element import Element
+from xosc_lateral.formats.openscenario.element import XmlElement
 from xosc_lateral.scenario.entity import Axle, Axles, BoundingBox, Controller, Entity, Performance
 from xosc_lateral.scenario.enums import EntityCategory, VehicleCategory
 
@@ -23,7 +23,7 @@ CATEGORIES = {
 _KIND_ATTRIBUTE = {"Vehicle": "vehicleCategory", "Pedestrian": "pedestrianCategory", "MiscObject": "miscObjectCategory"}
 
 
-def read_entities(root: Element, context: Context) -> tuple[Entity, ...]:
+def read_entities(root: XmlElement, context: Context) -> tuple[Entity, ...]:
     """All entities in file order, each trailer described inside its tractor after it; names go into the context."""
     owner = root.required("Entities")
     entities: list[Entity] = []
@@ -41,7 +41,7 @@ def _check_trailer(entity: Entity, context: Context) -> Entity:
     return entity if entity.trailer is None or entity.trailer in context.entities else replace(entity, trailer=None)
 
 
-def _read_selections(owner: Element, entities: list[Entity], context: Context) -> dict[str, tuple[str, ...]]:
+def _read_selections(owner: XmlElement, entities: list[Entity], context: Context) -> dict[str, tuple[str, ...]]:
     selections: dict[str, tuple[str, ...]] = {}
     for selection in owner.children("EntitySelection"):
         members: list[str] = []
@@ -56,7 +56,7 @@ def _read_selections(owner: Element, entities: list[Entity], context: Context) -
     return selections
 
 
-def _read_object(item: Element, context: Context, name: str | None = None) -> list[Entity]:
+def _read_object(item: XmlElement, context: Context, name: str | None = None) -> list[Entity]:
     name = item.text("name") if name is None else name
     if not name:
         item.fail("attribute 'name' is empty")
@@ -98,7 +98,7 @@ def _read_object(item: Element, context: Context, name: str | None = None) -> li
     return [entity, *inner]
 
 
-def _stand_in(reference: Element, name: str, context: Context, error: MissingFileError) -> Entity:
+def _stand_in(reference: XmlElement, name: str, context: Context, error: MissingFileError) -> Entity:
     """A car like others, for one whose catalog is missing."""
     context.remark(reference, f"{error.what}: '{name}' is played as a car of usual size without limits")
     return Entity(
@@ -111,7 +111,7 @@ def _stand_in(reference: Element, name: str, context: Context, error: MissingFil
     )
 
 
-def _vehicle_category(vehicle: Element, context: Context) -> VehicleCategory:
+def _vehicle_category(vehicle: XmlElement, context: Context) -> VehicleCategory:
     try:
         return vehicle.choice("vehicleCategory", VehicleCategory, VehicleCategory.CAR)
     except FormatError as error:
@@ -119,7 +119,7 @@ def _vehicle_category(vehicle: Element, context: Context) -> VehicleCategory:
         return VehicleCategory.CAR
 
 
-def _read_trailer(vehicle: Element, tractor: str, context: Context) -> tuple[str | None, list[Entity]]:
+def _read_trailer(vehicle: XmlElement, tractor: str, context: Context) -> tuple[str | None, list[Entity]]:
     """Name of the trailer hitched from the start, and the trailer itself when it is described right here.
 
     Catalog entries with a trailer are used several times over, so a trailer can't keep the name that it has there: it
@@ -140,12 +140,12 @@ def _read_trailer(vehicle: Element, tractor: str, context: Context) -> tuple[str
     return entities[0].name, entities
 
 
-def _coupling(vehicle: Element, tag: str) -> float | None:
+def _coupling(vehicle: XmlElement, tag: str) -> float | None:
     element = vehicle.child(tag)
     return None if element is None else element.number("dx")
 
 
-def _bounding_box(box: Element) -> BoundingBox:
+def _bounding_box(box: XmlElement) -> BoundingBox:
     center, size = box.required("Center"), box.required("Dimensions")
     length, width, height = size.number("length"), size.number("width"), size.number("height")
     if min(length, width, height) < 0:
@@ -153,7 +153,7 @@ def _bounding_box(box: Element) -> BoundingBox:
     return BoundingBox(center.number("x"), center.number("y"), center.number("z", 0.0), length, width, height)
 
 
-def _performance(element: Element | None) -> Performance:
+def _performance(element: XmlElement | None) -> Performance:
     if element is None:
         return Performance()
     inf = float("inf")
@@ -161,7 +161,7 @@ def _performance(element: Element | None) -> Performance:
     return Performance(*(element.number(name, inf, finite=False) for name in names))
 
 
-def _axles(element: Element | None) -> Axles | None:
+def _axles(element: XmlElement | None) -> Axles | None:
     if element is None:
         return None
     front, rear = element.child("FrontAxle"), element.child("RearAxle")
@@ -172,12 +172,12 @@ def _axles(element: Element | None) -> Axles | None:
     )
 
 
-def _axle(axle: Element) -> Axle:
+def _axle(axle: XmlElement) -> Axle:
     names = ("maxSteering", "positionX", "positionZ", "trackWidth", "wheelDiameter")
     return Axle(*(axle.number(name, 0.0) for name in names))
 
 
-def _controllers(item: Element, context: Context) -> tuple[Controller, ...]:
+def _controllers(item: XmlElement, context: Context) -> tuple[Controller, ...]:
     """Controllers of ObjectController elements (several from 1.3 on)."""
     found = []
     for owner in item.children("ObjectController"):
@@ -187,7 +187,7 @@ def _controllers(item: Element, context: Context) -> tuple[Controller, ...]:
     return tuple(found)
 
 
-def read_controller(owner: Element, context: Context) -> Controller | None:
+def read_controller(owner: XmlElement, context: Context) -> Controller | None:
     """Controller inline, from a catalog, or in an ObjectController (1.3 actions). Motion does not depend on it."""
     nested = owner.child("ObjectController")
     if nested is not None:
@@ -205,7 +205,7 @@ def read_controller(owner: Element, context: Context) -> Controller | None:
     return Controller(entry.text("name", ""), reference.place(), read_properties(entry))
 
 
-def read_properties(owner: Element) -> dict[str, str]:
+def read_properties(owner: XmlElement) -> dict[str, str]:
     """Name and value pairs of a ``Properties`` child."""
     properties = owner.child("Properties")
     if properties is None:

@@ -6,11 +6,11 @@ from datetime import datetime
 
 from xosc_lateral.formats.openscenario.context import Context
 from xosc_lateral.formats.openscenario.declarations import local_scope
-from xosc_lateral.formats.openscenario.element import Element
+from xosc_lateral.formats.openscenario.element import XmlElement
 from xosc_lateral.scenario.environment import Environment, TimeOfDay, Weather
 
 
-def read_environment(owner: Element, context: Context) -> Environment:
+def read_environment(owner: XmlElement, context: Context) -> Environment:
     """Environment inline or from a catalog; a missing catalog is remarked, and leaves everything as it is."""
     environment = owner.child("Environment")
     if environment is not None:
@@ -31,7 +31,7 @@ def read_environment(owner: Element, context: Context) -> Environment:
     )
 
 
-def read_date_time(element: Element, name: str = "dateTime") -> datetime | None:
+def read_date_time(element: XmlElement, name: str = "dateTime") -> datetime | None:
     """Local date and time without zone; None if it can't be understood."""
     try:
         return datetime.fromisoformat(element.text(name).strip()).replace(tzinfo=None)
@@ -39,7 +39,7 @@ def read_date_time(element: Element, name: str = "dateTime") -> datetime | None:
         return None
 
 
-def _time_of_day(element: Element | None, context: Context) -> TimeOfDay | None:
+def _time_of_day(element: XmlElement | None, context: Context) -> TimeOfDay | None:
     if element is None:
         return None
     moment = read_date_time(element)
@@ -49,7 +49,7 @@ def _time_of_day(element: Element | None, context: Context) -> TimeOfDay | None:
     return TimeOfDay(moment, element.boolean("animation", False))
 
 
-def _weather(element: Element | None, context: Context) -> Weather | None:
+def _weather(element: XmlElement | None, context: Context) -> Weather | None:
     if element is None:
         return None
     sun, fog, wind = element.child("Sun"), element.child("Fog"), element.child("Wind")
@@ -71,7 +71,7 @@ def _weather(element: Element | None, context: Context) -> Weather | None:
     )
 
 
-def _first_number(element: Element | None, *names: str) -> float | None:
+def _first_number(element: XmlElement | None, *names: str) -> float | None:
     if element is None:
         return None
     return next((value for name in names if (value := element.optional_number(name)) is not None), None)

@@ -8,7 +8,7 @@ from itertools import pairwise
 
 from xosc_lateral.formats.openscenario.context import Context
 from xosc_lateral.formats.openscenario.declarations import local_scope
-from xosc_lateral.formats.openscenario.element import Element
+from xosc_lateral.formats.openscenario.element import XmlElement
 from xosc_lateral.formats.openscenario.left_handed import mirrored, mirrored_shape
 from xosc_lateral.scenario.enums import ReferenceContext, RouteStrategy
 from xosc_lateral.scenario.place import Unsupported
@@ -43,7 +43,7 @@ from xosc_lateral.scenario.position import (
 )
 
 
-def read_position(owner: Element, context: Context) -> Position:
+def read_position(owner: XmlElement, context: Context) -> Position:
     """The position inside an element of type Position (``Position``, ``TargetPosition`` ...)."""
     content = owner.child()
     if content is None:
@@ -57,12 +57,12 @@ def read_position(owner: Element, context: Context) -> Position:
     return mirrored(position) if context.left_handed else position
 
 
-def read_position_in(owner: Element, context: Context) -> Position:
+def read_position_in(owner: XmlElement, context: Context) -> Position:
     """The position in the ``Position`` child of an element."""
     return read_position(owner.required("Position"), context)
 
 
-def read_route(owner: Element, context: Context) -> Route:
+def read_route(owner: XmlElement, context: Context) -> Route:
     """Route, given inline or from a catalog, inside `owner`."""
     route = _inline_or_entry(owner, "Route", context)
     waypoints = tuple(
@@ -77,7 +77,7 @@ def read_route(owner: Element, context: Context) -> Route:
     return Route(route.text("name", ""), waypoints, route.boolean("closed", False), route.place())
 
 
-def read_trajectory(owner: Element, context: Context) -> Trajectory:
+def read_trajectory(owner: XmlElement, context: Context) -> Trajectory:
     """Trajectory, given inline, in a TrajectoryRef (1.1) or from a catalog, inside `owner`."""
     reference = owner.child("TrajectoryRef")
     trajectory = _inline_or_entry(reference or owner, "Trajectory", context)
@@ -94,7 +94,7 @@ def read_trajectory(owner: Element, context: Context) -> Trajectory:
     return Trajectory(trajectory.text("name", ""), shape, trajectory.boolean("closed", False), trajectory.place())
 
 
-def _inline_or_entry(owner: Element, tag: str, context: Context) -> Element:
+def _inline_or_entry(owner: XmlElement, tag: str, context: Context) -> XmlElement:
     """In the scope of its own parameters; in a catalog, what the reference assigns comes before what is declared."""
     inline = owner.child(tag)
     if inline is not None:
@@ -105,7 +105,7 @@ def _inline_or_entry(owner: Element, tag: str, context: Context) -> Element:
     return entry
 
 
-def _orientation(owner: Element) -> Orientation | None:
+def _orientation(owner: XmlElement) -> Orientation | None:
     element = owner.child("Orientation")
     if element is None:
         return None
@@ -117,7 +117,7 @@ def _orientation(owner: Element) -> Orientation | None:
     )
 
 
-def _world(e: Element, _: Context) -> Position:
+def _world(e: XmlElement, _: Context) -> Position:
     return WorldPosition(
         e.number("x"),
         e.number("y"),
@@ -129,31 +129,31 @@ def _world(e: Element, _: Context) -> Position:
     )
 
 
-def _relative_world(e: Element, context: Context) -> Position:
+def _relative_world(e: XmlElement, context: Context) -> Position:
     x, y, z = e.number("dx", 0.0), e.number("dy", 0.0), e.optional_number("dz")
     return RelativeWorldPosition(context.entity(e), x, y, e.place(), z, _orientation(e))
 
 
-def _relative_object(e: Element, context: Context) -> Position:
+def _relative_object(e: XmlElement, context: Context) -> Position:
     x, y, z = e.number("dx", 0.0), e.number("dy", 0.0), e.optional_number("dz")
     return RelativeObjectPosition(context.entity(e), x, y, e.place(), z, _orientation(e))
 
 
-def _road(e: Element, _: Context) -> Position:
+def _road(e: XmlElement, _: Context) -> Position:
     return RoadPosition(_road_id(e), e.number("s"), e.number("t", 0.0), e.place(), _orientation(e))
 
 
-def _relative_road(e: Element, context: Context) -> Position:
+def _relative_road(e: XmlElement, context: Context) -> Position:
     return RelativeRoadPosition(context.entity(e), e.number("ds"), e.number("dt"), e.place(), _orientation(e))
 
 
-def _lane(e: Element, _: Context) -> Position:
+def _lane(e: XmlElement, _: Context) -> Position:
     return LanePosition(
         _road_id(e), e.integer("laneId"), e.number("s"), e.place(), e.number("offset", 0.0), _orientation(e)
     )
 
 
-def _relative_lane(e: Element, context: Context) -> Position:
+def _relative_lane(e: XmlElement, context: Context) -> Position:
     ds, ds_lane = e.optional_number("ds"), e.optional_number("dsLane")
     if ds is None and ds_lane is None:
         ds = 0.0
@@ -165,7 +165,7 @@ def _relative_lane(e: Element, context: Context) -> Position:
     )
 
 
-def _route(e: Element, context: Context) -> Position:
+def _route(e: XmlElement, context: Context) -> Position:
     reference = e.child("RouteRef")
     route = read_route(reference, context) if reference is not None else None
     owner = e.child("InRoutePosition")
@@ -173,7 +173,7 @@ def _route(e: Element, context: Context) -> Position:
     return RoutePosition(route, _in_route(content, context) if content else None, e.place(), _orientation(e))
 
 
-def _in_route(e: Element, context: Context) -> InRoutePosition | None:
+def _in_route(e: XmlElement, context: Context) -> InRoutePosition | None:
     if e.tag == "FromCurrentEntity":
         return FromCurrentEntity(context.entity(e))
     if e.tag == "FromRoadCoordinates":
@@ -184,13 +184,13 @@ def _in_route(e: Element, context: Context) -> InRoutePosition | None:
     return None
 
 
-def _trajectory(e: Element, context: Context) -> Position:
+def _trajectory(e: XmlElement, context: Context) -> Position:
     return TrajectoryPosition(
         read_trajectory(e, context), e.number("s"), e.place(), e.number("t", 0.0), _orientation(e)
     )
 
 
-def _geo(e: Element, _: Context) -> Position:
+def _geo(e: XmlElement, _: Context) -> Position:
     latitude, longitude = e.optional_number("latitude"), e.optional_number("longitude")
     if latitude is None or longitude is None:
         latitude, longitude = math.radians(e.number("latitudeDeg")), math.radians(e.number("longitudeDeg"))
@@ -200,7 +200,7 @@ def _geo(e: Element, _: Context) -> Position:
     return GeoPosition(latitude, longitude, e.place(), altitude, _orientation(e))
 
 
-def _road_id(e: Element) -> str:
+def _road_id(e: XmlElement) -> str:
     """Road ids are text; one that came out of an expression or a number parameter gets its plain form back."""
     text = e.text("roadId")
     if text.endswith(".0000000000") and text[:-11].lstrip("-").isdigit():
@@ -208,7 +208,7 @@ def _road_id(e: Element) -> str:
     return text
 
 
-_POSITIONS: dict[str, Callable[[Element, Context], Position]] = {
+_POSITIONS: dict[str, Callable[[XmlElement, Context], Position]] = {
     "WorldPosition": _world,
     "RelativeWorldPosition": _relative_world,
     "RelativeObjectPosition": _relative_object,
@@ -222,14 +222,14 @@ _POSITIONS: dict[str, Callable[[Element, Context], Position]] = {
 }
 
 
-def _polyline(e: Element, context: Context) -> Shape:
+def _polyline(e: XmlElement, context: Context) -> Shape:
     vertices = tuple(Vertex(read_position_in(v, context), v.optional_number("time")) for v in e.children("Vertex"))
     if len(vertices) < 2:
         e.fail(f"a polyline needs at least 2 vertices, this one has {len(vertices)}")
     return Polyline(vertices)
 
 
-def _clothoid(e: Element, context: Context) -> Shape:
+def _clothoid(e: XmlElement, context: Context) -> Shape:
     prime = e.optional_number("curvaturePrime")
     return Clothoid(
         read_position_in(e, context),
@@ -241,7 +241,7 @@ def _clothoid(e: Element, context: Context) -> Shape:
     )
 
 
-def _clothoid_spline(e: Element, context: Context) -> Shape:
+def _clothoid_spline(e: XmlElement, context: Context) -> Shape:
     segments = []
     for piece in e.children("ClothoidSplineSegment"):
         start = piece.child("PositionStart")
@@ -260,7 +260,7 @@ def _clothoid_spline(e: Element, context: Context) -> Shape:
     return ClothoidSpline(tuple(segments), e.optional_number("timeEnd"))
 
 
-def _nurbs(e: Element, context: Context) -> Shape:
+def _nurbs(e: XmlElement, context: Context) -> Shape:
     order = e.integer("order")
     points = tuple(
         ControlPoint(read_position_in(p, context), p.optional_number("time"), p.number("weight", 1.0))
@@ -280,7 +280,7 @@ def _nurbs(e: Element, context: Context) -> Shape:
     return Nurbs(order, points, knots)
 
 
-_SHAPES: dict[str, Callable[[Element, Context], Shape]] = {
+_SHAPES: dict[str, Callable[[XmlElement, Context], Shape]] = {
     "Polyline": _polyline,
     "Clothoid": _clothoid,
     "ClothoidSpline": _clothoid_spline,

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from xosc_lateral.formats.openscenario.context import Context
-from xosc_lateral.formats.openscenario.element import Element
+from xosc_lateral.formats.openscenario.element import XmlElement
 from xosc_lateral.formats.openscenario.entities import read_controller
 from xosc_lateral.formats.openscenario.positions import (
     read_position,
@@ -59,13 +59,13 @@ from xosc_lateral.scenario.enums import (
 from xosc_lateral.scenario.position import Timing
 
 
-def _teleport(e: Element, context: Context) -> ActionContent:
+def _teleport(e: XmlElement, context: Context) -> ActionContent:
     # 1.0 files in the field put the position right into the action.
     owner = e.child("Position")
     return TeleportAction(read_position(owner or e, context), e.place())
 
 
-def _speed(e: Element, context: Context) -> ActionContent:
+def _speed(e: XmlElement, context: Context) -> ActionContent:
     target = e.required("SpeedActionTarget").required("AbsoluteTargetSpeed", "RelativeTargetSpeed")
     dynamics = _transition(e.required("SpeedActionDynamics"))
     if target.tag == "AbsoluteTargetSpeed":
@@ -79,7 +79,7 @@ def _speed(e: Element, context: Context) -> ActionContent:
     return SpeedAction(relative, dynamics, e.place())
 
 
-def _speed_profile(e: Element, context: Context) -> ActionContent:
+def _speed_profile(e: XmlElement, context: Context) -> ActionContent:
     entries = tuple(
         SpeedProfileEntry(entry.number("speed"), entry.optional_number("time"))
         for entry in e.children("SpeedProfileEntry")
@@ -95,7 +95,7 @@ def _speed_profile(e: Element, context: Context) -> ActionContent:
     )
 
 
-def _longitudinal_distance(e: Element, context: Context) -> ActionContent:
+def _longitudinal_distance(e: XmlElement, context: Context) -> ActionContent:
     return LongitudinalDistanceAction(
         context.entity(e),
         e.boolean("continuous", False),
@@ -109,7 +109,7 @@ def _longitudinal_distance(e: Element, context: Context) -> ActionContent:
     )
 
 
-def _lane_change(e: Element, context: Context) -> ActionContent:
+def _lane_change(e: XmlElement, context: Context) -> ActionContent:
     target = e.required("LaneChangeTarget").required("AbsoluteTargetLane", "RelativeTargetLane")
     lane: AbsoluteTargetLane | RelativeTargetLane
     if target.tag == "AbsoluteTargetLane":
@@ -124,7 +124,7 @@ def _lane_change(e: Element, context: Context) -> ActionContent:
     )
 
 
-def _lane_offset(e: Element, context: Context) -> ActionContent:
+def _lane_offset(e: XmlElement, context: Context) -> ActionContent:
     target = e.required("LaneOffsetTarget").required("AbsoluteTargetLaneOffset", "RelativeTargetLaneOffset")
     offset: AbsoluteTargetLaneOffset | RelativeTargetLaneOffset
     value = -target.number("value") if context.left_handed else target.number("value")
@@ -142,7 +142,7 @@ def _lane_offset(e: Element, context: Context) -> ActionContent:
     )
 
 
-def _lateral_distance(e: Element, context: Context) -> ActionContent:
+def _lateral_distance(e: XmlElement, context: Context) -> ActionContent:
     return LateralDistanceAction(
         context.entity(e),
         e.boolean("continuous", False),
@@ -155,7 +155,7 @@ def _lateral_distance(e: Element, context: Context) -> ActionContent:
     )
 
 
-def _synchronize(e: Element, context: Context) -> ActionContent:
+def _synchronize(e: XmlElement, context: Context) -> ActionContent:
     return SynchronizeAction(
         context.entity(e, "masterEntityRef"),
         read_position(e.required("TargetPositionMaster"), context),
@@ -167,7 +167,7 @@ def _synchronize(e: Element, context: Context) -> ActionContent:
     )
 
 
-def _final_speed(e: Element) -> AbsoluteSpeed | RelativeSpeedToMaster | None:
+def _final_speed(e: XmlElement) -> AbsoluteSpeed | RelativeSpeedToMaster | None:
     owner = e.child("FinalSpeed")
     if owner is None:
         return None
@@ -180,7 +180,7 @@ def _final_speed(e: Element) -> AbsoluteSpeed | RelativeSpeedToMaster | None:
     return RelativeSpeedToMaster(speed.number("value"), kind, state)
 
 
-def _follow_trajectory(e: Element, context: Context) -> ActionContent:
+def _follow_trajectory(e: XmlElement, context: Context) -> ActionContent:
     mode = e.child("TrajectoryFollowingMode")
     return FollowTrajectoryAction(
         read_trajectory(e, context),
@@ -191,7 +191,7 @@ def _follow_trajectory(e: Element, context: Context) -> ActionContent:
     )
 
 
-def _timing(e: Element) -> Timing | None:
+def _timing(e: XmlElement) -> Timing | None:
     reference = e.child("TimeReference")
     timing = None if reference is None else reference.child("Timing")
     if timing is None:
@@ -203,15 +203,15 @@ def _timing(e: Element) -> Timing | None:
     )
 
 
-def _assign_route(e: Element, context: Context) -> ActionContent:
+def _assign_route(e: XmlElement, context: Context) -> ActionContent:
     return AssignRouteAction(read_route(e, context), e.place())
 
 
-def _acquire_position(e: Element, context: Context) -> ActionContent:
+def _acquire_position(e: XmlElement, context: Context) -> ActionContent:
     return AcquirePositionAction(read_position_in(e, context), e.place())
 
 
-def _assign_controller(e: Element, context: Context) -> ActionContent:
+def _assign_controller(e: XmlElement, context: Context) -> ActionContent:
     return AssignControllerAction(
         read_controller(e, context),
         e.place(),
@@ -220,7 +220,7 @@ def _assign_controller(e: Element, context: Context) -> ActionContent:
     )
 
 
-def _activate_controller(e: Element, _: Context) -> ActionContent:
+def _activate_controller(e: XmlElement, _: Context) -> ActionContent:
     return ActivateControllerAction(
         e.place(),
         e.optional_boolean("lateral"),
@@ -229,18 +229,18 @@ def _activate_controller(e: Element, _: Context) -> ActionContent:
     )
 
 
-def _override(e: Element, _: Context) -> ActionContent:
+def _override(e: XmlElement, _: Context) -> ActionContent:
     overrides = tuple((item.tag, item.boolean("active", False), item.optional_number("value")) for item in e.children())
     return OverrideControllerValueAction(overrides, e.place())
 
 
-def _visibility(e: Element, _: Context) -> ActionContent:
+def _visibility(e: XmlElement, _: Context) -> ActionContent:
     return VisibilityAction(
         e.boolean("graphics", True), e.boolean("sensors", True), e.boolean("traffic", True), e.place()
     )
 
 
-def _light_state(e: Element, _: Context) -> ActionContent:
+def _light_state(e: XmlElement, _: Context) -> ActionContent:
     kind, state = e.child("LightType"), e.child("LightState")
     light = None if kind is None else kind.child()
     name = "" if light is None else light.optional_text("vehicleLightType") or light.text("userDefinedLightType", "")
@@ -248,7 +248,7 @@ def _light_state(e: Element, _: Context) -> ActionContent:
     return LightStateAction(name, mode, e.place(), e.number("transitionTime", 0.0))
 
 
-def _animation(e: Element, _: Context) -> ActionContent:
+def _animation(e: XmlElement, _: Context) -> ActionContent:
     owner = e.child("AnimationType")
     content = None if owner is None else owner.child()
     return AnimationAction(
@@ -256,15 +256,15 @@ def _animation(e: Element, _: Context) -> ActionContent:
     )
 
 
-def _connect_trailer(e: Element, context: Context) -> ActionContent:
+def _connect_trailer(e: XmlElement, context: Context) -> ActionContent:
     return ConnectTrailerAction(context.entity(e, "trailerRef"), e.place())
 
 
-def _disconnect_trailer(e: Element, _: Context) -> ActionContent:
+def _disconnect_trailer(e: XmlElement, _: Context) -> ActionContent:
     return DisconnectTrailerAction(e.place())
 
 
-def _transition(e: Element) -> TransitionDynamics:
+def _transition(e: XmlElement) -> TransitionDynamics:
     shape = e.choice("dynamicsShape", DynamicsShape, DynamicsShape.STEP)
     # The reference player takes a missing dimension for time; a step has no use for either.
     dimension = e.choice("dynamicsDimension", DynamicsDimension, DynamicsDimension.TIME)
@@ -272,7 +272,7 @@ def _transition(e: Element) -> TransitionDynamics:
     return TransitionDynamics(shape, dimension, value, e.choice("followingMode", FollowingMode, FollowingMode.POSITION))
 
 
-def _constraints(owner: Element) -> DynamicConstraints | None:
+def _constraints(owner: XmlElement) -> DynamicConstraints | None:
     element = owner.child("DynamicConstraints")
     if element is None:
         return None
@@ -280,7 +280,7 @@ def _constraints(owner: Element) -> DynamicConstraints | None:
     return DynamicConstraints(*(element.optional_number(name, finite=False) for name in names))
 
 
-PRIVATE_ACTIONS: dict[str, Callable[[Element, Context], ActionContent]] = {
+PRIVATE_ACTIONS: dict[str, Callable[[XmlElement, Context], ActionContent]] = {
     "TeleportAction": _teleport,
     "SpeedAction": _speed,
     "SpeedProfileAction": _speed_profile,

@@ -13,7 +13,7 @@ from xosc_lateral.errors import FormatError
 from xosc_lateral.formats.openscenario.catalogs import Catalogs
 from xosc_lateral.formats.openscenario.context import Context
 from xosc_lateral.formats.openscenario.declarations import read_declarations, read_variables
-from xosc_lateral.formats.openscenario.element import Element, local_name
+from xosc_lateral.formats.openscenario.element import XmlElement, local_name
 from xosc_lateral.formats.openscenario.entities import read_entities
 from xosc_lateral.formats.openscenario.references import Boundary, allowed_roots
 from xosc_lateral.formats.openscenario.storyboard import read_storyboard
@@ -125,15 +125,15 @@ def read_scenario(
     )
 
 
-def open_scenario(document: etree._Element, path: Path) -> Element:
+def open_scenario(document: etree._Element, path: Path) -> XmlElement:
     """Root element of any OpenSCENARIO file."""
-    root = Element(document, path, Scope({}))
+    root = XmlElement(document, path, Scope({}))
     if local_name(document).lower() != "openscenario":
         root.fail(f"the root element is '{local_name(document)[:40]}', not OpenSCENARIO")
     return root
 
 
-def read_header(root: Element) -> FileHeader:
+def read_header(root: XmlElement) -> FileHeader:
     """File header; versions before 1.0 and after 1 are refused."""
     header = root.child("FileHeader")
     if header is None:
@@ -147,7 +147,7 @@ def read_header(root: Element) -> FileHeader:
     return FileHeader(major, minor, header.text("author", ""), header.text("description", ""), header.text("date", ""))
 
 
-def _catalog_locations(root: Element) -> dict[str, tuple[str, Place]]:
+def _catalog_locations(root: XmlElement) -> dict[str, tuple[str, Place]]:
     owner = root.child("CatalogLocations")
     locations = {}
     for location in owner.children() if owner else ():
@@ -158,7 +158,7 @@ def _catalog_locations(root: Element) -> dict[str, tuple[str, Place]]:
 
 
 def _road_network(
-    root: Element, boundary: Boundary, remarks: list[Unsupported], roads: RoadSearch
+    root: XmlElement, boundary: Boundary, remarks: list[Unsupported], roads: RoadSearch
 ) -> tuple[Path | None, Place | None, str | None, tuple[TrafficSignalController, ...]]:
     network = root.child("RoadNetwork")
     if network is None:
@@ -175,7 +175,7 @@ def _road_network(
     return road, logic.place() if logic else None, graph.text("filepath", "") if graph else None, controllers
 
 
-def _road_file(logic: Element, boundary: Boundary, remarks: list[Unsupported], roads: RoadSearch) -> Path:
+def _road_file(logic: XmlElement, boundary: Boundary, remarks: list[Unsupported], roads: RoadSearch) -> Path:
     """The road where the scenario says, or else, like the reference player, a file of that name near the scenario.
 
     Scenarios for CARLA name a town, without a suffix.
@@ -218,7 +218,7 @@ def is_town(reference: str) -> bool:
     return bool(reference.strip()) and not any(sign in reference for sign in "./\\")
 
 
-def _signal_controller(element: Element) -> TrafficSignalController:
+def _signal_controller(element: XmlElement) -> TrafficSignalController:
     phases = []
     for phase in element.children("Phase"):
         states = tuple(

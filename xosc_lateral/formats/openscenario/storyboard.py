@@ -6,7 +6,7 @@ from xosc_lateral.formats.openscenario.actions import read_actions
 from xosc_lateral.formats.openscenario.conditions import read_trigger
 from xosc_lateral.formats.openscenario.context import Context
 from xosc_lateral.formats.openscenario.declarations import local_scope
-from xosc_lateral.formats.openscenario.element import Element
+from xosc_lateral.formats.openscenario.element import XmlElement
 from xosc_lateral.scenario.enums import Priority
 from xosc_lateral.scenario.storyboard import (
     Act,
@@ -23,7 +23,7 @@ from xosc_lateral.scenario.storyboard import (
 PRIORITY_SYNONYMS = {"overwrite": Priority.OVERRIDE}
 
 
-def read_storyboard(root: Element, context: Context) -> Storyboard:
+def read_storyboard(root: XmlElement, context: Context) -> Storyboard:
     """The whole storyboard."""
     element = root.required("Storyboard")
     return Storyboard(
@@ -34,7 +34,7 @@ def read_storyboard(root: Element, context: Context) -> Storyboard:
     )
 
 
-def _read_init(element: Element, context: Context) -> Init:
+def _read_init(element: XmlElement, context: Context) -> Init:
     owner = element.child("Actions") or element
     global_actions, user_defined, privates = [], [], []
     for child in owner.children():
@@ -51,13 +51,13 @@ def _read_init(element: Element, context: Context) -> Init:
     return Init(tuple(global_actions), tuple(user_defined), tuple(privates))
 
 
-def _read_story(element: Element, context: Context) -> Story:
+def _read_story(element: XmlElement, context: Context) -> Story:
     story = element.within(local_scope(element))
     acts = tuple(_read_act(act, context) for act in story.children("Act"))
     return Story(story.text("name", ""), acts, story.place())
 
 
-def _read_act(element: Element, context: Context) -> Act:
+def _read_act(element: XmlElement, context: Context) -> Act:
     return Act(
         element.text("name", ""),
         tuple(_read_group(group, context) for group in element.children("ManeuverGroup")),
@@ -67,7 +67,7 @@ def _read_act(element: Element, context: Context) -> Act:
     )
 
 
-def _read_group(element: Element, context: Context) -> ManeuverGroup:
+def _read_group(element: XmlElement, context: Context) -> ManeuverGroup:
     maneuvers = []
     for child in element.children("Maneuver", "CatalogReference"):
         if child.tag == "Maneuver":
@@ -86,7 +86,7 @@ def _read_group(element: Element, context: Context) -> ManeuverGroup:
     )
 
 
-def _read_actors(group: Element, context: Context) -> Actors:
+def _read_actors(group: XmlElement, context: Context) -> Actors:
     element = group.child("Actors")
     if element is None:
         return Actors((), False, group.place())
@@ -94,12 +94,12 @@ def _read_actors(group: Element, context: Context) -> Actors:
     return Actors(tuple(names), element.boolean("selectTriggeringEntities", False), element.place())
 
 
-def _read_maneuver(element: Element, context: Context) -> Maneuver:
+def _read_maneuver(element: XmlElement, context: Context) -> Maneuver:
     events = tuple(_read_event(event, context) for event in element.children("Event"))
     return Maneuver(element.text("name", ""), events, element.place())
 
 
-def _read_event(element: Element, context: Context) -> Event:
+def _read_event(element: XmlElement, context: Context) -> Event:
     actions = []
     for item in element.children("Action"):
         contents = list(item.children("PrivateAction", "GlobalAction", "UserDefinedAction"))

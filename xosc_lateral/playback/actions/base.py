@@ -6,7 +6,7 @@ from enum import IntFlag
 from typing import Any
 
 from xosc_lateral.motion.nominal import Activity
-from xosc_lateral.playback.run import Run
+from xosc_lateral.playback.simulation import Simulation
 from xosc_lateral.playback.state import EntityState
 from xosc_lateral.playback.storyboard import ActionElement
 from xosc_lateral.scenario import Action
@@ -36,15 +36,15 @@ class RunningAction:
         As read.
     actor : EntityState or None
         Who acts; None for global and user-defined actions.
-    run : Run
+    simulation : Simulation
     """
 
     domains: Domain = Domain.NONE
 
-    def __init__(self, source: Action, actor: EntityState | None, run: Run) -> None:
+    def __init__(self, source: Action, actor: EntityState | None, simulation: Simulation) -> None:
         self.source = source
         self.actor = actor
-        self.run = run
+        self.simulation = simulation
         self.content: Any = source.content
         self.element: ActionElement
         self.prepare()
@@ -79,4 +79,4 @@ class RunningAction:
 
     def note(self, what: str) -> None:
         """Say that something was not played, or not as written."""
-        self.run.note(what, self.content.place)
+        self.simulation.note(what, self.content.place)

@@ -15,4 +15,4 @@ class RunningEnvironment(RunningAction):
         """Set the clock."""
         clock = self.content.environment.time_of_day
         if clock is not None:
-            self.run.time_of_day = (clock.date_time, clock.animation, self.run.time)
+            self.simulation.time_of_day = (clock.date_time, clock.animation, self.simulation.time)

@@ -21,7 +21,7 @@ Row = tuple[float, float, float, float]
 """Time [s], speed [m/s], acceleration [m/s2], jerk [m/s3] of a piece."""
 
 
-class Target(NamedTuple):
+class SpeedTarget(NamedTuple):
     """A speed to have at a time, and the acceleration from there to the next. [s], [m/s], [m/s2]"""
 
     time: float
@@ -33,7 +33,7 @@ class NoSolutionError(ValueError):
     """No jerk-limited profile meets the speeds at their times."""
 
 
-def follow(targets: Sequence[Target], acceleration: float, limits: Limits) -> tuple[list[Row], str]:
+def follow(targets: Sequence[SpeedTarget], acceleration: float, limits: Limits) -> tuple[list[Row], str]:
     """Pieces of the profile through `targets`, beginning with the present acceleration, and why the last of them are
     straight lines (empty: they are not). [m/s2]
 
@@ -52,7 +52,7 @@ def follow(targets: Sequence[Target], acceleration: float, limits: Limits) -> tu
     return _several(targets, acceleration, up, down)
 
 
-def _several(targets: Sequence[Target], acceleration: float, up: float, down: float) -> tuple[list[Row], str]:
+def _several(targets: Sequence[SpeedTarget], acceleration: float, up: float, down: float) -> tuple[list[Row], str]:
     first = targets[0]
     rows: list[Row] = []
     time, jerk = first.time, 0.0
@@ -85,7 +85,7 @@ def _several(targets: Sequence[Target], acceleration: float, up: float, down: fl
     return rows, ""
 
 
-def _single(targets: Sequence[Target], acceleration: float, limits: Limits, up: float, down: float) -> list[Row]:
+def _single(targets: Sequence[SpeedTarget], acceleration: float, limits: Limits, up: float, down: float) -> list[Row]:
     (t0, v0, wanted), (t3, v3, _) = targets
     a0 = acceleration
     j0 = -down if wanted < a0 else up
@@ -127,7 +127,7 @@ def _single(targets: Sequence[Target], acceleration: float, limits: Limits, up: 
     return [*rows, (t2, v2, a1, j1), (t3, v3, 0.0, 0.0)]
 
 
-def _one_way(targets: Sequence[Target], a0: float, jerk: float) -> list[Row]:
+def _one_way(targets: Sequence[SpeedTarget], a0: float, jerk: float) -> list[Row]:
     """Both ends with the same jerk: the present acceleration is beyond what is needed, and is taken back."""
     (t0, v0, _), (t3, v3, _) = targets
     span = jerk * (t0 - t3) - a0

@@ -30,7 +30,9 @@ class RunningLaneChange(RunningAction):
         """Find the entity that the lane is relative to."""
         target = self.content.target
         self._reference = (
-            None if isinstance(target, AbsoluteTargetLane) else self.run.entity(target.entity_ref, self.content.place)
+            None
+            if isinstance(target, AbsoluteTargetLane)
+            else self.simulation.entity(target.entity_ref, self.content.place)
         )
         self._transition = Transition.of(self.content.dynamics)
         self._guide: EntityState | None = None
@@ -44,15 +46,15 @@ class RunningLaneChange(RunningAction):
             self.note(f"'{state.name}' is on no road: the lane change is not played")
             return
         lane = self._target_lane()
-        if not self.run.network.has_lane_at(state.road, lane, state.s):
-            there = ", ".join(str(info.id) for info in self.run.network.lanes_at(state.road, state.s))
-            road = self.run.network.road_ids[state.road]
+        if not self.simulation.network.has_lane_at(state.road, lane, state.s):
+            there = ", ".join(str(info.id) for info in self.simulation.network.lanes_at(state.road, state.s))
+            road = self.simulation.network.road_ids[state.road]
             self.note(
                 f"road '{road}' has no lane {lane} at s = {state.s:.1f} m (lanes: {there}): lane change not played"
             )
             return
         state.turn(0.0 if state.is_forward else pi)
-        centre = self.run.network.lane_state_at(state.road, lane, state.s).centre_t
+        centre = self.simulation.network.lane_state_at(state.road, lane, state.s).centre_t
         guide = EntityState(state.entity, state.network)
         guide.put(Placement(state.road, lane, state.s, state.t - centre, state.relative_heading))
         guide.route = state.route
@@ -137,7 +139,7 @@ class RunningLaneChange(RunningAction):
 
     def _place(self, guide: EntityState, turn: float) -> None:
         """Put the actor where its guide is, on the lane that is under it."""
-        network, state = self.run.network, self.state
+        network, state = self.simulation.network, self.state
         t = guide.t
         found = network.lane_at(guide.road, guide.s, t)
         lane = found.lane or guide.lane

@@ -30,7 +30,7 @@ class RunningLaneOffset(RunningAction):
         self._reference = (
             None
             if isinstance(target, AbsoluteTargetLaneOffset)
-            else self.run.entity(target.entity_ref, self.content.place)
+            else self.simulation.entity(target.entity_ref, self.content.place)
         )
         self._transition: Transition | None = None
         self._road = NOWHERE
@@ -84,8 +84,8 @@ class RunningLaneOffset(RunningAction):
     def _target(self) -> float:
         target, state = self.content.target, self.state
         if isinstance(target, AbsoluteTargetLaneOffset):
-            if self.run.scenario.header.is_left_handed:  # counts from the lane's direction, not the road's
-                return target.value * self.run.network.travel_direction(state.road, state.lane)
+            if self.simulation.scenario.header.is_left_handed:  # counts from the lane's direction, not the road's
+                return target.value * self.simulation.network.travel_direction(state.road, state.lane)
             return target.value
         reference = self._reference
         assert reference is not None

@@ -29,8 +29,8 @@ class RunningLateralDistance(RunningAction):
 
     def prepare(self) -> None:
         """Find the entity to keep the distance to."""
-        self._other = self.run.entity(self.content.entity_ref, self.content.place)
-        self.run.derives_motion = True
+        self._other = self.simulation.entity(self.content.entity_ref, self.content.place)
+        self.simulation.derives_motion = True
         self._way: BesideEntity | BesideOnRoad | None = None
 
     def start(self) -> None:
@@ -79,6 +79,6 @@ class RunningLateralDistance(RunningAction):
         if content.freespace:
             half = 0.5 * (self.state.entity.bounding_box.width + other.entity.bounding_box.width)
             wanted += copysign(half, wanted)
-        if content.displacement is LateralDisplacement.ANY and self.run.scenario.header.version == (1, 0):
+        if content.displacement is LateralDisplacement.ANY and self.simulation.scenario.header.version == (1, 0):
             return wanted  # version 1.0 has no displacement: the sign of the distance tells the side
         return -abs(wanted) if content.displacement is LateralDisplacement.RIGHT else abs(wanted)

@@ -26,7 +26,7 @@ class RunningLongitudinalDistance(RunningAction):
 
     def prepare(self) -> None:
         """Find the entity to keep the distance to."""
-        self._other = self.run.entity(self.content.entity_ref, self.content.place)
+        self._other = self.simulation.entity(self.content.entity_ref, self.content.place)
         self._acceleration = 0.0
         self._ahead = True
         self._kept: float | None = None
@@ -71,7 +71,7 @@ class RunningLongitudinalDistance(RunningAction):
         if self.content.freespace:
             system = CoordinateSystem.ENTITY
         return entity_distance(
-            self.run.network,
+            self.simulation.network,
             self.state,
             self._other,
             system,

@@ -5,7 +5,7 @@ from __future__ import annotations
 from xosc_lateral.motion.nominal import Activity
 from xosc_lateral.playback.actions.base import RunningAction
 from xosc_lateral.playback.positions.resolve import resolve
-from xosc_lateral.playback.storyboard import ActionElement, State
+from xosc_lateral.playback.storyboard import ActionElement, ElementState
 from xosc_lateral.playback.trailers import disconnect
 from xosc_lateral.scenario.actions import AddEntityAction, DeleteEntityAction, TrafficAction
 
@@ -17,12 +17,12 @@ class RunningAddEntity(RunningAction):
 
     def start(self) -> None:
         """Put it there; one that exists already is left alone."""
-        state = self.run.entity(self.content.entity_ref, self.content.place)
+        state = self.simulation.entity(self.content.entity_ref, self.content.place)
         if state.active:
             self.note(f"'{state.name}' exists already: it is not added")
             return
         state.active = True
-        state.put(resolve(self.content.position, self.run))
+        state.put(resolve(self.content.position, self.simulation))
         state.teleported = True
         state.activity = Activity.ACTIVE | Activity.TELEPORTED
 
@@ -34,7 +34,7 @@ class RunningDeleteEntity(RunningAction):
 
     def start(self) -> None:
         """Take it out; trailers are left behind."""
-        state = self.run.entity(self.content.entity_ref, self.content.place)
+        state = self.simulation.entity(self.content.entity_ref, self.content.place)
         state.active = False
         state.activity = 0
         disconnect(state)
@@ -42,7 +42,7 @@ class RunningDeleteEntity(RunningAction):
             disconnect(state.tow)
         for element in (*state.init_actions, *state.event_actions):
             assert isinstance(element, ActionElement)
-            if element.state is State.RUNNING:
+            if element.state is ElementState.RUNNING:
                 element.end()
 
 

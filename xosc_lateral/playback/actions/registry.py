@@ -27,7 +27,7 @@ from xosc_lateral.playback.actions.values import (
     RunningVariableModify,
     RunningVariableSet,
 )
-from xosc_lateral.playback.run import Run
+from xosc_lateral.playback.simulation import Simulation
 from xosc_lateral.playback.state import EntityState
 from xosc_lateral.playback.storyboard import ActionElement
 from xosc_lateral.scenario import Action, Unsupported
@@ -71,6 +71,6 @@ ACTIONS: tuple[tuple[type, type[RunningAction]], ...] = (
 _RUNNING = dict(ACTIONS)
 
 
-def prepare_action(action: Action, actor: EntityState | None, run: Run) -> ActionElement:
+def prepare_action(action: Action, actor: EntityState | None, simulation: Simulation) -> ActionElement:
     """An action as an element of the storyboard, ready to be started."""
-    return ActionElement(action.name, _RUNNING[type(action.content)](action, actor, run), run)
+    return ActionElement(action.name, _RUNNING[type(action.content)](action, actor, simulation), simulation)

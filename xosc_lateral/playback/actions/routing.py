@@ -20,7 +20,7 @@ class RunningAssignRoute(RunningAction):
         others = {waypoint.strategy for waypoint in self.content.route.waypoints} - {RouteStrategy.SHORTEST}
         if others:
             self.note(f"routeStrategy {', '.join(sorted(others))}: the shortest way is taken")
-        route = route_guide(self.content.route, self.run)
+        route = route_guide(self.content.route, self.simulation)
         if route is None:
             self.note(f"no way leads along route '{self.content.route.name}': it is not followed")
         self.state.route = route
@@ -36,7 +36,7 @@ class RunningAcquirePosition(RunningAction):
         state = self.state
         state.locate()
         here = Placement(state.road, state.lane, state.s, state.offset_t, state.relative_heading)
-        route = guide(self.run.network, [here, resolve(self.content.position, self.run)])
+        route = guide(self.simulation.network, [here, resolve(self.content.position, self.simulation)])
         if route is None:
             self.note("no way leads to the position: it is not acquired")
         state.route = route

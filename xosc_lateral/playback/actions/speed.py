@@ -24,7 +24,9 @@ class RunningSpeed(RunningAction):
         """Find the entity that the speed is relative to."""
         target = self.content.target
         self._reference = (
-            self.run.entity(target.entity_ref, self.content.place) if isinstance(target, RelativeTargetSpeed) else None
+            self.simulation.entity(target.entity_ref, self.content.place)
+            if isinstance(target, RelativeTargetSpeed)
+            else None
         )
         self._reached = False
         self._transition = Transition.of(self.content.dynamics)

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 from xosc_lateral.playback.actions.base import Domain, RunningAction
 from xosc_lateral.playback.actions.constraints import Limits, limits_of
-from xosc_lateral.playback.actions.jerk_limited import NoSolutionError, Target, follow
+from xosc_lateral.playback.actions.jerk_limited import NoSolutionError, SpeedTarget, follow
 from xosc_lateral.playback.transition import EPSILON
 from xosc_lateral.scenario.actions import SpeedProfileAction
 from xosc_lateral.scenario.enums import FollowingMode
@@ -36,8 +36,10 @@ class RunningSpeedProfile(RunningAction):
     def prepare(self) -> None:
         """Find the entity that the speeds are relative to; the acceleration to start from is needed."""
         name = self.content.entity_ref
-        self._reference = None if name is None else self.run.entity(name, self.content.place)
-        self.run.derives_motion = self.run.derives_motion or self.content.following_mode is FollowingMode.FOLLOW
+        self._reference = None if name is None else self.simulation.entity(name, self.content.place)
+        self.simulation.derives_motion = (
+            self.simulation.derives_motion or self.content.following_mode is FollowingMode.FOLLOW
+        )
         self._pieces: list[Piece] = []
         self._current = 0
 
@@ -79,11 +81,11 @@ class RunningSpeedProfile(RunningAction):
             self.end()
 
     # ---- in detail ---------------------------------------------------------------------------------------------------
-    def _targets(self, offset: float, limits: Limits) -> list[Target]:
+    def _targets(self, offset: float, limits: Limits) -> list[SpeedTarget]:
         """Speeds at absolute times, the present one first unless the first entry is to hold now."""
         entries = self.content.entries
         follows = self.content.following_mode is FollowingMode.FOLLOW
-        time, speed = self.run.time, self.state.speed
+        time, speed = self.simulation.time, self.state.speed
         points = [(time, speed)]
         for index, entry in enumerate(entries):
             target = entry.speed + offset
@@ -97,7 +99,7 @@ class RunningSpeedProfile(RunningAction):
             else:
                 points.append((time, target))
         slopes = [(b[1] - a[1]) / (b[0] - a[0]) for a, b in itertools.pairwise(points)]
-        return [Target(t, v, k) for (t, v), k in zip(points, (*slopes, 0.0), strict=True)]
+        return [SpeedTarget(t, v, k) for (t, v), k in zip(points, (*slopes, 0.0), strict=True)]
 
 
 def _fastest(change: float, limits: Limits) -> float:

@@ -23,7 +23,7 @@ SAME_SPEED = 0.1
 """The entity is on the straight line to the final speed when its speed differs by less. [m/s]"""
 
 
-class Mode(Enum):
+class SpeedPhase(Enum):
     """Which part of the speed profile the entity is on."""
 
     NONE = "not decided"
@@ -47,20 +47,20 @@ class RunningSynchronize(RunningAction):
 
     def prepare(self) -> None:
         """Find master and places; velocities along the road are needed."""
-        self.run.derives_motion = True
-        self._master = self.run.entity(self.content.master_entity_ref, self.content.place)
+        self.simulation.derives_motion = True
+        self._master = self.simulation.entity(self.content.master_entity_ref, self.content.place)
         self._own_spot: Spot | None = None
         self._master_spot: Spot | None = None
         self._on_paths: dict[Spot, tuple[Path, float]] = {}
-        self._mode = Mode.NONE
+        self._mode = SpeedPhase.NONE
         self._rushes = False
         self._last = (FAR, FAR)
 
     def start(self) -> None:
         """Places are looked up once."""
-        self._own_spot = spot_at(self.content.target_position, self.run)()
-        self._master_spot = spot_at(self.content.target_position_master, self.run)()
-        self._mode = Mode.NONE
+        self._own_spot = spot_at(self.content.target_position, self.simulation)()
+        self._master_spot = spot_at(self.content.target_position_master, self.simulation)()
+        self._mode = SpeedPhase.NONE
         self._last = (FAR, FAR)
 
     def step(self, time: float, step: float) -> None:
@@ -79,8 +79,8 @@ class RunningSynchronize(RunningAction):
         # in the frame of no duration nothing has moved yet: every master stands (as in the reference player)
         master_speed = copysign(1.0, master_way) * along_road(self._master) if step > EPSILON else 0.0
         time_left = master_distance / master_speed if master_speed > EPSILON else FAR
-        if time_left == FAR and self._mode is not Mode.WAITING:
-            self._mode = Mode.WAITING
+        if time_left == FAR and self._mode is not SpeedPhase.WAITING:
+            self._mode = SpeedPhase.WAITING
             state.set_speed(0.0)
         final = self._final_speed()
         if there or passed or (master_speed > EPSILON and time_left < step):
@@ -92,7 +92,7 @@ class RunningSynchronize(RunningAction):
             if time_left == FAR:
                 state.speed_taken = True
                 return
-            self._mode = Mode.LINE
+            self._mode = SpeedPhase.LINE
             mean = distance / time_left
             acceleration = 2.0 * (mean - state.speed) / time_left
             state.set_speed(state.speed + acceleration * step)
@@ -110,7 +110,7 @@ class RunningSynchronize(RunningAction):
             way = self._target_s(entity.path, spot, position) - entity.path.s
             tangent = entity.path.path.at(entity.path.s).tangent
             return way if is_forward(entity.plane.heading - tangent) else -way
-        gap = road_gap(self.run.network, entity, spot)
+        gap = road_gap(self.simulation.network, entity, spot)
         if gap is not None:
             return gap.ds
         ahead, _ = ahead_and_left(entity, spot.x, spot.y)
@@ -144,34 +144,34 @@ class RunningSynchronize(RunningAction):
         """The next speed; None: keep the present one."""
         state = self.state
         steady = self._steady_distance(final)
-        if steady is not None and self._mode is not Mode.STEADY:
+        if steady is not None and self._mode is not SpeedPhase.STEADY:
             steady_time = steady / final if final else inf
             if distance - steady < EPSILON or time_left - steady_time < EPSILON:
-                self._mode = Mode.STEADY
+                self._mode = SpeedPhase.STEADY
             else:
                 distance, time_left = distance - steady, time_left - steady_time
-        if self._mode is Mode.STEADY:
+        if self._mode is SpeedPhase.STEADY:
             return final
-        if self._mode is Mode.WAITING:
+        if self._mode is SpeedPhase.WAITING:
             if time_left >= FAR:
                 return None
-            self._mode = Mode.NONE
-        if self._mode is Mode.STOPPING:
+            self._mode = SpeedPhase.NONE
+        if self._mode is SpeedPhase.STOPPING:
             speed = state.speed - HARD_BRAKING * step
             if speed < 0.0:
-                self._mode = Mode.WAITING
+                self._mode = SpeedPhase.WAITING
             return max(speed, 0.0)
-        if self._mode is Mode.STOPPED:
+        if self._mode is SpeedPhase.STOPPED:
             if time_left >= 2.0 * distance / max(final, EPSILON):
                 return 0.0
-            self._mode = Mode.LINE
-        if self._mode is Mode.TO_APEX and time_left < FAR and self._is_on_line(final, distance, time_left):
-            self._mode = Mode.LINE
+            self._mode = SpeedPhase.LINE
+        if self._mode is SpeedPhase.TO_APEX and time_left < FAR and self._is_on_line(final, distance, time_left):
+            self._mode = SpeedPhase.LINE
             return None
-        if self._mode is Mode.LINE:
+        if self._mode is SpeedPhase.LINE:
             return _on_line(final, distance, time_left)
-        if self._mode is Mode.NONE:
-            self._mode = Mode.TO_APEX
+        if self._mode is SpeedPhase.NONE:
+            self._mode = SpeedPhase.TO_APEX
             self._rushes = 0.5 * (final + state.speed) < distance / time_left
         return self._to_apex(final, distance, time_left, step)
 
@@ -183,7 +183,7 @@ class RunningSynchronize(RunningAction):
         now = along_road(state)
         apex, acceleration = _two_accelerations(now, final, s, t)
         if acceleration < 0.0 if self._rushes else acceleration > 0.0:
-            self._mode = Mode.LINE
+            self._mode = SpeedPhase.LINE
             return state.speed
         if apex >= 0.0:
             return state.speed + acceleration * step
@@ -192,9 +192,9 @@ class RunningSynchronize(RunningAction):
         acceleration = -now / stop_time if abs(stop_time) > EPSILON else 0.0
         if stop_time * now > s:
             acceleration = -HARD_BRAKING
-            self._mode = Mode.STOPPING
+            self._mode = SpeedPhase.STOPPING
         if now + acceleration * step < 0.0:
-            self._mode = Mode.STOPPED
+            self._mode = SpeedPhase.STOPPED
             return 0.0
         return state.speed + acceleration * step
 

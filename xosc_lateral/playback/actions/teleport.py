@@ -18,7 +18,7 @@ class RunningTeleport(RunningAction):
     def start(self) -> None:
         """Put the actor there, with its trailers."""
         state = self.state
-        place = resolve(self.content.position, self.run, route=state.route)
+        place = resolve(self.content.position, self.simulation, route=state.route)
         if state.tow is not None:
             self.note(f"'{state.name}' is towed by '{state.tow.name}': it is not teleported")
             return

@@ -14,7 +14,7 @@ class RunningConnectTrailer(RunningAction):
 
     def start(self) -> None:
         """Hitch it."""
-        trailer = self.run.entity(self.content.trailer_ref, self.content.place)
+        trailer = self.simulation.entity(self.content.trailer_ref, self.content.place)
         if trailer is self.state.trailer:
             return
         disconnect(self.state)

@@ -20,8 +20,8 @@ class RunningParameterSet(RunningAction):
 
     def start(self) -> None:
         """Set it."""
-        if self.content.parameter_ref in self.run.parameters:
-            self.run.parameters.set(self.content.parameter_ref, self.content.value)
+        if self.content.parameter_ref in self.simulation.parameters:
+            self.simulation.parameters.set(self.content.parameter_ref, self.content.value)
         else:
             self.note(f"parameter '{self.content.parameter_ref}' is not declared: nothing is set")
 
@@ -34,9 +34,9 @@ class RunningParameterModify(RunningAction):
     def start(self) -> None:
         """Modify it."""
         name = self.content.parameter_ref
-        if name not in self.run.parameters:
+        if name not in self.simulation.parameters:
             self.note(f"parameter '{name}' is not declared: nothing is modified")
-        elif not self.run.parameters.modify(name, self.content.operation, self.content.value):
+        elif not self.simulation.parameters.modify(name, self.content.operation, self.content.value):
             self.note(f"parameter '{name}' is not a number: nothing is modified")
 
 
@@ -47,8 +47,8 @@ class RunningVariableSet(RunningAction):
 
     def start(self) -> None:
         """Set it."""
-        if self.content.variable_ref in self.run.variables:
-            self.run.variables.set(self.content.variable_ref, self.content.value)
+        if self.content.variable_ref in self.simulation.variables:
+            self.simulation.variables.set(self.content.variable_ref, self.content.value)
         else:
             self.note(f"variable '{self.content.variable_ref}' is not declared: nothing is set")
 
@@ -61,9 +61,9 @@ class RunningVariableModify(RunningAction):
     def start(self) -> None:
         """Modify it."""
         name = self.content.variable_ref
-        if name not in self.run.variables:
+        if name not in self.simulation.variables:
             self.note(f"variable '{name}' is not declared: nothing is modified")
-        elif not self.run.variables.modify(name, self.content.operation, self.content.value):
+        elif not self.simulation.variables.modify(name, self.content.operation, self.content.value):
             self.note(f"variable '{name}' is not a number: nothing is modified")
 
 
@@ -74,7 +74,7 @@ class RunningSignalState(RunningAction):
 
     def start(self) -> None:
         """Set it."""
-        self.run.signals.set_state(self.content.name, self.content.state, self.run.time)
+        self.simulation.signals.set_state(self.content.name, self.content.state, self.simulation.time)
 
 
 class RunningSignalController(RunningAction):
@@ -84,5 +84,7 @@ class RunningSignalController(RunningAction):
 
     def start(self) -> None:
         """Send it there."""
-        if not self.run.signals.go_to_phase(self.content.controller_ref, self.content.phase, self.run.time):
+        if not self.simulation.signals.go_to_phase(
+            self.content.controller_ref, self.content.phase, self.simulation.time
+        ):
             self.note(f"no signal controller '{self.content.controller_ref}' with a phase '{self.content.phase}'")

@@ -6,16 +6,16 @@ from math import copysign, hypot
 
 from xosc_lateral.playback.conditions.base import EntityCheck
 from xosc_lateral.playback.conditions.direction import component, watch_motion
-from xosc_lateral.playback.run import Run
+from xosc_lateral.playback.simulation import Simulation
 from xosc_lateral.playback.state import EntityState
 from xosc_lateral.playback.values import holds
 from xosc_lateral.scenario.conditions import AccelerationCondition
 
 
-def prepare(content: AccelerationCondition, run: Run) -> EntityCheck:
+def prepare(content: AccelerationCondition, simulation: Simulation) -> EntityCheck:
     """Finite difference of velocities. Without a direction: its length, negative when it points backwards. [m/s2]"""
     direction = content.direction
-    watch_motion(run, direction)
+    watch_motion(simulation, direction)
 
     def check(state: EntityState) -> bool:
         ahead, left, up = state.body_frame(state.acceleration)

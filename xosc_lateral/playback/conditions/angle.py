@@ -7,7 +7,7 @@ from math import pi
 from xosc_lateral.playback.angles import difference
 from xosc_lateral.playback.conditions.base import EntityCheck
 from xosc_lateral.playback.placement import NOWHERE
-from xosc_lateral.playback.run import Run
+from xosc_lateral.playback.simulation import Simulation
 from xosc_lateral.playback.state import EntityState
 from xosc_lateral.playback.transition import EPSILON
 from xosc_lateral.road import Pose
@@ -15,24 +15,24 @@ from xosc_lateral.scenario.conditions import AngleCondition, RelativeAngleCondit
 from xosc_lateral.scenario.enums import AngleType, CoordinateSystem
 
 
-def prepare_angle(content: AngleCondition, run: Run) -> EntityCheck:
+def prepare_angle(content: AngleCondition, simulation: Simulation) -> EntityCheck:
     """Own angle in the world, or relative to road, lane or trajectory. [rad]"""
     system = content.coordinate_system or CoordinateSystem.WORLD
-    if not _is_played(content, system, run):
+    if not _is_played(content, system, simulation):
         return lambda state: False
 
     def check(state: EntityState) -> bool:
-        value = _angle(state, content.angle_type, system, run)
+        value = _angle(state, content.angle_type, system, simulation)
         return value is not None and abs(difference(value, content.angle)) < content.tolerance + EPSILON
 
     return check
 
 
-def prepare_relative_angle(content: RelativeAngleCondition, run: Run) -> EntityCheck:
+def prepare_relative_angle(content: RelativeAngleCondition, simulation: Simulation) -> EntityCheck:
     """Own angle minus that of another entity, each relative to its own road, lane or trajectory. [rad]"""
-    other = run.entity(content.entity_ref, content.place)
+    other = simulation.entity(content.entity_ref, content.place)
     system = content.coordinate_system or CoordinateSystem.ENTITY
-    if not _is_played(content, system, run):
+    if not _is_played(content, system, simulation):
         return lambda state: False
     if system is CoordinateSystem.ENTITY:
         system = CoordinateSystem.WORLD  # the difference of two angles is the same in either
@@ -40,7 +40,7 @@ def prepare_relative_angle(content: RelativeAngleCondition, run: Run) -> EntityC
     def check(state: EntityState) -> bool:
         if not other.active:
             return False
-        own, its = (_angle(entity, content.angle_type, system, run) for entity in (state, other))
+        own, its = (_angle(entity, content.angle_type, system, simulation) for entity in (state, other))
         if own is None or its is None:
             return False
         return abs(difference(own - its, content.angle)) < content.tolerance + EPSILON
@@ -48,15 +48,19 @@ def prepare_relative_angle(content: RelativeAngleCondition, run: Run) -> EntityC
     return check
 
 
-def _is_played(content: AngleCondition | RelativeAngleCondition, system: CoordinateSystem, run: Run) -> bool:
+def _is_played(
+    content: AngleCondition | RelativeAngleCondition, system: CoordinateSystem, simulation: Simulation
+) -> bool:
     """Pitch and roll are not known relative to a trajectory: it has none of its own."""
     if system is not CoordinateSystem.TRAJECTORY or content.angle_type is AngleType.HEADING:
         return True
-    run.note(f"{content.angle_type} relative to a trajectory can't be played: the condition stays false", content.place)
+    simulation.note(
+        f"{content.angle_type} relative to a trajectory can't be played: the condition stays false", content.place
+    )
     return False
 
 
-def _angle(state: EntityState, kind: AngleType, system: CoordinateSystem, run: Run) -> float | None:
+def _angle(state: EntityState, kind: AngleType, system: CoordinateSystem, simulation: Simulation) -> float | None:
     """Angle of an entity in a coordinate system; None: it follows no trajectory. [rad]"""
     if system is CoordinateSystem.ENTITY:
         return 0.0
@@ -66,7 +70,7 @@ def _angle(state: EntityState, kind: AngleType, system: CoordinateSystem, run: R
         return state.plane.heading - state.path.path.at(state.path.s).tangent
     own = _of_kind(state.pose, kind)
     if system is CoordinateSystem.WORLD:
-        return own + run.network.header_offset.heading if kind is AngleType.HEADING else own
+        return own + simulation.network.header_offset.heading if kind is AngleType.HEADING else own
     return own - _reference(state, kind, system)
 
 

@@ -4,18 +4,20 @@ from __future__ import annotations
 
 from xosc_lateral.playback.boxes import overlap
 from xosc_lateral.playback.conditions.base import EntityCheck
-from xosc_lateral.playback.run import Run
+from xosc_lateral.playback.simulation import Simulation
 from xosc_lateral.playback.state import EntityState
 from xosc_lateral.scenario.conditions import CollisionCondition
 
 
-def prepare(content: CollisionCondition, run: Run) -> EntityCheck:
+def prepare(content: CollisionCondition, simulation: Simulation) -> EntityCheck:
     """With one entity, or with any of a category."""
     others: tuple[EntityState, ...]
     if content.entity_ref is not None:
-        others = (run.entity(content.entity_ref, content.place),)
+        others = (simulation.entity(content.entity_ref, content.place),)
     else:
-        others = tuple(o for o in run.entities if content.by_type is None or o.entity.category is content.by_type)
+        others = tuple(
+            o for o in simulation.entities if content.by_type is None or o.entity.category is content.by_type
+        )
 
     def check(state: EntityState) -> bool:
         return any(other is not state and other.active and overlap(state, other) for other in others)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from xosc_lateral.playback.run import Run
+from xosc_lateral.playback.simulation import Simulation
 from xosc_lateral.scenario.enums import DirectionalDimension
 
 _AXES = (DirectionalDimension.LONGITUDINAL, DirectionalDimension.LATERAL, DirectionalDimension.VERTICAL)
@@ -13,8 +13,8 @@ def component(vector: tuple[float, float, float], direction: DirectionalDimensio
     return vector[_AXES.index(direction)]
 
 
-def watch_motion(run: Run, direction: DirectionalDimension | None = None) -> None:
+def watch_motion(simulation: Simulation, direction: DirectionalDimension | None = None) -> None:
     """Have velocities and accelerations worked out in every frame."""
-    run.derives_motion = True
+    simulation.derives_motion = True
     if direction is DirectionalDimension.VERTICAL:
-        run.derives_height = True
+        simulation.derives_height = True

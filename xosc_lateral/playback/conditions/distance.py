@@ -6,17 +6,17 @@ from xosc_lateral.playback.conditions.base import EntityCheck
 from xosc_lateral.playback.conditions.measure import measure_of
 from xosc_lateral.playback.distances import FAR, apart, spot_distance
 from xosc_lateral.playback.positions.resolve import spot_at
-from xosc_lateral.playback.run import Run
+from xosc_lateral.playback.simulation import Simulation
 from xosc_lateral.playback.state import EntityState
 from xosc_lateral.playback.values import holds
 from xosc_lateral.scenario.conditions import DistanceCondition
 from xosc_lateral.scenario.enums import RelativeDistanceType
 
 
-def prepare(content: DistanceCondition, run: Run) -> EntityCheck:
+def prepare(content: DistanceCondition, simulation: Simulation) -> EntityCheck:
     """Its amount counts; where no road leads there, it is huge. [m]"""
-    system, kind = measure_of(content, run)
-    spot = spot_at(content.position, run)
+    system, kind = measure_of(content, simulation)
+    spot = spot_at(content.position, simulation)
 
     if kind is RelativeDistanceType.EUCLIDIAN and not content.freespace:
 
@@ -27,7 +27,7 @@ def prepare(content: DistanceCondition, run: Run) -> EntityCheck:
         return check_straight
 
     def check(state: EntityState) -> bool:
-        distance = spot_distance(run.network, state, spot(), system, kind, freespace=content.freespace)
+        distance = spot_distance(simulation.network, state, spot(), system, kind, freespace=content.freespace)
         return holds(FAR if distance is None else abs(distance), content.rule, content.value)
 
     return check

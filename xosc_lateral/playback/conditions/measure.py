@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Protocol
 
-from xosc_lateral.playback.run import Run
+from xosc_lateral.playback.simulation import Simulation
 from xosc_lateral.scenario import Place
 from xosc_lateral.scenario.enums import CoordinateSystem, RelativeDistanceType, RoutingAlgorithm
 
@@ -35,7 +35,7 @@ class Measured(Protocol):
         """Where it stands."""
 
 
-def measure_of(content: Measured, run: Run) -> tuple[CoordinateSystem, RelativeDistanceType]:
+def measure_of(content: Measured, simulation: Simulation) -> tuple[CoordinateSystem, RelativeDistanceType]:
     """Defaults of the standard: entity frame, euclidian. `alongRoute` of version 1.0 names the road, but not which
     component of the distance; a euclidian one is the same in every frame (so the reference player has it, too).
 
@@ -47,9 +47,9 @@ def measure_of(content: Measured, run: Run) -> tuple[CoordinateSystem, RelativeD
     if kind is RelativeDistanceType.EUCLIDIAN:
         return system, kind
     if content.routing_algorithm not in _SHORTEST and system in (CoordinateSystem.ROAD, CoordinateSystem.LANE):
-        run.note(
+        simulation.note(
             f"routingAlgorithm '{content.routing_algorithm}': measured along the shortest way instead", content.place
         )
     if content.freespace and system is CoordinateSystem.TRAJECTORY:
-        run.note("free space along a trajectory: measured along the entity's own axes instead", content.place)
+        simulation.note("free space along a trajectory: measured along the entity's own axes instead", content.place)
     return system, kind

@@ -6,7 +6,7 @@ from xosc_lateral.playback.angles import difference
 from xosc_lateral.playback.conditions.base import EntityCheck
 from xosc_lateral.playback.distances import apart
 from xosc_lateral.playback.positions.resolve import pose_of, spot_at
-from xosc_lateral.playback.run import Run
+from xosc_lateral.playback.simulation import Simulation
 from xosc_lateral.playback.state import EntityState
 from xosc_lateral.scenario.conditions import ReachPositionCondition
 
@@ -14,9 +14,9 @@ ANGULAR_TOLERANCE = 0.05
 """How far heading, pitch and roll may be from an orientation that is given; the reference player's value. [rad]"""
 
 
-def prepare(content: ReachPositionCondition, run: Run) -> EntityCheck:
+def prepare(content: ReachPositionCondition, simulation: Simulation) -> EntityCheck:
     """Straight distance in the plane [m]; an orientation that the position gives has to be met, too."""
-    spot = spot_at(content.position, run)
+    spot = spot_at(content.position, simulation)
     oriented = getattr(content.position, "orientation", None) is not None
 
     def check(state: EntityState) -> bool:
@@ -25,7 +25,7 @@ def prepare(content: ReachPositionCondition, run: Run) -> EntityCheck:
             return False
         if not oriented:
             return True
-        wanted, pose = pose_of(content.position, run), state.pose
+        wanted, pose = pose_of(content.position, simulation), state.pose
         return all(
             abs(difference(getattr(pose, angle), getattr(wanted, angle))) < ANGULAR_TOLERANCE
             for angle in ("heading", "pitch", "roll")

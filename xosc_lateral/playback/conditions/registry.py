@@ -29,14 +29,14 @@ from xosc_lateral.playback.conditions import (
 )
 from xosc_lateral.playback.conditions.base import EntityCheck
 from xosc_lateral.playback.conditions.storyboard_element_state import StateWatch
-from xosc_lateral.playback.run import Run
+from xosc_lateral.playback.simulation import Simulation
 from xosc_lateral.playback.state import EntityState
 from xosc_lateral.playback.trigger import Check, RunningCondition, RunningTrigger
 from xosc_lateral.scenario import Condition, Trigger, Unsupported
 from xosc_lateral.scenario import conditions as written
 from xosc_lateral.scenario.enums import TriggeringEntitiesRule
 
-ENTITY_CONDITIONS: tuple[tuple[type, Callable[[Any, Run], EntityCheck]], ...] = (
+ENTITY_CONDITIONS: tuple[tuple[type, Callable[[Any, Simulation], EntityCheck]], ...] = (
     (written.AccelerationCondition, acceleration.prepare),
     (written.AngleCondition, angle.prepare_angle),
     (written.CollisionCondition, collision.prepare),
@@ -54,7 +54,7 @@ ENTITY_CONDITIONS: tuple[tuple[type, Callable[[Any, Run], EntityCheck]], ...] = 
     (written.TimeToCollisionCondition, time_to_collision.prepare),
     (written.TraveledDistanceCondition, traveled_distance.prepare),
 )
-VALUE_CONDITIONS: tuple[tuple[type, Callable[[Any, Run], Check]], ...] = (
+VALUE_CONDITIONS: tuple[tuple[type, Callable[[Any, Simulation], Check]], ...] = (
     (written.ParameterCondition, parameter.prepare),
     (written.SimulationTimeCondition, simulation_time.prepare),
     (written.StoryboardElementStateCondition, storyboard_element_state.prepare),
@@ -69,28 +69,28 @@ _ENTITY = dict(ENTITY_CONDITIONS)
 _VALUE = dict(VALUE_CONDITIONS)
 
 
-def prepare_trigger(trigger: Trigger, run: Run, *, when_empty: bool) -> RunningTrigger:
+def prepare_trigger(trigger: Trigger, simulation: Simulation, *, when_empty: bool) -> RunningTrigger:
     """A trigger ready to be evaluated frame by frame."""
-    groups = tuple(tuple(_prepare(condition, run) for condition in group.conditions) for group in trigger.groups)
+    groups = tuple(tuple(_prepare(condition, simulation) for condition in group.conditions) for group in trigger.groups)
     return RunningTrigger(groups, when_empty=when_empty)
 
 
-def _prepare(condition: Condition, run: Run) -> RunningCondition:
-    check = _check(condition, run)
+def _prepare(condition: Condition, simulation: Simulation) -> RunningCondition:
+    check = _check(condition, simulation)
     forget = check.forget if isinstance(check, StateWatch) else None
     return RunningCondition(check, condition.edge, condition.delay, forget)
 
 
-def _check(condition: Condition, run: Run) -> Check:
+def _check(condition: Condition, simulation: Simulation) -> Check:
     content = condition.content
     if isinstance(content, Unsupported):
-        run.note(content.reason or f"{content.kind} can't be played: the condition stays false", content.place)
+        simulation.note(content.reason or f"{content.kind} can't be played: the condition stays false", content.place)
         return lambda: False
     if type(content) in _VALUE:
-        return _VALUE[type(content)](content, run)
-    check = _ENTITY[type(content)](content, run)
+        return _VALUE[type(content)](content, simulation)
+    check = _ENTITY[type(content)](content, simulation)
     who = condition.triggering_entities
-    states = () if who is None else tuple(run.entity(name, condition.place) for name in who.entity_refs)
+    states = () if who is None else tuple(simulation.entity(name, condition.place) for name in who.entity_refs)
     if who is not None and who.rule is TriggeringEntitiesRule.ALL:
         return lambda: _all(check, states)
     if len(states) == 1:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from xosc_lateral.playback.conditions.base import EntityCheck
 from xosc_lateral.playback.distances import RoadGap, entity_distance, road_gap, spot_of
 from xosc_lateral.playback.placement import NOWHERE
-from xosc_lateral.playback.run import Run
+from xosc_lateral.playback.simulation import Simulation
 from xosc_lateral.playback.state import EntityState
 from xosc_lateral.road.network import DRIVING
 from xosc_lateral.scenario.conditions import RelativeClearanceCondition
@@ -15,7 +15,7 @@ _MANY_LANES = 1000
 """Wider than any road: an open end of a lane range."""
 
 
-def prepare(content: RelativeClearanceCondition, run: Run) -> EntityCheck:
+def prepare(content: RelativeClearanceCondition, simulation: Simulation) -> EntityCheck:
     """True when the lanes of the range exist and hold nobody between `-distance_backward` and `distance_forward`. [m]
 
     Lanes count along the road's lane ids, without lane 0, as in the reference player.
@@ -28,14 +28,14 @@ def prepare(content: RelativeClearanceCondition, run: Run) -> EntityCheck:
         for lanes in content.lane_ranges
     ) or ((-_MANY_LANES, _MANY_LANES),)
     names = content.entity_refs
-    others = tuple(run.entity(name, content.place) for name in names) if names else run.entities
+    others = tuple(simulation.entity(name, content.place) for name in names) if names else simulation.entities
     reach = max(content.distance_forward, content.distance_backward)
 
     def in_range(lanes: int) -> bool:
         return any(low <= lanes <= high for low, high in ranges)
 
     def occupied(state: EntityState, other: EntityState) -> bool:
-        gap = _gap(run, state, other, reach, freespace=content.freespace)
+        gap = _gap(simulation, state, other, reach, freespace=content.freespace)
         return (
             gap is not None
             and -content.distance_backward <= gap.ds <= content.distance_forward
@@ -53,7 +53,7 @@ def prepare(content: RelativeClearanceCondition, run: Run) -> EntityCheck:
             info.type in DRIVING
             and in_range(_lanes_between(state.lane, info.id))
             and (content.opposite_lanes or info.id * state.lane > 0)
-            for info in run.network.lanes_at(state.road, state.s)
+            for info in simulation.network.lanes_at(state.road, state.s)
         )
 
     return check
@@ -64,11 +64,13 @@ def _lanes_between(lane: int, other: int) -> int:
     return difference - (1 if difference > 0 else -1) if lane * other < 0 else difference
 
 
-def _gap(run: Run, state: EntityState, other: EntityState, reach: float, *, freespace: bool) -> RoadGap | None:
-    gap = road_gap(run.network, state, spot_of(other), limit=reach + 100.0)
+def _gap(
+    simulation: Simulation, state: EntityState, other: EntityState, reach: float, *, freespace: bool
+) -> RoadGap | None:
+    gap = road_gap(simulation.network, state, spot_of(other), limit=reach + 100.0)
     if gap is None or not freespace:
         return gap
     ds = entity_distance(
-        run.network, state, other, CoordinateSystem.ROAD, RelativeDistanceType.LONGITUDINAL, freespace=True
+        simulation.network, state, other, CoordinateSystem.ROAD, RelativeDistanceType.LONGITUDINAL, freespace=True
     )
     return None if ds is None else RoadGap(ds, gap.dt, gap.lanes, gap.opposite)

@@ -5,17 +5,17 @@ from __future__ import annotations
 from xosc_lateral.playback.conditions.base import EntityCheck
 from xosc_lateral.playback.conditions.measure import measure_of
 from xosc_lateral.playback.distances import FAR, apart, entity_distance
-from xosc_lateral.playback.run import Run
+from xosc_lateral.playback.simulation import Simulation
 from xosc_lateral.playback.state import EntityState
 from xosc_lateral.playback.values import holds
 from xosc_lateral.scenario.conditions import RelativeDistanceCondition
 from xosc_lateral.scenario.enums import RelativeDistanceType
 
 
-def prepare(content: RelativeDistanceCondition, run: Run) -> EntityCheck:
+def prepare(content: RelativeDistanceCondition, simulation: Simulation) -> EntityCheck:
     """Its amount counts; where no road leads there, it is huge. [m]"""
-    other = run.entity(content.entity_ref, content.place)
-    system, kind = measure_of(content, run)
+    other = simulation.entity(content.entity_ref, content.place)
+    system, kind = measure_of(content, simulation)
     straight = kind is RelativeDistanceType.EUCLIDIAN and not content.freespace
 
     def check(state: EntityState) -> bool:
@@ -24,7 +24,7 @@ def prepare(content: RelativeDistanceCondition, run: Run) -> EntityCheck:
         if straight:
             place = other.plane
             return holds(apart(state, place.x, place.y), content.rule, content.value)
-        distance = entity_distance(run.network, state, other, system, kind, freespace=content.freespace)
+        distance = entity_distance(simulation.network, state, other, system, kind, freespace=content.freespace)
         return holds(FAR if distance is None else abs(distance), content.rule, content.value)
 
     return check

@@ -4,18 +4,18 @@ from __future__ import annotations
 
 from xosc_lateral.playback.conditions.base import EntityCheck
 from xosc_lateral.playback.conditions.direction import component, watch_motion
-from xosc_lateral.playback.run import Run
+from xosc_lateral.playback.simulation import Simulation
 from xosc_lateral.playback.state import EntityState
 from xosc_lateral.playback.values import holds
 from xosc_lateral.scenario.conditions import RelativeSpeedCondition
 
 
-def prepare(content: RelativeSpeedCondition, run: Run) -> EntityCheck:
+def prepare(content: RelativeSpeedCondition, simulation: Simulation) -> EntityCheck:
     """Without a direction, the difference of the scalar speeds; else of the velocities, in the OTHER's frame. [m/s]"""
-    other = run.entity(content.entity_ref, content.place)
+    other = simulation.entity(content.entity_ref, content.place)
     direction = content.direction
     if direction is not None:
-        watch_motion(run, direction)
+        watch_motion(simulation, direction)
 
     def check(state: EntityState) -> bool:
         if not other.active:

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from xosc_lateral.playback.conditions.base import ValueCheck
-from xosc_lateral.playback.run import Run
+from xosc_lateral.playback.simulation import Simulation
 from xosc_lateral.playback.values import holds
 from xosc_lateral.scenario.conditions import SimulationTimeCondition
 
 
-def prepare(content: SimulationTimeCondition, run: Run) -> ValueCheck:
+def prepare(content: SimulationTimeCondition, simulation: Simulation) -> ValueCheck:
     """Compare the time at the start of the frame. [s]"""
-    return lambda: holds(run.time, content.rule, content.value)
+    return lambda: holds(simulation.time, content.rule, content.value)

@@ -4,18 +4,18 @@ from __future__ import annotations
 
 from xosc_lateral.playback.conditions.base import EntityCheck
 from xosc_lateral.playback.conditions.direction import component, watch_motion
-from xosc_lateral.playback.run import Run
+from xosc_lateral.playback.simulation import Simulation
 from xosc_lateral.playback.state import EntityState
 from xosc_lateral.playback.values import holds
 from xosc_lateral.scenario.conditions import SpeedCondition
 
 
-def prepare(content: SpeedCondition, run: Run) -> EntityCheck:
+def prepare(content: SpeedCondition, simulation: Simulation) -> EntityCheck:
     """Without a direction, the signed scalar speed. [m/s]"""
     direction = content.direction
     if direction is None:
         return lambda state: holds(state.speed, content.rule, content.value)
-    watch_motion(run, direction)
+    watch_motion(simulation, direction)
 
     def check(state: EntityState) -> bool:
         return holds(component(state.body_frame(state.velocity), direction), content.rule, content.value)

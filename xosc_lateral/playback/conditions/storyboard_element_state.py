@@ -3,20 +3,20 @@
 from __future__ import annotations
 
 from xosc_lateral.playback.conditions.base import ValueCheck
-from xosc_lateral.playback.run import Run
-from xosc_lateral.playback.storyboard import Element, State, Transition
+from xosc_lateral.playback.simulation import Simulation
+from xosc_lateral.playback.storyboard import ElementState, ElementTransition, StoryboardElement
 from xosc_lateral.scenario.conditions import StoryboardElementStateCondition
 from xosc_lateral.scenario.enums import StoryboardElementState
 
 _STATES = {
-    StoryboardElementState.STANDBY: State.STANDBY,
-    StoryboardElementState.RUNNING: State.RUNNING,
-    StoryboardElementState.COMPLETE: State.COMPLETE,
+    StoryboardElementState.STANDBY: ElementState.STANDBY,
+    StoryboardElementState.RUNNING: ElementState.RUNNING,
+    StoryboardElementState.COMPLETE: ElementState.COMPLETE,
 }
 _TRANSITIONS = {
-    StoryboardElementState.START_TRANSITION: Transition.START,
-    StoryboardElementState.END_TRANSITION: Transition.END,
-    StoryboardElementState.STOP_TRANSITION: Transition.STOP,
+    StoryboardElementState.START_TRANSITION: ElementTransition.START,
+    StoryboardElementState.END_TRANSITION: ElementTransition.END,
+    StoryboardElementState.STOP_TRANSITION: ElementTransition.STOP,
 }
 
 
@@ -27,16 +27,16 @@ class StateWatch:
     to count, but not its transition, which lasts for one look only.
     """
 
-    def __init__(self, content: StoryboardElementStateCondition, run: Run) -> None:
+    def __init__(self, content: StoryboardElementStateCondition, simulation: Simulation) -> None:
         self.content = content
-        self._run = run
+        self._simulation = simulation
         self._state = _STATES.get(content.state)
         self._transition = _TRANSITIONS.get(content.state)
-        self._changes: list[tuple[State, Transition]] = []
-        self._last: State | None = None
+        self._changes: list[tuple[ElementState, ElementTransition]] = []
+        self._last: ElementState | None = None
         self.found = False
 
-    def find(self, root: Element) -> None:
+    def find(self, root: StoryboardElement) -> None:
         """Look for the element: the first whose path ends in the reference."""
         reference = self.content.element_ref
         for element in root.walk():
@@ -49,9 +49,11 @@ class StateWatch:
                 self.found = True
                 return
         kind = self.content.element_type.value
-        self._run.note(f"no {kind} '{reference}' in the storyboard: the condition stays false", self.content.place)
+        self._simulation.note(
+            f"no {kind} '{reference}' in the storyboard: the condition stays false", self.content.place
+        )
 
-    def register(self, state: State, transition: Transition) -> None:
+    def register(self, state: ElementState, transition: ElementTransition) -> None:
         """The element has changed."""
         self._changes.append((state, transition))
 
@@ -70,8 +72,8 @@ class StateWatch:
         return any(transition is self._transition for _, transition in changes)
 
 
-def prepare(content: StoryboardElementStateCondition, run: Run) -> ValueCheck:
+def prepare(content: StoryboardElementStateCondition, simulation: Simulation) -> ValueCheck:
     """A watch; it finds its element once the storyboard stands."""
-    watch = StateWatch(content, run)
-    run.when_built.append(watch.find)
+    watch = StateWatch(content, simulation)
+    simulation.when_built.append(watch.find)
     return watch

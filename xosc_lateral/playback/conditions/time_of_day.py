@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 from xosc_lateral.playback.conditions.base import ValueCheck
-from xosc_lateral.playback.run import Run
+from xosc_lateral.playback.simulation import Simulation
 from xosc_lateral.playback.values import holds
 from xosc_lateral.scenario.conditions import TimeOfDayCondition
 
 
-def prepare(content: TimeOfDayCondition, run: Run) -> ValueCheck:
+def prepare(content: TimeOfDayCondition, simulation: Simulation) -> ValueCheck:
     """False while no environment has said what time it is."""
 
     def check() -> bool:
-        now = run.clock()
+        now = simulation.clock()
         if now is None:
-            run.note("no environment has set the time of day: the condition stays false", content.place)
+            simulation.note("no environment has set the time of day: the condition stays false", content.place)
             return False
         then = content.date_time
         if (now.tzinfo is None) != (then.tzinfo is None):

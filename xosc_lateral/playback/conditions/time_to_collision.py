@@ -8,33 +8,33 @@ from xosc_lateral.playback.conditions.base import EntityCheck
 from xosc_lateral.playback.conditions.measure import measure_of
 from xosc_lateral.playback.distances import FAR, entity_distance, spot_distance
 from xosc_lateral.playback.positions.resolve import spot_at
-from xosc_lateral.playback.run import Run
+from xosc_lateral.playback.simulation import Simulation
 from xosc_lateral.playback.state import EntityState
 from xosc_lateral.playback.transition import EPSILON
 from xosc_lateral.playback.values import holds
 from xosc_lateral.scenario.conditions import TimeToCollisionCondition
 
 
-def prepare(content: TimeToCollisionCondition, run: Run) -> EntityCheck:
+def prepare(content: TimeToCollisionCondition, simulation: Simulation) -> EntityCheck:
     """Not defined, hence false, when they don't come closer. [s]"""
-    system, kind = measure_of(content, run)
+    system, kind = measure_of(content, simulation)
     freespace = content.freespace
     target = content.target
     if isinstance(target, str):
-        run.derives_motion = True
-        other = run.entity(target, content.place)
+        simulation.derives_motion = True
+        other = simulation.entity(target, content.place)
 
         def to_entity(state: EntityState) -> bool:
             if not other.active:
                 return False
-            distance = entity_distance(run.network, state, other, system, kind, freespace=freespace)
+            distance = entity_distance(simulation.network, state, other, system, kind, freespace=freespace)
             return _holds(distance, _closing_speed(state, other), content)
 
         return to_entity
-    spot = spot_at(target, run)
+    spot = spot_at(target, simulation)
 
     def to_position(state: EntityState) -> bool:
-        distance = spot_distance(run.network, state, spot(), system, kind, freespace=freespace)
+        distance = spot_distance(simulation.network, state, spot(), system, kind, freespace=freespace)
         return _holds(distance, state.speed, content)
 
     return to_position

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from xosc_lateral.playback.conditions.base import EntityCheck
-from xosc_lateral.playback.run import Run
+from xosc_lateral.playback.simulation import Simulation
 from xosc_lateral.scenario.conditions import TraveledDistanceCondition
 
 
-def prepare(content: TraveledDistanceCondition, run: Run) -> EntityCheck:
+def prepare(content: TraveledDistanceCondition, simulation: Simulation) -> EntityCheck:
     """Teleports don't count. [m]"""
-    run.derives_motion = True
+    simulation.derives_motion = True
     return lambda state: state.odometer >= content.value

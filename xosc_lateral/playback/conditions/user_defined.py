@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from xosc_lateral.playback.conditions.base import ValueCheck
-from xosc_lateral.playback.run import Run
+from xosc_lateral.playback.simulation import Simulation
 from xosc_lateral.scenario.conditions import UserDefinedValueCondition
 
 
-def prepare(content: UserDefinedValueCondition, run: Run) -> ValueCheck:
+def prepare(content: UserDefinedValueCondition, simulation: Simulation) -> ValueCheck:
     """Always false, which is said."""
-    run.note(f"value '{content.name}' comes from outside the scenario: the condition stays false", content.place)
+    simulation.note(f"value '{content.name}' comes from outside the scenario: the condition stays false", content.place)
     return lambda: False

@@ -23,7 +23,7 @@ _TURN_PER_PANEL = 0.2
 
 
 @dataclass(frozen=True, slots=True)
-class ClothoidPiece:
+class TimedClothoid:
     """One clothoid: where it starts [m], [rad], curvatures at both ends [1/m], length [m], start time [s]."""
 
     x: float
@@ -59,13 +59,13 @@ class ClothoidPath:
 
     Parameters
     ----------
-    pieces : sequence of ClothoidPiece
+    pieces : sequence of TimedClothoid
         At least one.
     end_time : float
         [s]; NaN without times.
     """
 
-    def __init__(self, pieces: Sequence[ClothoidPiece], end_time: float = nan) -> None:
+    def __init__(self, pieces: Sequence[TimedClothoid], end_time: float = nan) -> None:
         self.pieces = tuple(pieces)
         self.length = sum(piece.length for piece in pieces)
         self.start_time = pieces[0].start_time

@@ -9,11 +9,11 @@ from typing import Any
 
 from xosc_lateral.errors import PlaybackError, UnsupportedElementError
 from xosc_lateral.playback.paths.base import Path
-from xosc_lateral.playback.paths.clothoid import ClothoidPath, ClothoidPiece
+from xosc_lateral.playback.paths.clothoid import ClothoidPath, TimedClothoid
 from xosc_lateral.playback.paths.nurbs import Control, NurbsPath, clamped_knots
 from xosc_lateral.playback.paths.polyline import Corner, PolylinePath, fill_times, has_gaps_in_time, merge_close
 from xosc_lateral.playback.positions.reference import reference_of
-from xosc_lateral.playback.run import Run
+from xosc_lateral.playback.simulation import Simulation
 from xosc_lateral.playback.state import EntityState
 from xosc_lateral.road import Pose
 from xosc_lateral.scenario import Place, Unsupported
@@ -40,8 +40,8 @@ VERTEX_RADIUS = 0.1
 class Layout:
     """What laying out a path may depend on, besides the world: who follows it, how, and how fast it comes. [m/s]"""
 
-    run: Run
-    pose_of: Callable[[Position, Run], Pose]
+    simulation: Simulation
+    pose_of: Callable[[Position, Simulation], Pose]
     place: Place
     follower: EntityState | None
     follow: bool
@@ -54,12 +54,14 @@ def _polyline(shape: Polyline, layout: Layout) -> Path:
     corners = [_corner(vertex, layout) for vertex in shape.vertices]
     _check_times([corner.time for corner in corners], "vertex", layout.place)
     if has_gaps_in_time(corners):
-        layout.run.note("vertices without a time get it by their distance from those that have one", layout.place)
+        layout.simulation.note(
+            "vertices without a time get it by their distance from those that have one", layout.place
+        )
         corners = fill_times(corners)
     merged = merge_close(corners, VERTEX_RADIUS)
     if len(merged) < len(corners):
         left_out = len(corners) - len(merged)
-        layout.run.note(
+        layout.simulation.note(
             f"{left_out} vertices nearer than {VERTEX_RADIUS:g} m to the one before are left out", layout.place
         )
     return PolylinePath(merged, follow=layout.follow, initial_speed=layout.speed)
@@ -68,7 +70,7 @@ def _polyline(shape: Polyline, layout: Layout) -> Path:
 def _corner(vertex: Vertex, layout: Layout) -> Corner:
     """A vertex where it is now; its height counts where the file gives one, and then its pitch and roll do."""
     position = vertex.position
-    pose = layout.pose_of(position, layout.run)
+    pose = layout.pose_of(position, layout.simulation)
     heading, pitch, roll = (
         own if given is not None else nan
         for own, given in zip((pose.heading, pose.pitch, pose.roll), _given_angles(position), strict=True)
@@ -82,21 +84,21 @@ def _corner(vertex: Vertex, layout: Layout) -> Corner:
 
 
 def _clothoid(shape: Clothoid, layout: Layout) -> Path:
-    pose = layout.pose_of(shape.position, layout.run)
+    pose = layout.pose_of(shape.position, layout.simulation)
     end = shape.curvature + shape.curvature_prime * shape.length
     start_time = nan if shape.start_time is None else shape.start_time
     _check_turning(shape.curvature, end, shape.length, layout.place)
-    piece = ClothoidPiece(pose.x, pose.y, pose.heading, shape.curvature, end, shape.length, start_time)
+    piece = TimedClothoid(pose.x, pose.y, pose.heading, shape.curvature, end, shape.length, start_time)
     return ClothoidPath([piece], nan if shape.stop_time is None else shape.stop_time)
 
 
 def _clothoid_spline(shape: ClothoidSpline, layout: Layout) -> Path:
     if not shape.segments:
         raise _error("the clothoid spline has no segments", layout.place)
-    pieces: list[ClothoidPiece] = []
+    pieces: list[TimedClothoid] = []
     for segment in shape.segments:
         if segment.position_start is not None:
-            pose = layout.pose_of(segment.position_start, layout.run)
+            pose = layout.pose_of(segment.position_start, layout.simulation)
             x, y, heading = pose.x, pose.y, pose.heading
         elif pieces:
             x, y, heading = pieces[-1].at(pieces[-1].length)
@@ -109,7 +111,7 @@ def _clothoid_spline(shape: ClothoidSpline, layout: Layout) -> Path:
         heading += segment.h_offset
         _check_turning(segment.curvature_start, segment.curvature_end, segment.length, layout.place)
         pieces.append(
-            ClothoidPiece(x, y, heading, segment.curvature_start, segment.curvature_end, segment.length, time)
+            TimedClothoid(x, y, heading, segment.curvature_start, segment.curvature_end, segment.length, time)
         )
     return ClothoidPath(pieces, nan if shape.time_end is None else shape.time_end)
 
@@ -144,7 +146,7 @@ def _nurbs(shape: Nurbs, layout: Layout) -> Path:
         )
     controls = []
     for point in shape.control_points:
-        pose = layout.pose_of(point.position, layout.run)
+        pose = layout.pose_of(point.position, layout.simulation)
         controls.append(Control(pose.x, pose.y, point.weight, nan if point.time is None else point.time))
     _check_times([control.time for control in controls], "control point", layout.place)
     return NurbsPath(controls, knots, shape.order)
@@ -162,8 +164,8 @@ _SHAPES = dict(SHAPES)
 
 def path_of(
     trajectory: Trajectory,
-    run: Run,
-    pose_of: Callable[[Position, Run], Pose],
+    simulation: Simulation,
+    pose_of: Callable[[Position, Simulation], Pose],
     *,
     follower: EntityState | None = None,
     follow: bool = False,
@@ -176,7 +178,7 @@ def path_of(
         raise UnsupportedElementError(
             shape.reason or f"a {shape.kind} can't be followed", path=place.path, line=place.line, element=place.element
         )
-    return _SHAPES[type(shape)](shape, Layout(run, pose_of, trajectory.place, follower, follow, speed))
+    return _SHAPES[type(shape)](shape, Layout(simulation, pose_of, trajectory.place, follower, follow, speed))
 
 
 def duration(shape: Shape) -> float:

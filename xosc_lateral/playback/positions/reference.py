@@ -6,16 +6,16 @@ from xosc_lateral.errors import PlaybackError
 from xosc_lateral.playback.drive import travel
 from xosc_lateral.playback.placement import NOWHERE, Placement
 from xosc_lateral.playback.routes import RouteGuide
-from xosc_lateral.playback.run import Run
+from xosc_lateral.playback.simulation import Simulation
 from xosc_lateral.playback.state import EntityState
 from xosc_lateral.road import Pose
 from xosc_lateral.scenario import Place
 from xosc_lateral.scenario.position import FromCurrentEntity, Position, RoutePosition
 
 
-def on_road(run: Run, name: str, place: Place) -> EntityState:
+def on_road(simulation: Simulation, name: str, place: Place) -> EntityState:
     """The entity, with its road coordinates; raises `PlaybackError` if it is on no road."""
-    state = run.entity(name, place)
+    state = simulation.entity(name, place)
     state.locate()
     if state.road == NOWHERE:
         raise PlaybackError(
@@ -36,9 +36,9 @@ def reference_of(position: Position) -> str | None:
     return name
 
 
-def pose_at(place: Placement, run: Run) -> Pose:
+def pose_at(place: Placement, simulation: Simulation) -> Pose:
     """World pose of a place. [m], [rad]"""
-    scout = EntityState(run.entities[0].entity, run.network)
+    scout = EntityState(simulation.entities[0].entity, simulation.network)
     scout.put(place)
     return scout.pose
 

@@ -6,16 +6,16 @@ from xosc_lateral.playback.placement import Placement
 from xosc_lateral.playback.positions.on_road import lane_placement
 from xosc_lateral.playback.positions.reference import moved_along, on_road
 from xosc_lateral.playback.routes import RouteGuide
-from xosc_lateral.playback.run import Run
+from xosc_lateral.playback.simulation import Simulation
 from xosc_lateral.scenario.position import RelativeLanePosition
 
 
-def resolve(position: RelativeLanePosition, run: Run, route: RouteGuide | None = None) -> Placement:
+def resolve(position: RelativeLanePosition, simulation: Simulation, route: RouteGuide | None = None) -> Placement:
     """`ds` goes along the road's s and counts lanes and offset along +t; `dsLane` goes along the lane's direction of
     travel and counts them to the left of it.
     """
-    state = on_road(run, position.entity_ref, position.place)
-    network = run.network
+    state = on_road(simulation, position.entity_ref, position.place)
+    network = simulation.network
     if position.ds_lane is None:
         there = moved_along(state, position.ds or 0.0, 1, route)
         side = 1
@@ -23,13 +23,13 @@ def resolve(position: RelativeLanePosition, run: Run, route: RouteGuide | None =
         there = moved_along(state, position.ds_lane, network.travel_direction(state.road, state.lane), route)
         side = network.travel_direction(there.road, there.lane)
     lane = beside(there.lane, side * position.d_lane)
-    if run.scenario.header.is_left_handed:  # the offset counts from the lane's direction, with `ds` too
+    if simulation.scenario.header.is_left_handed:  # the offset counts from the lane's direction, with `ds` too
         offset = position.offset * network.travel_direction(there.road, lane)
     else:
         offset = position.offset * side
     along_lane = position.ds_lane is not None
     return lane_placement(
-        run,
+        simulation,
         there.road,
         lane,
         there.s,

@@ -6,18 +6,18 @@ from math import nan
 
 from xosc_lateral.playback.placement import Placement
 from xosc_lateral.playback.positions.orientation import heading_of, is_absolute, tilted_or_road
-from xosc_lateral.playback.run import Run
+from xosc_lateral.playback.simulation import Simulation
 from xosc_lateral.playback.state import free, locate
 from xosc_lateral.scenario.position import RelativeWorldPosition
 
 
-def resolve(position: RelativeWorldPosition, run: Run) -> Placement:
+def resolve(position: RelativeWorldPosition, simulation: Simulation) -> Placement:
     """Relative headings count from the entity's."""
-    pose = run.entity(position.entity_ref, position.place).pose
+    pose = simulation.entity(position.entity_ref, position.place).pose
     heading = heading_of(position.orientation)
-    if not is_absolute(position.orientation, run):
+    if not is_absolute(position.orientation, simulation):
         heading += pose.heading
-    dx, dy = run.network.header_offset.turned_back(position.dx, position.dy)
+    dx, dy = simulation.network.header_offset.turned_back(position.dx, position.dy)
     z = nan if position.dz is None else pose.z + position.dz
-    tilt = tilted_or_road(position.orientation, pose, run)
-    return locate(run.network, free(pose.x + dx, pose.y + dy, heading, z, *tilt))
+    tilt = tilted_or_road(position.orientation, pose, simulation)
+    return locate(simulation.network, free(pose.x + dx, pose.y + dy, heading, z, *tilt))

@@ -22,14 +22,14 @@ from xosc_lateral.playback.positions import (
 )
 from xosc_lateral.playback.positions.reference import pose_at
 from xosc_lateral.playback.routes import RouteGuide, guide
-from xosc_lateral.playback.run import Run
+from xosc_lateral.playback.simulation import Simulation
 from xosc_lateral.playback.state import EntityState
 from xosc_lateral.road import Pose
 from xosc_lateral.scenario import Unsupported
 from xosc_lateral.scenario import position as written
 from xosc_lateral.scenario.position import Route
 
-POSITIONS: tuple[tuple[type, Callable[[Any, Run], Placement]], ...] = (
+POSITIONS: tuple[tuple[type, Callable[[Any, Simulation], Placement]], ...] = (
     (written.GeoPosition, geo.resolve),
     (written.LanePosition, lane.resolve),
     (written.RelativeLanePosition, relative_lane.resolve),
@@ -37,8 +37,8 @@ POSITIONS: tuple[tuple[type, Callable[[Any, Run], Placement]], ...] = (
     (written.RelativeRoadPosition, relative_road.resolve),
     (written.RelativeWorldPosition, relative_world.resolve),
     (written.RoadPosition, road.resolve),
-    (written.RoutePosition, lambda position, run: route.resolve(position, run, route_guide)),
-    (written.TrajectoryPosition, lambda position, run: trajectory.resolve(position, run, pose_of)),
+    (written.RoutePosition, lambda position, simulation: route.resolve(position, simulation, route_guide)),
+    (written.TrajectoryPosition, lambda position, simulation: trajectory.resolve(position, simulation, pose_of)),
     (written.WorldPosition, world.resolve),
 )
 
@@ -47,7 +47,7 @@ _FIXED = (written.GeoPosition, written.LanePosition, written.RoadPosition, writt
 """Positions that no entity has an influence on."""
 
 
-def resolve(position: written.Position, run: Run, *, route: RouteGuide | None = None) -> Placement:
+def resolve(position: written.Position, simulation: Simulation, *, route: RouteGuide | None = None) -> Placement:
     """The place that a position means now; raises `PlaybackError` where there is no such place.
 
     `route` is that of the entity which is to go there: a way along the road from another entity follows it, or else the
@@ -62,32 +62,32 @@ def resolve(position: written.Position, run: Run, *, route: RouteGuide | None = 
             element=where.element,
         )
     if isinstance(position, written.RelativeLanePosition):
-        return relative_lane.resolve(position, run, route)
+        return relative_lane.resolve(position, simulation, route)
     if isinstance(position, written.RelativeRoadPosition):
-        return relative_road.resolve(position, run, route)
-    return _RESOLVERS[type(position)](position, run)
+        return relative_road.resolve(position, simulation, route)
+    return _RESOLVERS[type(position)](position, simulation)
 
 
-def spot_at(position: written.Position, run: Run) -> Callable[[], Spot]:
+def spot_at(position: written.Position, simulation: Simulation) -> Callable[[], Spot]:
     """A position to measure distances to, found anew each time only if it may move."""
     if isinstance(position, _FIXED):
-        fixed = _spot(resolve(position, run), run)
+        fixed = _spot(resolve(position, simulation), simulation)
         return lambda: fixed
-    return lambda: _spot(resolve(position, run), run)
+    return lambda: _spot(resolve(position, simulation), simulation)
 
 
-def pose_of(position: written.Position, run: Run) -> Pose:
+def pose_of(position: written.Position, simulation: Simulation) -> Pose:
     """World pose of a position now. z, pitch and roll are the road's where none are given. [m], [rad]"""
-    return pose_at(resolve(position, run), run)
+    return pose_at(resolve(position, simulation), simulation)
 
 
-def route_guide(route_: Route, run: Run) -> RouteGuide | None:
+def route_guide(route_: Route, simulation: Simulation) -> RouteGuide | None:
     """The way over a route's waypoints; None: no way leads along it."""
-    return guide(run.network, [resolve(waypoint.position, run) for waypoint in route_.waypoints])
+    return guide(simulation.network, [resolve(waypoint.position, simulation) for waypoint in route_.waypoints])
 
 
-def _spot(place: Placement, run: Run) -> Spot:
-    scout = EntityState(run.entities[0].entity, run.network)
+def _spot(place: Placement, simulation: Simulation) -> Spot:
+    scout = EntityState(simulation.entities[0].entity, simulation.network)
     scout.put(place)
     pose = scout.pose
     if place.road == NOWHERE:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from xosc_lateral.enrich.result import Enriched, EntityResult
 from xosc_lateral.mask import stretches_of
 from xosc_lateral.motion.nominal import Activity, EntityMotion, NominalMotion
-from xosc_lateral.motion.trajectory import Trajectory
+from xosc_lateral.motion.trajectory import WorldTrajectory
 from xosc_lateral.report.path_dynamics import lateral_dynamics
 from xosc_lateral.report.player.packing import CENTIMETRE_PER_SECOND, MILLIMETRE, MILLIRADIAN_TENTH, pack
 from xosc_lateral.report.player.roads import road_shapes
@@ -111,7 +111,9 @@ def _entity(
     return values
 
 
-def _path(path: EntityMotion | Trajectory, rows: RowArray, origin: FloatArray, motion: EntityMotion) -> dict[str, Any]:
+def _path(
+    path: EntityMotion | WorldTrajectory, rows: RowArray, origin: FloatArray, motion: EntityMotion
+) -> dict[str, Any]:
     dynamics = lateral_dynamics(motion, path)  # type: ignore[arg-type]  # both have the fields that it reads
     across = np.interp(path.time[rows], dynamics.time, np.nan_to_num(dynamics.acceleration))
     return {

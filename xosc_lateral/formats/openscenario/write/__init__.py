@@ -7,7 +7,7 @@ from xosc_lateral.formats.openscenario.write.lane_offset_scenario import write_l
 from xosc_lateral.formats.openscenario.write.offset_chain import OffsetChain, offset_chain
 from xosc_lateral.formats.openscenario.write.result import WrittenScenario
 from xosc_lateral.formats.openscenario.write.sampled import motion_unknown_to
-from xosc_lateral.formats.openscenario.write.target import STANDARD, Player, Target, target
+from xosc_lateral.formats.openscenario.write.target import STANDARD, Player, TargetPlayer, target
 from xosc_lateral.formats.openscenario.write.trajectory_scenario import write_trajectory_scenario
 from xosc_lateral.formats.openscenario.write.variant_set import source_of_set, write_variant_set
 
@@ -15,7 +15,7 @@ __all__ = [
     "STANDARD",
     "OffsetChain",
     "Player",
-    "Target",
+    "TargetPlayer",
     "VariantFiles",
     "WrittenScenario",
     "motion_unknown_to",

@@ -11,7 +11,7 @@ from xosc_lateral.formats.openscenario.write.carla import fit_carla
 from xosc_lateral.formats.openscenario.write.esmini import fit_esmini
 from xosc_lateral.formats.openscenario.write.literal import fill_in, inline_catalogs
 from xosc_lateral.formats.openscenario.write.losses import Losses
-from xosc_lateral.formats.openscenario.write.target import Player, Target
+from xosc_lateral.formats.openscenario.write.target import Player, TargetPlayer
 from xosc_lateral.formats.openscenario.write.versions import fit_version
 from xosc_lateral.motion.nominal import NominalMotion
 from xosc_lateral.scenario import Scenario
@@ -22,7 +22,7 @@ def fit(
     root: etree._Element,
     scenario: Scenario,
     motion: NominalMotion,
-    target: Target,
+    target: TargetPlayer,
     scope: Scope,
     converted: Sequence[str] | None = None,
 ) -> tuple[str, ...]:
@@ -34,7 +34,7 @@ def fit(
         Of the output, its file references still as seen from the scenario. Changed in place.
     scenario : Scenario
     motion : NominalMotion
-    target : Target
+    target : TargetPlayer
     scope : Scope
         Global parameters.
     converted : sequence of str, optional

@@ -34,7 +34,7 @@ from xosc_lateral.formats.openscenario.write.offset_chain import LEAST_CHANGE, O
 from xosc_lateral.formats.openscenario.write.parameters import global_scope, override_parameters
 from xosc_lateral.formats.openscenario.write.relative_paths import rewrite_paths
 from xosc_lateral.formats.openscenario.write.result import WrittenScenario
-from xosc_lateral.formats.openscenario.write.target import STANDARD, Target
+from xosc_lateral.formats.openscenario.write.target import STANDARD, TargetPlayer
 from xosc_lateral.formats.xml import parse_xml
 from xosc_lateral.motion.nominal import NominalMotion, PlayedAction
 from xosc_lateral.scenario import Scenario
@@ -53,7 +53,7 @@ def write_lane_offset_scenario(
     provenance: Mapping[str, Any],
     summary: str,
     save: bool = True,
-    target: Target = STANDARD,
+    target: TargetPlayer = STANDARD,
 ) -> WrittenScenario:
     """Write the scenario with its maneuvers as they are and lane offset actions added.
 
@@ -72,7 +72,7 @@ def write_lane_offset_scenario(
         A few words of it for the file header's description.
     save : bool
         Write it; else the bytes are only handed back.
-    target : Target
+    target : TargetPlayer
         Player and version that it is made for.
 
     Raises

@@ -12,7 +12,7 @@ from lxml import etree
 
 from xosc_lateral.errors import FormatError
 from xosc_lateral.formats.openscenario.declarations import entry_scope, local_scope, parameter_name
-from xosc_lateral.formats.openscenario.element import Element, local_name
+from xosc_lateral.formats.openscenario.element import XmlElement, local_name
 from xosc_lateral.formats.openscenario.write.losses import Losses
 from xosc_lateral.formats.xml import read_document
 from xosc_lateral.scenario import Scenario
@@ -41,7 +41,7 @@ def fill_in(losses: Losses, scope: Scope, *, parameters: bool) -> None:
 def _fill(losses: Losses, item: etree._Element, scope: Scope, parameters: bool) -> None:
     inner = scope
     if item is not losses.root:
-        inner = local_scope(Element(item, losses.path, scope))
+        inner = local_scope(XmlElement(item, losses.path, scope))
     for name, value in item.attrib.items():
         text = str(value)
         if name in NAMES or not text.startswith("$") or not (parameters or text.startswith("${")):
@@ -72,7 +72,7 @@ def name_literally(root: etree._Element, path: Path, scope: Scope, wanted: Colle
 def _named_by_expression(
     item: etree._Element, path: Path, scope: Scope, found: list[tuple[etree._Element, str, str]]
 ) -> None:
-    inner = local_scope(Element(item, path, scope))
+    inner = local_scope(XmlElement(item, path, scope))
     for attribute in ("name", "storyboardElementRef"):
         text = item.get(attribute) or ""
         if text.startswith("$") and (attribute != "name" or local_name(item) in _NAMED):
@@ -105,7 +105,7 @@ def inline_catalogs(losses: Losses, scenario: Scenario, scope: Scope) -> None:
 
 
 def _references(losses: Losses, item: etree._Element, scope: Scope) -> Iterator[tuple[etree._Element, Scope]]:
-    inner = scope if item is losses.root else local_scope(Element(item, losses.path, scope))
+    inner = scope if item is losses.root else local_scope(XmlElement(item, losses.path, scope))
     for child in item:
         if isinstance(child.tag, str):
             if local_name(child) == "CatalogReference":
@@ -115,12 +115,12 @@ def _references(losses: Losses, item: etree._Element, scope: Scope) -> Iterator[
 
 
 def _inline(reference: etree._Element, scope: Scope, scenario: Scenario) -> bool:
-    asking = Element(reference, scenario.path, scope)
+    asking = XmlElement(reference, scenario.path, scope)
     found = _entry(asking.text("catalogName"), asking.text("entryName"), scenario)
     if found is None:
         return False
     entry, path = found
-    within = entry_scope(Element(entry, path, Scope({})), asking)
+    within = entry_scope(XmlElement(entry, path, Scope({})), asking)
     entry = copy.deepcopy(entry)
     entry.tail = reference.tail
     for item in [item for item in entry if isinstance(item.tag, str) and local_name(item) == "ParameterDeclarations"]:

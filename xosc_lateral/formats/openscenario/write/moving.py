@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from xosc_lateral.formats.openscenario.write import build
 from xosc_lateral.formats.openscenario.write.non_motion_actions import Pose
 from xosc_lateral.formats.openscenario.write.path_pieces import PathPiece, cut_path, vertex_times
-from xosc_lateral.formats.openscenario.write.vertices import Polyline, Vertices
+from xosc_lateral.formats.openscenario.write.vertices import TimedVertices, Vertices
 from xosc_lateral.motion.nominal import Activity, EntityMotion, NominalMotion
-from xosc_lateral.motion.trajectory import Trajectory
+from xosc_lateral.motion.trajectory import WorldTrajectory
 from xosc_lateral.scenario.enums import Priority
 
 FloatArray = NDArray[np.float64]
@@ -25,7 +25,7 @@ MOTION_SINCE = (1, 4)
 class Moving:
     """An entity with its path cut into pieces."""
 
-    def __init__(self, entity: EntityMotion, path: Trajectory, motion: NominalMotion) -> None:
+    def __init__(self, entity: EntityMotion, path: WorldTrajectory, motion: NominalMotion) -> None:
         self.name, self.path, self.end = entity.name, path, motion.end_time
         active = (entity.activity & Activity.ACTIVE) != 0
         teleported = (entity.activity & Activity.TELEPORTED) != 0
@@ -64,7 +64,7 @@ class Moving:
         return float(self.path.time[piece.first - 1 if piece.placed else piece.first])
 
 
-def _check(entity: EntityMotion, path: Trajectory, active: NDArray[np.bool_]) -> None:
+def _check(entity: EntityMotion, path: WorldTrajectory, active: NDArray[np.bool_]) -> None:
     arrays = (path.time, path.x, path.y, path.z, path.heading, path.pitch, path.roll)
     if any(len(values) != len(entity.time) for values in arrays):
         raise ValueError(f"trajectory of '{entity.name}' does not have the {len(entity.time)} rows of its motion")
@@ -107,7 +107,7 @@ def _add_hop(event: etree._Element, name: str, item: Moving, piece: PathPiece, v
 def _add_trajectory(
     owner: etree._Element,
     name: str,
-    path: Trajectory,
+    path: WorldTrajectory,
     rows: slice,
     times: FloatArray,
     version: build.Version,
@@ -155,7 +155,7 @@ def add_vertices(
     trajectory = build.sub(holder, "Trajectory", name=name, closed="false")
     x, y, z, h, p, r = columns
     polyline = build.sub(build.sub(trajectory, "Shape"), "Polyline")
-    vertices.add(polyline, Polyline(times, (x, y, z, _wrapped(h), p, r), motion))
+    vertices.add(polyline, TimedVertices(times, (x, y, z, _wrapped(h), p, r), motion))
     timing = build.sub(follow, "TimeReference")
     build.sub(timing, "Timing", domainAbsoluteRelative="absolute", scale="1", offset="0")
     build.sub(follow, "TrajectoryFollowingMode", followingMode="position")

@@ -25,7 +25,7 @@ class Player(StrEnum):
 
 
 @dataclass(frozen=True, slots=True)
-class Target:
+class TargetPlayer:
     """Player and version.
 
     Parameters
@@ -65,23 +65,23 @@ class Target:
         return self.player is Player.CARLA or self.version_for(scenario) != scenario.header.version
 
 
-STANDARD = Target()
+STANDARD = TargetPlayer()
 
 
-def target(player: str = Player.STANDARD.value, version: str | None = None) -> Target:
+def target(player: str = Player.STANDARD.value, version: str | None = None) -> TargetPlayer:
     """From the words of a user: a player's name, and a version such as "1.2".
 
     Raises
     ------
     ValueError
-        As `Target`, and for words that are neither.
+        As `TargetPlayer`, and for words that are neither.
     """
     if version is None:
-        return Target(Player(player))
+        return TargetPlayer(Player(player))
     known = {named(one): one for one in VERSIONS}
     if version not in known:
         raise ValueError(f"version {version!r} can't be written; {_ALL} can")
-    return Target(Player(player), known[version])
+    return TargetPlayer(Player(player), known[version])
 
 
 _ALL = ", ".join(named(one) for one in VERSIONS)

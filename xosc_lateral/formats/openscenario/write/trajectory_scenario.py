@@ -31,11 +31,11 @@ from xosc_lateral.formats.openscenario.write.non_motion_actions import (
 from xosc_lateral.formats.openscenario.write.parameters import global_scope, override_parameters
 from xosc_lateral.formats.openscenario.write.relative_paths import rewrite_paths
 from xosc_lateral.formats.openscenario.write.result import WrittenScenario
-from xosc_lateral.formats.openscenario.write.target import STANDARD, Player, Target
+from xosc_lateral.formats.openscenario.write.target import STANDARD, Player, TargetPlayer
 from xosc_lateral.formats.openscenario.write.vertices import Vertices
 from xosc_lateral.formats.xml import parse_xml
 from xosc_lateral.motion.nominal import NominalMotion, PlayedAction
-from xosc_lateral.motion.trajectory import Trajectory
+from xosc_lateral.motion.trajectory import WorldTrajectory
 from xosc_lateral.scenario import Scenario
 from xosc_lateral.scenario.actions import ConnectTrailerAction
 from xosc_lateral.scenario.conditions import SimulationTimeCondition
@@ -54,13 +54,13 @@ STOP_TRIGGER = "stop trigger"
 def write_trajectory_scenario(
     scenario: Scenario,
     motion: NominalMotion,
-    trajectories: Mapping[str, Trajectory],
+    trajectories: Mapping[str, WorldTrajectory],
     output: Path | str,
     *,
     provenance: Mapping[str, Any],
     summary: str,
     save: bool = True,
-    target: Target = STANDARD,
+    target: TargetPlayer = STANDARD,
 ) -> WrittenScenario:
     """Write a scenario in which entities follow trajectories; all else happens when it happened in the run.
 
@@ -70,7 +70,7 @@ def write_trajectory_scenario(
         As read: its bytes are the starting point, so that comments, catalogs and vendor extensions survive.
     motion : NominalMotion
         The run: gives the times of kept actions, standstill, teleports, and the end.
-    trajectories : mapping of str to Trajectory
+    trajectories : mapping of str to WorldTrajectory
         Per entity, on the rows of `motion`. An entity that is absent keeps its actions, at the times of the run.
         Trailers follow whoever pulls them: theirs are ignored.
     output : path
@@ -80,7 +80,7 @@ def write_trajectory_scenario(
         A few words of it for the file header's description.
     save : bool
         Write it; else the bytes are only handed back.
-    target : Target
+    target : TargetPlayer
         Player and version that it is made for.
 
     Raises
@@ -143,7 +143,7 @@ def _replace_stories(
     moving: Mapping[str, Moving],
     untouched: etree._Element,
     scope: Scope,
-    target: Target,
+    target: TargetPlayer,
     vertices: Vertices,
 ) -> None:
     storyboard = _child(root, "Storyboard")
@@ -167,7 +167,7 @@ def _new_story(
     moving: Mapping[str, Moving],
     untouched: etree._Element,
     scope: Scope,
-    target: Target,
+    target: TargetPlayer,
     vertices: Vertices,
 ) -> etree._Element:
     story = build.story(STORY)
@@ -246,6 +246,6 @@ def _child(parent: etree._Element, tag: str) -> etree._Element:
     return next(element for element in parent if isinstance(element.tag, str) and local_name(element) == tag)
 
 
-def _mirrored(path: Trajectory) -> Trajectory:
+def _mirrored(path: WorldTrajectory) -> WorldTrajectory:
     """In the left-handed coordinates of a scenario written for CARLA."""
     return replace(path, y=-path.y, heading=-path.heading, pitch=-path.pitch)

@@ -23,7 +23,7 @@ _MOTION = (("speed_longitudinal", 4), ("acceleration_longitudinal", 4))
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Polyline:
+class TimedVertices:
     """Vertices of one trajectory.
 
     Parameters
@@ -72,9 +72,9 @@ class Vertices:
 
     def __init__(self, source: bytes) -> None:
         self._mark = f"vertices-{hashlib.sha256(source).hexdigest()[:32]}"
-        self._polylines: list[Polyline] = []
+        self._polylines: list[TimedVertices] = []
 
-    def add(self, owner: etree._Element, polyline: Polyline) -> None:
+    def add(self, owner: etree._Element, polyline: TimedVertices) -> None:
         """Let an element hold these vertices and nothing else."""
         owner.append(etree.ProcessingInstruction(self._mark, str(len(self._polylines))))
         self._polylines.append(polyline)

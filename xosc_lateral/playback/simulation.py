@@ -1,4 +1,4 @@
-"""One run of a scenario: everything that actions, conditions and positions may look at."""
+"""A scenario being played: everything that actions, conditions and positions may look at."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ from xosc_lateral.road.network import RoadNetwork
 from xosc_lateral.scenario import Action, Place, Scenario
 
 
-class Run:
-    """The world of one run.
+class Simulation:
+    """All that one play-out of a scenario knows.
 
     Parameters
     ----------
