@@ -83,7 +83,7 @@ def run(case: dict[str, Any], protocol: dict[str, Any], seconds: float) -> dict[
         [one.term.kind, sorted(one.term.columns), one.p_value, one.term.component] for one in found.selection.accepted
     ]
     outcome["feedback"] = [
-        [one.column, round(one.coherence, 3), round(one.foretold, 3), one.doubtful] for one in found.feedback
+        [one.column, round(one.coherence, 3), round(one.predicted_share, 3), one.doubtful] for one in found.feedback
     ]
     outcome["p_mean"] = found.least("mean")
     if case["name"].startswith("slow vehicles"):

@@ -80,7 +80,7 @@ def test_a_spread_by_a_column_is_sized_and_closes_the_gap(tmp_path: Path) -> Non
 
 
 def test_a_weave_is_sized_at_its_period(driven: Driven) -> None:
-    plant = plants.Weave(0.2, 12.0)
+    plant = plants.CyclicTarget(0.2, 12.0)
     result = close_loop(driven(502, [plant], 1500.0), seed=1)
     finding = only_finding(result, "periodic", ())
     assert_closed(result, finding, truth.swing(truth.paired(plant, 502, 1500.0), plant.period))

@@ -40,7 +40,7 @@ def effect_of(selection: Selection, columns: tuple[str, ...]) -> ColumnEffect:
         (plants.SideWind(0.4), ("location", ("wind_direction", "wind_speed"))),
         (plants.SpreadBy("rain", 4.0), ("scale", ("rain",))),
         (plants.Fatigue(2.5), ("scale", ())),
-        (plants.Weave(0.15, 12.0), ("periodic", ())),
+        (plants.CyclicTarget(0.15, 12.0), ("periodic", ())),
         (plants.CameraStep(0.6), ("step", ())),
     ],
     ids=lambda value: getattr(value, "kind", ""),

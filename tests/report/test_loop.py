@@ -95,11 +95,11 @@ def page(result: LoopResult, lack_of_fit: LackOfFit, table: Path) -> str:
     return loop_page(result, lack_of_fit, [table])
 
 
-def hidden(result: LoopResult, effect: Effect | None, kind: str, cell: str = "movement by band") -> Finding:
+def hidden(result: LoopResult, effect: Effect | None, kind: str, statistic: str = "movement by band") -> Finding:
     """A finding without columns, as the loop would give it."""
     return replace(
         result.findings[0], effect="something hidden", kind=kind, columns=(), alike=(), lag_s=None, response_s=None,
-        effects=() if effect is None else (effect,), cell=cell, measure=cell,
+        effects=() if effect is None else (effect,), statistic=statistic, measure=statistic,
     )  # fmt: skip
 
 
@@ -240,5 +240,5 @@ def test_drives_are_described_one_by_one(result: LoopResult) -> None:
     means, spreads = by_drive(result, 20.0)
     assert len(means["measured"]) == 1
     assert len(spreads["after"]) == len(result.runs_after)
-    timeline = result.cells.timeline
+    timeline = result.statistics.timeline
     assert means["measured"][0] == pytest.approx(timeline.offset[timeline.valid].mean())

@@ -67,7 +67,7 @@ class LoopResult:
         How much the drives differ; None with too few of them.
     held_out : str
         What was held out, in words.
-    cells : SummaryStatistics
+    statistics : SummaryStatistics
     unmoved : array, shape (n,)
         Measured offsets less the effects on the mean. [m]
     real, before, after : mapping of str to array
@@ -97,7 +97,7 @@ class LoopResult:
     memory: Memory
     population: Population | None
     held_out: str
-    cells: SummaryStatistics
+    statistics: SummaryStatistics
     unmoved: FloatArray
     real: dict[str, FloatArray]
     before: dict[str, FloatArray]
@@ -181,13 +181,14 @@ def close_loop(
         findings += [memory_finding(memory, compared)] if memory.found else []
         findings += [population_finding(population, compared)] if population is not None and population.found else []
     rng = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(9,)))
-    floor = floor_of(scored.cells, unmoved, blocks, rng)
+    floor = floor_of(scored.statistics, unmoved, blocks, rng)
     scores = score_runs(timeline, scored.runs_before, scored.runs_after, blocks, rng)
     progress(1.0, "done")
     return LoopResult(
         timeline.names, base, refined, given, tuple(findings), coarse, selection.final, found.columns, found.feedback,
         selection.rejected, dict(found.unused), found.total if found.gains else None,
-        found.returned_base, memory, population, held_out_words(timeline, blocks), scored.cells, unmoved, scored.real,
+        found.returned_base, memory, population, held_out_words(timeline, blocks), scored.statistics,
+        unmoved, scored.real,
         scored.before, scored.after, *scored.errors, floor, scores, scored.runs_before, scored.runs_after, seed,
     )  # fmt: skip
 

@@ -6,7 +6,7 @@ Two marks, either of them enough.
 nothing with its causes. A steering angle or a yaw rate is the movement's own derivative, and shares nearly all.
 
 *Direction of time.* Given its own past, a cause owes nothing to what the car did just before; a column that a system
-computes from the offset (a torque that keeps the lane, a filtered copy) is foretold by it [1]_.
+computes from the offset (a torque that keeps the lane, a filtered copy) is predicted by it [1]_.
 
 Both are asked of the offset, its size, how far it is beyond its usual size, and its speed: what follows may follow in
 any of these ways.
@@ -43,7 +43,7 @@ CLEAR = 0.2
 """Squared coherence from which a column is feedback. Numbers that are causes stay below 0.06, also where
 they move the car by 0.9 m; consequences are above 0.5. [-]"""
 
-FORETOLD, PERHAPS, HARDLY = 0.05, 0.02, 0.01
+PREDICTED, PERHAPS, HARDLY = 0.05, 0.02, 0.01
 """Share of a column's innovations that the movement foretells: from the first on it is feedback, from the second on
 doubtful; below the last, coherence alone is doubtful too (a switch that moves a car by half a metre: 0.13). [-]"""
 
@@ -63,7 +63,7 @@ class Feedback:
     column : str
     coherence : float
         Squared, above 0.2 Hz, with what it follows most. [-]
-    foretold : float
+    predicted_share : float
         Share of its innovations that the movement foretells. [-]
     of : str
         What it follows: "offset", "size of the offset", ...
@@ -73,7 +73,7 @@ class Feedback:
 
     column: str
     coherence: float
-    foretold: float
+    predicted_share: float
     of: str
     doubtful: bool
 
@@ -98,13 +98,13 @@ def find_feedback(timeline: Timeline, columns: Iterable[Column]) -> list[Feedbac
         for name in ("size of the offset", "excess of the offset"):
             shared[name] = max(shared[name], _coherence(size, spectra[name]))
         of = max(shared, key=lambda name: shared[name])
-        # a switch has hardly any changes that could be foretold
-        foretold = _foretold(values, moved, rows) if column.role is Role.NUMBER else 0.0
+        # a switch has hardly any changes that could be predicted
+        predicted_share = _predicted_share(values, moved, rows) if column.role is Role.NUMBER else 0.0
         floor = 6.0 / len(starts)
         coherent = shared[of] >= max(CLEAR, floor)
-        clear = foretold >= FORETOLD or (coherent and foretold >= HARDLY)
-        if clear or coherent or foretold >= PERHAPS:
-            found.append(Feedback(column.name, shared[of], foretold, of, not clear))
+        clear = predicted_share >= PREDICTED or (coherent and predicted_share >= HARDLY)
+        if clear or coherent or predicted_share >= PERHAPS:
+            found.append(Feedback(column.name, shared[of], predicted_share, of, not clear))
     return found
 
 
@@ -121,7 +121,7 @@ def _movement(timeline: Timeline) -> Mapping[str, FloatArray]:
     }
 
 
-def _foretold(values: FloatArray, moved: Mapping[str, FloatArray], rows: IntArray) -> float:
+def _predicted_share(values: FloatArray, moved: Mapping[str, FloatArray], rows: IntArray) -> float:
     """Partial R squared of the recent movement, the present included, given the column's own past."""
     now = values[rows]
     own = [np.ones(len(rows)), *(values[rows - lag] for lag in range(1, OWN_PAST + 1))]

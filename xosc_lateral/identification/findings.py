@@ -48,10 +48,10 @@ class Finding:
         What that error compares.
     effects : tuple of Effect
         What the profile got.
-    cell : str
+    statistic : str
         Group of summary statistics that shows it best.
     gain : Gain or None
-        Held-out gain, nested; None where its path can't be foretold.
+        Held-out gain, nested; None where its path can't be predicted.
     """
 
     effect: str
@@ -68,7 +68,7 @@ class Finding:
     error_after: float
     measure: str
     effects: tuple[Effect, ...]
-    cell: str
+    statistic: str
     gain: Gain | None = None
 
 
@@ -77,40 +77,40 @@ def describe_finding(
 ) -> Finding:
     """Put sizes and errors to what was accepted."""
     told = one.term.describe(fitted, effects, key)
-    before, after = _errors(compared, told.cell)
+    before, after = _errors(compared, told.statistic)
     return Finding(
         told.name, one.term.kind, one.term.columns, one.alike, told.lag_s, told.response_s, told.shape, told.size,
-        told.error, one.p_value, before, after, told.measure, effects, told.cell, gain,
+        told.error, one.p_value, before, after, told.measure, effects, told.statistic, gain,
     )  # fmt: skip
 
 
 def memory_finding(memory: Memory, compared: Compared) -> Finding:
     """The core model is replaced: the first-order chain forgets too fast."""
     worst = int(np.argmax(np.abs(np.log(memory.ratio))))
-    cell = "movement by band"
-    before, after = _errors(compared, cell)
+    statistic = "movement by band"
+    before, after = _errors(compared, statistic)
     shape = f"movement within {memory.bands_s[worst]:g} s is {memory.ratio[worst]:.2f} times the measured"
     return Finding(
         "memory beyond one step", "memory", (), (), None, None, shape, float(memory.ratio[worst]), 0.0,
-        memory.p_value, before, after, "size of the movement by frequency band", (), cell,
+        memory.p_value, before, after, "size of the movement by frequency band", (), statistic,
     )  # fmt: skip
 
 
 def population_finding(population: Population, compared: Compared) -> Finding:
     """The core model is replaced: one pooled driver can't be many."""
-    cell = "quantiles of local spread"
-    before, after = _errors(compared, cell)
+    statistic = "quantiles of local spread"
+    before, after = _errors(compared, statistic)
     shape = f"{population.drives} drives; their spreads scatter by a factor of {np.exp(population.log_spread):.2f}"
     error = population.shift / np.sqrt(2.0 * population.drives)
     return Finding(
         "drivers that differ", "population", (), (), None, None, shape, population.shift, error,
-        population.p_value, before, after, cell, (), cell,
+        population.p_value, before, after, statistic, (), statistic,
     )  # fmt: skip
 
 
-def _errors(compared: Compared, cell: str) -> tuple[float, float]:
+def _errors(compared: Compared, statistic: str) -> tuple[float, float]:
     real, before, after = compared
-    if cell not in real:
+    if statistic not in real:
         return 0.0, 0.0
-    first, second = (float(np.sqrt(np.nanmean((real[cell] - other[cell]) ** 2))) for other in (before, after))
+    first, second = (float(np.sqrt(np.nanmean((real[statistic] - other[statistic]) ** 2))) for other in (before, after))
     return first, second

@@ -54,7 +54,7 @@ class Setting:
 class HeldOut:
     """Summary statistics on held-out blocks."""
 
-    cells: SummaryStatistics
+    statistics: SummaryStatistics
     real: dict[str, FloatArray]
     before: dict[str, FloatArray]
     after: dict[str, FloatArray]
@@ -72,13 +72,13 @@ def score_held_out(
 ) -> HeldOut:
     """Describe measured offsets and both profiles' runs; `nested` None: nothing is kept."""
     timeline = setting.coarse.timeline
-    cells = statistics_of(timeline, _quantities(selection, columns), _frequency(selection.final))
+    statistics = statistics_of(timeline, _quantities(selection, columns), _frequency(selection.final))
     kept = tuple(one.term for one in selection.accepted)
     runs_before, runs_after = _held_out_runs(setting, nested, kept, selection.start, progress)
-    real = cells.describe(timeline.offset, timeline.valid)
-    before = expected(cells, runs_before, timeline.valid)
-    after = before if runs_after is runs_before else expected(cells, runs_after, timeline.valid)
-    return HeldOut(cells, real, before, after, runs_before, runs_after)
+    real = statistics.describe(timeline.offset, timeline.valid)
+    before = expected(statistics, runs_before, timeline.valid)
+    after = before if runs_after is runs_before else expected(statistics, runs_after, timeline.valid)
+    return HeldOut(statistics, real, before, after, runs_before, runs_after)
 
 
 def _held_out_runs(

@@ -86,9 +86,9 @@ class LackOfFit:
 
 def lack_of_fit_of(result: LoopResult) -> LackOfFit:
     """Compare every group of cells, and all of them, with what the drives differ from themselves by (seeded)."""
-    timeline = result.cells.timeline
+    timeline = result.statistics.timeline
     rng = np.random.default_rng(np.random.SeedSequence(result.seed, spawn_key=(11,)))
-    splits = split_differences(result.cells, result.unmoved, hold_out_blocks(timeline), rng, SPLITS)
+    splits = split_differences(result.statistics, result.unmoved, hold_out_blocks(timeline), rng, SPLITS)
     floors = {name: np.sqrt(_mean_of_finite(np.stack([split[name] for split in splits]) ** 2)) for name in result.real}
     groups = tuple(
         GroupError(

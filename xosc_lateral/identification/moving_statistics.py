@@ -38,7 +38,7 @@ class MovingStatistic:
 
 def moving_mean(result: LoopResult, seconds: float) -> MovingStatistic:
     """Moving mean of the offset over so many seconds."""
-    timeline = result.cells.timeline
+    timeline = result.statistics.timeline
 
     def mean(offset: FloatArray) -> FloatArray:
         return coarse_mean(local_mean(offset, timeline.valid, seconds, timeline.step))
@@ -48,7 +48,7 @@ def moving_mean(result: LoopResult, seconds: float) -> MovingStatistic:
 
 def moving_spread(result: LoopResult, seconds: float) -> MovingStatistic:
     """Root mean square of the movement faster than 20 s, over so many seconds."""
-    timeline = result.cells.timeline
+    timeline = result.statistics.timeline
 
     def squares(offset: FloatArray) -> FloatArray:
         fast = offset - local_mean(offset, timeline.valid, LOCAL_S, timeline.step)
@@ -83,7 +83,7 @@ def by_drive(result: LoopResult, least_s: float) -> tuple[dict[str, FloatArray],
     means, spreads : mapping of "measured", "before", "after" to array
         Shape (drives,) or (runs * drives,). [m]
     """
-    timeline = result.cells.timeline
+    timeline = result.statistics.timeline
     rows = [np.flatnonzero(timeline.valid & (timeline.drive == index)) for index in range(len(timeline.names))]
     rows = [own for own in rows if len(own) * timeline.step >= least_s]
     series = {"measured": timeline.offset[None], "before": result.runs_before, "after": result.runs_after}
@@ -106,5 +106,5 @@ def _longest(result: LoopResult) -> BoolArray:
 def _statistic(result: LoopResult, measured: FloatArray, before: FloatArray, after: FloatArray) -> MovingStatistic:
     shown = _longest(result)
     n = len(result.coarse)
-    time = coarse_middle(result.cells.timeline.time)[:n]
+    time = coarse_middle(result.statistics.timeline.time)[:n]
     return MovingStatistic(time[shown], measured[shown], before[shown], after[shown])

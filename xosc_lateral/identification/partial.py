@@ -55,7 +55,7 @@ def curve_of(result: LoopResult, effect: ColumnEffect) -> Curve:
         return Curve(over, strength, error, nothing, nothing, nothing)
     where, own = _driving(result, effect)
     inside = result.coarse.valid & np.isfinite(where)
-    blocks = coarse_middle(hold_out_blocks(result.cells.timeline))
+    blocks = coarse_middle(hold_out_blocks(result.statistics.timeline))
     if effect.acts is Acts.LOCATION:
         values = _alone(result, effect)
     else:
@@ -115,7 +115,7 @@ def _alone(result: LoopResult, effect: ColumnEffect) -> FloatArray:
 
 def _squares(result: LoopResult, acts: Acts) -> FloatArray:
     """Mean square of the movement within 20 s (or, for fine noise, from sample to sample), per second. [m^2]"""
-    timeline = result.cells.timeline
+    timeline = result.statistics.timeline
     if acts is Acts.FINE:
         return coarse_mean(np.square(np.diff(timeline.offset, prepend=timeline.offset[:1])))
     fast = timeline.offset - local_mean(timeline.offset, timeline.valid, LOCAL_S, timeline.step)

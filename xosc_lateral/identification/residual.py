@@ -161,9 +161,9 @@ def simulated_runs(
     return result
 
 
-def expected(cells: SummaryStatistics, runs: FloatArray, used: BoolArray) -> dict[str, FloatArray]:
+def expected(statistics: SummaryStatistics, runs: FloatArray, used: BoolArray) -> dict[str, FloatArray]:
     """Mean of the cells over a profile's runs."""
-    several = [cells.describe(run, used) for run in runs]
+    several = [statistics.describe(run, used) for run in runs]
     return {name: np.mean([one[name] for one in several], axis=0) for name in several[0]}
 
 
@@ -173,7 +173,7 @@ def error_between(first: Mapping[str, FloatArray], second: Mapping[str, FloatArr
 
 
 def split_differences(
-    cells: SummaryStatistics, offset: FloatArray, blocks: IntArray, rng: np.random.Generator, splits: int
+    statistics: SummaryStatistics, offset: FloatArray, blocks: IntArray, rng: np.random.Generator, splits: int
 ) -> list[dict[str, FloatArray]]:
     """What measured data differs from itself: cells of random halves of the blocks against each other; NaN: no rows.
 
@@ -187,11 +187,15 @@ def split_differences(
     blocks : int array, shape (n,)
         What is dealt out.
     """
-    numbers = np.unique(blocks[cells.timeline.valid])
+    numbers = np.unique(blocks[statistics.timeline.valid])
     found = []
     for _ in range(splits):
         half = np.isin(blocks, rng.permutation(numbers)[: len(numbers) // 2])
-        first, second, balance = cells.describe(offset, half), cells.describe(offset, ~half), cells.balance(half)
+        first, second, balance = (
+            statistics.describe(offset, half),
+            statistics.describe(offset, ~half),
+            statistics.balance(half),
+        )
         found.append({name: balance[name] * (values - second[name]) for name, values in first.items()})
     return found
 
@@ -203,10 +207,10 @@ def size_of(differences: Mapping[str, FloatArray]) -> float:
 
 
 def floor_of(
-    cells: SummaryStatistics, offset: FloatArray, blocks: IntArray, rng: np.random.Generator, splits: int = 8
+    statistics: SummaryStatistics, offset: FloatArray, blocks: IntArray, rng: np.random.Generator, splits: int = 8
 ) -> float:
     """Mean size of `split_differences`. [m]"""
-    return float(np.mean([size_of(split) for split in split_differences(cells, offset, blocks, rng, splits)]))
+    return float(np.mean([size_of(split) for split in split_differences(statistics, offset, blocks, rng, splits)]))
 
 
 def _by_bin(values: FloatArray, label: IntArray, used: BoolArray) -> FloatArray:

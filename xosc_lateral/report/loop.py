@@ -161,7 +161,7 @@ def _pictures(result: LoopResult, finding: Finding) -> list[_Picture]:
             "and band: two standard errors). Right: means of held-out blocks, by fifths of the effect."
         )
         alt = f"Curve of {finding.effect} over measured points, and measured against expected before and after."
-        return [_Picture(effect_figure(result, finding), caption, alt)] if finding.cell in result.real else []
+        return [_Picture(effect_figure(result, finding), caption, alt)] if finding.statistic in result.real else []
     draw, caption = DRAWINGS[effect.kind if effect is not None else finding.kind]
     pictures = [_Picture(draw(result, finding), caption, f"{_capital(finding.effect)}: {caption}")]
     if finding.kind in ("regime", "population"):

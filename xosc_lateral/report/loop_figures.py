@@ -57,9 +57,9 @@ def residual_figure(result: LoopResult, lack_of_fit: LackOfFit, what: str) -> Fi
         floor = 100.0 * TWO_ERRORS * lack_of_fit.floors[group]
         axis.fill_between(place, -floor, floor, color=MUTED, alpha=0.2, linewidth=0, label="sampling error")
         axis.axhline(0.0, color=MUTED, linewidth=0.6)
-        for cells, color, label in ((result.before, BEFORE, "before"), (result.after, AFTER, "after")):
-            axis.plot(place, 100.0 * (result.real[group] - cells[group]), "o-", color=color, markersize=3, label=label)
-        _name_bins(axis, result.cells.middles[name], name)
+        for values, color, label in ((result.before, BEFORE, "before"), (result.after, AFTER, "after")):
+            axis.plot(place, 100.0 * (result.real[group] - values[group]), "o-", color=color, markersize=3, label=label)
+        _name_bins(axis, result.statistics.middles[name], name)
         axis.set_title(column_label(name, hint=False))
     for axis in axes.ravel()[len(names) :]:
         axis.set_visible(False)
@@ -79,14 +79,14 @@ def effect_figure(result: LoopResult, finding: Finding) -> Figure:
     figure, axes = new_figure(1, 2, height=3.3)
     _draw_curve(axes[0, 0], result, effect)
     axis = axes[0, 1]
-    name = finding.cell.split(" by ", 1)[1]
-    bins = _in_unit(effect, result.cells.middles[name])
-    for cells, color, label in (
+    name = finding.statistic.split(" by ", 1)[1]
+    bins = _in_unit(effect, result.statistics.middles[name])
+    for values, color, label in (
         (result.real, DRIVES, "measured"),
         (result.before, BEFORE, "profile before"),
         (result.after, AFTER, "profile after"),
     ):
-        axis.plot(bins, cells[finding.cell], "o-", color=color, markersize=3.5, label=label)
+        axis.plot(bins, values[finding.statistic], "o-", color=color, markersize=3.5, label=label)
     on_mean = effect.acts is Acts.LOCATION
     axis.set_title("Held-out blocks")
     axis.set_xlabel("shift by the effect [m]" if on_mean else "factor by the effect [-]")
@@ -189,7 +189,9 @@ def _quantity_label(effect: ColumnEffect) -> str:
 def _shown(result: LoopResult, what: str) -> list[str]:
     """Columns with a panel, those of the findings first."""
     names = [
-        name for name in result.cells.labels if f"{what} by {name}" in result.real and not name.startswith("effect: ")
+        name
+        for name in result.statistics.labels
+        if f"{what} by {name}" in result.real and not name.startswith("effect: ")
     ]
     acting = {column for finding in result.findings for column in finding.columns}
     return sorted(names, key=lambda name: not any(column == name or f"({column})" in name for column in acting))

@@ -56,7 +56,7 @@ def weave_figure(result: LoopResult, finding: Finding) -> Figure:
     assert isinstance(effect, Weave)
     figure, axes = new_figure(height=3.3)
     axis = axes[0, 0]
-    longest = int(np.bincount(result.cells.timeline.drive).max())
+    longest = int(np.bincount(result.statistics.timeline.drive).max())
     segment = min(WEAVE_ROWS, 2 ** int(np.log2(longest)))
     draw_spectra(axis, result, segment, within_blocks=False)
     line = 1.0 / effect.period_s
@@ -168,11 +168,11 @@ def memory_figure(result: LoopResult, finding: Finding) -> Figure:
     """Size of the movement in bands of time: the profiles' over the measured."""
     figure, axes = new_figure(height=3.0)
     axis = axes[0, 0]
-    cell = finding.cell
+    statistic = finding.statistic
     labels = ["< 1 s", "1-3 s", "3-8 s", "8-20 s", "20-60 s", "60-200 s", "> 200 s"]
-    place = np.arange(len(result.real[cell]))
-    for cells, color, label in ((result.before, BEFORE, "profile before"), (result.after, AFTER, "profile after")):
-        axis.plot(place, cells[cell] / result.real[cell], "o-", color=color, label=label)
+    place = np.arange(len(result.real[statistic]))
+    for values, color, label in ((result.before, BEFORE, "profile before"), (result.after, AFTER, "profile after")):
+        axis.plot(place, values[statistic] / result.real[statistic], "o-", color=color, label=label)
     axis.axhline(1.0, color=DRIVES, label="measured")
     axis.set_xticks(place, labels)
     axis.set_xlabel("averaging times that the movement lies between")
@@ -186,12 +186,12 @@ def quantiles_figure(result: LoopResult) -> Figure:
     """Quantiles of the local spread, measured and of both profiles."""
     figure, axes = new_figure(height=2.8)
     axis = axes[0, 0]
-    for cells, color, label in (
+    for values, color, label in (
         (result.real, DRIVES, "measured"),
         (result.before, BEFORE, "profile before"),
         (result.after, AFTER, "profile after"),
     ):
-        axis.plot(100.0 * np.asarray(QUANTILES), cells["quantiles of local spread"], "o-", color=color, label=label)
+        axis.plot(100.0 * np.asarray(QUANTILES), values["quantiles of local spread"], "o-", color=color, label=label)
     axis.set_xlabel("share of the time with less spread [%]")
     axis.set_ylabel(f"{SPREAD} [m]")
     axis.set_ylim(bottom=0.0)

@@ -45,7 +45,7 @@ def loop_record(result: LoopResult, lack_of_fit: LackOfFit, tables: Sequence[Pat
                 "why": feedback_words(item),
                 "doubtful": item.doubtful,
                 "coherence": item.coherence,
-                "foretold": item.foretold,
+                "foretold": item.predicted_share,
             }
             for item in result.feedback
         ],

@@ -51,7 +51,7 @@ LOOKS: Mapping[str, str] = MappingProxyType(
 )
 """What is asked of each component."""
 
-_CELLS: Mapping[str, str] = MappingProxyType(
+_PLAIN_GROUPS: Mapping[str, str] = MappingProxyType(
     {
         "movement by band": "standard deviation by frequency band",
         "spread by time": "spread by sixths of the drive",
@@ -140,7 +140,7 @@ def meaning(finding: Finding, result: LoopResult) -> str:
     if finding.alike:
         names = ", ".join(f"`{name}`" for name in finding.alike)
         words.append(f"{names} would explain it equally well; these drives cannot tell which of them it is.")
-    measure = _CELLS.get(finding.cell, finding.measure)
+    measure = _PLAIN_GROUPS.get(finding.statistic, finding.measure)
     change = f"{_cm(finding.error_before)} before, {_cm(finding.error_after)} now"
     words.append(f"Error of the {measure} on held-out blocks: {change}.")
     return " ".join(word for word in words if word)
@@ -149,7 +149,7 @@ def meaning(finding: Finding, result: LoopResult) -> str:
 def feedback_words(item: Feedback) -> str:
     """Why a column is no cause, in a sentence."""
     shared = f"above {BAND[0]:g}{GAP}Hz, where drivers hardly respond, its squared coherence with the {item.of} is"
-    told = f"the movement predicts {100 * item.foretold:.0f}{GAP}% of its changes"
+    told = f"the movement predicts {100 * item.predicted_share:.0f}{GAP}% of its changes"
     verdict = "it may follow from the car's own movement" if item.doubtful else "it follows from the car's own movement"
     return f"{shared} {item.coherence:.2f}, and {told}: {verdict}"
 
@@ -196,10 +196,10 @@ def most(lack_of_fit: LackOfFit, number: int = 4) -> tuple[GroupError, ...]:
 def group_words(name: str, result: LoopResult) -> str:
     """A group of cells as a reader would call it."""
     for finding in result.findings:
-        own = finding.cell.partition(" by effect: ")[2]
+        own = finding.statistic.partition(" by effect: ")[2]
         if own and name.endswith(f" by effect: {own}"):
             return f"{name.partition(' by ')[0]} by the effect of {' and '.join(finding.columns) or finding.effect}"
-    return _CELLS.get(name, name)
+    return _PLAIN_GROUPS.get(name, name)
 
 
 def _hidden_sentence(finding: Finding) -> str:

@@ -5,12 +5,13 @@ from __future__ import annotations
 from itertools import pairwise
 from math import inf, isfinite
 
+import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.driver.records import Record
 from xosc_lateral.driver.sensor.likelihood import Colour
-from xosc_lateral.driver.sensor.texture import wandering_level
+from xosc_lateral.driver.sensor.texture import amplitude_factor
 from xosc_lateral.errors import DriverProfileError
 
 FloatArray = NDArray[np.float64]
@@ -45,8 +46,8 @@ class SensorModel(Record, frozen=True):
     frequencies, densities : tuple of float
         Density of the error as it was measured in runs, see `texture`; empty: as the parts above have it.
         [Hz], [m2/Hz]
-    wanders, lasts : float
-        Variance of the log of the density over time [-], and how long a level lasts [s].
+    level_variance, level_duration : float
+        Variance of the log of the density over time [-], and how long a level lasts [s]; in files `wanders`, `lasts`.
 
     Raises
     ------
@@ -64,17 +65,17 @@ class SensorModel(Record, frozen=True):
     driver_share: tuple[float, float] = (0.0, 1.0)
     frequencies: tuple[float, ...] = ()
     densities: tuple[float, ...] = ()
-    wanders: float = 0.0
-    lasts: float = 60.0
+    level_variance: float = msgspec.field(default=0.0, name="wanders")
+    level_duration: float = msgspec.field(default=60.0, name="lasts")
 
     def __post_init__(self) -> None:
         """Check."""
         parts = (self.white, self.coloured, self.rounding, self.driver_variance, self.sensor_variance)
-        numbers = (*parts, self.wanders, *self.frequencies, *self.densities)
+        numbers = (*parts, self.level_variance, *self.frequencies, *self.densities)
         if not all(map(isfinite, numbers)) or min(numbers) < 0 or self.order < 0 or not self.corner > 0:
             raise DriverProfileError(f"sensor: {self}")
         rising = all(low < high for low, high in pairwise(self.frequencies))
-        if len(self.frequencies) != len(self.densities) or not rising or not 0.0 < self.lasts < inf:
+        if len(self.frequencies) != len(self.densities) or not rising or not 0.0 < self.level_duration < inf:
             raise DriverProfileError(f"sensor: {self}")
 
     @property
@@ -109,7 +110,9 @@ class SensorModel(Record, frozen=True):
         frequency: FloatArray = np.asarray(np.fft.rfftfreq(padded, step), dtype=np.float64)
         gain = np.sqrt(self.in_runs(frequency) / (2.0 * step))
         error: FloatArray = np.fft.irfft(np.fft.rfft(rng.normal(size=padded)) * gain, padded)[:n]
-        return error * wandering_level(self.wanders, self.lasts, n, step, rng) if self.wanders else error
+        if not self.level_variance:
+            return error
+        return error * amplitude_factor(self.level_variance, self.level_duration, n, step, rng)
 
     def in_runs(self, frequency: FloatArray) -> FloatArray:
         """One-sided power density of the error in runs at 5 Hz. [m2/Hz] Shape as `frequency` [Hz]."""

@@ -13,7 +13,7 @@ from xosc_lateral.driver.sensor.likelihood import Colour, Known, Solution, solve
 from xosc_lateral.driver.sensor.model import SensorModel
 from xosc_lateral.driver.sensor.periodogram import Periodogram, periodogram, windows_of
 from xosc_lateral.driver.sensor.quantisation import is_too_coarse, quantisation_step, rounding_density
-from xosc_lateral.driver.sensor.texture import FAST, LEAST_SHARE, MANY, measured_density, wandering
+from xosc_lateral.driver.sensor.texture import FAST, LEAST_SHARE, MANY, level_variation, measured_density
 from xosc_lateral.driver.sensor.vehicle_bound import density
 
 FloatArray = NDArray[np.float64]
@@ -134,14 +134,14 @@ def separate(
 def _textured(
     split: Separation, runs: Sequence[FloatArray], frequency: FloatArray, windows: FloatArray, step: float
 ) -> Separation:
-    """With the error's density as measured, and how its level wanders where the sensor outweighs the driver."""
+    """With the error's density as measured, and how its level varies where the sensor outweighs the driver."""
     share = 1.0 - split.driver_share_of(frequency)
     frequencies, densities = measured_density(frequency, windows, share)
     sensor = replace(split.sensor, frequencies=rounded(frequencies), densities=rounded(densities))
     fast = frequency > FAST
     if (windows.mean(axis=0) * share)[fast].sum() > LEAST_SHARE * windows.mean(axis=0)[fast].sum():
-        wanders, lasts = wandering(runs, sensor.sample(MANY, step, np.random.default_rng(0)), step)
-        sensor = replace(sensor, wanders=rounded((wanders,))[0], lasts=rounded((lasts,))[0])
+        variance, duration = level_variation(runs, sensor.sample(MANY, step, np.random.default_rng(0)), step)
+        sensor = replace(sensor, level_variance=rounded((variance,))[0], level_duration=rounded((duration,))[0])
     return Separation(split.knots, sensor, split.rounding, split.is_too_coarse)
 
 

@@ -1,8 +1,8 @@
-"""What a sensor's error looks like in runs: its density as measured, and how its level wanders.
+"""What a sensor's error looks like in runs: its density as measured, and how its level varies.
 
 The parametric split (`separation`) says how much of each frequency is the sensor's. The measured density, times that
 share, is what the error has in runs: with bumps of a provider's smoothing, and with what resampling leaves above
-1.5 Hz. And a camera is not equally noisy everywhere: the log of the density wanders, smoothly, as a critically damped
+1.5 Hz. And a camera is not equally noisy everywhere: the log of the density varies, smoothly, as a critically damped
 autoregression of second order (one of first order has corners, which show up to half the sampling rate).
 """
 
@@ -26,7 +26,7 @@ FAST = 0.9
 """Above it the level is looked at: there a sensor that shows at all outweighs the driver (docs/real_data.md). [Hz]"""
 
 LEAST_SHARE = 0.5
-"""Of the power above `FAST` that is the sensor's; below, the level that wanders may be the driver's. [-]"""
+"""Of the power above `FAST` that is the sensor's; below, a level that varies may be the driver's. [-]"""
 
 TRANSITION, ATTENUATION = 0.3, 40.0
 """Of the high-pass: from 0.75 to 1.05 Hz; of 30 cm of slow movement 3 mm would be left, and it is steep. [Hz], [dB]"""
@@ -77,8 +77,8 @@ def measured_density(
     return middles, tuple(float(density[inside].mean()) for inside in rows)
 
 
-def wandering(runs: Sequence[FloatArray], noise: FloatArray, step: float) -> tuple[float, float]:
-    """How the level of fast movement wanders, beyond what chance does to stationary noise.
+def level_variation(runs: Sequence[FloatArray], noise: FloatArray, step: float) -> tuple[float, float]:
+    """How the level of fast movement varies, beyond what chance does to stationary noise.
 
     Parameters
     ----------
@@ -92,7 +92,7 @@ def wandering(runs: Sequence[FloatArray], noise: FloatArray, step: float) -> tup
     Returns
     -------
     float, float
-        Variance of the log of the density [-] and how long a level lasts [s]; 0 where it doesn't wander.
+        Variance of the log of the density [-] and how long a level lasts [s]; 0 where it doesn't vary.
     """
     rows = round(PIECE / step)
     levels = [_log_power(run, rows, step) for run in runs]
@@ -108,10 +108,10 @@ def wandering(runs: Sequence[FloatArray], noise: FloatArray, step: float) -> tup
     return variance, float(-APART * PIECE / np.log(kept))
 
 
-def wandering_level(variance: float, lasts: float, n: int, step: float, rng: np.random.Generator) -> FloatArray:
+def amplitude_factor(variance: float, duration: float, n: int, step: float, rng: np.random.Generator) -> FloatArray:
     """Factor on the error's amplitude, shape (n,), whose square has the mean 1. [-]"""
-    keep = float(np.exp(-step / (lasts / TIMES_TO_1_E)))
-    before = round(WARM_UP * lasts / step)
+    keep = float(np.exp(-step / (duration / TIMES_TO_1_E)))
+    before = round(WARM_UP * duration / step)
     kicks = np.sqrt(variance * (1.0 - keep**2) ** 3 / (1.0 + keep**2)) * rng.normal(size=before + n)
     level = recur(np.zeros(2), kicks, np.array([2.0 * keep, -(keep**2)]))[2 + before :]
     return np.asarray(np.exp(0.5 * (level - 0.5 * variance)))

@@ -32,7 +32,7 @@ class Description:
         [m], or a factor.
     error : float
         Standard error of the size.
-    cell : str
+    statistic : str
         Group of summary statistics that shows it best.
     measure : str
         What the errors before and after compare.
@@ -43,7 +43,7 @@ class Description:
     shape: str
     size: float
     error: float
-    cell: str
+    statistic: str
     measure: str
     lag_s: float | None = None
     response_s: float | None = None

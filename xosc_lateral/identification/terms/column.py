@@ -109,7 +109,7 @@ class ColumnTerm(Term):
             shape=effect.shape,
             size=size,
             error=abs(strength) * relative * (1.0 if on_mean else size),
-            cell=f"{self.group} by effect: {key}",
+            statistic=f"{self.group} by effect: {key}",
             measure=f"{'mean offset' if on_mean else 'spread'} by fifths of the effect's own quantity",
             lag_s=effect.lag_s,
             response_s=effect.response_s,

@@ -68,5 +68,5 @@ class DriftTerm(Term):
         """Standard deviation and correlation time."""
         effect = effects[0]
         assert isinstance(effect, Drift)
-        shape, cell = f"correlated over {effect.correlation_s:.0f} s", "movement by band"
-        return Description("slow drift", shape, effect.size, effect.size_error, cell, cell)
+        shape, statistic = f"correlated over {effect.correlation_s:.0f} s", "movement by band"
+        return Description("slow drift", shape, effect.size, effect.size_error, statistic, statistic)

@@ -91,8 +91,8 @@ class RegimesTerm(Term):
         effect = effects[0]
         assert isinstance(effect, Regimes)
         shape = f"on for {effect.on_s:.0f} s, off for {effect.off_s:.0f} s on average"
-        cell = "quantiles of local spread"
-        return Description("on/off regimes", shape, effect.factor, effect.factor_error, cell, cell)
+        statistic = "quantiles of local spread"
+        return Description("on/off regimes", shape, effect.factor, effect.factor_error, statistic, statistic)
 
 
 def _probability(fitted: Fitted, known: FloatArray, rng: np.random.Generator) -> float:

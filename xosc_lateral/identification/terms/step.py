@@ -80,5 +80,5 @@ class StepTerm(Term):
         """Height and moment."""
         effect = effects[0]
         assert isinstance(effect, Step)
-        cell = f"mean by effect: {key}"
-        return Description("step", f"at {effect.at_s:.0f} s", effect.size, effect.size_error, cell, cell)
+        statistic = f"mean by effect: {key}"
+        return Description("step", f"at {effect.at_s:.0f} s", effect.size, effect.size_error, statistic, statistic)

@@ -93,8 +93,8 @@ class VarianceTrend(Term):
         effect = effects[0]
         assert isinstance(effect, GrowingSpread)
         name = f"{'growing' if effect.factor > 1 else 'shrinking'} spread"
-        cell = "spread by time"
-        return Description(name, "log-linear in time", effect.factor, effect.factor_error, cell, cell)
+        statistic = "spread by time"
+        return Description(name, "log-linear in time", effect.factor, effect.factor_error, statistic, statistic)
 
 
 def _probability(fitted: Fitted, slow: bool) -> float:
