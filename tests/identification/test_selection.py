@@ -52,9 +52,9 @@ def test_a_planted_effect_is_named(driven: Driven, plant: plants.Plant, expected
 @pytest.mark.parametrize(
     ("plant", "shape"),
     [
-        (plants.ShiftBy(("truck_right", "lane_index"), 0.5, plants.Response(lag=1.0)), Product),
-        (plants.ShiftBy(("grade",), 0.4, plants.Response(plants.threshold(2.0), lag=1.0)), Threshold),
-        (plants.ShiftBy(("grade",), 0.4, plants.Response(plants.saturating(1.0), lag=1.0)), Saturating),
+        (plants.ShiftBy(("truck_right", "lane_index"), 0.5, plants.SimulatedResponse(lag=1.0)), Product),
+        (plants.ShiftBy(("grade",), 0.4, plants.SimulatedResponse(plants.threshold(2.0), lag=1.0)), Threshold),
+        (plants.ShiftBy(("grade",), 0.4, plants.SimulatedResponse(plants.saturating(1.0), lag=1.0)), Saturating),
         (plants.LanePreference((0.3, -0.3, 0.3)), Levels),
     ],
     ids=["product", "threshold", "saturating", "levels"],
