@@ -14,9 +14,12 @@ from scipy.signal import lfilter
 
 from xosc_lateral.datasets import simulate_drive
 from xosc_lateral.datasets.movements import (
+    bursts,
     clustered,
     delayed_control,
     heavy_tailed,
+    lopsided,
+    pursuit,
     record_movement,
     reflected,
     wandering,
@@ -29,6 +32,9 @@ MOVEMENTS = {
     "reflected": reflected,
     "delayed_control": delayed_control,
     "clustered": clustered,
+    "bursts": bursts,
+    "lopsided": lopsided,
+    "pursuit": pursuit,
 }
 FOLLOWING = ["steering_wheel_angle", "yaw_rate"]
 

@@ -1,6 +1,6 @@
 """The protocol of proof, run: what is named on drives with known truth, beside what an oracle can see.
 
-    python -m benchmarks.identification_study --set design|validation|test [--only NAME] [-o OUT.jsonl]
+    python -m benchmarks.identification_study --set design|validation|test|design_2|validation_2|test_2 [--only NAME] [-o OUT.jsonl]
 
 docs/validation/identification.toml fixes seeds, movements, kinds, sizes and counts; `--share` runs a part of them. One
 line per drive goes to OUT.jsonl as it is finished; `--table OUT.jsonl` prints the tables of the documents.
@@ -35,6 +35,7 @@ from xosc_lateral.identification.identify import identify
 from xosc_lateral.identification.regression import Coarse, fit_model
 from xosc_lateral.identification.timeline import coarse_mean, join_drives
 
+SETS = ("design", "validation", "test", "design_2", "validation_2", "test_2")
 PROTOCOL = Path(__file__).parents[1] / "docs" / "validation" / "identification.toml"
 
 
@@ -227,7 +228,7 @@ def _plain(name: str) -> str:
 def main() -> None:
     """Run a set, or print the tables of one that was run."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--set", default="design", choices=("design", "validation", "test"))
+    parser.add_argument("--set", default="design", choices=SETS)
     parser.add_argument("--only", default="")
     parser.add_argument("--share", type=float, default=1.0)
     parser.add_argument("--seconds", type=float)

@@ -111,6 +111,37 @@ def clustered(n: int, rng: np.random.Generator) -> np.ndarray:
     return 0.2 * _scaled(_smooth(_filtered(loudness * rng.normal(size=n), 5.0)))
 
 
+def bursts(n: int, rng: np.random.Generator) -> np.ndarray:
+    """Corrections come in bursts: pushed three times as hard for 1 to 5 s, then hardly for 2 to 15. Shape (n,). [m]"""
+    loud = np.empty(n)
+    start, on = 0, False
+    while start < n:
+        stop = start + round((rng.uniform(1.0, 5.0) if on else rng.uniform(2.0, 15.0)) / PACE)
+        loud[start:stop] = 3.0 if on else 1.0
+        start, on = stop, not on
+    return 0.2 * _scaled(_smooth(_filtered(loud * rng.normal(size=n), 5.0)))
+
+
+def lopsided(n: int, rng: np.random.Generator) -> np.ndarray:
+    """Pushed to one side seldom and far, to the other often and little: gamma with shape 0.7. Shape (n,). [m]"""
+    pushes = rng.gamma(0.7, size=n) - 0.7
+    return 0.2 * _scaled(_smooth(_filtered(pushes, 4.0)) + 0.4 * _wander(n, rng, 40.0))
+
+
+def pursuit(n: int, rng: np.random.Generator) -> np.ndarray:
+    """Goes to one place after the other, each by a jerk-free move of 2 to 8 s, and stays for up to 10. Shape (n,). [m]"""
+    out = np.empty(n)
+    place, at = 0.0, 0
+    while at < n:
+        goal = 0.15 * rng.normal()
+        move, stay = round(rng.uniform(2.0, 8.0) / PACE), round(rng.uniform(0.0, 10.0) / PACE)
+        done = np.arange(1, move + 1) / move
+        path = np.concatenate([place + (goal - place) * done**3 * (10.0 - 15.0 * done + 6.0 * done**2), [goal] * stay])
+        out[at : at + len(path)] = path[: n - at]
+        place, at = goal, at + len(path)
+    return out + 0.02 * _smooth(_wander(n, rng, 1.0))
+
+
 def in_regimes(n: int, rng: np.random.Generator) -> np.ndarray:
     """For a minute at a time, pushed 2.5 times as hard; and then quiet for two. Shape (n,). [m]"""
     loud = np.ones(n)
