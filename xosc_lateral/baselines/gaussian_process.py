@@ -1,4 +1,9 @@
-"""A Gaussian process with the measured autocovariance: all that second moments can say."""
+"""A Gaussian process with the measured autocovariance: all that second moments can say.
+
+References
+----------
+.. [1] C. E. Rasmussen, C. K. I. Williams, "Gaussian Processes for Machine Learning", 2006, eqs. 2.19, 4.9 and 4.17.
+"""
 
 from __future__ import annotations
 

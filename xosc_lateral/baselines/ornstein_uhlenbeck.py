@@ -1,4 +1,10 @@
-"""The Ornstein-Uhlenbeck process: the simplest noise that comes back."""
+"""The Ornstein-Uhlenbeck process: the simplest noise that comes back.
+
+References
+----------
+.. [1] D. T. Gillespie, "Exact numerical simulation of the Ornstein-Uhlenbeck process and its integral", Physical
+       Review E 54, 1996.
+"""
 
 from __future__ import annotations
 

@@ -3,6 +3,10 @@
 Each movement knows nothing of the context columns that its table is given; so whatever a trace names there is chance.
 They differ in what a test of significance may wrongly take for granted: short memory, normal innovations, fine
 resolution, a linear pull to the middle, a steady loudness.
+
+References
+----------
+.. [1] G. E. Uhlenbeck, L. S. Ornstein, "On the theory of the Brownian motion", Physical Review 36, 1930.
 """
 
 from __future__ import annotations

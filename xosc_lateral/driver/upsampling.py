@@ -3,6 +3,9 @@
 Each piece is the quintic that meets value, slope and second derivative at both of its samples, where slope and second
 derivative are the central differences there. It needs one sample before and one behind the piece, no more, so that a
 stream can follow it; a spline through all samples would need them all.
+
+Derived here: six conditions (value, slope and second derivative at u = 0 and 1) fix the six coefficients; solved by
+hand.
 """
 
 from __future__ import annotations

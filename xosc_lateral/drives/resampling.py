@@ -4,6 +4,10 @@ Resampling in two steps. Rows are interpolated linearly to 40 Hz, which evens ou
 low-pass (Kaiser window, pass to 1.5 Hz, stop from 2.5 Hz = half the final rate, 50 dB) then keeps what lies above
 half the final rate from folding back. Past its two ends a run is continued point-symmetrically, so that a slope is
 kept. Context is averaged over +-0.2 s with positive weights instead: a leader that appears must not ring.
+
+References
+----------
+.. [1] J. F. Kaiser, "Nonrecursive digital filter design using the I0-sinh window function", Proc. IEEE ISCAS 1974.
 """
 
 from __future__ import annotations

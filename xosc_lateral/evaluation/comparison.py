@@ -1,4 +1,9 @@
-"""How two profiles differ: metrics of snippets from long free runs of both."""
+"""How two profiles differ: metrics of snippets from long free runs of both.
+
+References
+----------
+.. [1] N. Neis, J. Beyerer, arXiv:2405.17080, 2024: the ten metrics of a snippet.
+"""
 
 from __future__ import annotations
 

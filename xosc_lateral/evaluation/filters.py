@@ -1,4 +1,9 @@
-"""Movement below 0.5 Hz: what drivers do, without most of what cameras add."""
+"""Movement below 0.5 Hz: what drivers do, without most of what cameras add.
+
+References
+----------
+.. [1] J. F. Kaiser, "Nonrecursive digital filter design using the I0-sinh window function", Proc. IEEE ISCAS 1974.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,10 @@
-"""What is compared in a set of windows, computed once and then for any choice of rows."""
+"""What is compared in a set of windows, computed once and then for any choice of rows.
+
+References
+----------
+.. [1] A. Ramdas, N. García Trillos, M. Cuturi, "On Wasserstein two-sample testing and related families of
+       nonparametric tests", Entropy 19, 2017.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,9 @@
-"""Measured snippets of one length as arrays, and the same snippets sampled from a profile."""
+"""Measured snippets of one length as arrays, and the same snippets sampled from a profile.
+
+References
+----------
+.. [1] N. Neis, J. Beyerer, arXiv:2405.17080, 2024: snippets of 10 s, each sampled one from its real one's start.
+"""
 
 from __future__ import annotations
 

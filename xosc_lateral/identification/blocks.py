@@ -1,4 +1,9 @@
-"""Blocks of driving that are held out together, and the folds that they are dealt to."""
+"""Blocks of driving that are held out together, and the folds that they are dealt to.
+
+References
+----------
+.. [1] P. Burman, E. Chow, D. Nolan, "A cross-validatory method for dependent data", Biometrika 81, 1994.
+"""
 
 from __future__ import annotations
 

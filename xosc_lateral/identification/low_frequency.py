@@ -8,6 +8,10 @@ sums over frequencies, weighted by that spectrum.
 Two nulls, and the less convinced one is believed: simulated rows with such a wander, and the drive's own rows with
 the sign of whole minutes drawn anew. The first knows how a wander goes on from minute to minute; the second knows how
 large a single odd minute may be (a driver who sits on the marking for a while is no drift).
+
+References
+----------
+.. [1] U. K. Müller, M. W. Watson, "Testing models of low-frequency variability", Econometrica 76, 2008.
 """
 
 from __future__ import annotations

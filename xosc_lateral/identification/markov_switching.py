@@ -1,4 +1,10 @@
-"""On/off regimes as a two-state hidden Markov model of the innovations' size."""
+"""On/off regimes as a two-state hidden Markov model of the innovations' size.
+
+References
+----------
+.. [1] J. D. Hamilton, "A new approach to the economic analysis of nonstationary time series and the business cycle",
+       Econometrica 57, 1989.
+"""
 
 from __future__ import annotations
 

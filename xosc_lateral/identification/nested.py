@@ -1,4 +1,10 @@
-"""Held-out gain of everything that was accepted: each fold's terms are selected and sized without it."""
+"""Held-out gain of everything that was accepted: each fold's terms are selected and sized without it.
+
+References
+----------
+.. [1] S. Varma, R. Simon, "Bias in error estimation when using cross-validation for model selection", BMC
+       Bioinformatics 7, 2006.
+"""
 
 from __future__ import annotations
 

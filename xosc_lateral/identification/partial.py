@@ -1,4 +1,9 @@
-"""What the measured drives show of one effect alone: offsets with everything else taken out, averaged by its column."""
+"""What the measured drives show of one effect alone: offsets with everything else taken out, averaged by its column.
+
+References
+----------
+.. [1] W. A. Larsen, S. J. McCleary, "The use of partial residual plots in regression analysis", Technometrics 14, 1972.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,9 @@
-"""Whether drivers differ: do the drives' mean offsets, or their spreads, scatter more than each one's halves do?"""
+"""Whether drivers differ: do the drives' mean offsets, or their spreads, scatter more than each one's halves do?
+
+References
+----------
+.. [1] S. R. Searle, G. Casella, C. E. McCulloch, "Variance Components", Wiley 1992, chapter 3.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,9 @@
-"""From the dictionary's grid to the best lag, time constant and shape of one set of columns, in the same regression."""
+"""From the dictionary's grid to the best lag, time constant and shape of one set of columns, in the same regression.
+
+References
+----------
+.. [1] G. Schwarz, "Estimating the dimension of a model", Annals of Statistics 6, 1978.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,9 @@
-"""Squares of innovations, slower and finer than a second: what tells how large the movement is just now."""
+"""Squares of innovations, slower and finer than a second: what tells how large the movement is just now.
+
+References
+----------
+.. [1] A. C. Harvey, "Estimating regression models with multiplicative heteroscedasticity", Econometrica 44, 1976.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,10 @@
-"""Free space between vehicles: the exact distance between their bounding boxes, seen from above."""
+"""Free space between vehicles: the exact distance between their bounding boxes, seen from above.
+
+References
+----------
+.. [1] C. Ericson, "Real-Time Collision Detection", 2005, sections 5.1.2 (point and line segment) and 5.2.1
+       (separating axes).
+"""
 
 from __future__ import annotations
 

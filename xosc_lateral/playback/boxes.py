@@ -1,4 +1,10 @@
-"""Bounding boxes in the plane: overlap, and gaps between them. [m]"""
+"""Bounding boxes in the plane: overlap, and gaps between them. [m]
+
+References
+----------
+.. [1] C. Ericson, "Real-Time Collision Detection", 2005, sections 5.1.2 (point and line segment) and 5.2.1
+       (separating axes).
+"""
 
 from __future__ import annotations
 

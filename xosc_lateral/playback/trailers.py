@@ -1,4 +1,8 @@
-"""Trailers: drawn behind their tractor on a drawbar, the coupler always in the hitch."""
+"""Trailers: drawn behind their tractor on a drawbar, the coupler always in the hitch.
+
+Derived here: the line from hitch to coupler keeps its direction towards where the trailer was (a tractrix in small
+steps); its length is the drawbar's.
+"""
 
 from __future__ import annotations
 

@@ -3,6 +3,8 @@
 With a the start, b the change, c the range of the parameter (time or distance) and p the parameter:
 linear a + b p / c; cubic a + b (p/c)^2 (3 - 2 p/c); sinusoidal a + b (1 - cos(pi p/c)) / 2; step: a + b at once.
 A dynamics dimension `rate` gives the peak of the slope, hence c = |b| / rate, 1.5 |b| / rate, pi |b| / (2 rate).
+
+The peaks are those of the derivatives, at p = c / 2: (6 / 4) b / c of the cubic, (pi / 2) b / c of the sinusoid.
 """
 
 from __future__ import annotations

@@ -1,4 +1,10 @@
-"""Arc length of parametric cubics: from metres along the road to the parameter of paramPoly3 and poly3."""
+"""Arc length of parametric cubics: from metres along the road to the parameter of paramPoly3 and poly3.
+
+References
+----------
+.. [1] ASAM OpenDRIVE 1.8, chapter 9, "Parametric cubic curve": p runs with the arc length, or from 0 to 1.
+.. [2] M. Abramowitz, I. A. Stegun, "Handbook of Mathematical Functions", 1964, table 25.4: Gauss-Legendre nodes.
+"""
 
 from __future__ import annotations
 

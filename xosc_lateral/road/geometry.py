@@ -2,6 +2,10 @@
 
 Every element answers `at(ds)` -> (x, y, heading) and `curvature_at(ds)`, with ds [m] from its start; beyond its ends it
 is continued. Arrays of places are evaluated in `reference_line` from the same pieces.
+
+References
+----------
+.. [1] ASAM OpenDRIVE 1.8, chapter 9: line, spiral, arc, parametric cubic curve.
 """
 
 from __future__ import annotations

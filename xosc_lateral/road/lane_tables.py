@@ -1,4 +1,9 @@
-"""Lanes of a network as flat arrays: which lane is where, how wide, how fast; for arrays of places."""
+"""Lanes of a network as flat arrays: which lane is where, how wide, how fast; for arrays of places.
+
+References
+----------
+.. [1] ASAM OpenDRIVE 1.8, chapter 11: ids, widths and speeds of lanes.
+"""
 
 from __future__ import annotations
 

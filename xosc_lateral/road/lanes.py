@@ -1,4 +1,9 @@
-"""Lanes and lane sections, and how widths, borders and the lane offset make their edges."""
+"""Lanes and lane sections, and how widths, borders and the lane offset make their edges.
+
+References
+----------
+.. [1] ASAM OpenDRIVE 1.8, chapter 11: lane offset, and section 11.6, widths, borders and heights of lanes.
+"""
 
 from __future__ import annotations
 

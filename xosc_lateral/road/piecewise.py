@@ -1,4 +1,9 @@
-"""Piecewise cubic functions of s, one at a time in plain floats: lane edges, elevation, superelevation."""
+"""Piecewise cubic functions of s, one at a time in plain floats: lane edges, elevation, superelevation.
+
+References
+----------
+.. [1] ASAM OpenDRIVE 1.8, sections 10.5.1 and 11.6.1: a + b ds + c ds^2 + d ds^3, valid until the next record begins.
+"""
 
 from __future__ import annotations
 

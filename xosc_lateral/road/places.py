@@ -1,4 +1,8 @@
-"""One place on one road at a time, in plain floats: what the player asks at every step."""
+"""One place on one road at a time, in plain floats: what the player asks at every step.
+
+Derived here: the surface's axes are the reference line's, turned by its pitch and then by its roll; heading, pitch and
+roll of a vehicle follow from the axes that its own heading gives within that surface.
+"""
 
 from __future__ import annotations
 

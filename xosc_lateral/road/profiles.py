@@ -1,4 +1,9 @@
-"""Profiles along s for arrays of places: piecewise cubics of roads, heights of lanes."""
+"""Profiles along s for arrays of places: piecewise cubics of roads, heights of lanes.
+
+References
+----------
+.. [1] ASAM OpenDRIVE 1.8, section 10.5 (elevation, superelevation) and section 11.6 (height of lanes).
+"""
 
 from __future__ import annotations
 

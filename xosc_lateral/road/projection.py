@@ -1,4 +1,9 @@
-"""From x, y to s, t on roads that are known already: the foot of the perpendicular on the reference line."""
+"""From x, y to s, t on roads that are known already: the foot of the perpendicular on the reference line.
+
+References
+----------
+.. [1] W. H. Press et al., "Numerical Recipes", 3rd ed., 2007, section 9.4: Newton's method kept within a bracket.
+"""
 
 from __future__ import annotations
 

@@ -2,6 +2,8 @@
 
 Lines, arcs and spirals are one kind (clothoid pieces with a power series), paramPoly3 and poly3 the other. Arrays are
 laid out coefficient by coefficient, so that a whole chunk of places is a handful of gathers and multiply-adds.
+
+The series of a clothoid about its middle is derived in docs/design/clothoids.md.
 """
 
 from __future__ import annotations

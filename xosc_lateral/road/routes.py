@@ -1,4 +1,9 @@
-"""Distances and routes over the road network."""
+"""Distances and routes over the road network.
+
+References
+----------
+.. [1] E. W. Dijkstra, "A note on two problems in connexion with graphs", Numerische Mathematik 1, 1959.
+"""
 
 from __future__ import annotations
 

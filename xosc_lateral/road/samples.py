@@ -1,4 +1,9 @@
-"""Samples laid over all lanes, in a grid: which stretches of road are near a point."""
+"""Samples laid over all lanes, in a grid: which stretches of road are near a point.
+
+References
+----------
+.. [1] J. L. Bentley, J. H. Friedman, "Data structures for range searching", ACM Computing Surveys 11, 1979: cells.
+"""
 
 from __future__ import annotations
 

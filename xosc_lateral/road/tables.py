@@ -1,4 +1,8 @@
-"""Arrays of places: everything that `RoadNetwork` answers in a batch."""
+"""Arrays of places: everything that `RoadNetwork` answers in a batch.
+
+A line at the distance t to the left of a reference line of curvature k has the curvature k / (1 - k t): the angle that
+a stretch turns by is the same, its length is (1 - k t) of the reference line's.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,9 @@
-"""Strength by a direction: an angle has no beginning and no end."""
+"""Strength by a direction: an angle has no beginning and no end.
+
+References
+----------
+.. [1] K. V. Mardia, P. E. Jupp, "Directional Statistics", 2000: regression on sine and cosine of an angle.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Growing spread: fatigue, say."""
+"""Growing spread: fatigue, say.
+
+Our own form: the logarithm of the spread is linear in time, the one form of a factor that depends on no choice of zero.
+"""
 
 from __future__ import annotations
 

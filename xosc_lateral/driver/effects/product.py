@@ -1,4 +1,9 @@
-"""Two columns that act together: each alone may do nothing."""
+"""Two columns that act together: each alone may do nothing.
+
+References
+----------
+.. [1] L. S. Aiken, S. G. West, "Multiple Regression: Testing and Interpreting Interactions", 1991: centred factors.
+"""
 
 from __future__ import annotations
 

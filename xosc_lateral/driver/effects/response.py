@@ -1,4 +1,9 @@
-"""How a driver answers to a quantity: when, and how slowly. Block by block; a whole drive is one long block."""
+"""How a driver answers to a quantity: when, and how slowly. Block by block; a whole drive is one long block.
+
+References
+----------
+.. [1] K. J. Åström, B. Wittenmark, "Computer-Controlled Systems", 3rd ed., 1997, chapter 2: a lag sampled exactly.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,10 @@
-"""A periodic weave."""
+"""A periodic weave.
+
+References
+----------
+.. [1] A. Demir, A. Mehrotra, J. Roychowdhury, "Phase noise in oscillators: a unifying theory", IEEE Trans. Circuits
+       and Systems I 47, 2000: a phase in Brownian motion.
+"""
 
 from __future__ import annotations
 

@@ -2,6 +2,10 @@
 
 A process that reverts to its mean twice as fast is the process itself in a time that runs twice as fast (a change of
 time). A series known at even steps of its own time is therefore read off at uneven ones.
+
+References
+----------
+.. [1] E. Catmull, R. Rom, "A class of local interpolating splines", Computer Aided Geometric Design, 1974.
 """
 
 from __future__ import annotations

@@ -1,4 +1,9 @@
-"""Whittle's likelihood of driver plus sensor, climbed by Fisher scoring."""
+"""Whittle's likelihood of driver plus sensor, climbed by Fisher scoring.
+
+References
+----------
+.. [1] P. Whittle, "Estimation and information in stationary time series", Arkiv för Matematik 2, 1953.
+"""
 
 from __future__ import annotations
 

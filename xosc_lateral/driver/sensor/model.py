@@ -1,4 +1,10 @@
-"""What a sensor adds to the offset: white noise, low-passed noise, rounding, as a profile keeps it."""
+"""What a sensor adds to the offset: white noise, low-passed noise, rounding, as a profile keeps it.
+
+References
+----------
+.. [1] M. Shinozuka, G. Deodatis, "Simulation of stochastic processes by spectral representation", Applied Mechanics
+       Reviews 44, 1991.
+"""
 
 from __future__ import annotations
 

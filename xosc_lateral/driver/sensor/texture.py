@@ -4,6 +4,9 @@ The parametric split (`separation`) says how much of each frequency is the senso
 share, is what the error has in runs: with bumps of a provider's smoothing, and with what resampling leaves above
 1.5 Hz. And a camera is not equally noisy everywhere: the log of the density varies, smoothly, as a critically damped
 autoregression of second order (one of first order has corners, which show up to half the sampling rate).
+
+Derived here: a critically damped level has the double root k = exp(-step / time constant); its coefficients are then
+2 k and -k^2, and its variance (1 + k^2) / (1 - k^2)^3 times that of its kicks.
 """
 
 from __future__ import annotations

@@ -1,4 +1,9 @@
-"""A periodic weave of the mean that no column explains."""
+"""A periodic weave of the mean that no column explains.
+
+References
+----------
+.. [1] E. J. Hannan, "The estimation of frequency", J. Applied Probability 10, 1973.
+"""
 
 from __future__ import annotations
 

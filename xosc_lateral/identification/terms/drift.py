@@ -1,4 +1,9 @@
-"""A slow drift of the mean over minutes: a driver's mood, or a camera that warms up. Tested beside a step (`step`)."""
+"""A slow drift of the mean over minutes: a driver's mood, or a camera that warms up. Tested beside a step (`step`).
+
+References
+----------
+.. [1] U. K. Müller, M. W. Watson, "Testing models of low-frequency variability", Econometrica 76, 2008: half cosines.
+"""
 
 from __future__ import annotations
 

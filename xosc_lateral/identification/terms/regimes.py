@@ -1,4 +1,10 @@
-"""Loud and quiet stretches that no column tells apart: distraction, say."""
+"""Loud and quiet stretches that no column tells apart: distraction, say.
+
+References
+----------
+.. [1] J. D. Hamilton, "A new approach to the economic analysis of nonstationary time series and the business cycle",
+       Econometrica 57, 1989.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,8 @@
-"""Beside another entity in the frame of the road: at a difference of t."""
+"""Beside another entity in the frame of the road: at a difference of t.
+
+Derived here: x" = k (target - x) - 2 sqrt(k) x' has the double root -sqrt(k), which is the fastest return without
+overshoot.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,8 @@
-"""SynchronizeAction: be at a place when another entity, the master, is at its own."""
+"""SynchronizeAction: be at a place when another entity, the master, is at its own.
+
+Derived here: the speed m where both accelerations meet, m = v + a x = w + a (t - x), and the way, x (v + m) / 2 +
+(t - x) (m + w) / 2 = s, give a quadratic equation for m.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,9 @@
-"""TimeToCollisionCondition: distance over closing speed."""
+"""TimeToCollisionCondition: distance over closing speed.
+
+References
+----------
+.. [1] J. C. Hayward, "Near-miss determination through use of a scale of danger", Highway Research Record 384, 1972.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,9 @@
-"""Clothoids and clothoid splines: curvature changes evenly with length on each piece."""
+"""Clothoids and clothoid splines: curvature changes evenly with length on each piece.
+
+References
+----------
+.. [1] M. Abramowitz, I. A. Stegun, "Handbook of Mathematical Functions", 1964, table 25.4: Gauss-Legendre nodes.
+"""
 
 from __future__ import annotations
 

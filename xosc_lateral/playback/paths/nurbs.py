@@ -1,4 +1,9 @@
-"""NURBS curves, sampled each metre of their control polygon (as in the reference player) into a polyline."""
+"""NURBS curves, sampled each metre of their control polygon (as in the reference player) into a polyline.
+
+References
+----------
+.. [1] L. Piegl, W. Tiller, "The NURBS Book", 2nd ed., 1997, eqs. 2.5 (Cox and de Boor) and 4.1 (the curve).
+"""
 
 from __future__ import annotations
 

@@ -1,8 +1,11 @@
 """Polylines: straight pieces between vertices, perhaps with headings and times.
 
-In `position` mode the speed is constant on each piece and the heading that of the vertex at its start, blended into its
-neighbours within 2 m (or half the piece) of the corners. In `follow` mode the heading changes evenly over a piece, and
-so does the speed.
+In `position` mode the speed is constant on each piece and the heading that of the vertex at its start, blended into
+its neighbours within 2 m (or half the piece) of the corners. In `follow` mode the heading changes evenly over a piece,
+and so does the speed.
+
+Derived here: a piece of length ds that takes dt, begun at the speed v, has the constant acceleration 2 (ds - v dt) /
+dt^2.
 """
 
 from __future__ import annotations

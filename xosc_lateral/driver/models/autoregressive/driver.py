@@ -1,4 +1,9 @@
-"""Drivers drawn from the population that a model stands for."""
+"""Drivers drawn from the population that a model stands for.
+
+References
+----------
+.. [1] D. B. Rubin, "Using the SIR algorithm to simulate posterior distributions", Bayesian Statistics 3, 1988.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,10 @@
-"""The border between coarse and fine movement: one low-pass to measure by, one to build by."""
+"""The border between coarse and fine movement: one low-pass to measure by, one to build by.
+
+References
+----------
+.. [1] J. F. Kaiser, "Nonrecursive digital filter design using the I0-sinh window function", Proc. IEEE ISCAS 1974.
+.. [2] R. E. Crochiere, L. R. Rabiner, "Multirate Digital Signal Processing", 1983: interpolation phase by phase.
+"""
 
 from __future__ import annotations
 

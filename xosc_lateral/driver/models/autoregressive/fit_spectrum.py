@@ -1,4 +1,9 @@
-"""Spectrum of the autoregressive model: the coarse movement's scale, and fine noise that has what it lacks."""
+"""Spectrum of the autoregressive model: the coarse movement's scale, and fine noise that has what it lacks.
+
+References
+----------
+.. [1] G. Wahba, "Automatic smoothing of the log periodogram", J. American Statistical Association 75, 1980.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,9 @@
-"""Volatility while driving: factors on the coarse and on the fine movement, one value per coarse step."""
+"""Volatility while driving: factors on the coarse and on the fine movement, one value per coarse step.
+
+References
+----------
+.. [1] S. J. Taylor, "Modelling Financial Time Series", Wiley 1986: stochastic volatility.
+"""
 
 from __future__ import annotations
 
