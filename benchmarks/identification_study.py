@@ -1,6 +1,8 @@
 """The protocol of proof, run: what is named on drives with known truth, beside what an oracle can see.
 
-    python -m benchmarks.identification_study --set design|validation|test|design_2|validation_2|test_2 [--only NAME] [-o OUT.jsonl]
+    python -m benchmarks.identification_study --set SET [--only NAME] [-o OUT.jsonl]
+
+SET is design, validation, test, design_2, validation_2 or test_2.
 
 docs/validation/identification.toml fixes seeds, movements, kinds, sizes and counts; `--share` runs a part of them. One
 line per drive goes to OUT.jsonl as it is finished; `--table OUT.jsonl` prints the tables of the documents.

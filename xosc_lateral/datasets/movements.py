@@ -133,7 +133,10 @@ def lopsided(n: int, rng: np.random.Generator) -> np.ndarray:
 
 
 def pursuit(n: int, rng: np.random.Generator) -> np.ndarray:
-    """Goes to one place after the other, each by a jerk-free move of 2 to 8 s, and stays for up to 10. Shape (n,). [m]"""
+    """Goes to one place after the other, each by a jerk-free move of 2 to 8 s, and stays for up to 10 s.
+
+    Shape (n,). [m]
+    """
     out = np.empty(n)
     place, at = 0.0, 0
     while at < n:
