@@ -16,7 +16,6 @@ from xosc_lateral.drives.resampling import STEP
 from xosc_lateral.errors import NotEnoughDataError
 from xosc_lateral.evaluation.comparison import compare_profiles, driver_distances, free_runs, summary_of
 from xosc_lateral.evaluation.distances import (
-    floor_distances,
     metric_distances,
     snippet_distances,
     split_groups,
@@ -93,14 +92,6 @@ def test_halves_share_no_group():
 def test_one_group_alone_can_not_be_split():
     with pytest.raises(NotEnoughDataError, match="1 group"):
         split_groups(np.zeros(5), np.random.default_rng(0))
-
-
-def test_floor_shrinks_with_the_root_of_the_amount():
-    rng = np.random.default_rng(5)
-    rows = rng.normal(size=(3200, 51))
-    small = floor_distances(rows[:200], np.arange(200), np.random.default_rng(1), splits=20).mean
-    large = floor_distances(rows, np.arange(3200), np.random.default_rng(1), splits=20).mean
-    assert small / large == pytest.approx(4.0, rel=0.25)
 
 
 # ---- long-term -------------------------------------------------------------------------------------------------------

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from xosc_lateral.baselines.base import SegmentBatch, SimulatedModel, driver_means_of
 from xosc_lateral.baselines.calibration import Bounds, calibrate
 from xosc_lateral.drives.drive import Run
+from xosc_lateral.drives.filters import first_order
 
 FloatArray = NDArray[np.float64]
 
@@ -68,7 +69,5 @@ def recursion(start: FloatArray, keep: float, kicks: FloatArray) -> FloatArray:
 
     Shapes (n,) and (n, m); result (n, m).
     """
-    from scipy.signal import lfilter
-
     kicks[:, 0] = start
-    return np.asarray(lfilter([1.0], [1.0, -keep], kicks, axis=1), dtype=np.float64)
+    return first_order(kicks, keep)

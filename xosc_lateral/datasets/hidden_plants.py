@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.signal import lfilter
 
 from xosc_lateral.datasets.intent import Context, Intent
 from xosc_lateral.datasets.motorway import STEP
+from xosc_lateral.drives.filters import first_order
 
 
 @dataclass(frozen=True)
@@ -47,7 +47,7 @@ class TargetWander:
         """Move the target."""
         n = len(intent.target)
         keep = np.exp(-STEP / self.time_constant)
-        walk = lfilter([1.0], [1.0, -keep], rng.normal(size=n))
+        walk = first_order(rng.normal(size=n), keep)
         intent.target += self.size * (walk - walk.mean()) / walk.std()
 
 
@@ -162,7 +162,7 @@ class Companion:
     def apply(self, intent: Intent, context: Context, rng: np.random.Generator) -> None:
         """Add the column."""
         source = np.nan_to_num(context[self.of], nan=float(np.nanmax(context[self.of])))
-        own = lfilter([1.0], [1.0, -np.exp(-STEP / self.time_constant)], rng.normal(size=len(source)))
+        own = first_order(rng.normal(size=len(source)), np.exp(-STEP / self.time_constant))
         unit = (source - source.mean()) / source.std()
         own = (own - own.mean()) / own.std()
         context[self.name] = self.correlation * unit + np.sqrt(1.0 - self.correlation**2) * own

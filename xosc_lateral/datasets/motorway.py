@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.signal import lfilter
+
+from xosc_lateral.drives.filters import first_order
 
 STEP = 0.02
 """Time between two simulated states. [s]"""
@@ -47,7 +48,7 @@ def _wander(n: int, rng: np.random.Generator, time_constant: float) -> np.ndarra
     keep = np.exp(-STEP / time_constant)
     noise = rng.normal(size=n) * np.sqrt(1.0 - keep**2)
     noise[0] = rng.normal()
-    return lfilter([1.0], [1.0, -keep], noise)
+    return first_order(noise, keep)
 
 
 def _levels(n: int, rng: np.random.Generator, values: list[float], mean_length: float) -> np.ndarray:

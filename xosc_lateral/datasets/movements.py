@@ -19,6 +19,7 @@ from scipy.signal import lfilter
 
 from xosc_lateral.datasets.driver_simulator import measure, sample_times
 from xosc_lateral.datasets.motorway import N_LANES, STEP, draw_motorway
+from xosc_lateral.drives.filters import first_order
 
 PACE = 0.1
 """Step of the movements [s]; the table interpolates between."""
@@ -178,7 +179,7 @@ def _wander(n: int, rng: np.random.Generator, time_constant: float) -> np.ndarra
 
 
 def _filtered(values: np.ndarray, time_constant: float) -> np.ndarray:
-    return np.asarray(lfilter([1.0], [1.0, -np.exp(-PACE / time_constant)], values))
+    return first_order(values, np.exp(-PACE / time_constant))
 
 
 def _smooth(values: np.ndarray) -> np.ndarray:

@@ -10,11 +10,11 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
-from scipy.signal import lfilter
 
 from xosc_lateral.datasets.intent import Context, Intent
 from xosc_lateral.datasets.motorway import STEP
 from xosc_lateral.datasets.response import SimulatedResponse, lagged
+from xosc_lateral.drives.filters import first_order
 
 
 @dataclass(frozen=True)
@@ -174,5 +174,5 @@ class ShakyCamera:
         """Blur the measurement."""
         strength = SimulatedResponse().scaled(context[self.column])
         keep = np.exp(-STEP / self.memory)
-        error = lfilter([np.sqrt(1.0 - keep**2)], [1.0, -keep], rng.normal(size=len(strength)))
+        error = first_order(rng.normal(size=len(strength)), keep, gain=np.sqrt(1.0 - keep**2))
         intent.camera += self.size * (strength - strength.min()) * error

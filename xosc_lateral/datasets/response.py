@@ -6,9 +6,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.signal import lfilter
 
 from xosc_lateral.datasets.motorway import STEP
+from xosc_lateral.drives.filters import first_order
 
 Shape = Callable[[np.ndarray], np.ndarray]
 
@@ -66,4 +66,4 @@ def lagged(values: np.ndarray, time_constant: float) -> np.ndarray:
     if time_constant <= 0.0:
         return values
     keep = np.exp(-STEP / time_constant)
-    return np.asarray(lfilter([1.0 - keep], [1.0, -keep], values, zi=[keep * values[0]])[0])
+    return first_order(values, keep, gain=1.0 - keep, before=values[0])

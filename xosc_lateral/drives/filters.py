@@ -1,6 +1,7 @@
-"""Low-pass filters: windowed sinc with a Kaiser window, the one design used everywhere.
+"""Filters: low-passes of one design, a windowed sinc with a Kaiser window; first-order lags; gains over frequency.
 
-(What `scipy.signal.firwin` gives too, to rounding; importing that takes 0.4 s, which a conversion hasn't got.)
+(What `scipy.signal.firwin` gives too, to rounding; importing that takes 0.4 s, which a conversion hasn't got. Lags are
+needed where drives are simulated, which has the time.)
 
 References
 ----------
@@ -79,3 +80,47 @@ def low_pass(half: int, cutoff: float, beta: float) -> FloatArray:
     """
     kernel = np.sinc(cutoff * np.arange(-half, half + 1)) * np.kaiser(2 * half + 1, beta)
     return np.asarray(kernel / kernel.sum())
+
+
+def first_order(
+    values: FloatArray, keep: float, *, gain: float = 1.0, before: float | None = None, axis: int = -1
+) -> FloatArray:
+    """``y[k] = keep * y[k - 1] + gain * values[k]``: a first-order lag, or the noise of an autoregression.
+
+    Parameters
+    ----------
+    values : array
+        Even in time along `axis`. [any unit]
+    keep, gain : float
+        exp(-step / time constant), 0 to 1; the gain is ``1 - keep`` for a lag that comes to rest at its input. [-]
+    before : float, optional
+        y before the first row, of a single series; 0 unless given. [unit of the values]
+
+    Returns
+    -------
+    array, shape of `values`
+        In the same unit.
+    """
+    from scipy.signal import lfilter
+
+    if before is None:
+        return np.asarray(lfilter([gain], [1.0, -keep], values, axis=axis), dtype=np.float64)
+    return np.asarray(lfilter([gain], [1.0, -keep], values, axis=axis, zi=[keep * before])[0], dtype=np.float64)
+
+
+def scale_frequencies(values: FloatArray, gain: FloatArray) -> FloatArray:
+    """A series with every frequency scaled; it goes round: its end runs into its beginning.
+
+    Parameters
+    ----------
+    values : array, shape (n,)
+        [any unit]
+    gain : array, shape (n // 2 + 1,)
+        At ``numpy.fft.rfftfreq(n)`` cycles per sample. [-]
+
+    Returns
+    -------
+    array, shape (n,)
+        In the same unit.
+    """
+    return np.asarray(np.fft.irfft(np.fft.rfft(values) * gain, len(values)), dtype=np.float64)

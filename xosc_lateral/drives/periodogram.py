@@ -64,4 +64,30 @@ def window_powers(pieces: FloatArray, *, detrend: Detrend = Detrend.NOTHING) -> 
     elif detrend is Detrend.ENDS:
         slope = np.linspace(0.0, 1.0, size) * (pieces[:, -1:] - pieces[:, :1])
         pieces = pieces - pieces[:, :1] - slope
-    return np.asarray(np.abs(np.fft.rfft(pieces * hann(size), axis=1)) ** 2)
+    return tapered_powers(pieces, hann(size))
+
+
+def tapered_powers(rows: FloatArray, taper: FloatArray | float, *, size: int | None = None) -> FloatArray:
+    """Squared moduli of the transforms of rows seen through any window, padded with zeros to `size`.
+
+    Parameters
+    ----------
+    rows : array, shape (k, n)
+        [any unit]
+    taper : array, shape (n,), or 1
+        [-]
+    size : int, optional
+        n unless given.
+
+    Returns
+    -------
+    array, shape (k, size // 2 + 1)
+        [square of the rows' unit]
+    """
+    return np.asarray(np.abs(np.fft.rfft(rows * taper, n=size, axis=1)) ** 2)
+
+
+def without_line(rows: FloatArray) -> FloatArray:
+    """Rows, shape (k, n), less the straight line through the first and the last value of each. [unit of the rows]"""
+    line = np.linspace(0.0, 1.0, rows.shape[1])
+    return np.asarray(rows - (rows[:, :1] + line * (rows[:, -1:] - rows[:, :1])))

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from xosc_lateral.drives.periodogram import tapered_powers, without_line
 from xosc_lateral.evaluation.metrics import DIFFERENCE_SCALE, snippet_metrics
 from xosc_lateral.evaluation.rocket import rocket_features
 from xosc_lateral.evaluation.shape import shape_features
@@ -83,9 +84,7 @@ def snippet_features(snippets: FloatArray) -> FloatArray:
 
 def _log_power(snippets: FloatArray) -> FloatArray:
     """Log power in bands, straight line from end to end removed, Hann window, shape (n, bands)."""
-    m = snippets.shape[1]
-    line = snippets[:, :1] + np.linspace(0.0, 1.0, m) * (snippets[:, -1:] - snippets[:, :1])
-    power = np.abs(np.fft.rfft((snippets - line) * np.hanning(m), axis=1)) ** 2
+    power = tapered_powers(without_line(snippets), np.hanning(snippets.shape[1]))
     edges = np.unique(np.geomspace(1, power.shape[1], BANDS + 1).astype(np.int64))
     return np.column_stack([np.log(power[:, a:b].mean(axis=1) + 1e-12) for a, b in pairwise(edges.tolist())])
 

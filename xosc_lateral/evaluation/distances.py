@@ -99,22 +99,3 @@ def split_groups(groups: NDArray[np.generic], rng: np.random.Generator) -> NDArr
         raise NotEnoughDataError(f"{len(names)} group of snippets; two are needed to compare real with real")
     chosen = rng.permutation(len(names))[: len(names) // 2]
     return np.isin(groups, names[chosen])
-
-
-def floor_distances(
-    snippets: FloatArray, groups: NDArray[np.generic], rng: np.random.Generator, *, splits: int = 8
-) -> Distances:
-    """Distance that real snippets have from other real ones: what a perfect model can't go below.
-
-    Parameters
-    ----------
-    snippets : array, shape (n, length)
-        Real ones.
-    groups : array, shape (n,)
-        Drive or block that each comes from; halves never share one.
-    splits : int
-        Random halves to average over.
-    """
-    metrics = snippet_metrics(snippets)
-    halves = [split_groups(groups, rng) for _ in range(splits)]
-    return mean_distances([metric_distances(metrics[half], metrics[~half]) for half in halves])

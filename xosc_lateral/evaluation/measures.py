@@ -15,6 +15,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from xosc_lateral.drives.periodogram import tapered_powers, without_line
 from xosc_lateral.evaluation.distances import wasserstein
 from xosc_lateral.evaluation.lane_keeping import INDICATORS, lane_keeping_indicators
 from xosc_lateral.evaluation.metrics import METRICS, snippet_metrics
@@ -91,10 +92,8 @@ def band_power(offset: FloatArray, step: float, *, highest: float = float(BANDS[
     Shape (n, bands).
     """
     m = offset.shape[1]
-    line = np.linspace(0.0, 1.0, m)
-    ramp = offset[:, :1] + line * (offset[:, -1:] - offset[:, :1])
     window = np.hanning(m)
-    power = np.abs(np.fft.rfft((offset - ramp) * window, n=4 * m, axis=1)) ** 2 * 2.0 * step / (window**2).sum()
+    power = tapered_powers(without_line(offset), window, size=4 * m) * 2.0 * step / (window**2).sum()
     frequency = np.fft.rfftfreq(4 * m, step)
     bands = [(frequency >= low) & (frequency < high) for low, high in resolved_bands(m * step, highest)]
     return np.column_stack([power[:, inside].mean(axis=1) for inside in bands])

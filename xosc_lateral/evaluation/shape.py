@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from xosc_lateral.drives.periodogram import tapered_powers
+
 FloatArray = NDArray[np.float64]
 
 SHAPES = (
@@ -104,7 +106,7 @@ def _mode(z: FloatArray, bins: int) -> FloatArray:
 
 def _autocorrelation(z: FloatArray) -> FloatArray:
     m = z.shape[1]
-    power = np.abs(np.fft.rfft(z, n=2 * m, axis=1)) ** 2
+    power = tapered_powers(z, 1.0, size=2 * m)
     products = np.fft.irfft(power, axis=1)[:, : m // 2 + 1]
     return np.asarray(products / np.where(products[:, :1] > 0.0, products[:, :1], 1.0))
 
@@ -115,7 +117,7 @@ def _first(flags: NDArray[np.bool_]) -> FloatArray:
 
 
 def _spectral(z: FloatArray) -> tuple[FloatArray, FloatArray]:
-    power = np.abs(np.fft.rfft(z * np.hanning(z.shape[1]), axis=1)[:, 1:]) ** 2 + 1e-12
+    power = tapered_powers(z, np.hanning(z.shape[1]))[:, 1:] + 1e-12
     share = power / power.sum(axis=1, keepdims=True)
     fifth = max(1, share.shape[1] // 5)
     return share @ np.linspace(0.0, 1.0, share.shape[1]), share[:, :fifth].sum(axis=1)

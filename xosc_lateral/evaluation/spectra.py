@@ -15,6 +15,8 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from xosc_lateral.drives.periodogram import tapered_powers
+
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
 
@@ -90,8 +92,8 @@ def _periodogram(runs: Sequence[FloatArray], length: int, step: float) -> tuple[
     if not parts:
         return frequency, np.zeros(len(frequency)), 0
     rows = np.concatenate(parts)
-    rows = (rows - rows.mean(axis=1, keepdims=True)) * window
-    power = (np.abs(np.fft.rfft(rows, n=PADDING * length, axis=1)) ** 2).mean(axis=0)
+    centred = rows - rows.mean(axis=1, keepdims=True)
+    power = tapered_powers(centred, window, size=PADDING * length).mean(axis=0)
     density: FloatArray = 2.0 * step * power / (window**2).sum()
     return frequency, density, len(rows)
 
@@ -129,7 +131,7 @@ def gapped_spectrum(
     number = len(chosen)
     for index in chosen:
         rows = slice(starts[index], starts[index] + segment)
-        sums += np.mean(np.abs(np.fft.rfft(centred[:, rows] * window, axis=1)) ** 2, axis=0) / shares[index]
+        sums += np.mean(tapered_powers(centred[:, rows], window), axis=0) / shares[index]
     frequency = np.asarray(np.fft.rfftfreq(segment, step), dtype=np.float64)
     density = 2.0 * step * sums / number / float(np.sum(window**2)) if number else np.full(len(frequency), np.nan)
     return frequency[1:], density[1:], number

@@ -100,11 +100,6 @@ class Summary:
         """At this rate; None as long as there is none. [s]"""
         return (self.total - self.finished) / self.rate if self.rate > 0 else None
 
-    @property
-    def is_clean(self) -> bool:
-        """Whether nothing failed, nothing is warned of, and somebody was enriched in every output."""
-        return not (self.failed or self.with_warnings or self.nobody_enriched)
-
     def remarks(self) -> list[str]:
         """What a person has to know besides the counts, a line each."""
         lines = (

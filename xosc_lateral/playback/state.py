@@ -119,11 +119,6 @@ class EntityState:
         return self._free_pose
 
     @property
-    def is_located(self) -> bool:
-        """Whether the road coordinates are those of the world pose (they are worked out on demand)."""
-        return self._located
-
-    @property
     def is_forward(self) -> bool:
         """Whether it points along the road's s-direction."""
         return is_forward(self.relative_heading)

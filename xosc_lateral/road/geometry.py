@@ -12,7 +12,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from math import atan2, ceil, cos, hypot, sin, sqrt
-from typing import Protocol
 
 TURN_PER_PIECE = 0.5
 """A clothoid is expanded in power series over pieces that turn at most by this. [rad]"""
@@ -25,16 +24,6 @@ SERIES_TERMS = 13
 
 MAX_TURN = 2000.0
 """An element that turns more than this is refused by the reader. [rad]"""
-
-
-class ReferenceLineElement(Protocol):
-    """One element of a reference line."""
-
-    def at(self, ds: float) -> tuple[float, float, float]:
-        """x, y, heading at ds. Everything in [m], [rad]."""
-
-    def curvature_at(self, ds: float) -> float:
-        """Curvature at ds, positive to the left. [1/m]"""
 
 
 @dataclass(frozen=True, slots=True)

@@ -240,13 +240,6 @@ class RoadNetwork:
         """Whether the lane exists there. `s` in [m]."""
         return lane in self.roads[road].section_at(s).by_id
 
-    def lane_type_at(self, road: int, lane: int, s: float) -> str:
-        """The lane's type in the words of OpenDRIVE; raises `PlaybackError` for a lane that is not there.
-
-        `s` in [m].
-        """
-        return find_lane(self.roads[road], lane, s).type
-
     def lane_at(
         self, road: int, s: float, t: float, *, lane_types: Collection[str] | None = DRIVING
     ) -> LaneCoordinates:

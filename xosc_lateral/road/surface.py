@@ -116,13 +116,6 @@ class Surface:
         angle, grade = self.superelevation.at(s), self.elevation.with_slope_at(s)[1]
         return -across * tan(angle) * grade / sqrt(1.0 + grade * grade) if angle and grade else 0.0
 
-    def slopes_at(self, s: float, t: float) -> tuple[float, float]:
-        """Climb along +s and angle about s (positive falling to the right). [-], [rad]"""
-        _, grade = self.elevation.with_slope_at(s)
-        angle, twist = self.superelevation.with_slope_at(s)
-        _, lift_along, lean = self.profile_at(s, t)
-        return grade + t * cos(angle) * twist + lift_along, angle + atan(lean)
-
     def profile_at(self, s: float, t: float) -> tuple[float, float, float]:
         """What crossfall and shape add: height, its slope along s, its slope along t. [m], [-], [-]"""
         height = along = lean = 0.0

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from xosc_lateral.driver.records import Record
 from xosc_lateral.driver.sensor.likelihood import Colour
 from xosc_lateral.driver.sensor.texture import amplitude_factor
+from xosc_lateral.drives.filters import scale_frequencies
 from xosc_lateral.errors import DriverProfileError
 
 FloatArray = NDArray[np.float64]
@@ -115,7 +116,7 @@ class SensorModel(Record, frozen=True):
         padded = n + round(30.0 / step)  # a low-passed part must not come round to its own beginning
         frequency: FloatArray = np.asarray(np.fft.rfftfreq(padded, step), dtype=np.float64)
         gain = np.sqrt(self.in_runs(frequency) / (2.0 * step))
-        error: FloatArray = np.fft.irfft(np.fft.rfft(rng.normal(size=padded)) * gain, padded)[:n]
+        error = scale_frequencies(rng.normal(size=padded), gain)[:n]
         if not self.level_variance:
             return error
         return error * amplitude_factor(self.level_variance, self.level_duration, n, step, rng)

@@ -15,6 +15,7 @@ from xosc_lateral.driver.sensor.periodogram import Periodogram, periodogram, win
 from xosc_lateral.driver.sensor.quantisation import is_too_coarse, quantisation_step, rounding_density
 from xosc_lateral.driver.sensor.texture import FAST, LEAST_SHARE, MANY, level_variation, measured_density
 from xosc_lateral.driver.sensor.vehicle_bound import density
+from xosc_lateral.drives.filters import scale_frequencies
 
 FloatArray = NDArray[np.float64]
 
@@ -67,7 +68,7 @@ class Separation:
         about = offset - mean
         extended = np.concatenate([2.0 * about[0] - about[:0:-1], about, 2.0 * about[-1] - about[-2::-1]])
         frequency: FloatArray = np.asarray(np.fft.rfftfreq(len(extended), step), dtype=np.float64)
-        filtered = np.fft.irfft(np.fft.rfft(extended) * np.sqrt(self.driver_share_of(frequency)), len(extended))
+        filtered = scale_frequencies(extended, np.sqrt(self.driver_share_of(frequency)))
         return np.asarray(mean + filtered[n - 1 : 2 * n - 1])
 
     def driver_share_of(self, frequency: FloatArray) -> FloatArray:
