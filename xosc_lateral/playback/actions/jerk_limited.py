@@ -142,7 +142,7 @@ def _one_way(targets: Sequence[SpeedTarget], a0: float, jerk: float) -> list[Row
     )
     a1 = a0 + jerk * (t1 - t0)
     t2 = a1 / jerk + t3
-    if not t0 <= t1 <= t2:
+    if not t0 <= t1 <= t2 <= t3 + EPSILON:
         raise NoSolutionError("the present acceleration is already beyond what is needed")
     v1 = v0 + a0 * (t1 - t0) + 0.5 * jerk * (t1 - t0) ** 2
     return [(t0, v0, a0, jerk), (t1, v1, a1, 0.0), (t2, v1 + a1 * (t2 - t1), a1, jerk), (t3, v3, 0.0, 0.0)]
