@@ -131,6 +131,9 @@ CONTEXT_RANGES: Mapping[str, Range] = MappingProxyType(
 )
 """Context by the names of DESIGN, section 4, in the units of `segment.CONTEXT_UNITS`."""
 
+DISTANCES = frozenset({"lead_distance", "left_distance", "right_distance"})
+"""To vehicles in lanes; infinite where a lane has nobody in it."""
+
 ANY_CONTEXT = Range(-1e30, 1e30, "other names, whatever their unit: squares and cubes stay far from overflow")
 
 

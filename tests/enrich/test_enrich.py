@@ -187,8 +187,9 @@ def test_a_positive_offset_is_to_the_left_of_travel_in_both_traffic_rules(tmp_pa
     push = (np.array([0.0, 10.0]), np.array([1.0, 1.0]))
     for lane in (-2, 2):
         motion = together(drive(network, entity(), lane=lane, start=100.0))
-        base = enrich(motion, network, {"car": simulated_profile()}, seed=1).entity("car").trajectory
-        driver = _with(simulated_profile(), Shift(column="push"))
+        home = structs.replace(simulated_profile(), left_hand=rule == "LHT")
+        base = enrich(motion, network, {"car": home}, seed=1).entity("car").trajectory
+        driver = _with(home, Shift(column="push"))
         pushed = enrich(motion, network, {"car": driver}, seed=1, context={"push": push}).entity("car").trajectory
         heading = motion.entities[0].heading
         left = -np.sin(heading) * (pushed.x - base.x) + np.cos(heading) * (pushed.y - base.y)

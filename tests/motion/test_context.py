@@ -49,7 +49,7 @@ def test_lead_distance_is_bumper_to_bumper_also_across_a_road_border(tmp_path: P
     np.testing.assert_allclose(context["lead_distance"], 60.0 - 0.5 * (5.0 + 15.0), atol=1e-6)
     assert set(context["lead_is_truck"]) == {1.0}
     behind = entity_context(together(own, lead), network, 1, GRID)
-    assert np.isnan(behind["lead_distance"]).all()
+    assert np.isposinf(behind["lead_distance"]).all()
 
 
 @pytest.mark.parametrize(("lane", "neighbour"), [(-2, -1), (2, 1)])
@@ -67,7 +67,18 @@ def test_neighbours_are_found_on_their_side_and_flagged_while_alongside(
     assert set(context["right_is_truck"]) == {1.0}
     assert not context["truck_right"].any()
     np.testing.assert_array_equal(context["car_left"], (np.abs(-60 + 10 * time) <= 15.0 + 1e-9).astype(float))
-    assert np.isnan(context["lead_distance"]).all()
+    assert np.isposinf(context["lead_distance"]).all()
+
+
+@pytest.mark.parametrize(("rule", "outer"), [("RHT", "right"), ("LHT", "left")])
+def test_a_lane_with_nobody_in_it_is_told_from_no_lane(tmp_path: Path, rule: str, outer: str) -> None:
+    network = two_roads(tmp_path, rule=rule)
+    inner = {"right": "left", "left": "right"}[outer]
+    for lane in (-3, 3):
+        own = drive(network, entity("own"), lane=lane, start=100.0)
+        context = entity_context(together(own), network, 0, GRID)
+        assert np.isnan(context[f"{outer}_distance"]).all()
+        assert np.isposinf(context[f"{inner}_distance"]).all()
 
 
 def test_oncoming_traffic_is_seen_ahead_only(tmp_path: Path) -> None:

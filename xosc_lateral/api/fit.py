@@ -42,6 +42,7 @@ def fit(
     source: str = "",
     licence: str = "",
     sensor_noise: float | None = None,
+    left_hand: bool = False,
 ) -> DriverProfile:
     """Fit a driver profile.
 
@@ -57,15 +58,20 @@ def fit(
         Of the drives, for the provenance.
     sensor_noise : float, optional
         Standard deviation of the sensor's error on the offset, where it is known; else found from the drives. [m]
+    left_hand : bool
+        The drives are of left-hand traffic: roads with right-hand traffic get their mirror image.
 
     Raises
     ------
     FormatError, NotEnoughDataError
     """
+    from msgspec.structs import replace
+
     from xosc_lateral.driver.fitting import fit_profile
     from xosc_lateral.driver.profile import Provenance
 
     given = given_drives(drives, columns)
     known = Provenance(source=source or ", ".join(given.inputs), licence=licence, inputs=dict(given.inputs))
     with naming(given):
-        return fit_profile(given.drives, name=name, model=model, provenance=known, sensor_noise=sensor_noise)
+        profile = fit_profile(given.drives, name=name, model=model, provenance=known, sensor_noise=sensor_noise)
+    return replace(profile, left_hand=left_hand)

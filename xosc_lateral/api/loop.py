@@ -63,6 +63,10 @@ def close_loop(
     NotEnoughDataError
         Too little road-following is left after cutting.
     """
+    from dataclasses import replace
+
+    from msgspec.structs import replace as with_fields
+
     from xosc_lateral.driver.profile import Provenance
     from xosc_lateral.identification import close
     from xosc_lateral.identification.lack_of_fit import lack_of_fit_of
@@ -79,6 +83,8 @@ def close_loop(
             excluded=list(leave_out),
             progress=progress or (lambda share, what: None),
         )
+    if base is not None:
+        result = replace(result, refined=with_fields(result.refined, left_hand=base.left_hand))
     return ClosedLoop(result, lack_of_fit_of(result), given)
 
 

@@ -49,6 +49,7 @@ def fit(
         float | None,
         typer.Option(help="Standard deviation of the sensor's error [m]; default: estimated.", min=1e-4, max=2),
     ] = None,
+    left_hand: Annotated[bool, typer.Option("--left-hand", help="Drives of left-hand traffic.")] = False,
     force: Force = False,
     quiet: Quiet = False,
     as_json: AsJson = False,
@@ -73,6 +74,7 @@ def fit(
         source=source,
         licence=licence,
         sensor_noise=sensor_noise,
+        left_hand=left_hand,
     )
     if target is None:
         write_stdout(profile_bytes(profile))

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.errors import DriverProfileError
-from xosc_lateral.limits import OFFSET_LANES, context_range
+from xosc_lateral.limits import DISTANCES, OFFSET_LANES, context_range
 from xosc_lateral.segment import Segment
 
 if TYPE_CHECKING:
@@ -63,7 +63,7 @@ def _lanes(offset: FloatArray, lane_width: FloatArray | float, row: int) -> floa
 
 
 def check_context(context: Mapping[str, float], who: str) -> None:
-    """Refuse one moment's context that no road has. NaN is none, and fine.
+    """Refuse one moment's context that no road has. NaN is none, and fine; so is an infinite distance: nobody in sight.
 
     Raises
     ------
@@ -71,6 +71,8 @@ def check_context(context: Mapping[str, float], who: str) -> None:
         With name, value and range.
     """
     for name, value in context.items():
+        if name in DISTANCES and value == np.inf:
+            continue
         if (why := implausible(name, float(value))) is not None:
             raise ValueError(f"{who}: {why}")
 

@@ -112,6 +112,8 @@ class DriverProfile(Record, frozen=True):
     metadata : Metadata
     sensor : SensorModel, optional
         What the sensor added to the drives it was fitted on, where that is known.
+    left_hand : bool
+        Fitted on left-hand traffic. On a road of the other hand it is sampled as in a mirror.
 
     Raises
     ------
@@ -126,6 +128,7 @@ class DriverProfile(Record, frozen=True):
     provenance: Provenance = field(default_factory=Provenance)
     metadata: Metadata = field(default_factory=Metadata)
     sensor: SensorModel | None = None
+    left_hand: bool = False
 
     def __post_init__(self) -> None:
         """Check."""
@@ -155,7 +158,8 @@ class DriverProfile(Record, frozen=True):
         """Plain JSON values, as the profile file holds them."""
         values = plain(self)
         values["effects"] = [effect.to_dict() for effect in self.effects]
-        order = ("id", "metadata", "lane_width", "model", "effects", "sensor", "provenance")
+        hand = ("left_hand",) if self.left_hand else ()
+        order = ("id", "metadata", "lane_width", *hand, "model", "effects", "sensor", "provenance")
         return {"format": FORMAT, "version": VERSION, **{name: values[name] for name in order}}
 
     @classmethod

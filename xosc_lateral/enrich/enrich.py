@@ -16,6 +16,7 @@ from xosc_lateral.driver.sampling import OffsetSampler
 from xosc_lateral.driver.sensor.error import known_sensor, sensor_error
 from xosc_lateral.enrich.consequences import gaps_of, lane_departures
 from xosc_lateral.enrich.give_way import SampledVehicle, give_way
+from xosc_lateral.enrich.other_hand import mirrored
 from xosc_lateral.enrich.result import Enriched, EntityResult, SampledSegment
 from xosc_lateral.motion.context import entity_context
 from xosc_lateral.motion.deviation import SETTLING_TIME, SampledStretch, deviation_through
@@ -181,7 +182,9 @@ def _draw(
             continue
         segment = _segment(motion, network, index, knots, every, foreign_context)
         neutral |= _unknown(driver, segment)
-        wanted, inside = sampler.sample(segment), segment.inside
+        other_hand = _is_left_hand(entity, network, knots) != driver.left_hand
+        wanted = -sampler.sample(mirrored(segment)) if other_hand else sampler.sample(segment)
+        inside = segment.inside
         who = f"profile {driver.name} for {entity.name!r}"
         check_offsets(wanted, segment.lane_width[inside], who, segment.time[inside])
         errors.append(sensor_error(sensor, len(knots), SAMPLE_STEP, seed, part=len(segments)))
@@ -306,6 +309,11 @@ def _filled(values: FloatArray, inside: slice) -> FloatArray:
     filled[: inside.start][np.isnan(filled[: inside.start])] = values[inside.start]
     filled[inside.stop :][np.isnan(filled[inside.stop :])] = values[inside.stop - 1]
     return filled
+
+
+def _is_left_hand(entity: EntityMotion, network: RoadNetwork, knots: IntArray) -> bool:
+    """Whether one keeps left where a segment begins."""
+    return network.roads[int(entity.road[knots[0]])].rule == "LHT"
 
 
 def _unknown(driver: DriverProfile, segment: Segment) -> set[str]:

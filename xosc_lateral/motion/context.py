@@ -1,6 +1,7 @@
 """What a driver in the scenario may react to: DESIGN's context names as time series along each vehicle's motion.
 
-Distances between vehicles are free space: from bumper to bumper along the lane, 0 while they overlap lengthwise.
+Distances between vehicles are free space: from bumper to bumper along the lane, 0 while they overlap lengthwise,
+infinite where nobody is within reach, NaN where there is no such lane.
 """
 
 from __future__ import annotations
@@ -51,16 +52,13 @@ def entity_context(motion: NominalMotion, network: RoadNetwork, index: int, grid
     Returns
     -------
     dict of str to array, shape (n,)
-        Under DESIGN's names; NaN where there is none (no leader; off the road). Weather that the scenario does not
-        state is absent.
+        Under DESIGN's names; NaN where there is none (no lane to that side; off the road), infinite where a lane has
+        nobody within reach. Weather that the scenario does not state is absent.
     """
     entity = motion.entities[index]
-    return (
-        _own_motion(entity, grid)
-        | _road(entity, network, grid)
-        | _neighbours(motion, network, index, grid)
-        | _weather(motion, entity, grid)
-    )
+    road = _road(entity, network, grid)
+    around = _neighbours(motion, network, index, grid)
+    return _own_motion(entity, grid) | road | around | _empty_lanes(road, around) | _weather(motion, entity, grid)
 
 
 def _own_motion(entity: EntityMotion, grid: IntArray) -> dict[str, FloatArray]:
@@ -175,6 +173,14 @@ def _neighbours(motion: NominalMotion, network: RoadNetwork, index: int, grid: I
         context[f"truck_{side}"] = (alongside & (truck[side] > 0)).astype(np.float64)
         context[f"car_{side}"] = (alongside & (truck[side] == 0)).astype(np.float64)
     return context
+
+
+def _empty_lanes(road: Mapping[str, FloatArray], around: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
+    """Distances that say so where there is a lane but nobody in it."""
+    index, count = road["lane_index"], road["lane_count"]
+    there = {"lead": index >= 0, "right": index > 0, "left": index < count - 1}
+    names = {side: f"{side}_distance" for side in there}
+    return {name: np.where(there[side] & np.isnan(around[name]), np.inf, around[name]) for side, name in names.items()}
 
 
 @lru_cache(maxsize=1)  # asked for every entity of one motion after another

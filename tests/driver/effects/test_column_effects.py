@@ -230,3 +230,12 @@ def test_a_neighbour_counts_in_full_alongside_less_afar_and_not_at_all_when_ther
 def test_a_proximity_without_a_scale_is_refused() -> None:
     with pytest.raises(DriverProfileError, match="must be above 0"):
         Proximity(acts=Acts.LOCATION, column="x", scale=0.0, **ONE)
+
+
+@pytest.mark.parametrize("effect", [effect for effect in EXAMPLES if isinstance(effect, ColumnEffect)])
+def test_nobody_in_sight_is_far_away_where_the_curve_levels_off_and_else_is_none(effect: ColumnEffect) -> None:
+    """Infinity, against a kilometre and against NaN."""
+    there = {"y": np.full(5, 90.0)}
+    unseen, far, none = (strength(effect, x=np.full(5, value), **there) for value in (np.inf, 1000.0, np.nan))
+    curves = {"saturating", "nearness", "proximity"}
+    assert unseen == pytest.approx(far, abs=0.02) if effect.kind in curves else np.array_equal(unseen, none)

@@ -92,6 +92,14 @@ class ColumnEffect(Effect, frozen=True, kw_only=True):
             )
 
     @property
+    def levels_off(self) -> bool:
+        """Whether the quantity has a limit far out: infinity ("nobody in sight") is then as good as far away.
+
+        Of one without a limit, infinity is "there is none" (NaN).
+        """
+        return False
+
+    @property
     @abstractmethod
     def shape(self) -> str:
         """Word for the report: linear, threshold, saturating, product, levels, angular ..."""
@@ -103,7 +111,7 @@ class ColumnEffect(Effect, frozen=True, kw_only=True):
         Parameters
         ----------
         context : mapping of str to array, shape (n,)
-            Each column in its own unit; NaN: there is none.
+            Each column in its own unit; NaN: there is none. Infinite only where it `levels_off`.
 
         Returns
         -------
@@ -121,7 +129,7 @@ class ColumnEffect(Effect, frozen=True, kw_only=True):
 
     def known(self, context: Mapping[str, FloatArray]) -> FloatArray:
         """The quantity with what is neutral in place of NaN, shape (n, k). [unit of the quantity]"""
-        values = self.quantity(context)
+        values = self.quantity(context if self.levels_off else _finite(context, self.columns))
         missing = np.isnan(values)
         if not missing.any():
             return values
@@ -179,6 +187,10 @@ class ColumnEffect(Effect, frozen=True, kw_only=True):
         if not self.answer_range:
             del values["answer_range"]
         return values
+
+
+def _finite(context: Mapping[str, FloatArray], columns: Iterable[str]) -> dict[str, FloatArray]:
+    return {name: np.where(np.isinf(context[name]), np.nan, context[name]) for name in columns}
 
 
 def _finite_mean(values: FloatArray) -> float:

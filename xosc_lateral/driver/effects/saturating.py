@@ -19,7 +19,7 @@ class Saturating(ColumnEffect, frozen=True, kw_only=True):
     Parameters
     ----------
     column : str
-        Where it is NaN ("there is none"), nothing changes.
+        Where it is NaN ("there is none"), nothing changes; infinity is the far end of the curve.
     middle, scale : float
         scale > 0. [unit of the column]
     """
@@ -38,6 +38,11 @@ class Saturating(ColumnEffect, frozen=True, kw_only=True):
     def columns(self) -> tuple[str, ...]:
         """The one column."""
         return (self.column,)
+
+    @property
+    def levels_off(self) -> bool:
+        """At both ends."""
+        return True
 
     @property
     def shape(self) -> str:

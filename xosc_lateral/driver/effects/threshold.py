@@ -38,11 +38,17 @@ class Threshold(ColumnEffect, frozen=True, kw_only=True):
         return (self.column,)
 
     @property
+    def levels_off(self) -> bool:
+        """A step does."""
+        return self.jump
+
+    @property
     def shape(self) -> str:
         """Word for the report."""
         return f"threshold ({'step' if self.jump else 'hinge'} {'above' if self.above else 'below'} {self.at:.4g})"
 
     def quantity(self, context: Mapping[str, FloatArray]) -> FloatArray:
         """0 on the quiet side, 1 [-] or the distance from the limit [column's unit] on the other; shape (n, 1)."""
-        beyond = np.nan_to_num((context[self.column] - self.at) * (1.0 if self.above else -1.0), nan=0.0)
-        return np.where(beyond > 0, 1.0 if self.jump else beyond, 0.0)[:, None]
+        beyond = (context[self.column] - self.at) * (1.0 if self.above else -1.0)
+        with np.errstate(invalid="ignore"):
+            return np.where(beyond > 0, 1.0 if self.jump else beyond, 0.0)[:, None]
