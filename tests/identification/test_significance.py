@@ -1,0 +1,56 @@
+"""From maxima under the null to p-values, and how the budget of false alarms is shared."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.stats import gumbel_r, kstest
+
+from xosc_lateral.identification.significance import BUDGET, WEIGHTS, level_of, upper_tail
+
+
+def test_all_levels_together_are_the_budget() -> None:
+    assert sum(map(level_of, WEIGHTS)) == pytest.approx(BUDGET)
+    assert level_of("mean") > level_of("regimes") > 0.0
+
+
+def test_without_a_null_nothing_is_sure() -> None:
+    assert upper_tail(1e9, np.empty(0)) == 1.0
+
+
+def test_common_scores_have_the_share_of_the_null_that_reaches_them() -> None:
+    maxima = np.arange(100.0)
+    assert upper_tail(50.0, maxima) == 0.5
+    assert upper_tail(-1.0, maxima) == 1.0
+
+
+def test_rare_scores_have_the_tail_of_the_law_that_maxima_follow() -> None:
+    rng = np.random.default_rng(1)
+    maxima = gumbel_r.rvs(20.0, 3.0, size=100_000, random_state=rng)
+    for score in (32.0, 40.0):
+        assert np.log(upper_tail(score, maxima)) == pytest.approx(np.log(gumbel_r.sf(score, 20.0, 3.0)), abs=0.3)
+
+
+@given(st.floats(0.0, 200.0), st.floats(0.0, 200.0))
+def test_a_larger_score_is_never_likelier(first: float, second: float) -> None:
+    maxima = gumbel_r.rvs(20.0, 3.0, size=300, random_state=np.random.default_rng(2))
+    low, high = sorted((first, second))
+    assert 0.0 < upper_tail(high, maxima) <= upper_tail(low, maxima) <= 1.0
+
+
+@pytest.mark.parametrize("seed", [3, 4])
+def test_p_values_of_the_null_itself_are_not_too_small(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    p_values = []
+    for _ in range(400):
+        drawn = gumbel_r.rvs(20.0, 3.0, size=301, random_state=rng)
+        p_values.append(upper_tail(drawn[0], drawn[1:]))
+    # one-sided: a p-value may be too large (the heavier of two tails counts), not too small
+    assert kstest(p_values, "uniform", alternative="greater").pvalue > 0.001
+
+
+def test_a_null_that_never_varies_is_no_reason_for_certainty() -> None:
+    assert 0.0 < upper_tail(10.0, np.full(50, 10.0)) <= 1.0
+    assert upper_tail(11.0, np.full(50, 10.0)) > 0.0
