@@ -19,8 +19,7 @@ def drive(state: EntityState, distance: float) -> None:
     """Move an entity along its lane as far as it goes, lateral offset and relative heading kept.
 
     The way along the reference line follows from the curvature at the START of the step (explicit Euler, as the
-    reference player does it). Without a road there is no lane to follow: the entity stops; at a road's end it does so
-    in the frame after the first in which it has not moved.
+    reference player does it). Without a road there is no lane to follow: the entity stops.
 
     Parameters
     ----------
@@ -32,12 +31,31 @@ def drive(state: EntityState, distance: float) -> None:
     if state.road == NOWHERE:
         state.set_speed(0.0)
         return
-    was_at_end, stood = state.at_road_end, state.stuck
     way = 1 if state.is_forward else -1
-    road, s = state.road, state.s
-    travel(state, way, along_reference(state.network, road, state.lane, s, state.offset_t, distance))
-    state.stuck = state.road == road and abs(state.s - s) * abs(state.speed) < EPSILON * abs(distance)
-    state.set_speed(0.0 if was_at_end and state.at_road_end and stood else state.speed)
+    travel(state, way, along_reference(state.network, state.road, state.lane, state.s, state.offset_t, distance))
+    state.set_speed(state.speed)
+
+
+def halt_at_road_end(state: EntityState, step: float) -> None:
+    """Who has not moved at a road's end in the frame before stops, whoever drives it.
+
+    Parameters
+    ----------
+    state : EntityState
+        After it was moved in this frame.
+    step : float
+        [s]
+    """
+    if not state.at_road_end or state.free_pose is not None:
+        state.end_place, state.stuck = None, False
+        return
+    before, here = state.end_place, (state.road, state.s, state.offset_t)
+    if state.stuck:
+        state.set_speed(0.0)
+    state.stuck = before is not None and here[0] == before[0]
+    if before is not None:
+        state.stuck = state.stuck and abs(here[1] - before[1]) + abs(here[2] - before[2]) < EPSILON * step
+    state.end_place = here
 
 
 def along_reference(network: RoadNetwork, road: int, lane: int, s: float, offset_t: float, distance: float) -> float:

@@ -15,7 +15,7 @@ import numpy as np
 
 from xosc_lateral.errors import PlaybackError
 from xosc_lateral.motion.nominal import Activity, NominalMotion
-from xosc_lateral.playback.drive import drive
+from xosc_lateral.playback.drive import drive, halt_at_road_end
 from xosc_lateral.playback.placement import NOWHERE
 from xosc_lateral.playback.recorder import NO_LANE, Rows
 from xosc_lateral.playback.simulation import Simulation
@@ -119,6 +119,7 @@ class _Player:
                 continue
             if not state.longitudinal_taken and state.tow is None and abs(state.speed) > EPSILON:
                 drive(state, state.speed * step)
+            halt_at_road_end(state, step)
         pull_trailers(simulation.entities)
         if simulation.derives_motion:
             for state in simulation.entities:

@@ -52,6 +52,7 @@ class EntityState:
         "speed",
         "speed_taken",
         "standing_since",
+        "end_place",
         "stuck",
         "teleported",
         "tow",
@@ -73,8 +74,10 @@ class EntityState:
         self.section = (0.0, -1.0)
         """Range of s in which the lane id holds; empty: unknown. [m]"""
         self.at_road_end = False
+        self.end_place: tuple[int, float, float] | None = None
+        """Road, s and offset in the frame before, at a road's end. [m]"""
         self.stuck = False
-        """The default driver could not move it in the frame before: the road had ended."""
+        """It has not moved in the frame before: the road had ended."""
         self._free_pose: Pose | None = Pose(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
         self._located = True
         self._pose: Pose | None = None

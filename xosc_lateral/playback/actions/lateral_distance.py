@@ -24,7 +24,8 @@ class RunningLateralDistance(RunningAction):
     reference player; without a distance, the present one is kept.
     """
 
-    domains = Domain.LATERAL
+    domains = Domain.LONGITUDINAL
+    """As in the reference player, where it ends speed actions and is ended by them, and goes on beside lane changes."""
     content: LateralDistanceAction
 
     def prepare(self) -> None:

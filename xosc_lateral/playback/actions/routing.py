@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from xosc_lateral.playback.actions.base import RunningAction
+from xosc_lateral.playback.actions.base import Domain, RunningAction
 from xosc_lateral.playback.placement import Placement
 from xosc_lateral.playback.positions.resolve import resolve, route_guide
 from xosc_lateral.playback.routes import guide
@@ -29,6 +29,8 @@ class RunningAssignRoute(RunningAction):
 class RunningAcquirePosition(RunningAction):
     """The shortest way from here to there becomes the route; nothing stops the entity there."""
 
+    domains = Domain.LONGITUDINAL
+    """As in the reference player: an action on speed or distance ends when it begins."""
     content: AcquirePositionAction
 
     def start(self) -> None:
