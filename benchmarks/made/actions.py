@@ -113,10 +113,11 @@ def lane_change(stage: Stage, name: str) -> str:
 
 
 def _relative_lane(stage: Stage, of: str) -> str:
-    """One that is there, seen from where somebody starts; to the left of travel counts up."""
+    """One that is there, seen from where somebody starts; to the left of travel counts up, towards the middle."""
     lane = abs(stage.start[of][0])
     beside = [other for other in range(1, stage.map.lanes + 1) if other != lane]
-    return element("RelativeTargetLane", entityRef=of, value=lane - stage.pick(*beside))
+    way = -1 if stage.map.left_hand else 1
+    return element("RelativeTargetLane", entityRef=of, value=way * (lane - stage.pick(*beside)))
 
 
 def lane_offset(stage: Stage, name: str) -> str:
@@ -142,7 +143,7 @@ def lateral_distance(stage: Stage, name: str) -> str:
             continuous=stage.flag(),
             freespace=stage.flag(0.3),
             displacement=stage.pick("leftToReferencedEntity", "rightToReferencedEntity"),
-            coordinateSystem=stage.pick("entity", "lane", "road"),
+            coordinateSystem=stage.pick("entity", "road"),  # the reference player knows no others
         )
     )
 

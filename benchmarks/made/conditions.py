@@ -15,21 +15,21 @@ Condition = Callable[[Stage, str], str]
 GREATER, LESS = ("greaterThan", "greaterOrEqual"), ("lessThan", "lessOrEqual")
 
 
-def _entity(stage: Stage, name: str, inside: str, edge: str | None = None, delay: float | None = None) -> str:
-    names = [name] if stage.flag(0.8) else [name, stage.other(name)]
+def _entity(stage: Stage, name: str, inside: str, *, alone: bool = False) -> str:
+    names = [name] if alone or stage.flag(0.8) else [name, stage.other(name)]
     refs = (element("EntityRef", entityRef=one) for one in names)
     actors = element("TriggeringEntities", *refs, triggeringEntitiesRule=stage.pick("any", "all"))
-    return _wrapped(stage, element("ByEntityCondition", actors, element("EntityCondition", inside)), edge, delay)
+    return _wrapped(stage, element("ByEntityCondition", actors, element("EntityCondition", inside)))
 
 
 def _value(stage: Stage, inside: str) -> str:
     return _wrapped(stage, element("ByValueCondition", inside))
 
 
-def _wrapped(stage: Stage, inside: str, edge: str | None = None, delay: float | None = None) -> str:
-    edge = edge or stage.pick("none", "none", "none", "rising", "risingOrFalling")
+def _wrapped(stage: Stage, inside: str) -> str:
+    edge = stage.pick("none", "none", "none", "rising", "risingOrFalling")
     late = stage.number(0.2, 1.5) if stage.flag(0.3) else 0.0
-    return element("Condition", inside, name="c", conditionEdge=edge, delay=late if delay is None else delay)
+    return element("Condition", inside, name="c", conditionEdge=edge, delay=late)
 
 
 def _system(stage: Stage) -> dict[str, object]:
@@ -92,7 +92,7 @@ def relative_distance(stage: Stage, name: str) -> str:
 def reach_position(stage: Stage, name: str) -> str:
     place = stage.lane_position(name, 30, 100, stage.start[name][0])
     inside = element("ReachPositionCondition", element("Position", place), tolerance=stage.number(1, 5))
-    return _entity(stage, name, inside)
+    return _entity(stage, name, inside, alone=True)  # of several, the reference player remembers the one before
 
 
 def stand_still(stage: Stage, name: str) -> str:

@@ -17,6 +17,10 @@ from xosc_lateral.formats.opendrive import read_opendrive
 LAST = 14.0
 """When a scenario ends. [s]"""
 NAMES = ("Ego", "Lead", "Side")
+UNKNOWN_AT_FIRST = ("speed", "acceleration", "time_to_collision")
+"""The reference player has no velocities at time 0: conditions on them are false or true for no reason there."""
+ONCE = ("lateral_distance", "synchronize")
+"""The reference player begins a repetition with what is left of the first time: signs, widths, distances."""
 
 
 def made(seed: int) -> tuple[str, str, str]:
@@ -60,11 +64,11 @@ def _scenario(stage: Stage, title: str, action: str, condition: str) -> str:
     partner = stage.other(who)
     first = _event("first", ACTIONS[stage.pick(*MOTION)](stage, who), _after(stage, stage.number(0.5, 2)))
     conditions = [CONDITIONS[condition](stage, who)]
-    if stage.flag(0.7):  # at time 0, the reference player knows no velocities yet
+    if condition in UNKNOWN_AT_FIRST or stage.flag(0.6):
         conditions.append(_after(stage, stage.number(0.1, 2)))
     if stage.flag(0.3):
         conditions.append(CONDITIONS[stage.pick(*CONDITIONS)](stage, who))
-    asked = _event("asked", ACTIONS[action](stage, who), conditions, stage)
+    asked = _event("asked", ACTIONS[action](stage, who), conditions, stage, repeat=action not in ONCE)
     chain = element(
         "StoryboardElementStateCondition",
         storyboardElementType="event",
@@ -167,13 +171,15 @@ def _group_of(*conditions: str) -> str:
     return element("ConditionGroup", *conditions)
 
 
-def _event(name: str, action: str, conditions: str | list[str], stage: Stage | None = None) -> str:
+def _event(
+    name: str, action: str, conditions: str | list[str], stage: Stage | None = None, *, repeat: bool = False
+) -> str:
     priority = "parallel" if stage is None else stage.pick("override", "override", "parallel", "skip")
     groups = [_group_of(*([conditions] if isinstance(conditions, str) else conditions))]
     if stage is not None and stage.flag(0.4):
         groups.append(_group_of(_after(stage, stage.number(4, 8))))
     start = element("StartTrigger", *groups)
-    count = None if stage is None or stage.flag(0.7) else 2
+    count = None if stage is None or stage.flag(0.7) or not repeat else 2
     inside = element("Action", action, name=f"{name} action")
     return element("Event", inside, start, name=name, priority=priority, maximumExecutionCount=count)
 

@@ -130,7 +130,7 @@ class Stage:
     def route_position(self, name: str) -> str:
         """So far along a route, in lane coordinates."""
         lane, _, _ = self.start[name]
-        place = element("FromLaneCoordinates", pathS=self.number(30, 120), laneId=lane)
+        place = element("FromLaneCoordinates", pathS=self.number(30, 95), laneId=lane)
         return element("RoutePosition", element("RouteRef", self.route(name)), element("InRoutePosition", place))
 
     def path(self, name: str, points: int, spacing: float) -> list[tuple[float, float, float]]:

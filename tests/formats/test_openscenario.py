@@ -419,3 +419,14 @@ def test_what_field_files_leave_out_is_taken_as_meant_and_said(tmp_path: Path) -
     assert (scenario.header.minor, scenario.entities[0].vehicle_category) == (1, VehicleCategory.CAR)
     said = "; ".join(remark.reason for remark in scenario.remarks)
     assert "taken as a car" in said and "contains no action" in said
+
+
+def test_a_truth_value_in_capitals_is_remarked_once_for_each_word(tmp_path):
+    condition = (
+        '<ConditionGroup><Condition name="near" delay="0" conditionEdge="none"><ByEntityCondition>'
+        '<TriggeringEntities triggeringEntitiesRule="any"><EntityRef entityRef="Ego"/></TriggeringEntities>'
+        '<EntityCondition><TimeHeadwayCondition entityRef="Ego" value="1" freespace="True" rule="lessThan"/>'
+        "</EntityCondition></ByEntityCondition></Condition></ConditionGroup>"
+    )
+    (remark,) = [remark for remark in made(tmp_path, stop=2 * condition).remarks if "freespace" in remark.reason]
+    assert "freespace='True' is read as true (2 times)" in remark.reason

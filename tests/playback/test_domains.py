@@ -72,3 +72,21 @@ def test_a_vehicle_stops_at_the_end_of_the_road_two_frames_after_it_came_there_w
         arrived = int((motion.x > 100.0 - 1e-6).argmax())
         assert motion.speed[arrived + 1] > 0.0
         assert motion.speed[arrived + 3] == 0.0
+
+
+def test_a_step_of_speed_is_over_at_once_even_with_a_time(tmp_path: Path) -> None:
+    step = event(speed(25.0, "step", "time", 4.8), name="step", trigger=after(1.0))
+    played = Stage(tmp_path).play(maneuvers(step))
+    assert _end_of(played, "step-0") == pytest.approx(start_of(played, "step-0"), abs=0.021)
+
+
+def test_any_side_is_decided_by_free_space_and_once(tmp_path: Path) -> None:
+    """Alongside there is no free space either way: the reference player then trails."""
+    keep = longitudinal(
+        '<LongitudinalDistanceAction entityRef="Lead" continuous="true" freespace="true" distance="10" '
+        'displacement="any"><DynamicConstraints maxAcceleration="3" maxDeceleration="3" maxSpeed="50"/>'
+        "</LongitudinalDistanceAction>"
+    )
+    alongside = {"Ego": teleport(on_lane(-1, 12.0)) + speed(20.0), "Lead": teleport(on_lane(-2, 10.0)) + speed(20.0)}
+    motion = entity(Stage(tmp_path).play(maneuvers(event(keep)), start=alongside))
+    assert motion.speed[row(motion, 1.0)] < 20.0

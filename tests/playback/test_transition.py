@@ -85,3 +85,10 @@ def test_the_range_for_a_curvature_keeps_the_second_derivative_under_it(shape: D
         values = np.array([3.0 * CURVES[shape.value](x) for x in u])
         second = np.diff(values, 2) / (transition.range / 2000) ** 2
         assert np.abs(second).max() == pytest.approx(0.5, rel=1e-2)
+
+
+def test_a_step_has_no_range_whatever_value_it_comes_with() -> None:
+    transition = Transition(DynamicsShape.STEP, DynamicsDimension.TIME, 4.8)
+    transition.begin(10.0, 12.0)
+    assert transition.value() == 12.0
+    assert transition.is_done

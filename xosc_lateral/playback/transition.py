@@ -30,7 +30,7 @@ class Transition:
     dimension : DynamicsDimension
         What the parameter is: seconds (`time`, `rate`) or metres (`distance`).
     value : float
-        Range of the parameter, or peak slope for `rate` (its sign does not matter).
+        Range of the parameter (a step has none), or peak slope for `rate` (its sign does not matter).
     """
 
     __slots__ = ("dimension", "parameter", "peak_rate", "range", "scale", "shape", "start", "target")
@@ -43,7 +43,7 @@ class Transition:
         self.parameter = 0.0
         self.scale = 1.0
         self.peak_rate = abs(value) if dimension is DynamicsDimension.RATE else 0.0
-        self.range = 0.0 if dimension is DynamicsDimension.RATE else value
+        self.range = 0.0 if dimension is DynamicsDimension.RATE or shape is DynamicsShape.STEP else value
 
     @classmethod
     def of(cls, dynamics: TransitionDynamics) -> Transition:

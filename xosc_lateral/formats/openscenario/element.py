@@ -24,6 +24,11 @@ _TRUE = {"true", "1", "1.0000000000", "yes"}
 _FALSE = {"false", "0", "0.0000000000", "no"}
 
 
+def means_true(text: str) -> bool:
+    """Whether a word is read as true, in any case."""
+    return text.strip().lower() in _TRUE
+
+
 class XmlElement:
     """An element of the scenario or of a catalog, in the scope that its attributes are read in.
 
@@ -135,10 +140,9 @@ class XmlElement:
         text = self.optional_text(name)
         if text is None or not text.strip():
             return None
-        word = text.strip().lower()
-        if word in _TRUE:
+        if means_true(text):
             return True
-        if word in _FALSE:
+        if text.strip().lower() in _FALSE:
             return False
         self.fail(f"{name}='{text[:60]}' is neither true nor false")
 

@@ -16,6 +16,7 @@ from xosc_lateral.formats.openscenario.declarations import read_declarations, re
 from xosc_lateral.formats.openscenario.element import XmlElement, local_name
 from xosc_lateral.formats.openscenario.entities import read_entities
 from xosc_lateral.formats.openscenario.references import Boundary, allowed_roots
+from xosc_lateral.formats.openscenario.spelling import remark_spellings
 from xosc_lateral.formats.openscenario.storyboard import read_storyboard
 from xosc_lateral.formats.xml import read_document
 from xosc_lateral.scenario import (
@@ -96,6 +97,7 @@ def read_scenario(
     header = read_header(root)
     if header.version > NEWEST:
         remarks.append(Unsupported("FileHeader", root.place(), f"version 1.{header.minor} is read as 1.{NEWEST[1]}"))
+    remarks.extend(remark_spellings(root))
     scope, values = read_declarations(root, dict(parameters or {}), remarks)
     root = root.within(scope)
     boundary = Boundary(path.parent, allowed_roots(path, allowed))

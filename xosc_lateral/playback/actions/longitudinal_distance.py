@@ -28,16 +28,16 @@ class RunningLongitudinalDistance(RunningAction):
         """Find the entity to keep the distance to."""
         self._other = self.simulation.entity(self.content.entity_ref, self.content.place)
         self._acceleration = 0.0
-        self._ahead = True
+        self._ahead: bool | None = None
         self._kept: float | None = None
 
     def start(self) -> None:
-        """Decide on which side of the other entity to stay."""
+        """Decide on which side of the other entity to stay: the first time, as in the reference player."""
         self._acceleration = 0.0
         displacement = self.content.displacement
-        if displacement is LongitudinalDisplacement.ANY:
-            self._ahead = ahead_and_left(self.state, self._other.pose.x, self._other.pose.y)[0] >= 0.0
-        else:
+        if displacement is LongitudinalDisplacement.ANY and self._ahead is None:
+            self._ahead = self._is_ahead()
+        elif displacement is not LongitudinalDisplacement.ANY:
             # None given: behind the other (the reference player's default; version 1.0 knows nothing else).
             self._ahead = displacement is not LongitudinalDisplacement.LEADING
         self._kept = None
@@ -65,6 +65,12 @@ class RunningLongitudinalDistance(RunningAction):
         state.set_speed(min(max(speed, -limits.speed), limits.speed))
 
     # ---- in detail ---------------------------------------------------------------------------------------------------
+    def _is_ahead(self) -> bool:
+        """Whether the other one is ahead; with free space also while it is alongside."""
+        if self.content.freespace:
+            return (self._distance() or 0.0) >= 0.0
+        return ahead_and_left(self.state, self._other.pose.x, self._other.pose.y)[0] >= 0.0
+
     def _distance(self) -> float | None:
         system = self.content.coordinate_system or CoordinateSystem.ENTITY
         # With free space, the reference player measures between the boxes in the own frame, whatever is asked for.
