@@ -1,0 +1,109 @@
+"""What follows from the car's own movement is told from what moves it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+
+from xosc_lateral.identification.columns import Column, Role
+from xosc_lateral.identification.feedback import Feedback, find_feedback
+from xosc_lateral.identification.timeline import Timeline
+
+STEP = 0.2
+N = round(3000.0 / STEP)
+
+
+def low_passed(seconds: float, rng: np.random.Generator, n: int = N) -> np.ndarray:
+    keep = np.exp(-STEP / seconds)
+    walk = lfilter([np.sqrt(1.0 - keep**2)], [1.0, -keep], rng.normal(size=n))
+    return np.asarray(walk)
+
+
+def timeline(offset: np.ndarray, valid: np.ndarray | None = None, **context: np.ndarray) -> Timeline:
+    n = len(offset)
+    valid = np.ones(n, dtype=bool) if valid is None else valid
+    return Timeline(
+        ("d",), np.zeros(n, dtype=np.intp), STEP * np.arange(n), np.where(valid, offset, 0.0), valid, np.full(n, 3.5),
+        context, frozenset(),
+    )  # fmt: skip
+
+
+def driven(seed: int) -> tuple[np.ndarray, np.random.Generator]:
+    """A movement of tenths of a metre that lasts seconds."""
+    rng = np.random.default_rng(seed)
+    return 0.15 * low_passed(6.0, rng) + 0.05 * low_passed(1.0, rng), rng
+
+
+def feedback(offset: np.ndarray, values: np.ndarray, role: Role = Role.NUMBER) -> Feedback | None:
+    found = find_feedback(timeline(offset, x=values), [Column("x", role, False)])
+    return found[0] if found else None
+
+
+@pytest.mark.parametrize("seed", [21, 22, 23])
+def test_a_torque_that_keeps_the_lane_follows_from_the_offset(seed: int) -> None:
+    offset, rng = driven(seed)
+    late = np.concatenate([np.zeros(1), offset[:-1]])
+    found = feedback(offset, -2.0 * late + 0.05 * rng.normal(size=N))
+    assert found is not None
+    assert not found.doubtful
+    assert found.predicted_share > 0.5
+
+
+@pytest.mark.parametrize("seed", [24, 25])
+def test_a_heading_follows_from_the_lateral_speed(seed: int) -> None:
+    offset, rng = driven(seed)
+    found = feedback(offset, np.gradient(offset, STEP) / 30.0 + 1e-4 * rng.normal(size=N))
+    assert found is not None
+    assert (found.of, found.doubtful) == ("lateral speed", False)
+    assert found.coherence > 0.5
+
+
+def test_a_distance_to_the_nearer_marking_follows_from_the_offset_s_size() -> None:
+    offset, _ = driven(26)
+    found = feedback(offset, 1.75 - np.abs(offset - np.median(offset)))
+    assert found is not None
+    assert found.of == "size of the offset"
+
+
+@pytest.mark.parametrize("seed", [31, 32, 33])
+@pytest.mark.parametrize("size", [0.06, 0.2])
+def test_what_moves_the_car_slowly_does_not_follow_from_it(seed: int, size: float) -> None:
+    """By 0.2 and 0.7 m between its 5 % and 95 % quantiles; answered in two seconds, so that fast movement has little."""
+    offset, rng = driven(seed)
+    cause = low_passed(20.0, rng)
+    keep = np.exp(-STEP / 2.0)
+    assert feedback(offset + size * lfilter([1.0 - keep], [1.0, -keep], cause), cause) is None
+
+
+@pytest.mark.parametrize("seed", [41, 42, 43])
+def test_what_has_nothing_to_do_with_the_car_does_not_follow_from_it(seed: int) -> None:
+    offset, rng = driven(seed)
+    columns = {
+        "slow": low_passed(60.0, rng),
+        "fast": rng.normal(size=N),
+        "switch": (low_passed(10.0, rng) > 1).astype(float),
+    }
+    roles = {"slow": Role.NUMBER, "fast": Role.NUMBER, "switch": Role.SWITCH}
+    found = find_feedback(timeline(offset, **columns), [Column(name, role, False) for name, role in roles.items()])
+    assert not found
+
+
+def test_gaps_and_missing_values_are_no_evidence() -> None:
+    offset, rng = driven(51)
+    column = low_passed(20.0, rng)
+    column[rng.random(N) < 0.05] = np.nan
+    valid = np.ones(N, dtype=bool)
+    valid[4000:5000] = False
+    assert not find_feedback(timeline(offset, valid, x=column), [Column("x", Role.NUMBER, True)])
+
+
+def test_a_direction_is_never_feedback() -> None:
+    offset, _ = driven(52)
+    assert feedback(offset, offset, Role.ANGLE) is None
+
+
+def test_too_short_a_drive_says_nothing() -> None:
+    offset, _ = driven(53)
+    short = offset[: round(60.0 / STEP)]
+    assert not find_feedback(timeline(short, x=-short), [Column("x", Role.NUMBER, False)])
