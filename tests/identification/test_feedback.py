@@ -69,7 +69,7 @@ def test_a_distance_to_the_nearer_marking_follows_from_the_offset_s_size() -> No
 @pytest.mark.parametrize("seed", [31, 32, 33])
 @pytest.mark.parametrize("size", [0.06, 0.2])
 def test_what_moves_the_car_slowly_does_not_follow_from_it(seed: int, size: float) -> None:
-    """By 0.2 and 0.7 m between its 5 % and 95 % quantiles; answered in two seconds, so that fast movement has little."""
+    """By 0.2 and 0.7 m between its 5 % and 95 % quantiles; answered in 2 s: fast movement has little of it."""
     offset, rng = driven(seed)
     cause = low_passed(20.0, rng)
     keep = np.exp(-STEP / 2.0)
