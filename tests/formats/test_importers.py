@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import json
 import re
+import sys
 import zipfile
 from pathlib import Path
 
@@ -507,3 +508,32 @@ def test_exid_without_lateral_movement_is_refused_rather_than_guessed(tmp_path):
     tracks.to_csv(tmp_path / "07_tracks.csv", index=False)
     with pytest.raises(FormatError, match="which side of the lane is positive"):
         import_levelx(tmp_path)
+
+
+# ---- one more --------------------------------------------------------------------------------------------------------
+def import_three_rows(source: Path, *, width: str = "3.5") -> pd.DataFrame:
+    """Three rows.
+
+    A format of the package needs this function, a line in `IMPORTERS`, and its test.
+    """
+    assert source.read_text() == "anything"
+    time = [0.0, 0.1, 0.2]
+    return pd.DataFrame({"drive": "d", "time": time, "offset": [0.0, 0.1, 0.2], "lane_width": float(width)})
+
+
+def test_another_format_is_one_function_and_one_line(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    import xosc_lateral as xl
+    from xosc_lateral.formats import importers
+
+    monkeypatch.setitem(importers.IMPORTERS, "three-rows", f"{__name__}:import_three_rows")
+    monkeypatch.setattr(importers, "import_module", lambda name: sys.modules[name])
+    source = tmp_path / "log.bin"
+    source.write_text("anything")
+    assert xl.import_drives("three-rows", source).to_frame()["offset"].tolist() == [0.0, 0.1, 0.2]
+    target = tmp_path / "t.csv"
+    assert main(["import", "three-rows", str(source), "-o", str(target), "--set", "width=3.75"]) == 0
+    assert pd.read_csv(target)["lane_width"].tolist() == [3.75] * 3
+    assert main(["import", "--help"]) == 0
+    assert "three-rows" in capsys.readouterr().out

@@ -9,7 +9,6 @@ from xosc_lateral.api.inputs import PathLike, Paths, as_paths
 from xosc_lateral.api.result import Result
 from xosc_lateral.formats.importers import find_importer
 from xosc_lateral.formats.importers.table import as_imported
-from xosc_lateral.formats.tables import TABLE_SUFFIXES
 from xosc_lateral.formats.targets import claim, file_target
 
 if TYPE_CHECKING:
@@ -79,8 +78,9 @@ class ImportedDrives(Result):
     def write(self, path: PathLike, *, force: bool = False) -> Path:
         """Write the table: ``.parquet``, ``.csv`` or ``.csv.gz``, with its provenance."""
         from xosc_lateral.formats.importers.table import write_imported
+        from xosc_lateral.formats.output_tables import output_suffixes
 
-        target = file_target(path, f"{self.sources[0].name.split('.')[0]}.parquet", TABLE_SUFFIXES)
+        target = file_target(path, f"{self.sources[0].name.split('.')[0]}.parquet", output_suffixes())
         claim([target], [source for source in self.sources if source.is_file()], force=force)
         write_imported(self._imported, target)
         return target

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 from xosc_lateral.api.inputs import PathLike, Paths, as_paths, road_search
 from xosc_lateral.api.result import Result
 from xosc_lateral.formats.hashes import parsed_hash
-from xosc_lateral.formats.tables import TABLE_SUFFIXES
 from xosc_lateral.formats.targets import claim, file_target
 from xosc_lateral.motion.segments import SegmentRow
 from xosc_lateral.pipeline.load import Played, play_scenario
@@ -167,14 +166,11 @@ class Playback(Result):
 
     def write(self, path: PathLike, *, force: bool = False) -> Path:
         """Write the table: ``.csv``, ``.csv.gz`` or ``.parquet``."""
-        from xosc_lateral.formats.output_tables import write_csv, write_frame
+        from xosc_lateral.formats.output_tables import output_suffixes, write_table
 
-        target = file_target(path, f"{self.scenario.stem}.csv", TABLE_SUFFIXES)
+        target = file_target(path, f"{self.scenario.stem}.csv", output_suffixes())
         claim([target], self._inputs(), force=force)
-        if target.name.lower().endswith(".parquet"):
-            write_frame(self.to_frame(), target, self._provenance())
-        else:
-            write_csv(self.csv(), target, self._provenance())
+        write_table(target, self._provenance(), frame=self.to_frame, text=self.csv)
         return target
 
     def page(self) -> str:

@@ -17,7 +17,6 @@ from xosc_lateral.api.inputs import (
     naming,
 )
 from xosc_lateral.api.result import Result
-from xosc_lateral.formats.tables import TABLE_SUFFIXES
 from xosc_lateral.formats.targets import claim, file_target
 
 if TYPE_CHECKING:
@@ -154,9 +153,9 @@ class Offsets(Result):
 
     def write(self, path: PathLike, *, force: bool = False) -> Path:
         """Write the table: ``.csv``, ``.csv.gz`` or ``.parquet``, with its provenance."""
-        from xosc_lateral.formats.output_tables import write_frame
+        from xosc_lateral.formats.output_tables import output_suffixes, write_frame
 
-        target = file_target(path, f"{self.profile.name}.csv", TABLE_SUFFIXES)
+        target = file_target(path, f"{self.profile.name}.csv", output_suffixes())
         claim([target], () if self._given is None else self._given.files, force=force)
         write_frame(self.to_frame(), target, self._provenance())
         return target

@@ -158,23 +158,25 @@ def _import(
 
 
 class _WithPlugins(TyperGroup):
-    """The formats of the package, and those of plug-ins: these take their options as ``--set KEY=VALUE``."""
+    """Formats with options of their own, then others, of the package or of plug-ins, with ``--set KEY=VALUE``."""
 
     def list_commands(self, ctx: Any) -> list[str]:
-        from xosc_lateral.formats.importers import GROUP
-        from xosc_lateral.plugins import plugin_names
-
-        return [*super().list_commands(ctx), *plugin_names(GROUP)]
+        own = super().list_commands(ctx)
+        return [*own, *(name for name in _formats() if name not in own)]
 
     def get_command(self, ctx: Any, cmd_name: str) -> Any:
         known = super().get_command(ctx, cmd_name)
-        from xosc_lateral.formats.importers import GROUP
-        from xosc_lateral.plugins import plugin_names
-
-        return known if known is not None or cmd_name not in plugin_names(GROUP) else _plugin_command(cmd_name)
+        return _plain_command(cmd_name) if known is None and cmd_name in _formats() else known
 
 
-def _plugin_command(name: str) -> Any:
+def _formats() -> list[str]:
+    from xosc_lateral.formats.importers import GROUP, IMPORTERS
+    from xosc_lateral.plugins import plugin_names
+
+    return [*IMPORTERS, *plugin_names(GROUP)]
+
+
+def _plain_command(name: str) -> Any:
     from xosc_lateral.formats.importers import find_importer
 
     one = typer.Typer(context_settings={"help_option_names": ["-h", "--help"]}, rich_markup_mode=None)
@@ -189,6 +191,6 @@ def _plugin_command(name: str) -> Any:
     ) -> None:
         _import(name, sources, output, dict(pairs(settings, "--set")), force, quiet, as_json)
 
-    said = (find_importer(name).__doc__ or "From a plug-in.").strip()
+    said = (find_importer(name).__doc__ or "Another format.").strip()
     one.command(name, help=said, short_help=said.splitlines()[0])(command)
     return typer.main.get_command(one)

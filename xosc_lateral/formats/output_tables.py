@@ -1,13 +1,13 @@
-"""Tables that this package writes: CSV with a provenance file beside it, or Parquet with it inside."""
+"""Tables that this package writes: Parquet with the provenance inside, others with a provenance file beside them."""
 
 from __future__ import annotations
 
 import gzip
 import hashlib
 import io
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 from xosc_lateral.formats.atomic import write_atomically
 from xosc_lateral.formats.cells import harmless
@@ -22,6 +22,23 @@ METADATA_KEY = b"xosc-lateral"
 """Key of the provenance in a Parquet file's schema metadata."""
 
 
+Encoder: TypeAlias = "Callable[[Callable[[], pd.DataFrame], Callable[[], str]], bytes]"
+"""A table's bytes, from what gives it as a frame and what gives it as CSV; only one of both is asked for."""
+
+PARQUET = ".parquet"
+
+ENCODERS: dict[str, Encoder] = {
+    ".csv": lambda frame, text: text().encode(),
+    ".csv.gz": lambda frame, text: gzip.compress(text().encode(), mtime=0),
+}
+"""Suffix -> the bytes of a table, whose provenance goes into a file beside it. Parquet holds its own."""
+
+
+def output_suffixes() -> tuple[str, ...]:
+    """Of all formats that a table can be written in."""
+    return (*ENCODERS, PARQUET)
+
+
 def write_frame(
     frame: pd.DataFrame, path: Path, provenance: Mapping[str, Any], *, decimals: Mapping[str, int] | int = 6
 ) -> None:
@@ -30,21 +47,30 @@ def write_frame(
     Parameters
     ----------
     path : Path
-        Its suffix, one of `tables.TABLE_SUFFIXES`, decides the format.
+        Its suffix, one of `output_suffixes`, decides the format.
     provenance : mapping
         JSON values; the package's version is added.
     decimals : int or mapping of str to int
         Of the numbers in a CSV, per column or of all; Parquet keeps every bit.
     """
-    if path.name.lower().endswith(".parquet"):
-        write_atomically(path, _parquet(frame, stamped(provenance)))
-    else:
-        write_csv(csv_text(frame, decimals), path, provenance)
+    write_table(path, provenance, frame=lambda: frame, text=lambda: csv_text(frame, decimals))
 
 
-def write_csv(text: str, path: Path, provenance: Mapping[str, Any]) -> None:
-    """Write a CSV (packed if its name ends in ``.gz``) and its provenance beside it, with the hash of its bytes."""
-    data = gzip.compress(text.encode(), mtime=0) if path.name.lower().endswith(".gz") else text.encode()
+def write_table(
+    path: Path, provenance: Mapping[str, Any], *, frame: Callable[[], pd.DataFrame], text: Callable[[], str]
+) -> None:
+    """As `write_frame`, for tables that have a CSV of their own; whole or not at all.
+
+    Parameters
+    ----------
+    frame, text : callable
+        Give the table, and its CSV, when they are wanted.
+    """
+    name = path.name.lower()
+    if name.endswith(PARQUET):
+        write_atomically(path, _parquet(frame(), stamped(provenance)))
+        return
+    data = next(encode for suffix, encode in ENCODERS.items() if name.endswith(suffix))(frame, text)
     record = stamped(provenance) | {"sha256": hashlib.sha256(data).hexdigest()}
     write_atomically(path.with_name(path.name + SIDECAR_SUFFIX), canonical_json(record) + "\n")
     write_atomically(path, data)

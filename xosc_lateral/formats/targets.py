@@ -105,7 +105,7 @@ def is_own(path: Path) -> bool:
     for suffix, check in _CHECKS.items():
         if name.endswith(suffix):
             return check(path)
-    return False
+    return _own_table(path)
 
 
 def template_mark(text: str) -> str:
@@ -132,7 +132,7 @@ def _own_json(path: Path) -> bool:
 
 
 def _own_table(path: Path) -> bool:
-    """A CSV is ours as long as it is what the file beside it says."""
+    """A table is ours as long as it is what the file beside it says."""
     sidecar = path.with_name(path.name + SIDECAR_SUFFIX)
     try:
         values = json.loads(sidecar.read_bytes())

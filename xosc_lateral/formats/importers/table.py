@@ -15,7 +15,7 @@ from xosc_lateral.drives.cleaning import LANE_WIDTHS, MAX_OUTSIDE
 from xosc_lateral.errors import FormatError, NotEnoughDataError
 from xosc_lateral.formats.hashes import parsed_hash
 from xosc_lateral.formats.importers.cuts import KEPT
-from xosc_lateral.formats.output_tables import write_csv, write_frame
+from xosc_lateral.formats.output_tables import write_table
 from xosc_lateral.formats.tables import foreign_errors
 from xosc_lateral.limits import TIME, Range, context_range
 from xosc_lateral.version import __version__
@@ -170,11 +170,13 @@ def drop_cut(table: pd.DataFrame, keep_cut: bool) -> pd.DataFrame:
 
 def write_imported(imported: Imported, path: Path) -> None:
     """Write Parquet (provenance in its metadata) or CSV (provenance in a file beside it), whole or not at all."""
-    if path.name.lower().endswith(".parquet"):
-        write_frame(imported.table, path, asdict(imported.provenance))
-    else:
-        text = imported.table.to_csv(index=False, lineterminator="\n")
-        write_csv(text, path, asdict(imported.provenance))
+    table = imported.table
+    write_table(
+        path,
+        asdict(imported.provenance),
+        frame=lambda: table,
+        text=lambda: table.to_csv(index=False, lineterminator="\n"),
+    )
 
 
 def hash_files(paths: Sequence[Path]) -> str:
