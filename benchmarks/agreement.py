@@ -41,18 +41,24 @@ PATIENCE = 120.0
 
 
 def reference_rows(
-    esmini: Path, scenario: Path, step: float, limit: float, switches: Sequence[str] = (), seed: int = 1
+    esmini: Path,
+    scenario: Path,
+    step: float,
+    limit: float,
+    switches: Sequence[str] = (),
+    seed: int = 1,
+    messages: Path | None = None,
 ) -> pd.DataFrame:
-    """`time,name,x,y,speed` as esmini logs them; empty if it can't play the scenario."""
+    """`time,name,x,y,h,speed` as esmini logs them; empty if it can't play the scenario. What it says: in `messages`."""
     with tempfile.TemporaryDirectory() as folder:
         log = Path(folder) / "log.csv"
         command = [str(esmini), "--osc", str(scenario.resolve()), "--headless", "--fixed_timestep", str(step)]
         command += ["--disable_controllers", "--disable_stdout", "--seed", str(seed), "--csv_logger", str(log)]
-        command += ["--logfile_path", str(Path(folder) / "log.txt"), *_options(switches)]
+        command += ["--logfile_path", str(messages or Path(folder) / "log.txt"), *_options(switches)]
         player = subprocess.Popen(command, cwd=folder, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
         _wait(player, log, limit)
         rows = _logged(_written(log), limit)
-    return pd.DataFrame(rows, columns=["time", "name", "x", "y", "speed"])
+    return pd.DataFrame(rows, columns=["time", "name", "x", "y", "h", "speed"])
 
 
 def _wait(player: subprocess.Popen[bytes], log: Path, limit: float) -> None:
@@ -89,7 +95,7 @@ def _last_time(log: Path) -> float:
     return float(fields[1]) if len(fields) > 2 and fields[0].strip().isdigit() else 0.0
 
 
-def _logged(log: Path, limit: float) -> list[tuple[float, str, float, float, float]]:
+def _logged(log: Path, limit: float) -> list[tuple[float, str, float, float, float, float]]:
     """Rows up to the limit: a scenario without an end may have been logged far beyond."""
     if not log.is_file():
         return []
@@ -97,9 +103,9 @@ def _logged(log: Path, limit: float) -> list[tuple[float, str, float, float, flo
         return list(itertools.takewhile(lambda row: row[0] < limit + 1e-6, _rows(lines)))
 
 
-def _rows(lines: Iterable[str]) -> Iterator[tuple[float, str, float, float, float]]:
+def _rows(lines: Iterable[str]) -> Iterator[tuple[float, str, float, float, float, float]]:
     columns: list[str] = []
-    wanted = ("World_Position_X", "World_Position_Y", "Current_Speed")
+    wanted = ("World_Position_X", "World_Position_Y", "World_Heading_Angle", "Current_Speed")
     for line in lines:
         fields = [field.strip() for field in line.split(",")]
         if fields[0].startswith("Index"):
@@ -110,8 +116,8 @@ def _rows(lines: Iterable[str]) -> Iterator[tuple[float, str, float, float, floa
             fields = fields[own:]
             for first in range(2, len(fields) - len(columns) + 1, len(columns)):
                 one = dict(zip(columns, fields[first : first + len(columns)], strict=True))
-                x, y, speed = (float(one[name]) for name in wanted)
-                yield float(fields[1]), one["Entity_Name"], x, y, speed
+                x, y, heading, speed = (float(one[name]) for name in wanted)
+                yield float(fields[1]), one["Entity_Name"], x, y, heading, speed
 
 
 def own_rows(played: Played) -> pd.DataFrame:

@@ -19,7 +19,7 @@ from xosc_lateral.formats.openscenario.write import (
     WrittenScenario,
     motion_unknown_to,
     named,
-    offset_chain,
+    offset_chains,
     write_lane_offset_scenario,
     write_trajectory_scenario,
 )
@@ -207,9 +207,15 @@ def _write(
     facts = asdict(provenance)
     if settings.mode is OutputMode.LANE_OFFSET:
         chains = [
-            offset_chain(entity.motion, played.network, entity.deviation, segment.stretch.first, segment.stretch.last)
+            chain
             for entity in enriched.entities
-            for segment in entity.segments
+            for chain in offset_chains(
+                entity.motion,
+                played.network,
+                entity.deviation,
+                [segment.stretch for segment in entity.segments],
+                pulls=entity.name in played.trailers.values(),
+            )
         ]
         return write_lane_offset_scenario(
             played.scenario,

@@ -9,7 +9,7 @@ from xosc_lateral.playback.actions.base import Domain, RunningAction
 from xosc_lateral.playback.placement import NOWHERE
 from xosc_lateral.playback.transition import EPSILON, Transition
 from xosc_lateral.scenario.actions import AbsoluteTargetLaneOffset, LaneOffsetAction
-from xosc_lateral.scenario.enums import DynamicsDimension
+from xosc_lateral.scenario.enums import DynamicsDimension, DynamicsShape
 
 DEFAULT_LATERAL_ACCELERATION = 0.5
 """Where the file has none; the standard says as fast as can be, the reference player has this value. [m/s2]"""
@@ -48,8 +48,9 @@ class RunningLaneOffset(RunningAction):
         transition.begin(state.offset_t, self._target())
         limit = self.content.max_lateral_acc
         if limit is None:
-            self.note(f"no maxLateralAcc: played with {DEFAULT_LATERAL_ACCELERATION:g} m/s2")
             limit = DEFAULT_LATERAL_ACCELERATION
+            if self.content.shape is not DynamicsShape.STEP:
+                self.note(f"no maxLateralAcc: played with {limit:g} m/s2")
         transition.range = transition.range_for_curvature(limit)
         self._transition = transition
         self._forward = state.is_forward

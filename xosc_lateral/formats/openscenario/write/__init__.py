@@ -4,7 +4,7 @@ from xosc_lateral.formats.openscenario.provenance import provenance_of, refuse_c
 from xosc_lateral.formats.openscenario.write.build import named
 from xosc_lateral.formats.openscenario.write.distributions import VariantFiles, variant_index
 from xosc_lateral.formats.openscenario.write.lane_offset_scenario import write_lane_offset_scenario
-from xosc_lateral.formats.openscenario.write.offset_chain import OffsetChain, offset_chain
+from xosc_lateral.formats.openscenario.write.offset_chain import OffsetChain, offset_chains
 from xosc_lateral.formats.openscenario.write.result import WrittenScenario
 from xosc_lateral.formats.openscenario.write.sampled import motion_unknown_to
 from xosc_lateral.formats.openscenario.write.target import STANDARD, Player, TargetPlayer, target
@@ -20,7 +20,7 @@ __all__ = [
     "WrittenScenario",
     "motion_unknown_to",
     "named",
-    "offset_chain",
+    "offset_chains",
     "provenance_of",
     "refuse_converted",
     "source_of_set",

@@ -29,7 +29,7 @@ from xosc_lateral.formats.openscenario.write.lateral_actions import (
     LateralActions,
     lateral_actions,
 )
-from xosc_lateral.formats.openscenario.write.literal import name_literally
+from xosc_lateral.formats.openscenario.write.literal import inline_maneuvers, name_literally
 from xosc_lateral.formats.openscenario.write.offset_chain import LEAST_CHANGE, OffsetChain, Ramp, ramps
 from xosc_lateral.formats.openscenario.write.parameters import global_scope, override_parameters
 from xosc_lateral.formats.openscenario.write.relative_paths import rewrite_paths
@@ -42,6 +42,8 @@ from xosc_lateral.scenario.enums import Priority
 
 AT_ONCE = 0.1
 """A stretch that begins within this after a lateral action begins because of it. [s]"""
+PLACED = 1e-3
+"""What begins with the scenario begins only now: it would overrule an init action that has not been stepped yet. [s]"""
 
 
 def write_lane_offset_scenario(
@@ -93,21 +95,44 @@ def write_lane_offset_scenario(
         if not np.isfinite(chain.offset_t).all():
             raise ValueError(f"offsets of '{chain.entity}' are not finite")
         _add_act(story, f"xosc-lateral offsets {number}", chain, motion, lateral, target.version_for(scenario))
+    storyboard = next(element for element in root if local_name(element) == "Storyboard")
+    _place_aside(storyboard, scenario, chains)
     if len(story):
-        storyboard = next(element for element in root if local_name(element) == "Storyboard")
         # Last: a lane change that starts in the same frame has started before ours are looked at.
         stop = next((element for element in storyboard if local_name(element) == "StopTrigger"), None)
         build.insert_indented(storyboard, len(storyboard) if stop is None else storyboard.index(stop), story)
-    name_literally(root, scenario.path, global_scope(scenario), _referred(story))
+    scope, referred = global_scope(scenario), _referred(story)
+    name_literally(root, scenario.path, scope, referred)
+    inline_maneuvers(root, scenario, scope, referred)
     override_parameters(root, scenario)
-    notes = fit(root, scenario, motion, target, global_scope(scenario))
-    rewrite_paths(root, scenario, output, global_scope(scenario))
+    notes = fit(root, scenario, motion, target, scope)
+    rewrite_paths(root, scenario, output, scope)
     mark(root, provenance, summary)
     data = build.document(root)
     if save:
         write_atomically(output, data)
     names = tuple(dict.fromkeys(chain.entity for chain in chains))
     return WrittenScenario(output, hashlib.sha256(data).hexdigest(), names, (), data, notes)
+
+
+def _place_aside(storyboard: etree._Element, scenario: Scenario, chains: Sequence[OffsetChain]) -> None:
+    """Put those whose offsets begin with the scenario down there, after all else that places them."""
+    placed = {
+        chain.entity: found[0].origin if (found := ramps(chain)) else chain.start_t
+        for chain in chains
+        if chain.is_placed
+    }
+    owners = list(storyboard.iter("{*}Private"))
+    # The reader's order is the file's: names need no parameters filled in again.
+    last = {
+        private.entity_ref: owner
+        for owner, private in zip(owners, scenario.storyboard.init.privates, strict=True)
+        if private.entity_ref in placed
+    }
+    for entity, owner in last.items():
+        action = etree.Element("PrivateAction")
+        _lane_offset(action, {"dynamicsShape": "step"}, placed[entity])
+        build.insert_indented(owner, len(owner), action)
 
 
 def _referred(story: etree._Element) -> set[str]:
@@ -134,9 +159,9 @@ def _add_act(
     maneuver = build.sub(build.maneuver_group(act, f"{name} group", chain.entity), "Maneuver", name=f"{name} maneuver")
     for number, ramp in enumerate(found, start=1):
         event = build.event(maneuver, f"{name} event {number}", Priority.OVERRIDE, version)
-        _add_action(event, f"{name} action {number}", ramp)
+        _add_ramp(event, f"{name} action {number}", ramp)
         if cause is None:
-            build.time_trigger(event, "StartTrigger", ramp.start, version)
+            build.time_trigger(event, "StartTrigger", max(ramp.start, PLACED), version)
         else:
             group = build.sub(build.sub(event, "StartTrigger"), "ConditionGroup")
             build.state_condition(group, "act", name, "runningState", ramp.start - begin)
@@ -148,23 +173,23 @@ def _add_act(
     _add_stop(act, [item for item in lateral.by_entity.get(chain.entity, ()) if item.path not in already])
 
 
-def _add_action(event: etree._Element, name: str, ramp: Ramp) -> None:
+def _add_ramp(event: etree._Element, name: str, ramp: Ramp) -> None:
     """A ramp as an action.
 
     The reference player makes the duration from the change b and the acceleration A: pi sqrt(|b| / (2 A)).
     """
     change = max(abs(ramp.target - ramp.origin), LEAST_CHANGE)
     acceleration = 0.5 * pi**2 * change / (ramp.end - ramp.start) ** 2
-    lateral = build.sub(build.private_action(event, name), "LateralAction")
-    action = build.sub(lateral, "LaneOffsetAction", continuous="false")
-    build.sub(
-        action,
-        "LaneOffsetActionDynamics",
-        dynamicsShape="sinusoidal",
-        maxLateralAcc=build.decimal(acceleration, 6),
-    )
+    dynamics = {"dynamicsShape": "sinusoidal", "maxLateralAcc": build.decimal(acceleration, 6)}
+    _lane_offset(build.private_action(event, name), dynamics, ramp.target)
+
+
+def _lane_offset(owner: etree._Element, dynamics: Mapping[str, str], offset_t: float) -> None:
+    """To an offset along +t. [m]"""
+    action = build.sub(build.sub(owner, "LateralAction"), "LaneOffsetAction", continuous="false")
+    build.sub(action, "LaneOffsetActionDynamics", **dynamics)
     target = build.sub(action, "LaneOffsetTarget")
-    build.sub(target, "AbsoluteTargetLaneOffset", value=build.decimal(ramp.target, 4))
+    build.sub(target, "AbsoluteTargetLaneOffset", value=build.decimal(offset_t, 4))
 
 
 def _add_start_after(act: etree._Element, cause: LateralAction) -> None:

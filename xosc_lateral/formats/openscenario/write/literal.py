@@ -104,6 +104,23 @@ def inline_catalogs(losses: Losses, scenario: Scenario, scope: Scope) -> None:
             locations.text = None
 
 
+def inline_maneuvers(root: etree._Element, scenario: Scenario, scope: Scope, wanted: Collection[str]) -> None:
+    """Maneuvers of catalogs that hold an element of a wanted name, in place of the references to them.
+
+    Who looks at the file alone would find no element of that name.
+    """
+    losses = Losses(root, scenario.path, "", reactive=True)
+    for item, within in list(_references(losses, root, scope)):
+        owner = item.getparent()
+        if owner is None or local_name(owner) != "ManeuverGroup":
+            continue
+        asking = Element(item, scenario.path, within)
+        found = _entry(asking.text("catalogName"), asking.text("entryName"), scenario)
+        names = [] if found is None else [inner.get("name") or "" for inner in found[0].iter("{*}Event", "{*}Action")]
+        if any(name in wanted or name.startswith("$") for name in names):
+            _inline(item, within, scenario)
+
+
 def _references(losses: Losses, item: etree._Element, scope: Scope) -> Iterator[tuple[etree._Element, Scope]]:
     inner = scope if item is losses.root else local_scope(XmlElement(item, losses.path, scope))
     for child in item:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from lxml import etree
@@ -10,7 +11,13 @@ from numpy.typing import NDArray
 
 from xosc_lateral.formats.openscenario.write import build
 from xosc_lateral.formats.openscenario.write.non_motion_actions import Pose
-from xosc_lateral.formats.openscenario.write.path_pieces import PathPiece, cut_path, vertex_times
+from xosc_lateral.formats.openscenario.write.path_pieces import (
+    LEAST_SPACING,
+    VERTEX_STEP,
+    PathPiece,
+    cut_path,
+    vertex_times,
+)
 from xosc_lateral.formats.openscenario.write.vertices import TimedVertices, Vertices
 from xosc_lateral.motion.nominal import Activity, EntityMotion, NominalMotion
 from xosc_lateral.motion.trajectory import WorldTrajectory
@@ -26,12 +33,13 @@ class Moving:
     """An entity with its path cut into pieces."""
 
     def __init__(self, entity: EntityMotion, path: WorldTrajectory, motion: NominalMotion) -> None:
-        self.name, self.path, self.end = entity.name, path, motion.end_time
+        self.name, self.end = entity.name, motion.end_time
         active = (entity.activity & Activity.ACTIVE) != 0
         teleported = (entity.activity & Activity.TELEPORTED) != 0
         _check(entity, path, active)
         self.active_at_start = bool(active[0])
-        self.pieces = cut_path(path.time, path.x, path.y, active, teleported)
+        pieces = cut_path(path.time, path.x, path.y, active, teleported)
+        self.path, self.pieces = _stopping_in_time(path, pieces)
 
     @property
     def start(self) -> tuple[Pose, float] | None:
@@ -64,6 +72,27 @@ class Moving:
         return float(self.path.time[piece.first - 1 if piece.placed else piece.first])
 
 
+def _stopping_in_time(path: WorldTrajectory, pieces: Sequence[PathPiece]) -> tuple[WorldTrajectory, list[PathPiece]]:
+    """Sudden stops one step earlier, where the last step is too short for a vertex: it would slow the one before.
+
+    A car that runs at 20 m/s into the end of its road covers the last of it in a part of a step.
+    """
+    stopping = {piece for piece in pieces if piece.stops and piece.last - piece.first >= 2 and _is_sudden(path, piece)}
+    if not stopping:
+        return path, list(pieces)
+    rows = np.arange(len(path.time))
+    rows[[piece.last - 1 for piece in stopping]] += 1
+    arrays = {name: getattr(path, name)[rows] for name in ("x", "y", "z", "heading", "pitch", "roll")}
+    ends = [replace(piece, last=piece.last - 1) if piece in stopping else piece for piece in pieces]
+    return replace(path, **arrays), ends
+
+
+def _is_sudden(path: WorldTrajectory, piece: PathPiece) -> bool:
+    rows = slice(piece.last - 2, piece.last + 1)
+    before, final = np.hypot(np.diff(path.x[rows]), np.diff(path.y[rows]))
+    return bool(final < LEAST_SPACING < before)
+
+
 def _check(entity: EntityMotion, path: WorldTrajectory, active: NDArray[np.bool_]) -> None:
     arrays = (path.time, path.x, path.y, path.z, path.heading, path.pitch, path.roll)
     if any(len(values) != len(entity.time) for values in arrays):
@@ -85,7 +114,7 @@ def add_trajectories(maneuver: etree._Element, item: Moving, version: build.Vers
         if piece.placed:
             place = build.private_action(event, f"{name} place")
             build.world_position(build.sub(place, "TeleportAction"), item.pose(piece.first))
-        _add_trajectory(build.private_action(event, name), name, item.path, rows, times, version, vertices)
+        _add_trajectory(build.private_action(event, name), name, item.path, piece, times, version, vertices)
         build.time_trigger(event, "StartTrigger", item.trigger_time(piece), version)
         if piece.stops:
             name = f"{item.name} stand {number}"
@@ -108,19 +137,34 @@ def _add_trajectory(
     owner: etree._Element,
     name: str,
     path: WorldTrajectory,
-    rows: slice,
+    piece: PathPiece,
     times: FloatArray,
     version: build.Version,
     vertices: Vertices,
 ) -> None:
+    rows = slice(piece.first, piece.last + 1)
     time = path.time[rows]
     arrays = (path.x, path.y, path.z, np.unwrap(path.heading[rows]), path.pitch, path.roll)
     columns = [np.interp(times, time, values if len(values) == len(time) else values[rows]) for values in arrays]
+    columns[3] = np.interp(_heading_times(times, stops=piece.stops), time, np.unwrap(path.heading[rows]))
     speed = path.speed[rows]
     motion = None
     if version >= MOTION_SINCE:
         motion = [np.interp(times, time, values) for values in (speed, np.gradient(speed, time))]
     add_vertices(owner, name, vertices, version, times, columns, motion)
+
+
+def _heading_times(times: FloatArray, *, stops: bool) -> FloatArray:
+    """When the entity has the headings that the vertices get. [s]
+
+    The reference player has a vertex's heading in the middle of the gap after it: with gaps of `VERTEX_STEP`, half of
+    that late. Where gaps are shorter it would catch up with the path, and turn sharply: so it is kept as late there.
+    """
+    gaps = np.append(np.diff(times), 0.0)
+    late = 0.5 * (VERTEX_STEP - np.minimum(gaps, VERTEX_STEP))
+    if stops:
+        late[-1] = 0.0
+    return times - late
 
 
 def add_vertices(

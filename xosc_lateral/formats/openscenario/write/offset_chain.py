@@ -8,14 +8,16 @@ lateral acceleration, pi^2 b / (2 T^2) for a change b over the time T, over the 
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from math import inf
 
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.motion.nominal import EntityMotion
+from xosc_lateral.motion.nominal import Activity, EntityMotion
+from xosc_lateral.motion.segments import Stretch
 from xosc_lateral.road import RoadNetwork
 
 FloatArray = NDArray[np.float64]
@@ -24,8 +26,8 @@ SETTLING_TIME = 2.0
 """From the nominal offset at a stretch's start to the sampled one, where the turn allows it. [s]"""
 TOLERANCE = 0.013
 """How far the transitions may be from the sampled offset; a player's frames cost the rest of 2 cm. [m]"""
-MOST_TURNING = 0.028
-"""Of the heading, within a transition: 0.28 mrad in a frame of 0.01 s. [rad/s]"""
+MOST_TURNING = 0.027
+"""Of the heading, within a transition: 0.27 mrad in a frame of 0.01 s. [rad/s]"""
 GRID = 0.1
 """Time between places where a transition may begin or end. [s]"""
 LONGEST = 4.0
@@ -36,6 +38,11 @@ LEAST_CHANGE = 1e-3
 """A smaller change of the target is left to the next one. [m]"""
 FLIP_MARGIN = 0.3
 """Before and after a flip of +t in which nothing is commanded: the run may be a little early or late there. [s]"""
+PLACED_ASIDE = np.array([0.01 * sign * k for k in range(11) for sign in (1, -1)])
+"""From the sampled offset, the nearest first, where a chain begins with the scenario: a drift is met half way. [m]"""
+REST = 0.1
+"""Before a stretch's end in which nothing turns the car any more: the maneuver that ends it may come a little early,
+and begins with no lateral speed. [s]"""
 _TOO_FAST = 1e6
 """What turning faster than allowed costs: more than any number of transitions or centimetres. [-]"""
 _SLOW = 3.0
@@ -54,11 +61,13 @@ class OffsetChain:
     offset_t : array, shape (n,)
         From the lane centre along +t, as ``AbsoluteTargetLaneOffset`` has it, the nominal offset included. [m]
     start_t : float
-        Where the entity is when the chain begins, along +t: the first ramp leads from there. [m]
+        Where the entity is when the chain begins, along +t: the first ramp leads from there, unless it is placed. [m]
     flips : tuple of float
         Times from which +t is on the vehicle's other side: it comes to a road that runs the other way. [s]
     speed : array, shape (n,)
         Of the entity: how fast it may move sideways. Empty: 30 m/s. [m/s]
+    is_placed : bool
+        The chain begins with the scenario, and the entity is put down at its first offset: no ramp has to lead there.
     """
 
     entity: str
@@ -67,6 +76,7 @@ class OffsetChain:
     start_t: float = 0.0
     flips: tuple[float, ...] = ()
     speed: FloatArray = field(default_factory=lambda: np.empty(0))
+    is_placed: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,10 +89,45 @@ class Ramp:
     target: float
 
 
-def offset_chain(
+def offset_chains(
+    motion: EntityMotion, network: RoadNetwork, deviation: FloatArray, stretches: Sequence[Stretch], *, pulls: bool
+) -> list[OffsetChain]:
+    """Chains of one entity, with a deviation positive to the left of travel. [m]
+
+    A chain begins where the one before has left the entity, unless something else moved it aside in between. One that
+    pulls a trailer is not put down beside the middle: the trailer would swing.
+    """
+    chains: list[OffsetChain] = []
+    held, end = 0.0, -1
+    for stretch in stretches:
+        chain = _offset_chain(motion, network, deviation, stretch.first, stretch.last)
+        if stretch.first == 0 and not pulls:
+            chain = replace(chain, start_t=float(chain.offset_t[0]), is_placed=True)
+        if end >= 0 and not _moved_aside(motion, end + 1, stretch.first):
+            chain = replace(chain, start_t=_direction(motion, network, stretch.first) * held)
+        chains.append(chain)
+        found = ramps(chain)
+        at = int(np.searchsorted(motion.time, found[-1].end)) if found else stretch.first
+        held = _direction(motion, network, at) * (found[-1].target if found else chain.start_t)
+        end = stretch.last
+    return chains
+
+
+def _moved_aside(motion: EntityMotion, first: int, last: int) -> bool:
+    activity = motion.activity[first : last + 1]
+    aside = Activity.LATERAL | Activity.TRAJECTORY | Activity.TELEPORTED | Activity.OFF_ROAD
+    return bool(((activity & aside) != 0).any() or ((activity & Activity.ACTIVE) == 0).any())
+
+
+def _direction(motion: EntityMotion, network: RoadNetwork, row: int) -> float:
+    """+1 where +t is to the left of the lane's travel, else -1."""
+    return float(network.travel_directions(motion.road[row : row + 1], motion.lane[row : row + 1])[0])
+
+
+def _offset_chain(
     motion: EntityMotion, network: RoadNetwork, deviation: FloatArray, first: int, last: int
 ) -> OffsetChain:
-    """Chain for rows first..last (both included) of a motion with a deviation positive to the left of travel. [m]"""
+    """Rows first..last, both included, beginning at the nominal offset."""
     rows = slice(first, last + 1)
     along_lane = np.where(np.cos(motion.heading_relative[rows]) >= 0.0, 1.0, -1.0)
     offset = motion.offset[rows] + along_lane * deviation[rows]
@@ -99,39 +144,49 @@ def ramps(chain: OffsetChain) -> list[Ramp]:
     Around a flip of +t nothing is commanded: a target set on one side of it would be followed on the other.
     """
     found: list[Ramp] = []
-    borders = [float(chain.time[0]), *chain.flips, float(chain.time[-1]) + FLIP_MARGIN]
+    borders = [float(chain.time[0]), *chain.flips, float(chain.time[-1]) + FLIP_MARGIN - REST]
     speed = chain.speed if len(chain.speed) else np.full(len(chain.time), 30.0)
+    at = chain.start_t
     for number, (begin, end) in enumerate(pairwise(borders)):
+        if number > 0:
+            at = -at
         first, last = begin if number == 0 else begin + FLIP_MARGIN, end - FLIP_MARGIN
         if last - first < GRID:
             continue
         grid = np.linspace(first, last, int((last - first) / GRID + 1e-6) + 1)
         offset = np.interp(grid, chain.time, chain.offset_t)
-        if not found:
-            offset[0] = chain.start_t * (-1) ** number
         limit = MOST_TURNING * np.maximum(np.interp(grid, chain.time, speed), _SLOW)
-        found.extend(_transitions(grid, offset, limit, settles=not found))
+        is_placed = chain.is_placed and number == 0
+        starts = offset[:1] + PLACED_ASIDE if is_placed else np.array([at])
+        found.extend(_transitions(grid, offset, limit, starts, settles=not found and not is_placed))
+        at = found[-1].target if found else at
     return found
 
 
-def _transitions(time: FloatArray, offset: FloatArray, limit: FloatArray, *, settles: bool) -> list[Ramp]:
+def _transitions(
+    time: FloatArray, offset: FloatArray, limit: FloatArray, starts: FloatArray, *, settles: bool
+) -> list[Ramp]:
     """The cheapest way over the grid: each transition costs 1, each squared excess over the tolerance as much again.
 
-    Worked out from the end backwards (dynamic programming), for the first transition alone without a tolerance.
+    Worked out from the end backwards (dynamic programming), for the first transition alone without a tolerance if it
+    settles, and else from the best of the starts.
     """
     step, n = float(time[1] - time[0]), len(time)
     cost, following = np.full(n, inf), np.zeros(n, dtype=np.intp)
     cost[-1] = 0.0
     reach = round(LONGEST / step)
+    at = float(starts[0])
     for i in range(n - 2, -1, -1):
         far = n - 1 if settles and i == 0 else min(i + reach, n - 1)
         ends = np.arange(i + 1, far + 1)
-        price = cost[ends] + 1.0 + _turning(offset, limit, step, i, ends)
-        price += _settling(step, ends) if settles and i == 0 else _excess(offset, i, ends)
-        best = int(np.argmin(price))
-        cost[i], following[i] = price[best], ends[best]
+        for start in starts.tolist() if i == 0 else offset[i : i + 1].tolist():
+            price = cost[ends] + 1.0 + _turning(offset, start, limit, step, i, ends)
+            price += _settling(step, ends) if settles and i == 0 else _excess(offset, start, i, ends)
+            best = int(np.argmin(price))
+            if price[best] < cost[i]:
+                cost[i], following[i], at = price[best], ends[best], start
     found: list[Ramp] = []
-    i, at = 0, float(offset[0])
+    i = 0
     if cost[0] >= _TOO_FAST:
         return found  # too short a stretch to get anywhere
     while i < n - 1:
@@ -144,9 +199,11 @@ def _transitions(time: FloatArray, offset: FloatArray, limit: FloatArray, *, set
     return found
 
 
-def _turning(offset: FloatArray, limit: FloatArray, step: float, i: int, ends: NDArray[np.intp]) -> FloatArray:
+def _turning(
+    offset: FloatArray, start: float, limit: FloatArray, step: float, i: int, ends: NDArray[np.intp]
+) -> FloatArray:
     """What turning too fast costs."""
-    acceleration = 0.5 * np.pi**2 * np.abs(offset[ends] - offset[i]) / ((ends - i) * step - SLACK) ** 2
+    acceleration = 0.5 * np.pi**2 * np.abs(offset[ends] - start) / ((ends - i) * step - SLACK) ** 2
     slowest = np.minimum.accumulate(limit[i : ends[-1] + 1])[1:]
     return np.where(acceleration > slowest, _TOO_FAST * (acceleration / slowest), 0.0)
 
@@ -157,10 +214,10 @@ def _settling(step: float, ends: NDArray[np.intp]) -> FloatArray:
     return np.asarray(2.0 * np.abs(late) + 1e3 * np.maximum(late - 0.5, 0.0))
 
 
-def _excess(offset: FloatArray, i: int, ends: NDArray[np.intp]) -> FloatArray:
+def _excess(offset: FloatArray, start: float, i: int, ends: NDArray[np.intp]) -> FloatArray:
     """Largest distance from the sampled offset over the tolerance, squared, where it is above 1."""
     span = int(ends[-1]) - i
-    share = np.arange(1, span + 1)[None, :] / (ends - i)[:, None]
-    curve = offset[i] + 0.5 * (1.0 - np.cos(np.pi * np.minimum(share, 1.0))) * (offset[ends] - offset[i])[:, None]
-    error = np.where(share <= 1.0, np.abs(curve - offset[None, i + 1 : i + span + 1]), 0.0).max(axis=1) / TOLERANCE
+    share = np.arange(span + 1)[None, :] / (ends - i)[:, None]
+    curve = start + 0.5 * (1.0 - np.cos(np.pi * np.minimum(share, 1.0))) * (offset[ends] - start)[:, None]
+    error = np.where(share <= 1.0, np.abs(curve - offset[None, i : i + span + 1]), 0.0).max(axis=1) / TOLERANCE
     return np.where(error > 1.0, 10.0 * (error**2 - 1.0), 0.0)

@@ -26,6 +26,8 @@ VERTEX_SPACING = 0.105
 """Least distance between vertices: the player's 0.1 m and a margin for rounding. [m]"""
 LEAST_SPACING = VERTEX_SPACING - 1e-6
 """What counts as that far, rounding aside. [m]"""
+FARTHEST = 4.0
+"""Distance between vertices: the player turns cars within 2 m of one, more sharply where they are farther apart. [m]"""
 TOLERANCE = 0.01
 """Where straight motion between two vertices is further off than this, a vertex is added. [m]"""
 LARGE_ERROR = 0.04
@@ -191,10 +193,13 @@ def _cut_at_stops(
 
 
 def _head(time: FloatArray, way: FloatArray, until: float) -> list[float]:
+    """Vertices up to where those of the tail begin; evenly, since a player turns the car within half a gap."""
     times = [float(time[0])]
+    step = (until - times[0]) / max(1, round((until - times[0]) / VERTEX_STEP))
     while True:
-        nearest = _time_at(_way_at(times[-1], time, way) + VERTEX_SPACING, time, way)
-        following = max(times[-1] + VERTEX_STEP, nearest)
+        at = _way_at(times[-1], time, way)
+        nearest, farthest = (_time_at(at + far, time, way) for far in (VERTEX_SPACING, FARTHEST))
+        following = min(max(times[-1] + step, nearest), farthest)
         if following >= until - 1e-9:
             return times
         times.append(following)

@@ -1,0 +1,253 @@
+"""What the reference player makes of the outputs, in both modes, over folders of other people's scenarios.
+
+    python -m benchmarks.player_outputs FOLDER... --player PATH [--checker PATH] [--limit N] [--csv FILE]
+
+PATH is esmini's executable (a headless build is enough) and that of the ASAM checker bundle (`qc_openscenario` of the
+package `asam-qc-openscenarioxml`). Every scenario is converted in both modes; input and outputs are played with frames
+of 0.01 s, controllers off. Per scenario and mode:
+
+- far: the largest distance between a car in the player and where it was written to be. In trajectory mode the whole
+  path; in lane-offset mode to the sides of the sampled path, on road-following stretches, from the end of the first
+  transition on (at once where the scenario begins with the stretch). [cm]
+- turn: by how much more a car's heading changes within 0.01 s, above 5 m/s, than around that time in the played input
+  and (in trajectory mode) in what was written; in lane-offset mode its direction of movement, too, but for the time of
+  the scenario's own lateral actions. [mrad]
+- late: the largest difference of an event's start from that in the input, and how many no longer start. In trajectory
+  mode those of what is no motion. [s]
+- schema, checker: findings that the input does not have. `said`: the conversion warned of a shifted event.
+
+Scenarios that the player can't play, or that `convert` refuses in a line, are counted apart.
+"""
+
+from __future__ import annotations
+
+import argparse
+import tempfile
+import traceback
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+from lxml import etree
+
+import xosc_lateral as xl
+from benchmarks.agreement import scenarios
+from benchmarks.findings import checker_findings, schema_findings
+from benchmarks.in_player import PlayerRun, Span, distance, run, sharpest, shifts, within
+
+MODES = ("trajectory", "lane-offset")
+BOUNDS = {"far_cm": 5.0, "turn_mrad": 0.3, "late_s": 0.05, "lost": 0, "schema": 0, "checker": 0}
+"""What is asked of each measure."""
+LATERAL = ("LaneChangeAction", "LaneOffsetAction", "LateralDistanceAction", "FollowTrajectoryAction")
+OURS = "xosc-lateral"
+
+
+@dataclass(slots=True)
+class Measured:
+    """One output in the player."""
+
+    scenario: str
+    mode: str
+    far_cm: float = 0.0
+    turn_mrad: float = 0.0
+    late_s: float = 0.0
+    lost: int = 0
+    schema: int = 0
+    checker: int = 0
+    said: bool = False
+    what: str = ""
+
+    def row(self) -> str:
+        """For people."""
+        numbers = f"{self.far_cm:7.2f} cm {self.turn_mrad:8.3f} mrad {self.late_s:6.3f} s"
+        counts = f"{self.lost} lost {self.schema} schema {self.checker} checker"
+        return (
+            f"{self.scenario[:44]:44} {self.mode:11} {numbers} {counts} {'said ' if self.said else ''}{self.what[:140]}"
+        )
+
+
+def actions(scenario: Path) -> Iterator[tuple[str, etree._Element, set[str]]]:
+    """Name, element and actors of every action of an event."""
+    for group in etree.parse(str(scenario)).getroot().iter("{*}ManeuverGroup"):
+        actors = {item.get("entityRef") or "" for item in group.iter("{*}EntityRef")}
+        for action in group.iter("{*}Action"):
+            yield action.get("name") or "", action, actors
+
+
+def kept_actions(output: Path) -> set[str]:
+    """Names of what is no motion in a trajectory output."""
+    root = etree.parse(str(output)).getroot()
+    events = [event for event in root.iter("{*}Event") if (event.get("name") or "").startswith("kept ")]
+    return {action.get("name") or "" for event in events for action in event.iter("{*}Action")}
+
+
+def followers(output: Path) -> set[str]:
+    """Entities with a trajectory."""
+    return {
+        actor
+        for _, action, actors in actions(output)
+        if action.find(".//{*}FollowTrajectoryAction") is not None
+        for actor in actors
+    }
+
+
+def own_lateral(output: Path, played: PlayerRun) -> Mapping[str, list[Span]]:
+    """When the scenario's own lateral actions move which entity aside.
+
+    Their first frames count as ours, but for those of trajectories, which begin elsewhere.
+    """
+    found: dict[str, list[Span]] = {}
+    for name, action, actors in actions(output):
+        kind = next((tag for tag in LATERAL if action.find(f".//{{*}}{tag}") is not None), None)
+        if kind is None or name.startswith(OURS):
+            continue
+        first = 0.0 if kind == "FollowTrajectoryAction" else 0.03
+        for actor in actors:
+            found.setdefault(actor, []).extend((start + first, end + 0.03) for start, end in played.spans(name))
+    return found
+
+
+def settled(output: Path, played: PlayerRun) -> Mapping[str, list[Span]]:
+    """From the end of the first transition of each of our acts to the act's end."""
+    found: dict[str, list[Span]] = {}
+    for name, _, actors in actions(output):
+        if name.startswith(OURS) and name.endswith("action 1"):
+            for (begin, end), (_, act_end) in zip(
+                played.spans(name), played.spans(name[: -len(" action 1")]), strict=False
+            ):
+                for actor in actors:
+                    found.setdefault(actor, []).append((0.0 if begin <= 0.02 else end, act_end))
+    return found
+
+
+def on_stretches(made: xl.Conversion, output: Path, played: PlayerRun) -> Mapping[str, list[Span]]:
+    """Where the offsets are to be followed, by entity."""
+    after = settled(output, played)
+    found: dict[str, list[Span]] = {}
+    for item in made.to_dict()["entities"]:
+        for start, end in item["segments"]:
+            begins = [
+                max(start, begin) for begin, until in after.get(item["name"], ()) if begin < end and until > start
+            ]
+            if begins:
+                found.setdefault(item["name"], []).append((min(begins), end - 0.1))
+    return found
+
+
+def measure(path: Path, mode: str, plain: PlayerRun, folder: Path, options: argparse.Namespace) -> Measured:
+    """Convert in one mode, play, compare."""
+    output = folder / path.name
+    made = xl.convert(
+        path, output, mode=mode, seed=options.seed, time_limit=options.time_limit, allow=options.folders, force=True
+    )
+    played = run(options.player, output, made.end_time - 0.005, folder)
+    by_trajectory = mode == "trajectory"
+    spans = {} if by_trajectory else on_stretches(made, output, played)
+    lateral = {} if by_trajectory else own_lateral(output, played)
+    result = Measured(path.stem, mode)
+    meant = {str(name): one for name, one in made.to_frame().groupby("name")}
+    for name in sorted((followers(output) if by_trajectory else set(meant)) & set(plain.rows)):
+        rows = played.rows.get(name)
+        if rows is None:
+            result.far_cm, result.what = np.inf, f"{name} is not there"
+            continue
+        ahead, aside = distance(meant[name], rows)
+        far = (
+            np.hypot(ahead, aside)
+            if by_trajectory
+            else np.where(within(rows["time"].to_numpy(), spans.get(name, [])), aside, np.nan)
+        )
+        _worse(result, "far_cm", 100.0 * np.abs(far), rows["time"].to_numpy(), name)
+        for by_path in (False,) if by_trajectory else (False, True):
+            others = [plain.rows[name], meant[name]] if by_trajectory else [plain.rows[name]]
+            time, turn = sharpest(rows, others, by_path=by_path)
+            turn = np.where(within(time, lateral.get(name, [])), 0.0, turn)
+            _worse(result, "turn_mrad", 1e3 * turn, time, name)
+    kept = kept_actions(output) if by_trajectory else plain.starts.keys()
+    before = {name: times for name, times in plain.starts.items() if name in kept}
+    result.late_s, result.lost = shifts(before, played.starts, made.end_time)
+    found = [schema_findings(output) - schema_findings(path)]
+    if options.checker is not None:
+        found.append(checker_findings(options.checker, output) - checker_findings(options.checker, path))
+    result.schema, result.checker = found[0].total(), found[-1].total() if options.checker is not None else 0
+    result.said = any("with the offsets" in line for line in made.warnings)
+    result.what += " ".join(next(iter(one), "") for one in found)
+    return result
+
+
+def _worse(result: Measured, field: str, values: np.ndarray, time: np.ndarray, name: str) -> None:
+    """Keep the worst value; name who and when where it is beyond its bound."""
+    if not np.isfinite(values).any() or np.nanmax(values) <= getattr(result, field):
+        return
+    worst = int(np.nanargmax(values))
+    setattr(result, field, float(values[worst]))
+    if values[worst] > BOUNDS[field]:
+        result.what += f"{field.partition('_')[0]}: {name} at {time[worst]:.2f} s; "
+
+
+def summary(table: pd.DataFrame) -> str:
+    """For each mode: how many outputs keep each bound, and the worst of what was measured."""
+    lines = []
+    for mode, rows in table.groupby("mode"):
+        lines.append(f"{mode}: {len(rows)} outputs")
+        for name, bound in BOUNDS.items():
+            values = rows[name]
+            kept = 100.0 * np.mean(values <= bound + 1e-9)
+            spread = f"median {values.median():.3f}, 95 % {values.quantile(0.95):.3f}, worst {values.max():.3f}"
+            worst = rows.loc[values.idxmax(), "scenario"] if values.max() > 0.0 else "none"
+            lines.append(f"  {name:10} <= {bound:<4} {kept:5.1f} %; {spread} ({worst})")
+        quiet = int(((rows["late_s"] > BOUNDS["late_s"]) & ~rows["said"]).sum())
+        lines.append(f"  {quiet} with an event that is later or earlier and not warned of")
+    return "\n".join(lines)
+
+
+def outputs(paths: Sequence[Path], options: argparse.Namespace, apart: Counter[str]) -> Iterator[Measured]:
+    """Measure them; what can't be is counted in `apart`."""
+    for path in paths:
+        with tempfile.TemporaryDirectory() as name:
+            plain = run(options.player, path, options.time_limit, Path(name))
+            if not plain.rows or max(one["time"].max() for one in plain.rows.values()) < 0.03:
+                apart["not played by the player"] += 1
+                continue
+            for mode in options.mode or MODES:
+                try:
+                    yield measure(path, mode, plain, Path(name), options)
+                except xl.XoscLateralError as error:
+                    apart[f"refused ({mode})"] += 1
+                    print(f"{path.stem[:44]:44} {mode:11} refused: {' '.join(str(error).split())[-150:]}", flush=True)
+                except Exception:
+                    apart[f"traceback ({mode})"] += 1
+                    print(f"{path.stem[:44]:44} {mode:11} {traceback.format_exc()}", flush=True)
+
+
+def main() -> None:
+    """Measure and print."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("places", type=Path, nargs="+", metavar="FOLDER")
+    parser.add_argument("--player", type=Path, required=True)
+    parser.add_argument("--checker", type=Path)
+    parser.add_argument("--mode", choices=MODES, action="append")
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--time-limit", type=float, default=30.0)
+    parser.add_argument("--limit", type=int, help="this many scenarios, evenly spread")
+    parser.add_argument("--csv", type=Path, help="where all rows go")
+    options = parser.parse_args()
+    options.player = options.player.resolve()
+    options.folders = [place if place.is_dir() else place.parent.parent for place in options.places]
+    apart: Counter[str] = Counter()
+    found = []
+    for one in outputs(scenarios(options.places, options.limit), options, apart):
+        found.append(one)
+        print(one.row(), flush=True)
+    table = pd.DataFrame([asdict(one) for one in found])
+    if options.csv is not None:
+        table.to_csv(options.csv, index=False)
+    print(summary(table) if found else "nothing was measured")
+    print(", ".join(f"{count} {what}" for what, count in apart.items()))
+
+
+if __name__ == "__main__":
+    main()
