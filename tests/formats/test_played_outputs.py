@@ -51,7 +51,7 @@ def test_after_a_flip_of_the_t_axis_a_chain_goes_on_from_the_other_side() -> Non
     side = np.where(time < 10.0, 1.0, -1.0)
     found = ramps(OffsetChain("Ego", time, side * 0.2 * np.sin(0.8 * time), flips=(10.0,)))
     before = [ramp for ramp in found if ramp.end < 10.0][-1]
-    after = [ramp for ramp in found if ramp.start > 10.0][0]
+    after = next(ramp for ramp in found if ramp.start > 10.0)
     assert after.origin == pytest.approx(-before.target)
 
 

@@ -114,7 +114,7 @@ def inline_maneuvers(root: etree._Element, scenario: Scenario, scope: Scope, wan
         owner = item.getparent()
         if owner is None or local_name(owner) != "ManeuverGroup":
             continue
-        asking = Element(item, scenario.path, within)
+        asking = XmlElement(item, scenario.path, within)
         found = _entry(asking.text("catalogName"), asking.text("entryName"), scenario)
         names = [] if found is None else [inner.get("name") or "" for inner in found[0].iter("{*}Event", "{*}Action")]
         if any(name in wanted or name.startswith("$") for name in names):

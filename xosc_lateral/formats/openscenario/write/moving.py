@@ -164,7 +164,7 @@ def _heading_times(times: FloatArray, *, stops: bool) -> FloatArray:
     late = 0.5 * (VERTEX_STEP - np.minimum(gaps, VERTEX_STEP))
     if stops:
         late[-1] = 0.0
-    return times - late
+    return np.asarray(times - late)
 
 
 def add_vertices(
