@@ -17,6 +17,7 @@ import re
 import subprocess
 import tempfile
 from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import astuple, dataclass
 from pathlib import Path
 
 import numpy as np
@@ -166,13 +167,34 @@ def scenarios(
     kept: dict[bytes, Path] = {}
     for path in (path for place in places for path in ([place] if place.is_file() else sorted(place.rglob("*.xosc")))):
         name, data = path.stem.lower(), path.read_bytes()
-        side = int(hashlib.sha256(name.encode()).hexdigest()[0] >= "8")
-        if b"<Storyboard" in data and not _FOR_CARLA.search(data) and name not in known and half in (None, side):
+        is_played = b"<Storyboard" in data and not _FOR_CARLA.search(data)
+        if is_played and name not in known and half in (None, half_of(path)):
             kept.setdefault(b" ".join(data.split()), path)
     found = list(kept.values())
     if limit is None or limit >= len(found):
         return found
     return [found[k] for k in np.linspace(0, len(found) - 1, limit).astype(int)]
+
+
+def half_of(path: Path) -> int:
+    """0 or 1: by its name, so that all versions of a scenario are in the same half."""
+    return int(hashlib.sha256(path.stem.lower().encode()).hexdigest()[0] >= "8")
+
+
+@dataclass
+class Tally:
+    """Of one half."""
+
+    agreeing: int = 0
+    differing: int = 0
+    not_played_there: int = 0
+    left_to_chance: int = 0
+
+    def __str__(self) -> str:
+        return (
+            f"{self.agreeing} of {self.agreeing + self.differing} agree; {self.not_played_there} can't be played "
+            f"by the reference player, {self.left_to_chance} differ and come out there otherwise with another seed"
+        )
 
 
 def main() -> None:
@@ -190,30 +212,31 @@ def main() -> None:
     parser.add_argument("--without", type=Path, action="append", default=[], help="leave out names that occur there")
     options = parser.parse_args()
     folders = [place for place in options.folder if place.is_dir()]
-    agreeing = played_there = not_played_there = left_to_chance = 0
+    tallies = {0: Tally(), 1: Tally()}
     for path in scenarios(options.folder, options.limit, options.half, options.without):
+        tally = tallies[half_of(path)]
         run = (options.esmini.resolve(), path, options.step, options.time_limit, options.esmini_option)
         theirs = reference_rows(*run)
         if theirs["time"].nunique() < 3:
-            not_played_there += 1
+            tally.not_played_there += 1
             continue
-        played_there += 1
         try:
             ours = own_rows(play_scenario(path, step=options.step, time_limit=options.time_limit, allowed=folders))
             found = difference(theirs, ours, options.step, options.time_limit)
         except XoscLateralError as error:
             found = " ".join(str(error).split())
         if found and any(difference(theirs, reference_rows(*run, seed), *run[2:4]) for seed in OTHER_SEEDS):
-            played_there -= 1
-            left_to_chance += 1
+            tally.left_to_chance += 1
             continue
-        agreeing += not found
+        tally.agreeing += not found
+        tally.differing += bool(found)
         if found:
             print(f"{path.parent.name}/{path.name}: {found}", flush=True)
-    print(
-        f"{agreeing} of {played_there} agree; {not_played_there} can't be played by the reference player, "
-        f"{left_to_chance} differ and come out there otherwise with another seed"
-    )
+    whole = Tally(*(sum(amounts) for amounts in zip(*(astuple(tally) for tally in tallies.values()), strict=True)))
+    if options.half is None:
+        for half, tally in tallies.items():
+            print(f"half {half}: {tally}")
+    print(whole)
 
 
 if __name__ == "__main__":

@@ -106,7 +106,7 @@ def lane_change(stage: Stage, name: str) -> str:
     dimensions = {"time": (1.5, 6), "rate": (0.6, 2.5), "distance": (30, 120)}
     how = _dynamics(stage, "LaneChangeActionDynamics", dimensions)
     target = element("AbsoluteTargetLane", value=stage.some_lane())
-    if stage.flag(0.4):
+    if stage.flag(0.25):
         target = _relative_lane(stage, stage.pick(name, stage.other(name)))
     offset = stage.number(-0.7, 0.7) if stage.flag(0.3) else None
     return _lateral(element("LaneChangeAction", how, element("LaneChangeTarget", target), targetLaneOffset=offset))
@@ -134,16 +134,17 @@ def lane_offset(stage: Stage, name: str) -> str:
 def lateral_distance(stage: Stage, name: str) -> str:
     """A distance beside somebody."""
     limits = [_limits(stage)] if stage.flag(0.7) else []
+    system = stage.pick("entity", "road")  # the reference player knows no others, and no end in the entity's
     return _lateral(
         element(
             "LateralDistanceAction",
             *limits,
             entityRef=stage.other(name),
             distance=stage.number(2.5, 5),
-            continuous=stage.flag(),
+            continuous=system == "entity" or stage.flag(),
             freespace=stage.flag(0.3),
             displacement=stage.pick("leftToReferencedEntity", "rightToReferencedEntity"),
-            coordinateSystem=stage.pick("entity", "road"),  # the reference player knows no others
+            coordinateSystem=system,
         )
     )
 
@@ -320,7 +321,7 @@ def environment(stage: Stage, name: str) -> str:
 
 
 def user_defined(stage: Stage, name: str) -> str:
-    """Something that nobody knows."""
+    """Nobody knows it."""
     return element("UserDefinedAction", '<CustomCommandAction type="note">nothing</CustomCommandAction>')
 
 
@@ -346,5 +347,4 @@ ACTIONS: dict[str, Action] = {
         *(environment, user_defined, connect_trailer, disconnect_trailer),
     )
 }
-MOTION = ("speed", "lane_change", "lane_offset", "speed_profile", "longitudinal_distance", "speed_continuous")
-"""Those that go with every other."""
+COMMON = ("speed", "lane_change", "lane_offset", "speed_profile", "longitudinal_distance", "speed_continuous")

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks.made.actions import ACTIONS, MOTION
+from benchmarks.made.actions import ACTIONS, COMMON
 from benchmarks.made.conditions import CONDITIONS
 from benchmarks.made.roads import ROADS
 from benchmarks.made.stage import Stage
@@ -62,7 +62,7 @@ def _scenario(stage: Stage, title: str, action: str, condition: str) -> str:
     if action.endswith("trailer"):
         who = "Ego"
     partner = stage.other(who)
-    first = _event("first", ACTIONS[stage.pick(*MOTION)](stage, who), _after(stage, stage.number(0.5, 2)))
+    first = _event("first", ACTIONS[stage.pick(*COMMON)](stage, who), _after(stage, stage.number(0.5, 2)))
     conditions = [CONDITIONS[condition](stage, who)]
     if condition in UNKNOWN_AT_FIRST or stage.flag(0.6):
         conditions.append(_after(stage, stage.number(0.1, 2)))
@@ -78,8 +78,8 @@ def _scenario(stage: Stage, title: str, action: str, condition: str) -> str:
     then = element(
         "Condition", element("ByValueCondition", chain), name="then", conditionEdge="none", delay=stage.number(1, 4)
     )
-    last = _event("last", ACTIONS[stage.pick(*MOTION)](stage, who), then)
-    beside = _event("beside", ACTIONS[stage.pick(*MOTION)](stage, partner), _after(stage, stage.number(1, 5)))
+    last = _event("last", ACTIONS[stage.pick(*COMMON)](stage, who), then)
+    beside = _event("beside", ACTIONS[stage.pick(*COMMON)](stage, partner), _after(stage, stage.number(1, 5)))
     others = [partner] if stage.flag(0.8) else [partner, next(n for n in NAMES if n not in (who, partner))]
     groups = _group("own", [who], first, asked, last) + _group("theirs", others, beside)
     act = element("Act", groups, element("StartTrigger", _group_of(_after(stage, 0.0))), name="act")

@@ -46,16 +46,18 @@ def halt_at_road_end(state: EntityState, step: float) -> None:
     step : float
         [s]
     """
-    if not state.at_road_end or state.free_pose is not None:
-        state.end_place, state.stuck = None, False
+    if state.free_pose is not None:
+        state.last_place, state.stuck = None, False
         return
-    before, here = state.end_place, (state.road, state.s, state.offset_t)
+    before, here = state.last_place, (state.road, state.s, state.offset_t)
+    state.last_place = here
+    if not state.at_road_end:
+        state.stuck = False
+        return
     if state.stuck:
         state.set_speed(0.0)
-    state.stuck = before is not None and here[0] == before[0]
-    if before is not None:
-        state.stuck = state.stuck and abs(here[1] - before[1]) + abs(here[2] - before[2]) < EPSILON * step
-    state.end_place = here
+    moved = inf if before is None or before[0] != here[0] else abs(here[1] - before[1]) + abs(here[2] - before[2])
+    state.stuck = moved < EPSILON * step
 
 
 def along_reference(network: RoadNetwork, road: int, lane: int, s: float, offset_t: float, distance: float) -> float:

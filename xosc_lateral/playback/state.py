@@ -31,11 +31,11 @@ class EntityState:
         "active",
         "activity",
         "at_road_end",
-        "end_place",
         "entity",
         "event_actions",
         "init_actions",
         "lane",
+        "last_place",
         "longitudinal_taken",
         "name",
         "network",
@@ -74,8 +74,8 @@ class EntityState:
         self.section = (0.0, -1.0)
         """Range of s in which the lane id holds; empty: unknown. [m]"""
         self.at_road_end = False
-        self.end_place: tuple[int, float, float] | None = None
-        """Road, s and offset in the frame before, at a road's end. [m]"""
+        self.last_place: tuple[int, float, float] | None = None
+        """Road, s and offset in the frame before; None in the world's coordinates. [m]"""
         self.stuck = False
         """It has not moved in the frame before: the road had ended."""
         self._free_pose: Pose | None = Pose(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)

@@ -61,6 +61,7 @@ class RunningLaneOffset(RunningAction):
         if transition is None:
             self.end()
             return
+        state.locate()  # another action may have moved it in the world
         if state.is_forward is not self._forward:
             # The road under the entity now runs the other way, and so does its +t.
             transition.start, transition.target = -transition.start, -transition.target
