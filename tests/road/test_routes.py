@@ -53,3 +53,14 @@ def test_a_route_behind_the_start_leads_round_the_ring():
     assert route is not None
     assert sum(abs(step.s_end - step.s_start) for step in route) == pytest.approx(200.0 * pi - 30.0)
     assert [step.road for step in route] == [0, 1, 0]
+
+
+def test_a_route_takes_the_way_that_its_lane_leads_along_without_a_lane_change():
+    """Two lanes part at the end of a road; the shorter way round leads off the other lane."""
+    network = hand_written("parting")
+    start, end = network.index_of("start"), network.index_of("end")
+    on_the_left = network.route((start, -1, 10.0), (end, -1, 20.0))
+    on_the_right = network.route((start, -2, 10.0), (end, -1, 20.0))
+    assert on_the_left is not None and on_the_right is not None
+    assert [network.road_ids[step.road] for step in on_the_left] == ["start", "long", "end"]
+    assert [network.road_ids[step.road] for step in on_the_right] == ["start", "short", "end"]

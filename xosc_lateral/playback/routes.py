@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from xosc_lateral.playback.angles import is_forward
 from xosc_lateral.playback.placement import NOWHERE, Placement
 from xosc_lateral.road import LaneLink, RoadNetwork, RouteStep
 
@@ -25,9 +26,13 @@ class RouteGuide:
     def choose(self, road: int, options: Sequence[LaneLink]) -> LaneLink | None:
         """The link that leads along the route, be it by another connecting road; None: the route does not say."""
         roads = [step.road for step in self.steps]
-        if road not in roads:
-            return None
-        ahead = roads[roads.index(road) + 1 :]
+        for index in (index for index, other in enumerate(roads) if other == road):
+            found = self._towards(roads[index + 1 :], options)
+            if found is not None:
+                return found
+        return None
+
+    def _towards(self, ahead: Sequence[int], options: Sequence[LaneLink]) -> LaneLink | None:
         for link in options:
             if ahead and link.road == ahead[0]:
                 return link
@@ -53,5 +58,6 @@ def guide(network: RoadNetwork, stops: Sequence[Placement]) -> RouteGuide | None
     if len(stops) < 2 or any(stop.road == NOWHERE for stop in stops):
         return None
     first, *via, last = [(stop.road, stop.lane, stop.s) for stop in stops]
-    steps = network.route(first, last, via=via)
+    ways = [1 if is_forward(stop.relative_heading) else -1 for stop in stops]
+    steps = network.route(first, last, via=via, ways=ways)
     return None if steps is None else RouteGuide(network, steps)

@@ -312,13 +312,19 @@ class RoadNetwork:
         return path_between(self._links, start, end, direction=direction, limit=limit)
 
     def route(
-        self, start: tuple[int, int, float], end: tuple[int, int, float], *, via: Sequence[tuple[int, int, float]] = ()
+        self,
+        start: tuple[int, int, float],
+        end: tuple[int, int, float],
+        *,
+        via: Sequence[tuple[int, int, float]] = (),
+        ways: Sequence[int] | None = None,
     ) -> tuple[RouteStep, ...] | None:
-        """Shortest drivable way over roads and junctions between two (road, lane, s), in the lanes' travel directions.
+        """Shortest drivable way over roads and junctions between two (road, lane, s).
 
-        None: there is none.
+        Every stop is left in the direction `ways` (+1 along s, -1 against s), or in its lane's travel direction; where
+        the lane itself leads on, no lanes are changed. None: there is none.
         """
-        return route(self._links, start, end, via=via)
+        return route(self._links, start, end, via=via, ways=ways)
 
     # ---- to be seen --------------------------------------------------------------------------------------------------
     def road_marks(self, road: int) -> tuple[RoadMark, ...]:

@@ -14,7 +14,9 @@ from math import inf
 
 from xosc_lateral.road.lanes import DRIVING
 from xosc_lateral.road.links import End, Links
+from xosc_lateral.road.moving import follow_section
 from xosc_lateral.road.positions import RoadPath, RouteStep
+from xosc_lateral.road.road import Road
 
 
 def path_between(
@@ -66,58 +68,87 @@ def route(
     end: tuple[int, int, float],
     *,
     via: Sequence[tuple[int, int, float]] = (),
+    ways: Sequence[int] | None = None,
 ) -> tuple[RouteStep, ...] | None:
     """Shortest drivable way (see `RoadNetwork.route`). Distances in [m]."""
     steps: list[RouteStep] = []
     stops = [start, *via, end]
-    way = links.roads[start[0]].directions.get(start[1], 1)
-    for leg_start, leg_end in pairwise(stops):
+    if ways is None:
+        ways = [links.roads[road].directions.get(lane, 1) for road, lane, _ in stops]
+    for way, (leg_start, leg_end) in zip(ways, pairwise(stops), strict=False):  # the last stop is not left
         leg = _leg(links, leg_start, leg_end, way)
         if leg is None:
             return None
         if steps and steps[-1].road == leg[0].road and steps[-1].direction == leg[0].direction:
             leg = (leg[0]._replace(s_start=steps.pop().s_start), *leg[1:])
         steps += leg
-        way = steps[-1].direction
     return tuple(steps)
 
 
 def _leg(
     links: Links, start: tuple[int, int, float], end: tuple[int, int, float], way: int
 ) -> tuple[RouteStep, ...] | None:
-    (road, _, s), (target, _, target_s) = start, end
+    """The shortest way that the lane itself leads along, as who drives there changes no lanes; else any way."""
+    (road, lane, s), (target, _, target_s) = start, end
     if road == target and (target_s - s) * way >= 0.0:
         return (RouteStep(road, way, s, target_s),)
-    room = links.roads[road].length - s if way > 0 else s
-    queue: list[tuple[float, int, End, tuple[End, ...]]] = []
-    count = 0
-    for following in _drivable(links, road, way):
-        heappush(queue, (room, count, following, (following,)))
-        count += 1
-    done: set[End] = set()
-    while queue:
-        length, _, here, path = heappop(queue)
-        if here in done:
-            continue
-        done.add(here)
-        if here[0] == target:
+    for own_lane in (lane, None):
+        path = _shortest(links, (road, way), own_lane, target, s)
+        if path is not None:
             return _steps(links, (road, way, s), path, target_s)
-        for following in _drivable(links, *here):
-            if following not in done:
-                count += 1
-                heappush(queue, (length + links.roads[here[0]].length, count, following, (*path, following)))
     return None
 
 
-def _drivable(links: Links, road: int, way: int) -> Iterator[End]:
-    """Road ends reached by a driving lane in its travel direction (lanes may be changed on the road)."""
+def _shortest(links: Links, start: End, lane: int | None, target: int, s: float) -> tuple[End, ...] | None:
+    """Roads from a place to another road, on a lane and those it leads into; None: lanes may be changed."""
+    road, way = start
+    room = links.roads[road].length - s if way > 0 else s
+    queue: list[tuple[float, int, End, int | None, tuple[End, ...]]] = []
+    count = 0
+    for following, onto in _drivable(links, start, lane, s):
+        heappush(queue, (room, count, following, onto, (following,)))
+        count += 1
+    done: set[tuple[End, int | None]] = set()
+    while queue:
+        length, _, here, on, path = heappop(queue)
+        if (here, on) in done:
+            continue
+        done.add((here, on))
+        if here[0] == target:
+            return path
+        for following, onto in _drivable(links, here, on):
+            if (following, onto) not in done:
+                count += 1
+                heappush(queue, (length + links.roads[here[0]].length, count, following, onto, (*path, following)))
+    return None
+
+
+def _drivable(links: Links, here: End, lane: int | None, s: float | None = None) -> Iterator[tuple[End, int | None]]:
+    """Road ends, and lanes there, that a lane leads to; without a lane those that any driving lane of its way does."""
+    road, way = here
     section = links.roads[road].sections[-1 if way > 0 else 0]
-    reached: dict[End, None] = {}
-    for lane in section.lanes:
-        if lane.type in DRIVING and lane.direction == way:
-            for link in links.next_lanes(road, lane.id, way):
-                reached[(link.road, link.direction)] = None
+    reached: dict[tuple[End, int | None], None] = {}
+    if lane is None:
+        leaving = [one.id for one in section.lanes if one.type in DRIVING and one.direction == way]
+    else:
+        leaving = [found for found in (_at_end(links.roads[road], way, lane, s),) if found is not None]
+    for one in leaving:
+        for link in links.next_lanes(road, one, way):
+            reached[(link.road, link.direction), None if lane is None else link.lane] = None
     yield from reached
+
+
+def _at_end(road: Road, way: int, lane: int, s: float | None) -> int | None:
+    """What a lane has become where the road is left; None if it ends before."""
+    sections = list(road.sections)[::way]
+    if s is not None:
+        sections = sections[sections.index(road.section_at(s)) :]
+    for section, beyond in pairwise(sections):
+        onward = follow_section(road, section, beyond, lane, way)
+        if onward is None:
+            return None
+        lane = onward
+    return lane
 
 
 def _steps(links: Links, start: tuple[int, int, float], path: Sequence[End], target_s: float) -> tuple[RouteStep, ...]:
