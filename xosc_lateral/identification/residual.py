@@ -57,10 +57,9 @@ class SummaryStatistics:
 
     Parameters
     ----------
-    names : tuple of str
-        Groups: a column's name, "time", ...
+    timeline : Timeline
     labels : mapping of str to int array, shape (n,)
-        Bin of every row in each group, -1: none.
+        Bin of every row by group (a column's name, "time", ...), -1: none.
     middles : mapping of str to array
         Mean of the quantity per bin, for curves.
     oscillation : float, optional
@@ -73,7 +72,7 @@ class SummaryStatistics:
     oscillation: float | None = None
 
     def describe(self, offset: FloatArray, used: BoolArray) -> dict[str, FloatArray]:
-        """SummaryStatistics of one series of offsets on the grid, by group. [m]"""
+        """Statistics of one series of offsets on the grid, by group. [m]"""
         timeline = self.timeline
         used = used & timeline.valid
         slow = local_mean(offset, timeline.valid, LOCAL_S, timeline.step)
