@@ -118,7 +118,7 @@ def test_drivers_that_differ_are_told_from_one_driver(tmp_path: Path, apart: flo
 
 
 def test_what_a_missing_column_did_is_reported_as_unexplained_or_as_hidden(driven: Driven) -> None:
-    drives = driven(302, [plants.truck_avoidance(1.2)], 2400.0, drop=["truck_right"])
+    drives = driven(303, [plants.truck_avoidance(1.2)], 2400.0, drop=["truck_right"])
     result = close_loop(drives, seed=1)
     assert not any(finding.kind == "location" for finding in result.findings)
     lack_of_fit = lack_of_fit_of(result)

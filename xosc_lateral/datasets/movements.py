@@ -134,7 +134,7 @@ def lopsided(n: int, rng: np.random.Generator) -> np.ndarray:
 
 
 def pursuit(n: int, rng: np.random.Generator) -> np.ndarray:
-    """Goes to one place after the other, each by a jerk-free move of 2 to 8 s, and stays for up to 10 s.
+    """Goes to one place after the other, each by a smooth move of 2 to 8 s, and stays for up to 10 s.
 
     Shape (n,). [m]
     """

@@ -162,7 +162,7 @@ def classifier_two_sample_test(
     """
     try:
         from sklearn.model_selection import GroupKFold, cross_val_predict
-        from threadpoolctl import threadpool_limits  # comes with scikit-learn
+        from threadpoolctl import threadpool_limits
     except ImportError:
         return None
     rows, others = spread_out(len(real)), spread_out(len(other))

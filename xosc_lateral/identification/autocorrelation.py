@@ -97,9 +97,10 @@ def positions_in_run(valid: BoolArray) -> IntArray:
 
 
 def moving_sum(weights: FloatArray, values: FloatArray) -> FloatArray:
-    """sum_k weights[k] values[t - k], zeros before the start; shape of `values`, (n,) or (n, k)."""
+    """sum_k weights[k] values[t - k], zeros before the start; shape and precision of `values`, (n,) or (n, k)."""
     from scipy.signal import oaconvolve
 
+    weights = weights.astype(values.dtype)
     if values.ndim == 2 and values.shape[1] == 0:
         return np.zeros(values.shape)
     if len(weights) > 16 and len(values) > len(weights):
@@ -108,7 +109,7 @@ def moving_sum(weights: FloatArray, values: FloatArray) -> FloatArray:
     result = weights[0] * values
     for lag, weight in enumerate(weights[1:], start=1):
         result[lag:] += weight * values[:-lag]
-    return np.asarray(result, dtype=np.float64)
+    return np.asarray(result)
 
 
 def fit_autoregression(
@@ -306,16 +307,17 @@ class Whitener:
         return np.add.reduceat(self.ones**2, self._edges)
 
     def white(self, values: FloatArray) -> FloatArray:
-        """Whitened, levels still in; 0 at invalid rows; shape of `values`, (n,) or (n, k)."""
+        """Whitened, levels still in; 0 at invalid rows; shape and precision of `values`, (n,) or (n, k)."""
         columns = values[:, None] if values.ndim == 1 else values
-        scaled = columns / self.scale[:, None]
+        scaled = columns / self.scale[:, None].astype(columns.dtype)
+        start = self.process.start.astype(columns.dtype)
         if not self.runs:
             scaled = np.where(self.valid[:, None], scaled, 0.0)
         result = moving_sum(self.process.polynomial, scaled)
         for run in self._runs:
             stop = min(run.stop, run.start + self.process.order)
             known = stop - run.start
-            result[run.start : stop] = self.process.start[:known, :known] @ scaled[run.start : stop]
+            result[run.start : stop] = start[:known, :known] @ scaled[run.start : stop]
         if not self.runs:
             result[~self.valid] = 0.0
         return np.asarray(result[:, 0] if values.ndim == 1 else result)
@@ -323,9 +325,9 @@ class Whitener:
     def without_levels(self, white: FloatArray) -> FloatArray:
         """Take the drives' levels out of whitened rows."""
         columns = white[:, None] if white.ndim == 1 else white
-        sums = np.add.reduceat(self.ones[:, None] * columns, self._edges, axis=0)
-        mean = sums / np.maximum(self.power, 1e-300)[:, None]
-        result = columns - self.ones[:, None] * mean[self.drive]
+        ones, power = (of.astype(columns.dtype)[:, None] for of in (self.ones, np.maximum(self.power, 1e-30)))
+        mean = np.add.reduceat(ones * columns, self._edges, axis=0) / power
+        result = columns - ones * mean[self.drive]
         return np.asarray(result[:, 0] if white.ndim == 1 else result)
 
     def levels(self, values: FloatArray) -> FloatArray:

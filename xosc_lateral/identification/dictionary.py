@@ -19,15 +19,12 @@ SingleArray = NDArray[np.float32]
 BoolArray = NDArray[np.bool_]
 IntArray = NDArray[np.intp]
 
-RESPONSES = (1.0, 4.0)
-"""Time constants looked at first, refined later; sensitivity: docs/closing_the_loop.md. [s]"""
+TIMINGS: Mapping[float, tuple[int, ...]] = {1.0: (-2, -1, 0, 1), 4.0: (-4, -2, 0)}
+"""Lags looked at first, by time constant; refined later. What is smoothed by 4 s differs little from one second to the
+next. Sensitivity: docs/design/identification.md. [s]"""
 
-LAGS = (-4, -2, 0, 2)
-"""Lags looked at first, refined later. [s]"""
-
-PRODUCT_LAGS = (-2, 0)
-PRODUCT_RESPONSES = (2.0,)
-"""The same for products, of which there are many more."""
+PRODUCT_TIMINGS: Mapping[float, tuple[int, ...]] = {2.0: (-2, -1, 0, 1)}
+"""The same for products, of which there are many more. [s]"""
 
 NULL_DRAWS = 400
 """Rotated or re-signed residuals that the null is taken from."""
@@ -47,8 +44,11 @@ LEFT_OVER = 0.05
 CROSS_BASIS = 0.01
 """Directions of a column's cross-basis with less than this share of the largest variance are left in. [-]"""
 
-CHUNK = 192
-"""Candidates that are whitened at once."""
+CHUNK = 48
+"""Candidates that are whitened at once: few enough to stay in a processor's cache."""
+
+TINY = 1e-30
+"""Keeps single precision from dividing by zero."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,21 +131,21 @@ def build_dictionary(quantities: Quantities, whitener: Whitener) -> Dictionary:
     entries: list[tuple[Candidate, float, float]] = []
     blocks: list[SingleArray] = []
     families = (
-        ([i for i, c in enumerate(quantities.candidates) if len(c.columns) == 1], LAGS, RESPONSES),
-        ([i for i, c in enumerate(quantities.candidates) if len(c.columns) > 1], PRODUCT_LAGS, PRODUCT_RESPONSES),
+        ([i for i, c in enumerate(quantities.candidates) if len(c.columns) == 1], TIMINGS),
+        ([i for i, c in enumerate(quantities.candidates) if len(c.columns) > 1], PRODUCT_TIMINGS),
     )
-    for members, lags, responses in families:
+    for members, timings in families:
         for first in range(0, len(members), CHUNK):
             chunk = members[first : first + CHUNK]
-            own = quantities.values[chunk].astype(np.float64).T
-            for response in responses:
+            own = quantities.values[chunk].T
+            for response, lags in timings.items():
                 answer = respond_by_second(own, response)
                 for lag in lags:
                     # drives are padded by more than any lag
                     moved = answer[np.clip(seconds - lag, 0, len(answer) - 1)]
                     rows, support, kept = _unit_rows(compact.rows(moved), moved)
                     kept &= support >= MIN_SUPPORT_S
-                    blocks.append(rows[:, kept].T.astype(np.float32))
+                    blocks.append(rows.T[kept])
                     entries += [(quantities.candidates[chunk[i]], float(lag), response) for i in np.flatnonzero(kept)]
     stacked = np.concatenate(blocks) if blocks else np.zeros((0, len(seconds)), dtype=np.float32)
     return Dictionary(
@@ -157,7 +157,7 @@ def build_dictionary(quantities: Quantities, whitener: Whitener) -> Dictionary:
 
 
 def respond_by_second(values: FloatArray, response: float) -> FloatArray:
-    """Means over each second of a first-order lag of gain 1, settled at the start; shape of `values`, (n, k).
+    """Means over each second of a first-order lag of gain 1, settled at the start; like `values`, (n, k).
 
     Exact for values that stay the same for the second.
     """
@@ -165,16 +165,17 @@ def respond_by_second(values: FloatArray, response: float) -> FloatArray:
 
     keep = float(np.exp(-1.0 / response))
     late = response * (1.0 - keep)
-    return np.asarray(lfilter([1.0 - late, late - keep], [1.0, -keep], values, axis=0, zi=late * values[:1])[0])
+    later, earlier = np.array([[1.0 - late, late - keep], [1.0, -keep]], dtype=values.dtype)
+    return np.asarray(lfilter(later, earlier, values, axis=0, zi=late * values[:1])[0])
 
 
 def _unit_rows(rows: FloatArray, before: FloatArray) -> tuple[FloatArray, FloatArray, BoolArray]:
     """Rows of length one, the seconds that each rests on, and which vary within drives at all; `before` whitening."""
     squares = np.square(rows)
     power = squares.sum(axis=0)
-    kept = power > 1e-9 * np.maximum(np.square(before).sum(axis=0), 1e-300)
-    support = power**2 / np.maximum(np.square(squares).sum(axis=0), 1e-300)
-    return rows / np.sqrt(np.maximum(power, 1e-300)), support, kept
+    kept = power > 1e-9 * np.maximum(np.square(before).sum(axis=0), TINY)
+    support = power**2 / np.maximum(np.square(squares).sum(axis=0), TINY)
+    return rows / np.sqrt(np.maximum(power, TINY)), support, kept
 
 
 @dataclass(frozen=True, eq=False)

@@ -97,10 +97,15 @@ def identify(
         Columns that are not to be looked at.
     progress : callable
     """
+    from threadpoolctl import threadpool_limits
+
     columns, feedback, unused = usable_columns(coarse.timeline, excluded)
-    search = Search.over(coarse, columns, seed, lambda what: progress(0.1, what))
-    selection = select(search, initial)
-    kept, nested, gains, total, reason = _judged(search, selection, hold_out_blocks(coarse.timeline), initial, progress)
+    # products of small matrices gain nothing from threads, and lose a factor of ten to them where all cores are busy
+    with threadpool_limits(1, user_api="blas"):
+        search = Search.over(coarse, columns, seed, lambda what: progress(0.1, what))
+        selection = select(search, initial)
+        blocks = hold_out_blocks(coarse.timeline)
+        kept, nested, gains, total, reason = _judged(search, selection, blocks, initial, progress)
     return Identified(kept, nested, gains, total, reason, columns, feedback, unused)
 
 

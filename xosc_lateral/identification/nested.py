@@ -114,7 +114,8 @@ def nest(
         progress(fold / folds)
         held = seconds % folds == fold
         part = coarse.only(~held) if folds > 1 else coarse
-        selection = select(replace(search, coarse=part, _built=[]), initial, only=components)
+        share = (folds - 1) / folds if folds > 1 else 1.0
+        selection = select(replace(search, coarse=part, _built=[]), initial, only=components, share=share)
         selections.append(selection)
         by_row.append((held, coarse))
     return Nested(tuple(selections), tuple(by_row), seconds)

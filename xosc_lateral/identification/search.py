@@ -12,8 +12,7 @@ from xosc_lateral.identification.candidates import candidates_of
 from xosc_lateral.identification.columns import Column
 from xosc_lateral.identification.dictionary import (
     CROSS_BASIS,
-    LAGS,
-    RESPONSES,
+    TIMINGS,
     Dictionary,
     Quantities,
     build_dictionary,
@@ -84,8 +83,10 @@ class Search:
         own = [i for i, one in enumerate(self.quantities.candidates) if known.issuperset(one.columns)]
         values = self.quantities.values[own].astype(np.float64).T
         seconds, valid = np.arange(len(self.coarse)), self.coarse.valid[:, None]
-        answers = [respond_by_second(values, response) for response in RESPONSES]
-        blocks = [answer[np.clip(seconds - lag, 0, len(seconds) - 1)] * valid for answer in answers for lag in LAGS]
+        answers = [(respond_by_second(values, response), lags) for response, lags in TIMINGS.items()]
+        blocks = [
+            answer[np.clip(seconds - lag, 0, len(seconds) - 1)] * valid for answer, lags in answers for lag in lags
+        ]
         return orthonormal(np.concatenate(blocks, axis=1), CROSS_BASIS)
 
     def rng(self, *key: int) -> np.random.Generator:

@@ -77,7 +77,9 @@ class Selection:
         )
 
 
-def select(search: Search, initial: Sequence[Term] = (), *, only: frozenset[str] | None = None) -> Selection:
+def select(
+    search: Search, initial: Sequence[Term] = (), *, only: frozenset[str] | None = None, share: float = 1.0
+) -> Selection:
     """Add terms stage by stage.
 
     Parameters
@@ -87,6 +89,8 @@ def select(search: Search, initial: Sequence[Term] = (), *, only: frozenset[str]
         In the model already.
     only : frozenset of str, optional
         Components to look at; all without.
+    share : float
+        Of the table's rows that this is.
     """
     start = fitted = fit_model(search.coarse, initial)
     accepted: list[Accepted] = []
@@ -100,11 +104,11 @@ def select(search: Search, initial: Sequence[Term] = (), *, only: frozenset[str]
             tests = [(kind, test) for kind in asked if (test := _asked(search, kind, fitted)) is not None]
             passed = []
             for kind, test in tests:
-                if test.term is not None and test.p_value <= level_of(kind.component):
+                if test.term is not None and test.p_value <= level_of(kind.component, share):
                     passed.append(test)
                 else:
                     seen_at[kind.component] = len(accepted)
-                    rejected[kind.component] = _rejected(kind.component, test)
+                    rejected[kind.component] = _rejected(kind.component, test, share)
             if not passed:
                 break
             best = min(passed, key=lambda test: test.p_value)
@@ -113,11 +117,11 @@ def select(search: Search, initial: Sequence[Term] = (), *, only: frozenset[str]
             fitted = best.after or fit_model(search.coarse, (*fitted.terms, best.term))
     selection = Selection(tuple(accepted), tuple(rejected.values()), start, fitted)
     for one in accepted:
-        selection = _tested_again(search, selection, one)
+        selection = _tested_again(search, selection, one, share)
     return selection
 
 
-def _tested_again(search: Search, selection: Selection, one: Accepted) -> Selection:
+def _tested_again(search: Search, selection: Selection, one: Accepted, share: float) -> Selection:
     """The same without a term that no longer stands beside what was found after it.
 
     Rotations keep how loud the movement is, not where: a column that goes along with loud stretches scores on the mean.
@@ -138,7 +142,7 @@ def _tested_again(search: Search, selection: Selection, one: Accepted) -> Select
         test is not None
         and test.term is not None
         and test.term.columns == one.term.columns
-        and test.p_value <= level_of(one.term.component)
+        and test.p_value <= level_of(one.term.component, share)
     )
     return selection if stands else without
 
@@ -152,6 +156,6 @@ def _asked(search: Search, kind: type[Term], fitted: Fitted) -> Outcome | None:
     return kind.test(search, fitted)
 
 
-def _rejected(component: str, test: Outcome) -> Rejected:
-    why = f"not significant: its p-value is above {level_of(component):.2g}"
+def _rejected(component: str, test: Outcome, share: float) -> Rejected:
+    why = f"not significant: its p-value is above {level_of(component, share):.2g}"
     return Rejected(component, test.columns, test.p_value, why)

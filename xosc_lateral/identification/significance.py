@@ -39,9 +39,17 @@ WEIGHTS = {
 """Shares of the budget: half for the mean, a quarter for both measures of spread, about equal parts for the rest."""
 
 
-def level_of(component: str) -> float:
-    """Family-wise level that a component may spend."""
-    return BUDGET * WEIGHTS[component] / sum(WEIGHTS.values())
+def level_of(component: str, share: float = 1.0) -> float:
+    """Family-wise level that a component may spend.
+
+    Parameters
+    ----------
+    component : str
+    share : float
+        Of the table's rows. An effect's log p-value is in proportion to them: what is just significant on the table is
+        on average just below this level on a share of it.
+    """
+    return float((BUDGET * WEIGHTS[component] / sum(WEIGHTS.values())) ** share)
 
 
 def upper_tail(score: float, maxima: FloatArray) -> float:

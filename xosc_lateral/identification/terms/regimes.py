@@ -1,9 +1,15 @@
 """Loud and quiet stretches that no column tells apart: distraction, say.
 
+A two-state Markov chain [1]_. The null is a movement whose loudness wanders for seconds, a log-normal stochastic
+volatility [2]_: fitted to the logarithms of the squares [3]_ by their autocovariance, with a memory of at most
+`CLUSTER_S`.
+
 References
 ----------
 .. [1] J. D. Hamilton, "A new approach to the economic analysis of nonstationary time series and the business cycle",
        Econometrica 57, 1989.
+.. [2] A. Harvey, E. Ruiz, N. Shephard, "Multivariate stochastic variance models", Review of Economic Studies 61, 1994.
+.. [3] W. Fuller, "Introduction to Statistical Time Series", 2nd ed., 1996, section 9.2.
 """
 
 from __future__ import annotations
@@ -34,12 +40,18 @@ BoolArray = NDArray[np.bool_]
 MEMORIES_S = (6.0, 15.0, 40.0)
 """Lengths of regimes that are looked for. [s]"""
 
-SHORTEST_S = 20
-"""Loudness that comes and goes faster is how people steer, by a correction now and then, and no regime. Clusters of up
-to 6 s are taken for regimes on 4 of 10 such movements with 8 s here, on 1 of 10 with 20 s. [s]"""
+CLUSTER_S = 6.0
+"""Loudness that persists for up to this is how people steer, by a correction now and then and what it takes to settle,
+and no regime. Sensitivity: docs/design/identification.md. [s]"""
 
-SHUFFLES = 400
-"""Random orders of the seconds that are the null."""
+SHORTEST_S = 12
+"""Lags are compared from here on: two time constants of what is no regime. [s]"""
+
+DRAWS = 400
+"""Orders of the seconds that are the null."""
+
+FULLER = 0.02
+"""Share of the variance that keeps the logarithm of a square near 0 from being an outlier [3]_. [-]"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,7 +75,7 @@ class RegimesTerm(Term):
 
     @classmethod
     def test(cls, search: Search, fitted: Fitted) -> Outcome | None:
-        """Weighted autocovariance of the squared innovations; null: the same seconds in random order."""
+        """Weighted autocovariance of the squared innovations; null: the same seconds, clustered at most for seconds."""
         coarse = fitted.coarse
         if not coarse.lasts or any(isinstance(term, cls) for term in fitted.terms):
             return None
@@ -102,24 +114,66 @@ class RegimesTerm(Term):
 
 
 def _probability(fitted: Fitted, known: FloatArray, rng: np.random.Generator) -> float:
+    from scipy.signal import lfilter
+
     coarse = fitted.coarse
     squares = squared_innovations(fitted.rows, coarse.valid)
     if known.shape[1]:
         basis = np.linalg.qr((known - known[coarse.valid].mean(axis=0)) * coarse.valid[:, None])[0]
         squares = squares - basis @ (basis.T @ squares)
-    rows, shuffled, null = np.flatnonzero(coarse.valid), np.zeros(len(squares)), []
-    for _ in range(SHUFFLES):
-        shuffled[rows] = rng.permutation(squares[rows])
-        null.append(_scores(shuffled, coarse.valid).max())
+    rows, drawn, null = np.flatnonzero(coarse.valid), np.zeros(len(squares)), []
+    ordered = np.sort(squares[rows])
+    variance, memory = fit_clusters(fitted.rows, coarse.valid)
+    keep = float(np.exp(-1.0 / memory))
+    pushes = np.sqrt(variance * (1.0 - keep**2))
+    for _ in range(DRAWS):
+        loudness = lfilter([pushes], [1.0, -keep], rng.normal(size=len(squares)))[rows]
+        sizes = loudness + np.log(np.abs(rng.normal(size=len(rows))))
+        # the drive's own squares, in the order of the simulated ones: of as heavy tails as they are
+        drawn[rows[np.argsort(sizes)]] = ordered
+        null.append(_scores(drawn, coarse.valid).max())
     observed = float(_scores(squares, coarse.valid).max())
     return upper_tail(observed * abs(observed), np.asarray(null) * np.abs(null))
 
 
+def fit_clusters(rows: FloatArray, valid: BoolArray) -> tuple[float, float]:
+    """Loudness as a first-order autoregression of the log scale.
+
+    Parameters
+    ----------
+    rows : array, shape (n,)
+        Whitened, one per second.
+    valid : bool array, shape (n,)
+
+    Returns
+    -------
+    variance : float
+        Of the log scale. [-]
+    memory : float
+        Time constant, 1 to `CLUSTER_S`. [s]
+    """
+    squares = np.square(rows[valid])
+    least = FULLER * float(squares.mean())
+    logs = np.zeros(len(rows))
+    logs[valid] = np.log(squares + least) - least / (squares + least)
+    logs[valid] -= logs[valid].mean()
+    lags = np.arange(1, 2 * SHORTEST_S)
+    pairs = np.maximum(_products(valid.astype(np.float64), lags), 1.0)
+    covariance = _products(logs, lags) / pairs
+    memories = np.geomspace(1.0, CLUSTER_S, 12)
+    shapes = np.exp(-lags / memories[:, None])
+    variances = np.maximum(shapes @ covariance / np.square(shapes).sum(axis=1), 0.0)
+    best = int(np.argmin(np.square(covariance - variances[:, None] * shapes).sum(axis=1)))
+    return 0.25 * float(variances[best]), float(memories[best])
+
+
+def _products(series: FloatArray, lags: NDArray[np.intp]) -> FloatArray:
+    """Sums of products at lags."""
+    size = len(series) + int(lags[-1])
+    return np.asarray(np.fft.irfft(np.abs(np.fft.rfft(series, size)) ** 2, size)[lags])
+
+
 def _scores(squares: FloatArray, valid: BoolArray) -> FloatArray:
-    longest = int(3 * max(MEMORIES_S))
-    size = len(squares) + longest
-    transform = np.fft.rfft(squares, size)
-    lags = np.arange(SHORTEST_S, longest + 1)
-    covariance = np.fft.irfft(np.abs(transform) ** 2, size)[lags] / np.sqrt(valid.sum())
+    lags = np.arange(SHORTEST_S, int(3 * max(MEMORIES_S)) + 1)
     weights = np.exp(-lags[None, :] / np.asarray(MEMORIES_S)[:, None])
-    return np.asarray(weights @ covariance / np.sqrt((weights**2).sum(axis=1)))
+    return np.asarray(weights @ _products(squares, lags) / np.sqrt(valid.sum() * (weights**2).sum(axis=1)))
