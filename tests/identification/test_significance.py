@@ -54,3 +54,9 @@ def test_p_values_of_the_null_itself_are_not_too_small(seed: int) -> None:
 def test_a_null_that_never_varies_is_no_reason_for_certainty() -> None:
     assert 0.0 < upper_tail(10.0, np.full(50, 10.0)) <= 1.0
     assert upper_tail(11.0, np.full(50, 10.0)) > 0.0
+
+
+def test_a_share_of_the_rows_is_given_the_level_that_an_effect_reaches_there() -> None:
+    assert level_of("mean", 1.0) == level_of("mean")
+    # log p in proportion to the rows
+    assert np.log(level_of("mean", 0.75)) == pytest.approx(0.75 * np.log(level_of("mean")))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from msgspec import structs
@@ -16,6 +17,7 @@ from xosc_lateral.identification.timeline import COARSE, Timeline, coarse_mean
 
 FloatArray = NDArray[np.float64]
 SingleArray = NDArray[np.float32]
+Reals = NDArray[np.floating[Any]]
 BoolArray = NDArray[np.bool_]
 IntArray = NDArray[np.intp]
 
@@ -145,7 +147,7 @@ def build_dictionary(quantities: Quantities, whitener: Whitener) -> Dictionary:
                     moved = answer[np.clip(seconds - lag, 0, len(answer) - 1)]
                     rows, support, kept = _unit_rows(compact.rows(moved), moved)
                     kept &= support >= MIN_SUPPORT_S
-                    blocks.append(rows.T[kept])
+                    blocks.append(rows.T[kept].astype(np.float32, copy=False))
                     entries += [(quantities.candidates[chunk[i]], float(lag), response) for i in np.flatnonzero(kept)]
     stacked = np.concatenate(blocks) if blocks else np.zeros((0, len(seconds)), dtype=np.float32)
     return Dictionary(
@@ -156,7 +158,7 @@ def build_dictionary(quantities: Quantities, whitener: Whitener) -> Dictionary:
     )
 
 
-def respond_by_second(values: FloatArray, response: float) -> FloatArray:
+def respond_by_second(values: Reals, response: float) -> FloatArray:
     """Means over each second of a first-order lag of gain 1, settled at the start; like `values`, (n, k).
 
     Exact for values that stay the same for the second.
