@@ -79,6 +79,17 @@ def test_creeping_stays_within_five_centimetres(pace: float) -> None:
         assert (np.diff(times) > 0).all()
 
 
+def test_a_car_that_turns_back_has_a_piece_for_each_way() -> None:
+    """From 5 m/s forward to 5 m/s backward: where it turns, one piece ends and the next begins."""
+    x = driven(np.clip(20.0 - 5.0 * TIME, -5.0, 5.0))
+    there, back = pieces(x)
+    assert x[there.last] == x.max()
+    assert back.first == there.last
+    assert not there.stops
+    for piece in (there, back):
+        assert checked(x, piece)[2] < 0.03
+
+
 def test_a_sudden_change_of_speed_gets_a_vertex() -> None:
     x = driven(np.where(TIME > 10.05, 1.0, 33.0))
     (piece,) = pieces(x)

@@ -34,6 +34,8 @@ LARGE_ERROR = 0.04
 """Where it is still further off than this, a vertex takes the place of its neighbours. [m]"""
 REFINEMENTS = 4
 """How often vertices are added, and then replaced: each time one per gap."""
+LEAST_STEP = 1e-5
+"""A smaller step has no direction. [m]"""
 STANDSTILL_SPEED = 0.005
 """Slower counts as standing. [m/s]"""
 STANDSTILL_TIME = 0.3
@@ -170,7 +172,7 @@ def _spaced(rows: NDArray[np.intp], way: FloatArray) -> NDArray[np.intp]:
 def _cut_at_stops(
     time: FloatArray, x: FloatArray, y: FloatArray, first: int, last: int, placed: bool
 ) -> list[PathPiece]:
-    """Pieces between the stops inside rows first..last, which hold no jump."""
+    """Pieces between the stops and turns backwards inside rows first..last, which hold no jump."""
     rows = slice(first, last + 1)
     step = np.diff(time[rows])
     still = np.hypot(np.diff(x[rows]), np.diff(y[rows])) < STANDSTILL_SPEED * step
@@ -181,15 +183,25 @@ def _cut_at_stops(
         or first + part.stop == last
         or time[first + part.stop] - time[first + part.start] >= STANDSTILL_TIME
     ]
+    turned = first + _reversals(x[rows], y[rows])
+    stops += [(row, row) for row in turned.tolist() if not any(begin <= row <= end for begin, end in stops)]
     pieces = []
     begin = first
-    for stop_begin, stop_end in stops:
+    for stop_begin, stop_end in sorted(stops):
         if stop_begin > begin or (begin == first and placed):
-            pieces.append(PathPiece(begin, stop_begin, placed and begin == first, stops=True))
+            pieces.append(PathPiece(begin, stop_begin, placed and begin == first, stops=stop_end > stop_begin))
         begin = stop_end
     if begin < last or (begin == first and placed):
         pieces.append(PathPiece(begin, last, placed and begin == first, stops=False))
     return pieces
+
+
+def _reversals(x: FloatArray, y: FloatArray) -> NDArray[np.intp]:
+    """Rows at which the entity goes back the way it came: a path that is followed by its length has no such fold."""
+    step = np.diff(x) + 1j * np.diff(y)
+    moving = np.flatnonzero(np.abs(step) > LEAST_STEP)
+    back = (step[moving[1:]] * np.conj(step[moving[:-1]])).real < 0.0
+    return np.asarray(moving[1:][back], dtype=np.intp)
 
 
 def _head(time: FloatArray, way: FloatArray, until: float) -> list[float]:
