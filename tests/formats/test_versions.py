@@ -244,6 +244,39 @@ def test_a_reactive_scenario_keeps_its_events_for_others_to_refer_to(tmp_path: P
     assert bool(found.notes) == (minor < 3)
 
 
+SPLINE = (
+    "<PrivateAction><RoutingAction><FollowTrajectoryAction><TrajectoryRef>"
+    '<Trajectory name="way" closed="false"><Shape><ClothoidSpline>{segments}</ClothoidSpline></Shape></Trajectory>'
+    "</TrajectoryRef><TimeReference><None/></TimeReference>"
+    '<TrajectoryFollowingMode followingMode="position"/></FollowTrajectoryAction></RoutingAction></PrivateAction>'
+)
+AWAY = '<ClothoidSplineSegment curvatureStart="0" curvatureEnd="0.02" length="20">{start}</ClothoidSplineSegment>'
+BACK = '<ClothoidSplineSegment curvatureStart="0.02" curvatureEnd="-0.01" length="20"/>'
+AT_EGO = '<PositionStart><RelativeObjectPosition entityRef="Ego" dx="1" dy="0"/></PositionStart>'
+IN_WORLD = '<PositionStart><WorldPosition x="60" y="-1.75" h="0.1"/></PositionStart>'
+ON_LANE = '<PositionStart><LanePosition roadId="1" laneId="-1" s="60"/></PositionStart>'
+
+
+@pytest.mark.parametrize("start", ["", AT_EGO, IN_WORLD])
+@pytest.mark.parametrize("minor", range(3))
+def test_a_clothoid_spline_of_a_reactive_scenario_becomes_a_polyline(tmp_path: Path, minor: int, start: str) -> None:
+    follow = SPLINE.format(segments=AWAY.format(start=start) + BACK)
+    source = tree(tmp_path, stories=story(event("follow", action("follow", follow), time=1.0)))
+    found, root = reactive(source, f"1.{minor}")
+    schema_of(minor).assertValid(root)
+    assert any("written as a Polyline" in note for note in found.notes)
+    before = played(read_scenario(source)).entities[0]
+    after = played(read_scenario(source.with_name("reactive.xosc"))).entities[0]
+    assert np.hypot(after.x - before.x, after.y - before.y).max() < 0.02
+
+
+def test_a_clothoid_spline_that_begins_on_a_lane_is_refused(tmp_path: Path) -> None:
+    follow = SPLINE.format(segments=AWAY.format(start=ON_LANE) + BACK)
+    source = tree(tmp_path, stories=story(event("follow", action("follow", follow))))
+    with pytest.raises(FormatError, match="no ClothoidSpline"):
+        reactive(source, "1.2")
+
+
 def test_an_orientation_without_a_type_means_what_it_meant(tmp_path: Path) -> None:
     turned = teleport().replace("/></Position>", '><Orientation h="0.1"/></LanePosition></Position>')
     source = tree(tmp_path, 2, init=private("Ego", turned, speed_action()))
