@@ -95,7 +95,7 @@ def test_each_entity_has_random_numbers_of_its_own(tmp_path: Path) -> None:
     both = enrich(together(b, a), network, {"a": profile, "b": profile}, seed=5, joint=False)
     np.testing.assert_array_equal(alone.entity("a").deviation, both.entity("a").deviation)
     assert not np.array_equal(both.entity("a").deviation, both.entity("b").deviation)
-    for other in ({"seed": 6}, {"seed": 5, "variant": 1}, {"seed": 5, "entropy": [1]}):
+    for other in ({"seed": 6}, {"seed": 5, "variant": 1}, {"seed": 5, "entropy": {"a": [1]}}):
         changed = enrich(together(a), network, {"a": profile}, **other)  # type: ignore[arg-type]
         assert not np.array_equal(alone.entity("a").deviation, changed.entity("a").deviation)
 

@@ -41,7 +41,7 @@ from xosc_lateral.identification.lack_of_fit import LackOfFit, lack_of_fit_of
 from xosc_lateral.identification.moving_statistics import by_drive, moving_spread
 from xosc_lateral.identification.partial import curve_of
 from xosc_lateral.report.loop import loop_page, loop_text
-from xosc_lateral.report.loop_figures import DRIVES, effect_figure, residual_figure
+from xosc_lateral.report.loop_figures import DRIVES, draw_spectra, effect_figure, residual_figure
 from xosc_lateral.report.loop_hidden_figures import DRAWINGS
 from xosc_lateral.report.loop_json import loop_json
 from xosc_lateral.report.loop_words import lack_of_fit_words, meaning, p_value_words, size_words
@@ -242,3 +242,12 @@ def test_drives_are_described_one_by_one(result: LoopResult) -> None:
     assert len(spreads["after"]) == len(result.runs_after)
     timeline = result.statistics.timeline
     assert means["measured"][0] == pytest.approx(timeline.offset[timeline.valid].mean())
+
+
+def test_a_table_whose_runs_are_all_shorter_than_a_spectrum_s_segment_has_a_spectrum_still(result: LoopResult) -> None:
+    from matplotlib.figure import Figure
+
+    axis = Figure().add_subplot()
+    draw_spectra(axis, result, 10**6)
+    for line in axis.lines:
+        assert len(line.get_ydata()) and np.all(np.asarray(line.get_ydata())[1:] > 0.0)

@@ -51,7 +51,7 @@ def enrich(
     *,
     seed: int,
     variant: int = 0,
-    entropy: Sequence[int] = (),
+    entropy: Mapping[str, Sequence[int]] | None = None,
     context: Mapping[str, tuple[FloatArray, FloatArray]] | None = None,
     trailers: Mapping[str, str] | None = None,
     attempts: int = 1,
@@ -70,8 +70,8 @@ def enrich(
     seed, variant : int
         Together with `entropy` and the entity's name they seed each entity's own random numbers, so that adding an
         entity changes no other's offsets.
-    entropy : sequence of int
-        Further seed words: the input's hash.
+    entropy : mapping of entity name to sequence of int, optional
+        Further seed words of each entity.
     context : mapping of str to (time, values), optional
         Context that the scenario doesn't state, or that replaces what it states; the same for all entities. [s]
     trailers : mapping of str to str, optional
@@ -89,7 +89,7 @@ def enrich(
     DriverProfileError
         When the sensor is asked for and a profile knows of none.
     """
-    trailers = trailers or {}
+    trailers, words = trailers or {}, entropy or {}
     stretches = {
         entity.name: cut_stretches(entity, network, is_trailer=entity.name in trailers) for entity in motion.entities
     }
@@ -103,7 +103,9 @@ def enrich(
                 index,
                 stretches[entity.name],
                 drivers.get(entity.name, "not chosen"),
-                np.random.SeedSequence([seed, variant, attempt, zlib.crc32(entity.name.encode()), *entropy]),
+                np.random.SeedSequence(
+                    [seed, variant, attempt, zlib.crc32(entity.name.encode()), *words.get(entity.name, ())]
+                ),
                 context or {},
                 with_sensor,
             )

@@ -8,6 +8,8 @@ from collections.abc import Mapping
 from dataclasses import asdict
 from pathlib import Path
 
+import numpy as np
+
 from xosc_lateral.enrich.conversion import ConversionProvenance, ConvertedScenario
 from xosc_lateral.enrich.enrich import enrich
 from xosc_lateral.enrich.result import Enriched
@@ -25,6 +27,7 @@ from xosc_lateral.formats.openscenario.write import (
 )
 from xosc_lateral.formats.profiles import profile_hash
 from xosc_lateral.formats.source import guarding_inputs
+from xosc_lateral.motion.nominal import Activity
 from xosc_lateral.pipeline.drivers import choose_drivers
 from xosc_lateral.pipeline.load import Played, input_hashes, play_scenario
 from xosc_lateral.pipeline.settings import ConvertSettings, OutputMode
@@ -98,7 +101,7 @@ def _convert(
         drivers,
         seed=settings.seed,
         variant=variant,
-        entropy=_entropy(played.scenario),
+        entropy=_entropy(played),
         context=context,
         trailers=played.trailers,
         attempts=settings.attempts,
@@ -141,12 +144,18 @@ def _shifted(played: Played, output: Path, settings: ConvertSettings) -> list[st
     return shifted_events(played.motion, again.motion)
 
 
-def _entropy(scenario: Scenario) -> tuple[int, ...]:
-    """Seed words from what is played, not from where it lies: the scenario's bytes and its parameter values."""
-    digest = hashlib.sha256(scenario.source)
-    for name, parameter in sorted(scenario.parameters.items()):
-        digest.update(f"\0{name}={parameter.value}".encode())
-    return tuple(int.from_bytes(digest.digest()[k : k + 4], "little") for k in range(0, 16, 4))
+def _entropy(played: Played) -> dict[str, tuple[int, ...]]:
+    """Seed words of each entity from where it starts and how fast: nothing that anybody else does changes them."""
+    found = {}
+    for entity in played.motion.entities:
+        row = int(np.argmax((entity.activity & Activity.ACTIVE) != 0))
+        on_road = int(entity.road[row])
+        where = (entity.x[row], entity.y[row]) if on_road < 0 else (entity.s[row], entity.offset[row])
+        road = "" if on_road < 0 else played.network.road_ids[on_road]
+        told = [road, str(entity.lane[row]), *(f"{value:.3f}" for value in (*where, entity.speed[row]))]
+        digest = hashlib.sha256("\0".join(told).encode()).digest()
+        found[entity.name] = tuple(int.from_bytes(digest[k : k + 4], "little") for k in range(0, 16, 4))
+    return found
 
 
 def _provenance(

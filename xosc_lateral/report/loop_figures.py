@@ -16,6 +16,7 @@ from xosc_lateral.identification.close import LoopResult
 from xosc_lateral.identification.findings import Finding
 from xosc_lateral.identification.lack_of_fit import LackOfFit
 from xosc_lateral.identification.partial import curve_of
+from xosc_lateral.mask import stretches_of
 from xosc_lateral.report.evaluation_figures import LABELS, density_over
 from xosc_lateral.report.figures import BLUE, GRID, MUTED, VERMILLION, figure_style, new_figure, new_panels
 from xosc_lateral.report.loop_words import SPREAD, column_label, product_label
@@ -111,6 +112,8 @@ def draw_spectra(axis: Axes, result: LoopResult, segment: int, *, within_blocks:
     """Measured spectrum with its uncertainty, and the mean of either profile's runs; `segment` in samples."""
     timeline = result.coarse.timeline
     seams = hold_out_blocks(timeline) if within_blocks else timeline.drive
+    together = timeline.valid & np.r_[True, seams[1:] == seams[:-1]]
+    segment = min(segment, max(part.stop - part.start for part in stretches_of(together)))  # runs may all be shorter
     frequency, density, number = gapped_spectrum(timeline.offset[None], timeline.valid, seams, timeline.step, segment)
     # the mean of so many independent periodograms, which overlap by half
     about = TWO_ERRORS / np.sqrt(max(0.75 * number, 1.0))

@@ -1,0 +1,51 @@
+"""Contacts that lifelike movement brings into the dense template: conversions without resampling.
+
+    python -m benchmarks.contacts [--profile auto motorway-refined] [--count 1000]
+
+A contact counts if the nominal scenario lacks it, a departure if a reference point leaves the lane that it keeps
+nominally.
+"""
+
+from __future__ import annotations
+
+import argparse
+import tempfile
+from pathlib import Path
+
+import numpy as np
+
+from xosc_lateral.api.templates import write_template
+from xosc_lateral.enrich.enrich import enrich
+from xosc_lateral.pipeline.drivers import choose_drivers
+from xosc_lateral.pipeline.load import play_scenario
+from xosc_lateral.pipeline.settings import ConvertSettings
+
+QUANTILES = (0.0, 0.01, 0.1, 0.5)
+
+
+def main() -> None:
+    """Print a row per profile."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--profile", nargs="+", default=["auto", "motorway-refined"])
+    parser.add_argument("--count", type=int, default=1000)
+    args = parser.parse_args()
+    with tempfile.TemporaryDirectory() as folder:
+        written = write_template("dense-traffic", Path(folder))
+        played = play_scenario(next(path for path in written if path.suffix == ".xosc"))
+    print(f"Dense template, {args.count} conversions\n")
+    print("| profile | with contacts | with departures | smallest gap at quantiles 0, 1, 10, 50 % [m] |")
+    print("|---|---|---|---|")
+    for profile in args.profile:
+        drivers = choose_drivers(played.scenario, ConvertSettings(profile=profile))
+        contacts, departures, gaps = 0, 0, []
+        for seed in range(args.count):
+            made = enrich(played.motion, played.network, drivers, seed=seed)
+            contacts += bool(made.new_contacts)
+            departures += bool(made.departures)
+            gaps.append(min(gap.distance for gap in made.gaps_after))
+        told = ", ".join(f"{value:.2f}" for value in np.quantile(gaps, QUANTILES))
+        print(f"| `{profile}` | {contacts} | {departures} | {told} |")
+
+
+if __name__ == "__main__":
+    main()
