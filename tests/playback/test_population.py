@@ -142,6 +142,23 @@ def test_a_trailer_that_is_let_go_rolls_on_by_itself(tmp_path: Path) -> None:
     assert box.speed[-1] == pytest.approx(20.0)
 
 
+@pytest.mark.parametrize("kind", ["euclidianDistance", "longitudinal"])
+def test_free_space_to_a_vehicle_counts_from_the_trailer_that_it_draws(tmp_path: Path, kind: str) -> None:
+    near = (
+        f'<RelativeDistanceCondition entityRef="Truck" relativeDistanceType="{kind}" value="5" freespace="true" '
+        'rule="lessThan"/>'
+    )
+    brake = event(speed(0.0), name="brake", trigger=when(by_entity(near)))
+    played = Stage(tmp_path).play(
+        maneuvers(brake),
+        start=EGO | {"Truck": teleport(on_lane(-1, 60.0))},
+        entities=(car("Ego"), TRUCK, towing("Box")),
+        minor=3,
+    )
+    # Ego's front is 4 m ahead of it, the trailer's end 5 m behind the truck: nearer than 5 m from x = 46 on, after 36 m.
+    assert start_of(played, "brake-0") == pytest.approx(1.8, abs=0.021)
+
+
 # ---- controllers and what does not move -----------------------------------------------------------------------------
 def test_an_assigned_controller_is_named_and_the_default_driver_drives(tmp_path: Path) -> None:
     controller = (

@@ -7,7 +7,7 @@ that the entity points; without a road, the entity's own heading (as in the refe
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import copysign, cos, hypot, sin
+from math import copysign, cos, hypot, inf, sin
 
 from xosc_lateral.playback import boxes
 from xosc_lateral.playback.paths.base import nearest_s
@@ -124,6 +124,37 @@ def entity_distance(
     if boxes.overlap(state, other):
         return 0.0
     return _road_freespace(network, state, [_project(network, state, x, y) for x, y in boxes.corners(other)], kind)
+
+
+def train_distance(
+    network: RoadNetwork,
+    state: EntityState,
+    other: EntityState,
+    system: CoordinateSystem,
+    kind: RelativeDistanceType,
+    *,
+    freespace: bool,
+) -> float | None:
+    """As `entity_distance`; free space is that of the nearest two of both vehicles and all trailers that they draw."""
+    pairs = [(own, theirs) for own in _train(state) for theirs in _train(other)]
+    if not freespace or len(pairs) == 1:
+        return entity_distance(network, state, other, system, kind, freespace=freespace)
+    along = system in _ALONG_ROADS and kind is not RelativeDistanceType.EUCLIDIAN
+    apart = kind if along else RelativeDistanceType.EUCLIDIAN
+    found = [entity_distance(network, *pair, system, apart, freespace=True) for pair in pairs]
+    gap, nearest = min(zip(found, pairs, strict=True), key=lambda one: inf if one[0] is None else abs(one[0]))
+    return gap if apart is kind else entity_distance(network, *nearest, system, kind, freespace=True)
+
+
+def _train(state: EntityState) -> list[EntityState]:
+    """The vehicle in front and what it draws."""
+    while state.tow is not None:
+        state = state.tow
+    members = [state]
+    while state.trailer is not None:
+        state = state.trailer
+        members.append(state)
+    return members
 
 
 def spot_distance(

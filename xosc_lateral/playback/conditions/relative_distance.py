@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from xosc_lateral.playback.conditions.base import EntityCheck
 from xosc_lateral.playback.conditions.measure import measure_of
-from xosc_lateral.playback.distances import FAR, apart, entity_distance
+from xosc_lateral.playback.distances import FAR, apart, train_distance
 from xosc_lateral.playback.simulation import Simulation
 from xosc_lateral.playback.state import EntityState
 from xosc_lateral.playback.values import holds
@@ -24,7 +24,7 @@ def prepare(content: RelativeDistanceCondition, simulation: Simulation) -> Entit
         if straight:
             place = other.plane
             return holds(apart(state, place.x, place.y), content.rule, content.value)
-        distance = entity_distance(simulation.network, state, other, system, kind, freespace=content.freespace)
+        distance = train_distance(simulation.network, state, other, system, kind, freespace=content.freespace)
         return holds(FAR if distance is None else abs(distance), content.rule, content.value)
 
     return check

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from xosc_lateral.playback.conditions.base import EntityCheck
 from xosc_lateral.playback.conditions.measure import measure_of
-from xosc_lateral.playback.distances import FAR, entity_distance
+from xosc_lateral.playback.distances import FAR, train_distance
 from xosc_lateral.playback.simulation import Simulation
 from xosc_lateral.playback.state import EntityState
 from xosc_lateral.playback.transition import EPSILON
@@ -20,7 +20,7 @@ def prepare(content: TimeHeadwayCondition, simulation: Simulation) -> EntityChec
     def check(state: EntityState) -> bool:
         if not other.active or state.speed < EPSILON:
             return False
-        distance = entity_distance(simulation.network, state, other, system, kind, freespace=content.freespace)
+        distance = train_distance(simulation.network, state, other, system, kind, freespace=content.freespace)
         distance = FAR if distance is None else distance
         return distance >= 0.0 and holds(distance / state.speed, content.rule, content.value)
 

@@ -11,7 +11,7 @@ from math import copysign, hypot
 
 from xosc_lateral.playback.conditions.base import EntityCheck
 from xosc_lateral.playback.conditions.measure import measure_of
-from xosc_lateral.playback.distances import FAR, entity_distance, spot_distance
+from xosc_lateral.playback.distances import FAR, spot_distance, train_distance
 from xosc_lateral.playback.positions.resolve import spot_at
 from xosc_lateral.playback.simulation import Simulation
 from xosc_lateral.playback.state import EntityState
@@ -32,7 +32,7 @@ def prepare(content: TimeToCollisionCondition, simulation: Simulation) -> Entity
         def to_entity(state: EntityState) -> bool:
             if not other.active:
                 return False
-            distance = entity_distance(simulation.network, state, other, system, kind, freespace=freespace)
+            distance = train_distance(simulation.network, state, other, system, kind, freespace=freespace)
             return _holds(distance, _closing_speed(state, other), content)
 
         return to_entity
