@@ -155,7 +155,7 @@ def test_free_space_to_a_vehicle_counts_from_the_trailer_that_it_draws(tmp_path:
         entities=(car("Ego"), TRUCK, towing("Box")),
         minor=3,
     )
-    # Ego's front is 4 m ahead of it, the trailer's end 5 m behind the truck: nearer than 5 m from x = 46 on, after 36 m.
+    # Ego's front is 4 m ahead of it, the trailer's end 5 m behind the truck: nearer than 5 m from x = 46 on.
     assert start_of(played, "brake-0") == pytest.approx(1.8, abs=0.021)
 
 
