@@ -34,7 +34,7 @@ def main() -> None:
 
 
 def measure(template: Path, folder: Path, outputs: int, jobs: int) -> None:
-    batch = plan_batch([template], folder, ConvertSettings(profile="motorway-car", time_limit=10.0), variants=outputs)
+    batch = plan_batch([template], folder, ConvertSettings(profile="motorway", time_limit=10.0), variants=outputs)
     begin, cpu = time.monotonic(), cpu_seconds()
     counts, parents, workers = [], [], []
     for number, outcome in enumerate(convert_many(batch, workers=jobs), start=1):

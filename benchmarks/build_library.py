@@ -11,7 +11,7 @@ from pathlib import Path
 
 from xosc_lateral.formats.atomic import write_atomically
 from xosc_lateral.formats.profiles import read_profile, write_profile
-from xosc_lateral.pipeline.library import GROUPS, build_library
+from xosc_lateral.pipeline.library import build_library
 from xosc_lateral.pipeline.refined import NAME
 from xosc_lateral.report.cards import library_page
 
@@ -31,7 +31,7 @@ def main(argv: Sequence[str] | None = None) -> None:
     for profile in profiles:
         write_profile(profile, args.output / f"{profile.name}.json")
     if args.keep_refined:
-        profiles.insert(len(GROUPS), read_profile(args.output / f"{NAME}.json"))
+        profiles.insert(1, read_profile(args.output / f"{NAME}.json"))
     if args.cards is not None:
         write_atomically(args.cards, library_page(profiles))
 

@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from tests.profiles import as_drive
 from xosc_lateral.datasets import simulate_drive
 from xosc_lateral.driver.models.autoregressive import fit as fitting
+from xosc_lateral.driver.models.autoregressive import fit_coarse
 from xosc_lateral.driver.models.autoregressive.autoregression import Autoregression, fit_autoregression, stabilise
 from xosc_lateral.driver.models.autoregressive.fit_matching import simulate
 from xosc_lateral.driver.models.autoregressive.model import AutoregressiveModel
@@ -49,8 +50,10 @@ def per_driver(runs: Sequence[FloatArray], order: int = fitting.DEFAULT_SETTINGS
 def calm_moments(seconds: float) -> Fit:
     """Each moment weighted by how calm its surroundings are, as the fit did at first (with 10 s)."""
 
-    def weighted(runs: Sequence[FloatArray], order: int, *, every: int, drivers: Sequence[str]) -> Autoregression:
-        first = fit_autoregression(runs, order, every=every, drivers=drivers)
+    def weighted(
+        runs: Sequence[FloatArray], order: int, *, every: int, drivers: Sequence[str], between: float
+    ) -> Autoregression:
+        first = fit_autoregression(runs, order, every=every, drivers=drivers, between=between)
         coefficients = first.coefficients
         long = [run for run in runs if len(run) > every * (order + 1)]
         pasts = [np.stack([run[every * (order - 1 - k) : len(run) - every * (k + 1)] for k in range(order)], axis=1)
@@ -67,7 +70,7 @@ def calm_moments(seconds: float) -> Fit:
         return Autoregression(stabilise(coefficients), first.scale)
 
     def fit(runs: Sequence[FloatArray]) -> AutoregressiveModel:
-        with patch.object(fitting, "fit_autoregression", weighted):
+        with patch.object(fit_coarse, "fit_autoregression", weighted):
             return per_driver(runs)
 
     return fit

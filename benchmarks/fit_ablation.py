@@ -46,12 +46,8 @@ VARIANTS: dict[str, dict[str, object]] = {
     "no rounds": {"rounds": 0},
     "1 round": {"rounds": 1},
     "2 rounds": {"rounds": 2},
-    "4 rounds": {"rounds": 4},
-    "12 rounds": {"rounds": 12},
-    "gain of the coarse volatility 0.5": {"coarse_gain": 0.5},
-    "gain of the fine volatility 1": {"fine_gain": 1.0},
-    "scale by spread and speed alike": {"speed_weight": 0.5},
-    "scale by speed alone": {"speed_weight": 1.0},
+    "3 rounds": {"rounds": 3},
+    "8 rounds": {"rounds": 8},
 }
 
 

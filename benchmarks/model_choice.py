@@ -94,8 +94,6 @@ VARIANTS: dict[str, Callable[[Sequence[Run]], Sampler]] = {
     "memory of 4 s": lambda runs: batch(autoregressive(runs, order=4)),
     "memory of 8 s": lambda runs: batch(autoregressive(runs, order=8)),
     "memory of 24 s": lambda runs: batch(autoregressive(runs, order=24)),
-    "scale by spread alone": lambda runs: batch(autoregressive(runs, speed_weight=0.0)),
-    "scale by speed alone": lambda runs: batch(autoregressive(runs, speed_weight=1.0)),
 }
 
 

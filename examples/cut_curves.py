@@ -28,7 +28,7 @@ def main(out: Path) -> None:
         errors=(0.0,),
         reference=(0.0,),
     )
-    cutter = xl.read_profile("motorway-car").with_effects(effect, name="curve-cutter")
+    cutter = xl.read_profile("motorway").with_effects(effect, name="curve-cutter")
     xl.write_profile(cutter, out / "curve-cutter.json")
 
     scenario, _road = xl.write_template("curves", out, radius=RADIUS)

@@ -120,7 +120,7 @@ def test_results_are_short_to_print_and_become_frames(drive, tmp_path):
         played,
         xl.segments(played),
         xl.convert(scenario, time_limit=5.0),
-        xl.sample("motorway-car", duration=20.0),
+        xl.sample("motorway", duration=20.0),
         xl.list_profiles(),
         xl.list_templates(),
     ]
@@ -128,7 +128,7 @@ def test_results_are_short_to_print_and_become_frames(drive, tmp_path):
         assert len(repr(result)) < 200 and repr(result).startswith(f"<{type(result).__name__} ")
         assert isinstance(result.to_frame(), pd.DataFrame) and len(result.to_frame())
         assert isinstance(result.to_dict(), dict)
-    assert len(repr(xl.read_profile("motorway-car"))) < 200
+    assert len(repr(xl.read_profile("motorway"))) < 200
 
 
 def test_a_conversion_that_is_not_written_is_the_one_that_would_be(tmp_path):
@@ -144,9 +144,10 @@ def test_a_conversion_that_is_not_written_is_the_one_that_would_be(tmp_path):
 
 
 def test_a_profile_goes_in_by_name_path_and_object(tmp_path):
-    profile = xl.read_profile("motorway-truck")
+    profile = xl.read_profile("motorway-vehicle-2")
     path = xl.write_profile(profile, tmp_path)
-    frames = [xl.sample(one, duration=10.0, seed=2).to_frame() for one in (profile, path, str(path), "motorway-truck")]
+    same = (profile, path, str(path), "motorway-vehicle-2")
+    frames = [xl.sample(one, duration=10.0, seed=2).to_frame() for one in same]
     assert all(frame.equals(frames[0]) for frame in frames)
 
 

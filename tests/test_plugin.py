@@ -31,7 +31,7 @@ assert again.to_dict() == loop.profile.to_dict()
 
 known = {"coefficients": (0.3,), "errors": (0.0,), "reference": (0.0,)}
 effect = Ripple(column="wind_speed", period=5.0, acts=Acts.LOCATION, **known)
-base = xl.read_profile("motorway-car")
+base = xl.read_profile("motorway")
 windy = base.with_effects(effect, name="windy")
 xl.write_profile(windy, "windy.json")
 assert xl.read_profile("windy.json").effects == (*base.effects, effect)
@@ -39,7 +39,7 @@ time = np.arange(0.0, 60.0, 0.04)
 drive = pd.DataFrame({"time": time, "offset": 0.0 * time, "lane_width": 3.5, "speed": 30.0})
 shift = [
     xl.sample(one, context=drive.assign(wind_speed=10.0), seed=4).to_frame()["offset"]
-    for one in ("motorway-car", "windy.json")
+    for one in ("motorway", "windy.json")
 ]
 np.testing.assert_allclose(shift[1] - shift[0], 0.3, atol=1e-9)
 print("stored and read back")

@@ -68,8 +68,8 @@ def test_no_verb_writes_over_its_inputs(
 @pytest.mark.parametrize(
     "words",
     [
-        ["sample", "--profile", "motorway-car", "--like", "t.csv", "--seed", "1", "-o", "t.csv"],
-        ["sample", "--profile", "motorway-car", "--context", "t.csv", "--force", "-o", "t.csv"],
+        ["sample", "--profile", "motorway", "--like", "t.csv", "--seed", "1", "-o", "t.csv"],
+        ["sample", "--profile", "motorway", "--context", "t.csv", "--force", "-o", "t.csv"],
     ],
 )
 def test_no_verb_writes_over_measured_drives(

@@ -11,7 +11,7 @@ import xosc_lateral as xl
 from xosc_lateral.api.profiles import add_profile
 from xosc_lateral.cli import main
 
-BASES = ("motorway-car", "motorway-truck", "motorway-vehicle-1", "motorway-vehicle-2")
+BASES = ("motorway", "motorway-vehicle-1", "motorway-vehicle-2", "motorway-vehicle-3")
 
 
 @pytest.fixture(scope="module")
@@ -95,15 +95,15 @@ def test_tags_and_metadata_change_in_the_file(team, capsys):
     metadata = xl.read_profile("driver-20", team).metadata
     assert "rain" in metadata.tags and "population" not in metadata.tags
     assert (metadata.vehicle, metadata.driver) == ("bus", "d20")
-    code, _, err = run(capsys, "profiles", "tag", "motorway-car", "--tag", "mine")
+    code, _, err = run(capsys, "profiles", "tag", "motorway", "--tag", "mine")
     assert code == 1 and "comes with the package" in err
 
 
 def test_a_name_that_hides_a_shipped_one_is_said(tmp_path, capsys):
-    add_profile("motorway-truck", tmp_path, name="motorway-car")
+    add_profile("motorway-vehicle-1", tmp_path, name="motorway")
     code, out, _ = run(capsys, "profiles", "list", "--library", tmp_path)
     assert code == 0
-    assert "motorway-car.json hides the shipped profile 'motorway-car'" in out
+    assert "motorway.json hides the shipped profile 'motorway'" in out
 
 
 def test_a_folder_that_is_named_twice_counts_once(team, capsys, monkeypatch):
@@ -119,7 +119,7 @@ def test_a_folder_that_is_named_twice_counts_once(team, capsys, monkeypatch):
 
 
 def test_adding_does_not_replace_and_export_writes_what_was_there(team, tmp_path, capsys):
-    code, _, err = run(capsys, "profiles", "add", "motorway-car", "--library", team, "--name", "driver-03")
+    code, _, err = run(capsys, "profiles", "add", "motorway", "--library", team, "--name", "driver-03")
     assert code == 1 and "there is a profile of this id" in err
     code, _, _ = run(capsys, "profiles", "export", "driver-03", "driver-04", "--library", team, "-o", f"{tmp_path}/")
     assert code == 0

@@ -192,7 +192,7 @@ def test_every_kind_of_effect_is_covered_here() -> None:
 
 @pytest.mark.parametrize("effects", [(), PACED, HIDDEN], ids=["bare", "paced", "hidden"])
 def test_shipped_profiles_stream_and_go_on_like_the_batch_call(effects: tuple[Effect, ...]) -> None:
-    profile = replace(read_profile("motorway-car"), effects=effects)
+    profile = replace(read_profile("motorway"), effects=effects)
     assert profile.model.kind == "autoregressive"
     columns = make_contexts(500)
     contexts = rows(columns)

@@ -32,7 +32,7 @@ def scenario(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def profile() -> DriverProfile:
-    return replace(read_profile(shipped_folder("driver_profiles") / "motorway-car.json"), sensor=NOISE)
+    return replace(read_profile(shipped_folder("driver_profiles") / "motorway.json"), sensor=NOISE)
 
 
 def _offsets(made: object) -> dict[str, np.ndarray]:
@@ -54,7 +54,7 @@ def test_the_driver_stays_and_the_error_is_added(scenario: Path, profile: Driver
 
 
 def test_a_profile_that_knows_no_sensor_is_named(scenario: Path, profile: DriverProfile) -> None:
-    with pytest.raises(DriverProfileError, match="motorway-car holds no sensor"):
+    with pytest.raises(DriverProfileError, match="motorway holds no sensor"):
         convert(scenario, profile=replace(profile, sensor=None), with_sensor=True)
     assert known_sensor(profile) is NOISE
 

@@ -78,7 +78,7 @@ def _request_files(folder: Path) -> Iterable[Path]:
     _scenario(folder)
     rows = [
         "scenario,profile,profile:Ego,seed,variants,parameter:Twice,parameters,tag",
-        'a.xosc,motorway-car,motorway-truck,7,2,31.5,"{""Speed"": ""20""}",x',
+        'a.xosc,motorway,motorway-vehicle-1,7,2,31.5,"{""Speed"": ""20""}",x',
         "a.xosc,,,1,,,,",
     ]
     (folder / "r.csv").write_text("\n".join(rows) + "\n")
@@ -107,7 +107,7 @@ def _use_profile(path: Path) -> None:
 
 
 def _stream_files(folder: Path) -> Iterable[Path]:
-    for number, name in enumerate(("motorway-car", "motorway-refined")):
+    for number, name in enumerate(("motorway", "motorway-refined")):
         stream = OffsetStream(read_profile(name), 3)
         for k in range(400):
             stream.step({"speed": 30.0 + 0.01 * k})
@@ -141,7 +141,7 @@ def _scenario_files(folder: Path) -> Iterable[Path]:
 
 
 def _use_scenario(path: Path) -> None:
-    settings = ConvertSettings(profile="motorway-car", time_limit=5.0, step=0.05)
+    settings = ConvertSettings(profile="motorway", time_limit=5.0, step=0.05)
     convert_scenario(path.with_name("a.xosc"), path.with_name("out.xosc"), settings)
     read_scenario(path.with_name("out.xosc"))
 

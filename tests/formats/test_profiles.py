@@ -97,7 +97,7 @@ def broken(**changes: Any) -> str:
 
 def test_a_folder_that_is_not_there_is_no_library(tmp_path: Path) -> None:
     with pytest.raises(FormatError, match="nowhere: no such folder"):
-        find_profile("motorway-car", [tmp_path / "nowhere"])
+        find_profile("motorway", [tmp_path / "nowhere"])
 
 
 BAD = {

@@ -14,8 +14,9 @@ from xosc_lateral.cli import main
 from xosc_lateral.errors import NotEnoughDataError
 from xosc_lateral.evaluation.comparison import free_runs, summary_of
 from xosc_lateral.formats.profiles import list_profiles, read_profile
-from xosc_lateral.pipeline.library import GROUPS, most_different
+from xosc_lateral.pipeline.library import POPULATION, SINGLE_VEHICLES, most_different
 from xosc_lateral.report.cards import card_text
+from xosc_lateral.report.comparison import compare
 from xosc_lateral.report.evaluation_figures import _density
 
 
@@ -77,9 +78,9 @@ def test_traces_of_measured_drives_stand_beside_sampled_ones(table, profile):
 
 def test_a_profiles_card_is_a_page(tmp_path):
     page = tmp_path / "card.html"
-    assert main(["profiles", "show", "motorway-car", "--report", str(page), "--quiet"]) == 0
+    assert main(["profiles", "show", "motorway", "--report", str(page), "--quiet"]) == 0
     html = page.read_text(encoding="utf-8")
-    assert "Driver profile motorway-car" in html and html.count("<svg") == 2
+    assert "Driver profile motorway" in html and html.count("<svg") == 2
 
 
 def test_evaluate_tells_a_person_the_same(table, profile, capsys):
@@ -127,10 +128,16 @@ def test_shipped_profile_names_its_source_and_stays_in_the_lane(path):
     assert 0.03 < runs.std() < 0.5
 
 
-def test_population_classes_lanes_and_single_vehicles_are_shipped():
+def test_the_population_and_single_vehicles_are_shipped():
     names = {path.stem for path in list_profiles()}
-    assert {group.name for group in GROUPS} <= names
-    assert sum(name.startswith("motorway-vehicle-") for name in names) >= 5
+    single = {f"motorway-vehicle-{number}" for number in range(1, SINGLE_VEHICLES + 1)}
+    assert names == {POPULATION, "motorway-refined", *single}
+
+
+def test_shipped_profiles_differ_beyond_their_floor():
+    """But for the refined one: what it adds are answers to neighbours and bends, and even traffic has none."""
+    compared = compare([read_profile(path.stem) for path in list_profiles() if path.stem != "motorway-refined"], 0)
+    assert all(len(group) == 1 for group in compared.groups)
 
 
 def test_the_refined_profile_says_what_the_loop_found_and_differs_little_from_the_direct_fit():
@@ -169,13 +176,13 @@ def test_profiles_list_show_and_compare_see_own_folders(profile, capsys):
     folder = ["--library", str(profile.parent)]
     assert main(["profiles", "list", *folder, "--json"]) == 0
     listed = {one["id"]: one for one in json.loads(capsys.readouterr().out)["profiles"]}
-    assert listed["mine"]["source"] == "made up" and "motorway-car" in listed
+    assert listed["mine"]["source"] == "made up" and "motorway" in listed
     assert main(["profiles", "show", "mine", *folder]) == 0
     card = capsys.readouterr().out
     assert "made up" in card and "two-level" in card and "of the lane centre" in card
     assert main(["profiles", "show", "mine", *folder, "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["summary"]["spread"] == pytest.approx(0.25, abs=0.06)
-    assert main(["profiles", "compare", "mine", "motorway-car", *folder, "--json"]) == 0
+    assert main(["profiles", "compare", "mine", "motorway", *folder, "--json"]) == 0
     compared = json.loads(capsys.readouterr().out)
     assert compared["distance"][0][1] == compared["distance"][1][0] > compared["distance"][0][0] > 0
 
@@ -183,4 +190,4 @@ def test_profiles_list_show_and_compare_see_own_folders(profile, capsys):
 def test_an_unknown_profile_is_answered_with_the_known_ones(capsys):
     assert main(["profiles", "show", "nobody"]) == 1
     message = capsys.readouterr().err
-    assert "no profile 'nobody'" in message and "motorway-car" in message
+    assert "no profile 'nobody'" in message and "motorway" in message

@@ -60,7 +60,7 @@ def convert(
         File, or folder, to write to. Without it nothing is written; `Conversion.data` holds what would be, with file
         references as seen from the scenario's folder.
     profile : DriverProfile, path or name
-        Of every vehicle; "auto": a shipped one by the vehicle's class.
+        Of every vehicle; "auto": the shipped population's, `motorway`.
     entity : mapping of str to DriverProfile, path or name, optional
         Entity -> profile, before `profile`.
     only : collection of str, optional

@@ -28,7 +28,7 @@ def read_profile(profile: PathLike, library: Paths = ()) -> DriverProfile:
     Parameters
     ----------
     profile : str or Path
-        ``motorway-car`` or ``somewhere/mine.json``. A name is looked up in `library`, in the folders of
+        ``motorway`` or ``somewhere/mine.json``. A name is looked up in `library`, in the folders of
         ``XOSC_LATERAL_LIBRARY`` and of the configuration file, among those of plug-ins and those shipped.
     library : path or paths
         Folders with further profiles.

@@ -1,4 +1,4 @@
-"""Free numbers chosen by what is scored: the mean distance of the ten metrics on training runs."""
+"""Free numbers chosen by what the board ranks by, on training runs: other vehicles than those that are scored."""
 
 from __future__ import annotations
 
@@ -10,25 +10,26 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.baselines.base import LateralModel
-from xosc_lateral.driver.snippets import cut_snippets, segment_of
 from xosc_lateral.drives.drive import Run
 from xosc_lateral.drives.resampling import STEP
 from xosc_lateral.errors import NotEnoughDataError
-from xosc_lateral.evaluation.distances import metric_distances
-from xosc_lateral.evaluation.metrics import snippet_metrics
+from xosc_lateral.evaluation.condition import SnippetCondition
+from xosc_lateral.evaluation.measures import Features, differences, features_of
+from xosc_lateral.evaluation.ranked import LONG, SHORT, ranked_numbers
+from xosc_lateral.evaluation.snippets import Snippets, snippets_of
 from xosc_lateral.segment import Segment
 
 FloatArray = NDArray[np.float64]
 M = TypeVar("M", bound=LateralModel)
 
-LENGTHS = ((10.0, True), (30.0, False))
-"""Windows that are compared: length [s], and whether they share their starts. Those that the board ranks by."""
-
 MOST_WINDOWS = 250
 """Of each length; evenly thinned out."""
 
-FIRST_LOOK, STEPS = 32, 50
-"""Points that the box is first looked over at, and evaluations of the descent from the best of them."""
+FIRST_LOOK, STEPS = 64, 100
+"""Points at which the box is first looked over, and evaluations of the descent from the best of them."""
+
+LEAST = 1e-6
+"""Difference below which nothing is gained. [unit of the family]"""
 
 
 @dataclass(frozen=True)
@@ -79,7 +80,7 @@ def calibrate(
 
     def cost(shares: Sequence[float] | FloatArray) -> float:
         outside = float(np.abs(np.asarray(shares) - np.clip(shares, 0.0, 1.0)).sum())
-        return distance_to(targets, model_at(shares), seed) + outside
+        return float(np.log(distance_to(targets, model_at(shares), seed))) + outside
 
     points = qmc.Sobol(len(names), seed=seed).random(FIRST_LOOK if len(names) > 1 else FIRST_LOOK // 2)
     best = min(points, key=cost)
@@ -92,36 +93,47 @@ def calibrate(
 
 @dataclass(frozen=True, eq=False)
 class CalibrationTarget:
-    """Measured windows of one length and their metrics."""
+    """Measured windows under one condition, their features, and which families of them are ranked."""
 
+    condition: SnippetCondition
+    families: tuple[str, ...]
     segments: list[Segment]
     starts: FloatArray
-    metrics: FloatArray
-    same_start: bool
+    lane_width: FloatArray
+    features: Features
 
 
 def targets_of(runs: Sequence[Run]) -> list[CalibrationTarget]:
-    """Windows that a candidate is compared with; lengths that no run has are left out."""
-    targets = []
-    for seconds, same_start in LENGTHS:
-        if any(len(run) > round(seconds / STEP) for run in runs):
-            windows = cut_snippets(runs, seconds, STEP)
-            windows = windows[:: max(1, -(-len(windows) // MOST_WINDOWS))]
-            if len(windows) > 1:
-                rows = np.array([window.offset for window in windows])
-                segments = [segment_of(window.run, window.rows) for window in windows]
-                targets.append(CalibrationTarget(segments, rows[:, 0], snippet_metrics(rows), same_start))
-    if not targets:
+    """Windows that a candidate is compared with."""
+    windows = {seconds: snippets_of(runs, seconds, STEP, by_block=False) for seconds in (SHORT, LONG)}
+    windows = {seconds: found for seconds, found in windows.items() if len(found) > 1}
+    if SHORT not in windows:
         longest = max((len(run) for run in runs), default=0) * STEP
         raise NotEnoughDataError(f"the longest run lasts {longest:.1f} s; several windows of 10 s are needed to fit")
+    ranked = ranked_numbers(windows)
+    targets = []
+    for condition in dict.fromkeys(condition for condition, _ in ranked):
+        families = tuple(family for one, family in ranked if one == condition)
+        targets.append(_target(windows[condition.seconds], condition, families))
     return targets
 
 
+def _target(windows: Snippets, condition: SnippetCondition, families: tuple[str, ...]) -> CalibrationTarget:
+    every = max(1, -(-len(windows) // MOST_WINDOWS))
+    offset, width = windows.offset[::every], windows.lane_width[::every]
+    return CalibrationTarget(
+        condition, families, list(windows.segments[::every]), offset[:, 0], width, features_of(offset, width, STEP)
+    )
+
+
 def distance_to(targets: Sequence[CalibrationTarget], model: LateralModel, seed: int) -> float:
-    """Mean distance over the windows of all lengths, in standard deviations of the real metrics. [-]"""
+    """Geometric mean of what is ranked. Floors, being the same for every candidate, change no order. [mixed units]"""
     rng = np.random.default_rng(seed)
-    found = []
+    logs = []
     for target in targets:
-        sampled = np.array(model.sample(target.segments, target.starts if target.same_start else None, rng))
-        found.append(metric_distances(target.metrics, snippet_metrics(sampled)).mean)
-    return float(np.mean(found))
+        sampled = np.array(model.sample(target.segments, target.starts if target.condition.same_start else None, rng))
+        other = features_of(sampled, target.lane_width, STEP)
+        rows = np.arange(len(other))
+        found = differences(target.features, other, rows, rows)
+        logs += [np.log(max(found[family], LEAST)) for family in target.families]
+    return float(np.exp(np.mean(logs)))

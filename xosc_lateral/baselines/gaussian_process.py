@@ -8,13 +8,14 @@ References
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.baselines.base import SegmentBatch, SimulatedModel
+from xosc_lateral.baselines.calibration import Bounds, calibrate, distance_to, targets_of
 from xosc_lateral.drives.drive import Run
 from xosc_lateral.drives.resampling import STEP
 
@@ -51,10 +52,27 @@ class GaussianProcess(SimulatedModel):
         "C. E. Rasmussen, C. K. I. Williams, Gaussian Processes for Machine Learning, MIT Press 2006, "
         "eq. 2.19, 4.9 and 4.17, gaussianprocess.org/gpml"
     )
-    departures: ClassVar[str] = "fitted by moments (least squares on the pooled variogram), not by likelihood"
+    departures: ClassVar[str] = (
+        "the kernels' shares by least squares on the pooled variogram, not by likelihood; then the level of all, of "
+        "the constants and of the rough kernels, and how the shares lean to long scales, as every model's free numbers"
+    )
 
     @classmethod
     def fit(cls, runs: Sequence[Run]) -> Self:
+        """Moments, then what is ranked (`calibrate`); moments alone where that is no nearer."""
+        moments = cls.of_moments(runs)
+        bounds = {
+            "level": Bounds(0.3, 3.0),
+            "constants": Bounds(0.1, 3.0),
+            "rough": Bounds(1e-4, 3.0),
+            "lean": Bounds(0.5, 2.0),
+        }
+        found = calibrate(lambda values: moments.moved(**values), bounds, runs)
+        targets = targets_of(runs)
+        return min((moments, found), key=lambda model: distance_to(targets, model, 1))
+
+    @classmethod
+    def of_moments(cls, runs: Sequence[Run]) -> Self:
         """Non-negative least squares on the pooled variogram, in relative terms: short lags count like long ones."""
         from scipy.optimize import nnls
 
@@ -66,6 +84,12 @@ class GaussianProcess(SimulatedModel):
         weight = float(len(lags))
         found, _ = nnls(np.vstack([columns, weight * whole]), np.append(np.ones(len(lags)), weight))
         return cls(mean=float(everything.mean()), constant=float(found[-1]), variances=found[:-1])
+
+    def moved(self, *, level: float, constants: float, rough: float, lean: float) -> Self:
+        """With factors on all variances, on the constants', on the Matérn ones, and for each doubling of scale."""
+        leaning = lean ** np.log2(np.array(SCALES) / SCALES[len(SCALES) // 2])
+        factors = level * np.concatenate([leaning, rough * leaning])
+        return replace(self, constant=level * constants * self.constant, variances=factors * self.variances)
 
     def covariance(self, lags: FloatArray) -> FloatArray:
         """At time differences. [s] -> [m2] Shape as `lags`."""

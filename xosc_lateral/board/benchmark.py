@@ -11,13 +11,14 @@ from numpy.typing import NDArray
 from xosc_lateral.board.contestants import Contestant, contestants
 from xosc_lateral.board.half import Half, SampledHalf, make_half, sample_half
 from xosc_lateral.board.numbers import floors_of, numbers_of
-from xosc_lateral.board.ranking import RESAMPLES, SHORT, bootstrap
+from xosc_lateral.board.ranking import RESAMPLES, bootstrap
 from xosc_lateral.board.result import Board
 from xosc_lateral.board.summary import make_board
 from xosc_lateral.board.units import halves, units_of
 from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.drives.drive import Run
 from xosc_lateral.errors import NotEnoughDataError, XoscLateralError
+from xosc_lateral.evaluation.ranked import SHORT
 
 FloatArray = NDArray[np.float64]
 Progress = Callable[[float, str], None]

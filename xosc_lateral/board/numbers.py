@@ -8,12 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.board.half import Half, SampledHalf, floors, pooled
-from xosc_lateral.board.ranking import SHORT, ranked_numbers
 from xosc_lateral.board.result import ModelScore
 from xosc_lateral.evaluation.classifier import classifier_two_sample_test
 from xosc_lateral.evaluation.condition import SnippetCondition
 from xosc_lateral.evaluation.ensemble_scores import PROPER, proper_scores
 from xosc_lateral.evaluation.measures import UNITS, differences, named_distances
+from xosc_lateral.evaluation.ranked import SHORT, ranked_numbers
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -25,7 +25,7 @@ def numbers_of(parts: Parts, key: str, floor: Mapping[str, float], *, classify: 
     values = pooled([_of_half(half, sampled[key]) for half, sampled in parts])
     if classify:
         values |= _classified(parts[0][0], parts[0][1][key])
-    ranked = {f"{family}, {condition.name}" for condition, family in ranked_numbers(parts[0][0])}
+    ranked = {f"{family}, {condition.name}" for condition, family in ranked_numbers(parts[0][0].windows)}
     return tuple(
         ModelScore(name, _unit(name), value, floor[name], name in ranked)
         for name, value in values.items()

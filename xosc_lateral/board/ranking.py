@@ -10,21 +10,12 @@ from numpy.typing import NDArray
 from xosc_lateral.board.half import Half, SampledHalf, floors
 from xosc_lateral.evaluation.condition import SnippetCondition
 from xosc_lateral.evaluation.measures import differences
+from xosc_lateral.evaluation.ranked import SHORT, ranked_numbers
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
-SHORT, LONG = 10.0, 30.0
-"""Windows that count for the ranking: the paper's, and long enough to see drivers come back. [s]"""
-
 RESAMPLES = 200
-
-
-def ranked_numbers(half: Half) -> list[tuple[SnippetCondition, str]]:
-    """What counts: ten metrics from the same start, and everything of free runs in longer windows."""
-    seconds = LONG if LONG in half.windows else SHORT
-    free = [(SnippetCondition(seconds, False), family) for family in ("metrics", "lane_keeping", "spectrum", "memory")]
-    return [(SnippetCondition(SHORT, True), "metrics"), *free]
 
 
 def score_rows(
@@ -32,7 +23,7 @@ def score_rows(
 ) -> float:
     """Geometric mean of value over floor for a choice of windows. [-]"""
     logs, found = [], {}
-    for condition, family in ranked_numbers(half):
+    for condition, family in ranked_numbers(half.windows):
         if condition not in found:
             chosen = rows[condition.seconds]
             real, other = half.features[condition.seconds], sampled.features[condition]
@@ -46,8 +37,8 @@ Rows = Mapping[float, IntArray]
 
 def floor_of(half: Half) -> dict[tuple[SnippetCondition, str], float]:
     """Floors of what counts."""
-    by_condition = {condition: floors(half, condition) for condition, _ in ranked_numbers(half)}
-    return {(condition, family): by_condition[condition][family] for condition, family in ranked_numbers(half)}
+    by_condition = {condition: floors(half, condition) for condition, _ in ranked_numbers(half.windows)}
+    return {(condition, family): by_condition[condition][family] for condition, family in ranked_numbers(half.windows)}
 
 
 def all_rows(half: Half) -> Rows:

@@ -9,12 +9,13 @@ from numpy.typing import NDArray
 
 from xosc_lateral.board.contestants import Contestant
 from xosc_lateral.board.half import Half, SampledHalf
-from xosc_lateral.board.ranking import SHORT, kendall_tau, ranked_numbers, ranks
+from xosc_lateral.board.ranking import kendall_tau, ranks
 from xosc_lateral.board.result import Board, ModelScore, Row
 from xosc_lateral.drives.drive import Run
 from xosc_lateral.drives.resampling import STEP
 from xosc_lateral.evaluation.lane_keeping import variance_parts
 from xosc_lateral.evaluation.measures import LAGS, autocorrelation_of, resolved_bands
+from xosc_lateral.evaluation.ranked import SHORT, ranked_numbers
 from xosc_lateral.evaluation.snippets import BLOCK, FEW_DRIVES
 
 FloatArray = NDArray[np.float64]
@@ -42,7 +43,7 @@ def make_board(
     score = {key: float(np.exp(np.mean(np.log(values)))) for key, values in by_half.items()}
     order = sorted(score, key=lambda key: score[key])
     places = ranks(drawn)
-    free = ranked_numbers(half)[-1][0]
+    free = ranked_numbers(half.windows)[-1][0]
     shown = np.unique(np.linspace(0, len(half.windows[SHORT]) - 1, EXAMPLES).astype(np.int64))
     rows = []
     for rank, key in enumerate(order, start=1):

@@ -14,7 +14,7 @@ def register(app: typer.Typer) -> None:
     """Add the verb to the command line."""
     epilog = examples(
         "close-loop drives.csv.gz -o refined.json --report loop/",
-        "close-loop drives.csv.gz -p motorway-car -o refined.json --report loop/",
+        "close-loop drives.csv.gz -p motorway -o refined.json --report loop/",
     )
     app.command("close-loop", short_help="Find and add what a profile lacks.", epilog=epilog)(close_loop)
 

@@ -29,7 +29,7 @@ from xosc_lateral.pipeline.settings import OutputMode
 EXAMPLES = examples(
     "convert cut-in.xosc -o lifelike.xosc --seed 1 --report report.html",
     "convert scenarios/ -o enriched/ --variants 3 --jobs 2",
-    "convert cut-in.xosc -o - --entity Truck=motorway-truck | grep Vertex",
+    "convert cut-in.xosc -o - --entity Truck=motorway-vehicle-3 | grep Vertex",
 )
 
 
@@ -53,7 +53,7 @@ def convert(
         ),
     ] = None,
     profile: Annotated[
-        str, typer.Option("--profile", "-p", help="Name or path of a driver profile; auto: by the vehicle's class.")
+        str, typer.Option("--profile", "-p", help="Name or path of a driver profile; auto: motorway, the population.")
     ] = "auto",
     seed: Seed = 0,
     entity: Annotated[

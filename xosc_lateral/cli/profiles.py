@@ -22,10 +22,10 @@ Fields = Annotated[
 
 HELP = {
     "list": ("List profiles.", examples("profiles list --tag truck --where country=DE")),
-    "show": ("Show one profile's card.", examples("profiles show motorway-car --report card.html")),
+    "show": ("Show one profile's card.", examples("profiles show motorway --report card.html")),
     "compare": (
         "Compare several profiles.",
-        examples("profiles compare motorway-car motorway-truck --report compared.html"),
+        examples("profiles compare motorway motorway-vehicle-1 --report compared.html"),
     ),
     "add": (
         "Add a profile to a library.",
@@ -34,7 +34,7 @@ HELP = {
     "tag": ("Change tags and metadata.", examples("profiles tag mine --library team/ --tag night --remove day")),
     "export": (
         "Copy profiles, to pass them on.",
-        examples("profiles export motorway-car motorway-truck -o for-a-friend/"),
+        examples("profiles export motorway motorway-vehicle-1 -o for-a-friend/"),
     ),
     "check": ("Check a library for broken files.", examples("profiles check --library team/")),
 }

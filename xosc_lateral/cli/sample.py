@@ -28,7 +28,7 @@ Table = list[Path] | None
 def register(app: typer.Typer) -> None:
     """Add the verb to the command line."""
     epilog = examples(
-        "sample -p motorway-car --duration 600 --speed 33 --seed 1 -o offsets.csv",
+        "sample -p motorway --duration 600 --speed 33 --seed 1 -o offsets.csv",
         "sample -p mine.json --like drives.parquet --snippet 10 -o snippets.parquet",
     )
     app.command("sample", short_help="Sample offsets alone, as a table.", epilog=epilog)(sample)

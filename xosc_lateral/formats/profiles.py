@@ -50,7 +50,7 @@ def read_profile(name_or_path: str | Path, folders: Iterable[str | Path] = ()) -
     Parameters
     ----------
     name_or_path : str or Path
-        ``motorway-car`` or ``somewhere/mine.json``.
+        ``motorway`` or ``somewhere/mine.json``.
     folders : iterable of path
         Looked through first, in this order.
 

@@ -14,15 +14,9 @@ from xosc_lateral.pipeline.settings import AUTO, ConvertSettings
 from xosc_lateral.scenario import Entity, Scenario
 from xosc_lateral.scenario.enums import VehicleCategory
 
-SHIPPED_BY_CLASS = {
-    VehicleCategory.TRUCK: "motorway-truck",
-    VehicleCategory.SEMITRAILER: "motorway-truck",
-    VehicleCategory.BUS: "motorway-truck",
-    VehicleCategory.CAR: "motorway-car",
-    VehicleCategory.VAN: "motorway-car",
-    VehicleCategory.MOTORBIKE: "motorway-car",
-}
-"""What "auto" chooses. Motorcycles ride like cars for want of measured ones; the report names the profile."""
+AUTO_PROFILE = "motorway"
+"""What "auto" chooses: it gives every class, lane and speed its own. Motorcycles ride like cars for want of measured
+ones."""
 
 NO_DRIVER = {
     VehicleCategory.TRAILER: "a trailer has no driver",
@@ -64,19 +58,19 @@ def _driver(entity: Entity, settings: ConvertSettings) -> DriverProfile | str:
         category = entity.vehicle_category or VehicleCategory.CAR
         if category in NO_DRIVER:
             return NO_DRIVER[category]
-        named = SHIPPED_BY_CLASS[category]
+        named = AUTO_PROFILE
     return named if isinstance(named, DriverProfile) else load_profile(named, settings.libraries)
 
 
-def auto_profiles(libraries: tuple[Path, ...]) -> dict[str, Path]:
-    """Profiles that "auto" chooses from, by name: a file in one of the folders comes before the shipped one.
+def auto_profile(libraries: tuple[Path, ...]) -> Path:
+    """File of what "auto" chooses: one in one of the folders comes before the shipped one.
 
     Raises
     ------
     FormatError
         If a folder isn't there.
     """
-    return {name: find_profile(name, libraries) for name in sorted(set(SHIPPED_BY_CLASS.values()))}
+    return find_profile(AUTO_PROFILE, libraries)
 
 
 def uses_auto(settings: ConvertSettings) -> bool:
@@ -85,12 +79,9 @@ def uses_auto(settings: ConvertSettings) -> bool:
 
 
 def hidden_by_libraries(libraries: tuple[Path, ...]) -> tuple[str, ...]:
-    """A line for each shipped profile in whose place "auto" takes one of the user's."""
-    return tuple(
-        f"{path} hides the shipped profile {name!r}: auto takes it"
-        for name, path in auto_profiles(libraries).items()
-        if path.parent != SHIPPED
-    )
+    """A line where "auto" takes one of the user's profiles in place of the shipped one."""
+    path = auto_profile(libraries)
+    return () if path.parent == SHIPPED else (f"{path} hides the shipped profile {AUTO_PROFILE!r}: auto takes it",)
 
 
 def load_profile(name_or_path: str, libraries: tuple[Path, ...]) -> DriverProfile:

@@ -3,8 +3,8 @@
     python -m benchmarks.build_library tasi-0.15.4-py3-none-any.whl -o FOLDER [--cards docs/profiles.md]
 
 The same wheel gives the same bytes on the same kind of processor. Every profile is scored before it is written: for
-groups of drivers a fit to half of the vehicles (for the refined profile, a closed loop over them) is scored on the
-other half; for single vehicles a fit to the first part of the drive is held against the last part of its own drive and
+the population a fit to half of the vehicles (for the refined profile, a closed loop over them) is scored on the other
+half; for single vehicles a fit to the first part of the drive is held against the last part of its own drive and
 those of the others. What is written is fitted to all.
 """
 
@@ -14,7 +14,6 @@ import tempfile
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from dataclasses import replace as with_fields
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -51,37 +50,8 @@ SPREAD_FACTOR = 1.35  # a single vehicle's profile whose spread is off by more t
 FITTED_SHARE = 0.6  # of a single vehicle's drive; the rest is held out
 
 
-@dataclass(frozen=True)
-class Group:
-    """Which runs a profile of many drivers is fitted to.
-
-    Parameters
-    ----------
-    name, notes : str
-    classes : tuple of str
-        Vehicle classes; empty: all.
-    lane : int or None
-        0 = right lane; None: all.
-    """
-
-    name: str
-    notes: str
-    classes: tuple[str, ...] = ()
-    lane: int | None = None
-
-    def holds(self, run: Run, kind: Mapping[str, str]) -> bool:
-        """Whether a run belongs to it."""
-        lane = int(run.context["lane_index"][0])
-        return (not self.classes or kind[run.drive] in self.classes) and self.lane in (None, lane)
-
-
-GROUPS = (
-    Group("motorway", "All vehicles on a two-lane German motorway in the morning: the population."),
-    Group("motorway-car", "Cars and vans, both lanes.", classes=("car", "van", "motorbike")),
-    Group("motorway-truck", "Trucks, nearly all in the right lane.", classes=("truck",)),
-    Group("motorway-right-lane", "Whoever drives in the right lane.", lane=0),
-    Group("motorway-left-lane", "Whoever drives in the left lane.", lane=1),
-)
+POPULATION = "motorway"
+POPULATION_NOTES = "All vehicles on a two-lane German motorway in the morning: the population."
 
 
 def build_library(source: Path, *, model: str = "best", refine: bool = True) -> list[DriverProfile]:
@@ -108,9 +78,9 @@ def build_library(source: Path, *, model: str = "best", refine: bool = True) -> 
     runs = [_with_class(run, kind[run.drive]) for run in all_runs(drives)]
     seen = Seen(runs, *driver_runs(runs, drives))
     known = Provenance(source=SOURCE, licence=LICENCE, inputs={source.name: parsed_hash(source)})
-    groups = [_group_profile(seen.of(partial(group.holds, kind=kind)), group, known, model) for group in GROUPS]
+    population = _population_profile(seen, known, model)
     refined = [_refined_profile(drives, runs, known)] if refine else []
-    profiles = [*groups, *refined, *_single_profiles(seen, kind, known, model)]
+    profiles = [population, *refined, *_single_profiles(seen, kind, known, model)]
     return [replace(profile, metadata=shipped_metadata(profile)) for profile in profiles]
 
 
@@ -148,14 +118,14 @@ def shipped_metadata(profile: DriverProfile) -> Metadata:
     return Metadata(version="1", vehicle=vehicle, road="motorway", country="DE", date="2024-10-07", tags=tags)
 
 
-def _group_profile(seen: Seen, group: Group, known: Provenance, model: str) -> DriverProfile:
+def _population_profile(seen: Seen, known: Provenance, model: str) -> DriverProfile:
     """Score on held-out vehicles, then fit to all."""
     chosen = _fitted_half(seen.recorded)
     fitted = seen.of(lambda run: run.drive in chosen)
-    half = fit_population(fitted.driven, name=group.name, model=model, sensor=seen.sensor)
+    half = fit_population(fitted.driven, name=POPULATION, model=model, sensor=seen.sensor)
     evaluation = _evaluation(half, seen.of(lambda run: run.drive not in chosen).recorded)
-    provenance = replace(known, notes=group.notes, evaluation=evaluation)
-    return fit_population(seen.driven, name=group.name, model=model, provenance=provenance, sensor=seen.sensor)
+    provenance = replace(known, notes=POPULATION_NOTES, evaluation=evaluation)
+    return fit_population(seen.driven, name=POPULATION, model=model, provenance=provenance, sensor=seen.sensor)
 
 
 def _refined_profile(drives: Sequence[Drive], runs: Sequence[Run], known: Provenance) -> DriverProfile:

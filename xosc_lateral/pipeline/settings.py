@@ -21,7 +21,7 @@ TIME_LIMIT = 60.0
 """A scenario that does not end by itself is ended after this. [s]"""
 
 AUTO = "auto"
-"""Profile name that picks one of the shipped profiles by the vehicle's class."""
+"""Profile name for the shipped population, and for nobody who has no driver (a trailer, a tram)."""
 
 
 class OutputMode(StrEnum):
@@ -38,7 +38,7 @@ class ConvertSettings:
     Parameters
     ----------
     profile : str or DriverProfile
-        Profile of every vehicle, or its name or path; "auto": a shipped one by the vehicle's class.
+        Profile of every vehicle, or its name or path; "auto": the shipped population's, `motorway`.
     entity_profiles : mapping of str to str or DriverProfile
         Entity name -> profile, its name or path, before `profile`.
     only : frozenset of str or None

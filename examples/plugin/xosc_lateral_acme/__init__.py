@@ -17,6 +17,6 @@ def profiles() -> Path:
     folder = Path(tempfile.gettempdir()) / "xosc-lateral-acme"
     folder.mkdir(exist_ok=True)
     if not (folder / "acme-calm.json").exists():
-        calm = xl.read_profile("motorway-car").with_effects(name="acme-calm")
+        calm = xl.read_profile("motorway").with_effects(name="acme-calm")
         xl.write_profile(calm, folder / "acme-calm.json")
     return folder

@@ -1,8 +1,7 @@
 """Fitting our model. First what can be read off the data, then a few rounds of simulating and comparing.
 
-1. Mean, and the variance between drivers: the covariance that is left between moments far apart in a run.
-2. Coarse movement: autoregression on the low-passed offset, all moments of a driver counting the same, drivers' means
-   a random effect.
+1. Mean of all.
+2. Coarse movement and the variance between drivers (`fit_coarse`).
 3. Fine noise: what the coarse movement lacks of the offset's power spectrum, geometric mean over windows.
 4. Volatility: how much more, and for how long, the power in short windows varies than it would in steady movement.
 5. Rounds of simulating: snippets of the model from the measured snippets' starts must show the same moments of log
@@ -20,8 +19,9 @@ import numpy as np
 from msgspec.structs import replace
 from numpy.typing import NDArray
 
-from xosc_lateral.driver.models.autoregressive.autoregression import Autoregression, fit_autoregression
-from xosc_lateral.driver.models.autoregressive.filters import COARSE_EVERY, split_bands
+from xosc_lateral.driver.models.autoregressive.autoregression import Autoregression
+from xosc_lateral.driver.models.autoregressive.filters import split_bands
+from xosc_lateral.driver.models.autoregressive.fit_coarse import fit_coarse
 from xosc_lateral.driver.models.autoregressive.fit_matching import matched, with_volatility
 from xosc_lateral.driver.models.autoregressive.fit_settings import DEFAULT_SETTINGS, FitSettings
 from xosc_lateral.driver.models.autoregressive.fit_spectrum import fit_spectrum
@@ -53,9 +53,9 @@ def fit_autoregressive(
     everything = np.concatenate(runs)
     if everything.std() < 1e-7:
         raise NotEnoughDataError(f"the offset never moves: standard deviation {everything.std():.2g} lane widths")
-    mean, between = _drivers(runs, drives, settings)
+    mean = float(everything.mean())
     bands = [split_bands(run, settings.step) for run in runs]
-    coarse = _fit_coarse([slow - mean for slow, _ in bands], drives, between, settings)
+    coarse, between = fit_coarse([slow - mean for slow, _ in bands], drives, settings)
     coarse, fine = fit_spectrum(runs, coarse, settings)
     low, high = max(-0.5, float(everything.min())), min(0.5, float(everything.max()))
     model = AutoregressiveModel(
@@ -71,37 +71,6 @@ def fit_autoregressive(
     )
     model = with_volatility(model, bands, len(set(drives)) > 1, settings)
     return _rounded(matched(model, runs, settings))
-
-
-def _drivers(runs: Sequence[FloatArray], drives: Sequence[str], settings: FitSettings) -> tuple[float, float]:
-    """Mean of all, and variance of the drivers' means: covariance of moments far apart in one run. [-]"""
-    lengths = np.array([len(run) for run in runs])
-    mean = float(np.concatenate(runs).mean())
-    count = len(set(drives))
-    if count < 2:
-        return mean, 0.0
-    order = np.argsort(lengths)
-    typical = lengths[order][np.searchsorted(np.cumsum(lengths[order]), 0.5 * lengths.sum())]
-    reach = min(float(typical), settings.farthest / settings.step)
-    lags = range(int(settings.far[0] * reach), int(settings.far[1] * reach), COARSE_EVERY)
-    total, pairs = 0.0, 0
-    for run in runs:
-        about = run - mean
-        for lag in lags:
-            if len(about) > lag:
-                total += float(about[lag:] @ about[: len(about) - lag])
-                pairs += len(about) - lag
-    variance = float(np.concatenate(runs).var())
-    # The common mean was taken out, and with it a part of the differences between a few drivers.
-    return mean, float(np.clip(total / max(pairs, 1) * count / (count - 1), 0.0, 0.9 * variance))
-
-
-def _fit_coarse(
-    slow: Sequence[FloatArray], drives: Sequence[str], between: float, settings: FitSettings
-) -> Autoregression:
-    longest = max(map(len, slow)) * settings.step
-    order = max(2, min(settings.order, int(0.4 * longest * settings.step * COARSE_EVERY)))
-    return fit_autoregression(slow, order, every=COARSE_EVERY, drivers=drives, between=between)
 
 
 DIGITS = 9

@@ -24,6 +24,23 @@ from xosc_lateral.drives.periodogram import Detrend, window_powers
 
 FloatArray = NDArray[np.float64]
 
+SIMULATED, SNIPPETS_EACH = 4000, 3
+"""Drivers that a round simulates, and snippets of each: what chance does to the mean log spread of so many is 0.5 %.
+All fits draw from one seed, so it is a bias of every profile. [-]"""
+
+LEAST_VOLATILITY = Volatility(0.0, 1e-3, 10.0)
+"""Of a movement that seems steady: rounds scale a volatility, and from none nothing grows. 3 % up and down."""
+
+NUDGE = float(np.log(2.0))
+"""Change of the log variance of the volatilities by which the moments' slopes are measured, and the largest that a
+round makes: beyond, the slopes are extrapolated. [-]"""
+
+LEAST_SLOPE = 1e-6
+"""Of what is asked, where a volatility shows in nothing: its lack is chance, and the step stays bounded. [-]"""
+
+MOST_CORRELATED = 0.95
+"""Correlation of the volatilities at most: the two stay two. [-]"""
+
 LARGEST_STEP = float(np.log(1.5))
 """By which the fine noise's log amplitude changes at a frequency in one round: a whole step would overshoot where the
 coarse movement outweighs it. [-]"""
@@ -46,8 +63,7 @@ def with_volatility(
         covariance, counts = autocovariance(measured, n_lags)
         expected, _ = autocovariance([log_power(which(pair), window) for pair in reference], n_lags)
         found.append(fit_volatility(covariance - expected, counts, seconds, population=population))
-    floor = Volatility(0.0, 1e-3, 10.0)
-    coarse, fine = (part if part.total > floor.total else floor for part in found)
+    coarse, fine = (part if part.total > LEAST_VOLATILITY.total else LEAST_VOLATILITY for part in found)
     return replace(model, coarse_volatility=coarse, fine_volatility=fine, correlation=0.5)
 
 
@@ -87,20 +103,29 @@ def matched(model: AutoregressiveModel, runs: Sequence[FloatArray], settings: Fi
     """Correct scales and volatilities until simulated snippets vary as the measured ones do.
 
     From runs of shape (n_i,) [lane widths]; indirect inference: C. Gourieroux, A. Monfort, E. Renault, Journal of
-    Applied Econometrics 8 (1993), S85-S118.
+    Applied Econometrics 8 (1993), S85-S118. Simulated snippets are cut from free runs, as the measured ones are:
+    those that begin where the measured ones do are drawn otherwise, which would be taken for a lack.
     """
     length = round(settings.snippet / settings.step) + 1
     real = np.concatenate(
         [run[: len(run) // length * length].reshape(-1, length) for run in runs if len(run) >= length]
     )
-    starts = np.resize(real[:, 0], max(settings.n_snippets, len(real)))
     target, spectrum = _moments(real), _log_spectrum(real)
+    slopes: FloatArray | None = None
     for _ in range(settings.rounds):
-        simulated = simulate(model, length, settings.seed, drivers=len(starts), starts=starts)
-        lacks = spectrum - _log_spectrum(simulated)
-        model = _corrected(model, target - _moments(simulated), settings)
+        simulated = _snippets_of(model, length, settings.seed)
+        lacks, found = spectrum - _log_spectrum(simulated), _moments(simulated)
+        if slopes is None:
+            nudged = _snippets_of(_volatile(model, NUDGE, NUDGE), length, settings.seed)
+            slopes = _asked(_moments(nudged) - found) / NUDGE
+        model = _corrected(model, target - found, slopes, settings)
         model = replace(model, fine=replace(model.fine, damping=model.fine.damping * _gain(model, lacks)))
     return model
+
+
+def _snippets_of(model: AutoregressiveModel, length: int, seed: int) -> FloatArray:
+    """Of free runs, each by its own driver, shape (n, length). [lane widths]"""
+    return simulate(model, SNIPPETS_EACH * length, seed, drivers=SIMULATED).reshape(-1, length)
 
 
 def _log_spectrum(snippets: FloatArray) -> FloatArray:
@@ -126,24 +151,31 @@ def _moments(snippets: FloatArray) -> FloatArray:
     return np.array([*spreads, np.mean((spread - spread.mean()) * (rough - rough.mean()))])
 
 
-def _corrected(model: AutoregressiveModel, lacks: FloatArray, settings: FitSettings) -> AutoregressiveModel:
-    """The model with each parameter moved against what its moment lacks."""
-    coarse, fine = model.coarse_volatility, model.fine_volatility
-    spread_mean, spread_variance, speed_mean, speed_variance, _, rough_variance, covariance = lacks
-    larger = np.exp((1.0 - settings.speed_weight) * spread_mean + settings.speed_weight * speed_mean)
-    # Calm and volatile snippets differ in spread and in speed; one variance has to serve both and meets them half-way.
-    factors = [
-        float(np.clip(1.0 + gain * lack / max(part.total, 0.02), 0.5, 2.0))
-        for gain, lack, part in (
-            (settings.coarse_gain, 0.5 * (spread_variance + speed_variance), coarse),
-            (settings.fine_gain, rough_variance, fine),
-        )
-    ]
-    both = max(np.sqrt(coarse.total * fine.total), 0.02)
+def _asked(lacks: FloatArray) -> FloatArray:
+    """What is asked of both volatilities' variances: spread and speed differ, and meet half-way. Shape (2,). [-]"""
+    _, spread, _, speed, _, rough, _ = lacks
+    return np.array([0.5 * (spread + speed), rough])
+
+
+def _volatile(model: AutoregressiveModel, coarse: float, fine: float) -> AutoregressiveModel:
+    """The model with the log variance of either volatility moved. [-]"""
     return replace(
         model,
-        coarse=Autoregression(model.coarse.coefficients, model.coarse.scale * float(larger)),
-        coarse_volatility=coarse.scaled(factors[0]),
-        fine_volatility=fine.scaled(factors[1]),
-        correlation=float(np.clip(model.correlation + covariance / both, 0.0, 0.95)),
+        coarse_volatility=model.coarse_volatility.scaled(float(np.exp(coarse))),
+        fine_volatility=model.fine_volatility.scaled(float(np.exp(fine))),
+    )
+
+
+def _corrected(
+    model: AutoregressiveModel, lacks: FloatArray, slopes: FloatArray, settings: FitSettings
+) -> AutoregressiveModel:
+    """The model with each parameter moved against what its moment lacks; `slopes` of what is asked, shape (2,)."""
+    larger = float(np.exp(0.5 * (lacks[0] + lacks[2])))
+    coarse, fine = np.clip(_asked(lacks) / np.maximum(slopes, LEAST_SLOPE), -NUDGE, NUDGE).tolist()
+    shown = [part.over(settings.snippet) for part in (model.coarse_volatility, model.fine_volatility)]
+    correlation = model.correlation + lacks[6] / max(np.sqrt(shown[0] * shown[1]), LEAST_SLOPE)
+    return replace(
+        _volatile(model, coarse, fine),
+        coarse=Autoregression(model.coarse.coefficients, model.coarse.scale * larger),
+        correlation=float(np.clip(correlation, 0.0, MOST_CORRELATED)),
     )

@@ -32,15 +32,9 @@ class FitSettings:
     farthest : float
         [s]
     snippet : float
-        Length of the simulated snippets. [s]
-    n_snippets : int
-        Simulated at least, in each round.
-    speed_weight : float
-        The coarse scale is corrected by what snippets lack in lateral speed with this weight, in spread with the rest.
+        Length of the snippets that are compared. [s]
     rounds : int
-    coarse_gain, fine_gain : float
-        How far a round corrects the variance of a volatility, per missing variance of what is compared: the fine
-        part's volatility varies within less than a snippet, which shows a fraction of their variance.
+        Of simulating and comparing: more change nothing beyond the standard error of held-out drives.
     seed : int
         Of the simulations.
     """
@@ -57,11 +51,7 @@ class FitSettings:
     far: tuple[float, float] = (0.5, 1.0)
     farthest: float = 120.0
     snippet: float = 10.0
-    n_snippets: int = 2000
-    speed_weight: float = 0.7
-    rounds: int = 8
-    coarse_gain: float = 1.0
-    fine_gain: float = 3.0
+    rounds: int = 4
     seed: int = 20240517
     step: float = STEP
 

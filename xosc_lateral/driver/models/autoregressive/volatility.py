@@ -70,6 +70,11 @@ class Volatility(Record, frozen=True):
         """Variance of the logarithm over all drivers and times. [-]"""
         return self.between + self.within + self.slow
 
+    def over(self, seconds: float) -> float:
+        """Variance of the logarithm's mean over so long a stretch [s], over all drivers and times. [-]"""
+        within, slow = (float(averaged_memory(1, seconds, memory)[0]) for memory in (self.memory, SLOW_MEMORY))
+        return self.between + within * self.within + slow * self.slow
+
     def scaled(self, factor: float) -> Volatility:
         """All variances times a factor [-] >= 0."""
         return Volatility(self.between * factor, self.within * factor, self.memory, self.slow * factor)
