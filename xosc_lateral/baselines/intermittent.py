@@ -67,7 +67,7 @@ class Intermittent(SimulatedModel):
             "threshold": Bounds(0.003, 0.5),
             "accumulator_noise": Bounds(0.02, 1.5),
             "motor_noise": Bounds(0.02, 1.0),
-            "unrest": Bounds(0.001, 0.1),
+            "unrest": Bounds(0.0001, 0.1),
         }
         return calibrate(lambda values: cls(driver_means=driver_means, **values), bounds, runs)
 

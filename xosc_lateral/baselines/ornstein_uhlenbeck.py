@@ -49,7 +49,7 @@ class OrnsteinUhlenbeck(SimulatedModel):
     def fit(cls, runs: Sequence[Run]) -> Self:
         """Numbers of the smallest distance (`calibrate`)."""
         driver_means, mean = driver_means_of(runs), float(np.concatenate([run.offset for run in runs]).mean())
-        bounds = {"time_constant": Bounds(0.5, 100.0), "spread": Bounds(0.03, 1.0)}
+        bounds = {"time_constant": Bounds(0.5, 100.0), "spread": Bounds(0.003, 1.0)}
         return calibrate(lambda values: cls(driver_means=driver_means, mean=mean, **values), bounds, runs)
 
     def simulate(self, batch: SegmentBatch, rng: np.random.Generator) -> FloatArray:

@@ -55,7 +55,7 @@ class PotentialField(SimulatedModel):
             "strength": Bounds(0.01, 10.0),
             "reach": Bounds(0.1, 3.0),
             "friction": Bounds(0.02, 5.0),
-            "noise": Bounds(0.003, 0.5),
+            "noise": Bounds(0.0003, 0.5),
         }
         return calibrate(lambda values: cls(driver_means=driver_means, **values), bounds, runs)
 

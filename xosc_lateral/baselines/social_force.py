@@ -57,7 +57,7 @@ class SocialForce(SimulatedModel):
     def fit(cls, runs: Sequence[Run]) -> Self:
         """The shift from the runs where neighbours are known, the rest by the smallest distance (`calibrate`)."""
         driver_means, shift = driver_means_of(runs), shift_beside(runs)
-        bounds = {"stiffness": Bounds(0.001, 3.0), "friction": Bounds(0.02, 5.0), "noise": Bounds(0.003, 0.5)}
+        bounds = {"stiffness": Bounds(0.001, 3.0), "friction": Bounds(0.02, 5.0), "noise": Bounds(0.0003, 0.5)}
         return calibrate(lambda values: cls(driver_means=driver_means, shift=shift, **values), bounds, runs)
 
     def force(self, offset: FloatArray, lane_width: FloatArray, beside: FloatArray) -> FloatArray:
