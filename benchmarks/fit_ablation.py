@@ -46,7 +46,7 @@ VARIANTS: dict[str, dict[str, object]] = {
     "no rounds": {"rounds": 0},
     "1 round": {"rounds": 1},
     "2 rounds": {"rounds": 2},
-    "3 rounds": {"rounds": 3},
+    "4 rounds": {"rounds": 4},
     "8 rounds": {"rounds": 8},
 }
 

@@ -24,8 +24,8 @@ from xosc_lateral.drives.periodogram import Detrend, window_powers
 
 FloatArray = NDArray[np.float64]
 
-SIMULATED, SNIPPETS_EACH = 4000, 3
-"""Drivers that a round simulates, and snippets of each: what chance does to the mean log spread of so many is 0.5 %.
+SIMULATED, SNIPPETS_EACH = 4000, 2
+"""Drivers that a round simulates, and snippets of each: what chance does to the mean log spread of so many is 0.6 %.
 All fits draw from one seed, so it is a bias of every profile. [-]"""
 
 LEAST_VOLATILITY = Volatility(0.0, 1e-3, 10.0)

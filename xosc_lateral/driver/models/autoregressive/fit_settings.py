@@ -51,7 +51,7 @@ class FitSettings:
     far: tuple[float, float] = (0.5, 1.0)
     farthest: float = 120.0
     snippet: float = 10.0
-    rounds: int = 4
+    rounds: int = 3
     seed: int = 20240517
     step: float = STEP
 
