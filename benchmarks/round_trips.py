@@ -1,6 +1,6 @@
 """Sample a population, fit it, sample the fit: what comes back? Long runs and short ones.
 
-    python -m benchmarks.round_trips [--seeds 14] [--profile motorway] [--write docs/validation/driver_model.md]
+    python -m benchmarks.round_trips [--seeds 10] [--profile motorway] [--write docs/validation/driver_model.md]
 
 Logarithms of standard deviations of the fit less those of its own sample, which takes the sample's luck out; the spread
 less the profile's own, with the sample's drivers in place of all; mean over the seeds, with the standard error.
@@ -53,7 +53,7 @@ def trip(model: AutoregressiveModel, drivers: int, seconds: float, variance: flo
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--seeds", type=int, default=14)
+    parser.add_argument("--seeds", type=int, default=10)
     parser.add_argument("--profile", default="motorway")
     parser.add_argument("--write", type=Path, help="page with the markers")
     args = parser.parse_args()

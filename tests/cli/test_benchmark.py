@@ -7,6 +7,7 @@ import pandas as pd
 import pytest
 
 from tests.baselines.made_runs import smooth_runs
+from xosc_lateral.baselines import calibration
 from xosc_lateral.cli import main
 
 
@@ -23,8 +24,10 @@ def table(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_a_board_is_written_for_machines_documents_and_people(
-    table: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    table: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    monkeypatch.setattr(calibration, "FIRST_LOOK", 8)  # what is tested is what is written
+    monkeypatch.setattr(calibration, "STEPS", 10)
     words = ["benchmark", "realism", str(table), "-o", str(tmp_path / "out"), "--no-classify", "--resamples", "10"]
     assert main([*words, "--model", "lane-centre", "--model", "gaussian-process", "-p", "motorway", "--json"]) == 0
     said = json.loads(capsys.readouterr().out)

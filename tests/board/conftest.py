@@ -1,0 +1,16 @@
+"""Fits of the board's models with a small budget: what is tested is the board."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from unittest.mock import patch
+
+import pytest
+
+from xosc_lateral.baselines import calibration
+
+
+@pytest.fixture(scope="module", autouse=True)
+def small_budget() -> Iterator[None]:
+    with patch.multiple(calibration, FIRST_LOOK=8, STEPS=10):
+        yield
