@@ -14,6 +14,7 @@ import argparse
 import hashlib
 import itertools
 import re
+import signal
 import subprocess
 import tempfile
 from collections.abc import Iterable, Iterator, Sequence
@@ -71,8 +72,12 @@ def _wait(player: subprocess.Popen[bytes], log: Path, limit: float) -> None:
         except subprocess.TimeoutExpired:
             if _last_time(_written(log)) > limit:
                 break
-    player.kill()
-    player.wait()
+    player.send_signal(signal.SIGINT)  # it then quits by itself, and has said all it had to
+    try:
+        player.wait(5.0)
+    except subprocess.TimeoutExpired:
+        player.kill()
+        player.wait()
 
 
 def _options(words: Sequence[str]) -> list[str]:

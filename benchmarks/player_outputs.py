@@ -143,7 +143,7 @@ def measure(path: Path, mode: str, plain: PlayerRun, folder: Path, options: argp
     made = xl.convert(
         path, output, mode=mode, seed=options.seed, time_limit=options.time_limit, allow=options.folders, force=True
     )
-    played = run(options.player, output, made.end_time + 1.0, folder)  # it ends by itself, and says all it has to
+    played = run(options.player, output, made.end_time - 0.005, folder)
     by_trajectory = mode == "trajectory"
     spans = {} if by_trajectory else on_stretches(made, output, played)
     lateral = {} if by_trajectory else own_lateral(output, played)
