@@ -12,7 +12,8 @@ from xosc_lateral.driver.effects import Acts, Effect
 from xosc_lateral.identification.problem import Problem, of_squares
 from xosc_lateral.identification.regression import Coarse, Fitted
 from xosc_lateral.identification.squares import SLOW_S, log_sizes, slow_squares
-from xosc_lateral.identification.terms.column import ColumnTerm, columns_on_size
+from xosc_lateral.identification.terms.column import ColumnTerm, answers, columns_on_size
+from xosc_lateral.identification.terms.mean import MeanTerm
 from xosc_lateral.identification.terms.spread import known_log_scale
 
 FloatArray = NDArray[np.float64]
@@ -34,9 +35,10 @@ class SlowSpreadTerm(ColumnTerm):
 
     @classmethod
     def problem(cls, fitted: Fitted) -> Problem:
-        """Squares of running sums."""
+        """Squares of running sums; an effect on the mean whose size is a little wrong leaves some where it is large."""
         squares = slow_squares(fitted)
-        return of_squares(fitted.coarse, squares.standardised, squares.valid, known_log_scale(fitted))
+        known = np.concatenate([known_log_scale(fitted), np.abs(answers(fitted, MeanTerm))], axis=1)
+        return of_squares(fitted.coarse, squares.standardised, squares.valid, known)
 
     @classmethod
     def barred(cls, fitted: Fitted) -> frozenset[str]:

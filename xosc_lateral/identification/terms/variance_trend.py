@@ -9,11 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.driver.effects import Effect, GrowingSpread
+from xosc_lateral.identification.dictionary import orthonormal
 from xosc_lateral.identification.log_scale import squared_innovations
 from xosc_lateral.identification.regression import Coarse, Fitted, elapsed
 from xosc_lateral.identification.significance import LEAST
 from xosc_lateral.identification.squares import SLOW_S, fine_squares, log_sizes, slow_squares
 from xosc_lateral.identification.terms.base import Description, Outcome, Removal, Term
+from xosc_lateral.identification.terms.column import columns_on_size
 
 if TYPE_CHECKING:
     from xosc_lateral.identification.search import Search
@@ -57,7 +59,9 @@ class VarianceTrend(Term):
         """Regress squares on time; clustered seconds count for less."""
         if not fitted.coarse.lasts or any(isinstance(term, cls) for term in fitted.terms):
             return None
-        fast, slow = (_probability(fitted, own) for own in (False, True))
+        # what a column does to the size of any part of the movement is no trend, slow as the column may be
+        known = search.cross_basis(columns_on_size(fitted))
+        fast, slow = (_probability(fitted, own, known) for own in (False, True))
         term = cls(slow=slow < fast)
         p_value = min(1.0, 2.0 * min(fast, slow))
         return Outcome(term, (), p_value)
@@ -97,8 +101,10 @@ class VarianceTrend(Term):
         return Description(name, "log-linear in time", effect.factor, effect.factor_error, statistic, statistic)
 
 
-def _probability(fitted: Fitted, slow: bool) -> float:
+def _probability(fitted: Fitted, slow: bool, known: FloatArray) -> float:
     """Two-sided p-value of squares regressed on time, their long-run variance by equally weighted cosines [1]_.
+
+    `known`, shape (n, k), is taken out of both.
 
     References
     ----------
@@ -114,10 +120,10 @@ def _probability(fitted: Fitted, slow: bool) -> float:
         squares, valid = own.standardised, own.valid
     else:
         squares, valid = squared_innovations(fitted.rows, coarse.valid), coarse.valid
-    time = elapsed(coarse)[valid]
-    time = time - time.mean()
-    slope = float(time @ squares[valid]) / max(float(time @ time), 1e-300)
-    scores = time * (squares[valid] - slope * time)
+    basis = orthonormal(np.column_stack([np.ones(valid.sum()), known[valid]]))
+    time, left = (values - basis @ (basis.T @ values) for values in (elapsed(coarse)[valid], squares[valid]))
+    slope = float(time @ left) / max(float(time @ time), 1e-300)
+    scores = time * (left - slope * time)
     cosines = max(4, round(COSINES * len(scores) ** (2.0 / 3.0)))
     weights = dct(scores, type=2, norm="ortho")[1 : cosines + 1]
     error = float(np.sqrt(len(scores) * np.mean(weights**2))) / max(float(time @ time), 1e-300)
