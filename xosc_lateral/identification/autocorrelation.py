@@ -46,7 +46,7 @@ BIAS_SEED = 0
 
 
 @dataclass(frozen=True, eq=False)
-class Autoregression:
+class MovementProcess:
     """x_t = sum_k a_k x_{t-k} + sd * white.
 
     Parameters
@@ -114,7 +114,7 @@ def moving_sum(weights: FloatArray, values: FloatArray) -> FloatArray:
 
 def fit_autoregression(
     values: FloatArray, valid: BoolArray, order: int, *, longest: int | None = None
-) -> Autoregression:
+) -> MovementProcess:
     """Least squares over all rows that have the whole memory in their own run.
 
     Parameters
@@ -139,7 +139,7 @@ def fit_autoregression(
         edges.append(2 * edges[-1])
     rows = np.flatnonzero(position >= edges[-1])
     if len(rows) < 2 * order:
-        return Autoregression((np.zeros(0),), np.array([max(float(np.std(values[valid])), 1e-150)]))
+        return MovementProcess((np.zeros(0),), np.array([max(float(np.std(values[valid])), 1e-150)]))
     sums = np.concatenate([[0.0], np.cumsum(np.where(valid, values, 0.0))])
     past = [values[rows - lag] for lag in range(1, order + 1)]
     past += [(sums[rows - low] - sums[rows - high]) / (high - low) for low, high in pairwise(edges)]
@@ -167,7 +167,7 @@ def _reflections(lags: FloatArray) -> FloatArray:
     return np.array(reflections[::-1])
 
 
-def _stepped_down(lags: FloatArray, variance: float) -> Autoregression:
+def _stepped_down(lags: FloatArray, variance: float) -> MovementProcess:
     """All lower-order predictors, forwards from safe reflections."""
     predictors: list[FloatArray] = [np.zeros(0)]
     shares = [1.0]
@@ -176,7 +176,7 @@ def _stepped_down(lags: FloatArray, variance: float) -> Autoregression:
         predictors.append(np.concatenate([before - last * before[::-1], [last]]))
         shares.append(shares[-1] * (1.0 - last**2))
     deviations = np.sqrt(variance * np.asarray(shares) / shares[-1])
-    return Autoregression(tuple(predictors), deviations)
+    return MovementProcess(tuple(predictors), deviations)
 
 
 def start_factors(rows: FloatArray, valid: BoolArray, order: int) -> FloatArray:
@@ -203,8 +203,8 @@ def start_factors(rows: FloatArray, valid: BoolArray, order: int) -> FloatArray:
 
 
 def unbiased(
-    process: Autoregression, valid: BoolArray, drive: IntArray, order: int, *, longest: int | None = None
-) -> Autoregression:
+    process: MovementProcess, valid: BoolArray, drive: IntArray, order: int, *, longest: int | None = None
+) -> MovementProcess:
     """Take out what free levels of short drives do to a fitted autoregression.
 
     A level that is estimated takes part of the slow movement with it, so that the process looks less persistent than it
@@ -213,7 +213,7 @@ def unbiased(
 
     Parameters
     ----------
-    process : Autoregression
+    process : MovementProcess
         Fitted to `valid` rows less each drive's level.
     valid, drive, order, longest
         As it was fitted.
@@ -248,7 +248,7 @@ class Whitener:
 
     Parameters
     ----------
-    process : Autoregression
+    process : MovementProcess
         Of the movement divided by `scale`.
     valid : bool array, shape (n,)
     drive : int array, shape (n,)
@@ -259,7 +259,7 @@ class Whitener:
         Rows of each run, where they stand side by side without anything invalid in between.
     """
 
-    process: Autoregression
+    process: MovementProcess
     valid: BoolArray
     drive: IntArray
     scale: FloatArray

@@ -19,7 +19,7 @@ from xosc_lateral.identification.held_out import Setting, fit_without, score_hel
 from xosc_lateral.identification.identify import Progress, identify, initial_terms
 from xosc_lateral.identification.memory import Memory, test_memory
 from xosc_lateral.identification.nested import Gain
-from xosc_lateral.identification.population import Population, test_population
+from xosc_lateral.identification.population import DriverVariance, test_population
 from xosc_lateral.identification.regression import Coarse, Fitted, fit_model
 from xosc_lateral.identification.removal import Estimates, estimate_all, removal_of
 from xosc_lateral.identification.residual import SummaryStatistics, floor_of
@@ -63,7 +63,7 @@ class LoopResult:
         Why the base is returned although effects were found; empty otherwise.
     memory : Memory
         How the base's own runs compare with the drives from band to band.
-    population : Population or None
+    population : DriverVariance or None
         How much the drives differ; None with too few of them.
     held_out : str
         What was held out, in words.
@@ -95,7 +95,7 @@ class LoopResult:
     gain: Gain | None
     returned_base: str
     memory: Memory
-    population: Population | None
+    population: DriverVariance | None
     held_out: str
     statistics: SummaryStatistics
     unmoved: FloatArray

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from xosc_lateral.driver.effects import Effect
 from xosc_lateral.identification.memory import Memory
 from xosc_lateral.identification.nested import Gain
-from xosc_lateral.identification.population import Population
+from xosc_lateral.identification.population import DriverVariance
 from xosc_lateral.identification.regression import Fitted
 from xosc_lateral.identification.selection import Accepted
 
@@ -96,7 +96,7 @@ def memory_finding(memory: Memory, compared: Compared) -> Finding:
     )  # fmt: skip
 
 
-def population_finding(population: Population, compared: Compared) -> Finding:
+def population_finding(population: DriverVariance, compared: Compared) -> Finding:
     """The core model is replaced: one pooled driver can't be many."""
     statistic = "quantiles of local spread"
     before, after = _errors(compared, statistic)

@@ -28,7 +28,7 @@ LEVEL = 0.002
 
 
 @dataclass(frozen=True, slots=True)
-class Population:
+class DriverVariance:
     """Scatter between drives, noise taken out.
 
     Parameters
@@ -54,7 +54,7 @@ class Population:
         return self.p_value < LEVEL
 
 
-def test_population(fitted: Fitted, known: FloatArray) -> Population | None:
+def test_population(fitted: Fitted, known: FloatArray) -> DriverVariance | None:
     """Analysis of variance with every drive's halves as the noise; None with too few drives.
 
     Halves of a drive are as far apart in time as a drive is long: what wanders slowly counts as noise, not as a driver.
@@ -73,7 +73,7 @@ def test_population(fitted: Fitted, known: FloatArray) -> Population | None:
         return None
     shift, p_shift = _scatter(np.asarray(means))
     log_spread, p_spread = _scatter(np.asarray(spreads))
-    return Population(len(means), shift, log_spread, max(min(1.0, 2.0 * min(p_shift, p_spread)), LEAST))
+    return DriverVariance(len(means), shift, log_spread, max(min(1.0, 2.0 * min(p_shift, p_spread)), LEAST))
 
 
 def _scatter(halves: FloatArray) -> tuple[float, float]:

@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.identification.autocorrelation import Autoregression, Whitener, fit_autoregression
+from xosc_lateral.identification.autocorrelation import MovementProcess, Whitener, fit_autoregression
 from xosc_lateral.identification.regression import LONGEST, ORDER, Coarse
 
 FloatArray = NDArray[np.float64]
@@ -68,6 +68,6 @@ def of_products(coarse: Coarse, rows: FloatArray, columns: FloatArray, factor: F
 
     The products themselves are rotated in the null: a few loud seconds, in which both are large, stay what they are.
     """
-    nothing = Autoregression((np.zeros(0),), np.ones(1))
+    nothing = MovementProcess((np.zeros(0),), np.ones(1))
     whitener = Whitener(nothing, coarse.valid, np.zeros(len(coarse), dtype=np.intp), np.ones(len(coarse)))
     return Problem(whitener, rows * factor, columns)
