@@ -14,7 +14,7 @@ import numpy as np
 from msgspec import structs
 from numpy.typing import NDArray
 
-from xosc_lateral.driver.effects import Acts, ColumnEffect, Effect
+from xosc_lateral.driver.effects import Acts, ColumnEffect, Effect, Linear
 from xosc_lateral.identification.dictionary import NULL_DRAWS
 from xosc_lateral.identification.problem import Problem
 from xosc_lateral.identification.regression import Fitted
@@ -66,6 +66,9 @@ class BetweenTerm(ColumnTerm):
         candidates, usual = [], []
         for candidate, values in zip(search.quantities.candidates, search.quantities.values, strict=True):
             if len(candidate.columns) > 1 or len(candidate.contrast) > 1 or present & set(candidate.columns):
+                continue
+            if isinstance(candidate.effect, Linear) and search.columns[candidate.columns[0]].gaps:
+                # a line in a distance would set a neighbour who is far away apart from one who is gone
                 continue
             mean = places.left(coarse.by_drive(values.astype(np.float64)))
             power = float(mean @ mean)
