@@ -21,7 +21,7 @@ Reals = NDArray[np.floating[Any]]
 BoolArray = NDArray[np.bool_]
 IntArray = NDArray[np.intp]
 
-TIMINGS: Mapping[float, tuple[int, ...]] = {1.0: (-2, -1, 0, 1), 4.0: (-4, -2, 0)}
+TIMINGS: Mapping[float, tuple[int, ...]] = {1.0: (-3, -2, -1, 0, 1, 2), 4.0: (-4, -2, 0, 2)}
 """Lags looked at first, by time constant; refined later. What is smoothed by 4 s differs little from one second to the
 next. Sensitivity: docs/design/identification.md. [s]"""
 
