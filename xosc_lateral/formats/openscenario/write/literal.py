@@ -90,7 +90,11 @@ def inline_catalogs(losses: Losses, scenario: Scenario, scope: Scope) -> None:
     """
     missing = set()
     for _ in range(_DEEPEST):
-        references = [(item, within) for item, within in _references(losses, losses.root, scope) if item not in missing]
+        references = [
+            (item, within)
+            for item, within in in_scope(losses, losses.root, scope, "CatalogReference")
+            if item not in missing
+        ]
         if not references:
             break
         for item, within in references:
@@ -110,7 +114,7 @@ def inline_maneuvers(root: etree._Element, scenario: Scenario, scope: Scope, wan
     Who looks at the file alone would find no element of that name.
     """
     losses = Losses(root, scenario.path, "", reactive=True)
-    for item, within in list(_references(losses, root, scope)):
+    for item, within in list(in_scope(losses, root, scope, "CatalogReference")):
         owner = item.getparent()
         if owner is None or local_name(owner) != "ManeuverGroup":
             continue
@@ -121,14 +125,15 @@ def inline_maneuvers(root: etree._Element, scenario: Scenario, scope: Scope, wan
             _inline(item, within, scenario)
 
 
-def _references(losses: Losses, item: etree._Element, scope: Scope) -> Iterator[tuple[etree._Element, Scope]]:
+def in_scope(losses: Losses, item: etree._Element, scope: Scope, tag: str) -> Iterator[tuple[etree._Element, Scope]]:
+    """Elements of one tag below another, not within each other, with the scope that each is read in."""
     inner = scope if item is losses.root else local_scope(XmlElement(item, losses.path, scope))
     for child in item:
         if isinstance(child.tag, str):
-            if local_name(child) == "CatalogReference":
+            if local_name(child) == tag:
                 yield child, inner
             else:
-                yield from _references(losses, child, inner)
+                yield from in_scope(losses, child, inner, tag)
 
 
 def _inline(reference: etree._Element, scope: Scope, scenario: Scenario) -> bool:

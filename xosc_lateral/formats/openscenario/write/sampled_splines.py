@@ -7,9 +7,9 @@ from math import ceil, hypot, isfinite, nan, sqrt
 
 from lxml import etree
 
-from xosc_lateral.formats.openscenario.declarations import local_scope
 from xosc_lateral.formats.openscenario.element import XmlElement, local_name
 from xosc_lateral.formats.openscenario.write import build
+from xosc_lateral.formats.openscenario.write.literal import in_scope
 from xosc_lateral.formats.openscenario.write.losses import Losses
 from xosc_lateral.formats.openscenario.write.path_pieces import LEAST_SPACING, VERTEX_SPACING
 from xosc_lateral.playback.paths.clothoid import TimedClothoid
@@ -34,7 +34,7 @@ def sample_splines(losses: Losses, scope: Scope) -> None:
     What else there is stays, and is refused or left out with what its version lacks: where such a spline begins
     depends on the road.
     """
-    for item, within in list(_splines(losses, losses.root, scope)):
+    for item, within in list(in_scope(losses, losses.root, scope, "ClothoidSpline")):
         spline = XmlElement(item, losses.path, within)
         frame = _frame(spline)
         if frame is None:
@@ -48,16 +48,6 @@ def sample_splines(losses: Losses, scope: Scope) -> None:
         polyline.tail = item.tail
         shape.remove(item)
         losses.note(f"ClothoidSpline: written as a Polyline of {len(polyline)} vertices ({losses.target} has none)")
-
-
-def _splines(losses: Losses, item: etree._Element, scope: Scope) -> Iterator[tuple[etree._Element, Scope]]:
-    inner = scope if item is losses.root else local_scope(XmlElement(item, losses.path, scope))
-    for child in item:
-        if isinstance(child.tag, str):
-            if local_name(child) == "ClothoidSpline":
-                yield child, inner
-            else:
-                yield from _splines(losses, child, inner)
 
 
 def _frame(spline: XmlElement) -> Frame | None:
