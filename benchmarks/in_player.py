@@ -23,6 +23,10 @@ BESIDE = 1.1
 """A metre beside the middle of a bend of 10 m: so much the turn may differ. [-]"""
 JUMP = 0.3
 """Farther than it drives in a step: the car was placed anew. [m]"""
+ABREAST = 4
+"""Steps of looking for the moment at which a car was to be where it is."""
+EARLIER = 1.0
+"""Than that moment, or later, is looked for. [s]"""
 _MESSAGE = re.compile(r"\[\s*([\d.]+)\] \[info\] (.*?) \w+ -> (startTransition -> runningState|\w+ -> completeState)")
 
 FloatArray = NDArray[np.float64]
@@ -75,14 +79,37 @@ def placed(rows: pd.DataFrame) -> list[Span]:
     return [(moment - 0.04, moment + 0.04) for moment in time[1:][(step > driven + JUMP) | (np.diff(time) > 0.05)]]
 
 
-def distance(meant: pd.DataFrame, played: pd.DataFrame) -> tuple[FloatArray, FloatArray]:
-    """Ahead of and aside from the meant place, at each row of the player; not a number where it was placed anew. [m]"""
+def distance(meant: pd.DataFrame, played: pd.DataFrame) -> FloatArray:
+    """From the meant place, at each row of the player; not a number where it was placed anew. [m]"""
     time = played["time"].to_numpy()
+    return np.where(_is_known(meant, time), np.hypot(*_away(meant, played, time)), np.nan)
+
+
+def beside(meant: pd.DataFrame, played: pd.DataFrame) -> FloatArray:
+    """From the meant path, to the left, at each row of the player; not a number where it was placed anew. [m]
+
+    Compared with the moment at which the entity was to be abreast: a maneuver that begins one of the player's frames
+    earlier leaves a car farther along its path, which bends.
+    """
+    time = played["time"].to_numpy()
+    at = time
+    for _ in range(ABREAST):
+        ahead, _ = _away(meant, played, at)
+        speed = np.interp(at, meant["time"], meant["speed"])
+        late = ahead / np.where(np.abs(speed) < FAST, np.copysign(FAST, speed), speed)
+        at = np.clip(at + late, time - EARLIER, time + EARLIER)
+    return np.where(_is_known(meant, time) & _is_known(meant, at), _away(meant, played, at)[1], np.nan)
+
+
+def _away(meant: pd.DataFrame, played: pd.DataFrame, time: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Ahead of the place meant at some times, and to its left. [m]"""
     dx, dy = (played[axis].to_numpy() - np.interp(time, meant["time"], meant[axis]) for axis in "xy")
     heading = np.interp(time, meant["time"], np.unwrap(meant["h"]))
-    known = ~within(time, placed(meant)) & (time >= meant["time"].min()) & (time <= meant["time"].max())
-    ahead, aside = dx * np.cos(heading) + dy * np.sin(heading), dy * np.cos(heading) - dx * np.sin(heading)
-    return np.where(known, ahead, np.nan), np.where(known, aside, np.nan)
+    return dx * np.cos(heading) + dy * np.sin(heading), dy * np.cos(heading) - dx * np.sin(heading)
+
+
+def _is_known(meant: pd.DataFrame, time: FloatArray) -> BoolArray:
+    return ~within(time, placed(meant)) & (time >= meant["time"].min()) & (time <= meant["time"].max())
 
 
 def sharpest(played: pd.DataFrame, others: Sequence[pd.DataFrame], *, by_path: bool) -> tuple[FloatArray, FloatArray]:

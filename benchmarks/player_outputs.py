@@ -1,6 +1,6 @@
 """What the reference player makes of the outputs, in both modes, over folders of other people's scenarios.
 
-    python -m benchmarks.player_outputs FOLDER... --player PATH [--checker PATH] [--limit N] [--csv FILE]
+    python -m benchmarks.player_outputs FOLDER... --player PATH [--checker PATH] [--once] [--limit N] [--csv FILE]
 
 PATH is esmini's executable (a headless build is enough) and that of the ASAM checker bundle (`qc_openscenario` of the
 package `asam-qc-openscenarioxml`). Every scenario is converted in both modes; input and outputs are played with frames
@@ -16,7 +16,9 @@ of 0.01 s, controllers off. Per scenario and mode:
   mode those of what is no motion. [s]
 - schema, checker: findings that the input does not have. `said`: the conversion warned of a shifted event.
 
-Scenarios that the player can't play, or that `convert` refuses in a line, are counted apart.
+Scenarios that the player can't play, or that `convert` refuses in a line, are counted apart. `--once` takes one
+scenario of each name, that of the first folder. Rows go to the CSV file as they come, and what is in it already is not
+measured again.
 """
 
 from __future__ import annotations
@@ -25,8 +27,8 @@ import argparse
 import tempfile
 import traceback
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from collections.abc import Iterator, Mapping
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -36,7 +38,7 @@ from lxml import etree
 import xosc_lateral as xl
 from benchmarks.agreement import scenarios
 from benchmarks.findings import checker_findings, schema_findings
-from benchmarks.in_player import PlayerRun, Span, distance, run, sharpest, shifts, within
+from benchmarks.in_player import PlayerRun, Span, beside, distance, run, sharpest, shifts, within
 
 MODES = ("trajectory", "lane-offset")
 BOUNDS = {"far_cm": 5.0, "turn_mrad": 0.3, "late_s": 0.05, "lost": 0, "schema": 0, "checker": 0}
@@ -47,10 +49,11 @@ OURS = "xosc-lateral"
 
 @dataclass(slots=True)
 class Measured:
-    """One output in the player."""
+    """One output in the player, or why there is none (`apart`)."""
 
     scenario: str
     mode: str
+    apart: str = ""
     far_cm: float = 0.0
     turn_mrad: float = 0.0
     late_s: float = 0.0
@@ -62,6 +65,8 @@ class Measured:
 
     def row(self) -> str:
         """For people."""
+        if self.apart:
+            return f"{self.scenario[:44]:44} {self.mode:11} {self.apart}: {self.what[-1000:]}"
         numbers = f"{self.far_cm:7.2f} cm {self.turn_mrad:8.3f} mrad {self.late_s:6.3f} s"
         counts = f"{self.lost} lost {self.schema} schema {self.checker} checker"
         return (
@@ -111,7 +116,12 @@ def own_lateral(output: Path, played: PlayerRun) -> Mapping[str, list[Span]]:
 
 
 def settled(output: Path, played: PlayerRun) -> Mapping[str, list[Span]]:
-    """From the end of the first transition of each of our acts to the act's end."""
+    """From the end of the first transition of each of our acts to the act's end; at once if it was put down aside."""
+    placed = {
+        private.get("entityRef")
+        for private in etree.parse(str(output)).getroot().iter("{*}Private")
+        if private.find(".//{*}LaneOffsetActionDynamics[@dynamicsShape='step']") is not None
+    }
     found: dict[str, list[Span]] = {}
     for name, _, actors in actions(output):
         if name.startswith(OURS) and name.endswith("action 1"):
@@ -119,7 +129,7 @@ def settled(output: Path, played: PlayerRun) -> Mapping[str, list[Span]]:
                 played.spans(name), played.spans(name[: -len(" action 1")]), strict=False
             ):
                 for actor in actors:
-                    found.setdefault(actor, []).append((0.0 if begin <= 0.02 else end, act_end))
+                    found.setdefault(actor, []).append((0.0 if begin <= 0.02 and actor in placed else end, act_end))
     return found
 
 
@@ -154,12 +164,9 @@ def measure(path: Path, mode: str, plain: PlayerRun, folder: Path, options: argp
         if rows is None:
             result.far_cm, result.what = np.inf, f"{name} is not there"
             continue
-        ahead, aside = distance(meant[name], rows)
-        far = (
-            np.hypot(ahead, aside)
-            if by_trajectory
-            else np.where(within(rows["time"].to_numpy(), spans.get(name, [])), aside, np.nan)
-        )
+        far = distance(meant[name], rows) if by_trajectory else beside(meant[name], rows)
+        if not by_trajectory:
+            far = np.where(within(rows["time"].to_numpy(), spans.get(name, [])), far, np.nan)
         _worse(result, "far_cm", 100.0 * np.abs(far), rows["time"].to_numpy(), name)
         for by_path in (False,) if by_trajectory else (False, True):
             others = [plain.rows[name], meant[name]] if by_trajectory else [plain.rows[name]]
@@ -204,23 +211,29 @@ def summary(table: pd.DataFrame) -> str:
     return "\n".join(lines)
 
 
-def outputs(paths: Sequence[Path], options: argparse.Namespace, apart: Counter[str]) -> Iterator[Measured]:
-    """Measure them; what can't be is counted in `apart`."""
-    for path in paths:
-        with tempfile.TemporaryDirectory() as name:
-            plain = run(options.player, path, options.time_limit, Path(name))
-            if not plain.rows or max(one["time"].max() for one in plain.rows.values()) < 0.03:
-                apart["not played by the player"] += 1
-                continue
-            for mode in options.mode or MODES:
-                try:
-                    yield measure(path, mode, plain, Path(name), options)
-                except xl.XoscLateralError as error:
-                    apart[f"refused ({mode})"] += 1
-                    print(f"{path.stem[:44]:44} {mode:11} refused: {' '.join(str(error).split())[-150:]}", flush=True)
-                except Exception:
-                    apart[f"traceback ({mode})"] += 1
-                    print(f"{path.stem[:44]:44} {mode:11} {traceback.format_exc()}", flush=True)
+def outputs(path: Path, scenario: str, options: argparse.Namespace) -> Iterator[Measured]:
+    """Measure those of one scenario."""
+    with tempfile.TemporaryDirectory() as name:
+        plain = run(options.player, path, options.time_limit, Path(name))
+        if not plain.rows or max(one["time"].max() for one in plain.rows.values()) < 0.03:
+            yield Measured(scenario, "", "not played by the player")
+            return
+        for mode in options.mode or MODES:
+            try:
+                yield replace(measure(path, mode, plain, Path(name), options), scenario=scenario)
+            except xl.XoscLateralError as error:
+                yield Measured(scenario, mode, f"refused ({mode})", what=" ".join(str(error).split())[-150:])
+            except Exception:
+                yield Measured(scenario, mode, f"traceback ({mode})", what=traceback.format_exc())
+
+
+def chosen(options: argparse.Namespace) -> Iterator[tuple[str, Path]]:
+    """Scenarios, each with what tells it from the others."""
+    names: set[str] = set()
+    for path in scenarios(options.places, options.limit):
+        if not options.once or path.stem.lower() not in names:
+            yield path.stem if options.once else "/".join(path.parts[-4:]), path
+        names.add(path.stem.lower())
 
 
 def main() -> None:
@@ -233,19 +246,27 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--time-limit", type=float, default=30.0)
     parser.add_argument("--limit", type=int, help="this many scenarios, evenly spread")
+    parser.add_argument("--once", action="store_true", help="one scenario of each name")
     parser.add_argument("--csv", type=Path, help="where all rows go")
     options = parser.parse_args()
     options.player = options.player.resolve()
     options.folders = [place if place.is_dir() else place.parent.parent for place in options.places]
-    apart: Counter[str] = Counter()
-    found = []
-    for one in outputs(scenarios(options.places, options.limit), options, apart):
-        found.append(one)
-        print(one.row(), flush=True)
-    table = pd.DataFrame([asdict(one) for one in found])
-    if options.csv is not None:
-        table.to_csv(options.csv, index=False)
-    print(summary(table) if found else "nothing was measured")
+    found: list[Measured] = []
+    if options.csv is not None and options.csv.exists():
+        rows = pd.read_csv(options.csv, keep_default_na=False).to_dict("records")
+        found = [Measured(**{str(name): value for name, value in row.items()}) for row in rows]
+    known = {one.scenario for one in found}
+    for scenario, path in chosen(options):
+        if scenario in known:
+            continue
+        for one in outputs(path, scenario, options):
+            found.append(one)
+            print(one.row(), flush=True)
+        if options.csv is not None:
+            pd.DataFrame([asdict(one) for one in found]).to_csv(options.csv, index=False)
+    measured = pd.DataFrame([asdict(one) for one in found if not one.apart])
+    print(summary(measured) if len(measured) else "nothing was measured")
+    apart = Counter(one.apart for one in found if one.apart)
     print(", ".join(f"{count} {what}" for what, count in apart.items()))
 
 

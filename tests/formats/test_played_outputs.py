@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +16,8 @@ from xosc_lateral.formats.openscenario import read_scenario
 from xosc_lateral.formats.openscenario.write import OffsetChain, offset_chains, write_lane_offset_scenario
 from xosc_lateral.formats.openscenario.write.moving import Moving, _heading_times
 from xosc_lateral.formats.openscenario.write.offset_chain import ramps
+from xosc_lateral.formats.openscenario.write.path_pieces import vertex_times
+from xosc_lateral.formats.openscenario.write.ramp_targets import FRAME, Ramp, acceleration, fitted
 from xosc_lateral.motion.nominal import Activity
 from xosc_lateral.motion.segments import Stretch, StretchKind
 
@@ -84,13 +87,50 @@ def test_a_car_that_runs_into_the_end_of_its_road_keeps_its_speed_until_there(tm
     assert item.path.x[300] == pytest.approx(path.x[301])
 
 
-def test_headings_are_as_late_in_short_gaps_as_in_usual_ones() -> None:
-    """In the middle of each gap the player has the heading of the vertex before it: always the one of 0.05 s ago."""
-    times = np.array([0.0, 0.1, 0.2, 0.22, 0.3, 0.4, 0.44])
+def test_headings_are_as_late_in_short_gaps_as_in_usual_ones_and_in_time_at_the_end() -> None:
+    """In the middle of each gap the player has the heading of the vertex before it: that of half a usual gap ago."""
+    times = np.sort(np.append(np.linspace(0.0, 3.0, 31), 0.92))
     middle = 0.5 * (times[1:] + times[:-1])
-    assert middle - _heading_times(times, stops=False)[:-1] == pytest.approx(0.05)
-    assert _heading_times(times, stops=False)[-1] == pytest.approx(0.39)
-    assert _heading_times(times, stops=True)[-1] == 0.44
+    shown = _heading_times(times)
+    late = middle - shown[:-1]
+    assert late[middle < 2.4] == pytest.approx(0.05)
+    assert shown[-1] == times[-1]
+    assert (np.diff(shown) > 0.0).all()
+    assert (np.diff(late[middle > 2.4]) / np.diff(middle[middle > 2.4])).min() > -0.1
+
+
+@pytest.mark.parametrize(("radius", "most"), [(200.0, 0.1), (40.0, 0.05), (9.0, 0.02)])
+def test_gaps_are_even_in_a_bend_however_sharp(radius: float, most: float) -> None:
+    """Where gaps change, the player turns a car within half a gap by what belongs to both."""
+    time = np.arange(0.0, 3.0, 0.02)
+    turned = 25.0 * np.clip(time - 1.0, 0.0, 0.6) / radius
+    ahead = 25.0 * (time - np.clip(time - 1.0, 0.0, 0.6))
+    before, after = np.minimum(ahead, 25.0), np.maximum(ahead - 25.0, 0.0)
+    x = before + radius * np.sin(turned) + after * np.cos(turned)
+    y = radius * (1.0 - np.cos(turned)) + after * np.sin(turned)
+    gaps = np.diff(vertex_times(time, x, y))
+    assert gaps == pytest.approx(most, rel=0.03)
+
+
+def test_targets_halve_the_error_of_an_offset_that_turns_back() -> None:
+    """Led to the offset itself, transitions err on one side; none of them turns the car faster for it."""
+    time = np.arange(0.0, 8.01, 0.1)
+    offset = 0.05 * (time - 4.0) ** 2
+    limit = np.full(len(time), 0.8)
+    plain = [Ramp(2.0 * k, 2.0 * k + 1.97, offset[20 * k], offset[20 * k + 20]) for k in range(4)]
+    found = fitted(plain, time, offset, limit, settles=False, starts=True)
+    worst, better = (np.abs(_followed(ramps, time) - offset).max() for ramps in (plain, found))
+    assert better < 0.6 * worst
+    assert all(acceleration(ramp.target - ramp.origin, ramp.end - ramp.start) <= 0.8 + 1e-9 for ramp in found)
+    assert all(one.target == other.origin for one, other in pairwise(found))
+
+
+def _followed(found: list[Ramp], time: np.ndarray) -> np.ndarray:
+    place = np.full(len(time), found[0].origin)
+    for ramp in found:
+        share = np.clip((time - ramp.start - FRAME) / (ramp.end - ramp.start), 0.0, 1.0)
+        place += (ramp.target - ramp.origin) * 0.5 * (1.0 - np.cos(np.pi * share))
+    return place
 
 
 def test_a_maneuver_of_a_catalog_is_written_out_where_the_offsets_refer_to_it(tmp_path: Path) -> None:

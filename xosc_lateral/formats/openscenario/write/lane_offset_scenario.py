@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Mapping, Sequence
-from math import pi
 from pathlib import Path
 from typing import Any
 
@@ -30,8 +29,9 @@ from xosc_lateral.formats.openscenario.write.lateral_actions import (
     lateral_actions,
 )
 from xosc_lateral.formats.openscenario.write.literal import inline_maneuvers, name_literally
-from xosc_lateral.formats.openscenario.write.offset_chain import LEAST_CHANGE, OffsetChain, Ramp, ramps
+from xosc_lateral.formats.openscenario.write.offset_chain import LEAST_CHANGE, OffsetChain, ramps
 from xosc_lateral.formats.openscenario.write.parameters import global_scope, override_parameters
+from xosc_lateral.formats.openscenario.write.ramp_targets import Ramp, acceleration
 from xosc_lateral.formats.openscenario.write.relative_paths import rewrite_paths
 from xosc_lateral.formats.openscenario.write.result import WrittenScenario
 from xosc_lateral.formats.openscenario.write.target import STANDARD, TargetPlayer
@@ -179,8 +179,8 @@ def _add_ramp(event: etree._Element, name: str, ramp: Ramp) -> None:
     The reference player makes the duration from the change b and the acceleration A: pi sqrt(|b| / (2 A)).
     """
     change = max(abs(ramp.target - ramp.origin), LEAST_CHANGE)
-    acceleration = 0.5 * pi**2 * change / (ramp.end - ramp.start) ** 2
-    dynamics = {"dynamicsShape": "sinusoidal", "maxLateralAcc": build.decimal(acceleration, 6)}
+    most = float(acceleration(change, ramp.end - ramp.start))
+    dynamics = {"dynamicsShape": "sinusoidal", "maxLateralAcc": build.decimal(most, 6)}
     _lane_offset(build.private_action(event, name), dynamics, ramp.target)
 
 

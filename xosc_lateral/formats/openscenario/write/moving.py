@@ -13,7 +13,6 @@ from xosc_lateral.formats.openscenario.write import build
 from xosc_lateral.formats.openscenario.write.non_motion_actions import Pose
 from xosc_lateral.formats.openscenario.write.path_pieces import (
     LEAST_SPACING,
-    VERTEX_STEP,
     PathPiece,
     cut_path,
     vertex_times,
@@ -27,6 +26,10 @@ FloatArray = NDArray[np.float64]
 
 MOTION_SINCE = (1, 4)
 """Version from which a vertex may say how fast the entity is there."""
+
+
+CATCH_UP = 12.0
+"""Over so many times as long as a heading is late it catches up before a path is over: 8 % faster than it turns. [-]"""
 
 
 class Moving:
@@ -146,7 +149,7 @@ def _add_trajectory(
     time = path.time[rows]
     arrays = (path.x, path.y, path.z, np.unwrap(path.heading[rows]), path.pitch, path.roll)
     columns = [np.interp(times, time, values if len(values) == len(time) else values[rows]) for values in arrays]
-    columns[3] = np.interp(_heading_times(times, stops=piece.stops), time, np.unwrap(path.heading[rows]))
+    columns[3] = np.interp(_heading_times(times), time, np.unwrap(path.heading[rows]))
     speed = path.speed[rows]
     motion = None
     if version >= MOTION_SINCE:
@@ -154,17 +157,18 @@ def _add_trajectory(
     add_vertices(owner, name, vertices, version, times, columns, motion)
 
 
-def _heading_times(times: FloatArray, *, stops: bool) -> FloatArray:
+def _heading_times(times: FloatArray) -> FloatArray:
     """When the entity has the headings that the vertices get. [s]
 
-    The reference player has a vertex's heading in the middle of the gap after it: with gaps of `VERTEX_STEP`, half of
-    that late. Where gaps are shorter it would catch up with the path, and turn sharply: so it is kept as late there.
+    The reference player has a vertex's heading in the middle of the gap after it: half a gap late. Where gaps are
+    shorter than most it would catch up with the path, and turn sharply: so it is kept as late there. Towards the end it
+    catches up slowly, for there the path is over at once.
     """
-    gaps = np.append(np.diff(times), 0.0)
-    late = 0.5 * (VERTEX_STEP - np.minimum(gaps, VERTEX_STEP))
-    if stops:
-        late[-1] = 0.0
-    return np.asarray(times - late)
+    gaps = np.diff(times)
+    usual = 0.5 * float(np.median(gaps))
+    middle = times + np.minimum(0.5 * np.append(gaps, 0.0), usual)
+    late = usual * np.minimum((times[-1] - middle) / (CATCH_UP * usual), 1.0)
+    return np.asarray(np.minimum(middle - late, times[-1]))
 
 
 def add_vertices(

@@ -9,6 +9,7 @@ enough, at a sudden change of speed, a vertex is added.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -21,7 +22,9 @@ FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
 
 VERTEX_STEP = 0.1
-"""Time between vertices where distance allows it. [s]"""
+"""Time between vertices where distance and bends allow it. [s]"""
+BEND = 3
+"""Gaps in a row that a path is cut in by half the tolerance or more: a kink is in one gap, or in two. [-]"""
 VERTEX_SPACING = 0.105
 """Least distance between vertices: the player's 0.1 m and a margin for rounding. [m]"""
 LEAST_SPACING = VERTEX_SPACING - 1e-6
@@ -86,20 +89,21 @@ def cut_path(
 def vertex_times(time: FloatArray, x: FloatArray, y: FloatArray) -> FloatArray:
     """Times of the vertices of one piece, ends included; fewer than 2 when it is shorter than the vertex spacing. [s]
 
-    Every `VERTEX_STEP`, but never closer than `VERTEX_SPACING`. Counted from the start, and near the end from the end,
-    so that the last stretch before a stop is not longer than it has to be.
+    Every `VERTEX_STEP` (or evenly more often, for sharp bends), but never closer than `VERTEX_SPACING`. Counted from
+    the start, and near the end from the end, so that the last stretch before a stop is not longer than it has to be.
     """
     way = np.concatenate(([0.0], np.cumsum(np.hypot(np.diff(x), np.diff(y)))))
     if way[-1] < LEAST_SPACING:
         return time[:1]
     # Strictly increasing distance, so that it can be turned into time where the entity creeps.
     way = way + np.arange(len(way)) * 1e-12
-    tail = _tail(time, way)
+    step = _step(time, way, x, y)
+    tail = _tail(time, way, step)
     if _way_at(tail[0], time, way) < 2.0 * VERTEX_SPACING and len(tail) > 1:
         # Slow from end to end: evenly, so that no gap is left over.
         times = np.interp(np.linspace(0.0, way[-1], int(way[-1] / VERTEX_SPACING) + 1), way, time)
     else:
-        head = _head(time, way, tail[0])
+        head = _head(time, way, tail[0], step)
         while len(head) > 1 and _way_at(tail[0], time, way) - _way_at(head[-1], time, way) < LEAST_SPACING:
             head.pop()
         times = np.array([*head, *tail])
@@ -204,10 +208,31 @@ def _reversals(x: FloatArray, y: FloatArray) -> NDArray[np.intp]:
     return np.asarray(moving[1:][back], dtype=np.intp)
 
 
-def _head(time: FloatArray, way: FloatArray, until: float) -> list[float]:
+def _step(time: FloatArray, way: FloatArray, x: FloatArray, y: FloatArray) -> float:
+    """`VERTEX_STEP`, or less where the piece holds a bend that gaps of that length would cut.
+
+    The same everywhere: where gaps change, a player that turns the car within half a gap turns it more sharply.
+    """
+    for step in (VERTEX_STEP, VERTEX_STEP / 2.0):
+        if not _is_cut([*_head(time, way, float(time[-1]), step), float(time[-1])], time, x, y):
+            return step
+    return float(time[1] - time[0])
+
+
+def _is_cut(times: Sequence[float], time: FloatArray, x: FloatArray, y: FloatArray) -> bool:
+    """A bend, which is more than a kink: too far from straight in the middle of several gaps in a row."""
+    ends = np.array([np.interp(times, time, x), np.interp(times, time, y)])
+    middle = 0.5 * (np.asarray(times)[1:] + np.asarray(times)[:-1])
+    chord = np.diff(ends)
+    away = np.array([np.interp(middle, time, x), np.interp(middle, time, y)]) - ends[:, :-1]
+    aside = np.abs(chord[0] * away[1] - chord[1] * away[0]) / np.maximum(np.hypot(*chord), LEAST_STEP)
+    return any(part.stop - part.start >= BEND for part in stretches_of(aside > TOLERANCE / 2.0))
+
+
+def _head(time: FloatArray, way: FloatArray, until: float, step: float) -> list[float]:
     """Vertices up to where those of the tail begin; evenly, since a player turns the car within half a gap."""
     times = [float(time[0])]
-    step = (until - times[0]) / max(1, round((until - times[0]) / VERTEX_STEP))
+    step = (until - times[0]) / max(1, round((until - times[0]) / step))
     while True:
         at = _way_at(times[-1], time, way)
         nearest, farthest = (_time_at(at + far, time, way) for far in (VERTEX_SPACING, FARTHEST))
@@ -217,7 +242,7 @@ def _head(time: FloatArray, way: FloatArray, until: float) -> list[float]:
         times.append(following)
 
 
-def _tail(time: FloatArray, way: FloatArray) -> list[float]:
+def _tail(time: FloatArray, way: FloatArray, step: float) -> list[float]:
     """Vertices from where time spacing stops being possible to the end, in order of time."""
     times = [float(time[-1])]
     while True:
@@ -225,7 +250,7 @@ def _tail(time: FloatArray, way: FloatArray) -> list[float]:
         if target <= VERTEX_SPACING:
             break
         previous = _time_at(target, time, way)
-        if times[-1] - previous <= VERTEX_STEP:
+        if times[-1] - previous <= step:
             break
         times.append(previous)
     return times[::-1]
