@@ -2,7 +2,7 @@
 
     python -m benchmarks.identification_study --set SET [--only NAME] [-o OUT.jsonl]
 
-SET is design, validation, test, design_2, validation_2 or test_2.
+SET is design, validation or test, alone or with _2 or _3 for the later rounds.
 
 docs/validation/identification.toml fixes seeds, movements, kinds, sizes and counts; `--share` runs a part of them. One
 line per drive goes to OUT.jsonl as it is finished; `--table OUT.jsonl` prints the tables of the documents.
@@ -28,6 +28,7 @@ from benchmarks.identification_drives import (
     long_drive,
     quantity,
     short_drives,
+    smoothed_tracks,
     unit,
     with_mean,
     with_spread,
@@ -37,7 +38,7 @@ from xosc_lateral.identification.identify import identify
 from xosc_lateral.identification.regression import Coarse, fit_model
 from xosc_lateral.identification.timeline import coarse_mean, join_drives
 
-SETS = ("design", "validation", "test", "design_2", "validation_2", "test_2")
+SETS = tuple(name + suffix for suffix in ("", "_2", "_3") for name in ("design", "validation", "test"))
 PROTOCOL = Path(__file__).parents[1] / "docs" / "validation" / "identification.toml"
 
 
@@ -56,8 +57,10 @@ def cases(protocol: dict[str, Any], which: str, share: float) -> Iterator[dict[s
                 accepted = [entry.get("columns", [_plain(entry["quantity"])]), *entry.get("accepted", [])]
                 planted = {"type": kind, "name": entry["name"], what: size, "accepted": accepted}
                 wanted += [planted] * repeats
+    smoothed = which in protocol["smoothing"]["sets"]
     for place, case in enumerate(wanted):
-        yield {**case, "seed": first + place, "movement": movements[place % len(movements)]}
+        more = {"smoothed": True} if smoothed and place % 2 else {}
+        yield {**case, "seed": first + place, "movement": movements[place % len(movements)], **more}
 
 
 def run(case: dict[str, Any], protocol: dict[str, Any], seconds: float) -> dict[str, Any]:
@@ -77,6 +80,8 @@ def run(case: dict[str, Any], protocol: dict[str, Any], seconds: float) -> dict[
         table = with_mean(table, case["name"], case["size"], seed)
     elif "factor" in case:
         table = with_spread(table, case["name"], case["factor"], seed)
+    if "smoothed" in case:
+        table = smoothed_tracks(table)
     started = time.process_time()
     coarse = Coarse.of(join_drives(drives_of_table(table, {})))
     found = identify(coarse, np.random.SeedSequence(1))

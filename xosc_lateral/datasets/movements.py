@@ -150,6 +150,14 @@ def pursuit(n: int, rng: np.random.Generator) -> np.ndarray:
     return out + 0.02 * _smooth(_wander(n, rng, 1.0))
 
 
+def oscillating(n: int, rng: np.random.Generator) -> np.ndarray:
+    """Swings about the middle with a period of 14 s, a third of critically damped, kept up by noise. Shape (n,). [m]"""
+    turn = 2.0 * np.pi * PACE / 14.0
+    keep = np.exp(-0.33 * turn)
+    swing = lfilter([1.0], [1.0, -2.0 * keep * np.cos(turn), keep**2], rng.normal(size=n))
+    return 0.2 * _scaled(_scaled(swing) + 0.5 * _wander(n, rng, 40.0))
+
+
 def in_regimes(n: int, rng: np.random.Generator) -> np.ndarray:
     """For a minute at a time, pushed 2.5 times as hard; and then quiet for two. Shape (n,). [m]"""
     loud = np.ones(n)
