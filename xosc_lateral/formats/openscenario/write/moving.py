@@ -13,6 +13,7 @@ from xosc_lateral.formats.openscenario.write import build
 from xosc_lateral.formats.openscenario.write.non_motion_actions import Pose
 from xosc_lateral.formats.openscenario.write.path_pieces import (
     LEAST_SPACING,
+    VERTEX_SPACING,
     PathPiece,
     cut_path,
     vertex_times,
@@ -28,8 +29,8 @@ MOTION_SINCE = (1, 4)
 """Version from which a vertex may say how fast the entity is there."""
 
 
-CATCH_UP = 12.0
-"""Over so many times as long as a heading is late it catches up before a path is over: 8 % faster than it turns. [-]"""
+CATCH_UP = 20.0
+"""Over so many times as long as a heading is late it catches up before a path is over: 5 % faster than it turns. [-]"""
 
 
 class Moving:
@@ -76,24 +77,35 @@ class Moving:
 
 
 def _stopping_in_time(path: WorldTrajectory, pieces: Sequence[PathPiece]) -> tuple[WorldTrajectory, list[PathPiece]]:
-    """Sudden stops one step earlier, where the last step is too short for a vertex: it would slow the one before.
+    """Sudden stops whose last step is too short for a vertex of its own: it would slow the one before.
 
-    A car that runs at 20 m/s into the end of its road covers the last of it in a part of a step.
+    A car that runs at 20 m/s into the end of its road covers the last of it in a part of a step. It is there a step
+    earlier, or the step begins farther back: what moves it less.
     """
-    stopping = {piece for piece in pieces if piece.stops and piece.last - piece.first >= 2 and _is_sudden(path, piece)}
-    if not stopping:
+    sudden = {piece for piece in pieces if piece.last - piece.first >= 2 and _is_sudden(path, piece)}
+    early = {piece for piece in sudden if _way(path, piece.last) < 0.5 * VERTEX_SPACING}
+    if not sudden:
         return path, list(pieces)
     rows = np.arange(len(path.time))
-    rows[[piece.last - 1 for piece in stopping]] += 1
+    rows[[piece.last - 1 for piece in early]] += 1
     arrays = {name: getattr(path, name)[rows] for name in ("x", "y", "z", "heading", "pitch", "roll")}
-    ends = [replace(piece, last=piece.last - 1) if piece in stopping else piece for piece in pieces]
+    for last in (piece.last for piece in sudden - early):
+        share = (VERTEX_SPACING - _way(path, last)) / _way(path, last - 1)
+        for name in ("x", "y", "z"):
+            arrays[name][last - 1] += share * (arrays[name][last - 2] - arrays[name][last - 1])
+    ends = [replace(piece, last=piece.last - 1, stops=True) if piece in early else piece for piece in pieces]
     return replace(path, **arrays), ends
 
 
 def _is_sudden(path: WorldTrajectory, piece: PathPiece) -> bool:
-    rows = slice(piece.last - 2, piece.last + 1)
-    before, final = np.hypot(np.diff(path.x[rows]), np.diff(path.y[rows]))
-    return bool(final < LEAST_SPACING < before)
+    final, before = _way(path, piece.last), _way(path, piece.last - 1)
+    stops = piece.stops or (piece.last == len(path.time) - 1 and final < 0.5 * before)
+    return stops and final < LEAST_SPACING < before
+
+
+def _way(path: WorldTrajectory, row: int) -> float:
+    """Of the step to a row. [m]"""
+    return float(np.hypot(path.x[row] - path.x[row - 1], path.y[row] - path.y[row - 1]))
 
 
 def _check(entity: EntityMotion, path: WorldTrajectory, active: NDArray[np.bool_]) -> None:

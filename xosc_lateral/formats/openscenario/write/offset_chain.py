@@ -10,13 +10,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from itertools import pairwise
 from math import inf
 
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.formats.openscenario.write.ramp_targets import Ramp, acceleration, fitted
+from xosc_lateral.formats.openscenario.write.ramp_targets import Ramp, fitted, slowing, turning
 from xosc_lateral.motion.nominal import Activity, EntityMotion
 from xosc_lateral.motion.segments import Stretch
 from xosc_lateral.road import RoadNetwork
@@ -28,8 +27,9 @@ SETTLING_TIME = 2.0
 TOLERANCE = 0.010
 """How far transitions that lead from sampled offset to sampled offset may be from it. 1.3 cm takes a tenth fewer of
 them, and 1 % of the chains more err by over 2 cm. [m]"""
-MOST_TURNING = 0.027
-"""Of the heading, within a transition: 0.27 mrad in a frame of 0.01 s. [rad/s]"""
+MOST_TURNING = 0.026
+"""Of the heading, within a transition: 0.26 mrad in a frame of 0.01 s. The reference player ends an action 1e-6 m before
+its target, up to 2 ms early, and turns the car by that much more in its last frame: up to 0.31 mrad. [rad/s]"""
 GRID = 0.1
 """Time between places where a transition may begin or end. [s]"""
 LONGEST = 4.0
@@ -39,7 +39,7 @@ SLACK = 0.03
 LEAST_CHANGE = 1e-3
 """A smaller change of the target is left to the next one. [m]"""
 FLIP_MARGIN = 0.3
-"""Before and after a flip of +t in which nothing is commanded: the run may be a little early or late there. [s]"""
+"""Before and after a flip of +t in which no transition begins: the run may be a little early or late there. [s]"""
 PLACED_ASIDE = np.array([0.01 * sign * k for k in range(11) for sign in (1, -1)])
 """From the sampled offset, the nearest first, where a chain begins with the scenario: a drift is met half way. [m]"""
 REST = 0.1
@@ -99,7 +99,7 @@ def offset_chains(
             chain = replace(chain, start_t=_direction(motion, network, stretch.first) * held)
         chains.append(chain)
         found = ramps(chain)
-        at = int(np.searchsorted(motion.time, found[-1].end)) if found else stretch.first
+        at = int(np.searchsorted(motion.time, found[-1].start)) if found else stretch.first
         held = _direction(motion, network, at) * (found[-1].target if found else chain.start_t)
         end = stretch.last
     return chains
@@ -133,46 +133,54 @@ def _offset_chain(
 def ramps(chain: OffsetChain) -> list[Ramp]:
     """As few transitions as the tolerance allows; the first leads from where the entity is.
 
-    Around a flip of +t nothing is commanded: a target set on one side of it would be followed on the other.
+    None begins around a flip of +t, where its target could be taken for one on the other side. One that has begun goes
+    on beyond it: the player keeps to the side of travel that it began on.
     """
-    found: list[Ramp] = []
-    borders = [float(chain.time[0]), *chain.flips, float(chain.time[-1]) + FLIP_MARGIN - REST]
+    first, last = float(chain.time[0]), float(chain.time[-1]) - REST
+    if last - first < GRID:
+        return []
     speed = chain.speed if len(chain.speed) else np.full(len(chain.time), 30.0)
-    at = chain.start_t
-    for number, (begin, end) in enumerate(pairwise(borders)):
-        if number > 0:
-            at = -at
-        first, last = begin if number == 0 else begin + FLIP_MARGIN, end - FLIP_MARGIN
-        if last - first < GRID:
-            continue
-        grid = np.linspace(first, last, int((last - first) / GRID + 1e-6) + 1)
-        offset = np.interp(grid, chain.time, chain.offset_t)
-        limit = MOST_TURNING * np.maximum(np.interp(grid, chain.time, speed), _SLOW)
-        is_placed = chain.is_placed and number == 0
-        starts = offset[:1] + PLACED_ASIDE if is_placed else np.array([at])
-        found.extend(_transitions(grid, offset, limit, starts, settles=not found and not is_placed))
-        at = found[-1].target if found else at
-    return found
+    grid = np.linspace(first, last, int((last - first) / GRID + 1e-6) + 1)
+    offset = np.interp(grid, chain.time, _side(chain, chain.time) * chain.offset_t)
+    limit = MOST_TURNING * np.maximum(np.interp(grid, chain.time, speed), _SLOW)
+    starts = offset[:1] + PLACED_ASIDE if chain.is_placed else np.array([chain.start_t])
+    near = np.abs(grid[:, None] - np.array(chain.flips)[None, :]) < FLIP_MARGIN
+    found = _transitions(grid, offset, limit, starts, settles=not chain.is_placed, barred=near.any(axis=1))
+    side = _side(chain, np.array([ramp.start for ramp in found])).tolist()
+    return [
+        replace(ramp, origin=way * ramp.origin, target=way * ramp.target) for ramp, way in zip(found, side, strict=True)
+    ]
+
+
+def _side(chain: OffsetChain, time: FloatArray) -> FloatArray:
+    """+1 where +t is on the side of travel that it is on at the chain's start, else -1."""
+    return np.asarray(1.0 - 2.0 * (np.searchsorted(chain.flips, time, side="right") % 2))
 
 
 def _transitions(
-    time: FloatArray, offset: FloatArray, limit: FloatArray, starts: FloatArray, *, settles: bool
+    time: FloatArray,
+    offset: FloatArray,
+    limit: FloatArray,
+    starts: FloatArray,
+    *,
+    settles: bool,
+    barred: NDArray[np.bool_],
 ) -> list[Ramp]:
     """The cheapest way over the grid: each transition costs 1, each squared excess over the tolerance as much again.
 
-    Worked out from the end backwards (dynamic programming), for the first transition alone without a tolerance if it
-    settles, and else from the best of the starts.
+    None but the first begins where it is barred. Worked out from the end backwards (dynamic programming), for the first
+    transition alone without a tolerance if it settles, and else from the best of the starts.
     """
     step, n = float(time[1] - time[0]), len(time)
     cost, following = np.full(n, inf), np.zeros(n, dtype=np.intp)
     cost[-1] = 0.0
-    reach = round(LONGEST / step)
+    reach, change_of_speed = round(LONGEST / step), slowing(time, limit)
     at = float(starts[0])
-    for i in range(n - 2, -1, -1):
+    for i in [*(n - 2 - np.flatnonzero(~barred[1:-1][::-1])).tolist(), 0]:
         far = n - 1 if settles and i == 0 else min(i + reach, n - 1)
         ends = np.arange(i + 1, far + 1)
         for start in starts.tolist() if i == 0 else offset[i : i + 1].tolist():
-            price = cost[ends] + 1.0 + _turning(offset, start, limit, step, i, ends)
+            price = cost[ends] + 1.0 + _turning(offset, start, limit, change_of_speed, step, i, ends)
             price += _settling(step, ends) if settles and i == 0 else _excess(offset, start, i, ends)
             best = int(np.argmin(price))
             if price[best] < cost[i]:
@@ -200,11 +208,18 @@ def _needed(found: Sequence[Ramp]) -> list[Ramp]:
 
 
 def _turning(
-    offset: FloatArray, start: float, limit: FloatArray, step: float, i: int, ends: NDArray[np.intp]
+    offset: FloatArray,
+    start: float,
+    limit: FloatArray,
+    change_of_speed: FloatArray,
+    step: float,
+    i: int,
+    ends: NDArray[np.intp],
 ) -> FloatArray:
     """What turning too fast costs."""
-    needed = acceleration(offset[ends] - start, (ends - i) * step - SLACK)
-    slowest = np.minimum.accumulate(limit[i : ends[-1] + 1])[1:]
+    rows = slice(i, int(ends[-1]) + 1)
+    slowest, fastest = np.minimum.accumulate(limit[rows])[1:], np.maximum.accumulate(change_of_speed[rows])[1:]
+    needed = turning(offset[ends] - start, (ends - i) * step - SLACK, fastest)
     return np.where(needed > slowest, _TOO_FAST * (needed / slowest), 0.0)
 
 

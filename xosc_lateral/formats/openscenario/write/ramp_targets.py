@@ -37,6 +37,20 @@ def acceleration(change: ArrayLike, duration: ArrayLike) -> FloatArray:
     return np.asarray(0.5 * np.pi**2 * np.abs(change) / np.square(duration))
 
 
+def turning(change: ArrayLike, duration: ArrayLike, slowing: ArrayLike) -> FloatArray:
+    """As much lateral acceleration as turns the car as fast as a transition does at most. [m/s2]
+
+    `slowing` is how fast the speed changes, as a share of itself [1/s]: a car that brakes turns by its lateral speed.
+    """
+    share = np.asarray(duration) * np.asarray(slowing) / np.pi
+    return np.asarray(acceleration(change, duration) * np.sqrt(1.0 + share**2))
+
+
+def slowing(time: FloatArray, limit: FloatArray) -> FloatArray:
+    """How fast the speed changes, as a share of itself, from a limit in proportion to it. [1/s]"""
+    return np.asarray(np.abs(np.gradient(limit, time)) / limit)
+
+
 def fitted(
     ramps: Sequence[Ramp],
     time: FloatArray,
@@ -81,8 +95,10 @@ def fitted(
         [-change, None, None],
         [None, eye_array(count), coo_array(-np.ones((count, 1)))],
     ]
-    lowest = np.array([limit[(time >= a - 1e-9) & (time <= b + 1e-9)].min() for a, b in zip(start, end, strict=True)])
-    most = lowest / acceleration(1.0, end - start)
+    parts = [(time >= a - 1e-9) & (time <= b + 1e-9) for a, b in zip(start, end, strict=True)]
+    change_of_speed = slowing(time, limit)
+    lowest, fastest = np.array([(limit[part].min(), change_of_speed[part].max()) for part in parts]).T
+    most = lowest / turning(1.0, end - start, fastest)
     lower, upper = np.repeat([-np.inf, 0.0], count + 1), np.full(2 * count + 2, np.inf)
     if not starts:
         lower[0] = upper[0] = ramps[0].origin
