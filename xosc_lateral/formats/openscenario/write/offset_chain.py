@@ -28,8 +28,8 @@ TOLERANCE = 0.010
 """How far transitions that lead from sampled offset to sampled offset may be from it. 1.3 cm takes a tenth fewer of
 them, and 1 % of the chains more err by over 2 cm. [m]"""
 MOST_TURNING = 0.026
-"""Of the heading, within a transition: 0.26 mrad in a frame of 0.01 s. The reference player ends an action 1e-6 m before
-its target, up to 2 ms early, and turns the car by that much more in its last frame: up to 0.31 mrad. [rad/s]"""
+"""Of the heading, within a transition: 0.26 mrad in a frame of 0.01 s. The reference player ends an action 1e-6 m short
+of its target, up to 2 ms early, and turns the car by that much more in its last frame: up to 0.31 mrad. [rad/s]"""
 GRID = 0.1
 """Time between places where a transition may begin or end. [s]"""
 LONGEST = 4.0
