@@ -6,7 +6,7 @@ import re
 import subprocess
 import tempfile
 from collections import Counter
-from functools import cache
+from functools import cache, lru_cache
 from pathlib import Path
 
 from lxml import etree
@@ -34,6 +34,12 @@ def schema_findings(path: Path) -> Counter[str]:
     schema = _schema(min(minor, max(FILES)))
     schema.validate(document)
     return Counter(_NUMBERS.sub("", error.message) for error in schema.error_log)
+
+
+@lru_cache(maxsize=1)
+def checker_findings_of_input(checker: Path, path: Path) -> Counter[str]:
+    """As `checker_findings`, kept for the next output of the same input."""
+    return checker_findings(checker, path)
 
 
 def checker_findings(checker: Path, path: Path) -> Counter[str]:

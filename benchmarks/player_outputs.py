@@ -37,7 +37,7 @@ from lxml import etree
 
 import xosc_lateral as xl
 from benchmarks.agreement import scenarios
-from benchmarks.findings import checker_findings, schema_findings
+from benchmarks.findings import checker_findings, checker_findings_of_input, schema_findings
 from benchmarks.in_player import PlayerRun, Span, beside, distance, run, sharpest, shifts, within
 
 MODES = ("trajectory", "lane-offset")
@@ -178,7 +178,7 @@ def measure(path: Path, mode: str, plain: PlayerRun, folder: Path, options: argp
     result.late_s, result.lost = shifts(before, played.starts, made.end_time)
     found = [schema_findings(output) - schema_findings(path)]
     if options.checker is not None:
-        found.append(checker_findings(options.checker, output) - checker_findings(options.checker, path))
+        found.append(checker_findings(options.checker, output) - checker_findings_of_input(options.checker, path))
     result.schema, result.checker = found[0].total(), found[-1].total() if options.checker is not None else 0
     result.said = any("with the offsets" in line for line in made.warnings)
     result.what += " ".join(next(iter(one), "") for one in found)

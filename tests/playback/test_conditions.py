@@ -214,6 +214,15 @@ def test_collision(tmp_path: Path) -> None:
     assert fires(tmp_path, trigger, start=NEXT_TO) is None
 
 
+def test_who_is_named_touches_itself_and_its_own_kind_does_not(tmp_path: Path) -> None:
+    named, of_kind = '<EntityRef entityRef="Ego"/>', '<ByType type="vehicle"/>'
+    found = [
+        fires(tmp_path, when(by_entity(f"<CollisionCondition>{target}</CollisionCondition>")), start=NEXT_TO)
+        for target in (named, of_kind)
+    ]
+    assert found == [0.0, None]
+
+
 def test_clearance_of_the_lane_beside(tmp_path: Path) -> None:
     inside = (
         '<RelativeClearanceCondition distanceForward="30" distanceBackward="20" freeSpace="false" '

@@ -257,3 +257,15 @@ def test_where_a_lane_has_closed_the_one_of_its_side_that_opens_beside_it_goes_o
     motion = entity(Stage(tmp_path, roads).play(start=start, last=8.0))
     assert motion.x[-1] > 200.0
     assert motion.y[-1] == pytest.approx(-0.5 * WIDTH)
+
+
+def test_where_a_lane_ends_with_its_section_the_one_beside_its_middle_goes_on(tmp_path: Path) -> None:
+    """With the offset kept, however far aside that is."""
+    sections = section(lanes(1), lanes(-1, -2) + lanes(-3, links={-3: (None, None)})) + section(
+        lanes(1), lanes(-1, -2), s=200.0
+    )
+    roads = map_of(road("1", line(length=400.0), 400.0, sections=sections))
+    start = {"Ego": teleport(on_lane(-3, 150.0, offset=4.0)) + speed(10.0)}
+    motion = entity(Stage(tmp_path, roads).play(start=start, last=8.0))
+    assert motion.x[-1] > 200.0
+    assert motion.y[-1] == pytest.approx(-1.5 * WIDTH + 4.0)

@@ -80,6 +80,16 @@ def test_heading_chooses_between_roads_that_cross():
     assert network.world_to_lane_at(pose.x, pose.y, None, 0.1).road == straight_on
 
 
+@pytest.mark.parametrize("y", [-0.5, -1.5, -2.5])
+def test_where_roads_lie_on_each_other_a_point_has_gone_onto_the_one_least_bent(y):
+    """At the entry of a junction; whose lane's middle is nearest says nothing there."""
+    network = hand_written("junction")
+    west, bend, straight_on = (network.index_of(name) for name in ("west", "west-south", "west-east"))
+    assert network.world_to_lane(-18.0, y, near=[bend]).distance <= 1e-6
+    assert network.world_to_lane_at(-18.0, y, near=(west, 99.0)).road == straight_on
+    assert network.world_to_lane_at(-18.0, y, near=(bend, 1.0)).road == bend
+
+
 def test_a_car_on_the_wrong_side_of_its_road_is_in_the_lane_that_it_is_in():
     network = hand_written("straight")
     pose = network.pose_at(0, 1, 100.0)

@@ -127,8 +127,8 @@ def _turn_round(state: EntityState) -> None:
 def _bridge_gap(state: EntityState, way: int) -> int | None:
     """A lane ends without a link: go on in the nearest lane beyond; the new way along s, or None at a true end.
 
-    Between sections of a road the offset is kept, between roads the entity goes to the middle of the new lane (both as
-    the reference player does it).
+    Between sections of a road that is the one nearest to the middle of the old lane, and the offset is kept; between
+    roads it is the one nearest to the entity, which goes to its middle (both as the reference player does it).
     """
     network = state.network
     road = network.roads[state.road]
@@ -136,7 +136,7 @@ def _bridge_gap(state: EntityState, way: int) -> int | None:
     t = state.t
     if not at_end:
         beyond = state.s + way * EPSILON
-        found = network.lane_at(state.road, beyond, t)
+        found = network.lane_at(state.road, beyond, t - state.offset_t)
         if not found.lane or found.lane == state.lane:
             return None
         state.move_to(state.road, found.lane, beyond, state.offset_t)

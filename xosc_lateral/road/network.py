@@ -23,6 +23,7 @@ from xosc_lateral.road.lanes import DRIVING
 from xosc_lateral.road.links import Links
 from xosc_lateral.road.marks import road_marks
 from xosc_lateral.road.moving import Chooser, advance, straightest
+from xosc_lateral.road.onward import gone_on
 from xosc_lateral.road.places import cross_section, find_lane, lane_at, lane_pose, surface_pose
 from xosc_lateral.road.positions import (
     Advance,
@@ -264,8 +265,14 @@ class RoadNetwork:
         near: tuple[int, float] | None = None,
         lane_types: Collection[str] | None = DRIVING,
     ) -> LaneCoordinates:
-        """`world_to_lane` of one point; `near` = (road, s) where it was a moment ago makes it cheap. [m], [rad]"""
-        return self._index.world_to_lane_at(x, y, z, heading, near=near, lane_types=lane_types)
+        """`world_to_lane` of one point [m], [rad].
+
+        `near` = (road, s) where it was a moment ago makes it cheap, and tells roads that lie on each other apart.
+        """
+        found = self._index.world_to_lane_at(x, y, z, heading, near=near, lane_types=lane_types)
+        if near is None or near[0] < 0:
+            return found
+        return gone_on(self._links, found, near, (x, y), lane_types=lane_types)
 
     # ---- where lanes lead --------------------------------------------------------------------------------------------
     def next_lanes(self, road: int, lane: int, direction: int) -> tuple[LaneLink, ...]:

@@ -10,8 +10,9 @@ from xosc_lateral.scenario.conditions import CollisionCondition
 
 
 def prepare(content: CollisionCondition, simulation: Simulation) -> EntityCheck:
-    """With one entity, or with any of a category."""
+    """With one entity, or with any other of a category. Who is named touches itself, as in the reference player."""
     others: tuple[EntityState, ...]
+    is_named = content.entity_ref is not None
     if content.entity_ref is not None:
         others = (simulation.entity(content.entity_ref, content.place),)
     else:
@@ -20,6 +21,6 @@ def prepare(content: CollisionCondition, simulation: Simulation) -> EntityCheck:
         )
 
     def check(state: EntityState) -> bool:
-        return any(other is not state and other.active and overlap(state, other) for other in others)
+        return any((is_named or other is not state) and other.active and overlap(state, other) for other in others)
 
     return check
