@@ -9,41 +9,20 @@ import numpy as np
 import pytest
 from msgspec.structs import replace
 
+from tests.driver.models.made_models import POPULATION, STEADY
 from tests.profiles import as_drive
 from xosc_lateral.datasets import simulate_drive
 from xosc_lateral.driver.kernels import worth_compiling
-from xosc_lateral.driver.models.autoregressive.autoregression import Autoregression
 from xosc_lateral.driver.models.autoregressive.fit import fit_autoregressive
 from xosc_lateral.driver.models.autoregressive.fit_matching import simulate
 from xosc_lateral.driver.models.autoregressive.fit_settings import FitSettings
 from xosc_lateral.driver.models.autoregressive.model import AutoregressiveModel
 from xosc_lateral.driver.models.autoregressive.volatility import Volatility
 from xosc_lateral.driver.models.base import Start
-from xosc_lateral.driver.models.noise import ShapedNoise
 from xosc_lateral.driver.records import plain, read_as
 from xosc_lateral.drives.cuts import PAPER_RULES, all_runs
 from xosc_lateral.errors import DriverProfileError, NotEnoughDataError
 from xosc_lateral.identification.timeline import Timeline, join_drives, local_mean
-
-DAMPING = np.concatenate([np.zeros(5), np.linspace(0.02, 0.001, 46)])
-
-POPULATION = AutoregressiveModel(
-    mean=-0.02,
-    between_drivers=0.04,
-    coarse=Autoregression(np.array([1.5, -0.62]), 0.012),
-    fine=ShapedNoise(DAMPING, 71, 5.0),
-    coarse_volatility=Volatility(0.05, 0.10, 4.0),
-    fine_volatility=Volatility(0.08, 0.20, 3.0),
-    correlation=0.5,
-    limits=(-0.45, 0.40),
-)
-
-STEADY = replace(
-    POPULATION,
-    between_drivers=0.0,
-    coarse_volatility=Volatility(),
-    fine_volatility=Volatility(),
-)
 
 
 def offsets(model: AutoregressiveModel, n: int, seed: int, start: Start | None = None) -> np.ndarray:

@@ -101,5 +101,7 @@ class AutoregressiveParameters(CoreModel, frozen=True, eq=False, dict=True):
         """Lower triangle that turns white noise into a stationary past, shape (order, order). [lane widths]"""
         order = self.coarse.order
         covariance = self.coarse.covariance(order)
+        if not covariance[0] > 0.0:  # coarse movement that is none has a past of none
+            return np.zeros((order, order))
         matrix = covariance[np.abs(np.subtract.outer(np.arange(order), np.arange(order)))]
         return np.asarray(np.linalg.cholesky(matrix + 1e-9 * covariance[0] * np.eye(order)))
