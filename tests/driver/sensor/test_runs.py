@@ -1,0 +1,87 @@
+"""The driver's part of runs, and the sensor's error for tests of a perception chain."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tests.baselines.made_runs import made_run
+from tests.driver.models.made_models import POPULATION
+from xosc_lateral.driver.profile import DriverProfile
+from xosc_lateral.driver.sensor.error import known_sensor, sensor_error
+from xosc_lateral.driver.sensor.model import SensorModel
+from xosc_lateral.driver.sensor.periodogram import WINDOWS
+from xosc_lateral.driver.sensor.runs import _rows, driver_runs
+from xosc_lateral.drives.drive import Drive
+from xosc_lateral.errors import DriverProfileError
+
+STEP = 0.2
+SEED = np.random.SeedSequence(5)
+SENSOR = SensorModel(white=2.0 * STEP * 0.02**2)
+"""0.02 m of white noise on rows of 5 Hz, of which 1.5 of 2.5 Hz are left in runs."""
+
+
+def recorded(rate: float = 20.0, seconds: float = 30.0, start: float = 100.0) -> Drive:
+    time = start + np.arange(round(seconds * rate)) / rate
+    return Drive("d", time, 0.1 * np.sin(time), np.full(len(time), 3.5))
+
+
+def test_runs_shorter_than_a_spectrum_are_left_alone() -> None:
+    run = made_run(np.random.default_rng(1).normal(size=round(WINDOWS[-1] / STEP) - 1))
+    kept, sensor = driver_runs([run])
+    assert kept == [run]
+    assert sensor is None
+    assert driver_runs([]) == ([], None)
+
+
+def test_rows_as_recorded_are_those_within_each_run() -> None:
+    drive = recorded()
+    run = made_run(np.zeros(50))
+    run = type(run)("d", 0, 110.0 + STEP * np.arange(50), run.offset, run.lane_width)
+    rows, rate = _rows([run], [drive])
+    assert rate == pytest.approx(20.0)
+    assert rows is not None
+    inside = (drive.time >= 110.0 - 1e-6) & (drive.time <= 119.8 + 1e-6)
+    np.testing.assert_array_equal(rows[0], drive.offset[inside])
+
+
+def test_without_the_drive_of_a_run_there_are_no_rows() -> None:
+    assert _rows([made_run(np.zeros(50), drive="elsewhere")], [recorded()]) == (None, None)
+
+
+def test_a_profile_without_a_sensor_says_so() -> None:
+    bare = DriverProfile(name="bare", model=POPULATION)
+    with pytest.raises(DriverProfileError, match="profile bare holds no sensor: fit it anew"):
+        known_sensor(bare)
+    assert known_sensor(DriverProfile(name="own", model=POPULATION, sensor=SENSOR)) is SENSOR
+
+
+def test_without_a_sensor_nothing_is_added() -> None:
+    np.testing.assert_array_equal(sensor_error(None, 5, STEP, SEED), np.zeros(5))
+
+
+def test_the_error_has_the_power_of_its_density_below_the_runs_low_pass() -> None:
+    error = sensor_error(SENSOR, 60_000, STEP, SEED)
+    assert error.std() == pytest.approx(0.02 * np.sqrt(1.5 / 2.5), rel=0.02)
+    assert error.mean() == pytest.approx(0.0, abs=5e-4)
+
+
+def test_pieces_of_a_drive_and_drives_have_errors_of_their_own() -> None:
+    one, same, piece, drive = (
+        sensor_error(SENSOR, 4000, STEP, seed, part)
+        for seed, part in ((SEED, 0), (SEED, 0), (SEED, 1), (np.random.SeedSequence(6), 0))
+    )
+    np.testing.assert_array_equal(one, same)
+    for other in (piece, drive):
+        assert abs(np.corrcoef(one, other)[0, 1]) < 4.0 / np.sqrt(2400)
+
+
+def test_four_times_the_density_is_twice_the_error() -> None:
+    louder = SensorModel(white=4.0 * SENSOR.white)
+    np.testing.assert_allclose(
+        sensor_error(louder, 100, STEP, SEED), 2.0 * sensor_error(SENSOR, 100, STEP, SEED), rtol=1e-9
+    )
+
+
+def test_no_rows_have_no_error() -> None:
+    assert len(sensor_error(SENSOR, 0, STEP, SEED)) == 0
