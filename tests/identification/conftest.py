@@ -13,9 +13,8 @@ from xosc_lateral.drives.drive import Drive
 from xosc_lateral.formats.drives import read_drives
 
 
-@pytest.fixture
-def driven(tmp_path: Path) -> Callable[..., list[Drive]]:
-    """Drives as the loop gets them: simulated, written, and read back."""
+def driver_in(folder: Path) -> Callable[..., list[Drive]]:
+    """Drives as the loop gets them: simulated, written to a folder, and read back."""
 
     def drive(
         seed: int,
@@ -24,8 +23,14 @@ def driven(tmp_path: Path) -> Callable[..., list[Drive]]:
         drop: Sequence[str] = (),
         driver: Driver | None = None,
     ) -> list[Drive]:
-        path = tmp_path / f"drive-{seed}.parquet"
+        path = folder / f"drive-{seed}.parquet"
         simulate_drive(duration, seed, effects=effects, drop=drop, driver=driver).table.to_parquet(path)
         return read_drives([path])
 
     return drive
+
+
+@pytest.fixture
+def driven(tmp_path: Path) -> Callable[..., list[Drive]]:
+    """Drives in a folder of the test's own."""
+    return driver_in(tmp_path)

@@ -11,6 +11,7 @@ import pandas as pd
 import pytest
 
 from tests.identification import truth
+from tests.identification.conftest import driver_in
 from xosc_lateral import datasets as plants
 from xosc_lateral.cli import main
 from xosc_lateral.datasets.driver_simulator import Driver, simulate_drive
@@ -129,13 +130,29 @@ def test_what_a_missing_column_did_is_reported_as_unexplained_or_as_hidden(drive
     assert record["sentence"]
 
 
-def test_a_truck_effect_is_sized_within_its_uncertainty_and_closes_the_gap(driven: Driven) -> None:
-    result = close_loop(driven(101, [plants.truck_avoidance(0.3)]), seed=1)
+@pytest.fixture(scope="module")
+def beside_trucks(tmp_path_factory: pytest.TempPathFactory) -> tuple[list[Drive], LoopResult]:
+    """Drives of somebody who keeps away from trucks, and their closed loop."""
+    drives = driver_in(tmp_path_factory.mktemp("trucks"))(101, [plants.truck_avoidance(0.3)])
+    return drives, close_loop(drives, seed=1)
+
+
+def test_a_truck_effect_is_sized_within_its_uncertainty_and_closes_the_gap(
+    beside_trucks: tuple[list[Drive], LoopResult],
+) -> None:
+    _, result = beside_trucks
     finding = next(finding for finding in result.findings if finding.columns == ("truck_right",))
     assert abs(finding.size_m - 0.3) < 3 * finding.size_error + 0.05  # a driver gets to his target in part only
     assert finding.error_after < 0.5 * finding.error_before
     assert result.error_after < result.error_before
     assert any(isinstance(effect, Linear) and effect.column == "truck_right" for effect in result.refined.effects)
+
+
+def test_a_refined_profile_is_not_refined_again(beside_trucks: tuple[list[Drive], LoopResult]) -> None:
+    drives, first = beside_trucks
+    again = close_loop(drives, first.refined, seed=2)
+    assert not any(finding.columns == ("truck_right",) for finding in again.findings)
+    assert any(effect.columns == ("truck_right",) for effect in again.refined.effects)
 
 
 def test_a_two_level_base_is_told_that_it_lacks_memory(driven: Driven) -> None:
@@ -146,14 +163,6 @@ def test_a_two_level_base_is_told_that_it_lacks_memory(driven: Driven) -> None:
     assert len(memory) == 1
     assert result.refined.model.kind != base.model.kind
     assert memory[0].error_after < memory[0].error_before
-
-
-def test_a_refined_profile_is_not_refined_again(driven: Driven) -> None:
-    drives = driven(101, [plants.truck_avoidance(0.3)])
-    refined = close_loop(drives, seed=1).refined
-    again = close_loop(drives, refined, seed=2)
-    assert not any(finding.columns == ("truck_right",) for finding in again.findings)
-    assert any(effect.columns == ("truck_right",) for effect in again.refined.effects)
 
 
 def test_too_short_a_drive_is_refused(driven: Driven) -> None:
