@@ -34,7 +34,7 @@ OWN_LEVEL_S = 30.0
 
 
 def squared_innovations(rows: FloatArray, valid: BoolArray) -> FloatArray:
-    """Clipped squares, standardised over the valid rows; 0 elsewhere."""
+    """Clipped squares of white rows, standardised over the valid ones, shape (n,); 0 elsewhere. [-]"""
     squares = np.minimum(rows**2, CLIP)
     mean, deviation = squares[valid].mean(), squares[valid].std()
     return np.where(valid, (squares - mean) / max(deviation, 1e-12), 0.0)
@@ -52,8 +52,8 @@ def own_levels(squares: FloatArray, valid: BoolArray, drive: IntArray) -> FloatA
 
 
 def clipped_squares(rows: FloatArray, valid: BoolArray) -> FloatArray:
-    """About 1 over the valid rows, shape (n,)."""
-    return np.asarray(np.minimum(np.square(rows) / np.mean(rows[valid] ** 2), CLIP))
+    """Squares over their mean where valid, at most `CLIP`, shape (n,). [-]"""
+    return np.asarray(np.minimum(np.square(rows) / max(float(np.mean(rows[valid] ** 2)), 1e-300), CLIP))
 
 
 def _within_drives(scales: FloatArray, valid: BoolArray, drive: IntArray) -> FloatArray:
@@ -63,14 +63,14 @@ def _within_drives(scales: FloatArray, valid: BoolArray, drive: IntArray) -> Flo
 
 
 def scoring_step(scales: FloatArray, rows: FloatArray, valid: BoolArray, drive: IntArray) -> FloatArray:
-    """One Fisher-scoring step for log sd = scales . sizes (variance of a squared normal is 2)."""
+    """One Fisher-scoring step [-], shape (j,), for log sd = scales . sizes (variance of a squared normal is 2)."""
     variance = np.minimum(rows[valid] ** 2, CLIP * float(np.mean(rows[valid] ** 2)))
     design = _within_drives(scales, valid, drive)
     return np.asarray(np.linalg.pinv(2.0 * design.T @ design) @ (design.T @ (variance / variance.mean() - 1.0)))
 
 
 def bounded(log_sizes: FloatArray, scales: FloatArray) -> FloatArray:
-    """Scaled down as a whole to `MOST_LOG_SCALE`."""
+    """Log sizes [-], shape (j,), scaled down as a whole so that no row's log scale is beyond `MOST_LOG_SCALE`."""
     reach = float(np.max(np.abs(scales @ log_sizes), initial=0.0))
     return log_sizes * min(1.0, MOST_LOG_SCALE / max(reach, 1e-300))
 

@@ -1,4 +1,9 @@
-"""Whether a profile's own runs move as the drives do, from tenths of seconds to minutes: memory."""
+"""Whether a profile's own runs move as the drives do, from tenths of seconds to minutes: memory.
+
+References
+----------
+.. [1] H. Hotelling, "The generalization of Student's ratio", Annals of Mathematical Statistics 2, 1931.
+"""
 
 from __future__ import annotations
 
@@ -26,6 +31,9 @@ LEVEL = 0.003
 
 N_RUNS = 3
 """Runs of the profile."""
+
+STILL = 1e-9
+"""Blocks that move by less stand still: their bands are nothing but rounding. [m]"""
 
 WORTH_ADDING = 0.05
 """A difference below this share of a band's size is no reason for another core model, however sure it is. [-]"""
@@ -83,6 +91,6 @@ def _shapes(offset: FloatArray, timeline: Timeline) -> FloatArray:
     for first in range(0, len(inside) - BLOCK + 1, BLOCK):
         at = inside[first : first + BLOCK]
         whole = float(np.std(slow[at]))
-        if whole > 0:
-            rows.append([np.log(max(float(np.std(band[at])), 1e-9) / whole) for band in bands])
+        if whole > STILL:
+            rows.append([np.log(max(float(np.std(band[at])), STILL) / whole) for band in bands])
     return np.asarray(rows).reshape(-1, len(bands))

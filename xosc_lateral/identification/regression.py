@@ -105,7 +105,7 @@ class Coarse:
         return bool(np.bincount(self.drive, self.valid.astype(float)).max() >= MIN_DRIFT_S)
 
     def answer(self, effect: ColumnEffect, *, keep: bool = False) -> FloatArray:
-        """The effect's quantity as the driver answers to it, less its mean where valid; shape (n, k)."""
+        """The effect's quantity [own unit] as the driver answers to it, less its mean where valid; shape (n, k)."""
         key = structs.replace(
             effect, acts=Acts.LOCATION, coefficients=(), errors=(), reference=(), between_drivers=(), answer_range=()
         )
@@ -118,7 +118,7 @@ class Coarse:
         return np.asarray(answer, dtype=np.float64)
 
     def by_drive(self, values: FloatArray) -> FloatArray:
-        """Mean over the valid rows of each drive, shape (drives,); 0 where there are none."""
+        """Mean over the valid rows of each drive, shape (drives,), in the values' unit; 0 where there are none."""
         return means_by_drive(values, self.valid, self.drive)
 
 
@@ -126,19 +126,19 @@ class ModelTerm(Protocol):
     """What the regression asks of a term: its columns; see `terms.base.Term` for all that a term can do."""
 
     def mean_columns(self, coarse: Coarse) -> FloatArray:
-        """Columns of the mean, shape (n, k)."""
+        """Columns of the mean, shape (n, k). [any unit]"""
         ...
 
     def fine_mean_columns(self, coarse: Coarse) -> FloatArray:
-        """The same on the 0.2 s grid, shape (fine n, k)."""
+        """The same on the 0.2 s grid, shape (fine n, k). [any unit]"""
         ...
 
     def scale_columns(self, coarse: Coarse) -> FloatArray:
-        """Columns of the log scale, shape (n, j)."""
+        """Columns of the log scale, shape (n, j). [any unit]"""
         ...
 
     def known_scale(self, coarse: Coarse) -> FloatArray | None:
-        """Log scale that is known as a whole, shape (n,)."""
+        """Log scale that is known as a whole, shape (n,). [-]"""
         ...
 
 
@@ -188,7 +188,7 @@ class Fitted:
 
     @property
     def scale(self) -> FloatArray:
-        """Factor on the movement, shape (n,)."""
+        """Factor on the movement, > 0, shape (n,). [-]"""
         return self.whitener.scale
 
     @property
@@ -237,7 +237,7 @@ def fit_model(coarse: Coarse, terms: Sequence[ModelTerm]) -> Fitted:
             log_sizes = bounded(log_sizes + scoring_step(scales, rows, valid, drive), scales[valid])
         spread = spread * np.sqrt(own_levels(clipped_squares(rows, valid), valid, drive))
     n = int(coarse.valid.sum())
-    variance = float(rows @ rows) / max(1, n - len(sizes))
+    variance = max(float(rows @ rows) / max(1, n - len(sizes)), 1e-300)  # a drive may stand still
     left = np.where(coarse.valid, coarse.offset - columns @ sizes - levels[coarse.drive], 0.0)
     starts = start_factors(rows, coarse.valid, process.order)
     return Fitted(
@@ -272,7 +272,7 @@ def held_out_likelihood(fitted: Fitted, coarse: Coarse, held: BoolArray) -> Floa
 
 
 def elapsed(coarse: Coarse) -> FloatArray:
-    """Time on the road, -0.5 at the start and 0.5 at the end of each drive's valid part; shape (n,)."""
+    """Time on the road [-], -0.5 at the start and 0.5 at the end of each drive's valid part; shape (n,)."""
     share = np.zeros(len(coarse))
     for index in range(coarse.drives):
         rows = np.flatnonzero(coarse.drive == index)

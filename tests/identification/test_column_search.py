@@ -1,0 +1,95 @@
+"""The search for one more column: names the planted one with its timing, refuses to be sure of idle ones."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tests.identification.made_coarse import coarse_of, movement, wander
+from xosc_lateral.driver.effects import Acts, Linear
+from xosc_lateral.driver.effects.response import respond
+from xosc_lateral.identification.column_search import HOPELESS, find_column
+from xosc_lateral.identification.columns import Column, Role
+from xosc_lateral.identification.regression import Coarse, fit_model
+from xosc_lateral.identification.search import Search
+from xosc_lateral.identification.significance import level_of
+from xosc_lateral.identification.terms.base import Outcome
+from xosc_lateral.identification.terms.mean import MeanTerm
+from xosc_lateral.identification.terms.restoring import RestoringTerm
+from xosc_lateral.identification.terms.spread import SpreadTerm
+
+SECONDS = 700.0
+COLUMNS = [Column(name, Role.NUMBER, False) for name in ("idle", "x")]
+
+
+def drive(seed: int, shift: float = 0.0, *, lag_s: float = 0.0, log_spread: float = 0.0) -> Coarse:
+    """0.1 m of movement; a column that may shift it, another that does nothing."""
+    rng = np.random.default_rng(seed)
+    n = round(SECONDS / 0.2)
+    x, idle = wander(rng, n, 12.0), wander(rng, n, 12.0)
+    own = movement(rng, SECONDS) * np.exp(log_spread * x)
+    return coarse_of(shift * respond(x, 0.2, lag_s, 2.0) + own, {"x": x, "idle": idle})
+
+
+def outcome(coarse: Coarse, kind: type, columns: list[Column] = COLUMNS, seed: int = 1) -> Outcome | None:
+    search = Search.over(coarse, columns, np.random.SeedSequence(seed))
+    return find_column(search, kind, fit_model(coarse, ()))
+
+
+@pytest.fixture(scope="module")
+def found() -> Outcome:
+    """What moves the mean of a drive that a column shifts by 0.15 m, a second late."""
+    one = outcome(drive(31, 0.15, lag_s=1.0), MeanTerm)
+    assert one is not None
+    return one
+
+
+def test_a_shift_of_15_centimetres_is_named_with_its_delay(found: Outcome) -> None:
+    assert isinstance(found.term, MeanTerm)
+    assert found.columns == ("x",)
+    assert found.p_value < level_of("mean")
+    assert found.term.effect.lag_s == pytest.approx(1.0, abs=1.0)
+    assert found.after is not None
+    assert found.after.terms == (found.term,)
+
+
+def test_idle_columns_are_hardly_ever_sure_to_do_anything() -> None:
+    """At a level of 2.3 % two of three null drives below it are chance in one test of six hundred."""
+    told = [outcome(drive(seed), MeanTerm) for seed in (32, 33, 34)]
+    values = [one.p_value for one in told if one is not None]
+    assert len(values) == 3
+    assert sum(value < level_of("mean") for value in values) <= 1
+    assert max(values) > HOPELESS
+
+
+def test_a_spread_is_found_as_a_spread_and_not_as_a_shift() -> None:
+    coarse = drive(36, log_spread=0.5)
+    spread, shift = outcome(coarse, SpreadTerm), outcome(coarse, MeanTerm)
+    assert spread is not None
+    assert spread.columns == ("x",)
+    assert spread.p_value < level_of("spread")
+    assert shift is not None
+    assert shift.p_value > level_of("mean")
+
+
+def test_a_column_that_is_barred_is_not_taken_up() -> None:
+    """What moves the mean already is no candidate for the rate of return."""
+    coarse = drive(37, 0.15)
+    search = Search.over(coarse, COLUMNS, np.random.SeedSequence(1))
+    term = MeanTerm.of(Linear(acts=Acts.LOCATION, column="x", response_s=2.0))
+    found = find_column(search, RestoringTerm, fit_model(coarse, (term,)))
+    assert found is None or "x" not in found.columns
+
+
+def test_without_columns_there_is_nothing_to_find() -> None:
+    assert outcome(drive(38), MeanTerm, columns=[]) is None
+
+
+def test_the_mirror_image_is_found_with_the_same_certainty(found: Outcome) -> None:
+    mirrored = drive(31, 0.15, lag_s=1.0)
+    other = outcome(replace(mirrored, offset=-mirrored.offset), MeanTerm)
+    assert other is not None
+    assert other.p_value == pytest.approx(found.p_value, rel=1e-6)
+    assert other.columns == found.columns

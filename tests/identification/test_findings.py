@@ -1,0 +1,51 @@
+"""What was found, in numbers: errors before and after are those of the group that shows it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from xosc_lateral.driver.effects import Step
+from xosc_lateral.identification.findings import describe_finding, memory_finding, population_finding
+from xosc_lateral.identification.memory import TIMES_S, Memory
+from xosc_lateral.identification.population import DriverVariance
+from xosc_lateral.identification.selection import Accepted
+from xosc_lateral.identification.terms.step import StepTerm
+
+REAL = {"mean by effect: step 0": np.array([0.1, -0.1]), "movement by band": np.array([0.2, 0.1, np.nan])}
+BEFORE = {"mean by effect: step 0": np.array([0.0, 0.0]), "movement by band": np.array([0.2, 0.4, 0.3])}
+AFTER = {name: values.copy() for name, values in REAL.items()}
+COMPARED = (REAL, BEFORE, AFTER)
+
+
+def test_an_accepted_term_is_told_with_its_errors_on_held_out_rows() -> None:
+    accepted = Accepted(StepTerm(at=300), 1e-6)
+    effects = (Step(size=0.2, size_error=0.02, at_s=285.0),)
+    found = describe_finding(accepted, "step 0", None, effects, None, COMPARED)  # type: ignore[arg-type]
+    assert (found.effect, found.kind, found.shape) == ("step", "step", "at 285 s")
+    assert (found.size_m, found.size_error, found.p_value) == (0.2, 0.02, 1e-6)
+    assert (found.error_before, found.error_after) == pytest.approx((0.1, 0.0))
+    assert (found.alike, found.effects, found.gain) == ((), effects, None)
+
+
+def test_a_group_that_nobody_described_has_no_error() -> None:
+    found = describe_finding(Accepted(StepTerm(at=300), 1e-6), "step 7", None, (Step(size=0.2),), None, COMPARED)  # type: ignore[arg-type]
+    assert (found.error_before, found.error_after) == (0.0, 0.0)
+
+
+@pytest.mark.parametrize(("ratio", "worst"), [((1.0, 1.1, 0.5, 1.0, 1.0), 2), ((1.0, 3.0, 0.5, 1.0, 1.0), 1)])
+def test_memory_is_told_by_the_band_that_is_farthest_off_either_way(ratio: tuple[float, ...], worst: int) -> None:
+    found = memory_finding(Memory(TIMES_S, np.array(ratio), 1e-5), COMPARED)
+    assert found.size_m == ratio[worst]
+    assert f"within {TIMES_S[worst]:g} s is {ratio[worst]:.2f} times" in found.shape
+    # 0.3 off in one of two cells that both know; the third was never measured
+    assert found.error_before == pytest.approx(np.sqrt(0.3**2 / 2.0))
+    assert (found.kind, found.columns, found.effects) == ("memory", (), ())
+
+
+def test_drivers_that_differ_are_told_with_the_error_of_their_spread() -> None:
+    found = population_finding(DriverVariance(50, 0.15, 0.2, 1e-4), COMPARED)
+    assert found.size_m == 0.15
+    assert found.size_error == pytest.approx(0.15 / np.sqrt(100.0))
+    assert found.shape == "50 drives; their spreads scatter by a factor of 1.22"
+    assert (found.kind, found.error_before) == ("population", 0.0)
