@@ -67,12 +67,12 @@ class MovementProcess:
 
     @property
     def polynomial(self) -> FloatArray:
-        """(1, -a_1, ..., -a_p) / sd: turns the process into white noise of variance 1."""
+        """(1, -a_1, ..., -a_p) / sd, shape (p + 1,): turns the process into white noise of variance 1. [1/m]"""
         return np.asarray(np.concatenate([[1.0], -self.lags[-1]]) / self.deviations[-1], dtype=np.float64)
 
     @cached_property
     def start(self) -> FloatArray:
-        """Whitening of the first p rows of a run, lower triangular, shape (p, p)."""
+        """Whitening of the first p rows of a run, lower triangular, shape (p, p). [1/m]"""
         matrix = np.zeros((self.order, self.order))
         for row in range(self.order):
             matrix[row, row] = 1.0
@@ -81,7 +81,7 @@ class MovementProcess:
         return matrix
 
     def simulate(self, n: int, rng: np.random.Generator, *, runs: int = 1) -> FloatArray:
-        """Stationary sample paths, shape (runs, n)."""
+        """Stationary sample paths, shape (runs, n). [m]"""
         from scipy.signal import lfilter
 
         warm = 20 * self.order + 200
@@ -90,7 +90,7 @@ class MovementProcess:
 
 
 def positions_in_run(valid: BoolArray) -> IntArray:
-    """How many valid rows in a row came before each row; -1 where invalid."""
+    """How many valid rows in a row came before each row, shape (n,); -1 where invalid. [-]"""
     rows = np.arange(len(valid))
     start = np.where(valid & ~np.concatenate([[False], valid[:-1]]), rows, 0)
     return np.where(valid, rows - np.maximum.accumulate(start), -1)
@@ -298,12 +298,12 @@ class Whitener:
 
     @cached_property
     def ones(self) -> FloatArray:
-        """A level of 1, whitened, shape (n,)."""
+        """A level of 1 m, whitened, shape (n,). [-]"""
         return self.white(np.ones(len(self.valid)))
 
     @cached_property
     def power(self) -> FloatArray:
-        """What every drive tells of its level, in 1 / variance, shape (drives,)."""
+        """What every drive tells of its level: 1 / variance, > 0, shape (drives,). [1/m2]"""
         return np.add.reduceat(self.ones**2, self._edges)
 
     def white(self, values: FloatArray) -> FloatArray:
@@ -323,7 +323,7 @@ class Whitener:
         return np.asarray(result[:, 0] if values.ndim == 1 else result)
 
     def without_levels(self, white: FloatArray) -> FloatArray:
-        """Take the drives' levels out of whitened rows."""
+        """Take the drives' levels out of whitened rows [-], shape (n,) or (n, k)."""
         columns = white[:, None] if white.ndim == 1 else white
         ones, power = (of.astype(columns.dtype)[:, None] for of in (self.ones, np.maximum(self.power, 1e-30)))
         mean = np.add.reduceat(ones * columns, self._edges, axis=0) / power
@@ -331,10 +331,10 @@ class Whitener:
         return np.asarray(result[:, 0] if white.ndim == 1 else result)
 
     def levels(self, values: FloatArray) -> FloatArray:
-        """Level of every drive by generalised least squares, shape (drives,)."""
+        """Level of every drive by generalised least squares, shape (drives,). [m]"""
         sums = np.add.reduceat(self.ones * self.white(values), self._edges)
         return np.asarray(sums / np.maximum(self.power, 1e-300))
 
     def rows(self, values: FloatArray) -> FloatArray:
-        """Whitened, levels out; shape of `values`."""
+        """Whitened, levels out; shape of `values` [m], the rows of variance 1. [-]"""
         return self.without_levels(self.white(values))

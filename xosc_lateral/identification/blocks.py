@@ -22,7 +22,7 @@ BLOCK_S = 150.0
 
 
 def hold_out_blocks(timeline: Timeline) -> IntArray:
-    """Number of the block that every row is in, shape (n,); block b belongs to fold b modulo `FOLDS`."""
+    """Number of the block that every row is in, shape (n,) [-]; block b belongs to fold b modulo `FOLDS`."""
     blocks = np.zeros(len(timeline), dtype=np.intp)
     length = round(BLOCK_S / timeline.step)
     next_block = 0
@@ -35,7 +35,7 @@ def hold_out_blocks(timeline: Timeline) -> IntArray:
 
 
 def folds_of(blocks: IntArray) -> int:
-    """Number of folds: fewer than `FOLDS` when there are fewer blocks."""
+    """Number of folds, at most `FOLDS`: fewer when there are fewer blocks. `blocks` of shape (n,). [-]"""
     return min(FOLDS, int(blocks.max()) + 1)
 
 

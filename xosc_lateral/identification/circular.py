@@ -14,7 +14,7 @@ FEW = 8
 
 
 def circular_period(drives: Sequence[FloatArray]) -> float:
-    """Full circle of a column that wraps around, else 0.
+    """Full circle of a column that wraps around, else 0. [unit of the column]
 
     It has a value everywhere; it jumps across its whole range again and again, hardly ever by a part of it, and mostly
     moves in small steps. The range is the circle, rounded to 360 or 2 pi when that is within 2 %.

@@ -244,7 +244,7 @@ def _steps(coarse: Coarse, whitener: Whitener) -> tuple[FloatArray, NDArray[np.i
 
 
 def half_cosines(coarse: Coarse) -> FloatArray:
-    """Half cosines over every drive that lasts long enough, shape (n, terms)."""
+    """Half cosines over every drive that lasts at least `MIN_DRIFT_S`, within -1..1, shape (n, terms). [-]"""
     columns = []
     for index in range(coarse.drives):
         rows = np.flatnonzero(coarse.drive == index)

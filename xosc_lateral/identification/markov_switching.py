@@ -50,7 +50,7 @@ class RegimeFit:
 
 
 def fit_regimes(rows: FloatArray, valid: NDArray[np.bool_]) -> RegimeFit:
-    """Fit by expectation maximisation; one step per second; cut-out seconds say nothing about the regime."""
+    """Fit to white rows [-], shape (n,), by expectation maximisation; cut-out seconds say nothing about the regime."""
     fits = []
     for factor, length in STARTS:
         quiet = float(np.sqrt(np.mean(rows[valid] ** 2) / (0.7 + 0.3 * factor**2)))

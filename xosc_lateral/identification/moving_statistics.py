@@ -37,7 +37,7 @@ class MovingStatistic:
 
 
 def moving_mean(result: LoopResult, seconds: float) -> MovingStatistic:
-    """Moving mean of the offset over so many seconds."""
+    """Moving mean of the offset over so many `seconds` > 0. [m]"""
     timeline = result.statistics.timeline
 
     def mean(offset: FloatArray) -> FloatArray:
@@ -47,7 +47,7 @@ def moving_mean(result: LoopResult, seconds: float) -> MovingStatistic:
 
 
 def moving_spread(result: LoopResult, seconds: float) -> MovingStatistic:
-    """Root mean square of the movement faster than 20 s, over so many seconds."""
+    """Root mean square of the movement faster than 20 s, over so many `seconds` > 0. [m]"""
     timeline = result.statistics.timeline
 
     def squares(offset: FloatArray) -> FloatArray:
@@ -61,7 +61,7 @@ def moving_spread(result: LoopResult, seconds: float) -> MovingStatistic:
 
 
 def hidden_mean(result: LoopResult) -> FloatArray:
-    """Step, drift and oscillation as fitted, about their mean, at the times of a `MovingStatistic`; 0: none. [m]"""
+    """Step, drift and oscillation as fitted, about their mean; 0: none. [m] Shape as a `MovingStatistic`'s times."""
     coarse, fitted = result.coarse, result.final
     own = [term for term in fitted.terms if isinstance(term, Cycle | StepTerm | DriftTerm)]
     hidden = np.sum([np.zeros(len(coarse)), *(latent_path(term, fitted) for term in own)], axis=0)
@@ -69,7 +69,7 @@ def hidden_mean(result: LoopResult) -> FloatArray:
 
 
 def regime_probability(result: LoopResult) -> FloatArray:
-    """Probability of the regime of large spread, at the times of a `MovingStatistic`; 0: no regimes. [-]"""
+    """Probability, 0 to 1, of the regime of large spread. [-] Shape as a `MovingStatistic`'s times."""
     fits = [term.fit.on for term in result.final.terms if isinstance(term, RegimesTerm)]
     on = fits[0] if fits else np.zeros(len(result.coarse))
     return np.asarray(on[_longest(result)])

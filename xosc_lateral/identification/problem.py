@@ -40,21 +40,24 @@ class Problem:
 
     @cached_property
     def response(self) -> FloatArray:
-        """White series, levels out, shape (seconds,), valid ones only."""
+        """White series, levels out, shape (seconds,), valid ones only. [-]"""
         return self.rows(self.series)
 
     @cached_property
     def known(self) -> FloatArray:
-        """White columns, shape (seconds, k)."""
+        """White columns, shape (seconds, k). [-]"""
         return self.rows(self.columns)
 
     def rows(self, values: FloatArray) -> FloatArray:
-        """White rows of series or columns, valid ones only."""
+        """White rows [-] of series or columns, shape (n,) or (n, k); valid ones only."""
         return self.whitener.compact.rows(values[self.valid])
 
 
 def of_squares(coarse: Coarse, squares: FloatArray, valid: BoolArray, columns: FloatArray) -> Problem:
-    """Regression of squares on what may make them larger; they come in clusters, as far as no column explains them."""
+    """Regression of squares [-], shape (n,), on columns, shape (n, k), that may make them larger.
+
+    Squares come in clusters, as far as no column explains them.
+    """
     left = squares
     if columns.shape[1]:
         design = columns - columns[valid].mean(axis=0)
@@ -64,7 +67,7 @@ def of_squares(coarse: Coarse, squares: FloatArray, valid: BoolArray, columns: F
 
 
 def of_products(coarse: Coarse, rows: FloatArray, columns: FloatArray, factor: FloatArray) -> Problem:
-    """Regression of white rows times a factor on columns, about one level for all drives.
+    """Regression of white rows [-] times a factor, shape (n,) each, on columns, about one level for all drives.
 
     The products themselves are rotated in the null: a few loud seconds, in which both are large, stay what they are.
     """

@@ -12,7 +12,7 @@ FloatArray = NDArray[np.float64]
 
 
 def driving_range(coarse: Coarse, effect: ColumnEffect) -> tuple[FloatArray, FloatArray]:
-    """Quantity at the low and at the high end of what drives the effect, shape (k,) each.
+    """Quantity [own unit] at the low and at the high end of what drives the effect, shape (k,) each.
 
     That is the 5 % and the 95 % quantile while road-following: of the column, where a single number drives it; of the
     product; of the strength, for angles and levels. The extremes where both quantiles are the same (a switch that is on

@@ -45,7 +45,7 @@ def removal_of(fitted: Fitted, estimates: Estimates) -> Removal:
 
 
 def bare_runs(timeline: Timeline, removal: Removal, used: BoolArray) -> list[Run]:
-    """Runs of the movement without effects, from the valid rows in `used`."""
+    """Runs of the movement [m] without effects, from the valid rows in `used`, shape (n,); at least `MIN_RUN` long."""
     runs: list[Run] = []
     for index, name in enumerate(timeline.names):
         for rows in stretches_of(timeline.valid & used & (timeline.drive == index)):
@@ -55,7 +55,7 @@ def bare_runs(timeline: Timeline, removal: Removal, used: BoolArray) -> list[Run
 
 
 def bare_movement(timeline: Timeline, removal: Removal, rows: slice, mean: float | None = None) -> FloatArray:
-    """Offsets of one uninterrupted stretch without the effects, about their own mean or the given one [m]."""
+    """Offsets of one uninterrupted stretch without the effects, about their own mean or a given one. [m] Shape (k,)."""
     left = timeline.offset[rows] - removal.location[rows]
     mean = float(left.mean()) if mean is None else mean
     slow = _smooth(left)

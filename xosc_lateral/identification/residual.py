@@ -72,7 +72,7 @@ class SummaryStatistics:
     oscillation: float | None = None
 
     def describe(self, offset: FloatArray, used: BoolArray) -> dict[str, FloatArray]:
-        """Statistics of one series of offsets on the grid, by group. [m]"""
+        """Statistics of one series of offsets on the grid, shape (n,), by group. [m]"""
         timeline = self.timeline
         used = used & timeline.valid
         slow = local_mean(offset, timeline.valid, LOCAL_S, timeline.step)
@@ -133,7 +133,7 @@ def simulated_runs(
     runs: int | None = None,
     held: BoolArray | None = None,
 ) -> FloatArray:
-    """Free runs of a profile under the drives' context, shape (runs, n); 0 outside the drives.
+    """Free runs [m] of a profile under the drives' context, shape (runs, n); 0 outside the drives.
 
     With `held`, shape (n,), drives that have no such row are left out.
     """
@@ -161,7 +161,7 @@ def simulated_runs(
 
 
 def expected(statistics: SummaryStatistics, runs: FloatArray, used: BoolArray) -> dict[str, FloatArray]:
-    """Mean of the cells over a profile's runs."""
+    """Mean of the cells over a profile's runs, shape (runs, n). [m]"""
     several = [statistics.describe(run, used) for run in runs]
     return {name: np.mean([one[name] for one in several], axis=0) for name in several[0]}
 
@@ -200,7 +200,7 @@ def split_differences(
 
 
 def size_of(differences: Mapping[str, FloatArray]) -> float:
-    """Root mean square over groups of cells, each group's mean square counting the same. [m]"""
+    """Root mean square over groups of cells, >= 0, each group's mean square counting the same. [m]"""
     squares = [float(np.mean(seen**2)) for values in differences.values() if len(seen := values[np.isfinite(values)])]
     return float(np.sqrt(np.mean(squares))) if squares else 0.0
 

@@ -1,4 +1,9 @@
-"""The ten metrics of 10 s snippets on held-out blocks, before and after, beside the floor."""
+"""The ten metrics of 10 s snippets on held-out blocks, before and after, beside the floor.
+
+References
+----------
+.. [1] N. Neis, J. Beyerer, arXiv:2405.17080, 2024: the ten metrics of a snippet.
+"""
 
 from __future__ import annotations
 
@@ -43,7 +48,7 @@ class Scorecard:
 def score_runs(
     timeline: Timeline, before: FloatArray, after: FloatArray, blocks: IntArray, rng: np.random.Generator
 ) -> Scorecard:
-    """Cut all series into the same snippets and compare."""
+    """Cut offsets [m], shape (n,), and runs, shape (runs, n), into the same snippets and compare."""
     starts = _starts(timeline)
     rows = starts[:, None] + np.arange(SNIPPET_ROWS)
     if len(starts) < 8:

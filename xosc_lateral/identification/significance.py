@@ -53,7 +53,7 @@ def level_of(component: str, share: float = 1.0) -> float:
 
 
 def upper_tail(score: float, maxima: FloatArray) -> float:
-    """Probability that chance gives a maximum of `score` or more.
+    """Probability, `LEAST` to 1, that chance gives a maximum of `score` or more. [-]
 
     Parameters
     ----------

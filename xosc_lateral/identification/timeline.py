@@ -130,13 +130,13 @@ def _column(part: Timeline, name: str) -> FloatArray:
 
 
 def coarse_mean(values: FloatArray) -> FloatArray:
-    """Mean over each second, shape (n // 5, ...)."""
+    """Mean over each second, shape (n // 5, ...), in the unit of the values."""
     n = len(values) // COARSE
     return np.asarray(values[: n * COARSE].reshape(n, COARSE, *values.shape[1:]).mean(axis=1))
 
 
 def coarse_middle(values: NDArray[Any]) -> NDArray[Any]:
-    """Value in the middle of each second, shape (n // 5,): for what can't be averaged."""
+    """Value in the middle of each second, shape (n // 5,), in its own unit: for what can't be averaged."""
     return values[COARSE // 2 :: COARSE][: len(values) // COARSE]
 
 
@@ -147,7 +147,7 @@ def coarse_all(mask: BoolArray) -> BoolArray:
 
 
 def means_by_drive(values: FloatArray, valid: BoolArray, drive: IntArray) -> FloatArray:
-    """Mean over the valid rows of each drive, shape (drives,); 0 where there are none."""
+    """Mean over the valid rows of each drive, shape (drives,), in the values' unit; 0 where there are none."""
     drives = int(drive.max()) + 1
     count = np.bincount(drive, valid.astype(float), minlength=drives)
     sums = np.bincount(drive, np.where(valid, values, 0.0), minlength=drives)

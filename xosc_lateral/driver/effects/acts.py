@@ -1,4 +1,10 @@
-"""What an effect acts on, and how its strength becomes terms of the movement."""
+"""What an effect acts on, and how its strength becomes terms of the movement.
+
+References
+----------
+.. [1] A. C. Harvey, "Estimating regression models with multiplicative heteroscedasticity", Econometrica 44, 1976:
+       log-linear factors.
+"""
 
 from __future__ import annotations
 

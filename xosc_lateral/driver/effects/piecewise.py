@@ -1,4 +1,9 @@
-"""A curve of straight pieces: for a column whose effect bends."""
+"""A curve of straight pieces: for a column whose effect bends.
+
+References
+----------
+.. [1] C. de Boor, "A Practical Guide to Splines", 1978, chapter VIII: truncated powers, here of first degree.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,9 @@
-"""Drivers that differ: each has a place and a spread of his own."""
+"""Drivers that differ: each has a place and a spread of his own.
+
+References
+----------
+.. [1] N. M. Laird, J. H. Ware, "Random-effects models for longitudinal data", Biometrics 38, 1982.
+"""
 
 from __future__ import annotations
 

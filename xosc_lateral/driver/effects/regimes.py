@@ -1,4 +1,9 @@
-"""On/off regimes: at times the driver is another one, distracted say."""
+"""On/off regimes: at times the driver is another one, distracted say.
+
+References
+----------
+.. [1] J. R. Norris, "Markov Chains", 1997, section 2.6: a chain in continuous time stays exponentially long.
+"""
 
 from __future__ import annotations
 

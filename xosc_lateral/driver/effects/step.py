@@ -1,4 +1,10 @@
-"""A step: from one moment on, everything is measured (or driven) elsewhere, as after a recalibrated camera."""
+"""A step: from one moment on, everything is measured (or driven) elsewhere, as after a recalibrated camera.
+
+References
+----------
+.. [1] G. E. P. Box, G. C. Tiao, "Intervention analysis with applications to economic and environmental problems", J.
+       American Statistical Association 70, 1975.
+"""
 
 from __future__ import annotations
 

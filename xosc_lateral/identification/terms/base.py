@@ -120,15 +120,15 @@ class Term(ABC):
         return self.kind if self.component == "low_frequency" else self.component
 
     def mean_columns(self, coarse: Coarse) -> FloatArray:
-        """Columns of the mean, shape (n, k)."""
+        """Columns of the mean, shape (n, k). [any unit]"""
         return np.zeros((len(coarse), 0))
 
     def fine_mean_columns(self, coarse: Coarse) -> FloatArray:
-        """The same columns of the mean on the 0.2 s grid, shape (fine n, k)."""
+        """The same columns of the mean on the 0.2 s grid, shape (fine n, k). [any unit]"""
         return on_fine_grid(self.mean_columns(coarse), coarse.timeline)
 
     def scale_columns(self, coarse: Coarse) -> FloatArray:
-        """Columns of the log scale, shape (n, j)."""
+        """Columns of the log scale, shape (n, j). [any unit]"""
         return np.zeros((len(coarse), 0))
 
     def size_columns(self, coarse: Coarse) -> FloatArray:
@@ -136,7 +136,7 @@ class Term(ABC):
         return self.scale_columns(coarse)
 
     def known_scale(self, coarse: Coarse) -> FloatArray | None:
-        """Log scale that is known as a whole, shape (n,)."""
+        """Log scale that is known as a whole, shape (n,). [-]"""
         return None
 
     @classmethod

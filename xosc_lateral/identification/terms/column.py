@@ -130,7 +130,7 @@ class ColumnTerm(Term):
         return np.where(varies, low, least), np.where(varies, high, most)
 
     def bounded(self, coarse: Coarse) -> FloatArray:
-        """Answers within `ends`, about their mean, shape (n, k)."""
+        """Answers within `ends`, about their mean, shape (n, k). [unit of the quantity]"""
         answer = np.clip(coarse.answer(self.effect, keep=True), *self.ends(coarse))
         return np.asarray(answer - answer[coarse.valid].mean(axis=0))
 
@@ -150,7 +150,7 @@ class ColumnTerm(Term):
 
 
 def shrunk(sizes: FloatArray, errors: FloatArray) -> FloatArray:
-    """Positive-part James-Stein: a size with a z of 2 keeps three quarters, one with a z of 5 all but 4 %."""
+    """Positive-part James-Stein, shape and unit of `sizes`: at a z of 2 three quarters are kept, at 5 all but 4 %."""
     squares = float(np.sum(np.square(sizes / np.maximum(errors, 1e-300))))
     return np.asarray(sizes * max(0.0, 1.0 - len(sizes) / max(squares, 1e-300)))
 

@@ -41,7 +41,7 @@ class DriftTerm(Term):
     seen_held_out: ClassVar[bool] = False
 
     def mean_columns(self, coarse: Coarse) -> FloatArray:
-        """Half cosines."""
+        """Half cosines, within -1..1, shape (n, terms). [-]"""
         return half_cosines(coarse)
 
     @classmethod

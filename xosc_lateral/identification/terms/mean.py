@@ -31,7 +31,7 @@ class MeanTerm(ColumnTerm):
     group: ClassVar[str] = "mean"
 
     def mean_columns(self, coarse: Coarse) -> FloatArray:
-        """The answer."""
+        """The answer, shape (n, k). [unit of the quantity]"""
         return coarse.answer(self.effect, keep=True)
 
     def fine_mean_columns(self, coarse: Coarse) -> FloatArray:

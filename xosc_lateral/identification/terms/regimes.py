@@ -70,7 +70,7 @@ class RegimesTerm(Term):
     fit: RegimeFit = field(repr=False)
 
     def known_scale(self, coarse: Coarse) -> FloatArray | None:
-        """As far as the regimes can be told, about its mean."""
+        """As far as the regimes can be told, about its mean, shape (n,). [-]"""
         scale = self.fit.on * np.log(self.fit.factor)
         return np.asarray(scale - scale[coarse.valid].mean())
 

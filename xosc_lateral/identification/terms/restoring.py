@@ -66,7 +66,7 @@ class RestoringTerm(ColumnTerm):
 
 
 def recent_offset(fitted: Fitted) -> FloatArray:
-    """Recent movement before each second, unit variance: what the driver steers back from; 0 where unknown."""
+    """Recent movement before each second, variance 1, shape (n,): what he steers back from; 0 where unknown. [-]"""
     from scipy.signal import lfilter
 
     valid = fitted.coarse.valid

@@ -32,7 +32,7 @@ class SpreadTerm(ColumnTerm):
     what: ClassVar[str] = "spread"
 
     def scale_columns(self, coarse: Coarse) -> FloatArray:
-        """The bounded answer."""
+        """The bounded answer, shape (n, k). [unit of the quantity]"""
         return self.bounded(coarse)
 
     @classmethod
@@ -63,7 +63,7 @@ def fine_twin(term: ColumnTerm, fitted: Fitted) -> ColumnEffect:
 
 
 def known_log_scale(fitted: Fitted) -> FloatArray:
-    """What is known of the movement's size, shape (n, k)."""
+    """What is known of the movement's log size, shape (n, k). [any unit]"""
     coarse, terms = fitted.coarse, [term for term in fitted.terms if isinstance(term, Term)]
     columns = [term.size_columns(coarse) for term in terms]
     known = [scale[:, None] for term in terms if (scale := term.known_scale(coarse)) is not None]

@@ -41,7 +41,7 @@ class StepTerm(Term):
     at: int
 
     def mean_columns(self, coarse: Coarse) -> FloatArray:
-        """0 before, 1 after."""
+        """0 before, 1 after, shape (n, 1). [-]"""
         return (np.arange(len(coarse)) >= self.at).astype(np.float64)[:, None]
 
     @classmethod

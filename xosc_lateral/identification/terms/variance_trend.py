@@ -47,11 +47,11 @@ class VarianceTrend(Term):
         return not self.slow
 
     def scale_columns(self, coarse: Coarse) -> FloatArray:
-        """Time."""
+        """Time, -0.5 to 0.5, shape (n, 1); none of slow growth. [-]"""
         return np.zeros((len(coarse), 0)) if self.slow else elapsed(coarse)[:, None]
 
     def size_columns(self, coarse: Coarse) -> FloatArray:
-        """Time, whichever movement grows."""
+        """Time, -0.5 to 0.5, shape (n, 1), whichever movement grows. [-]"""
         return elapsed(coarse)[:, None]
 
     @classmethod
