@@ -137,7 +137,8 @@ def main() -> None:
     parser.add_argument("--halves", type=int, default=4)
     parser.add_argument("--write", type=Path, help="page with the markers")
     args = parser.parse_args()
-    runs, _ = driver_runs(all_runs(read_drives(args.table)))
+    drives = read_drives(args.table)
+    runs, _ = driver_runs(all_runs(drives), drives)
     text = "\n".join([*order_table(runs), "", *variant_table(runs, args.halves)])
     print(text)
     if args.write is not None:

@@ -61,10 +61,10 @@ def test_a_profile_that_knows_no_sensor_is_named(scenario: Path, profile: Driver
 
 def test_pieces_of_a_drive_have_errors_of_their_own() -> None:
     seed = np.random.SeedSequence(3)
-    one, other = (sensor_error(NOISE, 50, 0.2, seed, part=part) for part in (0, 1))
+    one, other = (sensor_error(NOISE, np.zeros(50), 0.2, seed, part=part) for part in (0, 1))
     assert abs(np.corrcoef(one, other)[0, 1]) < 0.5
-    np.testing.assert_array_equal(sensor_error(NOISE, 50, 0.2, seed), one)
-    assert not sensor_error(None, 5, 0.2, seed).any()
+    np.testing.assert_array_equal(sensor_error(NOISE, np.zeros(50), 0.2, seed), one)
+    assert not sensor_error(None, np.zeros(5), 0.2, seed).any()
 
 
 def test_the_command_line_and_the_manifest_say_which(

@@ -73,8 +73,8 @@ def test_a_sensor_counts_where_all_is_compared_and_not_below_half_a_hertz(profil
     assert scores.of(SHORT).with_sensor and not scores.of(SLOW).with_sensor
     assert scores.of(SHORT).families["spectrum"].ratio > 3.0
     assert scores.of(SLOW).families["spectrum"].ratio < 2.0
-    assert sensor_noise(noisy, [400], 0)[0].std() == pytest.approx(np.sqrt(4e-3 * 1.5), rel=0.15)
-    assert not sensor_noise(profile, [400], 0)[0].any()
+    assert sensor_noise(noisy, [np.zeros(400)], 0)[0].std() == pytest.approx(np.sqrt(4e-3 * 1.5), rel=0.15)
+    assert not sensor_noise(profile, [np.zeros(400)], 0)[0].any()
 
 
 def test_a_foreign_place_shows_in_free_runs_and_less_from_the_same_start(profile: DriverProfile, own: list[Run]):

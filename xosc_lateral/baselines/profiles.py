@@ -16,7 +16,7 @@ from xosc_lateral.driver.sampling import sample_offsets
 from xosc_lateral.driver.seeds import child
 from xosc_lateral.driver.sensor.runs import driver_runs
 from xosc_lateral.drives.drive import Drive, Run
-from xosc_lateral.evaluation.snippets import sensor_noise
+from xosc_lateral.evaluation.snippets import sample_recorded, sensor_noise
 from xosc_lateral.segment import Segment
 
 FloatArray = NDArray[np.float64]
@@ -36,15 +36,12 @@ class ProfileModel:
         What was recorded is driver and sensor, so a profile that knows its sensor is sampled with it.
         """
         seed = int(rng.integers(2**32))
+        if starts is not None:
+            return sample_recorded(self.profile, segments, starts, seed)
         root = np.random.SeedSequence(seed)
-        lengths = [segment.lane_width[segment.inside].size for segment in segments]
-        found = []
-        for number, (segment, noise) in enumerate(
-            zip(segments, sensor_noise(self.profile, lengths, seed), strict=True)
-        ):
-            start = None if starts is None else float(starts[number] - noise[:1].sum())
-            found.append(sample_offsets(self.profile, segment, child(root, number), start=start) + noise)
-        return found
+        paths = [sample_offsets(self.profile, segment, child(root, number)) for number, segment in enumerate(segments)]
+        noise = sensor_noise(self.profile, paths, seed)
+        return [path + error for path, error in zip(paths, noise, strict=True)]
 
     @property
     def settings(self) -> Mapping[str, float]:

@@ -12,7 +12,7 @@ from xosc_lateral.driver.plausibility import check_offsets
 from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.driver.sampling import sample_offsets
 from xosc_lateral.driver.seeds import child
-from xosc_lateral.driver.sensor.error import known_sensor, sensor_error
+from xosc_lateral.driver.sensor.error import known_sensor, recorded, sensor_error
 from xosc_lateral.drives.cuts import PAPER_RULES, CutRules, all_runs, whole_run
 from xosc_lateral.drives.drive import Drive, Run
 from xosc_lateral.drives.resampling import STEP
@@ -118,8 +118,11 @@ def sample_like(
     for snippet in cut_snippets(all_runs(drives, rules), seconds):
         own = child(root, numbers[snippet.run.drive], snippet.index)
         segment = segment_of(snippet.run, snippet.rows)
-        noise = sensor_error(sensor, len(snippet.time), STEP, own)
-        offset = sample_offsets(profile, segment, own, start=float(snippet.offset[0] - noise[0])) + noise
+
+        def draw(start: float, segment: Segment = segment, own: np.random.SeedSequence = own) -> FloatArray:
+            return sample_offsets(profile, segment, own, start=start)
+
+        offset = recorded(sensor, draw, len(snippet.time), float(snippet.offset[0]), STEP, own)
         _check(offset, segment, profile, snippet.run.drive)
         yield SampledOffsets(snippet.run.drive, snippet.index, snippet.time, offset, snippet.offset)
 
@@ -133,7 +136,8 @@ def sample_context(
     for number, drive in enumerate(drives):
         run = whole_run(drive)
         own, segment = child(root, number), segment_of(run)
-        offset = sample_offsets(profile, segment, own) + sensor_error(sensor, len(run), STEP, own)
+        offset = sample_offsets(profile, segment, own)
+        offset = offset + sensor_error(sensor, offset, STEP, own)
         _check(offset, segment, profile, drive.name)
         yield SampledOffsets(drive.name, 0, run.time, offset, None)
 
@@ -171,7 +175,6 @@ def sample_free(
     width = profile.lane_width if lane_width is None else lane_width
     segment = Segment(time=time, lane_width=np.full(n, width), speed=np.full(n, speed))
     own = child(np.random.SeedSequence(seed), 0)
-    offset = sample_offsets(profile, segment, own) + sensor_error(
-        known_sensor(profile) if with_sensor else None, n, STEP, own
-    )
+    offset = sample_offsets(profile, segment, own)
+    offset = offset + sensor_error(known_sensor(profile) if with_sensor else None, offset, STEP, own)
     yield SampledOffsets(profile.name, 0, time, offset, None)

@@ -12,6 +12,8 @@ References
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -33,6 +35,9 @@ ATTENUATION = 50.0
 
 CUTOFF, TRANSITION = 0.8, 0.4
 """Middle and width of the low-pass's transition, as shares of half the final rate: from 1.5 Hz to 2.5 Hz. [-]"""
+
+GAINS = 501
+"""Frequencies, 5 mHz apart, between which the gain is interpolated. [-]"""
 
 
 def resample(time: FloatArray, values: FloatArray, grid: FloatArray, *, oversampling: int = OVERSAMPLING) -> FloatArray:
@@ -93,6 +98,21 @@ def nearest(time: FloatArray, values: FloatArray, grid: FloatArray) -> FloatArra
     right = np.clip(np.searchsorted(time, grid), 1, len(time) - 1) if len(time) > 1 else np.zeros(len(grid), dtype=int)
     left = np.maximum(right - 1, 0)
     return values[np.where(grid - time[left] <= time[right] - grid, left, right)]
+
+
+def passed(frequency: FloatArray) -> FloatArray:
+    """What the low-pass of `resample` leaves of the amplitude at the model's step. Shape as `frequency` [Hz]. [-]"""
+    return np.asarray(np.interp(frequency, *_gains(), right=0.0))
+
+
+@lru_cache(maxsize=1)
+def _gains() -> tuple[FloatArray, FloatArray]:
+    """Frequencies [Hz], and the low-pass's gain at them. [-]"""
+    kernel = _low_pass(OVERSAMPLING)
+    half = len(kernel) // 2
+    lags = STEP / OVERSAMPLING * np.arange(1, half + 1)
+    known = np.linspace(0.0, 0.5 / STEP, GAINS)
+    return known, np.asarray(kernel[half] + 2.0 * np.cos(2.0 * np.pi * np.outer(known, lags)) @ kernel[half + 1 :])
 
 
 def _fine_grid(grid: FloatArray, oversampling: int) -> FloatArray:

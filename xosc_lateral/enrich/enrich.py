@@ -189,7 +189,7 @@ def _draw(
         inside = segment.inside
         who = f"profile {driver.name} for {entity.name!r}"
         check_offsets(wanted, segment.lane_width[inside], who, segment.time[inside])
-        errors.append(sensor_error(sensor, len(knots), SAMPLE_STEP, seed, part=len(segments)))
+        errors.append(sensor_error(sensor, wanted, SAMPLE_STEP, seed, part=len(segments)))
         segments.append((stretch, knots, wanted))
     if not segments:
         return _Drawn(entity, stretches, None, "no road-following segment")

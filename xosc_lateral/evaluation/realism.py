@@ -136,7 +136,7 @@ def score_realism(
     """
     step = profile.model.step
     driver = sample_runs(profile, runs, seed, same_start=False)
-    noise = sensor_noise(profile, list(map(len, runs)), seed)
+    noise = sensor_noise(profile, driver, seed)
     recorded = [path + error for path, error in zip(driver, noise, strict=True)]
     slow_real = [below_half_hertz(run.offset, step) for run in runs]
     slow_driver = [below_half_hertz(path, step) for path in driver]

@@ -17,7 +17,7 @@ from xosc_lateral.driver.models.base import Start
 from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.driver.sampling import sample_offsets
 from xosc_lateral.driver.seeds import child
-from xosc_lateral.driver.sensor.error import sensor_error
+from xosc_lateral.driver.sensor.error import recorded, sensor_error
 from xosc_lateral.driver.snippets import Snippet, cut_snippets, segment_of
 from xosc_lateral.drives.drive import Run
 from xosc_lateral.segment import Segment
@@ -110,14 +110,28 @@ def sample_snippets(profile: DriverProfile, snippets: Snippets, seed: int, *, wi
 
     With the sensor, what starts there is the sum of both, as it does in what was recorded.
     """
-    root = np.random.SeedSequence(seed)
-    lengths = [snippets.offset.shape[1] if with_sensor else 0] * len(snippets)
-    rows = []
-    for k, (one, noise) in enumerate(zip(snippets.items, sensor_noise(profile, lengths, seed), strict=True)):
-        start = float(one.offset[0] - noise[:1].sum())
-        offset = sample_offsets(profile, segment_of(one.run, one.rows), child(root, k), start=start)
-        rows.append(offset + noise if with_sensor else offset)
+    rows = sample_recorded(profile, snippets.segments, snippets.offset[:, 0], seed, with_sensor=with_sensor)
     return np.array(rows).reshape(snippets.offset.shape)
+
+
+def sample_recorded(
+    profile: DriverProfile, segments: Sequence[Segment], starts: FloatArray, seed: int, *, with_sensor: bool = True
+) -> list[FloatArray]:
+    """For each segment one path of a new driver, as the profile's sensor would have recorded it. [m]
+
+    `starts` of the sums, shape (segments,) [m].
+    """
+    root, sensor = np.random.SeedSequence(seed), profile.sensor if with_sensor else None
+    rows = []
+    for k, (segment, start) in enumerate(zip(segments, starts.tolist(), strict=True)):
+        own = child(root, k)
+
+        def draw(begin: float, segment: Segment = segment, own: np.random.SeedSequence = own) -> FloatArray:
+            return sample_offsets(profile, segment, own, start=begin)
+
+        n = segment.lane_width[segment.inside].size
+        rows.append(recorded(sensor, draw, n, start, profile.model.step, own))
+    return rows
 
 
 def sample_parts(profile: DriverProfile, snippets: Snippets, seed: int) -> tuple[FloatArray, FloatArray]:
@@ -143,7 +157,7 @@ def sample_runs(profile: DriverProfile, runs: Sequence[Run], seed: int, *, same_
     ]
 
 
-def sensor_noise(profile: DriverProfile, lengths: Sequence[int], seed: int) -> list[FloatArray]:
-    """What the profile's sensor adds to runs of these lengths; zeros where it knows of none. [m] Shape (n_i,) each."""
+def sensor_noise(profile: DriverProfile, paths: Sequence[FloatArray], seed: int) -> list[FloatArray]:
+    """What the profile's sensor adds to these paths; zeros where it knows of none. [m] Shape (n_i,) each."""
     root, step = np.random.SeedSequence(seed), profile.model.step
-    return [sensor_error(profile.sensor, n, step, child(root, k)) for k, n in enumerate(lengths)]
+    return [sensor_error(profile.sensor, path, step, child(root, k)) for k, path in enumerate(paths)]

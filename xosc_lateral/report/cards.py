@@ -163,7 +163,10 @@ def _evaluation_items(evaluation: Mapping[str, Any]) -> list[tuple[str, str]]:
             )
         )
     if evaluation.get("spectrum_error_db") is not None:
-        items.append(("spectrum", f"differs by {evaluation['spectrum_error_db']:.1f} dB (rms over frequency bands)"))
+        apart = f"{evaluation['spectrum_error_db']:.1f} dB"
+        items.append(
+            ("spectrum", f"the driver alone differs from what was recorded by {apart} (rms over frequency bands)")
+        )
     if evaluation.get("told_apart"):
         items.append(("own driver", str(evaluation["told_apart"])))
     return items

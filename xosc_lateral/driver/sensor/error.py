@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -27,10 +29,36 @@ def known_sensor(profile: DriverProfile) -> SensorModel:
 
 
 def sensor_error(
-    sensor: SensorModel | None, n: int, step: float, seed: np.random.SeedSequence, part: int = 0
+    sensor: SensorModel | None, path: FloatArray, step: float, seed: np.random.SeedSequence, part: int = 0
 ) -> FloatArray:
-    """Error on n offsets of a drive, `step` seconds apart, from random numbers of its own; zeros without a sensor. [m]
+    """Error on a drive's sampled path, shape (n,), from random numbers of its own; zeros without a sensor. [m]
 
     `part` tells the pieces of one drive apart: a sensor knows nothing of what it measured minutes ago.
     """
-    return np.zeros(n) if sensor is None else sensor.sample(n, step, generator(seed, DriveSeed.SENSOR, part))
+    if sensor is None:
+        return np.zeros(len(path))
+    return sensor.error_on(path, step, generator(seed, DriveSeed.SENSOR, part))
+
+
+def recorded(
+    sensor: SensorModel | None,
+    draw: Callable[[float], FloatArray],
+    n: int,
+    start: float,
+    step: float,
+    seed: np.random.SeedSequence,
+) -> FloatArray:
+    """A sampled path of n offsets with the sensor's error on it, the sum of which begins at `start`. [m]
+
+    `draw` samples the path from where it is told to begin [m].
+    """
+    if sensor is None:
+        return draw(start)
+    rng = generator(seed, DriveSeed.SENSOR, 0)
+    noise = sensor.sample(n, step, rng)
+    path = draw(start - float(noise[0]))
+    if sensor.kinks is None:
+        return path + noise
+    kinked = sensor.kinks.sample(path, step, rng)
+    # They hang on the path, so they come after it; where they begin is a matter of millimetres.
+    return np.asarray(path + noise + (kinked - kinked[0]))

@@ -1,4 +1,4 @@
-"""What a sensor adds to the offset: white noise, low-passed noise, rounding, as a profile keeps it.
+"""What a sensor adds to the offset: white noise, low-passed noise, rounding, kinks, as a profile keeps it.
 
 References
 ----------
@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.driver.records import Record
+from xosc_lateral.driver.sensor.kinks import CROSSING, Kinks
 from xosc_lateral.driver.sensor.likelihood import Colour
 from xosc_lateral.driver.sensor.texture import amplitude_factor
 from xosc_lateral.drives.filters import scale_frequencies
@@ -51,10 +52,12 @@ class SensorModel(Record, frozen=True):
         Share of the driver: 95 % interval. [-]
 
     frequencies, densities : tuple of float
-        Density of the error as it was measured in runs, see `texture`; empty: as the parts above have it.
-        [Hz], [m2/Hz]
+        Density of the error as it was measured in runs, without kinks, see `texture`; empty: as the parts above have
+        it. [Hz], [m2/Hz]
     level_variance, level_duration : float
         Variance of the log of the density over time [-], and how long a level lasts [s]; in files `wanders`, `lasts`.
+    kinks : Kinks or None
+        Of tracks that were smoothed piece by piece.
 
     Raises
     ------
@@ -74,6 +77,7 @@ class SensorModel(Record, frozen=True):
     densities: tuple[float, ...] = ()
     level_variance: float = msgspec.field(default=0.0, name="wanders")
     level_duration: float = msgspec.field(default=60.0, name="lasts")
+    kinks: Kinks | None = None
 
     def __post_init__(self) -> None:
         """Check."""
@@ -94,20 +98,37 @@ class SensorModel(Record, frozen=True):
     def in_words(self) -> str:
         """How the measured variance is split, in a sentence."""
         low, high = self.driver_share
-        return (
+        words = (
             f"{100 * self.share:.1f} % of the measured variance is the driver's (95 % interval: {100 * low:.1f} to "
             f"{100 * high:.1f} %), the rest is sensor error ({np.sqrt(self.sensor_variance):.3f} m rms)"
         )
+        if self.kinks is None:
+            return words
+        fastest = CROSSING[1] * self.kinks.highest
+        return (
+            f"{words}; tracks are made of pieces of {self.kinks.every:g} s, whose kinks are all that they show above "
+            f"{fastest:.2g} Hz"
+        )
 
     def density(self, frequency: FloatArray) -> FloatArray:
-        """One-sided power density of the noise, without rounding. [m2/Hz] Shape as `frequency` [Hz]."""
+        """One-sided power density of noise and kinks, without rounding. [m2/Hz] Shape as `frequency` [Hz]."""
+        noise = self.noise_density(frequency)
+        return noise if self.kinks is None else noise + self.kinks.density(frequency)
+
+    def noise_density(self, frequency: FloatArray) -> FloatArray:
+        """The same without kinks. [m2/Hz] Shape as `frequency` [Hz]."""
         total: FloatArray = np.full(np.shape(frequency), self.white)
         if self.order:
             total = total + self.coloured * Colour(self.order, self.corner).shape(frequency)
         return total
 
+    def error_on(self, path: FloatArray, step: float, rng: np.random.Generator) -> FloatArray:
+        """What the sensor adds to a sampled path, shape (n,). [m]"""
+        noise = self.sample(len(path), step, rng)
+        return noise if self.kinks is None or not len(path) else noise + self.kinks.sample(path, step, rng)
+
     def sample(self, n: int, step: float, rng: np.random.Generator) -> FloatArray:
-        """Noise as it is in measured runs at this step, shape (n,). [m]
+        """Noise as it is in measured runs at this step, without kinks, shape (n,). [m]
 
         Without a measured density, what rounding adds is left out: runs are low-passed, and lie on its lattice no more.
         """
@@ -122,9 +143,9 @@ class SensorModel(Record, frozen=True):
         return error * amplitude_factor(self.level_variance, self.level_duration, n, step, rng)
 
     def in_runs(self, frequency: FloatArray) -> FloatArray:
-        """One-sided power density of the error in runs at 5 Hz. [m2/Hz] Shape as `frequency` [Hz]."""
+        """One-sided power density of the noise in runs at 5 Hz. [m2/Hz] Shape as `frequency` [Hz]."""
         if not self.frequencies:
-            return np.asarray(self.density(frequency) * (frequency <= HIGHEST))
+            return np.asarray(self.noise_density(frequency) * (frequency <= HIGHEST))
         table = np.log(np.array(self.densities) + FAINTEST)
         log = np.interp(np.log(np.maximum(frequency, 1e-9)), np.log(self.frequencies), table)
         return np.asarray(np.exp(log))

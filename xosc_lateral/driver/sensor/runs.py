@@ -38,13 +38,13 @@ def driver_runs(
     """
     if max(map(len, runs), default=0) * STEP < WINDOWS[-1]:
         return list(runs), None
-    rows, rate = _rows(runs, drives)
+    rows, rate = rows_of(runs, drives)
     found = separate([run.offset for run in runs], STEP, rows=rows, rate=rate, sensor_noise=sensor_noise)
     return [replace(run, offset=found.driver_part(run.offset, STEP)) for run in runs], found.sensor
 
 
-def _rows(runs: Sequence[Run], drives: Sequence[Drive]) -> tuple[list[FloatArray] | None, float | None]:
-    """The runs as recorded, and rows per second."""
+def rows_of(runs: Sequence[Run], drives: Sequence[Drive]) -> tuple[list[FloatArray] | None, float | None]:
+    """Offsets of the runs as recorded [m], and rows per second [Hz]; None where not all drives are there."""
     known = {drive.name: drive for drive in drives}
     if not all(run.drive in known for run in runs):
         return None, None

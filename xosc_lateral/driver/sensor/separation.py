@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from dataclasses import replace as replaced
 
 import numpy as np
 from msgspec.structs import replace
 from numpy.typing import NDArray
 
+from xosc_lateral.driver.sensor.kinks_fit import find_kinks
 from xosc_lateral.driver.sensor.likelihood import Colour, Known, Solution, solve
 from xosc_lateral.driver.sensor.model import SensorModel
 from xosc_lateral.driver.sensor.periodogram import Periodogram, periodogram, windows_of
@@ -16,6 +18,7 @@ from xosc_lateral.driver.sensor.quantisation import is_too_coarse, quantisation_
 from xosc_lateral.driver.sensor.texture import FAST, LEAST_SHARE, MANY, level_variation, measured_density
 from xosc_lateral.driver.sensor.vehicle_bound import density
 from xosc_lateral.drives.filters import scale_frequencies
+from xosc_lateral.drives.resampling import passed
 
 FloatArray = NDArray[np.float64]
 
@@ -114,21 +117,28 @@ def separate(
     known = None if sensor_noise is None else Known(sensor_noise, rate or 1.0 / step)
     grain = quantisation_step(np.concatenate(measured))
     coarse = is_too_coarse(grain, variance)
+    pieces = None if rows is None or rate is None else find_kinks(rows, rate, frequency, windows.mean(axis=0))
+    kinks, noise = pieces or (None, 0.0)
+    if kinks is not None and known is None:
+        known = Known(noise, rate or 1.0 / step)
     rounding: Callable[[FloatArray], FloatArray] = _no_density
     colours = [Colour(), *_colours()]
     if grain and not coarse:
         rounding = _rounding(data, grain, variance)
         colours = colours[:1]
     base = rounding(data.frequency)
+    if kinks is not None:
+        base = base + kinks.density(data.frequency)
     found = [(solve(data, colour, base, known), colour) for colour in colours]
     criteria = np.array([2.0 * one.loss + 2.0 * np.log(data.count) * bool(colour.order) for one, colour in found])
     best, colour = found[int(np.argmin(criteria))]
-    result = Separation(best.knots, _sensor(best, colour, grain), rounding, bool(coarse))
+    result = Separation(best.knots, replace(_sensor(best, colour, grain), kinks=kinks), rounding, bool(coarse))
     driver = float(np.concatenate([result.driver_part(run, step) for run in runs]).var())
     share = min(driver / variance, 1.0)
     plausible = [one for one, good in zip(found, criteria < criteria.min() + PLAUSIBLE, strict=True) if good]
     interval = _interval(frequency, windows, best, colour, base, known, plausible, share, data)
     sensor = _sensor(best, colour, grain, share * variance, (1.0 - share) * variance, interval)
+    sensor = replace(sensor, kinks=kinks)
     return _textured(Separation(best.knots, sensor, rounding, bool(coarse)), runs, frequency, windows, step)
 
 
@@ -138,6 +148,11 @@ def _textured(
     """With the error's density as measured, and how its level varies where the sensor outweighs the driver."""
     share = 1.0 - split.driver_share_of(frequency)
     frequencies, densities = measured_density(frequency, windows, share)
+    if split.sensor.kinks is not None:  # what varies in level is theirs, and what they leave is as the parts have it
+        middles = np.array(frequencies)
+        densities = tuple((split.sensor.noise_density(middles) * passed(middles) ** 2).tolist())
+        sensor = replace(split.sensor, frequencies=rounded(frequencies), densities=rounded(densities))
+        return replaced(split, sensor=sensor)
     sensor = replace(split.sensor, frequencies=rounded(frequencies), densities=rounded(densities))
     fast = frequency > FAST
     if (windows.mean(axis=0) * share)[fast].sum() > LEAST_SHARE * windows.mean(axis=0)[fast].sum():

@@ -1,0 +1,119 @@
+"""Tracks made of pieces: found where they are, sampled as they were found."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from xosc_lateral.driver.records import plain, read_as
+from xosc_lateral.driver.sensor.kinks import Kinks
+from xosc_lateral.driver.sensor.kinks_fit import find_kinks, jumps_of
+from xosc_lateral.driver.sensor.model import SensorModel
+from xosc_lateral.driver.sensor.separation import separate
+from xosc_lateral.drives.filters import scale_frequencies
+from xosc_lateral.drives.periodogram import periodograms
+from xosc_lateral.drives.resampling import STEP, passed, resample
+from xosc_lateral.errors import DriverProfileError
+
+RATE, EVERY, JUMP = 20.0, 1.0, 0.02
+WHITE = 2.0 * EVERY * JUMP**2
+"""One-sided density of jumps that know nothing of each other. [m2/s2/Hz]"""
+
+
+def track(rng: np.random.Generator, jump: float, seconds: float = 60.0) -> np.ndarray:
+    """Slow movement in millimetres, whose slope jumps once a second."""
+    n, size = round(seconds * RATE), round(EVERY * RATE)
+    frequency = np.fft.rfftfreq(n, 1.0 / RATE)
+    slow = scale_frequencies(rng.normal(size=n), np.where((frequency > 0.0) & (frequency < 0.15), 2.0, 0.0))
+    places = np.arange(int(rng.integers(size)) + 1, n - 1, size)
+    steps = np.zeros(n)
+    steps[places] = jump * rng.normal(size=len(places))
+    bent = np.cumsum(np.cumsum(steps)) / RATE
+    bent -= np.polyval(np.polyfit(np.arange(n), bent, 6), np.arange(n))  # it would wander off
+    return np.round(slow + bent, 3)
+
+
+@pytest.fixture(scope="module")
+def tracks() -> list[np.ndarray]:
+    rng = np.random.default_rng(5)
+    return [track(rng, JUMP) for _ in range(40)]
+
+
+def seen(rows: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray, list[np.ndarray]]:
+    time = np.arange(len(rows[0])) / RATE
+    runs = [resample(time, one, np.arange(0.0, time[-1], STEP)) for one in rows]
+    density = 2.0 * STEP * np.concatenate([periodograms(run, 128) for run in runs]).mean(axis=0)
+    return np.fft.rfftfreq(128, STEP), density, runs
+
+
+def test_jumps_between_cubics_are_read_exactly():
+    size, rng = 20, np.random.default_rng(1)
+    time = np.arange(400) / RATE
+    jumps = rng.normal(size=19)
+    path = 0.3 * time - 0.02 * time**2 + 0.001 * time**3
+    for k, jump in enumerate(jumps, start=1):
+        path = path + jump * np.maximum(time - k * EVERY, 0.0)
+    found, first = jumps_of(path, size, RATE)
+    np.testing.assert_allclose(found, jumps, atol=1e-9)
+    assert first == size
+
+
+def test_kinks_are_found_with_their_period_size_and_the_rows_rounding(tracks):
+    frequency, density, _ = seen(tracks)
+    kinks, noise = find_kinks(tracks, RATE, frequency, density)
+    assert kinks.every == EVERY
+    middle = np.array(kinks.densities[2:-2])
+    assert middle.mean() == pytest.approx(WHITE, rel=0.1)  # 40 tracks of 58 jumps
+    assert noise == pytest.approx(1e-3 / np.sqrt(12.0), rel=0.05)
+    assert kinks.level_variance < 0.3  # of 0, with an error of about 0.1
+
+
+def test_smooth_tracks_have_none():
+    rng = np.random.default_rng(6)
+    smooth = [track(rng, 0.0) for _ in range(40)]
+    frequency, density, _ = seen(smooth)
+    assert find_kinks(smooth, RATE, frequency, density) is None
+
+
+def test_what_kinks_add_is_the_sensors_above_half_a_kink_a_period_and_no_drivers(tracks):
+    frequency, density, runs = seen(tracks)
+    split = separate(runs, STEP, rows=tracks, rate=RATE)
+    images = (frequency > 0.6) & (frequency < 0.9)
+    assert split.driver_share_of(frequency)[images].mean() < 0.15
+    known = split.sensor.kinks.density(frequency)
+    np.testing.assert_allclose(known[images].mean(), density[images].mean(), rtol=0.1)
+
+
+def test_sampled_kinks_have_their_density_with_zeros_once_a_period():
+    kinks = Kinks(EVERY, (WHITE,) * 5, (0.0,) * 5, 0.5, 5.0)
+    rng = np.random.default_rng(2)
+    made = [kinks.sample(np.zeros(1000), STEP, rng) for _ in range(60)]
+    frequency = np.fft.rfftfreq(200, STEP)
+    density = 2.0 * STEP * np.concatenate([periodograms(one, 200) for one in made]).mean(axis=0)
+    between = (frequency > 0.65) & (frequency < 0.95) | (frequency > 1.05) & (frequency < 1.45)
+    ratio = density[between] / kinks.density(frequency[between])
+    np.testing.assert_allclose(np.log(ratio).mean(), 0.0, atol=0.1)
+    slow = (frequency > 0.1) & (frequency < 0.4)
+    assert density[slow].max() < 0.05 * WHITE / (2.0 * np.pi * 0.4) ** 4
+
+
+def test_images_of_slow_movement_follow_from_it():
+    """All of a wave is the kinks': what they add is its image, smaller by the square of the frequencies' ratio."""
+    kinks = Kinks(EVERY, (0.0,) * 5, (1.0,) * 5, 0.0, 5.0)
+    time = STEP * np.arange(3000)
+    path = np.cos(2.0 * np.pi * 0.3 * time)
+    added = kinks.sample(path, STEP, np.random.default_rng(0))[500:2500]
+    for image in (0.7, 1.3):
+        wave = np.exp(-2j * np.pi * image * time[500:2500])
+        amplitude = 2.0 * abs(np.mean(added * wave)) / passed(np.array([image]))[0]
+        assert amplitude == pytest.approx((0.3 / image) ** 2, rel=0.05)
+    assert abs(np.mean(added * np.exp(-2j * np.pi * 0.3 * time[500:2500]))) < 1e-3
+
+
+def test_kinks_are_kept_in_files_and_checked():
+    kinks = Kinks(EVERY, (1e-3, 2e-3), (0.1, 0.2), 0.5, 5.0)
+    sensor = SensorModel(white=1e-8, kinks=kinks)
+    assert read_as(SensorModel, plain(sensor)) == sensor
+    for wrong in ((0.0, (1.0, 1.0), (0.1, 0.1)), (1.0, (1.0,), (0.1,)), (1.0, (1.0, 1.0), (0.1, 2.0))):
+        with pytest.raises(DriverProfileError, match="kinks"):
+            Kinks(*wrong, 0.5, 5.0)
