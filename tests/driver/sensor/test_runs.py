@@ -11,7 +11,7 @@ from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.driver.sensor.error import known_sensor, sensor_error
 from xosc_lateral.driver.sensor.model import SensorModel
 from xosc_lateral.driver.sensor.periodogram import WINDOWS
-from xosc_lateral.driver.sensor.runs import _rows, driver_runs
+from xosc_lateral.driver.sensor.runs import driver_runs, rows_of
 from xosc_lateral.drives.drive import Drive
 from xosc_lateral.errors import DriverProfileError
 
@@ -38,7 +38,7 @@ def test_rows_as_recorded_are_those_within_each_run() -> None:
     drive = recorded()
     run = made_run(np.zeros(50))
     run = type(run)("d", 0, 110.0 + STEP * np.arange(50), run.offset, run.lane_width)
-    rows, rate = _rows([run], [drive])
+    rows, rate = rows_of([run], [drive])
     assert rate == pytest.approx(20.0)
     assert rows is not None
     inside = (drive.time >= 110.0 - 1e-6) & (drive.time <= 119.8 + 1e-6)
@@ -46,7 +46,7 @@ def test_rows_as_recorded_are_those_within_each_run() -> None:
 
 
 def test_without_the_drive_of_a_run_there_are_no_rows() -> None:
-    assert _rows([made_run(np.zeros(50), drive="elsewhere")], [recorded()]) == (None, None)
+    assert rows_of([made_run(np.zeros(50), drive="elsewhere")], [recorded()]) == (None, None)
 
 
 def test_a_profile_without_a_sensor_says_so() -> None:
@@ -57,18 +57,18 @@ def test_a_profile_without_a_sensor_says_so() -> None:
 
 
 def test_without_a_sensor_nothing_is_added() -> None:
-    np.testing.assert_array_equal(sensor_error(None, 5, STEP, SEED), np.zeros(5))
+    np.testing.assert_array_equal(sensor_error(None, np.zeros(5), STEP, SEED), np.zeros(5))
 
 
 def test_the_error_has_the_power_of_its_density_below_the_runs_low_pass() -> None:
-    error = sensor_error(SENSOR, 60_000, STEP, SEED)
+    error = sensor_error(SENSOR, np.zeros(60_000), STEP, SEED)
     assert error.std() == pytest.approx(0.02 * np.sqrt(1.5 / 2.5), rel=0.02)
     assert error.mean() == pytest.approx(0.0, abs=5e-4)
 
 
 def test_pieces_of_a_drive_and_drives_have_errors_of_their_own() -> None:
     one, same, piece, drive = (
-        sensor_error(SENSOR, 4000, STEP, seed, part)
+        sensor_error(SENSOR, np.zeros(4000), STEP, seed, part)
         for seed, part in ((SEED, 0), (SEED, 0), (SEED, 1), (np.random.SeedSequence(6), 0))
     )
     np.testing.assert_array_equal(one, same)
@@ -79,9 +79,11 @@ def test_pieces_of_a_drive_and_drives_have_errors_of_their_own() -> None:
 def test_four_times_the_density_is_twice_the_error() -> None:
     louder = SensorModel(white=4.0 * SENSOR.white)
     np.testing.assert_allclose(
-        sensor_error(louder, 100, STEP, SEED), 2.0 * sensor_error(SENSOR, 100, STEP, SEED), rtol=1e-9
+        sensor_error(louder, np.zeros(100), STEP, SEED),
+        2.0 * sensor_error(SENSOR, np.zeros(100), STEP, SEED),
+        rtol=1e-9,
     )
 
 
 def test_no_rows_have_no_error() -> None:
-    assert len(sensor_error(SENSOR, 0, STEP, SEED)) == 0
+    assert len(sensor_error(SENSOR, np.zeros(0), STEP, SEED)) == 0
