@@ -24,6 +24,7 @@ from xosc_lateral.datasets.movements import (
     pursuit,
     record_movement,
     reflected,
+    sawtooth,
     wandering,
 )
 
@@ -38,6 +39,7 @@ MOVEMENTS = {
     "lopsided": lopsided,
     "pursuit": pursuit,
     "oscillating": oscillating,
+    "sawtooth": sawtooth,
 }
 FOLLOWING = ["steering_wheel_angle", "yaw_rate"]
 

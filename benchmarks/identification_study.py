@@ -2,7 +2,7 @@
 
     python -m benchmarks.identification_study --set SET [--only NAME] [-o OUT.jsonl]
 
-SET is design, validation or test, alone or with _2 or _3 for the later rounds.
+SET is design, validation or test, alone or with _2, _3 or _4 for the later rounds.
 
 docs/validation/identification.toml fixes seeds, movements, kinds, sizes and counts; `--share` runs a part of them. One
 line per drive goes to OUT.jsonl as it is finished; `--table OUT.jsonl` prints the tables of the documents.
@@ -38,7 +38,7 @@ from xosc_lateral.identification.identify import identify
 from xosc_lateral.identification.regression import Coarse, fit_model
 from xosc_lateral.identification.timeline import coarse_mean, join_drives
 
-SETS = tuple(name + suffix for suffix in ("", "_2", "_3") for name in ("design", "validation", "test"))
+SETS = tuple(name + suffix for suffix in ("", "_2", "_3", "_4") for name in ("design", "validation", "test"))
 PROTOCOL = Path(__file__).parents[1] / "docs" / "validation" / "identification.toml"
 
 

@@ -158,6 +158,21 @@ def oscillating(n: int, rng: np.random.Generator) -> np.ndarray:
     return 0.2 * _scaled(_scaled(swing) + 0.5 * _wander(n, rng, 40.0))
 
 
+def sawtooth(n: int, rng: np.random.Generator) -> np.ndarray:
+    """Drifts off at a rate of its own until 0.1 to 0.5 m, is brought back within 2 s, and drifts anew. Shape (n,). [m]"""
+    out = np.empty(n)
+    at, place = 0, 0.0
+    while at < n:
+        rate, end = 0.03 * rng.normal(), rng.uniform(0.1, 0.5)
+        drift = max(1, round(min((end - np.sign(rate) * place) / max(abs(rate), 5e-3), 40.0) / PACE))
+        back = round(rng.uniform(1.0, 2.0) / PACE)
+        top = place + rate * PACE * drift
+        path = np.concatenate([np.linspace(place, top, drift), np.linspace(top, 0.05 * rng.normal(), back)])
+        out[at : at + len(path)] = path[: n - at]
+        at, place = at + len(path), path[-1]
+    return _smooth(out) + 0.03 * _smooth(_wander(n, rng, 1.0))
+
+
 def in_regimes(n: int, rng: np.random.Generator) -> np.ndarray:
     """For a minute at a time, pushed 2.5 times as hard; and then quiet for two. Shape (n,). [m]"""
     loud = np.ones(n)
