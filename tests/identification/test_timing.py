@@ -1,12 +1,18 @@
-"""When and how slowly a driver answers, looked for at 1 Hz: the same answer as the profile's."""
+"""When and how slowly a driver answers: the profile's answer at 1 Hz, and what not knowing it adds to an error."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
+from msgspec import structs
 
+from tests.identification.made_coarse import coarse_of, movement, wander
+from xosc_lateral.driver.effects import Acts, Linear
 from xosc_lateral.driver.effects.response import respond
 from xosc_lateral.identification.dictionary import respond_by_second
+from xosc_lateral.identification.regression import fit_model
+from xosc_lateral.identification.terms.mean import MeanTerm
+from xosc_lateral.identification.timing import _beside, _profile, widening
 
 
 @pytest.mark.parametrize("response", [0.6, 1.5, 4.0])
@@ -15,3 +21,33 @@ def test_an_answer_by_the_second_is_the_mean_of_the_answer_within_it(response: f
     fine = respond(np.repeat(quantity, 1000, axis=0), 0.001, 0.0, response)
     expected = fine.reshape(60, 1000, 2).mean(axis=1)
     np.testing.assert_allclose(respond_by_second(quantity, response), expected, atol=2e-3)
+
+
+def test_a_size_beside_known_columns_is_that_of_least_squares() -> None:
+    rng = np.random.default_rng(6)
+    known, rows, series = rng.normal(size=(200, 3)), rng.normal(size=(200, 2)), rng.normal(size=200)
+    others, _ = np.linalg.qr(known)
+    contrast = np.array([1.0, -0.5])
+    explained, size, variance = _profile(_beside(others, rows), _beside(others, series), contrast)
+    both = np.column_stack([known, rows])
+    sizes, left, *_ = np.linalg.lstsq(both, series, rcond=None)
+    _, alone, *_ = np.linalg.lstsq(known, series, rcond=None)
+    assert size == pytest.approx(contrast @ sizes[3:])
+    assert explained == pytest.approx(alone[0] - left[0])
+    inverse = np.linalg.inv(both.T @ both)[3:, 3:]
+    assert variance == pytest.approx(contrast @ inverse @ contrast)
+
+
+@pytest.mark.parametrize(("memory", "least", "most"), [(2.0, 1.05, 6.0), (200.0, 1.0, 1.6)], ids=["quick", "slow"])
+def test_not_knowing_the_timing_widens_the_error_of_a_quick_column_and_hardly_of_a_slow_one(
+    memory: float, least: float, most: float
+) -> None:
+    """A column that stays for minutes is answered alike whatever the delay."""
+    rng = np.random.default_rng(7)
+    x = wander(rng, 4500, memory)
+    shift = 0.15 * respond(x, 0.2, 0.4, 1.5)
+    term = MeanTerm.of(Linear(acts=Acts.LOCATION, column="x", lag_s=0.4, response_s=1.5))
+    fitted = fit_model(coarse_of(shift + movement(rng, 900.0), {"x": x}), (term,))
+    part = fitted.mean_part(term)
+    effect = structs.replace(term.effect, coefficients=tuple(fitted.sizes[part]), errors=(0.1,), reference=(0.0,))
+    assert least <= widening(fitted, effect, part) < most

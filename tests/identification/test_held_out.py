@@ -1,0 +1,132 @@
+"""Rows that nothing was fitted on: what a term gains there, which profiles are scored, and by what."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tests.identification.made_coarse import SPREAD, coarse_of, movement, wander
+from xosc_lateral.driver.effects import Acts, Linear
+from xosc_lateral.driver.models.kinds import ModelKind
+from xosc_lateral.driver.profile import Provenance
+from xosc_lateral.errors import NotEnoughDataError
+from xosc_lateral.identification.columns import Column, Role
+from xosc_lateral.identification.held_out import _as_kept, _frequency, _quantities, fit_without
+from xosc_lateral.identification.nested import Gain, Nested, _over_blocks
+from xosc_lateral.identification.regression import Coarse, fit_model
+from xosc_lateral.identification.removal import estimate_all
+from xosc_lateral.identification.selection import Accepted, Selection
+from xosc_lateral.identification.terms.base import Term
+from xosc_lateral.identification.terms.cycle import Cycle
+from xosc_lateral.identification.terms.mean import MeanTerm
+from xosc_lateral.identification.terms.step import StepTerm
+
+SECONDS = 900.0
+N = round(SECONDS / 0.2)
+
+
+def mean_term(column: str) -> MeanTerm:
+    return MeanTerm.of(Linear(acts=Acts.LOCATION, column=column))
+
+
+X, IDLE = mean_term("x"), mean_term("idle")
+
+
+@pytest.fixture(scope="module")
+def coarse() -> Coarse:
+    """0.15 m per unit of a column, in 0.1 m of movement; another column does nothing."""
+    rng = np.random.default_rng(151)
+    x, idle = wander(rng, N, 30.0), wander(rng, N, 30.0)
+    angle = np.arange(N) * 0.7 % 360.0
+    return coarse_of(0.15 * x + movement(rng, SECONDS), {"x": x, "idle": idle, "wind": angle})
+
+
+def chosen(coarse: Coarse, *terms: Term) -> Selection:
+    accepted = tuple(Accepted(term, 1e-6) for term in terms)
+    return Selection(accepted, (), fit_model(coarse, ()), fit_model(coarse, terms))
+
+
+@pytest.fixture(scope="module")
+def nested(coarse: Coarse) -> Nested:
+    """Three folds; the idle column was chosen in one of them."""
+    blocks = np.arange(len(coarse)) // 60
+    folds = [blocks % 3 == fold for fold in range(3)]
+    picked = ((X,), (X, IDLE), (X,))
+    selections = tuple(chosen(coarse.only(~held), *terms) for held, terms in zip(folds, picked, strict=True))
+    return Nested(selections, tuple((held, coarse) for held in folds), blocks)
+
+
+def test_what_acts_gains_on_rows_that_it_was_not_fitted_on(nested: Nested) -> None:
+    gain = nested.of(X)
+    assert gain.folds == 3
+    assert gain.interval[0] > 0.0
+
+
+def test_what_does_nothing_gains_nothing_and_counts_where_it_was_chosen(nested: Nested) -> None:
+    gain = nested.of(IDLE)
+    assert gain.folds == 1
+    assert gain.interval[0] < 0.05
+
+
+def test_a_term_that_no_fold_chose_gains_exactly_nothing(nested: Nested) -> None:
+    assert nested.of(mean_term("wind")) == Gain(0.0, 0.0, 0)
+
+
+def test_terms_together_gain_what_the_start_lacks(nested: Nested) -> None:
+    assert nested.together([X]).mean == pytest.approx(nested.of(X).mean, abs=0.5)
+    assert nested.together([]) == Gain(0.0, 0.0, 3)
+
+
+def test_a_gain_is_the_mean_over_blocks_with_its_standard_error(coarse: Coarse) -> None:
+    blocks = np.arange(len(coarse)) // 60
+    rows = np.random.default_rng(1).normal(size=len(coarse))
+    found = _over_blocks(rows, blocks, [(coarse.valid, coarse)], 2)
+    sums = np.array([rows[blocks == block].sum() for block in np.unique(blocks[coarse.valid])])
+    assert found.mean == pytest.approx(sums.mean())
+    assert found.error == pytest.approx(sums.std(ddof=1) / np.sqrt(len(sums)))
+    low, high = found.interval
+    assert (low + high) / 2.0 == pytest.approx(found.mean)
+    assert high - low == pytest.approx(2.0 * 1.96 * found.error)
+
+
+def test_a_fold_is_scored_with_its_own_version_of_what_was_kept(coarse: Coarse) -> None:
+    fold = chosen(coarse, X, IDLE)
+    assert _as_kept(fold, (mean_term("x"), mean_term("idle"))) is fold.final
+    assert _as_kept(fold, (mean_term("x"),)).terms == (X,)
+    assert _as_kept(fold, ()).terms == ()
+
+
+def test_a_base_is_fitted_to_what_is_left_without_the_effects(coarse: Coarse) -> None:
+    fitted = fit_model(coarse, (X,))
+    used = np.ones(len(coarse.timeline), dtype=bool)
+    with_it = fit_without(fitted, estimate_all(fitted), used, ModelKind.TWO_LEVEL, "after", Provenance(source="here"))
+    bare = fit_model(coarse, ())
+    without = fit_without(bare, estimate_all(bare), used, ModelKind.TWO_LEVEL, "before", None)
+    assert [effect.columns for effect in with_it.effects] == [("x",)]
+    assert without.effects == ()
+    assert (with_it.name, with_it.provenance.source) == ("after", "here")
+    paths = [one.model.stream(np.random.SeedSequence(1)).take(20_000)[0] for one in (with_it, without)]
+    spreads = [3.6 * float(np.std(path)) for path in paths]
+    assert spreads[0] == pytest.approx(SPREAD, rel=0.3)
+    assert spreads[1] > 1.3 * spreads[0]
+
+
+def test_without_a_run_of_ten_seconds_there_is_no_base(coarse: Coarse) -> None:
+    fitted = fit_model(coarse, ())
+    nothing = np.zeros(len(coarse.timeline), dtype=bool)
+    with pytest.raises(NotEnoughDataError, match="no run of 10 s is left"):
+        fit_without(fitted, estimate_all(fitted), nothing, ModelKind.TWO_LEVEL, "before", None)
+
+
+def test_the_residual_is_cut_by_every_column_and_by_what_was_found(coarse: Coarse) -> None:
+    columns = [Column("idle", Role.NUMBER, False), Column("wind", Role.ANGLE, False, period=360.0)]
+    quantities = _quantities(chosen(coarse, X, StepTerm(at=300)), columns)
+    assert list(quantities) == ["idle", "sin(wind)", "cos(wind)", "effect: mean 0", "effect: step 0"]
+    np.testing.assert_allclose(quantities["sin(wind)"] ** 2 + quantities["cos(wind)"] ** 2, 1.0)
+    step = quantities["effect: step 0"]
+    assert (step[1499], step[1500]) == (0.0, 1.0)
+
+
+def test_a_cycle_s_frequency_is_known_where_there_is_one(coarse: Coarse) -> None:
+    assert _frequency(fit_model(coarse, (X,))) is None
+    assert _frequency(fit_model(coarse, (Cycle(1.0 / 12.0),))) == 1.0 / 12.0
