@@ -97,12 +97,12 @@ def run(case: dict[str, Any], protocol: dict[str, Any], seconds: float) -> dict[
     if case["name"].startswith("slow vehicles"):
         outcome |= _oracle_between(case, table)
     elif "size" in case:
-        outcome |= _oracle(case, bare, coarse, seed)
+        outcome |= oracle(case, bare, coarse, seed)
         outcome |= _size(case, found, coarse)
     return outcome
 
 
-def _oracle(case: dict[str, Any], table: pd.DataFrame, coarse: Coarse, seed: int) -> dict[str, float]:
+def oracle(case: dict[str, Any], table: pd.DataFrame, coarse: Coarse, seed: int) -> dict[str, float]:
     """z of the planted answer itself in the same regression, its timing told."""
     from dataclasses import dataclass
 

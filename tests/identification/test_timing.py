@@ -20,7 +20,7 @@ def test_an_answer_by_the_second_is_the_mean_of_the_answer_within_it(response: f
     quantity = np.random.default_rng(5).normal(size=(60, 2))
     fine = respond(np.repeat(quantity, 1000, axis=0), 0.001, 0.0, response)
     expected = fine.reshape(60, 1000, 2).mean(axis=1)
-    np.testing.assert_allclose(respond_by_second(quantity, response), expected, atol=2e-3)
+    np.testing.assert_allclose(respond_by_second(quantity, response, np.zeros(60, dtype=np.intp)), expected, atol=2e-3)
 
 
 def test_a_size_beside_known_columns_is_that_of_least_squares() -> None:
@@ -51,3 +51,15 @@ def test_not_knowing_the_timing_widens_the_error_of_a_quick_column_and_hardly_of
     part = fitted.mean_part(term)
     effect = structs.replace(term.effect, coefficients=tuple(fitted.sizes[part]), errors=(0.1,), reference=(0.0,))
     assert least <= widening(fitted, effect, part) < most
+
+
+@pytest.mark.parametrize("response", [1.0, 4.0])
+def test_an_answer_starts_anew_with_every_drive(response: float) -> None:
+    rng = np.random.default_rng(6)
+    lengths = (7, 1, 30)
+    parts = [rng.normal(size=(n, 3)) + 10.0 * number for number, n in enumerate(lengths)]
+    first = np.repeat(np.cumsum([0, *lengths[:-1]]), lengths).astype(np.intp)
+    alone = [respond_by_second(part, response, np.zeros(len(part), dtype=np.intp)) for part in parts]
+    np.testing.assert_allclose(
+        respond_by_second(np.concatenate(parts), response, first), np.concatenate(alone), atol=1e-12
+    )

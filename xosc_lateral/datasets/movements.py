@@ -159,7 +159,7 @@ def oscillating(n: int, rng: np.random.Generator) -> np.ndarray:
 
 
 def sawtooth(n: int, rng: np.random.Generator) -> np.ndarray:
-    """Drifts off at a rate of its own until 0.1 to 0.5 m, is brought back within 2 s, and drifts anew. Shape (n,). [m]"""
+    """Drifts at a rate of its own for up to 40 s, is brought back within 2 s, and drifts anew. Shape (n,). [m]"""
     out = np.empty(n)
     at, place = 0, 0.0
     while at < n:

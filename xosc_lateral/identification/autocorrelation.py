@@ -113,7 +113,7 @@ def moving_sum(weights: FloatArray, values: FloatArray) -> FloatArray:
 
 
 def fit_autoregression(
-    values: FloatArray, valid: BoolArray, order: int, *, longest: int | None = None
+    values: FloatArray, valid: BoolArray, order: int, *, longest: int | None = None, floor: float = 0.0
 ) -> MovementProcess:
     """Least squares over all rows that have the whole memory in their own run.
 
@@ -126,6 +126,8 @@ def fit_autoregression(
         Past values that have a coefficient each; lowered when the runs are too short for it.
     longest : int, optional
         Past values that are seen as means of stretches that double in length; `order` without.
+    floor : float
+        Standard deviation of white noise that the process has beside what `values` show. In regressions it is a ridge.
     """
     position = positions_in_run(valid)
     rows_in_all = max(1, int((position >= 0).sum()))
@@ -144,10 +146,14 @@ def fit_autoregression(
     past = [values[rows - lag] for lag in range(1, order + 1)]
     past += [(sums[rows - low] - sums[rows - high]) / (high - low) for low, high in pairwise(edges)]
     design, now = np.stack(past, axis=1), values[rows]
+    # of what each past value or mean is made of, the floor's share
+    noise = floor**2 / np.array([1.0] * order + [high - low for low, high in pairwise(edges)])
     gram = design.T @ design
     gram[np.diag_indices(len(gram))] *= 1.0 + 1e-9
+    gram[np.diag_indices(len(gram))] += len(rows) * noise
     sizes = np.linalg.lstsq(gram, design.T @ now, rcond=None)[0]
     variance = float(np.mean((now - design @ sizes) ** 2)) * len(rows) / max(1, len(rows) - len(sizes))
+    variance += floor**2 + float(noise @ sizes**2)
     lags = [sizes[:order]]
     lags += [
         np.full(high - low, size / (high - low))
@@ -180,7 +186,7 @@ def _stepped_down(lags: FloatArray, variance: float) -> MovementProcess:
 
 
 def start_factors(rows: FloatArray, valid: BoolArray, order: int) -> FloatArray:
-    """Factor on the errors of the first rows of runs, shape (order + 1,); 1 for rows with the whole memory.
+    """Factor on the errors of the first rows of runs, shape (order + 1,), beside those of rows with the whole memory.
 
     The process says how well a row is predicted from the few before it, if the run is a piece of a stationary movement.
     Runs begin where something ended, a lane change for one: their first rows may be off by more.
@@ -192,13 +198,15 @@ def start_factors(rows: FloatArray, valid: BoolArray, order: int) -> FloatArray:
     valid : bool array, shape (n,)
     """
     position = positions_in_run(valid)
-    early = (position >= 0) & (position < order)
+    early, late = (position >= 0) & (position < order), position >= order
+    usual = float(np.mean(rows[late] ** 2)) if late.any() else 1.0
     squares = np.bincount(position[early], rows[early] ** 2, minlength=order)
     count = np.bincount(position[early], minlength=order)
     factors = np.ones(order + 1)
     edges = [0, *(2**power for power in range(order.bit_length()) if 2**power < order), order]
     for low, high in pairwise(edges):
-        factors[low:high] = np.sqrt((squares[low:high].sum() + START_ROWS) / (count[low:high].sum() + START_ROWS))
+        mean = (squares[low:high].sum() + START_ROWS * usual) / (count[low:high].sum() + START_ROWS)
+        factors[low:high] = np.sqrt(mean / max(usual, 1e-300))
     return factors
 
 

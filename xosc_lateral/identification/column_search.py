@@ -29,9 +29,6 @@ from xosc_lateral.identification.terms.base import Outcome, Term
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
 
-HOPELESS = 0.1
-"""With so large a p-value before refinement nothing is refined. [-]"""
-
 CONTENDERS = 4
 """Sets of columns that are refined, at most."""
 
@@ -57,13 +54,14 @@ ROUNDING = 1e-6
 """A term may lower the likelihood of the rows that it is fitted to by so much. More, and the model contradicts it: a
 factor on the movement that changes faster than the movement does, say, which its innovations alone allow. [nat]"""
 
-SECOND_LOOKS = 2
-"""Times that what acts is looked for again beside what was found; the first changes most."""
+LOOKS = 2
+"""Times that what acts is looked for beside what was found before; the first changes most."""
 
 
 class ColumnKind(ModelTerm, Protocol):
     """What the search asks of a kind of term; see `terms.column.ColumnTerm`."""
 
+    component: ClassVar[str]
     single: ClassVar[bool]
 
     @property
@@ -111,13 +109,41 @@ def find_column(search: Search, kind: type[ColumnKind], fitted: Fitted) -> Outco
         if look is None:
             return Outcome(None, min(refused), 1.0) if refused else None
         p_value = upper_tail(float(look.scores.scores[look.scores.best]), look.scores.maxima)
-        if p_value > HOPELESS:
+        if p_value > search.level_of(kind.component):  # refined, it would not be accepted either
             return Outcome(None, dictionary.candidates[look.scores.best].columns, p_value)
         term, after = _best(search, kind, fitted, look, refused)
         if not _grows(fitted, after) and after.log_likelihood >= fitted.log_likelihood - ROUNDING:
             assert isinstance(term, Term)
             return Outcome(term, term.columns, p_value, after)
         refused.add(term.columns)
+
+
+def probability_of(search: Search, kind: type[ColumnKind], fitted: Fitted, columns: tuple[str, ...]) -> float:
+    """p-value of the best candidate of given columns, against the same null as in `find_column`.
+
+    Parameters
+    ----------
+    fitted : Fitted
+        Without a term of these columns. Where it has a product with one of them, that product is known as it is, not
+        with every shape of its factors: nothing would be left to test.
+    """
+    look = _first_look(search, kind, fitted, spared=columns)
+    if look is None:
+        return 1.0
+    own = [i for i, candidate in enumerate(look.dictionary.candidates) if candidate.columns == columns]
+    return upper_tail(float(look.scores.scores[own].max()), look.scores.maxima) if own else 1.0
+
+
+def best_probability(search: Search, kind: type[ColumnKind], fitted: Fitted) -> float:
+    """p-value of the best candidate of all, before refinement."""
+    look = _first_look(search, kind, fitted)
+    return 1.0 if look is None else upper_tail(float(look.scores.scores.max()), look.scores.maxima)
+
+
+def _first_look(search: Search, kind: type[ColumnKind], fitted: Fitted, spared: tuple[str, ...] = ()) -> _Look | None:
+    problem = kind.problem(fitted)
+    dictionary = search.dictionary(kind, fitted, problem)
+    return _look(search, kind, fitted, problem, dictionary, (), draws=NULL_DRAWS, spared=spared)
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,12 +165,13 @@ def _look(
     refused: Collection[tuple[str, ...]],
     *,
     draws: int,
+    spared: tuple[str, ...] = (),
 ) -> _Look | None:
     """Score what is not barred or refused; None: nothing is left."""
     barred = _barred(dictionary, kind, fitted, refused)
     if len(dictionary) == 0 or barred.all():
         return None
-    known = _known(problem, dictionary, [term for term in fitted.terms if isinstance(term, kind)])
+    known = _known(problem, dictionary, [term for term in fitted.terms if isinstance(term, kind)], spared)
     drive = search.coarse.drive[problem.valid]
     scores = score_entries(dictionary, problem.response, known, barred, drive, search.rng(0), draws=draws)
     return _Look(problem, dictionary, known, scores)
@@ -159,23 +186,24 @@ def _best(
     looked for once more with the noise that is left beside what was found: a strong slow effect makes the noise look
     slow, and against slow noise a quicker look-alike stands out better than the effect itself.
     """
-    refined, term = _refined(search, kind, look)
+    term: ColumnKind = kind.of(look.dictionary.timed(look.scores.best))
     after = fit_model(fitted.coarse, (*fitted.terms, term))
-    for _ in range(SECOND_LOOKS):
+    best: Refined | None = None
+    for _ in range(LOOKS):
         problem = kind.reweighted(fitted, after)
-        if problem is None:
+        here: _Look | None = look
+        if problem is not None:
+            dictionary = build_dictionary(search.quantities, problem.whitener)
+            here = _look(search, kind, fitted, problem, dictionary, refused, draws=0)
+        if here is None:
             break
-        dictionary = build_dictionary(search.quantities, problem.whitener)
-        again = _look(search, kind, fitted, problem, dictionary, refused, draws=0)
-        if again is None:
+        refined, other = _refined(search, kind, here)
+        other_after = fit_model(fitted.coarse, (*fitted.terms, other))
+        if best and 2.0 * other_after.log_likelihood - refined.price <= 2.0 * after.log_likelihood - best.price:
             break
-        other, other_term = _refined(search, kind, again)
-        other_after = fit_model(fitted.coarse, (*fitted.terms, other_term))
-        if 2.0 * other_after.log_likelihood - other.price <= 2.0 * after.log_likelihood - refined.price:
-            break
-        same = other_term.columns == term.columns
-        refined, term, after = other, other_term, other_after
-        if same:
+        same = other.columns == term.columns
+        best, term, after = refined, other, other_after
+        if same or problem is None:
             break
     return term, after
 
@@ -199,13 +227,14 @@ def _grows(before: Fitted, after: Fitted) -> bool:
     return len(sums) > 1 and float(sums.sum()) < -GROWN * float(np.std(sums, ddof=1)) * np.sqrt(len(sums))
 
 
-def _known(problem: Problem, dictionary: Dictionary, own: Sequence[ColumnKind]) -> FloatArray:
-    """What the model has already, and the whole cross-basis of its columns: nothing may be blamed on their likes."""
+def _known(problem: Problem, dictionary: Dictionary, own: Sequence[ColumnKind], spared: tuple[str, ...]) -> FloatArray:
+    """What the model has already, and the whole cross-basis of its columns, but for one set that is `spared`: nothing
+    may be blamed on their likes."""
     known = problem.known
     sizes = np.maximum(np.linalg.norm(known, axis=0), 1e-300)
     blocks = [orthonormal(known / sizes, 1e-8)]
     for term in own:
-        parts = {(column,) for column in term.columns} | {term.columns}
+        parts = ({(column,) for column in term.columns} | {term.columns}) - {spared}
         rows = np.array([candidate.columns in parts for candidate in dictionary.candidates])
         if rows.any():
             blocks.append(orthonormal(dictionary.rows[rows].astype(np.float64).T, CROSS_BASIS))

@@ -39,9 +39,10 @@ SEGMENT = 128
 BAND = (0.2, 0.3, 0.4, 0.6, 0.8)
 """Edges of the parts of the band where a driver no longer answers, and sensors still see the car move. [Hz]"""
 
-CLEAR = 0.2
-"""Squared coherence from which a column is feedback. Numbers that are causes stay below 0.06, also where
-they move the car by 0.9 m; consequences are above 0.5. [-]"""
+CLEAR, ALONE = 0.2, 0.5
+"""Squared coherence from which a column is feedback if the movement foretells it too, and from which it is doubtful if
+not. Numbers that are causes stay below 0.06, also where they move the car by 0.9 m; a switch that moves a car of little
+movement of its own by 0.2 m has 0.29; consequences are above 0.5. [-]"""
 
 PREDICTED, PERHAPS, HARDLY = 0.05, 0.02, 0.01
 """Share of a column's innovations that the movement foretells: from the first on it is feedback, from the second on
@@ -101,9 +102,8 @@ def find_feedback(timeline: Timeline, columns: Iterable[Column]) -> list[Feedbac
         # a switch has hardly any changes that could be predicted
         predicted_share = _predicted_share(values, moved, rows) if column.role is Role.NUMBER else 0.0
         floor = 6.0 / len(starts)
-        coherent = shared[of] >= max(CLEAR, floor)
-        clear = predicted_share >= PREDICTED or (coherent and predicted_share >= HARDLY)
-        if clear or coherent or predicted_share >= PERHAPS:
+        clear = predicted_share >= PREDICTED or (shared[of] >= max(CLEAR, floor) and predicted_share >= HARDLY)
+        if clear or shared[of] >= max(ALONE, floor) or predicted_share >= PERHAPS:
             found.append(Feedback(column.name, shared[of], predicted_share, of, not clear))
     return found
 

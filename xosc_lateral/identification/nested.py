@@ -9,6 +9,7 @@ References
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -106,19 +107,25 @@ def nest(
     components : frozenset of str
         Those in which anything was accepted; where nothing was, nothing is to be judged.
     """
+    from joblib import cpu_count
+
     coarse = search.coarse
     seconds = coarse_middle(blocks)[: len(coarse)]
     folds = folds_of(blocks)
-    selections, by_row = [], []
-    for fold in range(folds):
-        progress(fold / folds)
-        held = seconds % folds == fold
-        part = coarse.only(~held) if folds > 1 else coarse
-        share = (folds - 1) / folds if folds > 1 else 1.0
-        selection = select(replace(search, coarse=part, _built=[]), initial, only=components, share=share)
-        selections.append(selection)
-        by_row.append((held, coarse))
-    return Nested(tuple(selections), tuple(by_row), seconds)
+    share = (folds - 1) / folds if folds > 1 else 1.0
+    quiet = replace(search, share=share, progress=lambda _: None)
+
+    def selected(fold: int) -> Selection:
+        part = coarse.only(seconds % folds != fold) if folds > 1 else coarse
+        return select(replace(quiet, coarse=part, _built=[]), initial, only=components)
+
+    selections = []
+    # threads: the work is in compiled code that lets others run, and all folds read the same candidates
+    with ThreadPoolExecutor(min(folds, cpu_count())) as pool:
+        for selection in pool.map(selected, range(folds)):
+            selections.append(selection)
+            progress(len(selections) / folds)
+    return Nested(tuple(selections), tuple((seconds % folds == fold, coarse) for fold in range(folds)), seconds)
 
 
 def _over_blocks(rows: FloatArray, blocks: IntArray, where: Sequence[tuple[BoolArray, Coarse]], folds: int) -> Gain:

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Protocol
 
 import numpy as np
@@ -21,6 +22,7 @@ from numpy.typing import NDArray
 
 from xosc_lateral.driver.effects import Acts, ColumnEffect
 from xosc_lateral.identification.autocorrelation import Whitener, fit_autoregression, start_factors, unbiased
+from xosc_lateral.identification.least_squares import clustered_least_squares
 from xosc_lateral.identification.log_scale import (
     CLIP,
     bounded,
@@ -40,6 +42,16 @@ ORDER = 12
 
 LONGEST = 96
 """Past seconds that it sees as means of doubling stretches: the wander of a minute and a half. [s]"""
+
+FLOOR = 0.03
+"""White noise that the model of a drive has beside what it shows: no table knows the lane better (in the motorway
+recording the standard error of a lane's centre is 0.03 m; docs/real_data.md). Providers smooth their tracks, answers
+and all; without a floor an effect is sized where the smoothing left nothing of it. Sensitivity:
+docs/design/identification.md. [m]"""
+
+STRETCH_S = 60
+"""Stretches of a drive that count as independent in the errors of sizes: far beyond what whitening leaves of the
+memory, and the whole of a passing vehicle. [s]"""
 
 ROUNDS = 4
 """Turns of sizes, autoregression and scale; they settle in three."""
@@ -98,6 +110,14 @@ class Coarse:
     def drives(self) -> int:
         """Number of drives."""
         return int(self.drive.max()) + 1
+
+    @cached_property
+    def stretch(self) -> IntArray:
+        """Stretches of a minute within drives, numbered, shape (n,); they count as independent of each other."""
+        _, first = np.unique(self.drive, return_index=True)
+        minute = (np.arange(len(self)) - first[self.drive]) // STRETCH_S
+        _, stretch = np.unique(self.drive * len(self) + minute, return_inverse=True)
+        return stretch.astype(np.intp)
 
     @property
     def lasts(self) -> bool:
@@ -163,6 +183,8 @@ class Fitted:
         Natural logarithm per unit.
     rows : array, shape (n,)
         Whitened residual, variance 1, 0 where invalid.
+    innovations : array, shape (n,)
+        The same by the movement as it is seen, without a floor: what tells how large it is just now.
     movement : array, shape (n,)
         Offset less level and mean terms, over the scale; 0 where invalid. [m]
     starts : array, shape (order + 1,)
@@ -182,6 +204,7 @@ class Fitted:
     log_sizes: FloatArray
     log_covariance: FloatArray
     rows: FloatArray
+    innovations: FloatArray
     movement: FloatArray
     starts: FloatArray
     log_likelihood: float
@@ -225,26 +248,42 @@ def fit_model(coarse: Coarse, terms: Sequence[ModelTerm]) -> Fitted:
         scale = np.exp(scales @ log_sizes + known) * spread[coarse.drive]
         left = coarse.offset - columns @ sizes - levels[coarse.drive]
         movement = np.where(coarse.valid, left / scale, 0.0)
-        process = fit_autoregression(movement, coarse.valid, ORDER, longest=LONGEST)
+        process = fit_autoregression(movement, coarse.valid, ORDER, longest=LONGEST, floor=FLOOR)
         if not coarse.lasts:
             process = unbiased(process, coarse.valid, coarse.drive, ORDER, longest=LONGEST)
         whitener = Whitener(process, coarse.valid, coarse.drive, scale)
         response, design = whitener.rows(coarse.offset), whitener.rows(columns)
-        sizes, covariance = _least_squares(design, response)
+        sizes, covariance = clustered_least_squares(design, response, coarse.stretch)
         rows = response - design @ sizes
         levels = whitener.levels(coarse.offset - columns @ sizes)
         if scales.shape[1]:
             log_sizes = bounded(log_sizes + scoring_step(scales, rows, valid, drive), scales[valid])
         spread = spread * np.sqrt(own_levels(clipped_squares(rows, valid), valid, drive))
-    n = int(coarse.valid.sum())
-    variance = max(float(rows @ rows) / max(1, n - len(sizes)), 1e-300)  # a drive may stand still
     left = np.where(coarse.valid, coarse.offset - columns @ sizes - levels[coarse.drive], 0.0)
     starts = start_factors(rows, coarse.valid, process.order)
+    seconds = int(valid.sum())
+    freedom = seconds / max(1, seconds - len(sizes))
     return Fitted(
         coarse, tuple(terms), whitener, columns, sizes, covariance, levels, scales, log_sizes,
-        covariance_of_log_sizes(scales, rows, valid, drive), rows / np.sqrt(variance), left / scale, starts,
+        covariance_of_log_sizes(scales, rows, valid, drive), _standardised(rows, valid, freedom),
+        _innovations(coarse, left, scale, freedom), left / scale, starts,
         _log_likelihood(rows, whitener, starts),
     )  # fmt: skip
+
+
+def _innovations(coarse: Coarse, left: FloatArray, scale: FloatArray, freedom: float) -> FloatArray:
+    """What is new in each second of the movement as it is seen, without a floor; young runs by their own size."""
+    process = fit_autoregression(left / scale, coarse.valid, ORDER, longest=LONGEST)
+    whitener = Whitener(process, coarse.valid, coarse.drive, scale)
+    rows = whitener.rows(left)
+    rows = rows / whitener.by_position(start_factors(rows, coarse.valid, process.order))
+    return _standardised(rows, coarse.valid, freedom)
+
+
+def _standardised(rows: FloatArray, valid: BoolArray, freedom: float) -> FloatArray:
+    """Of variance 1, with as many degrees of freedom as the rows less the sizes have."""
+    variance = freedom * float(rows @ rows) / max(1, int(valid.sum()))
+    return np.asarray(rows / np.sqrt(max(variance, 1e-300)))
 
 
 def held_out_likelihood(fitted: Fitted, coarse: Coarse, held: BoolArray) -> FloatArray:
@@ -300,19 +339,3 @@ def _log_likelihood(rows: FloatArray, whitener: Whitener, starts: FloatArray) ->
     factor = whitener.by_position(starts)
     squares = np.square(rows / factor)
     return float(np.sum((-0.5 * squares - np.log(factor * whitener.deviations))[whitener.valid]))
-
-
-def _least_squares(design: FloatArray, response: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Sizes, and a sandwich for their covariance [1]_: loud seconds come together, and a column may come with them.
-
-    References
-    ----------
-    .. [1] H. White, "A heteroskedasticity-consistent covariance matrix estimator", Econometrica 48, 1980.
-    """
-    if design.shape[1] == 0:
-        return np.zeros(0), np.zeros((0, 0))
-    inverse = np.linalg.pinv(design.T @ design)
-    sizes = inverse @ (design.T @ response)
-    scores = design * (response - design @ sizes)[:, None]
-    freedom = len(response) / max(1, len(response) - design.shape[1])
-    return sizes, np.asarray(inverse @ (scores.T @ scores) @ inverse * freedom, dtype=np.float64)

@@ -17,10 +17,10 @@ from xosc_lateral.identification.dictionary import (
     Quantities,
     build_dictionary,
     orthonormal,
-    respond_by_second,
 )
 from xosc_lateral.identification.problem import Problem
 from xosc_lateral.identification.regression import Coarse
+from xosc_lateral.identification.significance import level_of
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
@@ -43,6 +43,8 @@ class Search:
     seed : SeedSequence
     progress : callable
         Told what is being done, in a few words.
+    share : float
+        Of the table's rows that `coarse` is.
     """
 
     coarse: Coarse
@@ -50,6 +52,7 @@ class Search:
     quantities: Quantities
     seed: np.random.SeedSequence
     progress: Callable[[str], None]
+    share: float = 1.0
     _built: list[tuple[object, object, Dictionary]] = field(default_factory=list, repr=False)
 
     @classmethod
@@ -81,13 +84,16 @@ class Search:
         """What columns can do in any shape, at any lag and response, at 1 Hz, orthonormal, shape (n, rank)."""
         known = frozenset(columns)
         own = [i for i, one in enumerate(self.quantities.candidates) if known.issuperset(one.columns)]
-        values = self.quantities.values[own].astype(np.float64).T
         seconds, valid = np.arange(len(self.coarse)), self.coarse.valid[:, None]
-        answers = [(respond_by_second(values, response), lags) for response, lags in TIMINGS.items()]
+        answers = [(self.quantities.answers(own, response), lags) for response, lags in TIMINGS.items()]
         blocks = [
             answer[np.clip(seconds - lag, 0, len(seconds) - 1)] * valid for answer, lags in answers for lag in lags
         ]
-        return orthonormal(np.concatenate(blocks, axis=1), CROSS_BASIS)
+        return orthonormal(np.concatenate(blocks, axis=1).astype(np.float64), CROSS_BASIS)
+
+    def level_of(self, component: str) -> float:
+        """Family-wise level that a component may spend on these rows."""
+        return level_of(component, self.share)
 
     def rng(self, *key: int) -> np.random.Generator:
         """Independent stream by purpose."""

@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 
 from xosc_lateral.identification.regression import Fitted, fit_model
 from xosc_lateral.identification.search import Search
-from xosc_lateral.identification.significance import level_of
 from xosc_lateral.identification.stages import STAGES
 from xosc_lateral.identification.terms.base import Outcome, Term
 
@@ -77,9 +76,7 @@ class Selection:
         )
 
 
-def select(
-    search: Search, initial: Sequence[Term] = (), *, only: frozenset[str] | None = None, share: float = 1.0
-) -> Selection:
+def select(search: Search, initial: Sequence[Term] = (), *, only: frozenset[str] | None = None) -> Selection:
     """Add terms stage by stage.
 
     Parameters
@@ -89,8 +86,6 @@ def select(
         In the model already.
     only : frozenset of str, optional
         Components to look at; all without.
-    share : float
-        Of the table's rows that this is.
     """
     start = fitted = fit_model(search.coarse, initial)
     accepted: list[Accepted] = []
@@ -104,11 +99,11 @@ def select(
             tests = [(kind, test) for kind in asked if (test := _asked(search, kind, fitted)) is not None]
             passed = []
             for kind, test in tests:
-                if test.term is not None and test.p_value <= level_of(kind.component, share):
+                if test.term is not None and test.p_value <= search.level_of(kind.component):
                     passed.append(test)
                 else:
                     seen_at[kind.component] = len(accepted)
-                    rejected[kind.component] = _rejected(kind.component, test, share)
+                    rejected[kind.component] = _rejected(search, kind.component, test)
             if not passed:
                 break
             best = min(passed, key=lambda test: test.p_value)
@@ -117,11 +112,11 @@ def select(
             fitted = best.after or fit_model(search.coarse, (*fitted.terms, best.term))
     selection = Selection(tuple(accepted), tuple(rejected.values()), start, fitted)
     for one in accepted:
-        selection = _tested_again(search, selection, one, share)
+        selection = _tested_again(search, selection, one)
     return selection
 
 
-def _tested_again(search: Search, selection: Selection, one: Accepted, share: float) -> Selection:
+def _tested_again(search: Search, selection: Selection, one: Accepted) -> Selection:
     """The same without a term that no longer stands beside what was found after it.
 
     Rotations keep how loud the movement is, not where: a column that goes along with loud stretches scores on the mean.
@@ -137,13 +132,8 @@ def _tested_again(search: Search, selection: Selection, one: Accepted, share: fl
     if not explains:
         return selection
     without = selection.without([one.term], "what was found after it explains it")
-    test = _asked(search, type(one.term), without.final)
-    stands = (
-        test is not None
-        and test.term is not None
-        and test.term.columns == one.term.columns
-        and test.p_value <= level_of(one.term.component, share)
-    )
+    search.progress(f"looking at {one.term.component.replace('_', ' ')} again")
+    stands = one.term.probability_beside(search, without.final) <= search.level_of(one.term.component)
     return selection if stands else without
 
 
@@ -156,6 +146,6 @@ def _asked(search: Search, kind: type[Term], fitted: Fitted) -> Outcome | None:
     return kind.test(search, fitted)
 
 
-def _rejected(component: str, test: Outcome, share: float) -> Rejected:
-    why = f"not significant: its p-value is above {level_of(component, share):.2g}"
+def _rejected(search: Search, component: str, test: Outcome) -> Rejected:
+    why = f"not significant: its p-value is above {search.level_of(component):.2g}"
     return Rejected(component, test.columns, test.p_value, why)

@@ -52,14 +52,23 @@ class Squares:
 
 
 def fine_squares(fitted: Fitted) -> Squares:
-    """Squared innovations of the 0.2 s grid, averaged to 1 Hz; drives are each compared with themselves."""
+    """Squared innovations of the 0.2 s grid, averaged to 1 Hz; drives are each compared with themselves.
+
+    Answers to columns are taken out as far as the innovations show them: where the provider of the tracks smoothed them
+    away, they would be put in, and look like noise.
+    """
     coarse, timeline = fitted.coarse, fitted.coarse.timeline
-    on_grid, n = fitted.explained, len(timeline)
+    n = len(timeline)
     valid = timeline.valid & np.repeat(coarse.valid, COARSE)[:n] if len(coarse) * COARSE >= n else timeline.valid
-    moved = np.where(valid, timeline.offset - on_grid, 0.0)
+    level = fitted.levels[timeline.drive]
+    moved = np.where(valid, timeline.offset - level, 0.0)
+    answers = np.where(valid, fitted.explained - level, 0.0)
     process = fit_autoregression(moved, valid, FINE_ORDER)
-    innovations = moving_sum(process.polynomial, moved)
+    innovations, answers = moving_sum(process.polynomial, moved), moving_sum(process.polynomial, answers)
     settled = moving_sum(np.ones(process.order + 1), valid.astype(np.float64)) > process.order + 0.5
+    power = float(answers[settled] @ answers[settled])
+    seen = float(np.clip(answers[settled] @ innovations[settled] / power, 0.0, 1.0)) if power > 0.0 else 0.0
+    innovations = innovations - seen * answers
     squares = coarse_mean(np.where(settled, np.square(innovations), 0.0))
     whole = coarse_all(settled)
     return Squares(squares / own_levels(squares, whole, coarse.drive)[coarse.drive], whole)
@@ -68,7 +77,7 @@ def fine_squares(fitted: Fitted) -> Squares:
 def slow_squares(fitted: Fitted) -> Squares:
     """Squares of the whitened movement's running sums: more is let pass, but what is done is done as always."""
     valid = fitted.coarse.valid
-    sums = moving_sum(np.ones(SLOW_S), fitted.rows)
+    sums = moving_sum(np.ones(SLOW_S), fitted.innovations)
     whole = valid & (moving_sum(np.ones(SLOW_S), valid.astype(np.float64)) >= SLOW_S - 0.5)
     deviation = float(sums[whole].std()) if whole.any() else 1.0
     return Squares(np.where(whole, np.square(sums / max(deviation, 1e-12)), 0.0), whole)

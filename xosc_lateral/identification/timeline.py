@@ -195,7 +195,7 @@ def _gridded(drive: Drive, rules: CutRules, periods: Mapping[str, float]) -> Tim
         time=drive.time[0] + STEP * (np.arange(total) - PAD),
         offset=np.pad(offset, pads),
         valid=np.pad(valid, pads),
-        lane_width=np.pad(average(drive.time, drive.lane_width, grid), pads, mode="edge"),
+        lane_width=np.pad(_averaged(drive.time, drive.lane_width, grid), pads, mode="edge"),
         context=context,
         levels=drive.levels,
     )
@@ -220,7 +220,14 @@ def _lengthened(part: Timeline, total: int) -> Timeline:
 def _on_grid(drive: Drive, name: str, grid: FloatArray, periods: Mapping[str, float]) -> FloatArray:
     values = drive.context[name]
     held = name in drive.levels or name in periods
-    return (nearest if held else average)(drive.time, values, grid)
+    return nearest(drive.time, values, grid) if held else _averaged(drive.time, values, grid)
+
+
+def _averaged(time: FloatArray, values: FloatArray, grid: FloatArray) -> FloatArray:
+    """Averages of equal numbers as equal numbers: a threshold must not tell rounding errors apart."""
+    largest = float(np.max(np.abs(values), initial=0.0, where=np.isfinite(values)))
+    digits = 12 - int(np.ceil(np.log10(largest))) if largest > 0.0 else 0
+    return np.round(average(time, values, grid), digits)
 
 
 def _periods(drives: Sequence[Drive]) -> dict[str, float]:

@@ -144,6 +144,11 @@ class Term(ABC):
     def test(cls, search: Search, fitted: Fitted) -> Outcome | None:
         """Look for one more term of this kind beside those fitted; None: there is nothing to look at."""
 
+    def probability_beside(self, search: Search, fitted: Fitted) -> float:
+        """p-value of this very finding beside the terms fitted, which it is not one of."""
+        test = type(self).test(search, fitted)
+        return test.p_value if test is not None and test.term is not None and self.matches(test.term) else 1.0
+
     @abstractmethod
     def estimate(self, fitted: Fitted) -> tuple[Effect, ...]:
         """What the profile gets: the effect proper first, then what goes with it."""

@@ -11,7 +11,7 @@ from msgspec import structs
 from numpy.typing import NDArray
 
 from xosc_lateral.driver.effects import Acts, ColumnEffect, Effect
-from xosc_lateral.identification.column_search import find_column
+from xosc_lateral.identification.column_search import find_column, probability_of
 from xosc_lateral.identification.problem import Problem
 from xosc_lateral.identification.ranges import span
 from xosc_lateral.identification.regression import Coarse, Fitted
@@ -77,6 +77,10 @@ class ColumnTerm(Term):
     def test(cls, search: Search, fitted: Fitted) -> Outcome | None:
         """The best candidate of the whole dictionary against rotations."""
         return find_column(search, cls, fitted)
+
+    def probability_beside(self, search: Search, fitted: Fitted) -> float:
+        """p-value of its columns in whatever shape suits them beside the terms fitted."""
+        return probability_of(search, type(self), fitted, self.columns)
 
     def remove(self, fitted: Fitted, effects: tuple[Effect, ...], removal: Removal) -> None:
         """Evaluate the sized effects."""

@@ -78,7 +78,7 @@ class Cycle(Term):
         for index in range(coarse.drives):
             rows = coarse.drive == index
             if coarse.valid[rows].sum() >= MIN_DRIFT_S:
-                outcomes += [_line(fitted.rows[rows], width) for width in WIDTHS]
+                outcomes += [_line(fitted.innovations[rows], width) for width in WIDTHS]
         if not outcomes:
             return None
         p_value, frequency, width = min(outcomes)

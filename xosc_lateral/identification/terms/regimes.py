@@ -82,8 +82,10 @@ class RegimesTerm(Term):
             return None
         # what a column does to the size in another shape than the one that was found is no regime either
         known = [known_log_scale(fitted), search.cross_basis(columns_on_size(fitted))]
-        p_value = probability_of_clusters(fitted.rows, coarse.valid, np.concatenate(known, axis=1), search.rng(3))
-        return Outcome(cls(fit_regimes(fitted.rows, coarse.valid)), (), p_value)
+        p_value = probability_of_clusters(
+            fitted.innovations, coarse.valid, np.concatenate(known, axis=1), search.rng(3)
+        )
+        return Outcome(cls(fit_regimes(fitted.innovations, coarse.valid)), (), p_value)
 
     def estimate(self, fitted: Fitted) -> tuple[Effect, ...]:
         """Regimes are told by the innovations; what they do to the movement itself may be more."""

@@ -38,7 +38,7 @@ class RestoringTerm(ColumnTerm):
     @classmethod
     def problem(cls, fitted: Fitted) -> Problem:
         """Innovations on quantity times recent offset."""
-        return of_products(fitted.coarse, fitted.rows, answers(fitted, cls), recent_offset(fitted))
+        return of_products(fitted.coarse, fitted.innovations, answers(fitted, cls), recent_offset(fitted))
 
     @classmethod
     def barred(cls, fitted: Fitted) -> frozenset[str]:
@@ -54,7 +54,7 @@ class RestoringTerm(ColumnTerm):
         change = np.diff(fitted.movement, prepend=0.0)[inside] / fitted.whitener.process.deviations[-1]
         base = float(design[:, 0] @ change) / max(float(design[:, 0] @ design[:, 0]), 1e-12)
         inverse = np.linalg.pinv(design.T @ design)
-        slope = float((inverse @ (design.T @ fitted.rows[inside]))[1])
+        slope = float((inverse @ (design.T @ fitted.innovations[inside]))[1])
         low, high = driving_range(coarse, self.effect)
         limit = np.log(MAX_FACTOR) / max(float(abs(high[0] - low[0])), 1e-12)
         size = float(np.clip(slope / min(base, -1e-3), -limit, limit))

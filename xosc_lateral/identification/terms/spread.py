@@ -39,7 +39,9 @@ class SpreadTerm(ColumnTerm):
     def problem(cls, fitted: Fitted) -> Problem:
         """Squared innovations."""
         coarse = fitted.coarse
-        return of_squares(coarse, squared_innovations(fitted.rows, coarse.valid), coarse.valid, known_log_scale(fitted))
+        return of_squares(
+            coarse, squared_innovations(fitted.innovations, coarse.valid), coarse.valid, known_log_scale(fitted)
+        )
 
     @classmethod
     def barred(cls, fitted: Fitted) -> frozenset[str]:

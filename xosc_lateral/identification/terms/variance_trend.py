@@ -119,7 +119,7 @@ def _probability(fitted: Fitted, slow: bool, known: FloatArray) -> float:
         own = slow_squares(fitted)
         squares, valid = own.standardised, own.valid
     else:
-        squares, valid = squared_innovations(fitted.rows, coarse.valid), coarse.valid
+        squares, valid = squared_innovations(fitted.innovations, coarse.valid), coarse.valid
     basis = orthonormal(np.column_stack([np.ones(valid.sum()), known[valid]]))
     time, left = (values - basis @ (basis.T @ values) for values in (elapsed(coarse)[valid], squares[valid]))
     slope = float(time @ left) / max(float(time @ time), 1e-300)

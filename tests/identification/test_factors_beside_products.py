@@ -1,0 +1,35 @@
+"""A term tested anew beside the others: what a product leaves for its factors, and what it does not."""
+
+import numpy as np
+import pytest
+
+from tests.identification.planted import planted_drive
+from xosc_lateral.driver.effects import Acts, Product
+from xosc_lateral.driver.effects.product import Factor, Form
+from xosc_lateral.identification.column_search import best_probability, probability_of
+from xosc_lateral.identification.identify import usable_columns
+from xosc_lateral.identification.regression import fit_model
+from xosc_lateral.identification.search import Search
+from xosc_lateral.identification.terms.mean import MeanTerm
+
+PRODUCT = MeanTerm.of(
+    Product(
+        acts=Acts.LOCATION,
+        factors=(Factor(column="gust", form=Form.VALUE), Factor(column="slope", form=Form.VALUE)),
+        response_s=2.0,
+    )
+)
+
+
+@pytest.mark.parametrize("seed", [821, 822])
+def test_a_factor_stands_beside_its_product_if_it_acts_by_itself(seed: int) -> None:
+    coarse = planted_drive(
+        lambda column: 0.12 * column["gust"] + 0.12 * column["gust"] * column["slope"], seed, ("gust", "slope")
+    )
+    search = Search.over(coarse, usable_columns(coarse.timeline)[0], np.random.SeedSequence(1))
+    beside = fit_model(coarse, (PRODUCT,))
+    assert probability_of(search, MeanTerm, beside, ("gust",)) < 1e-3
+    assert probability_of(search, MeanTerm, beside, ("slope",)) > 0.02
+    # looked for anew, it can't be found: the whole cross-basis of the product's columns is known
+    assert best_probability(search, MeanTerm, beside) > 0.02
+    assert probability_of(search, MeanTerm, fit_model(coarse, ()), ("gust", "slope")) < 1e-3
