@@ -5,7 +5,7 @@
 SET is design, validation or test, alone or with _2, _3 or _4 for the later rounds.
 
 docs/validation/identification.toml fixes seeds, movements, kinds, sizes and counts; `--share` runs a part of them. One
-line per drive goes to OUT.jsonl as it is finished; `--table OUT.jsonl` prints the tables of the documents.
+line per drive goes to OUT.jsonl as it is finished; `--table OUT.jsonl...` prints the tables of the documents.
 """
 
 from __future__ import annotations
@@ -33,6 +33,7 @@ from benchmarks.identification_drives import (
     with_mean,
     with_spread,
 )
+from benchmarks.identification_tables import calibration, summary, table
 from xosc_lateral.formats.drives import drives_of_table
 from xosc_lateral.identification.identify import identify
 from xosc_lateral.identification.regression import Coarse, fit_model
@@ -156,78 +157,6 @@ def _size(case: dict[str, Any], found: Any, coarse: Coarse) -> dict[str, float]:
     return {}
 
 
-def right(outcome: dict[str, Any]) -> bool:
-    """Whether the planted thing is named."""
-    kind = "scale" if "factor" in outcome else "location"
-    accepted = [sorted(columns) for columns in outcome["accepted"]]
-    if outcome["name"] == "both neighbours":
-        return all(any(columns == [one] for _, columns, *_ in outcome["named"]) for one in outcome["accepted"][0])
-    return any(k == kind and columns in accepted for k, columns, *_ in outcome["named"])
-
-
-def false(outcome: dict[str, Any]) -> list[Any]:
-    """What is named and was not planted."""
-    accepted = [sorted(columns) for columns in outcome.get("accepted", [])]
-    if outcome["name"] == "both neighbours":
-        accepted += [[one] for one in outcome["accepted"][0]]
-    kind = "scale" if "factor" in outcome else "location"
-    return [one for one in outcome["named"] if not (one[0] == kind and one[1] in accepted) and not _lane(outcome, one)]
-
-
-def _lane(outcome: dict[str, Any], named: list[Any]) -> bool:
-    """Whether a finding is what all short drives hold: the left lane's vehicles keep 0.08 m further right.
-
-    Between drives any column tells the lane that is there, or wider, in one of the two lanes only.
-    """
-    tells = ("lane_index", "lane_width", "speed", "left_distance", "right_distance", "left_is_truck", "right_is_truck")
-    return outcome["type"].endswith("short") and named[3] == "between" and set(named[1]) <= set(tells)
-
-
-def table(outcomes: list[dict[str, Any]]) -> str:
-    """Markdown: per kind and size, the oracle's z, how many are named, what is false."""
-    lines = [
-        "| drives | size | drives | oracle z (median) | z >= 5 | of these named | all named | something false |",
-        "|---|---|---|---|---|---|---|---|",
-    ]
-    groups: dict[tuple[str, Any], list[dict[str, Any]]] = {}
-    for one in outcomes:
-        groups.setdefault((one["name"], one.get("size", one.get("factor", ""))), []).append(one)
-    for (name, size), own in groups.items():
-        z = [abs(one["oracle_z"]) for one in own if "oracle_z" in one]
-        seen = [one for one in own if abs(one.get("oracle_z", 0.0)) >= 5.0]
-        named = sum(right(one) for one in seen) if seen else ""
-        hits = sum(right(one) for one in own) if "accepted" in own[0] else ""
-        wrong = sum(bool(false(one)) for one in own)
-        median = f"{np.median(z):.1f}" if z else ""
-        lines.append(
-            f"| {name} | {size} | {len(own)} | {median} | {len(seen) if z else ''} | {named} | {hits} | {wrong} |"
-        )
-    return "\n".join(lines)
-
-
-def calibration(outcomes: list[dict[str, Any]]) -> str:
-    """p-values on nulls, and cover of the intervals."""
-    p = np.array([one["p_mean"] for one in outcomes if one["type"].startswith("null") and one["p_mean"] is not None])
-    told = [one for one in outcomes if "oracle_size" in one]
-    cover = (
-        np.mean([abs(one["oracle_size"] - one["size"]) <= 1.96 * one["oracle_error"] for one in told])
-        if told
-        else math.nan
-    )
-    found = [one for one in told if "found_size" in one and right(one)]
-    own = (
-        np.mean([abs(abs(one["found_size"]) - one["size"]) <= 1.96 * one["found_error"] for one in found])
-        if found
-        else math.nan
-    )
-    quantiles = ", ".join(f"{value:.2f}" for value in np.quantile(p, [0.1, 0.25, 0.5, 0.75, 0.9])) if len(p) else ""
-    return (
-        f"p-values of the mean on {len(p)} nulls: 10, 25, 50, 75, 90 % quantiles {quantiles}; "
-        f"below 0.05: {(p < 0.05).mean() if len(p) else 0:.2f}. "
-        f"95 % intervals: told {cover:.2f} of {len(told)}, found {own:.2f} of {len(found)}."
-    )
-
-
 def _plain(name: str) -> str:
     return name
 
@@ -241,11 +170,12 @@ def main() -> None:
     parser.add_argument("--seconds", type=float)
     parser.add_argument("--part", default="0/1", help="K/N: every N-th drive from the K-th on")
     parser.add_argument("-o", "--output", type=Path)
-    parser.add_argument("--table", type=Path)
+    parser.add_argument("--table", type=Path, nargs="+")
     args = parser.parse_args()
     if args.table is not None:
-        outcomes = [json.loads(line) for line in args.table.read_text(encoding="utf-8").splitlines()]
-        print(table(outcomes), calibration(outcomes), sep="\n\n")
+        lines = [line for path in args.table for line in path.read_text(encoding="utf-8").splitlines()]
+        outcomes = sorted(map(json.loads, lines), key=lambda outcome: outcome["seed"])
+        print(summary(outcomes), calibration(outcomes), table(outcomes), sep="\n\n")
         return
     protocol = tomllib.loads(PROTOCOL.read_text(encoding="utf-8"))
     part, parts = map(int, args.part.split("/"))
@@ -272,7 +202,7 @@ def main() -> None:
         if args.output is not None:
             with args.output.open("a", encoding="utf-8") as file:
                 file.write(json.dumps(outcome) + "\n")
-    print(table(outcomes), calibration(outcomes), sep="\n\n")
+    print(summary(outcomes), calibration(outcomes), table(outcomes), sep="\n\n")
 
 
 if __name__ == "__main__":

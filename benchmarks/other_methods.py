@@ -36,7 +36,8 @@ import numpy as np
 import pandas as pd
 
 from benchmarks.identification_drives import long_drive, offset_of, short_drives, with_mean
-from benchmarks.identification_study import PROTOCOL, cases, false, right
+from benchmarks.identification_study import PROTOCOL, cases
+from benchmarks.identification_tables import false, right
 
 Values = np.ndarray
 LAGS_S = 4

@@ -7,6 +7,7 @@ import pytest
 
 from tests.identification.made_coarse import SPREAD, coarse_of, movement, wander
 from xosc_lateral.driver.effects import Acts, Linear, Magnitude
+from xosc_lateral.identification import regression
 from xosc_lateral.identification.regression import Coarse, elapsed, fit_model, held_out_likelihood
 from xosc_lateral.identification.terms.mean import MeanTerm
 from xosc_lateral.identification.terms.spread import SpreadTerm
@@ -106,17 +107,21 @@ def test_sizes_are_least_squares_on_the_white_rows() -> None:
     np.testing.assert_allclose(fitted.sizes, sizes, rtol=1e-6)
 
 
-def test_white_rows_are_white() -> None:
+def test_innovations_are_white() -> None:
     fitted = fit_model(planted(4), (mean_term(),))
-    rows = fitted.rows[fitted.coarse.valid]
+    rows = fitted.innovations[fitted.coarse.valid]
     assert rows.var() == pytest.approx(1.0, rel=0.02)
     for lag in (1, 2, 5):
         assert abs(float(rows[lag:] @ rows[:-lag])) / len(rows) < 4.0 / np.sqrt(len(rows))
 
 
 @pytest.mark.parametrize("factor", [-1.0, 10.0, 1e-3])
-def test_the_unit_of_the_offset_scales_the_sizes_and_nothing_else(factor: float) -> None:
-    one, other = fit_model(planted(5), (mean_term(),)), fit_model(planted(5, scale=factor), (mean_term(),))
+def test_the_unit_of_the_offset_scales_the_sizes_and_nothing_else(
+    factor: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    one = fit_model(planted(5), (mean_term(),))
+    monkeypatch.setattr(regression, "FLOOR", abs(factor) * regression.FLOOR)
+    other = fit_model(planted(5, scale=factor), (mean_term(),))
     np.testing.assert_allclose(other.sizes, factor * one.sizes, rtol=1e-6)
     np.testing.assert_allclose(other.rows, np.sign(factor) * one.rows, atol=1e-6)
 

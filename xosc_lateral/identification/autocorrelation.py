@@ -200,13 +200,15 @@ def start_factors(rows: FloatArray, valid: BoolArray, order: int) -> FloatArray:
     position = positions_in_run(valid)
     early, late = (position >= 0) & (position < order), position >= order
     usual = float(np.mean(rows[late] ** 2)) if late.any() else 1.0
+    if usual <= 0.0:  # nothing moves
+        return np.ones(order + 1)
     squares = np.bincount(position[early], rows[early] ** 2, minlength=order)
     count = np.bincount(position[early], minlength=order)
     factors = np.ones(order + 1)
     edges = [0, *(2**power for power in range(order.bit_length()) if 2**power < order), order]
     for low, high in pairwise(edges):
         mean = (squares[low:high].sum() + START_ROWS * usual) / (count[low:high].sum() + START_ROWS)
-        factors[low:high] = np.sqrt(mean / max(usual, 1e-300))
+        factors[low:high] = np.sqrt(mean / usual)
     return factors
 
 

@@ -8,6 +8,7 @@ from scipy.signal import lfilter
 
 from tests.identification.made_coarse import SPREAD, coarse_of, movement, wander
 from xosc_lateral.driver.effects import Acts, ColumnEffect, Linear
+from xosc_lateral.identification import regression
 from xosc_lateral.identification.regression import Coarse, Fitted, fit_model
 from xosc_lateral.identification.terms.column import ColumnTerm
 from xosc_lateral.identification.terms.fine_noise import FineNoiseTerm
@@ -82,10 +83,14 @@ def test_the_sign_of_a_spread_is_that_of_its_column() -> None:
 
 
 @pytest.mark.parametrize("kind", [SpreadTerm, SlowSpreadTerm, FineNoiseTerm, RestoringTerm])
-def test_metres_or_centimetres_are_the_same_factor(kind: type[ColumnTerm]) -> None:
+def test_metres_or_centimetres_are_the_same_factor(kind: type[ColumnTerm], monkeypatch: pytest.MonkeyPatch) -> None:
     x = column_of(11)
     own = movement(np.random.default_rng(12), SECONDS) * np.exp(LOG_SIZE * x)
-    sizes = [estimate(fit_model(coarse_of(k * own, {"x": x}), (term(kind),)))[0].coefficients[0] for k in (1.0, 100.0)]
+    sizes = []
+    for factor in (1.0, 100.0):
+        monkeypatch.setattr(regression, "FLOOR", 0.03 * factor)
+        fitted = fit_model(coarse_of(factor * own, {"x": x}), (term(kind),))
+        sizes.append(estimate(fitted)[0].coefficients[0])
     assert sizes[0] == pytest.approx(sizes[1], rel=1e-5)
 
 

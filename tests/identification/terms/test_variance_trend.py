@@ -42,7 +42,7 @@ def test_p_values_of_white_rows_are_even() -> None:
     coarse = growing(1.0, 72)
     rng, nothing = np.random.default_rng(73), np.zeros((len(coarse), 0))
     values = [
-        _probability(SimpleNamespace(coarse=coarse, rows=rng.normal(size=len(coarse))), False, nothing)  # type: ignore[arg-type]
+        _probability(SimpleNamespace(coarse=coarse, innovations=rng.normal(size=len(coarse))), False, nothing)  # type: ignore[arg-type]
         for _ in range(300)
     ]
     assert stats.kstest(values, "uniform").pvalue > 0.001
@@ -56,7 +56,9 @@ def test_loudness_in_clusters_is_no_trend_more_often_than_it_is_said() -> None:
     values = []
     for _ in range(200):
         loud = np.repeat(np.exp(0.6 * rng.normal(size=n // 20 + 1)), 20)[:n]
-        values.append(_probability(SimpleNamespace(coarse=coarse, rows=loud * rng.normal(size=n)), False, nothing))  # type: ignore[arg-type]
+        values.append(
+            _probability(SimpleNamespace(coarse=coarse, innovations=loud * rng.normal(size=n)), False, nothing)
+        )  # type: ignore[arg-type]
     assert np.mean(np.array(values) < 0.05) < 0.05 + 4.0 * np.sqrt(0.05 * 0.95 / 200)
 
 
