@@ -15,8 +15,8 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from benchmarks.identification_cases import PROTOCOL, SETS, cases, oracle
 from benchmarks.identification_drives import long_drive, short_drives, smoothed_tracks, with_mean
-from benchmarks.identification_study import PROTOCOL, SETS, cases, oracle
 from xosc_lateral.formats.drives import drives_of_table
 from xosc_lateral.identification import regression
 from xosc_lateral.identification.column_search import best_probability

@@ -35,8 +35,8 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from benchmarks.identification_cases import PROTOCOL, cases
 from benchmarks.identification_drives import long_drive, offset_of, short_drives, with_mean
-from benchmarks.identification_study import PROTOCOL, cases
 from benchmarks.identification_tables import false, right
 
 Values = np.ndarray

@@ -1,0 +1,72 @@
+"""Drives of the protocol (docs/validation/identification.toml), and what an oracle sees in one with an effect."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from benchmarks.identification_drives import answered, quantity, unit
+from xosc_lateral.identification.regression import Coarse, fit_model
+from xosc_lateral.identification.timeline import coarse_mean
+
+SETS = tuple(name + suffix for suffix in ("", "_2", "_3", "_4") for name in ("design", "validation", "test"))
+PROTOCOL = Path(__file__).parents[1] / "docs" / "validation" / "identification.toml"
+
+
+def cases(protocol: dict[str, Any], which: str, share: float) -> Iterator[dict[str, Any]]:
+    """Every drive of a set, in a fixed order."""
+    counts, movements, first = protocol["counts"][which], protocol["movements"][which], protocol["seeds"][which]
+    wanted: list[dict[str, Any]] = [{"type": "null", "name": "null"}] * max(1, round(share * counts["null"]))
+    wanted += [{"type": "null_short", "name": "null, short"}] * max(1, round(share * counts["null_short"]))
+    repeats = max(1, round(share * counts["effect"]))
+    for bait in protocol["bait"]:
+        wanted += [{"type": "bait", "name": bait["name"]}] * repeats
+    for key, kind in (("kind", "effect"), ("short_kind", "effect_short")):
+        for entry in protocol[key]:
+            for size in entry.get("sizes", entry.get("factors")):
+                what = "factor" if "factors" in entry else "size"
+                accepted = [entry.get("columns", [_plain(entry["quantity"])]), *entry.get("accepted", [])]
+                planted = {"type": kind, "name": entry["name"], what: size, "accepted": accepted}
+                wanted += [planted] * repeats
+    smoothed = which in protocol["smoothing"]["sets"]
+    for place, case in enumerate(wanted):
+        more = {"smoothed": True} if smoothed and place % 2 else {}
+        yield {**case, "seed": first + place, "movement": movements[place % len(movements)], **more}
+
+
+def oracle(case: dict[str, Any], table: pd.DataFrame, coarse: Coarse, seed: int) -> dict[str, float]:
+    """z of the planted answer itself in the same regression, its timing told."""
+    from dataclasses import dataclass
+
+    from xosc_lateral.identification.terms.mean import MeanTerm
+
+    time_, values = table["time"].to_numpy(), unit(quantity(case["name"], table))
+    if "drive" in table:
+        names, drives = table["drive"].to_numpy(), coarse.timeline.names
+        rows = [np.flatnonzero(names == name) for name in drives]
+    else:
+        rows = [np.arange(len(table))]
+    fine = np.zeros(len(coarse.timeline))
+    for span, own in zip(coarse.timeline.spans, rows, strict=True):
+        answer = answered(values[own], time_[own], np.random.default_rng([7, seed]))
+        grid = time_[own][0] + coarse.timeline.step * (np.arange(span.stop - span.start) - 75)
+        fine[span] = np.interp(grid, time_[own], answer)
+    told = coarse_mean(fine)
+    told = told - told[coarse.valid].mean()
+
+    @dataclass(frozen=True, eq=False)
+    class Told(MeanTerm):
+        def mean_columns(self, coarse: Coarse) -> np.ndarray:
+            return told[:, None]
+
+    fitted = fit_model(coarse, (Told(None),))  # type: ignore[arg-type]
+    error = float(np.sqrt(fitted.covariance[0, 0]))
+    return {"oracle_z": float(fitted.sizes[0]) / error, "oracle_size": float(fitted.sizes[0]), "oracle_error": error}
+
+
+def _plain(name: str) -> str:
+    return name
