@@ -15,6 +15,7 @@ from xosc_lateral.identification.timeline import (
     coarse_all,
     coarse_mean,
     coarse_middle,
+    in_digits,
     join_drives,
     local_mean,
     means_by_drive,
@@ -122,3 +123,12 @@ def test_a_column_that_one_drive_lacks_is_there_and_says_there_is_none() -> None
     joined = join_drives([drive("a", 300.0, rain=rain), drive("b", 200.0)])
     assert np.isfinite(joined.context["rain"][joined.drive == 0]).all()
     assert np.isnan(joined.context["rain"][joined.valid & (joined.drive == 1)]).all()
+
+
+def test_equal_numbers_that_were_averaged_are_equal() -> None:
+    values = np.array([3.7, 3.7 + 4e-16, 3.7 - 9e-16, 3.85, np.nan])
+    rounded = in_digits(values)
+    assert len(np.unique(rounded[:3])) == 1
+    assert rounded[3] == pytest.approx(3.85, abs=1e-12)
+    assert np.isnan(rounded[4])
+    assert in_digits(np.zeros(2)) == pytest.approx([0.0, 0.0])

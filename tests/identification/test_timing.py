@@ -58,8 +58,8 @@ def test_an_answer_starts_anew_with_every_drive(response: float) -> None:
     rng = np.random.default_rng(6)
     lengths = (7, 1, 30)
     parts = [rng.normal(size=(n, 3)) + 10.0 * number for number, n in enumerate(lengths)]
-    first = np.repeat(np.cumsum([0, *lengths[:-1]]), lengths).astype(np.intp)
+    drive = np.repeat(np.arange(3), lengths).astype(np.intp)
     alone = [respond_by_second(part, response, np.zeros(len(part), dtype=np.intp)) for part in parts]
     np.testing.assert_allclose(
-        respond_by_second(np.concatenate(parts), response, first), np.concatenate(alone), atol=1e-12
+        respond_by_second(np.concatenate(parts), response, drive), np.concatenate(alone), atol=1e-12
     )

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from xosc_lateral.driver.effects import ColumnEffect
 from xosc_lateral.identification.autocorrelation import Whitener
 from xosc_lateral.identification.candidates import Candidate
-from xosc_lateral.identification.timeline import COARSE, Timeline, coarse_mean, coarse_middle
+from xosc_lateral.identification.timeline import COARSE, Timeline, coarse_mean, coarse_middle, start_anew
 
 FloatArray = NDArray[np.float64]
 SingleArray = NDArray[np.float32]
@@ -61,13 +61,13 @@ class Quantities:
     ----------
     candidates : list of Candidate
     values : array, shape (candidates, n)
-    first : int array, shape (n,)
-        First row of each row's drive.
+    drive : int array, shape (n,)
+        Of each row.
     """
 
     candidates: list[Candidate]
     values: SingleArray
-    first: IntArray
+    drive: IntArray
 
     @classmethod
     def of(
@@ -88,14 +88,12 @@ class Quantities:
             if deviation > 1e-9 * max(float(np.abs(second).max()), 1e-300):
                 kept.append(candidate)
                 rows.append(((second - second[valid].mean()) / deviation).astype(np.float32))
-        drive = coarse_middle(timeline.drive)[: len(valid)]
-        _, starts = np.unique(drive, return_index=True)
         stacked = np.stack(rows) if rows else np.zeros((0, len(valid)), dtype=np.float32)
-        return cls(kept, stacked, starts[drive].astype(np.intp))
+        return cls(kept, stacked, coarse_middle(timeline.drive)[: len(valid)])
 
     def answers(self, members: Sequence[int], response: float) -> FloatArray:
         """Some of them through a first-order lag, each drive on its own, shape (n, members)."""
-        return respond_by_second(self.values[members].T, response, self.first)
+        return respond_by_second(self.values[members].T, response, self.drive)
 
 
 @dataclass(frozen=True, eq=False)
@@ -167,10 +165,10 @@ def build_dictionary(quantities: Quantities, whitener: Whitener) -> Dictionary:
     )
 
 
-def respond_by_second(values: Reals, response: float, first: IntArray) -> FloatArray:
+def respond_by_second(values: Reals, response: float, drive: IntArray) -> FloatArray:
     """Means over each second of a first-order lag of gain 1, settled where a drive starts; like `values`, (n, k).
 
-    Exact for values that stay the same for the second. `first`: first row of each row's drive, shape (n,).
+    Exact for values that stay the same for the second. `drive`: of each row, shape (n,), increasing.
     """
     from scipy.signal import lfilter
 
@@ -178,10 +176,7 @@ def respond_by_second(values: Reals, response: float, first: IntArray) -> FloatA
     late = response * (1.0 - keep)
     later, earlier = np.array([[1.0 - late, late - keep], [1.0, -keep]], dtype=values.dtype)
     answer = lfilter(later, earlier, values, axis=0, zi=late * values[:1])[0]
-    # what is left of the drive before: what is constant within drives must stay so
-    left = keep ** (np.arange(len(values)) - first).astype(values.dtype)
-    answer -= (answer - values)[first] * left[:, None]
-    return np.asarray(answer)
+    return start_anew(answer, values, keep, drive)
 
 
 def _unit_rows(rows: FloatArray, before: FloatArray) -> tuple[FloatArray, FloatArray, BoolArray]:

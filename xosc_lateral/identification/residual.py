@@ -20,7 +20,7 @@ from xosc_lateral.driver.effects.response import respond
 from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.driver.sampling import OffsetSampler
 from xosc_lateral.driver.seeds import child
-from xosc_lateral.identification.timeline import LOCAL_S, PAD, Timeline, local_mean
+from xosc_lateral.identification.timeline import LOCAL_S, PAD, Timeline, in_digits, local_mean, start_anew
 from xosc_lateral.segment import Segment
 
 FloatArray = NDArray[np.float64]
@@ -117,7 +117,9 @@ def statistics_of(
     """Bins for every quantity, shape (n,) each on the grid, and for time; an oscillation's frequency [1/s], if any."""
     labels, middles = {}, {}
     for name, values in quantities.items():
-        smooth = respond(_filled(values, timeline.valid), timeline.step, 0.0, ANSWER_S)
+        filled = _filled(values, timeline.valid)
+        answer = respond(filled, timeline.step, 0.0, ANSWER_S)
+        smooth = in_digits(start_anew(answer, filled, float(np.exp(-timeline.step / ANSWER_S)), timeline.drive))
         label, middle = _binned(smooth, timeline.valid)
         if len(middle) > 1:
             labels[name], middles[name] = label, middle

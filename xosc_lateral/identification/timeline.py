@@ -154,6 +154,35 @@ def means_by_drive(values: FloatArray, valid: BoolArray, drive: IntArray) -> Flo
     return np.asarray(sums / np.maximum(count, 1.0))
 
 
+def in_digits(values: FloatArray) -> FloatArray:
+    """Twelve digits of the largest: averages of equal numbers are equal, and no threshold tells their errors apart."""
+    largest = float(np.max(np.abs(values), initial=0.0, where=np.isfinite(values)))
+    return np.round(values, 12 - int(np.ceil(np.log10(largest)))) if largest > 0.0 else values
+
+
+def start_anew(
+    answer: FloatArray, values: NDArray[np.floating[Any]], keep: float, drive: NDArray[np.intp]
+) -> FloatArray:
+    """A first-order lag over drives in a row, less what it carries over: settled where each drive starts.
+
+    What is constant within drives must stay so: a threshold or a cell's edge would tell what is left of the drive
+    before.
+
+    Parameters
+    ----------
+    answer : array, shape (n,) or (n, k)
+        Of the lag, to `values` of the same shape.
+    keep : float
+        What the lag keeps of itself from row to row.
+    drive : int array, shape (n,)
+        Increasing.
+    """
+    _, starts, own = np.unique(drive, return_index=True, return_inverse=True)
+    first = starts[own]
+    left = keep ** (np.arange(len(values)) - first).astype(values.dtype)
+    return np.asarray(answer - (answer - values)[first] * (left[:, None] if values.ndim == 2 else left))
+
+
 def on_fine_grid(values: FloatArray, timeline: Timeline) -> FloatArray:
     """From the middles of the seconds, shape (n // 5, ...), to the 0.2 s grid: steps of a second would be noise."""
     n = len(timeline)
@@ -224,10 +253,7 @@ def _on_grid(drive: Drive, name: str, grid: FloatArray, periods: Mapping[str, fl
 
 
 def _averaged(time: FloatArray, values: FloatArray, grid: FloatArray) -> FloatArray:
-    """Averages of equal numbers as equal numbers: a threshold must not tell rounding errors apart."""
-    largest = float(np.max(np.abs(values), initial=0.0, where=np.isfinite(values)))
-    digits = 12 - int(np.ceil(np.log10(largest))) if largest > 0.0 else 0
-    return np.round(average(time, values, grid), digits)
+    return in_digits(average(time, values, grid))
 
 
 def _periods(drives: Sequence[Drive]) -> dict[str, float]:
