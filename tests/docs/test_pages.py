@@ -121,6 +121,7 @@ def begin_script(words: list[str], monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.syspath_prepend(str(ROOT))
     with pytest.raises(BegunError):
         if words[0] == "-m":
+            monkeypatch.delitem(sys.modules, words[1], raising=False)  # another page's benchmark may have imported it
             runpy.run_module(words[1], run_name="__main__")
         else:
             monkeypatch.syspath_prepend(str((ROOT / words[0]).parent))
