@@ -65,9 +65,10 @@ def group_table(lack_of_fit: LackOfFit) -> str:
 def draw(result: LoopResult, lack_of_fit: LackOfFit, folder: Path) -> None:
     """Figures on white, which light and dark pages show alike."""
     folder.mkdir(parents=True, exist_ok=True)
-    for finding in result.findings:
+    for number, finding in enumerate(result.findings, 1):
         if finding.columns:
-            _save(effect_figure(result, finding), folder / f"loop_dlr_{'_'.join(finding.columns)}.png")
+            name = "_".join([str(number), *finding.columns])  # one column may act in several ways
+            _save(effect_figure(result, finding), folder / f"loop_dlr_{name}.png")
         else:
             figure, _ = DRAWINGS[finding.kind]
             _save(figure(result, finding), folder / f"loop_dlr_{finding.kind}.png")
