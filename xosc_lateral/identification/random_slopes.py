@@ -12,7 +12,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.identification.regression import Fitted, ModelTerm
+from xosc_lateral.identification.regression import Fitted, ModelTerm, whitener_as_seen
 
 FloatArray = NDArray[np.float64]
 
@@ -31,13 +31,17 @@ def slope_deviation(fitted: Fitted, term: ModelTerm) -> float:
     coarse = fitted.coarse
     if part.stop - part.start != 1 or coarse.drives < MIN_DRIVES:
         return 0.0
-    column = fitted.whitener.rows(fitted.columns[:, part])[:, 0]
+    # independent rows, which a floor does not leave: what they have in common would look like drivers that differ
+    whitener = whitener_as_seen(coarse, fitted.movement, fitted.scale)
+    column = whitener.rows(fitted.columns[:, part])[:, 0]
+    rows = whitener.rows(fitted.movement * fitted.scale)
+    rows = rows / max(float(np.sqrt(np.mean(rows[coarse.valid] ** 2))), 1e-300)
     power = np.bincount(coarse.drive, column**2, minlength=coarse.drives)
     told = power > 1e-3 * float(power.mean())
     if told.sum() < MIN_DRIVES:
         return 0.0
     weight = power[told]
-    off = np.bincount(coarse.drive, column * fitted.rows, minlength=coarse.drives)[told] / weight
+    off = np.bincount(coarse.drive, column * rows, minlength=coarse.drives)[told] / weight
     off = off - float(weight @ off) / float(weight.sum())
     scatter, freedom = float(weight @ off**2), int(told.sum()) - 1
     if chi2.sf(scatter, freedom) > LEVEL:

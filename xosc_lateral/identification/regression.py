@@ -271,12 +271,17 @@ def fit_model(coarse: Coarse, terms: Sequence[ModelTerm]) -> Fitted:
     )  # fmt: skip
 
 
+def whitener_as_seen(coarse: Coarse, movement: FloatArray, scale: FloatArray) -> Whitener:
+    """What turns the movement as it is seen into independent rows: without a floor."""
+    process = fit_autoregression(movement, coarse.valid, ORDER, longest=LONGEST)
+    return Whitener(process, coarse.valid, coarse.drive, scale)
+
+
 def _innovations(coarse: Coarse, left: FloatArray, scale: FloatArray, freedom: float) -> FloatArray:
     """What is new in each second of the movement as it is seen, without a floor; young runs by their own size."""
-    process = fit_autoregression(left / scale, coarse.valid, ORDER, longest=LONGEST)
-    whitener = Whitener(process, coarse.valid, coarse.drive, scale)
+    whitener = whitener_as_seen(coarse, left / scale, scale)
     rows = whitener.rows(left)
-    rows = rows / whitener.by_position(start_factors(rows, coarse.valid, process.order))
+    rows = rows / whitener.by_position(start_factors(rows, coarse.valid, whitener.process.order))
     return _standardised(rows, coarse.valid, freedom)
 
 
