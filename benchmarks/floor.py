@@ -15,8 +15,8 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from benchmarks.identification_cases import PROTOCOL, SETS, cases, oracle
-from benchmarks.identification_drives import long_drive, short_drives, smoothed_tracks, with_mean
+from benchmarks.identification_cases import PROTOCOL, SETS, bare_drive, cases, oracle
+from benchmarks.identification_drives import smoothed_tracks, with_mean
 from xosc_lateral.formats.drives import drives_of_table
 from xosc_lateral.identification import regression
 from xosc_lateral.identification.column_search import best_probability
@@ -51,13 +51,8 @@ def main() -> None:
 def measured(case: dict[str, Any], protocol: dict[str, Any]) -> list[dict[str, Any]]:
     """One effect under every floor, on the table as it is and smoothed."""
     case = {**case, "size": SMALLER * case["size"]}
-    seed, drives = case["seed"], protocol["drives"]
-    short = case["type"].endswith("short")
-    bare = (
-        short_drives(drives["short_drives"], tuple(drives["short_s"]), seed)
-        if short
-        else long_drive(case["movement"], drives["long_s"], seed)
-    )
+    seed, short = case["seed"], case["type"].endswith("short")
+    bare = bare_drive(case, protocol, protocol["drives"]["long_s"])
     planted = with_mean(bare, case["name"], case["size"], seed)
     rows, usual = [], regression.FLOOR
     for smooth in (False, True):

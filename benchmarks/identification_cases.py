@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from benchmarks.identification_drives import answered, quantity, unit
+from benchmarks.identification_drives import answered, long_drive, quantity, short_drives, unit
 from xosc_lateral.identification.regression import Coarse, fit_model
 from xosc_lateral.identification.timeline import coarse_mean
 
@@ -29,13 +29,20 @@ def cases(protocol: dict[str, Any], which: str, share: float) -> Iterator[dict[s
         for entry in protocol[key]:
             for size in entry.get("sizes", entry.get("factors")):
                 what = "factor" if "factors" in entry else "size"
-                accepted = [entry.get("columns", [_plain(entry["quantity"])]), *entry.get("accepted", [])]
+                accepted = [entry.get("columns", [entry["quantity"]]), *entry.get("accepted", [])]
                 planted = {"type": kind, "name": entry["name"], what: size, "accepted": accepted}
                 wanted += [planted] * repeats
     smoothed = which in protocol["smoothing"]["sets"]
     for place, case in enumerate(wanted):
         more = {"smoothed": True} if smoothed and place % 2 else {}
         yield {**case, "seed": first + place, "movement": movements[place % len(movements)], **more}
+
+
+def bare_drive(case: dict[str, Any], protocol: dict[str, Any], seconds: float) -> pd.DataFrame:
+    """A case's table before anything is planted; a long drive lasts so many seconds."""
+    if case["type"].endswith("short"):
+        return short_drives(protocol["drives"]["short_drives"], tuple(protocol["drives"]["short_s"]), case["seed"])
+    return long_drive(case["movement"], seconds, case["seed"])
 
 
 def oracle(case: dict[str, Any], table: pd.DataFrame, coarse: Coarse, seed: int) -> dict[str, float]:
@@ -66,7 +73,3 @@ def oracle(case: dict[str, Any], table: pd.DataFrame, coarse: Coarse, seed: int)
     fitted = fit_model(coarse, (Told(None),))  # type: ignore[arg-type]
     error = float(np.sqrt(fitted.covariance[0, 0]))
     return {"oracle_z": float(fitted.sizes[0]) / error, "oracle_size": float(fitted.sizes[0]), "oracle_error": error}
-
-
-def _plain(name: str) -> str:
-    return name

@@ -21,11 +21,9 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from benchmarks.identification_cases import PROTOCOL, SETS, cases, oracle
+from benchmarks.identification_cases import PROTOCOL, SETS, bare_drive, cases, oracle
 from benchmarks.identification_drives import (
     baited,
-    long_drive,
-    short_drives,
     smoothed_tracks,
     unit,
     with_mean,
@@ -40,12 +38,8 @@ from xosc_lateral.identification.timeline import join_drives
 
 def run(case: dict[str, Any], protocol: dict[str, Any], seconds: float) -> dict[str, Any]:
     """Make one drive, identify, and compare with the truth."""
-    seed, drives = case["seed"], protocol["drives"]
-    if case["type"].endswith("short"):
-        table = short_drives(drives["short_drives"], tuple(drives["short_s"]), seed)
-    else:
-        table = long_drive(case["movement"], seconds, seed)
-    bare = table
+    seed = case["seed"]
+    table = bare = bare_drive(case, protocol, seconds)
     if case["type"] == "bait":
         table = baited(table, case["name"], seed)
     elif case["name"].startswith("slow vehicles"):
