@@ -35,8 +35,8 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from benchmarks.identification_cases import PROTOCOL, cases
-from benchmarks.identification_drives import long_drive, offset_of, short_drives, with_mean
+from benchmarks.identification_cases import PROTOCOL, bare_drive, cases
+from benchmarks.identification_drives import offset_of, with_mean
 from benchmarks.identification_tables import false, right
 
 Values = np.ndarray
@@ -185,11 +185,8 @@ def judged(case: dict[str, Any], named: list[str]) -> tuple[bool | None, list[st
 
 def run(case: dict[str, Any], protocol: dict[str, Any]) -> dict[str, Any]:
     """All methods on one drive."""
-    drives, seed = protocol["drives"], case["seed"]
-    if case["type"].endswith("short"):
-        table = short_drives(drives["short_drives"], tuple(drives["short_s"]), seed)
-    else:
-        table = long_drive(case["movement"], drives["long_s"], seed)
+    seed = case["seed"]
+    table = bare_drive(case, protocol, protocol["drives"]["long_s"])
     if "size" in case:
         table = with_mean(table, case["name"], case["size"], seed)
     series = by_second(table)
