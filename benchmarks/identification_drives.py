@@ -19,6 +19,7 @@ from xosc_lateral.datasets.movements import (
     clustered,
     delayed_control,
     heavy_tailed,
+    long_memory,
     lopsided,
     oscillating,
     pursuit,
@@ -40,6 +41,7 @@ MOVEMENTS = {
     "pursuit": pursuit,
     "oscillating": oscillating,
     "sawtooth": sawtooth,
+    "long_memory": long_memory,
 }
 FOLLOWING = ["steering_wheel_angle", "yaw_rate"]
 

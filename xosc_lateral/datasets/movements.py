@@ -7,6 +7,7 @@ resolution, a linear pull to the middle, a steady loudness.
 References
 ----------
 .. [1] G. E. Uhlenbeck, L. S. Ornstein, "On the theory of the Brownian motion", Physical Review 36, 1930.
+.. [2] C. W. J. Granger, "Long memory relationships and the aggregation of dynamic models", J. Econometrics 14, 1980.
 """
 
 from __future__ import annotations
@@ -171,6 +172,11 @@ def sawtooth(n: int, rng: np.random.Generator) -> np.ndarray:
         out[at : at + len(path)] = path[: n - at]
         at, place = at + len(path), path[-1]
     return _smooth(out) + 0.03 * _smooth(_wander(n, rng, 1.0))
+
+
+def long_memory(n: int, rng: np.random.Generator) -> np.ndarray:
+    """Flicker noise: wandering of 1 to 200 s in equal parts [2]_, smoothed as a car's mass does. Shape (n,). [m]"""
+    return 0.25 * _scaled(_smooth(sum(_wander(n, rng, constant) for constant in (1.0, 3.0, 8.0, 20.0, 60.0, 200.0))))
 
 
 def in_regimes(n: int, rng: np.random.Generator) -> np.ndarray:
