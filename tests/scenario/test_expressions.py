@@ -116,3 +116,70 @@ def test_any_text_gives_a_value_or_an_expression_error(expression: str) -> None:
 )
 def test_integer_arithmetic_agrees_with_python(expression: str) -> None:
     assert float(value(expression)) == pytest.approx(eval(expression, {}), abs=5e-7)
+
+
+@pytest.mark.parametrize(
+    ("number", "nearest"), [("0.5", 1), ("1.5", 2), ("2.5", 3), ("-0.5", -1), ("-2.5", -3), ("2.4999", 2), ("-7.6", -8),
+     ("0.49999999999999994", 0)],
+)  # fmt: skip
+def test_halves_are_rounded_away_from_zero_as_in_c(number: str, nearest: int) -> None:
+    """As the standard's own evaluator and the reference player; Python's `round` takes 2.5 to 2."""
+    assert float(value(f"round({number})")) == nearest
+
+
+@pytest.mark.parametrize(("number", "sign"), [("-0.001", -1), ("0", 0), ("-0", 0), ("1e-9", 1)])
+def test_the_sign_of_nothing_is_nothing(number: str, sign: int) -> None:
+    assert float(value(f"sign({number})")) == sign
+
+
+@pytest.mark.parametrize(
+    "expression", ["sqrt(2)", "sin(0.7)", "cos(0.7)", "tan(0.7)", "asin(0.7)", "acos(0.7)", "atan(0.7)"]
+)
+def test_functions_are_those_of_mathematics_in_radians(expression: str) -> None:
+    assert float(value(expression)) == pytest.approx(eval(expression, vars(math)), abs=5e-7)
+
+
+_logic = st.recursive(
+    st.sampled_from(["true", "false", "1 < 2", "2 <= 1", "3 == 3", "3 != 3"]),
+    lambda inner: st.one_of(
+        inner.map(lambda one: f"not {one}"),
+        inner.map(lambda one: f"({one})"),
+        st.tuples(inner, st.sampled_from(["and", "or"]), inner).map(" ".join),
+    ),
+    max_leaves=8,
+)
+
+
+@settings(max_examples=150, deadline=None, derandomize=True)
+@given(_logic)
+def test_and_or_and_not_bind_as_python_has_them(expression: str) -> None:
+    """Loosest first: or, and, not, comparison; Python's order is the same and its words are."""
+    expected = bool(eval(expression, {"true": True, "false": False}))
+    assert value(expression) == str(expected).lower()
+    symbols = expression.replace("and", "&&").replace("or", "||").replace("not ", "!")
+    assert value(symbols) == str(expected).lower()
+
+
+@settings(max_examples=150, deadline=None, derandomize=True)
+@given(
+    st.lists(st.integers(1, 9), min_size=2, max_size=7),
+    st.lists(st.sampled_from(["+", "-", "*", "/"]), min_size=6, max_size=6),
+)
+def test_operators_without_parentheses_bind_and_go_on_from_the_left(numbers: list[int], operators: list[str]) -> None:
+    text = str(numbers[0]) + "".join(f" {o} {n}" for o, n in zip(operators, numbers[1:], strict=False))
+    assert float(value(text)) == pytest.approx(eval(text), abs=1e-6, rel=1e-9)
+
+
+@given(st.integers(-50, 50), st.integers(1, 12))
+def test_the_rest_of_a_division_has_the_sign_of_what_is_divided(number: int, by: int) -> None:
+    """As `%` of C and Java."""
+    rest = float(value(f"({number}) % {by}"))
+    assert rest == math.copysign(abs(number) % by, number) or rest == 0.0 == abs(number) % by
+
+
+def test_words_grow_no_longer_than_a_value_may_be() -> None:
+    long = {"long": "x" * 5000}
+    with pytest.raises(ExpressionError, match="characters"):
+        evaluate(" + ".join(["$long"] * 100), long.__getitem__)
+    with pytest.raises(ExpressionError, match="characters"):
+        evaluate(" + ".join(["$long"] * 100) + " + word", long.__getitem__)

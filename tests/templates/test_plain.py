@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import xml.etree.ElementTree as ET
 from pathlib import Path
 
 import pytest
@@ -55,7 +56,31 @@ def test_a_chosen_value_is_the_only_thing_that_changes(mine):
     assert files["mine.xosc"] == SCENARIO.replace('"30"', '"33"').replace("value='1'", 'value="2"')
 
 
-@pytest.mark.parametrize(("name", "value"), [("speed", "fast"), ("speed", "nan"), ("lanes", "1.5"), ("colour", "red")])
+TRICKY = SCENARIO.replace(
+    "    <!-- a comment that stays -->",
+    """    <!-- <ParameterDeclaration name="speed" parameterType="double" value="1"/> as it was -->
+    <ParameterDeclaration value="$speed > 3 &amp; more" name="fast" parameterType="string"/>""",
+)
+
+
+@pytest.mark.parametrize(("name", "value"), [("speed", "33"), ("fast", 'a "b" > <c> & d'), ("lanes", "+2")])
+def test_the_scenario_that_is_read_has_the_chosen_value_whatever_stands_around_it(name, value, tmp_path):
+    """In a comment above stands the same declaration, and a value holds what ends a tag elsewhere."""
+    (tmp_path / "mine.xosc").write_text(TRICKY)
+    (tmp_path / "mine.xodr").write_text("<OpenDRIVE/>")
+    (template,) = plain_templates(tmp_path)
+    before, after = (
+        {one.get("name"): one.get("value") for one in ET.fromstring(text).iter("ParameterDeclaration")}
+        for text in (TRICKY, template.files({name: value})["mine.xosc"])
+    )
+    assert after == {**before, name: value}
+    assert "<!-- <ParameterDeclaration" in template.files({name: value})["mine.xosc"]
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [("speed", "fast"), ("speed", "nan"), ("speed", "1_000"), ("lanes", "1.5"), ("lanes", "٣"), ("colour", "red")],
+)
 def test_a_setting_that_is_none_is_refused_by_name(mine, name, value):
     with pytest.raises(XoscLateralError, match=name):
         mine.files({name: value})

@@ -168,6 +168,29 @@ def test_weather_is_written_in_the_standards_units():
     assert float(root.find(".//RoadCondition").get("frictionScaleFactor")) < 1.0
 
 
+@pytest.mark.parametrize(
+    ("hour", "azimuth", "up"),
+    [("6", 0.5 * np.pi, True), ("12", np.pi, True), ("18", 1.5 * np.pi, True), ("0", 0.0, False), ("23", None, False)],
+)
+def test_the_sun_goes_from_east_over_south_to_west(hour, azimuth, up):
+    """The standard counts azimuth from north (0) over east (pi/2) to south (pi)."""
+    root = scenario(find_template("curves"), {"time_of_day": hour})
+    sun, clock = root.find(".//Sun"), root.find(".//TimeOfDay").get("dateTime")
+    assert clock == f"2024-06-21T{int(hour):02d}:00:00"
+    assert (float(sun.get("elevation")) > 0.0) is up
+    assert (float(sun.get("illuminance")) > 1000.0) is up
+    if azimuth is not None:
+        assert float(sun.get("azimuth")) == pytest.approx(azimuth, abs=1e-5)
+
+
+def test_the_sun_is_highest_at_noon_and_as_high_before_as_after():
+    height = [
+        float(scenario(find_template("curves"), {"time_of_day": f"{hour:g}"}).find(".//Sun").get("elevation"))
+        for hour in (8.0, 10.0, 12.0, 14.0, 16.0)
+    ]
+    assert height == pytest.approx(height[::-1]) and max(height) == height[2] == pytest.approx(np.pi / 3)
+
+
 def test_write_names_the_files_that_it_wrote_and_list_names_all_templates(tmp_path, capsys):
     assert main(["template", "write", "jam-end", "-o", str(tmp_path / "new" / "folder")]) == 0
     written = capsys.readouterr().out.splitlines()

@@ -21,7 +21,7 @@ MAX_DEPTH = 30
 """Nested parentheses and signs. Bounds the recursion."""
 
 FUNCTIONS: dict[str, tuple[int, Callable[..., float]]] = {
-    "round": (1, lambda a: float(round(a))),
+    "round": (1, lambda a: _rounded(a)),
     "floor": (1, lambda a: float(math.floor(a))),
     "ceil": (1, lambda a: float(math.ceil(a))),
     "sqrt": (1, math.sqrt),
@@ -287,6 +287,12 @@ class _Parser:
         value = rule()
         self._depth -= 1
         return value
+
+
+def _rounded(value: float) -> float:
+    """The nearest whole number, halves away from zero: `round` of C, as the standard's own evaluator has it."""
+    whole = math.trunc(value)
+    return float(whole if abs(value - whole) < 0.5 else whole + math.copysign(1.0, value))
 
 
 def _number(value: Value) -> float:

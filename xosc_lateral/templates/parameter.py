@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping
+import re
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 from xosc_lateral.errors import XoscLateralError
@@ -113,7 +114,7 @@ class Declared:
 
     def read(self, text: str) -> str:
         """Value of ``--set NAME=text``; `XoscLateralError` when it is not of the type."""
-        if self.kind in _TYPES and not _TYPES[self.kind](text):
+        if self.kind in _TYPES and not _TYPES[self.kind].fullmatch(text):
             raise XoscLateralError(f"{self.name}: {text!r} is no {self.kind}")
         return text
 
@@ -131,22 +132,16 @@ class Declared:
 Parameter = Number | Choice | Declared
 
 
-def _is_double(text: str) -> bool:
-    try:
-        return math.isfinite(float(text))
-    except ValueError:
-        return False
-
-
-_TYPES: dict[str, Callable[[str], bool]] = {
-    "double": _is_double,
-    "integer": lambda text: text.removeprefix("-").isdecimal(),
-    "int": lambda text: text.removeprefix("-").isdecimal(),
-    "unsignedInt": str.isdecimal,
-    "unsignedShort": str.isdecimal,
-    "boolean": lambda text: text in ("true", "false", "1", "0"),
+_WHOLE, _UNSIGNED = r"[+-]?[0-9]+", r"\+?[0-9]+"
+_TYPES: dict[str, re.Pattern[str]] = {
+    "double": re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?"),
+    "integer": re.compile(_WHOLE),
+    "int": re.compile(_WHOLE),
+    "unsignedInt": re.compile(_UNSIGNED),
+    "unsignedShort": re.compile(_UNSIGNED),
+    "boolean": re.compile("true|false|1|0"),
 }
-"""OpenSCENARIO's parameter types that not every text is a value of."""
+"""OpenSCENARIO's parameter types that not every text is a value of, as XML Schema writes their values."""
 
 
 class Settings:

@@ -8,7 +8,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from xml.sax.saxutils import quoteattr
+from xml.sax.saxutils import quoteattr, unescape
 
 from xosc_lateral.errors import FormatError, XoscLateralError
 from xosc_lateral.templates.parameter import Declared
@@ -82,10 +82,22 @@ def plain_templates(folder: Path) -> Iterator[PlainTemplate]:
             yield PlainTemplate(path)
 
 
+# A comment (to be left alone), or a declaration; a value may hold ">", which ends no tag there.
+_COMMENT_OR_DECLARATION = re.compile(
+    r"""<!--.*?-->|<ParameterDeclaration\b(?:[^>"']|"[^"]*"|'[^']*')*>""",
+    re.DOTALL,
+)
+_ATTRIBUTE = re.compile(r"""(?P<name>[\w:.-]+)(?P<equals>\s*=\s*)(?P<quoted>"[^"]*"|'[^']*')""")
+
+
 def _declared(text: str, name: str, value: str) -> str:
     """The text with another value of a declared parameter; all else, comments and layout, stays."""
-    tag = re.compile(rf"<ParameterDeclaration\b[^>]*\bname\s*=\s*[\"']{re.escape(name)}[\"'][^>]*>")
-    found = tag.search(text)
-    assert found is not None, "it is among the parsed declarations"
-    replaced = re.sub(r"(\bvalue\s*=\s*)([\"']).*?\2", lambda hit: hit[1] + quoteattr(value), found[0])
-    return text[: found.start()] + replaced + text[found.end() :]
+    for found in _COMMENT_OR_DECLARATION.finditer(text):
+        attributes = {one["name"]: one["quoted"][1:-1] for one in _ATTRIBUTE.finditer(found[0])}
+        if found[0].startswith("<!--") or unescape(attributes.get("name", "")) != name:
+            continue
+        replaced = _ATTRIBUTE.sub(
+            lambda one: one["name"] + one["equals"] + quoteattr(value) if one["name"] == "value" else one[0], found[0]
+        )
+        return text[: found.start()] + replaced + text[found.end() :]
+    raise AssertionError("it is among the parsed declarations")

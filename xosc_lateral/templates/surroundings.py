@@ -58,10 +58,13 @@ def _wind(settings: Settings) -> Any:
 
 
 def _sun(hour: float, clearness: float) -> Any:
-    """Sun of a midsummer day in middle latitudes: up at 5 h, at noon 60 degrees high, down at 19 h (rounded)."""
+    """Sun of a midsummer day in middle latitudes: up at 5 h, at noon 60 degrees high, down at 19 h (rounded).
+
+    Azimuth as the standard counts it: 0 north, pi/2 east, pi south; 15 degrees an hour.
+    """
     from scenariogeneration import xosc
 
     height = math.radians(60.0) * math.sin(math.pi * (hour - 5.0) / 14.0)
     light = _NIGHT_LIGHT + clearness * _NOON_LIGHT * max(0.0, math.sin(height))
-    azimuth = (math.pi - math.radians(15.0) * (hour - 12.0)) % (2.0 * math.pi)
+    azimuth = (math.pi + math.radians(15.0) * (hour - 12.0)) % (2.0 * math.pi)
     return xosc.Sun(round(light, 1), round(azimuth, 6), round(height, 6))
