@@ -26,7 +26,8 @@ from xosc_lateral.drives.drive import Run
 from xosc_lateral.drives.filters import kaiser_design, low_pass
 from xosc_lateral.evaluation.classifier import classifier_two_sample_test, context_features
 from xosc_lateral.evaluation.filters import ATTENUATION, CUTOFF, THINNED, TRANSITION
-from xosc_lateral.evaluation.snippets import sample_runs, snippets_of
+from xosc_lateral.evaluation.sampled_snippets import sample_runs
+from xosc_lateral.evaluation.snippets import snippets_of
 from xosc_lateral.formats.drives import read_drives
 
 FloatArray = NDArray[np.float64]

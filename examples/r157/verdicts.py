@@ -9,15 +9,11 @@ import numpy as np
 from encounters import Target
 from numpy.typing import NDArray
 
-from xosc_lateral.evaluation.r157 import (
-    CompetentDriver,
-    Ego,
-    EncounterOutcome,
-    FuzzySafetyModel,
-    Traffic,
-    evaluate_braking,
-    required_by_reaction_time,
-)
+from xosc_lateral.evaluation.r157.braking import evaluate_braking
+from xosc_lateral.evaluation.r157.competent_driver import CompetentDriver
+from xosc_lateral.evaluation.r157.encounters import Ego, EncounterOutcome, Traffic
+from xosc_lateral.evaluation.r157.fuzzy_safety import FuzzySafetyModel
+from xosc_lateral.evaluation.r157.reaction_time import required_by_reaction_time
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]

@@ -7,13 +7,15 @@ import pytest
 
 from tests.baselines.made_runs import made_run, smooth_runs
 from xosc_lateral.board.benchmark import benchmark_realism
-from xosc_lateral.board.half import floors, make_half, sample_half
+from xosc_lateral.board.half import floors, make_half
 from xosc_lateral.board.ranking import kendall_tau, ranks, resampled_rows
 from xosc_lateral.board.result import Board
+from xosc_lateral.board.sampled_half import sample_half
 from xosc_lateral.board.units import halves, units_of
 from xosc_lateral.drives.drive import Run
 from xosc_lateral.errors import NotEnoughDataError
-from xosc_lateral.evaluation.measures import band_power, differences, features_of
+from xosc_lateral.evaluation.differences import differences
+from xosc_lateral.evaluation.measures import band_power, features_of
 from xosc_lateral.segment import Segment
 
 QUICK = ["lane-centre", "constant", "gaussian-process"]

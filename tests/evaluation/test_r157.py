@@ -14,16 +14,11 @@ from xosc_lateral.evaluation.cut_in import (
     intrudes,
     leaves_wandering_zone,
 )
-from xosc_lateral.evaluation.r157 import (
-    CompetentDriver,
-    Ego,
-    FuzzySafetyModel,
-    Traffic,
-    critical_metric,
-    evaluate_braking,
-    proactive_metric,
-    required_by_reaction_time,
-)
+from xosc_lateral.evaluation.r157.braking import evaluate_braking
+from xosc_lateral.evaluation.r157.competent_driver import CompetentDriver
+from xosc_lateral.evaluation.r157.encounters import Ego, Traffic
+from xosc_lateral.evaluation.r157.fuzzy_safety import FuzzySafetyModel, critical_metric, proactive_metric
+from xosc_lateral.evaluation.r157.reaction_time import required_by_reaction_time
 
 STEP, LANE = 0.02, 3.5
 

@@ -13,7 +13,7 @@ from xosc_lateral.cli import main
 from xosc_lateral.datasets.assist import FLAG, OPENLKA_MAP, LaneKeepingAssist, openlka_layout
 from xosc_lateral.datasets.driver_simulator import simulate_drive
 from xosc_lateral.drives.cuts import all_runs
-from xosc_lateral.evaluation.snippets import sample_runs
+from xosc_lateral.evaluation.sampled_snippets import sample_runs
 from xosc_lateral.formats.drives import parse_map, read_drives
 from xosc_lateral.formats.profiles import read_profile
 

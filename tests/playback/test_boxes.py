@@ -29,9 +29,9 @@ from xosc_lateral.road.positions import Pose
 from xosc_lateral.scenario import Parameter, Performance, Place
 from xosc_lateral.scenario.actions import ModifyOperation
 from xosc_lateral.scenario.dynamics import DynamicConstraints
-from xosc_lateral.scenario.entity import BoundingBox
 from xosc_lateral.scenario.enums import ParameterType, Rule
 from xosc_lateral.scenario.scenario import TrafficSignalController, TrafficSignalPhase
+from xosc_lateral.scenario.vehicle import BoundingBox
 
 HERE = Place(Path("x.xosc"), 1, "X")
 

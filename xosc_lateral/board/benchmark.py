@@ -9,10 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.board.contestants import Contestant, contestants
-from xosc_lateral.board.half import Half, SampledHalf, make_half, sample_half
+from xosc_lateral.board.half import Half, make_half
 from xosc_lateral.board.numbers import floors_of, numbers_of
 from xosc_lateral.board.ranking import RESAMPLES, bootstrap
 from xosc_lateral.board.result import Board
+from xosc_lateral.board.sampled_half import SampledHalf, sample_half
 from xosc_lateral.board.summary import make_board
 from xosc_lateral.board.units import halves, units_of
 from xosc_lateral.driver.profile import DriverProfile

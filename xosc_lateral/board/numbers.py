@@ -7,12 +7,13 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.board.half import Half, SampledHalf, floors, pooled
+from xosc_lateral.board.half import Half, floors, pooled
 from xosc_lateral.board.result import ModelScore
+from xosc_lateral.board.sampled_half import SampledHalf
 from xosc_lateral.evaluation.classifier import classifier_two_sample_test
 from xosc_lateral.evaluation.condition import SnippetCondition
+from xosc_lateral.evaluation.differences import UNITS, differences, named_distances
 from xosc_lateral.evaluation.ensemble_scores import PROPER, proper_scores
-from xosc_lateral.evaluation.measures import UNITS, differences, named_distances
 from xosc_lateral.evaluation.ranked import SHORT, ranked_numbers
 
 FloatArray = NDArray[np.float64]

@@ -7,9 +7,10 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.board.half import Half, SampledHalf, floors
+from xosc_lateral.board.half import Half, floors
+from xosc_lateral.board.sampled_half import SampledHalf
 from xosc_lateral.evaluation.condition import SnippetCondition
-from xosc_lateral.evaluation.measures import differences
+from xosc_lateral.evaluation.differences import differences
 from xosc_lateral.evaluation.ranked import SHORT, ranked_numbers
 
 FloatArray = NDArray[np.float64]

@@ -8,15 +8,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.board.contestants import Contestant
-from xosc_lateral.board.half import Half, SampledHalf
+from xosc_lateral.board.half import Half
 from xosc_lateral.board.ranking import kendall_tau, ranks
 from xosc_lateral.board.result import Board, ModelScore, Row
+from xosc_lateral.board.sampled_half import SampledHalf
 from xosc_lateral.drives.drive import Run
 from xosc_lateral.drives.resampling import STEP
-from xosc_lateral.evaluation.lane_keeping import variance_parts
-from xosc_lateral.evaluation.measures import LAGS, autocorrelation_of, resolved_bands
+from xosc_lateral.evaluation.differences import autocorrelation_of
+from xosc_lateral.evaluation.measures import LAGS, resolved_bands
 from xosc_lateral.evaluation.ranked import SHORT, ranked_numbers
 from xosc_lateral.evaluation.snippets import BLOCK, FEW_DRIVES
+from xosc_lateral.evaluation.variance import variance_parts
 
 FloatArray = NDArray[np.float64]
 Parts = Sequence[tuple[Half, Mapping[str, SampledHalf]]]

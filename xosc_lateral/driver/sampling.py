@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.driver.effects import EffectTerms
-from xosc_lateral.driver.kernels import prepare
+from xosc_lateral.driver.jit_kernel import prepare
 from xosc_lateral.driver.process import DriveProcess, combine
 from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.segment import Segment

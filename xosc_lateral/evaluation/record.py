@@ -7,10 +7,11 @@ from math import isfinite
 from typing import Any
 
 from xosc_lateral.evaluation.filters import CUTOFF
-from xosc_lateral.evaluation.lane_keeping import UNITS, VarianceParts
+from xosc_lateral.evaluation.lane_keeping import UNITS
+from xosc_lateral.evaluation.margins import Margins
 from xosc_lateral.evaluation.realism import Beside, ConditionScores
 from xosc_lateral.evaluation.scores import LAGS, ProfileScores, SnippetScores
-from xosc_lateral.evaluation.spectra import Margins
+from xosc_lateral.evaluation.variance import VarianceParts
 
 
 def scores_to_dict(scores: ProfileScores) -> dict[str, Any]:

@@ -12,7 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.errors import NotEnoughDataError
-from xosc_lateral.evaluation.measures import Features, differences
+from xosc_lateral.evaluation.differences import differences
+from xosc_lateral.evaluation.measures import Features
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]

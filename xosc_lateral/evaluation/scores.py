@@ -14,16 +14,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.driver.models.two_level.fit import split_levels
-from xosc_lateral.driver.models.two_level.parameters import PAPER_SETTINGS
+from xosc_lateral.driver.models.two_level.settings import PAPER_SETTINGS
 from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.drives.drive import Run
 from xosc_lateral.errors import NotEnoughDataError
 from xosc_lateral.evaluation.condition import SnippetCondition
 from xosc_lateral.evaluation.distances import Distances, mean_distances, metric_distances, split_groups
+from xosc_lateral.evaluation.margins import Margins, margins
 from xosc_lateral.evaluation.metrics import METRICS, snippet_metrics
 from xosc_lateral.evaluation.realism import Realism, score_realism
-from xosc_lateral.evaluation.snippets import Snippets, sample_parts, sample_runs, sample_snippets, snippets_of
-from xosc_lateral.evaluation.spectra import Margins, Spectrum, autocorrelation, margins, spectrum
+from xosc_lateral.evaluation.sampled_snippets import sample_parts, sample_runs, sample_snippets
+from xosc_lateral.evaluation.snippets import Snippets, snippets_of
+from xosc_lateral.evaluation.spectra import Spectrum, autocorrelation, spectrum
 
 FloatArray = NDArray[np.float64]
 

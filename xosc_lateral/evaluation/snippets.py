@@ -13,11 +13,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.driver.models.base import Start
-from xosc_lateral.driver.profile import DriverProfile
-from xosc_lateral.driver.sampling import sample_offsets
-from xosc_lateral.driver.seeds import child
-from xosc_lateral.driver.sensor.error import recorded, sensor_error
 from xosc_lateral.driver.snippets import Snippet, cut_snippets, segment_of
 from xosc_lateral.drives.drive import Run
 from xosc_lateral.segment import Segment
@@ -103,61 +98,3 @@ def snippets_of(runs: Sequence[Run], seconds: float, step: float, *, by_block: b
         np.array(groups, dtype=np.str_),
         tuple((numbers[id(one.run)], one.rows) for one in items),
     )
-
-
-def sample_snippets(profile: DriverProfile, snippets: Snippets, seed: int, *, with_sensor: bool = False) -> FloatArray:
-    """For each snippet one of a new driver, of the same length, start and context. Shape (n, m). [m]
-
-    With the sensor, what starts there is the sum of both, as it does in what was recorded.
-    """
-    rows = sample_recorded(profile, snippets.segments, snippets.offset[:, 0], seed, with_sensor=with_sensor)
-    return np.array(rows).reshape(snippets.offset.shape)
-
-
-def sample_recorded(
-    profile: DriverProfile, segments: Sequence[Segment], starts: FloatArray, seed: int, *, with_sensor: bool = True
-) -> list[FloatArray]:
-    """For each segment one path of a new driver, as the profile's sensor would have recorded it. [m]
-
-    `starts` of the sums, shape (segments,) [m].
-    """
-    root, sensor = np.random.SeedSequence(seed), profile.sensor if with_sensor else None
-    rows = []
-    for k, (segment, start) in enumerate(zip(segments, starts.tolist(), strict=True)):
-        own = child(root, k)
-
-        def draw(begin: float, segment: Segment = segment, own: np.random.SeedSequence = own) -> FloatArray:
-            return sample_offsets(profile, segment, own, start=begin)
-
-        n = segment.lane_width[segment.inside].size
-        rows.append(recorded(sensor, draw, n, start, profile.model.step, own))
-    return rows
-
-
-def sample_parts(profile: DriverProfile, snippets: Snippets, seed: int) -> tuple[FloatArray, FloatArray]:
-    """Coarse and fine part of sampled snippets, without effects, in lane widths; shape (n, m) each. [-]"""
-    root = np.random.SeedSequence(seed)
-    relative = snippets.offset / snippets.lane_width
-    coarse, fine = np.empty_like(relative), np.empty_like(relative)
-    for k, start in enumerate(relative[:, 0].tolist()):
-        stream = profile.model.stream(child(root, k), Start(rel_offset=start))
-        coarse[k], fine[k] = stream.take(relative.shape[1])
-    return coarse, fine
-
-
-def sample_runs(profile: DriverProfile, runs: Sequence[Run], seed: int, *, same_start: bool = True) -> list[FloatArray]:
-    """For each run one of a new driver, of the same length and context, and the same start or any. [m]
-
-    Shape (n_i,) each.
-    """
-    root = np.random.SeedSequence(seed)
-    return [
-        sample_offsets(profile, segment_of(run), child(root, k), start=float(run.offset[0]) if same_start else None)
-        for k, run in enumerate(runs)
-    ]
-
-
-def sensor_noise(profile: DriverProfile, paths: Sequence[FloatArray], seed: int) -> list[FloatArray]:
-    """What the profile's sensor adds to these paths; zeros where it knows of none. [m] Shape (n_i,) each."""
-    root, step = np.random.SeedSequence(seed), profile.model.step
-    return [sensor_error(profile.sensor, path, step, child(root, k)) for k, path in enumerate(paths)]

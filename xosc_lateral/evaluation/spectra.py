@@ -32,12 +32,6 @@ PERIODS = 1.0
 PADDING = 8
 """Windows are padded with zeros to so many times their length: every band then holds a frequency. [-]"""
 
-MANY_SEGMENTS = 8
-"""With so many segments without a gap, spectra are taken from these only."""
-
-NEAR_MARKING = 1.2
-"""A reference point this close to a marking counts as near: half a car (0.9 m) and 0.3 m of air. [m]"""
-
 
 @dataclass(frozen=True, eq=False)
 class Spectrum:
@@ -98,45 +92,6 @@ def _periodogram(runs: Sequence[FloatArray], length: int, step: float) -> tuple[
     return frequency, density, len(rows)
 
 
-def gapped_spectrum(
-    series: FloatArray, valid: BoolArray, seams: NDArray[np.intp], step: float, segment: int
-) -> tuple[FloatArray, FloatArray, int]:
-    """Power density by Welch's method of series with gaps, over segments that are mostly valid and lie in one part.
-
-    Parameters
-    ----------
-    series : array, shape (runs, n)
-        Gaps are filled with the mean. [m]
-    valid : bool array, shape (n,)
-    seams : int array, shape (n,)
-        Number of the part that a row belongs to: runs are put together from parts, with a jump between them.
-    step : float
-        [s]
-    segment : int
-        Samples.
-
-    Returns
-    -------
-    frequency : array [Hz], density : array [m^2/Hz], number of segments : int
-        Without frequency 0; the density is NaN if no segment is long enough.
-    """
-    centred = np.where(valid, series - series[:, valid].mean(axis=1, keepdims=True), 0.0)
-    window = np.hanning(segment)
-    sums = np.zeros(segment // 2 + 1)
-    starts = np.arange(0, valid.size - segment + 1, segment // 2)
-    shares = np.array([float(valid[first : first + segment].mean()) for first in starts])
-    usable = (shares > 0.8) & (seams[starts] == seams[starts + segment - 1])
-    whole = usable & (shares == 1.0)
-    chosen = np.flatnonzero(whole if whole.sum() >= MANY_SEGMENTS else usable)
-    number = len(chosen)
-    for index in chosen:
-        rows = slice(starts[index], starts[index] + segment)
-        sums += np.mean(tapered_powers(centred[:, rows], window), axis=0) / shares[index]
-    frequency = np.asarray(np.fft.rfftfreq(segment, step), dtype=np.float64)
-    density = 2.0 * step * sums / number / float(np.sum(window**2)) if number else np.full(len(frequency), np.nan)
-    return frequency[1:], density[1:], number
-
-
 def autocorrelation(runs: Sequence[FloatArray], lags: Sequence[int]) -> FloatArray:
     """Correlation of the offset with itself some steps later, about the mean of all runs.
 
@@ -156,37 +111,3 @@ def autocorrelation(runs: Sequence[FloatArray], lags: Sequence[int]) -> FloatArr
         if count and variance > 0.0:
             result[k] = sum(products) / count / variance
     return result
-
-
-@dataclass(frozen=True)
-class Margins:
-    """How a driver uses the lane's margins.
-
-    Parameters
-    ----------
-    share_near : float
-        Share of time with the reference point within `NEAR_MARKING` of a marking. [-]
-    excursions_per_hour : float
-        How often that zone is entered. [1/h]
-    largest : float
-        Largest |offset|. [m]
-    """
-
-    share_near: float
-    excursions_per_hour: float
-    largest: float
-
-
-def margins(offsets: Sequence[FloatArray], lane_widths: Sequence[FloatArray], step: float) -> Margins:
-    """Time near a marking and rate of excursions over several runs (offset and lane width [m] at an even step [s]).
-
-    Shape (n_i,) each.
-    """
-    near = [np.abs(x) > 0.5 * w - NEAR_MARKING for x, w in zip(offsets, lane_widths, strict=True)]
-    rows = sum(len(one) for one in near)
-    entries = sum(int((one[1:] & ~one[:-1]).sum()) for one in near)
-    return Margins(
-        share_near=sum(int(one.sum()) for one in near) / rows,
-        excursions_per_hour=entries / (rows * step / 3600.0),
-        largest=max(float(np.abs(x).max()) for x in offsets),
-    )

@@ -10,7 +10,7 @@ from xosc_lateral.version import __version__
 
 if TYPE_CHECKING:
     from xosc_lateral.board.result import Board, ModelScore, Row
-    from xosc_lateral.evaluation.lane_keeping import VarianceParts
+    from xosc_lateral.evaluation.variance import VarianceParts
 
 FAMILIES = {
     "metrics": "ten metrics",

@@ -7,11 +7,11 @@ from math import isfinite
 from typing import Any
 
 from xosc_lateral.driver.profile import DriverProfile
+from xosc_lateral.evaluation.margins import NEAR_MARKING, Margins
 from xosc_lateral.evaluation.metrics import METRICS
 from xosc_lateral.evaluation.realism import Realism
 from xosc_lateral.evaluation.record import scores_to_dict
 from xosc_lateral.evaluation.scores import SNIPPET, PartEvaluation, ProfileScores, SnippetScores
-from xosc_lateral.evaluation.spectra import NEAR_MARKING, Margins
 from xosc_lateral.formats.profiles import profile_hash
 from xosc_lateral.report import evaluation_figures as figures
 from xosc_lateral.report.evaluation_figures import LABELS

@@ -9,7 +9,7 @@ from scipy.signal import lfilter
 
 from xosc_lateral.driver.effects import Drift
 from xosc_lateral.driver.effects.response import respond, split_shift
-from xosc_lateral.driver.kernels import WORTH_IMPORTING
+from xosc_lateral.driver.jit_kernel import WORTH_IMPORTING
 
 STEP = 0.2
 LAGS = (0.0, 1.0, -1.0, 0.6, 0.53, -0.71, 0.05, -0.05, 1e-12, -1e-12, 9.9, -9.9, 10.0, -10.0, 55.5, -55.5)

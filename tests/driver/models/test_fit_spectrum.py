@@ -11,7 +11,8 @@ from tests.driver.models.made_models import STEADY
 from xosc_lateral.driver.models.autoregressive.autoregression import Autoregression
 from xosc_lateral.driver.models.autoregressive.fit_settings import DEFAULT_SETTINGS
 from xosc_lateral.driver.models.autoregressive.fit_spectrum import _shaped, _typical_power, fit_spectrum
-from xosc_lateral.driver.models.noise import NOISE_VARIANCE, ShapedNoise
+from xosc_lateral.driver.models.fit_noise import NOISE_VARIANCE
+from xosc_lateral.driver.models.noise import ShapedNoise
 
 KNOTS = np.linspace(0.0, 2.5, DEFAULT_SETTINGS.n_knots)
 """[Hz]"""

@@ -5,13 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from xosc_lateral.driver.models.autoregressive.volatility import (
-    Volatility,
-    autocovariance,
-    averaged_memory,
-    fit_volatility,
-    log_power,
-)
+from xosc_lateral.driver.models.autoregressive.fit_volatility import autocovariance, fit_volatility, log_power
+from xosc_lateral.driver.models.autoregressive.volatility import Volatility, averaged_memory
 from xosc_lateral.errors import DriverProfileError
 
 

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from xosc_lateral.driver.effects.base import EffectTerms
 from xosc_lateral.driver.effects.hidden import HiddenEffect
-from xosc_lateral.driver.kernels import recur
+from xosc_lateral.driver.recursion import recur
 
 FloatArray = NDArray[np.float64]
 

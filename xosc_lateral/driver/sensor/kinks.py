@@ -17,8 +17,8 @@ from math import isfinite
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.driver.kernels import recur
 from xosc_lateral.driver.records import Record
+from xosc_lateral.driver.recursion import recur
 from xosc_lateral.drives.filters import scale_frequencies
 from xosc_lateral.drives.resampling import passed
 from xosc_lateral.errors import DriverProfileError

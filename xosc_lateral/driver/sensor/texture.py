@@ -17,7 +17,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.driver.kernels import recur
+from xosc_lateral.driver.recursion import recur
 from xosc_lateral.drives.filters import kaiser_design, low_pass
 
 FloatArray = NDArray[np.float64]

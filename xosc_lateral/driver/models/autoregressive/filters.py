@@ -13,7 +13,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.driver.kernels import JitKernel, worth_compiling
+from xosc_lateral.driver.jit_kernel import JitKernel, worth_compiling
 from xosc_lateral.drives.filters import low_pass
 
 FloatArray = NDArray[np.float64]

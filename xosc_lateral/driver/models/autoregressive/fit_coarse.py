@@ -13,14 +13,9 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.driver.models.autoregressive.autoregression import (
-    GRID,
-    RIDGE,
-    Autoregression,
-    fit_autoregression,
-    stabilise,
-)
+from xosc_lateral.driver.models.autoregressive.autoregression import GRID, Autoregression, stabilise
 from xosc_lateral.driver.models.autoregressive.filters import COARSE_EVERY, measuring_low_pass
+from xosc_lateral.driver.models.autoregressive.fit_autoregression import RIDGE, fit_autoregression
 from xosc_lateral.driver.models.autoregressive.fit_settings import FitSettings
 
 FloatArray = NDArray[np.float64]

@@ -11,14 +11,9 @@ from numpy.typing import NDArray
 from xosc_lateral.driver.models.autoregressive.autoregression import Autoregression
 from xosc_lateral.driver.models.autoregressive.filters import COARSE_EVERY, split_bands
 from xosc_lateral.driver.models.autoregressive.fit_settings import FitSettings
+from xosc_lateral.driver.models.autoregressive.fit_volatility import MAX_LAG, autocovariance, fit_volatility, log_power
 from xosc_lateral.driver.models.autoregressive.model import AutoregressiveModel
-from xosc_lateral.driver.models.autoregressive.volatility import (
-    MAX_LAG,
-    Volatility,
-    autocovariance,
-    fit_volatility,
-    log_power,
-)
+from xosc_lateral.driver.models.autoregressive.volatility import Volatility
 from xosc_lateral.driver.models.base import Start
 from xosc_lateral.drives.periodogram import Detrend, window_powers
 

@@ -8,11 +8,12 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.driver.kernels import convolve, recur
+from xosc_lateral.driver.convolution import convolve
 from xosc_lateral.driver.models.autoregressive.driver import DriverState
 from xosc_lateral.driver.models.autoregressive.filters import COARSE_EVERY, TICKS, interpolate
 from xosc_lateral.driver.models.autoregressive.parameters import AutoregressiveParameters
 from xosc_lateral.driver.models.autoregressive.volatility_stream import COARSE, FINE, Factors, FactorState
+from xosc_lateral.driver.recursion import recur
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]

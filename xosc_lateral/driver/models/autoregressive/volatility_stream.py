@@ -11,10 +11,10 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.driver.kernels import recur
 from xosc_lateral.driver.models.autoregressive.filters import COARSE_EVERY
 from xosc_lateral.driver.models.autoregressive.parameters import AutoregressiveParameters
 from xosc_lateral.driver.models.autoregressive.volatility import SLOW_MEMORY
+from xosc_lateral.driver.recursion import recur
 from xosc_lateral.driver.seeds import AutoregressiveSeed, generator
 
 FloatArray = NDArray[np.float64]

@@ -7,11 +7,11 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.driver.kernels import convolve
-from xosc_lateral.driver.models.noise import fit_shaped_noise
+from xosc_lateral.driver.convolution import convolve
+from xosc_lateral.driver.models.fit_noise import fit_shaped_noise
 from xosc_lateral.driver.models.two_level.markov import bin_of, fit_markov_chain
 from xosc_lateral.driver.models.two_level.model import TwoLevelModel
-from xosc_lateral.driver.models.two_level.parameters import PAPER_SETTINGS, TwoLevelSettings
+from xosc_lateral.driver.models.two_level.settings import PAPER_SETTINGS, TwoLevelSettings
 
 FloatArray = NDArray[np.float64]
 

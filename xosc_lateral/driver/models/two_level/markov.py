@@ -20,7 +20,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.driver.kernels import JitKernel
+from xosc_lateral.driver.jit_kernel import JitKernel
 from xosc_lateral.errors import DriverProfileError, NotEnoughDataError
 
 FloatArray = NDArray[np.float64]

@@ -1,0 +1,80 @@
+"""What a model does in one half of the board: free runs and windows, under the context of the scored vehicles."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from xosc_lateral.baselines.base import LateralModel
+from xosc_lateral.board.half import ENSEMBLE, Half
+from xosc_lateral.driver.snippets import segment_of
+from xosc_lateral.drives.resampling import STEP
+from xosc_lateral.evaluation.condition import SnippetCondition
+from xosc_lateral.evaluation.measures import Features, features_of
+from xosc_lateral.evaluation.snippets import Snippets
+from xosc_lateral.evaluation.variance import VarianceParts, variance_parts
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class SampledHalf:
+    """What a model did in one half.
+
+    Parameters
+    ----------
+    settings : mapping
+    paths : list of array
+        A free run for each of the half's runs. [m]
+    ensemble : array, shape (n, 8, 51), or None
+        Snippets of 10 s with the real starts. [m]
+    windows : mapping of SnippetCondition to array, shape (n, m)
+        [m]
+    features : mapping of SnippetCondition to Features
+    variance : VarianceParts
+    """
+
+    settings: Mapping[str, float]
+    paths: list[FloatArray]
+    ensemble: FloatArray
+    windows: Mapping[SnippetCondition, FloatArray]
+    features: Mapping[SnippetCondition, Features]
+    variance: VarianceParts
+
+
+def sample_half(model: LateralModel, half: Half, rng: np.random.Generator) -> SampledHalf:
+    """Free runs over the half's runs, and windows with the real starts."""
+    paths = model.sample([segment_of(run) for run in half.test], None, rng)
+    shortest = min(half.windows)
+    ensemble = sample_same_start(model, half.windows[shortest], rng, ENSEMBLE)
+    cut: dict[SnippetCondition, FloatArray] = {}
+    for condition in half.conditions:
+        own = half.windows[condition.seconds]
+        if not condition.same_start:
+            cut[condition] = own.cut_from(paths)
+        elif condition.seconds == shortest:
+            cut[condition] = ensemble[:, 0]
+        else:
+            cut[condition] = sample_same_start(model, own, rng, 1)[:, 0]
+    features = {
+        condition: features_of(rows, half.windows[condition.seconds].lane_width, STEP)
+        for condition, rows in cut.items()
+    }
+    free = half.windows[shortest].cut_from(paths)
+    return SampledHalf(model.settings, paths, ensemble, cut, features, variance_parts(free, run_names(half)))
+
+
+def run_names(half: Half) -> NDArray[np.str_]:
+    """Run of each of the shortest windows: a free run is one driver. Shape (n,). [-]"""
+    return np.array([str(number) for number, _ in half.windows[min(half.windows)].place])
+
+
+def sample_same_start(model: LateralModel, windows: Snippets, rng: np.random.Generator, members: int) -> FloatArray:
+    """Shape (n, members, m). [m]"""
+    segments = [segment for segment in windows.segments for _ in range(members)]
+    starts = np.repeat(windows.offset[:, 0], members)
+    rows = np.array(model.sample(segments, starts, rng))
+    return rows.reshape(len(windows), members, -1)
