@@ -33,7 +33,7 @@ class Intermittent(SimulatedModel):
     look_ahead : float
         [s]
     threshold : float
-        Error that alone makes a driver act after a second. [m/s2]
+        Error that alone makes a driver act after 1.4 s: after a second, were nothing forgotten. [m/s2]
     accumulator_noise : float
         Standard deviation in one second, threshold 1. [-]
     motor_noise : float
