@@ -21,7 +21,7 @@ from pathlib import Path
 from xosc_lateral.pipeline.convert import convert_scenario
 from xosc_lateral.pipeline.settings import ConvertSettings
 from xosc_lateral.templates.motorway import Bend, Motorway, Straight
-from xosc_lateral.templates.parameter import Settings
+from xosc_lateral.templates.settings import Settings
 from xosc_lateral.templates.storyboard import Actor, PlannedEvent, Plot, Vehicle, at_time, lane_change
 from xosc_lateral.templates.template import Template
 

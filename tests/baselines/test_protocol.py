@@ -10,7 +10,7 @@ import pytest
 from tests.baselines.made_runs import smooth_runs
 from xosc_lateral.baselines import calibration
 from xosc_lateral.baselines.base import LateralModel
-from xosc_lateral.baselines.calibration import distance_to, targets_of
+from xosc_lateral.baselines.calibration_targets import distance_to, targets_of
 from xosc_lateral.baselines.catalogue import MODELS
 from xosc_lateral.baselines.profiles import drives_of
 from xosc_lateral.driver.snippets import cut_snippets, segment_of

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tests.baselines.made_runs import STEP, made_run, smooth_runs, straight
-from xosc_lateral.baselines.base import BURN_IN, batch_of, driver_means_of
+from xosc_lateral.baselines.batch import batch_of
 from xosc_lateral.baselines.bounded_noise import BoundedNoise
 from xosc_lateral.baselines.constant_offset import ConstantOffset
 from xosc_lateral.baselines.gaussian_process import GaussianProcess
@@ -16,6 +16,7 @@ from xosc_lateral.baselines.lc_sigma import LcSigma
 from xosc_lateral.baselines.linear_preview import NODES, LinearPreview
 from xosc_lateral.baselines.ornstein_uhlenbeck import OrnsteinUhlenbeck
 from xosc_lateral.baselines.potential_field import PotentialField
+from xosc_lateral.baselines.simulated import BURN_IN, driver_means_of
 from xosc_lateral.baselines.sloppy_driver import SloppyDriver
 from xosc_lateral.baselines.social_force import PUBLISHED_SHIFT, SocialForce, shift_beside
 from xosc_lateral.baselines.strip_based import StripBased
@@ -61,7 +62,7 @@ def test_lc_sigma_is_as_wide_as_its_sigma_and_as_slow_as_its_formula() -> None:
 
 def test_lc_sigma_is_what_a_real_sumo_does() -> None:
     pytest.importorskip("sumo")
-    from xosc_lateral.baselines.sumo_run import simulate_sumo
+    from xosc_lateral.baselines.sumo_process import simulate_sumo
 
     sigma = 0.4
     tracks = simulate_sumo(sigma, 7, lanes=20, seconds=260.0)

@@ -7,19 +7,13 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from xosc_lateral.datasets.hidden_plants import (
-    CameraStep,
-    Companion,
-    CyclicTarget,
-    Distraction,
-    Fatigue,
-    SensorDrift,
-    TargetWander,
-)
+from xosc_lateral.datasets.camera_plants import CameraStep, SensorDrift
+from xosc_lateral.datasets.hidden_plants import Companion, CyclicTarget, Distraction, Fatigue, TargetWander
 from xosc_lateral.datasets.intent import Context, Intent, Plant
 from xosc_lateral.datasets.motorway import STEP, draw_motorway
-from xosc_lateral.datasets.plants import LanePreference, RestoringBy, ShiftBy, SpreadBy
+from xosc_lateral.datasets.plants import LanePreference, ShiftBy
 from xosc_lateral.datasets.response import SimulatedResponse, lagged, threshold
+from xosc_lateral.datasets.spread_plants import RestoringBy, SpreadBy
 
 N = round(3600.0 / STEP)
 FIELDS = ("target", "tolerance", "gain", "noise", "attention", "camera")

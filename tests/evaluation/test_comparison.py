@@ -8,8 +8,9 @@ from msgspec.structs import replace
 
 from tests.driver.models.made_models import POPULATION, STEADY
 from xosc_lateral.driver.profile import DriverProfile
-from xosc_lateral.evaluation.comparison import compare_profiles, free_runs, summarise
+from xosc_lateral.evaluation.comparison import compare_profiles
 from xosc_lateral.evaluation.filters import THINNED, below_half_hertz, thinned
+from xosc_lateral.evaluation.movement_summary import free_runs, summarise
 
 
 def test_a_sine_is_summed_up_by_its_closed_forms() -> None:

@@ -14,7 +14,7 @@ from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.drives.drive import Run
 from xosc_lateral.drives.resampling import STEP
 from xosc_lateral.errors import NotEnoughDataError
-from xosc_lateral.evaluation.comparison import compare_profiles, driver_distances, free_runs, summary_of
+from xosc_lateral.evaluation.comparison import compare_profiles, driver_distances
 from xosc_lateral.evaluation.distances import (
     metric_distances,
     snippet_distances,
@@ -23,8 +23,10 @@ from xosc_lateral.evaluation.distances import (
 )
 from xosc_lateral.evaluation.margins import margins
 from xosc_lateral.evaluation.metrics import METRICS, cut_snippets, snippet_metrics
+from xosc_lateral.evaluation.movement_summary import free_runs, summary_of
 from xosc_lateral.evaluation.record import scores_to_dict
-from xosc_lateral.evaluation.scores import score_profile, score_snippets
+from xosc_lateral.evaluation.scores import score_profile
+from xosc_lateral.evaluation.snippet_scores import score_snippets
 from xosc_lateral.evaluation.snippets import snippets_of
 from xosc_lateral.evaluation.spectra import autocorrelation, spectrum
 

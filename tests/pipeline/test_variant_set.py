@@ -12,7 +12,7 @@ import xosc_lateral as xl
 from xosc_lateral.cli import main
 from xosc_lateral.formats.openscenario import read_distribution
 from xosc_lateral.pipeline.load import play_scenario
-from xosc_lateral.scenario.distribution import Stochastic
+from xosc_lateral.scenario.stochastic import Stochastic
 
 XSD = Path(__file__).parents[1] / "data" / "xsd"
 SCHEMAS = {"0": "1.0.0", "1": "1.1.1", "2": "1.2.0", "3": "1.3.0"}

@@ -10,21 +10,19 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import stats
 
-from xosc_lateral.scenario.distribution import (
-    Deterministic,
+from xosc_lateral.scenario.deterministic import Deterministic, SteppedRange, ValueSets
+from xosc_lateral.scenario.place import Place
+from xosc_lateral.scenario.stochastic import (
     DistributionError,
     Draw,
     Histogram,
     LogNormal,
     Normal,
     Poisson,
-    SteppedRange,
     Stochastic,
     Uniform,
-    ValueSets,
     Weighted,
 )
-from xosc_lateral.scenario.place import Place
 
 PLACE = Place("f.xosc", 1, "e")
 COUNT = 4000

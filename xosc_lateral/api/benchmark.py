@@ -114,7 +114,7 @@ class RealismBoard(Result):
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values, as ``--json`` prints them."""
-        from xosc_lateral.report.board import board_record
+        from xosc_lateral.report.board_json import board_record
 
         return board_record(self._board, self._given.inputs)
 
@@ -127,7 +127,8 @@ class RealismBoard(Result):
     def write(self, folder: PathLike, *, force: bool = False) -> list[Path]:
         """Write board.json, board.md and board.html; nothing is half-written."""
         from xosc_lateral.formats.atomic import write_atomically
-        from xosc_lateral.report.board import board_markdown, board_page
+        from xosc_lateral.report.board import board_markdown
+        from xosc_lateral.report.board_page import board_page
 
         paths = board_files(folder)
         claim(paths, self._given.files, force=force)

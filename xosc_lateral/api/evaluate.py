@@ -125,7 +125,7 @@ class Evaluation(Result):
 
     def plot(self) -> Figure:
         """Violins of the ten metrics, measured beside sampled."""
-        from xosc_lateral.report.evaluation_figures import violin_figure
+        from xosc_lateral.report.violins import violin_figure
 
         return violin_figure(self._scores.evaluations[3])
 

@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 from xosc_lateral.api.inputs import PathLike
 from xosc_lateral.api.result import Result
-from xosc_lateral.formats.targets import claim, folder_target, template_mark
+from xosc_lateral.formats.own_files import template_mark
+from xosc_lateral.formats.targets import claim, folder_target
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -14,8 +14,10 @@ from typing import ClassVar, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.baselines.base import SegmentBatch, SimulatedModel
-from xosc_lateral.baselines.calibration import Bounds, calibrate, distance_to, targets_of
+from xosc_lateral.baselines.batch import SegmentBatch
+from xosc_lateral.baselines.calibration import Bounds, calibrate
+from xosc_lateral.baselines.calibration_targets import distance_to, targets_of
+from xosc_lateral.baselines.simulated import SimulatedModel
 from xosc_lateral.drives.drive import Run
 from xosc_lateral.drives.resampling import STEP
 

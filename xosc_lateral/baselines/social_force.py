@@ -9,9 +9,10 @@ from typing import ClassVar, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.baselines.base import ALONGSIDE, SegmentBatch, SimulatedModel, driver_means_of
+from xosc_lateral.baselines.batch import ALONGSIDE, SegmentBatch
 from xosc_lateral.baselines.calibration import Bounds, calibrate
 from xosc_lateral.baselines.potential_field import move
+from xosc_lateral.baselines.simulated import SimulatedModel, driver_means_of
 from xosc_lateral.drives.drive import Run
 
 FloatArray = NDArray[np.float64]

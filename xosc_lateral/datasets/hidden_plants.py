@@ -1,4 +1,4 @@
-"""Planted effects that no column explains: on the driver, on the camera; and a column that explains nothing."""
+"""Planted effects on the driver that no column explains; and a column that explains nothing."""
 
 from __future__ import annotations
 
@@ -107,33 +107,6 @@ class Distraction:
                 glance = np.arange(min(stop, n) - start) * STEP
                 intent.attention[start:stop] = np.mod(glance, 3.0) > 0.9
             start, on = stop, not on
-
-
-@dataclass(frozen=True)
-class CameraStep:
-    """The camera is recalibrated: from `at` (share of the drive) on, it reads `size` [m] more to the left."""
-
-    size: float = 0.25
-    at: float = 0.45
-    kind: str = "step"
-    columns: tuple[str, ...] = ()
-
-    def apply(self, intent: Intent, context: Context, rng: np.random.Generator) -> None:
-        """Shift the measurement, not the car."""
-        intent.camera[round(self.at * len(intent.camera)) :] += self.size
-
-
-@dataclass(frozen=True)
-class SensorDrift:
-    """The camera drifts steadily by `size` [m] over the drive."""
-
-    size: float = 0.3
-    kind: str = "drift"
-    columns: tuple[str, ...] = ()
-
-    def apply(self, intent: Intent, context: Context, rng: np.random.Generator) -> None:
-        """Shift the measurement, not the car."""
-        intent.camera += self.size * (np.linspace(0.0, 1.0, len(intent.camera)) - 0.5)
 
 
 @dataclass(frozen=True)

@@ -1,8 +1,8 @@
-"""Effects of columns that a test plants in a simulated drive: on what the driver wants or can do, or on the camera.
+"""Effects of columns that a test plants in a simulated drive: on where the driver wants to be.
 
 A plant is small and frozen; `apply` changes the driver's `Intent`, which the steering loop then follows with all its
-lags, thresholds and noise: what ends up in the recorded offset is the driver's doing. `hidden_plants` holds those
-without a column.
+lags, thresholds and noise: what ends up in the recorded offset is the driver's doing. `spread_plants` holds effects on
+how exactly he keeps to it, `hidden_plants` those without a column, `camera_plants` those that he has no part in.
 """
 
 from __future__ import annotations
@@ -12,9 +12,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from xosc_lateral.datasets.intent import Context, Intent
-from xosc_lateral.datasets.motorway import STEP
 from xosc_lateral.datasets.response import SimulatedResponse, lagged
-from xosc_lateral.drives.filters import first_order
 
 
 @dataclass(frozen=True)
@@ -91,88 +89,3 @@ class LanePreference:
     def apply(self, intent: Intent, context: Context, rng: np.random.Generator) -> None:
         """Move the target; smooth over two seconds, as a lane change is."""
         intent.target += lagged(np.asarray(self.offsets)[context["lane_index"].astype(int)], 1.0)
-
-
-@dataclass(frozen=True)
-class SpreadBy:
-    """The driver is more or less careful, depending on a column: tolerance and inexactness together.
-
-    Parameters
-    ----------
-    column : str
-        Where it is NaN (no car ahead), the largest value counts.
-    factor : float
-        Spread at the 95 % quantile over the spread at the 5 % quantile. [-]
-    """
-
-    column: str
-    factor: float
-    response: SimulatedResponse = field(default_factory=lambda: SimulatedResponse(lag=1.0))
-    kind: str = "scale"
-
-    @property
-    def columns(self) -> tuple[str, ...]:
-        """The one column."""
-        return (self.column,)
-
-    def apply(self, intent: Intent, context: Context, rng: np.random.Generator) -> None:
-        """Widen or narrow the tolerance."""
-        factor = self.factor ** self.response.scaled(context[self.column])
-        intent.tolerance *= factor
-        intent.noise *= factor
-
-
-@dataclass(frozen=True)
-class RestoringBy:
-    """One correction takes away more or less of a noticed error, depending on a column.
-
-    Parameters
-    ----------
-    factor : float
-        Share at the 95 % quantile over the share at the 5 % quantile. [-]
-    """
-
-    column: str
-    factor: float
-    response: SimulatedResponse = field(default_factory=SimulatedResponse)
-    kind: str = "dynamics"
-
-    @property
-    def columns(self) -> tuple[str, ...]:
-        """The one column."""
-        return (self.column,)
-
-    def apply(self, intent: Intent, context: Context, rng: np.random.Generator) -> None:
-        """Strengthen or weaken the corrections."""
-        intent.gain *= self.factor ** self.response.scaled(context[self.column])
-
-
-@dataclass(frozen=True)
-class ShakyCamera:
-    """The camera reads less exactly where a column is high: fine noise, and no movement of the car.
-
-    Parameters
-    ----------
-    column : str
-    size : float
-        Standard deviation of the error at the 95 % quantile less that at the 5 % quantile; none at the smallest. [m]
-    memory : float
-        Correlation time of the error. [s]
-    """
-
-    column: str
-    size: float = 0.04
-    memory: float = 0.3
-    kind: str = "scale"
-
-    @property
-    def columns(self) -> tuple[str, ...]:
-        """The one column."""
-        return (self.column,)
-
-    def apply(self, intent: Intent, context: Context, rng: np.random.Generator) -> None:
-        """Blur the measurement."""
-        strength = SimulatedResponse().scaled(context[self.column])
-        keep = np.exp(-STEP / self.memory)
-        error = first_order(rng.normal(size=len(strength)), keep, gain=np.sqrt(1.0 - keep**2))
-        intent.camera += self.size * (strength - strength.min()) * error

@@ -6,14 +6,15 @@ import hashlib
 import json
 from collections.abc import Mapping
 from functools import lru_cache
-from typing import Annotated, Any
+from typing import Any
 
 import msgspec
-from msgspec import Meta, defstruct, field, structs
+from msgspec import defstruct, field, structs
 
 from xosc_lateral.driver.effects import Effect, any_effect
 from xosc_lateral.driver.models.base import CoreModel
 from xosc_lateral.driver.models.registry import CORE_MODELS, any_model
+from xosc_lateral.driver.provenance import Metadata, Provenance
 from xosc_lateral.driver.records import Record, plain, read_as, schema_hook, set_once
 from xosc_lateral.driver.sensor.model import SensorModel
 from xosc_lateral.driver.versions import FORMAT, VERSION, upgraded
@@ -21,77 +22,6 @@ from xosc_lateral.errors import DriverProfileError
 
 MAX_LANE_WIDTH = 10.0
 """Lanes that wide are none: 2 to 6 m is what measured ones have. [m]"""
-
-
-class Provenance(Record, frozen=True):
-    """Where a profile comes from.
-
-    Parameters
-    ----------
-    source : str
-        The drives in words.
-    licence : str
-        Of the drives, and what it asks of who passes the profile on.
-    hours : float
-        Driving that was fitted, after cutting. [h]
-    drives, runs : int
-        How many.
-    inputs : mapping of str to str
-        File name -> SHA-256 of every table.
-    fit : mapping
-        Model and settings of the fit.
-    evaluation : mapping
-        Results on held-out drives, if there are any.
-    package_version : str
-        That wrote it.
-    notes : str
-    """
-
-    source: Annotated[str, Meta(description="The drives in words.")] = ""
-    licence: Annotated[str, Meta(description="Of the drives.")] = ""
-    hours: Annotated[float, Meta(ge=0, description="Driving fitted, after cutting. [h]")] = 0.0
-    drives: Annotated[int, Meta(ge=0)] = 0
-    runs: Annotated[int, Meta(ge=0)] = 0
-    inputs: Annotated[Mapping[str, str], Meta(description="File name to SHA-256.")] = field(default_factory=dict)
-    fit: Annotated[Mapping[str, Any], Meta(description="Model and settings of the fit.")] = field(default_factory=dict)
-    evaluation: Annotated[Mapping[str, Any], Meta(description="Results on held-out drives.")] = field(
-        default_factory=dict
-    )
-    package_version: str = ""
-    notes: str = ""
-
-    def to_dict(self) -> dict[str, Any]:
-        """Plain JSON values."""
-        values: dict[str, Any] = plain(self)
-        return values
-
-
-class Metadata(Record, frozen=True):
-    """What a profile is of, to be searched by; all of it is optional.
-
-    Parameters
-    ----------
-    version : str
-        Of the profile itself, as its owners count: "2", "1.3".
-    driver, vehicle, road : str
-        Whom and what was measured, and where: "professional", "truck", "motorway".
-    country : str
-        ISO 3166-1 alpha-2: "DE".
-    date : str
-        When the drives were recorded, ISO 8601: "2026-05", "2026-05-03/2026-06-01".
-    licence : str
-        Of the profile.
-    tags : tuple of str
-    """
-
-    version: str = ""
-    driver: str = ""
-    vehicle: str = ""
-    road: str = ""
-    country: str = ""
-    date: str = ""
-    licence: str = ""
-    tags: tuple[str, ...] = ()
 
 
 class DriverProfile(Record, frozen=True):

@@ -10,7 +10,8 @@ from xosc_lateral.evaluation.filters import CUTOFF
 from xosc_lateral.evaluation.lane_keeping import UNITS
 from xosc_lateral.evaluation.margins import Margins
 from xosc_lateral.evaluation.realism import Beside, ConditionScores
-from xosc_lateral.evaluation.scores import LAGS, ProfileScores, SnippetScores
+from xosc_lateral.evaluation.scores import LAGS, ProfileScores
+from xosc_lateral.evaluation.snippet_scores import SnippetScores
 from xosc_lateral.evaluation.variance import VarianceParts
 
 

@@ -13,91 +13,28 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.driver.models.two_level.fit import split_levels
-from xosc_lateral.driver.models.two_level.settings import PAPER_SETTINGS
 from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.drives.drive import Run
 from xosc_lateral.errors import NotEnoughDataError
 from xosc_lateral.evaluation.condition import SnippetCondition
-from xosc_lateral.evaluation.distances import Distances, mean_distances, metric_distances, split_groups
 from xosc_lateral.evaluation.margins import Margins, margins
-from xosc_lateral.evaluation.metrics import METRICS, snippet_metrics
+from xosc_lateral.evaluation.parts import PartEvaluation, evaluate_parts
 from xosc_lateral.evaluation.realism import Realism, score_realism
-from xosc_lateral.evaluation.sampled_snippets import sample_parts, sample_runs, sample_snippets
+from xosc_lateral.evaluation.sampled_snippets import sample_runs, sample_snippets
+from xosc_lateral.evaluation.snippet_scores import SNIPPET, SnippetScores, score_snippets
 from xosc_lateral.evaluation.snippets import Snippets, snippets_of
 from xosc_lateral.evaluation.spectra import Spectrum, autocorrelation, spectrum
 
 FloatArray = NDArray[np.float64]
 
-SNIPPET = 10.0
-"""The paper's. [s]"""
 LONG_SNIPPET = 60.0
 """[s]"""
-FINE_SHIFT = 5.0
-"""Real fine parts are shifted round by this, to part them from their coarse parts. [s]"""
-SPLITS = 8
-"""Random halves of the drives that distances and floors are averaged over."""
 LAGS = (0.2, 0.4, 0.6, 1.0, 1.4, 2.0, 3.0, 4.0, 6.0, 8.0, 12.0, 16.0, 24.0, 32.0)
 """Of the autocorrelation. [s]"""
 TRACES, TRACE = 6, 120.0
 """Drives of which a trace is kept for the eye, and its length. [s]"""
 MIN_SNIPPETS = 20
 """Fewer say nothing about a distribution."""
-
-
-@dataclass(frozen=True, eq=False)
-class PartEvaluation:
-    """One of the paper's four evaluations.
-
-    Parameters
-    ----------
-    number : int
-        1 real coarse + shifted real fine, 2 sampled coarse + real fine, 3 real coarse + sampled fine, 4 both sampled.
-    coarse, fine : str
-        Where each part comes from.
-    real, artificial : array, shape (n, 10)
-        Metrics of the snippets. [m]
-    distances : Distances
-        Between the two, all snippets.
-    """
-
-    number: int
-    coarse: str
-    fine: str
-    real: FloatArray
-    artificial: FloatArray
-    distances: Distances
-
-
-@dataclass(frozen=True, eq=False)
-class SnippetScores:
-    """Distances for snippets of one length.
-
-    Parameters
-    ----------
-    seconds : float
-        Length. [s]
-    count : int
-    distances, floor : Distances
-        Real to sampled and real to real, averaged over the same random halves of the drives.
-    """
-
-    seconds: float
-    count: int
-    distances: Distances
-    floor: Distances
-
-    @property
-    def ratio(self) -> float:
-        """Mean distance over mean floor. 1: as close as real data is to itself. [-]"""
-        return self.distances.mean / self.floor.mean
-
-    @property
-    def worst_ratio(self) -> tuple[str, float]:
-        """Metric with the largest ratio, and that. [-]"""
-        ratios = {name: self.distances.by_metric[name] / self.floor.by_metric[name] for name in METRICS}
-        worst = max(ratios, key=ratios.__getitem__)
-        return worst, ratios[worst]
 
 
 @dataclass(frozen=True, eq=False)
@@ -238,63 +175,6 @@ def _traces(runs: Sequence[Run], sampled: Sequence[FloatArray], step: float) -> 
         Trace(drive, step, np.array(runs[k].offset[rows]), np.array(sampled[k][rows]))
         for drive, k in list(longest.items())[:TRACES]
     )
-
-
-def score_snippets(
-    real: FloatArray, sampled: FloatArray, group: NDArray[np.str_], *, seed: int, seconds: float = SNIPPET
-) -> SnippetScores:
-    """Distances of sampled snippets, and the floor, over random halves of the groups.
-
-    A half of real snippets is compared with its own sampled ones, and with the other real half: both distances rest on
-    as many snippets, so that their ratio is fair.
-
-    Parameters
-    ----------
-    real, sampled : array, shape (n, m)
-        Row k of both starts at the same offset under the same context. [m]
-    group : array, shape (n,)
-        Never split between halves.
-    """
-    rng = np.random.default_rng(seed)
-    metrics, artificial = snippet_metrics(real), snippet_metrics(sampled)
-    model, floor = [], []
-    for _ in range(SPLITS):
-        half = split_groups(group, rng)
-        model.append(metric_distances(metrics[half], artificial[half]))
-        floor.append(metric_distances(metrics[half], metrics[~half]))
-    return SnippetScores(seconds, len(real), mean_distances(model), mean_distances(floor))
-
-
-def evaluate_parts(
-    profile: DriverProfile, snippets: Snippets, sampled: FloatArray, *, seed: int
-) -> tuple[PartEvaluation, ...]:
-    """Run the paper's four evaluations; (4) takes `sampled`, effects included. `sampled` of shape (n, m). [m]"""
-    coarse_real, fine_real = _real_parts(snippets)
-    coarse, fine = sample_parts(profile, snippets, seed)
-    shifted = np.roll(fine_real, round(FINE_SHIFT / profile.model.step), axis=1)
-    width = snippets.lane_width
-    combinations = (
-        ("measured", "measured, shifted", (coarse_real + shifted) * width),
-        ("sampled", "measured", (coarse + fine_real) * width),
-        ("measured", "sampled", (coarse_real + fine) * width),
-        ("sampled", "sampled", sampled),
-    )
-    real = snippet_metrics(snippets.offset)
-    results = []
-    for number, (coarse_from, fine_from, rows) in enumerate(combinations, start=1):
-        artificial = snippet_metrics(rows)
-        distances = metric_distances(real, artificial)
-        results.append(PartEvaluation(number, coarse_from, fine_from, real, artificial, distances))
-    return tuple(results)
-
-
-def _real_parts(snippets: Snippets) -> tuple[FloatArray, FloatArray]:
-    """The paper's split of the measured snippets, made on whole runs so that only a run's ends are ends."""
-    runs = {id(one.run): one.run for one in snippets.items}
-    split = {key: split_levels(run.rel_offset, PAPER_SETTINGS) for key, run in runs.items()}
-    coarse = np.array([split[id(one.run)][0][one.rows] for one in snippets.items])
-    fine = np.array([split[id(one.run)][1][one.rows] for one in snippets.items])
-    return coarse, fine
 
 
 def _enough(snippets: Snippets) -> Snippets:

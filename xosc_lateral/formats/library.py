@@ -8,7 +8,8 @@ from pathlib import Path
 
 from msgspec.structs import replace
 
-from xosc_lateral.driver.profile import DriverProfile, Metadata
+from xosc_lateral.driver.profile import DriverProfile
+from xosc_lateral.driver.provenance import Metadata
 from xosc_lateral.errors import FormatError, XoscLateralError
 from xosc_lateral.formats.profiles import SHIPPED, find_profile, list_profiles, read_profile
 

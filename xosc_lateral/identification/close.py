@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.driver.models.kinds import ModelKind
-from xosc_lateral.driver.profile import DriverProfile, Provenance
+from xosc_lateral.driver.profile import DriverProfile
+from xosc_lateral.driver.provenance import Provenance
 from xosc_lateral.drives.drive import Drive
 from xosc_lateral.identification.blocks import held_out_words, hold_out_blocks
 from xosc_lateral.identification.columns import Column

@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from xosc_lateral.driver.effects import ColumnEffect, Effect
 from xosc_lateral.driver.fitting import fit_runs
 from xosc_lateral.driver.models.kinds import ModelKind
-from xosc_lateral.driver.profile import DriverProfile, Provenance
+from xosc_lateral.driver.profile import DriverProfile
+from xosc_lateral.driver.provenance import Provenance
 from xosc_lateral.errors import NotEnoughDataError
 from xosc_lateral.identification.blocks import folds_of
 from xosc_lateral.identification.columns import Column

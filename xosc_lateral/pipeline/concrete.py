@@ -12,9 +12,10 @@ from xosc_lateral.formats.openscenario.distribution import read_distribution
 from xosc_lateral.formats.openscenario.references import Boundary, allowed_roots
 from xosc_lateral.formats.openscenario.write import source_of_set, variant_index
 from xosc_lateral.limits import PARAMETER_SETS
-from xosc_lateral.pipeline.request import DISTRIBUTIONS, DocumentKind, Request
+from xosc_lateral.pipeline.document_kind import DISTRIBUTIONS, DocumentKind
+from xosc_lateral.pipeline.request import Request
 from xosc_lateral.pipeline.settings import ConvertSettings
-from xosc_lateral.scenario.distribution import ParameterSet
+from xosc_lateral.scenario.deterministic import ParameterSet
 from xosc_lateral.scenario.place import Place
 
 

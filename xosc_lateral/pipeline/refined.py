@@ -9,7 +9,8 @@ from msgspec.structs import replace
 from xosc_lateral.driver.effects.rounding import rounded_effect, rounded_number
 from xosc_lateral.driver.fitting import fit_profile
 from xosc_lateral.driver.models.kinds import ModelKind
-from xosc_lateral.driver.profile import DriverProfile, Provenance
+from xosc_lateral.driver.profile import DriverProfile
+from xosc_lateral.driver.provenance import Provenance
 from xosc_lateral.drives.drive import Drive
 from xosc_lateral.identification.close import LoopResult, close_loop
 

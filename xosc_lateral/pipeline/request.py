@@ -6,18 +6,12 @@ import json
 import os
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from enum import Enum
 from pathlib import Path
-from typing import IO, TYPE_CHECKING, Any
-
-from lxml import etree
+from typing import TYPE_CHECKING, Any
 
 from xosc_lateral.errors import FormatError
-from xosc_lateral.formats.openscenario.element import local_name
-from xosc_lateral.formats.openscenario.provenance import HEADER_MARK
-from xosc_lateral.formats.source import open_source
 from xosc_lateral.formats.tables import TABLE_SUFFIXES, as_text, read_text_table
-from xosc_lateral.limits import XML_TREE
+from xosc_lateral.pipeline.document_kind import DISTRIBUTIONS, document_kind
 from xosc_lateral.pipeline.manifest import MANIFEST
 from xosc_lateral.pipeline.settings import ConvertSettings
 
@@ -29,22 +23,6 @@ TABLE_COLUMNS = ("scenario", "profile", "seed", "variants", "parameters", "only"
 """Columns of a table of scenarios; further ones are ``profile:ENTITY`` and ``parameter:NAME``."""
 
 _GLOB_CHARACTERS = frozenset("*?[")
-
-
-class DocumentKind(Enum):
-    """What an OpenSCENARIO file holds."""
-
-    SCENARIO = "scenario"
-    CATALOG = "catalog"
-    DISTRIBUTION = "parameter value distribution"
-    CONVERTED = "converted scenario"
-    VARIANTS = "set of converted variants"
-
-
-DISTRIBUTIONS = frozenset({DocumentKind.DISTRIBUTION, DocumentKind.VARIANTS})
-"""Files that stand for several scenarios."""
-_KINDS = {"Catalog": DocumentKind.CATALOG, "ParameterValueDistribution": DocumentKind.DISTRIBUTION}
-_SCENARIO_PARTS = frozenset({"CatalogLocations", "RoadNetwork", "Entities", "Storyboard"})
 
 
 @dataclass(frozen=True, slots=True)
@@ -159,34 +137,6 @@ def is_single(given: str | Path) -> bool:
         is_table = path.name.lower().endswith(TABLE_SUFFIXES)
         return not is_table and document_kind(path) not in DISTRIBUTIONS
     return not path.is_dir() and not _GLOB_CHARACTERS & set(str(given))
-
-
-def document_kind(path: Path) -> DocumentKind:
-    """What a file holds, from its first elements; what can't be read counts as a scenario (its reader says why)."""
-    try:
-        with open_source(path, XML_TREE) as source:
-            return _kind_from(source.file)
-    except (etree.XMLSyntaxError, FormatError, OSError, ValueError, LookupError):
-        return DocumentKind.SCENARIO
-
-
-def _kind_from(file: IO[bytes]) -> DocumentKind:
-    events = etree.iterparse(
-        file, events=("start",), resolve_entities=False, no_network=True, load_dtd=False, remove_comments=True
-    )
-    is_ours = False
-    for _, element in events:
-        parent = element.getparent()
-        if parent is not None and parent.getparent() is None and isinstance(element.tag, str):
-            name = local_name(element)
-            if name == "FileHeader" and HEADER_MARK in (element.get("description") or ""):
-                is_ours = True
-            elif is_ours:
-                is_set = name == "ParameterValueDistribution"
-                return DocumentKind.VARIANTS if is_set else DocumentKind.CONVERTED
-            if name in _KINDS or name in _SCENARIO_PARTS:
-                return _KINDS.get(name, DocumentKind.SCENARIO)
-    return DocumentKind.CONVERTED if is_ours else DocumentKind.SCENARIO
 
 
 def _search(folder: Path, leave_out: Path | None) -> Iterator[Path]:

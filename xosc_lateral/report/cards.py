@@ -7,8 +7,9 @@ from dataclasses import asdict
 from typing import Any
 
 from xosc_lateral.driver.effects import Acts, ColumnEffect, Effect
-from xosc_lateral.driver.profile import DriverProfile, Provenance
-from xosc_lateral.evaluation.comparison import DURATION, MovementSummary, summary_of
+from xosc_lateral.driver.profile import DriverProfile
+from xosc_lateral.driver.provenance import Provenance
+from xosc_lateral.evaluation.movement_summary import DURATION, MovementSummary, summary_of
 from xosc_lateral.formats.library import FIELDS, Entry, facts_of
 from xosc_lateral.formats.profiles import profile_hash
 from xosc_lateral.report.render import render_text

@@ -10,9 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.driver.profile import DriverProfile
-from xosc_lateral.evaluation.comparison import SNIPPET, MovementSummary, free_runs, summarise
+from xosc_lateral.evaluation.comparison import SNIPPET
 from xosc_lateral.evaluation.distances import wasserstein
 from xosc_lateral.evaluation.metrics import METRICS, cut_snippets, snippet_metrics
+from xosc_lateral.evaluation.movement_summary import MovementSummary, free_runs, summarise
 from xosc_lateral.evaluation.spectra import Spectrum, spectrum
 from xosc_lateral.formats.profiles import profile_hash
 from xosc_lateral.report.figures import PALETTE, figure_style, new_figure

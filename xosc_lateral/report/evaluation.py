@@ -9,12 +9,13 @@ from typing import Any
 from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.evaluation.margins import NEAR_MARKING, Margins
 from xosc_lateral.evaluation.metrics import METRICS
+from xosc_lateral.evaluation.parts import PartEvaluation
 from xosc_lateral.evaluation.realism import Realism
 from xosc_lateral.evaluation.record import scores_to_dict
-from xosc_lateral.evaluation.scores import SNIPPET, PartEvaluation, ProfileScores, SnippetScores
+from xosc_lateral.evaluation.scores import ProfileScores
+from xosc_lateral.evaluation.snippet_scores import SNIPPET, SnippetScores
 from xosc_lateral.formats.profiles import profile_hash
 from xosc_lateral.report import evaluation_figures as figures
-from xosc_lateral.report.evaluation_figures import LABELS
 from xosc_lateral.report.realism import (
     FAMILIES,
     condition_groups,
@@ -24,6 +25,7 @@ from xosc_lateral.report.realism import (
     start_fade_note,
 )
 from xosc_lateral.report.render import KeyFigure, Tone, render_page
+from xosc_lateral.report.violins import LABELS
 from xosc_lateral.version import __version__
 
 CLOSE, FAR = 1.2, 2.0

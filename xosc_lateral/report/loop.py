@@ -193,8 +193,8 @@ def _group_row(group: GroupError, result: LoopResult) -> dict[str, object]:
 
 
 def _movement(result: LoopResult) -> dict[str, Any]:
-    from xosc_lateral.report.evaluation_figures import LABELS
     from xosc_lateral.report.loop_figures import spectrum_figure, violins_figure
+    from xosc_lateral.report.violins import LABELS
 
     scores, values = result.scores, {"spectrum": spectrum_figure(result), "metric_rows": []}
     if scores.before is None or scores.after is None or scores.floor is None:

@@ -17,9 +17,9 @@ from xosc_lateral.identification.findings import Finding
 from xosc_lateral.identification.lack_of_fit import LackOfFit
 from xosc_lateral.identification.partial import curve_of
 from xosc_lateral.mask import stretches_of
-from xosc_lateral.report.evaluation_figures import LABELS, density_over
 from xosc_lateral.report.figures import BLUE, GRID, MUTED, VERMILLION, figure_style, new_figure, new_panels
 from xosc_lateral.report.loop_words import SPREAD, column_label, product_label
+from xosc_lateral.report.violins import LABELS, density_over
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

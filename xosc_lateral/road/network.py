@@ -17,6 +17,7 @@ from functools import cached_property
 from numpy.typing import ArrayLike
 
 from xosc_lateral.errors import PlaybackError
+from xosc_lateral.road.connections import Junction
 from xosc_lateral.road.header_offset import HeaderOffset
 from xosc_lateral.road.index import SurfaceIndex
 from xosc_lateral.road.lanes import DRIVING
@@ -40,7 +41,7 @@ from xosc_lateral.road.positions import (
     RoadPath,
     RouteStep,
 )
-from xosc_lateral.road.road import Junction, Road
+from xosc_lateral.road.road import Road
 from xosc_lateral.road.routes import path_between, route
 from xosc_lateral.road.tables import NetworkTables
 

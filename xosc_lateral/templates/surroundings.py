@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from xosc_lateral.templates.parameter import Choice, Number, Parameter, Settings
+from xosc_lateral.templates.parameter import Choice, Number, Parameter
+from xosc_lateral.templates.settings import Settings
 
 COMMON: tuple[Parameter, ...] = (
     Choice("traffic", "right", ("right", "left"), "Side of the road that traffic keeps to."),

@@ -5,14 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from xosc_lateral.driver.models.two_level.markov import (
-    AliasTable,
-    MarkovChain,
-    bin_of,
-    fit_markov_chain,
-    open_traps,
-    walk,
-)
+from xosc_lateral.driver.models.two_level.alias_table import AliasTable, walk
+from xosc_lateral.driver.models.two_level.fit import fit_markov_chain
+from xosc_lateral.driver.models.two_level.markov import MarkovChain, bin_of
+from xosc_lateral.driver.models.two_level.traps import open_traps
 from xosc_lateral.errors import DriverProfileError, NotEnoughDataError
 
 

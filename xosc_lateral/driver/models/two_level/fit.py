@@ -9,9 +9,10 @@ from numpy.typing import NDArray
 
 from xosc_lateral.driver.convolution import convolve
 from xosc_lateral.driver.models.fit_noise import fit_shaped_noise
-from xosc_lateral.driver.models.two_level.markov import bin_of, fit_markov_chain
+from xosc_lateral.driver.models.two_level.markov import N_BINS, MarkovChain, bin_of
 from xosc_lateral.driver.models.two_level.model import TwoLevelModel
 from xosc_lateral.driver.models.two_level.settings import PAPER_SETTINGS, TwoLevelSettings
+from xosc_lateral.errors import NotEnoughDataError
 
 FloatArray = NDArray[np.float64]
 
@@ -36,6 +37,30 @@ def split_levels(rel_offset: FloatArray, settings: TwoLevelSettings = PAPER_SETT
     weight = convolve(np.pad(np.ones(len(levels)), half), kernel)
     coarse = convolve(np.pad(levels, half), kernel) / weight
     return coarse, np.clip(rel_offset - coarse, -settings.fine_cap, settings.fine_cap)
+
+
+def fit_markov_chain(rel_offsets: Sequence[FloatArray], *, n_bins: int = N_BINS) -> MarkovChain:
+    """Count transitions inside each run; none across two runs.
+
+    Parameters
+    ----------
+    rel_offsets : sequence of array, shape (n_i,)
+        Relative offsets, one array per run, evenly sampled. [-]
+    n_bins : int
+        Over [-0.5, 0.5].
+
+    Raises
+    ------
+    NotEnoughDataError
+        When there is no transition.
+    """
+    counts = np.zeros((n_bins, n_bins), dtype=np.int64)
+    for run in rel_offsets:
+        bins = bin_of(np.asarray(run), n_bins)
+        np.add.at(counts, (bins[:-1], bins[1:]), 1)
+    if not counts.any():
+        raise NotEnoughDataError(f"{len(rel_offsets)} runs hold no two successive offsets: nothing to fit")
+    return MarkovChain(counts)
 
 
 def fit_two_level(rel_offsets: Sequence[FloatArray], settings: TwoLevelSettings = PAPER_SETTINGS) -> TwoLevelModel:

@@ -1,0 +1,77 @@
+"""The paper's four evaluations: coarse and fine part, each measured or sampled."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from xosc_lateral.driver.models.two_level.fit import split_levels
+from xosc_lateral.driver.models.two_level.settings import PAPER_SETTINGS
+from xosc_lateral.driver.profile import DriverProfile
+from xosc_lateral.evaluation.distances import Distances, metric_distances
+from xosc_lateral.evaluation.metrics import snippet_metrics
+from xosc_lateral.evaluation.sampled_snippets import sample_parts
+from xosc_lateral.evaluation.snippets import Snippets
+
+FloatArray = NDArray[np.float64]
+
+FINE_SHIFT = 5.0
+"""Real fine parts are shifted round by this, to part them from their coarse parts. [s]"""
+
+
+@dataclass(frozen=True, eq=False)
+class PartEvaluation:
+    """One of the paper's four evaluations.
+
+    Parameters
+    ----------
+    number : int
+        1 real coarse + shifted real fine, 2 sampled coarse + real fine, 3 real coarse + sampled fine, 4 both sampled.
+    coarse, fine : str
+        Where each part comes from.
+    real, artificial : array, shape (n, 10)
+        Metrics of the snippets. [m]
+    distances : Distances
+        Between the two, all snippets.
+    """
+
+    number: int
+    coarse: str
+    fine: str
+    real: FloatArray
+    artificial: FloatArray
+    distances: Distances
+
+
+def evaluate_parts(
+    profile: DriverProfile, snippets: Snippets, sampled: FloatArray, *, seed: int
+) -> tuple[PartEvaluation, ...]:
+    """Run the paper's four evaluations; (4) takes `sampled`, effects included. `sampled` of shape (n, m). [m]"""
+    coarse_real, fine_real = _real_parts(snippets)
+    coarse, fine = sample_parts(profile, snippets, seed)
+    shifted = np.roll(fine_real, round(FINE_SHIFT / profile.model.step), axis=1)
+    width = snippets.lane_width
+    combinations = (
+        ("measured", "measured, shifted", (coarse_real + shifted) * width),
+        ("sampled", "measured", (coarse + fine_real) * width),
+        ("measured", "sampled", (coarse_real + fine) * width),
+        ("sampled", "sampled", sampled),
+    )
+    real = snippet_metrics(snippets.offset)
+    results = []
+    for number, (coarse_from, fine_from, rows) in enumerate(combinations, start=1):
+        artificial = snippet_metrics(rows)
+        distances = metric_distances(real, artificial)
+        results.append(PartEvaluation(number, coarse_from, fine_from, real, artificial, distances))
+    return tuple(results)
+
+
+def _real_parts(snippets: Snippets) -> tuple[FloatArray, FloatArray]:
+    """The paper's split of the measured snippets, made on whole runs so that only a run's ends are ends."""
+    runs = {id(one.run): one.run for one in snippets.items}
+    split = {key: split_levels(run.rel_offset, PAPER_SETTINGS) for key, run in runs.items()}
+    coarse = np.array([split[id(one.run)][0][one.rows] for one in snippets.items])
+    fine = np.array([split[id(one.run)][1][one.rows] for one in snippets.items])
+    return coarse, fine

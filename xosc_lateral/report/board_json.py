@@ -1,0 +1,68 @@
+"""The board of in-lane realism as strict JSON."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+from xosc_lateral.version import __version__
+
+if TYPE_CHECKING:
+    from xosc_lateral.board.result import Board, Row
+    from xosc_lateral.evaluation.variance import VarianceParts
+from xosc_lateral.report.board import method_text
+
+
+def board_record(board: Board, inputs: Mapping[str, str]) -> dict[str, Any]:
+    """Plain JSON values: all numbers, floors, intervals, sources."""
+    return {
+        "made_by": f"xosc-lateral {__version__}",
+        "seed": board.seed,
+        "inputs": dict(inputs),
+        "method": method_text(board),
+        "data": {
+            "drives": board.vehicles,
+            "runs": board.runs,
+            "hours": round(board.hours, 4),
+            "windows": dict(board.windows),
+            "unit": board.unit,
+            "variance_m2": _variance(board.real_variance),
+        },
+        "kendall_tau_between_halves": _short(board.tau),
+        "resamples": board.resamples,
+        "models": [_row_record(row) for row in board.rows],
+        "absent": dict(board.absent),
+    }
+
+
+def _row_record(row: Row) -> dict[str, Any]:
+    return {
+        "name": row.key,
+        "title": row.title,
+        "source": row.source,
+        "departures": row.departures,
+        "fitted": {name: _short(value) for name, value in row.settings.items()},
+        "rank": row.rank,
+        "rank_interval": [row.best_rank, row.worst_rank],
+        "score": _short(row.score),
+        "score_interval": [_short(row.low), _short(row.high)],
+        "score_by_half": [_short(value) for value in row.scores_by_half],
+        "variance_m2": _variance(row.variance),
+        "numbers": {
+            number.name: {
+                "value": _short(number.value),
+                "floor": _short(number.floor),
+                "unit": number.unit,
+                "ranked": number.ranked,
+            }
+            for number in row.numbers
+        },
+    }
+
+
+def _variance(parts: VarianceParts) -> dict[str, float | None]:
+    return {"between": _short(parts.between), "within": _short(parts.within), "inside": _short(parts.inside)}
+
+
+def _short(value: float) -> float | None:
+    return None if value != value else float(f"{value:.5g}")
