@@ -176,7 +176,8 @@ def sawtooth(n: int, rng: np.random.Generator) -> np.ndarray:
 
 def long_memory(n: int, rng: np.random.Generator) -> np.ndarray:
     """Flicker noise: wandering of 1 to 200 s in equal parts [2]_, smoothed as a car's mass does. Shape (n,). [m]"""
-    return 0.25 * _scaled(_smooth(sum(_wander(n, rng, constant) for constant in (1.0, 3.0, 8.0, 20.0, 60.0, 200.0))))
+    parts = (_wander(n, rng, constant) for constant in (1.0, 3.0, 8.0, 20.0, 60.0, 200.0))
+    return 0.25 * _scaled(_smooth(sum(parts, start=np.zeros(n))))
 
 
 def in_regimes(n: int, rng: np.random.Generator) -> np.ndarray:
