@@ -11,7 +11,7 @@ from scipy.special import gamma, kv
 
 from tests.baselines.made_runs import STEP, made_run, smooth_runs, straight
 from xosc_lateral.baselines import calibration
-from xosc_lateral.baselines.base import ALONGSIDE, MEAN_SPEED, SegmentBatch, batch_of, driver_means_of
+from xosc_lateral.baselines.batch import ALONGSIDE, MEAN_SPEED, SegmentBatch, batch_of
 from xosc_lateral.baselines.bounded_noise import BoundedNoise
 from xosc_lateral.baselines.calibration import Bounds, calibrate
 from xosc_lateral.baselines.gaussian_process import SCALES, GaussianProcess, matern, pooled_variogram
@@ -19,9 +19,11 @@ from xosc_lateral.baselines.intermittent import Intermittent
 from xosc_lateral.baselines.linear_preview import LinearPreview
 from xosc_lateral.baselines.ornstein_uhlenbeck import recursion
 from xosc_lateral.baselines.potential_field import PotentialField
+from xosc_lateral.baselines.simulated import driver_means_of
 from xosc_lateral.baselines.social_force import SocialForce
 from xosc_lateral.baselines.strip_based import StripBased
-from xosc_lateral.baselines.sumo_run import NEAREST, SumoRun, _read_tracks, _repeated
+from xosc_lateral.baselines.sumo_process import _read_tracks
+from xosc_lateral.baselines.sumo_run import NEAREST, SumoRun, _repeated
 from xosc_lateral.driver.snippets import segment_of
 
 RNG_SEED = 31

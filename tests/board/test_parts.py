@@ -16,13 +16,15 @@ from tests.profiles import simulated_profile
 from xosc_lateral.board import contestants as entries
 from xosc_lateral.board.benchmark import benchmark_realism
 from xosc_lateral.board.contestants import AS_IT_IS, contestants
-from xosc_lateral.board.half import Half, SampledHalf, make_half, pooled, sample_half
+from xosc_lateral.board.half import Half, make_half, pooled
 from xosc_lateral.board.ranking import all_rows, bootstrap, floor_of, kendall_tau, ranks, resampled_rows, score_rows
 from xosc_lateral.board.result import Board, ModelScore
+from xosc_lateral.board.sampled_half import SampledHalf, sample_half
 from xosc_lateral.board.units import halves, units_of
 from xosc_lateral.drives.drive import Run
 from xosc_lateral.errors import NotEnoughDataError, XoscLateralError
-from xosc_lateral.evaluation.measures import LAGS, autocorrelation_of, resolved_bands
+from xosc_lateral.evaluation.differences import autocorrelation_of
+from xosc_lateral.evaluation.measures import LAGS, resolved_bands
 from xosc_lateral.evaluation.ranked import LONG, SHORT, ranked_numbers
 
 RUNS = smooth_runs(24, 65.0)
