@@ -11,6 +11,8 @@ from pathlib import Path
 
 from lxml import etree
 
+from xosc_lateral.formats.xml import parse_xml
+
 XSD = Path(__file__).parents[1] / "tests" / "data" / "xsd"
 FILES = {0: "1.0.0", 1: "1.1.1", 2: "1.2.0", 3: "1.3.0"}
 """Schema by minor version."""
@@ -27,12 +29,12 @@ def _schema(minor: int) -> etree.XMLSchema:
 
 
 def schema_findings(path: Path) -> Counter[str]:
-    """Errors by their text, numbers aside."""
-    document = etree.parse(str(path))
-    header = document.getroot().find("{*}FileHeader")
+    """Errors by their text, numbers aside; the file is read as the product reads it."""
+    root = parse_xml(path.read_bytes(), path)
+    header = root.find("{*}FileHeader")
     minor = int(re.sub(r"\D", "", (header.get("revMinor") if header is not None else None) or "0") or 0)
     schema = _schema(min(minor, max(FILES)))
-    schema.validate(document)
+    schema.validate(root)
     return Counter(_NUMBERS.sub("", error.message) for error in schema.error_log)
 
 

@@ -145,10 +145,10 @@ def _turns(rows: pd.DataFrame, *, by_path: bool) -> tuple[FloatArray, FloatArray
 def shifts(
     before: Mapping[str, Sequence[float]], after: Mapping[str, Sequence[float]], end: float
 ) -> tuple[float, int]:
-    """Largest difference of starts by name [s], and how many are gone; the last 0.1 s may hold one more or less."""
+    """Largest difference of starts by name [s], and how many are gone; from 0.1 s before the end on none counts."""
     late, lost = 0.0, 0
     for name, times in before.items():
-        now = after.get(name, ())
-        late = max([late, *(abs(a - b) for a, b in zip(times, now, strict=False))])
-        lost += sum(1 for moment in times[len(now) :] if moment < end - 0.1)
+        now, due = after.get(name, ()), [moment for moment in times if moment < end - 0.1]
+        late = max([late, *(abs(a - b) for a, b in zip(due, now, strict=False))])
+        lost += max(len(due) - len(now), 0)
     return late, lost

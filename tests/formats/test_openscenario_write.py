@@ -37,6 +37,7 @@ from xosc_lateral.formats.openscenario.write import (
     write_lane_offset_scenario,
     write_trajectory_scenario,
 )
+from xosc_lateral.formats.openscenario.write.lateral_actions import lateral_actions
 from xosc_lateral.formats.openscenario.write.offset_chain import MOST_TURNING, TOLERANCE, ramps
 from xosc_lateral.motion.nominal import NominalMotion
 from xosc_lateral.motion.trajectory import WorldTrajectory
@@ -408,6 +409,12 @@ LANE_CHANGE = (
     '<LaneChangeTarget><AbsoluteTargetLane value="-2"/></LaneChangeTarget>'
     "</LaneChangeAction></LateralAction></PrivateAction>"
 )
+
+
+def test_a_lateral_action_without_a_name_is_referred_to_by_its_event(tmp_path: Path) -> None:
+    text = scenario_text(stories=story(event("change", action("", LANE_CHANGE), time=8.0)), stop=time_condition(25))
+    found = lateral_actions(read_scenario(write_scenario(tmp_path, text)))
+    assert [(one.kind, one.reference) for one in found.by_entity["Ego"]] == [("event", "change")]
 
 
 def test_a_lane_change_overrules_the_offsets_whenever_it_comes(tmp_path: Path) -> None:

@@ -14,6 +14,7 @@ from xosc_lateral.playback.distances import (
     ahead_and_left,
     apart,
     entity_distance,
+    free_road_gap,
     road_gap,
     spot_distance,
     spot_of,
@@ -128,6 +129,17 @@ def test_lanes_are_counted_without_the_middle_one(world: World) -> None:
     assert across == RoadGap(30.0, 3.5, 1, True)
     far = road_gap(world.network, own, spot_of(world.put(1, 2, 70.0)))
     assert far == RoadGap(-30.0, 7.0, 2, True)
+
+
+@pytest.mark.parametrize(("offset_t", "lanes"), [(0.0, 0), (-0.7, 0), (-0.8, -1)])
+def test_with_free_space_lanes_are_those_of_front_right_corners(world: World, offset_t: float, lanes: int) -> None:
+    """Cars of 2 m in lanes of 3.5 m: 0.75 m to the right of the middle, a corner is in the next lane."""
+    own = world.put(0, -1, 100.0)
+    gap = free_road_gap(world.network, own, world.put(1, -1, 130.0, offset_t))
+    assert gap is not None
+    assert (gap.ds, gap.lanes) == (pytest.approx(25.0), lanes)
+    touching = free_road_gap(world.network, own, world.put(1, -1, 102.0, offset_t))
+    assert touching == RoadGap(0.0, 0.0, 0, False)
 
 
 # ---- between boxes ---------------------------------------------------------------------------------------------------

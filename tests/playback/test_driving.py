@@ -139,12 +139,12 @@ def test_without_a_road_an_entity_stands(tmp_path: Path) -> None:
 
 
 # ---- junctions -------------------------------------------------------------------------------------------------------
-def crossing() -> str:
+def crossing(arms: str = section("", lanes(-1))) -> str:
     """Road 1 leads into a junction from which 2 goes on straight, 3 turns left and 4 turns right (20 m arms)."""
 
     def connecting(name: str, plan: str, length: float, to: str) -> str:
         link = PREDECESSOR.format("1", "end") + SUCCESSOR.format(to, "start")
-        return road(name, plan, length, link=link, junction="100", sections=section("", lanes(-1)))
+        return road(name, plan, length, link=link, junction="100", sections=arms)
 
     quarter = 10.0 * pi / 2.0
     one_lane = section(lanes(1), lanes(-1))
@@ -183,6 +183,13 @@ def acquire(position: str) -> str:
 def test_without_a_route_a_junction_is_crossed_straight(tmp_path: Path) -> None:
     played = Stage(tmp_path, crossing()).play(start=ego(-1, 50.0), last=5.0)
     assert played.network.road_ids[entity(played).road[-1]] == "2"
+
+
+def test_who_drives_against_the_lane_takes_the_way_that_turns_most(tmp_path: Path) -> None:
+    """As the reference player does, which takes straight on as seen by who drives along the lane."""
+    against = {"Ego": teleport(on_lane(1, 50.0, orientation=facing(pi))) + speed(20.0)}
+    played = Stage(tmp_path, crossing(section(lanes(1), lanes(-1)))).play(start=against, last=5.0)
+    assert played.network.road_ids[entity(played).road[-1]] == "3"
 
 
 @pytest.mark.parametrize("exit_road", ["2", "3", "4"])

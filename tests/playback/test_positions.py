@@ -115,6 +115,16 @@ def test_a_position_on_a_route(tmp_path: Path, path_s: float, place: tuple[float
     assert placed(tmp_path, position, roads=crossing(), ref=ref)[:2] == pytest.approx(place, abs=1e-6)
 
 
+def test_where_a_route_runs_along_the_road_its_lanes_are_the_road_s(tmp_path: Path) -> None:
+    waypoints = "".join(
+        f'<Waypoint routeStrategy="shortest"><Position>{on_lane(-1, s)}</Position></Waypoint>' for s in (100.0, 300.0)
+    )
+    place = '<InRoutePosition><FromLaneCoordinates pathS="20" laneId="1"/></InRoutePosition>'
+    route = f'<RouteRef><Route name="r" closed="false">{waypoints}</Route></RouteRef>'
+    position = f"<RoutePosition>{route}{place}</RoutePosition>"
+    assert placed(tmp_path, position)[:2] == pytest.approx((120.0, 0.5 * WIDTH), abs=1e-6)
+
+
 @pytest.mark.parametrize("orientation_first", [True, False])
 def test_a_position_on_a_route_against_the_road_is_along_the_route(tmp_path: Path, orientation_first: bool) -> None:
     """Lane -1 of the route is the road's lane 1; the standard lets the orientation stand before or after the place."""

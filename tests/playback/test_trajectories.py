@@ -84,6 +84,14 @@ def test_absolute_times_with_scale_and_offset(tmp_path: Path) -> None:
     assert motion.speed[k] == pytest.approx(40.0, abs=1e-6)
 
 
+@pytest.mark.parametrize(("moment", "is_said"), [(1.0, False), (4.0, True)])
+def test_times_that_are_over_at_the_start_are_said(tmp_path: Path, moment: float, is_said: bool) -> None:
+    way = polyline((0.0, in_world(0.0, 0.0)), (3.0, in_world(60.0, 0.0)))
+    timing = '<Timing domainAbsoluteRelative="absolute" scale="1" offset="0"/>'
+    played = Stage(tmp_path).play(maneuvers(event(follow(way, timing=timing), trigger=after(moment))), start=EGO)
+    assert any("are over when it starts" in note.what for note in played.motion.notes) is is_said
+
+
 def test_in_follow_mode_the_speed_changes_evenly_from_that_before() -> None:
     path = PolylinePath([Corner(0, 0, time=0.0), Corner(30, 0, time=2.0)], follow=True, initial_speed=10.0)
     assert path.s_at(1.0) == pytest.approx(10.0 + 0.5 * 5.0)

@@ -6,7 +6,7 @@ that the entity points; without a road, the entity's own heading (as in the refe
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import copysign, cos, hypot, inf, sin
 
 from xosc_lateral.playback import boxes
@@ -81,19 +81,41 @@ def spot_of(state: EntityState) -> Spot:
 
 def road_gap(network: RoadNetwork, state: EntityState, spot: Spot, *, limit: float = FAR) -> RoadGap | None:
     """Way from an entity to a spot along the roads; None: there is none."""
-    state.locate()
-    if state.road == NOWHERE or spot.road == NOWHERE:
+    return _gap_between(network, spot_of(state), spot, 1 if state.is_forward else -1, limit)
+
+
+def free_road_gap(
+    network: RoadNetwork, state: EntityState, other: EntityState, *, limit: float = FAR
+) -> RoadGap | None:
+    """Free space along the roads to another entity, and the lanes between their front right corners; None: no way.
+
+    A box may lie in two lanes, and the standard does not say which counts: the corner as in the reference player,
+    where boxes that touch are in the same lane.
+    """
+    if boxes.overlap(state, other):
+        return RoadGap(0.0, 0.0, 0, opposite=False)
+    ds = entity_distance(
+        network, state, other, CoordinateSystem.ROAD, RelativeDistanceType.LONGITUDINAL, freespace=True
+    )
+    if ds is None:
         return None
-    direction = 1 if state.is_forward else -1
-    path = network.path_between((state.road, state.s), (spot.road, spot.s), direction=direction, limit=limit)
+    own, theirs = (_project(network, state, *boxes.corners(one)[-1]) for one in (state, other))
+    gap = _gap_between(network, own, theirs, 1 if state.is_forward else -1, limit)
+    return gap and replace(gap, ds=ds)
+
+
+def _gap_between(network: RoadNetwork, own: Spot, spot: Spot, direction: int, limit: float) -> RoadGap | None:
+    if own.road == NOWHERE or spot.road == NOWHERE:
+        return None
+    path = network.path_between((own.road, own.s), (spot.road, spot.s), direction=direction, limit=limit)
     if path is None:
         return None
-    lane = _lane_there(network, state, path)
+    lane = _lane_there(network, own, path)
     opposite = lane * spot.lane < 0
     lanes = spot.lane - lane
     if opposite:
         lanes -= 1 if lanes > 0 else -1
-    return RoadGap(path.ds, spot.t - (-state.t if path.is_turned else state.t), lanes, opposite, path.is_turned)
+    return RoadGap(path.ds, spot.t - (-own.t if path.is_turned else own.t), lanes, opposite, path.is_turned)
 
 
 def entity_distance(
@@ -254,13 +276,13 @@ def _project(network: RoadNetwork, state: EntityState, x: float, y: float) -> Sp
     return Spot(x, y, found.road, found.lane, found.s, found.t)
 
 
-def _lane_there(network: RoadNetwork, state: EntityState, path: RoadPath) -> int:
-    """Lane that the entity's lane leads to at the end of a way; where none does, its own, counted from there."""
-    road, lane, way = state.road, state.lane, path.way
+def _lane_there(network: RoadNetwork, own: Spot, path: RoadPath) -> int:
+    """Lane that a place's lane leads to at the end of a way; where none does, its own, counted from there."""
+    road, lane, way = own.road, own.lane, path.way
     for entered, entry in path.entered:
         onward = network.next_lanes(road, lane, way)
         there = [link.lane for link in onward if (link.road, link.direction) == (entered, entry)]
         if not there:
-            return -state.lane if path.is_turned else state.lane
+            return -own.lane if path.is_turned else own.lane
         road, lane, way = entered, there[0], entry
     return lane

@@ -9,6 +9,7 @@ from xosc_lateral.playback.placement import NOWHERE
 from xosc_lateral.playback.state import EntityState
 from xosc_lateral.playback.transition import EPSILON
 from xosc_lateral.road import LaneLink, RoadNetwork
+from xosc_lateral.road.moving import most_turning
 from xosc_lateral.road.network import DRIVING
 
 _TIGHT = 1e-3
@@ -110,12 +111,17 @@ _MOST_GAPS = 8
 
 
 def _choose(state: EntityState, options: Sequence[LaneLink]) -> LaneLink:
-    """At a junction: along the route; where that says nothing, the first way on, as in the reference player; without a
-    route straight on.
+    """At a junction: along the route; where that says nothing, the first way on, as in the reference player.
+
+    Without a route straight on, seen from the direction in which the lane is driven: who drives against it takes the
+    way that turns most. The standard does not say; the reference player does it so.
     """
+    network, first = state.network, options[0]
     if state.route is not None:
-        return state.route.choose(state.road, options) or options[0]
-    return state.network.straightest(options)
+        return state.route.choose(state.road, options) or first
+    if first.direction != network.travel_direction(first.road, first.lane):
+        return most_turning(network.roads, options)
+    return network.straightest(options)
 
 
 def _turn_round(state: EntityState) -> None:

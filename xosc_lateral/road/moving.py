@@ -67,6 +67,11 @@ def straightest(roads: Sequence[Road], options: Sequence[LaneLink]) -> LaneLink:
     return min(options, key=lambda link: abs(_turn(roads[link.road])))
 
 
+def most_turning(roads: Sequence[Road], options: Sequence[LaneLink]) -> LaneLink:
+    """The link whose road turns most; of equals the first."""
+    return max(options, key=lambda link: abs(_turn(roads[link.road])))
+
+
 def _turn(road: Road) -> float:
     return normal_angle(road.reference_at(road.length)[2] - road.reference_at(0.0)[2])
 

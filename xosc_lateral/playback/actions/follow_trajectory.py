@@ -117,6 +117,11 @@ class RunningFollowTrajectory(RunningAction):
             self._time = clock = (time + step) * timing.scale
         before, self._s = self._s, path.s_at(self._time + timing.offset)
         if self._is_first and timing.domain is ReferenceContext.ABSOLUTE:
+            if clock > path.end_time + EPSILON and step > 0.0:
+                self.note(
+                    f"the times of trajectory '{self.content.trajectory.name}' are over when it starts: "
+                    f"'{state.name}' is put where its speed would have taken it since"
+                )
             self.jumped(max(abs(self._s - before) - 2.0 * abs(path.speed_at(before)) * step, 0.0))
         self._is_first = step <= 0.0
         # Beyond its end the path has no speed to give: the last one stays.

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from xosc_lateral.playback.conditions.base import EntityCheck
-from xosc_lateral.playback.distances import RoadGap, entity_distance, road_gap, spot_of
+from xosc_lateral.playback.distances import free_road_gap, road_gap, spot_of
 from xosc_lateral.playback.placement import NOWHERE
 from xosc_lateral.playback.simulation import Simulation
 from xosc_lateral.playback.state import EntityState
 from xosc_lateral.road.network import DRIVING
 from xosc_lateral.scenario.conditions import RelativeClearanceCondition
-from xosc_lateral.scenario.enums import CoordinateSystem, RelativeDistanceType
 
 _MANY_LANES = 1000
 """Wider than any road: an open end of a lane range."""
@@ -35,7 +34,10 @@ def prepare(content: RelativeClearanceCondition, simulation: Simulation) -> Enti
         return any(low <= lanes <= high for low, high in ranges)
 
     def occupied(state: EntityState, other: EntityState) -> bool:
-        gap = _gap(simulation, state, other, reach, freespace=content.freespace)
+        if content.freespace:
+            gap = free_road_gap(simulation.network, state, other, limit=reach + 100.0)
+        else:
+            gap = road_gap(simulation.network, state, spot_of(other), limit=reach + 100.0)
         return (
             gap is not None
             and -content.distance_backward <= gap.ds <= content.distance_forward
@@ -62,15 +64,3 @@ def prepare(content: RelativeClearanceCondition, simulation: Simulation) -> Enti
 def _lanes_between(lane: int, other: int) -> int:
     difference = other - lane
     return difference - (1 if difference > 0 else -1) if lane * other < 0 else difference
-
-
-def _gap(
-    simulation: Simulation, state: EntityState, other: EntityState, reach: float, *, freespace: bool
-) -> RoadGap | None:
-    gap = road_gap(simulation.network, state, spot_of(other), limit=reach + 100.0)
-    if gap is None or not freespace:
-        return gap
-    ds = entity_distance(
-        simulation.network, state, other, CoordinateSystem.ROAD, RelativeDistanceType.LONGITUDINAL, freespace=True
-    )
-    return None if ds is None else RoadGap(ds, gap.dt, gap.lanes, gap.opposite)

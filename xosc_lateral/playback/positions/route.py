@@ -44,12 +44,12 @@ def resolve(
 
 
 def _with_route(simulation: Simulation, road: int, lane: int, offset: float, direction: int) -> tuple[int, float]:
-    """A lane that is driven against the route is one that was counted from the route: its twin on the other side.
+    """Where the route runs against s, a lane that is driven against the route was counted from it: its twin.
 
-    Files do both: ids as the road has them, and ids as if each road ran along the route.
+    Files do both: ids as the road has them, and ids as if each road ran along the route. Along s these are the same.
     """
     network = simulation.network
-    if lane == 0 or network.travel_direction(road, lane) == direction:
+    if direction > 0 or lane == 0 or network.travel_direction(road, lane) == direction:
         return lane, offset
     twin_exists = any(-lane in section.by_id for section in network.roads[road].sections)
     return (-lane, -offset) if twin_exists else (lane, offset)

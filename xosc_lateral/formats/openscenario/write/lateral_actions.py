@@ -49,10 +49,13 @@ def lateral_actions(scenario: Scenario) -> LateralActions:
 
 
 def _referable(path: tuple[str, ...], is_alone: bool, names: Mapping[str, int]) -> LateralAction:
-    """By its own name where no other element has it, else by its event's, else by the whole path."""
-    if names[path[-1]] == 1:
+    """By its own name where no other element has it, else by its event's, else by the whole path.
+
+    An action without a name, which the standard doesn't allow and some tools write, has only its event's.
+    """
+    if path[-1] and names[path[-1]] == 1:
         return LateralAction(path, "action", path[-1])
-    if is_alone and names[path[-2]] == 1:
+    if (is_alone or not path[-1]) and names[path[-2]] == 1:
         return LateralAction(path, "event", path[-2])
     return LateralAction(path, "action", "::".join(path))
 
