@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, TypeAlias
 from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.drives.drive import Drive
 from xosc_lateral.errors import FormatError, NotEnoughDataError
-from xosc_lateral.formats.hashes import parsed_hash
+from xosc_lateral.formats.hashes import parsed_hashes
 from xosc_lateral.formats.openscenario.read import RoadSearch
 
 if TYPE_CHECKING:
@@ -83,7 +83,7 @@ def given_drives(drives: DrivesLike, columns: Mapping[str, str] | None = None) -
     mapping = parse_map(f"{name}={column}" for name, column in (columns or {}).items())
     files = [Path(item) for item in items if isinstance(item, str | Path)]
     if len(files) == len(items):
-        return GivenDrives(read_drives(files, mapping), {path.name: parsed_hash(path) for path in files}, tuple(files))
+        return GivenDrives(read_drives(files, mapping), parsed_hashes(files), tuple(files))
     found: list[Drive] = []
     inputs: dict[str, str] = {}
     for number, item in enumerate(items, start=1):
@@ -91,12 +91,11 @@ def given_drives(drives: DrivesLike, columns: Mapping[str, str] | None = None) -
             found.append(item)
         elif isinstance(item, str | Path):
             found += read_drives(item, mapping)
-            inputs[Path(item).name] = parsed_hash(Path(item))
         else:
             name = "DataFrame" if len(items) == 1 else f"DataFrame {number}"
             found += drives_of_table(item, mapping, name)
             inputs[name] = frame_hash(item)
-    return GivenDrives(with_distinct_names(found), inputs, tuple(files))
+    return GivenDrives(with_distinct_names(found), parsed_hashes(files) | inputs, tuple(files))
 
 
 def frame_hash(frame: pd.DataFrame) -> str:

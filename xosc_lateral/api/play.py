@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from xosc_lateral.api.inputs import PathLike, Paths, as_paths, road_search
 from xosc_lateral.api.result import Result
-from xosc_lateral.formats.hashes import parsed_hash
+from xosc_lateral.formats.hashes import parsed_hashes
 from xosc_lateral.formats.targets import claim, file_target
 from xosc_lateral.motion.segments import SegmentRow
 from xosc_lateral.pipeline.load import Played, play_scenario
@@ -205,7 +205,7 @@ class Playback(Result):
         return [*scenario.input_files, *([scenario.road_file] if scenario.road_file else [])]
 
     def _provenance(self) -> dict[str, Any]:
-        return {"inputs": {path.name: parsed_hash(path) for path in self._inputs()}}
+        return {"inputs": parsed_hashes(self._inputs())}
 
 
 class Segments(Result):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Iterable
 from functools import lru_cache
 from pathlib import Path
 
@@ -32,6 +33,15 @@ def parsed_hash(path: Path) -> str:
         return last_read(path)
     except KeyError:
         return file_hash(path)
+
+
+def parsed_hashes(paths: Iterable[Path]) -> dict[str, str]:
+    """`parsed_hash` of each file by its name; files of one name by as much of their paths as tells them apart."""
+    names = {path: path.name for path in paths}
+    for depth in range(2, max((len(path.parts) for path in names), default=0) + 1):
+        given = list(names.values())
+        names |= {path: "/".join(path.parts[-depth:]) for path, name in names.items() if given.count(name) > 1}
+    return {name: parsed_hash(path) for path, name in names.items()}
 
 
 @lru_cache(maxsize=1024)

@@ -71,8 +71,13 @@ def shown_columns(board: Board) -> dict[str, str]:
 
 
 def _cell(row: Row, name: str) -> str:
-    number = next((one for one in row.numbers if one.name == name), None)
+    number = known_number(row, name)
     return "" if number is None else _value(number)
+
+
+def known_number(row: Row, name: str) -> ModelScore | None:
+    """A number that the first model has, where this one has it too."""
+    return next((one for one in row.numbers if one.name == name), None)
 
 
 def _value(number: ModelScore) -> str:

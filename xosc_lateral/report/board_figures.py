@@ -70,7 +70,8 @@ def windows_figure(board: Board) -> Figure:
         title, paths = shown[number]
         axis.plot(time, paths.T, color=MEASURED if number == 0 else SAMPLED, linewidth=1.0)
         axis.set_title(title, fontsize=8.5)
-        axis.set_ylim(-reach, reach)
+        if reach > 0.0:
+            axis.set_ylim(-reach, reach)
     for axis in axes[-1]:
         axis.set_xlabel("time [s]")
     for axis in axes[:, 0]:

@@ -9,7 +9,7 @@ from xosc_lateral.report.render import KeyFigure, render_page
 
 if TYPE_CHECKING:
     from xosc_lateral.board.result import Board
-from xosc_lateral.report.board import headline, method_text, shown_columns
+from xosc_lateral.report.board import headline, known_number, method_text, shown_columns
 
 
 def board_page(board: Board, inputs: Mapping[str, str]) -> str:
@@ -47,7 +47,7 @@ def _number_rows(board: Board) -> list[dict[str, object]]:
     columns = shown_columns(board)
     rows: list[dict[str, object]] = [
         {"": row.rank, "model": row.title, "score": round(row.score, 3)}
-        | {head: row.number(name).value for name, head in columns.items()}
+        | {head: number.value if (number := known_number(row, name)) else None for name, head in columns.items()}
         for row in board.rows
     ]
     floor: dict[str, object] = {"": None, "model": "floor: other real drivers", "score": 1.0}

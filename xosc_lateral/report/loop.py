@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from xosc_lateral.driver.effects import ColumnEffect
-from xosc_lateral.formats.hashes import parsed_hash
+from xosc_lateral.formats.hashes import parsed_hashes
 from xosc_lateral.formats.profiles import profile_hash
 from xosc_lateral.identification.close import LoopResult
 from xosc_lateral.identification.findings import Finding
@@ -81,7 +81,7 @@ def loop_page(result: LoopResult, lack_of_fit: LackOfFit, tables: Sequence[Path]
             "refined profile": f"{result.refined.name} {profile_hash(result.refined)[:12]}",
             "held out": result.held_out,
             "seed": result.seed,
-            **{table.name: parsed_hash(table)[:16] for table in tables},
+            **{name: value[:16] for name, value in parsed_hashes(tables).items()},
         },
         result=result,
         outcome=outcome(result),

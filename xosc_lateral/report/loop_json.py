@@ -9,7 +9,7 @@ from typing import Any
 
 from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.evaluation.distances import Distances
-from xosc_lateral.formats.hashes import parsed_hash
+from xosc_lateral.formats.hashes import parsed_hashes
 from xosc_lateral.formats.profiles import canonical_json, profile_hash
 from xosc_lateral.identification.close import LoopResult
 from xosc_lateral.identification.findings import Finding
@@ -77,7 +77,7 @@ def loop_record(result: LoopResult, lack_of_fit: LackOfFit, tables: Sequence[Pat
         "provenance": {
             "package_version": __version__,
             "seed": result.seed,
-            "inputs": {table.name: parsed_hash(table) for table in tables},
+            "inputs": parsed_hashes(tables),
         },
     }
 

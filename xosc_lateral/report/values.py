@@ -17,10 +17,11 @@ def format_number(value: float, digits: int = 3) -> str:
     if math.isinf(value):
         return "∞" if value > 0 else "-∞"
     if value == 0 or float(value).is_integer():
-        return f"{value:.0f}" if abs(value) < 1e7 else f"{value:.{digits - 1}e}"
-    magnitude = math.floor(math.log10(abs(value)))
+        return f"{value + 0.0:.0f}" if abs(value) < 1e7 else f"{value:.{digits - 1}e}"
+    rounded = f"{value:.{digits - 1}e}"
+    magnitude = int(rounded.partition("e")[2])  # of what is shown: 9.996 is 10.0
     if not -4 <= magnitude < 6:
-        return f"{value:.{digits - 1}e}"
+        return rounded
     return f"{value:.{max(0, digits - 1 - magnitude)}f}"
 
 
