@@ -187,14 +187,16 @@ def test_a_free_run_has_the_length_and_the_seed_that_were_asked_for():
 # ---- the library -----------------------------------------------------------------------------------------------------
 def test_tags_and_metadata_go_into_a_library_and_find_their_profile_again(tmp_path):
     folder = tmp_path / "team"
-    path = add_profile("motorway-vehicle-1", folder, name="anna", tags=["calm", "truck"], metadata={"country": "DE"})
-    add_profile("motorway-vehicle-2", folder, name="bert", tags=["calm"])
+    path = add_profile(
+        "motorway-vehicle-1", folder, name="anna", tags=["t-calm", "t-heavy"], metadata={"country": "XX"}
+    )
+    add_profile("motorway-vehicle-2", folder, name="bert", tags=["t-calm"])
     assert path == folder / "anna.json"
-    assert xl.list_profiles(folder, tags=["calm", "truck"]).names == ("anna",)
-    assert xl.list_profiles(folder, where={"country": "DE"}).names == ("anna",)
-    tag_profile("anna", folder, add=["old"], remove=["truck"])
-    assert xl.list_profiles(folder, tags=["truck"]).names == ()
-    assert xl.list_profiles(folder, tags=["calm"]).names == ("anna", "bert")
+    assert xl.list_profiles(folder, tags=["t-calm", "t-heavy"]).names == ("anna",)
+    assert xl.list_profiles(folder, where={"country": "XX"}).names == ("anna",)
+    tag_profile("anna", folder, add=["t-old"], remove=["t-heavy"])
+    assert xl.list_profiles(folder, tags=["t-heavy"]).names == ()
+    assert xl.list_profiles(folder, tags=["t-calm"]).names == ("anna", "bert")
     with pytest.raises(FormatError, match="there is a profile of this id"):
         add_profile("motorway-vehicle-2", folder, name="anna")
     one, other = (xl.sample(name, duration=10.0, seed=1, library=folder).to_frame() for name in ("anna", "bert"))
