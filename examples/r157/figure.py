@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -33,3 +34,11 @@ def verdict_figure(verdicts: Mapping[str, Verdicts], gaps: NDArray[np.float64]) 
         axis.set_xlabel("gap when the cut-in begins [m]")
     axes[0, 0].legend(loc="center right", fontsize=7.5)
     return figure
+
+
+def save_figure(figure: Figure, path: Path) -> None:
+    """As SVG, the same bytes each time: ids are salted hashes, which matplotlib salts by chance."""
+    import matplotlib as mpl
+
+    with mpl.rc_context({"svg.hashsalt": path.stem}):
+        figure.savefig(path, metadata={"Date": None})

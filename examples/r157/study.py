@@ -13,6 +13,7 @@ from __future__ import annotations
 import argparse
 import json
 import re
+import shutil
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -25,7 +26,7 @@ sys.path.insert(0, str(Path(__file__).parent))  # the study's own modules, from 
 
 from alarms import detection_times, false_alarms, measured_alarms
 from encounters import Target, targets_of
-from figure import verdict_figure
+from figure import save_figure, verdict_figure
 from verdicts import GAPS, Verdicts, verdicts_of
 
 import xosc_lateral as xl
@@ -123,7 +124,9 @@ def main() -> None:
     parser.add_argument("--seeds", type=int, default=100)
     parser.add_argument("--profile", default="motorway")
     parser.add_argument("--table", type=Path)
-    parser.add_argument("--page", type=Path, help="page whose tables, between two markers, are replaced")
+    parser.add_argument(
+        "--page", type=Path, help="page whose tables, between two markers, are replaced; and its figure"
+    )
     parser.add_argument("--only", nargs="+", metavar="PART", help="scenarios whose name has one of these parts")
     args = parser.parse_args()
     paths = sorted(args.scenarios.glob("*.xosc"))
@@ -136,10 +139,11 @@ def main() -> None:
     args.output.mkdir(parents=True, exist_ok=True)
     (args.output / "study.json").write_text(json.dumps(record, indent=1) + "\n", encoding="utf-8")
     (args.output / "study.md").write_text(markdown(record), encoding="utf-8")
-    verdict_figure(verdicts, GAPS).savefig(args.output / "verdict.svg", metadata={"Date": None})
+    save_figure(verdict_figure(verdicts, GAPS), args.output / "verdict.svg")
     print(markdown(record))
     if args.page is not None:
         _put_into(args.page, markdown(record))
+        shutil.copyfile(args.output / "verdict.svg", args.page.parent / "figures" / "r157_verdict.svg")
 
 
 def _put_into(page: Path, text: str) -> None:
