@@ -216,7 +216,7 @@ def _vehicle(name: str, lengths: tuple[float, float], rng: np.random.Generator) 
 
 
 def _neighbours(time: Values, rng: np.random.Generator) -> tuple[Values, Values]:
-    """Distance to the nearest of a row of vehicles that is passed, 0 while it overlaps, empty beyond 200 m."""
+    """Distance to the nearest of a row of vehicles that is passed, 0 while it overlaps, infinite beyond 200 m."""
     places = np.cumsum(rng.exponential(90.0, 12)) - rng.uniform(0.0, 500.0)
     trucks = rng.random(len(places)) < 0.3
     gaps = places[:, None] - rng.uniform(1.0, 7.0) * time
@@ -224,7 +224,7 @@ def _neighbours(time: Values, rng: np.random.Generator) -> tuple[Values, Values]
     length = np.where(trucks, 16.0, 4.5)[nearest]
     distance = np.maximum(np.abs(gaps[nearest, np.arange(len(time))]) - 0.5 * (length + 4.5), 0.0)
     near = distance < 200.0
-    return np.where(near, distance, np.nan), (trucks[nearest] & near).astype(float)
+    return np.where(near, distance, np.inf), (trucks[nearest] & near).astype(float)
 
 
 def _noise(n: int, constant: float, step: float, rng: np.random.Generator) -> Values:

@@ -14,8 +14,9 @@ import numpy as np
 from scipy.stats import t
 
 from xosc_lateral.formats.drives import read_drives
+from xosc_lateral.identification.held_out_gain import held_out_gain
 from xosc_lateral.identification.identify import identify
-from xosc_lateral.identification.regression import Coarse, fit_model, held_out_likelihood
+from xosc_lateral.identification.regression import Coarse, fit_model
 from xosc_lateral.identification.terms.base import Term
 from xosc_lateral.identification.timeline import join_drives
 
@@ -49,8 +50,7 @@ def judged(coarse: Coarse, terms: Sequence[Term], own: np.ndarray, other: np.nda
     """Gain in log-likelihood a vehicle, sized on one half, seen on the other; one-sided t test over vehicles."""
     here = np.isin(coarse.drive, own)
     part = coarse.only(here)
-    gain = held_out_likelihood(fit_model(part, terms), coarse, ~here)
-    gain = gain - held_out_likelihood(fit_model(part, ()), coarse, ~here)
+    gain = held_out_gain(fit_model(part, terms), fit_model(part, ()), coarse, ~here)
     sums = np.bincount(coarse.drive, gain, minlength=coarse.drives)[other]
     score = sums.mean() / (sums.std(ddof=1) / np.sqrt(len(sums)))
     return f"{sums.mean():+.2f} nat a vehicle, p = {t.sf(score, len(sums) - 1):.1e}"

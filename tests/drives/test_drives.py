@@ -52,6 +52,8 @@ def test_a_context_that_appears_does_not_ring() -> None:
     found = average(time, distance, np.arange(0.0, 19.8, STEP))
     assert np.isnan(found[:49]).all()
     assert np.allclose(found[51:], 80.0)
+    far = average(time, np.where(time < 10.0, np.inf, 80.0), np.arange(0.0, 19.8, STEP))
+    assert np.isposinf(far[:49]).all() and np.allclose(far[51:], 80.0), "nobody within reach is in no average"
     step = average(time, np.where(time < 10.0, 0.0, 80.0), np.arange(0.0, 19.8, STEP))
     assert step.min() >= 0.0
     assert step.max() <= 80.0

@@ -44,6 +44,22 @@ def test_all_formats_give_the_same_drive(tmp_path: Path, suffix: str) -> None:
     assert np.isnan(drive.context["lead_distance"][:100]).all()
 
 
+@pytest.mark.parametrize("suffix", [".csv", ".parquet"])
+def test_an_infinite_distance_is_nobody_within_reach_and_no_other_column_may_be_infinite(
+    tmp_path: Path, suffix: str
+) -> None:
+    path = tmp_path / f"mine{suffix}"
+    made = table().assign(rain=lambda t: np.where(t.time < 10, np.inf, 1.0))
+    made["lead_distance"] = np.where(made.time < 10, np.inf, np.where(made.time < 20, -np.inf, 50.0))
+    made.to_parquet(path) if suffix == ".parquet" else made.to_csv(path, index=False)
+    (drive,) = read_drives(path)
+    lead = drive.context["lead_distance"]
+    assert np.isposinf(lead[:200]).all() and np.isnan(lead[200:400]).all() and (lead[400:] == 50.0).all()
+    assert np.isnan(drive.context["rain"][:200]).all()
+    (run,) = all_runs([drive])
+    assert np.isposinf(run.context["lead_distance"][10:40]).all()
+
+
 @pytest.mark.parametrize("separator", [";", "\t"])
 def test_other_separators_and_a_byte_order_mark_are_read(tmp_path: Path, separator: str) -> None:
     path = tmp_path / "mine.csv"

@@ -34,7 +34,8 @@ def test_neighbours_agree_with_a_search_over_all_pairs():
     n = 400
     frame, lane = rng.integers(0, 8, n), rng.integers(-1, 3, n)
     s, length, truck = rng.uniform(0, 1500, n), rng.uniform(4, 18, n), rng.random(n) < 0.3
-    near = find_neighbours(frame, lane, s, length, truck)
+    there = {"lead": lane >= 0, "left": (lane >= 0) & (lane < 2), "right": lane > 0}
+    near = find_neighbours(frame, lane, s, length, truck, lane_on_left=there["left"], lane_on_right=there["right"])
     for k in range(n):
         for name, step in (("lead", 0), ("left", 1), ("right", -1)):
             others = [
@@ -50,7 +51,10 @@ def test_neighbours_agree_with_a_search_over_all_pairs():
             found = getattr(near, f"{name}_distance")[k]
             free = np.inf if nearest is None else max(abs(s[nearest] - s[k]) - (length[k] + length[nearest]) / 2, 0.0)
             # with the nearest centre on the other side, a longer vehicle may still be nearer bumper to bumper
-            assert (np.isnan(found) and free > REACH) or found <= free
+            if not there[name][k]:
+                assert np.isnan(found), "no such lane"
+            else:
+                assert (found == np.inf and free > REACH) or found <= min(free, REACH)
             if step == 0 and free <= REACH:
                 assert found == pytest.approx(free)
                 assert near.lead_is_truck[k] == truck[nearest]
@@ -275,7 +279,10 @@ def test_dlr_leaders_and_classes_are_those_of_the_recording(dlr_full):
     table = dlr_full.table
     trucks = set(table.loc[table["vehicle_class"] == "truck", "drive"])
     assert 10 < len(trucks) < 45
-    assert table["lead_distance"].dropna().between(0, REACH).all()
+    inside = table[table["lane_index"] >= 0]
+    assert inside["lead_distance"].replace(np.inf, REACH).between(0, REACH).all(), "infinite: nobody within reach"
+    assert inside["left_distance"].isna().eq(inside["lane_index"] == 1).all(), "no lane beyond the left one"
+    assert inside["right_distance"].isna().eq(inside["lane_index"] == 0).all()
     assert set(table["lead_is_truck"].unique()) <= {0.0, 1.0}
     # in left-hand-positive terms the road bends left for one direction and right for the other
     assert table["curvature"].abs().median() == pytest.approx(1 / RADIUS, rel=0.4)
@@ -421,7 +428,8 @@ def test_highd_offsets_are_left_positive_on_both_carriageways(tmp_path):
     follower = table.loc["highd-01-1"]
     assert follower["lead_distance"].to_numpy() == pytest.approx(60.0 - 2.25 - 6.0)
     assert set(follower["lead_is_truck"]) == {1.0}
-    assert table.loc["highd-01-2", "lead_distance"].isna().all()
+    assert np.isposinf(table.loc["highd-01-2", "lead_distance"]).all(), "nobody within reach"
+    assert table["right_distance"].isna().all() and np.isposinf(table["left_distance"]).all()
     assert table["acceleration"].to_numpy() == pytest.approx(0.1)
     assert imported.provenance.format == "levelx highD"
 

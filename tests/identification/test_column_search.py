@@ -49,7 +49,7 @@ def found() -> Outcome:
 def test_a_shift_of_15_centimetres_is_named_with_its_delay(found: Outcome) -> None:
     assert isinstance(found.term, MeanTerm)
     assert found.columns == ("x",)
-    assert found.p_value < level_of("mean")
+    assert found.p_value < level_of("mean", 1)
     assert found.term.effect.lag_s == pytest.approx(1.0, abs=1.0)
     assert found.after is not None
     assert found.after.terms == (found.term,)
@@ -60,7 +60,7 @@ def test_idle_columns_are_hardly_ever_sure_to_do_anything() -> None:
     told = [outcome(drive(seed), MeanTerm) for seed in (32, 33, 34)]
     values = [one.p_value for one in told if one is not None]
     assert len(values) == 3
-    assert sum(value < level_of("mean") for value in values) <= 1
+    assert sum(value < level_of("mean", 1) for value in values) <= 1
     assert max(values) > 0.1
 
 
@@ -69,9 +69,9 @@ def test_a_spread_is_found_as_a_spread_and_not_as_a_shift() -> None:
     spread, shift = outcome(coarse, SpreadTerm), outcome(coarse, MeanTerm)
     assert spread is not None
     assert spread.columns == ("x",)
-    assert spread.p_value < level_of("spread")
+    assert spread.p_value < level_of("spread", 1)
     assert shift is not None
-    assert shift.p_value > level_of("mean")
+    assert shift.p_value > level_of("mean", 1)
 
 
 def test_a_column_that_is_barred_is_not_taken_up() -> None:

@@ -8,7 +8,7 @@ import pytest
 from tests.identification.made_coarse import SPREAD, coarse_of, movement, wander
 from xosc_lateral.driver.effects import Acts, Linear, Magnitude
 from xosc_lateral.identification import regression
-from xosc_lateral.identification.regression import Coarse, elapsed, fit_model, held_out_likelihood
+from xosc_lateral.identification.regression import Coarse, elapsed, fit_model
 from xosc_lateral.identification.terms.mean import MeanTerm
 from xosc_lateral.identification.terms.spread import SpreadTerm
 
@@ -169,22 +169,6 @@ def test_a_term_of_the_right_column_is_likelier_than_an_idle_one() -> None:
     )
     assert right > bare + 20.0
     assert idle < bare + 8.0
-
-
-# ---- rows held out ---------------------------------------------------------------------------------------------------
-def test_held_out_rows_are_likelier_under_the_model_that_made_them() -> None:
-    coarse = planted(14)
-    held = np.arange(len(coarse)) % 300 < 100
-    part = coarse.only(~held)
-    told = [held_out_likelihood(fit_model(part, terms), coarse, held) for terms in ((), (mean_term(),))]
-    assert (told[0][~(held & coarse.valid)] == 0.0).all()
-    assert told[1].sum() > told[0].sum() + 5.0
-
-
-def test_nothing_held_out_has_no_likelihood() -> None:
-    coarse = planted(15)
-    nothing = np.zeros(len(coarse), dtype=bool)
-    assert held_out_likelihood(fit_model(coarse, ()), coarse, nothing).sum() == 0.0
 
 
 def test_magnitudes_and_lines_are_told_apart_by_likelihood() -> None:

@@ -8,12 +8,18 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.stats import gumbel_r, kstest
 
-from xosc_lateral.identification.significance import BUDGET, WEIGHTS, level_of, upper_tail
+from xosc_lateral.identification.significance import BUDGET, MANY_DRIVES, WEIGHTS, level_of, upper_tail
 
 
-def test_all_levels_together_are_the_budget() -> None:
-    assert sum(map(level_of, WEIGHTS)) == pytest.approx(BUDGET)
-    assert level_of("mean") > level_of("regimes") > 0.0
+@pytest.mark.parametrize("drives", [1, MANY_DRIVES])
+def test_all_levels_together_are_the_budget(drives: int) -> None:
+    assert sum(level_of(component, drives) for component in WEIGHTS) == pytest.approx(BUDGET)
+    assert level_of("mean", drives) > level_of("regimes", drives) > 0.0
+
+
+def test_what_cannot_be_asked_between_a_few_drives_is_asked_within_them() -> None:
+    assert level_of("between", 1) == 0.0
+    assert level_of("mean", 1) == level_of("mean", MANY_DRIVES) + level_of("between", MANY_DRIVES)
 
 
 def test_without_a_null_nothing_is_sure() -> None:
@@ -57,6 +63,6 @@ def test_a_null_that_never_varies_is_no_reason_for_certainty() -> None:
 
 
 def test_a_share_of_the_rows_is_given_the_level_that_an_effect_reaches_there() -> None:
-    assert level_of("mean", 1.0) == level_of("mean")
+    assert level_of("mean", 1, share=1.0) == level_of("mean", 1)
     # log p in proportion to the rows
-    assert np.log(level_of("mean", 0.75)) == pytest.approx(0.75 * np.log(level_of("mean")))
+    assert np.log(level_of("mean", 1, share=0.75)) == pytest.approx(0.75 * np.log(level_of("mean", 1)))

@@ -71,7 +71,7 @@ def check_context(context: Mapping[str, float], who: str) -> None:
         With name, value and range.
     """
     for name, value in context.items():
-        if name in DISTANCES and value == np.inf:
+        if nobody(name, np.asarray(value)):
             continue
         if (why := implausible(name, float(value))) is not None:
             raise ValueError(f"{who}: {why}")
@@ -87,9 +87,19 @@ def implausible(name: str, value: float) -> str | None:
 
 def first_implausible(name: str, values: FloatArray) -> int | None:
     """Row of the first context value that can't be. `values` of shape (n,). [unit of the column]"""
-    believed = context_range(name)
-    wrong = np.flatnonzero((values < believed.low) | (values > believed.high))
+    wrong = np.flatnonzero(implausible_rows(name, values))
     return int(wrong[0]) if len(wrong) else None
+
+
+def implausible_rows(name: str, values: FloatArray) -> NDArray[np.bool_]:
+    """Which context values can't be, shape (n,) as `values` [unit of the column]; NaN ("there is none") can."""
+    believed = context_range(name)
+    return (values < believed.low) | ((values > believed.high) & ~nobody(name, values))
+
+
+def nobody(name: str, values: FloatArray) -> NDArray[np.bool_]:
+    """Where the distance to somebody says that nobody is within reach: it is infinite. Shape as `values`."""
+    return np.isposinf(values) & (name in DISTANCES)
 
 
 def check_profile(profile: DriverProfile) -> None:

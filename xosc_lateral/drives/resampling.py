@@ -72,13 +72,14 @@ def resample(time: FloatArray, values: FloatArray, grid: FloatArray, *, oversamp
 
 
 def average(time: FloatArray, values: FloatArray, grid: FloatArray, *, oversampling: int = OVERSAMPLING) -> FloatArray:
-    """Average a context column, shape (n,), over one step to each side (Hann weights); NaN where the nearest row is.
+    """Average a context column, shape (n,), over one step to each side (Hann weights).
 
-    `time` and `grid` in [s]; shape of `grid`, (m,), in the column's unit.
+    NaN ("there is none") or infinite ("nobody within reach") where the nearest row is, and in no average. `time` and
+    `grid` in [s]; shape of `grid`, (m,), in the column's unit.
     """
-    missing = np.isnan(values)
+    missing = ~np.isfinite(values)
     if missing.all():
-        return np.full(len(grid), np.nan)
+        return nearest(time, values, grid)
     if len(grid) < 2 or np.median(np.diff(time)) >= PASS_STEP / STEP * (grid[1] - grid[0]):
         result = np.interp(grid, time[~missing], values[~missing])
     else:
@@ -89,8 +90,8 @@ def average(time: FloatArray, values: FloatArray, grid: FloatArray, *, oversampl
         sums = _decimate(np.pad(fine, len(kernel) // 2), kernel, oversampling, len(grid))
         weights = _decimate(np.pad(weight, len(kernel) // 2), kernel, oversampling, len(grid))
         result = sums / np.where(weights > 0, weights, 1.0)
-    result[nearest(time, missing.astype(np.float64), grid) != 0] = np.nan
-    return result
+    closest = nearest(time, values, grid)
+    return np.where(np.isfinite(closest), result, closest)
 
 
 def nearest(time: FloatArray, values: FloatArray, grid: FloatArray) -> FloatArray:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.driver.plausibility import first_implausible, implausible
+from xosc_lateral.driver.plausibility import first_implausible, implausible, implausible_rows, nobody
 from xosc_lateral.drives.cleaning import MAX_MEDIAN_SPEED, MAX_OUTSIDE, OWN, clean_drive
 from xosc_lateral.drives.cuts import MIN_RUN
 from xosc_lateral.drives.drive import Drive
@@ -18,7 +18,6 @@ from xosc_lateral.errors import FormatError, NotEnoughDataError
 from xosc_lateral.formats.tables import read_table
 from xosc_lateral.formats.text_columns import comma_numbers, indicators, plain_cells, seconds_of_text
 from xosc_lateral.formats.units import factor
-from xosc_lateral.limits import context_range
 from xosc_lateral.segment import CONTEXT_UNITS
 
 if TYPE_CHECKING:
@@ -157,7 +156,8 @@ def _scaled(column: pd.Series, by: float, path: Path, name: str) -> pd.Series:
 
 
 def _numeric_columns(table: pd.DataFrame, path: Path) -> dict[str, FloatArray]:
-    """Columns that hold numbers or categories, as float64; infinite values count as missing."""
+    """Columns that hold numbers or categories, as float64; infinite values count as missing, but for those of distances
+    to others: nobody is within reach."""
     from pandas.api import types
 
     columns = {}
@@ -166,7 +166,7 @@ def _numeric_columns(table: pd.DataFrame, path: Path) -> dict[str, FloatArray]:
             continue
         if name in OWN or name == "speed" or types.is_numeric_dtype(table[name]) or types.is_bool_dtype(table[name]):
             values = _as_numbers(table[name], path, name)
-            values[~np.isfinite(values)] = np.nan
+            values[np.isinf(values) & ~nobody(name, values)] = np.nan
             if name not in OWN:
                 _leave_out_nonsense(values, name, path)
             if name in OWN or not np.isnan(values).all():
@@ -183,8 +183,7 @@ def _leave_out_nonsense(values: FloatArray, name: str, path: Path) -> None:
     row = first_implausible(name, values)
     if row is None or (name == "speed" and np.nanmedian(values) > MAX_MEDIAN_SPEED):
         return  # a wrong unit is said per drive, with what to do
-    believed = context_range(name)
-    wrong = (values < believed.low) | (values > believed.high)
+    wrong = implausible_rows(name, values)
     if wrong.mean() > MAX_OUTSIDE:
         what = f"{implausible(name, float(values[row]))}, and {100 * wrong.mean():.0f} % of the rows are not"
         raise FormatError(f"{what}; name the unit with --map", path=path, line=row + 2, element=f"column {name!r}")

@@ -94,7 +94,7 @@ class Candidate:
 
     def values(self, context: Mapping[str, FloatArray]) -> FloatArray:
         """Quantity before lag and response, shape (n,); NaN: neutral."""
-        return np.asarray(self.effect.quantity(context) @ np.asarray(self.contrast))
+        return np.asarray(self.effect.seen(context) @ np.asarray(self.contrast))
 
 
 def candidates_of(columns: Sequence[Column], context: Mapping[str, FloatArray], *, most: int) -> list[Candidate]:

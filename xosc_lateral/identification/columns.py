@@ -61,7 +61,7 @@ def known_columns(timeline: Timeline) -> tuple[list[Column], dict[str, str]]:
     found, unused = [], {}
     context = {"lane_width": timeline.lane_width, **timeline.context}
     for name in sorted(context):
-        column = _column(name, context[name][timeline.valid], timeline.periods.get(name, 0.0))
+        column = read_column(name, context[name][timeline.valid], timeline.periods.get(name, 0.0))
         if isinstance(column, str):
             unused[name] = column
         else:
@@ -69,7 +69,9 @@ def known_columns(timeline: Timeline) -> tuple[list[Column], dict[str, str]]:
     return found, unused
 
 
-def _column(name: str, seen: FloatArray, period: float) -> Column | str:
+def read_column(name: str, seen: FloatArray, period: float) -> Column | str:
+    """What a column holds, from its values while road-following, shape (n,), and its full circle; or why it tells
+    nothing."""
     there = np.isfinite(seen)
     share = float(there.mean())
     if share < MIN_SHARE:

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from xosc_lateral.driver.effects import ColumnEffect
 from xosc_lateral.identification.autocorrelation import Whitener
 from xosc_lateral.identification.candidates import Candidate
+from xosc_lateral.identification.significance import MANY_DRIVES
 from xosc_lateral.identification.timeline import COARSE, Timeline, coarse_mean, coarse_middle, start_anew
 
 FloatArray = NDArray[np.float64]
@@ -30,9 +31,6 @@ PRODUCT_TIMINGS: Mapping[float, tuple[int, ...]] = {2.0: (-2, -1, 0, 1)}
 
 NULL_DRAWS = 400
 """Rotated or re-signed residuals that the null is taken from."""
-
-MANY_DRIVES = 20
-"""From so many drives on, the null draws the sign of each drive anew in place of rotating; see `draw_null`."""
 
 LEAST_SHIFT_S = 60
 """No rotation is shorter: a driver's answer must be out of reach. [s]"""

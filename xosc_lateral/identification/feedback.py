@@ -92,8 +92,8 @@ def find_feedback(timeline: Timeline, columns: Iterable[Column]) -> list[Feedbac
         if column.role is Role.ANGLE:
             continue
         values = timeline.context.get(column.name, timeline.lane_width)
-        seen = values[timeline.valid]
-        values = np.where(np.isfinite(values), values, np.nanmedian(seen))
+        known = np.isfinite(values)
+        values = np.where(known, values, np.median(values[timeline.valid & known]))
         shared = {name: _coherence(_spectra(values, starts), own) for name, own in spectra.items()}
         size = _spectra(np.abs(values - np.median(values[timeline.valid])), starts)
         for name in ("size of the offset", "excess of the offset"):

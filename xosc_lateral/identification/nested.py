@@ -16,7 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.identification.blocks import folds_of
-from xosc_lateral.identification.regression import Coarse, fit_model, held_out_likelihood
+from xosc_lateral.identification.held_out_gain import held_out_gain
+from xosc_lateral.identification.regression import Coarse, fit_model
 from xosc_lateral.identification.search import Search
 from xosc_lateral.identification.selection import Selection, select
 from xosc_lateral.identification.terms.base import Term
@@ -73,7 +74,7 @@ class Nested:
                 continue
             chosen += 1
             rest = fit_model(selection.final.coarse, tuple(one for one in selection.final.terms if one is not own[0]))
-            rows += held_out_likelihood(selection.final, coarse, held) - held_out_likelihood(rest, coarse, held)
+            rows += held_out_gain(selection.final, rest, coarse, held)
         return _over_blocks(rows, self._blocks, self._by_row, chosen)
 
     def together(self, terms: Sequence[Term]) -> Gain:
@@ -87,7 +88,7 @@ class Nested:
             ]
             if own:
                 fitted = fit_model(selection.final.coarse, (*selection.start.terms, *own))
-                rows += held_out_likelihood(fitted, coarse, held) - held_out_likelihood(selection.start, coarse, held)
+                rows += held_out_gain(fitted, selection.start, coarse, held)
         return _over_blocks(rows, self._blocks, self._by_row, len(self.selections))
 
 

@@ -77,7 +77,7 @@ def curve_of(result: LoopResult, effect: ColumnEffect) -> Curve:
 def _fitted(result: LoopResult, effect: ColumnEffect) -> tuple[FloatArray, FloatArray, FloatArray]:
     coarse = result.coarse
     context = {column: coarse.context[column][coarse.timeline.valid] for column in effect.columns}
-    seen = effect.quantity(context)[:, 0] if isinstance(effect, Product) else context[effect.columns[0]]
+    seen = effect.seen(context)[:, 0] if isinstance(effect, Product) else context[effect.columns[0]]
     seen = seen[np.isfinite(seen)]
     low, high = _ends(seen)
     over = np.linspace(low, high, 200)

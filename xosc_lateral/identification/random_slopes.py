@@ -13,11 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.identification.regression import Fitted, ModelTerm, whitener_as_seen
+from xosc_lateral.identification.significance import MANY_DRIVES
 
 FloatArray = NDArray[np.float64]
-
-MIN_DRIVES = 20
-"""Fewer drives say nothing about how drivers differ."""
 
 LEVEL = 0.01
 """Probability of taking noise for drivers that differ; drivers that are alike are the simpler profile. [-]"""
@@ -29,7 +27,7 @@ def slope_deviation(fitted: Fitted, term: ModelTerm) -> float:
 
     part = fitted.mean_part(term)
     coarse = fitted.coarse
-    if part.stop - part.start != 1 or coarse.drives < MIN_DRIVES:
+    if part.stop - part.start != 1 or coarse.drives < MANY_DRIVES:
         return 0.0
     # independent rows, which a floor does not leave: what they have in common would look like drivers that differ
     whitener = whitener_as_seen(coarse, fitted.movement, fitted.scale)
@@ -38,7 +36,7 @@ def slope_deviation(fitted: Fitted, term: ModelTerm) -> float:
     rows = rows / max(float(np.sqrt(np.mean(rows[coarse.valid] ** 2))), 1e-300)
     power = np.bincount(coarse.drive, column**2, minlength=coarse.drives)
     told = power > 1e-3 * float(power.mean())
-    if told.sum() < MIN_DRIVES:
+    if told.sum() < MANY_DRIVES:
         return 0.0
     weight = power[told]
     off = np.bincount(coarse.drive, column * rows, minlength=coarse.drives)[told] / weight

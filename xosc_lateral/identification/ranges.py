@@ -25,7 +25,7 @@ def driving_range(coarse: Coarse, effect: ColumnEffect) -> tuple[FloatArray, Flo
         low, high = effect.quantity({effect.column: ends})
         if np.any(low != high):
             return low, high
-    quantity = effect.quantity({column: coarse.context[column][inside] for column in effect.columns})
+    quantity = effect.seen({column: coarse.context[column][inside] for column in effect.columns})
     quantity = quantity[np.isfinite(quantity).all(axis=1)]
     if quantity.shape[1] == 1:
         low, high = _ends(quantity[:, 0])

@@ -24,7 +24,6 @@ from xosc_lateral.driver.effects import Acts, ColumnEffect
 from xosc_lateral.identification.autocorrelation import Whitener, fit_autoregression, start_factors, unbiased
 from xosc_lateral.identification.least_squares import clustered_least_squares
 from xosc_lateral.identification.log_scale import (
-    CLIP,
     bounded,
     clipped_squares,
     covariance_of_log_sizes,
@@ -218,7 +217,7 @@ class Fitted:
     def explained(self) -> FloatArray:
         """Levels and mean terms on the 0.2 s grid, shape (fine n,). [m]"""
         timeline = self.coarse.timeline
-        columns = _joined([term.fine_mean_columns(self.coarse) for term in self.terms], len(timeline))
+        columns = joined([term.fine_mean_columns(self.coarse) for term in self.terms], len(timeline))
         return columns @ self.sizes + self.levels[timeline.drive]
 
     def mean_part(self, term: ModelTerm) -> slice:
@@ -237,9 +236,9 @@ class Fitted:
 
 def fit_model(coarse: Coarse, terms: Sequence[ModelTerm]) -> Fitted:
     """Fit all terms jointly: generalised least squares and the autoregression by turns."""
-    columns = _joined([term.mean_columns(coarse) for term in terms], len(coarse))
-    scales = _joined([term.scale_columns(coarse) for term in terms], len(coarse))
-    known = _known_scale(coarse, terms)
+    columns = joined([term.mean_columns(coarse) for term in terms], len(coarse))
+    scales = joined([term.scale_columns(coarse) for term in terms], len(coarse))
+    known = known_scale_of(coarse, terms)
     sizes, log_sizes = np.zeros(columns.shape[1]), np.zeros(scales.shape[1])
     covariance = np.zeros((len(sizes), len(sizes)))
     levels, spread = coarse.by_drive(coarse.offset), np.ones(coarse.drives)
@@ -291,30 +290,6 @@ def _standardised(rows: FloatArray, valid: BoolArray, freedom: float) -> FloatAr
     return np.asarray(rows / np.sqrt(max(variance, 1e-300)))
 
 
-def held_out_likelihood(fitted: Fitted, coarse: Coarse, held: BoolArray) -> FloatArray:
-    """Gaussian log-likelihood of every valid row in `held`, shape (n,), under a model fitted without them; 0 elsewhere.
-
-    The held-out rows' own levels of place and spread are taken from themselves, for every model alike.
-
-    Parameters
-    ----------
-    coarse : Coarse
-        With the held-out rows valid.
-    """
-    rows = coarse.valid & held
-    columns = _joined([term.mean_columns(fitted.coarse) for term in fitted.terms], len(coarse))
-    scales = _joined([term.scale_columns(fitted.coarse) for term in fitted.terms], len(coarse))
-    scale = np.exp(scales @ fitted.log_sizes + _known_scale(coarse, fitted.terms))
-    bare = Whitener(fitted.whitener.process, rows, coarse.drive, scale)
-    squares = np.square(bare.rows(np.where(rows, coarse.offset - columns @ fitted.sizes, 0.0)))
-    typical = max(float(squares[rows].mean()), 1e-300) if rows.any() else 1.0
-    level = own_levels(np.minimum(squares, CLIP * typical), rows, coarse.drive) * typical
-    own = level[coarse.drive]
-    factor = bare.by_position(fitted.starts)
-    deviation = np.sqrt(own) * factor * bare.deviations
-    return np.where(rows, -0.5 * np.minimum(squares / (own * factor**2), CLIP) - np.log(deviation), 0.0)
-
-
 def elapsed(coarse: Coarse) -> FloatArray:
     """Time on the road [-], -0.5 at the start and 0.5 at the end of each drive's valid part; shape (n,)."""
     share = np.zeros(len(coarse))
@@ -328,14 +303,16 @@ def elapsed(coarse: Coarse) -> FloatArray:
 
 def _within(values: FloatArray, valid: BoolArray) -> FloatArray:
     seen = values[valid & np.isfinite(values)]
-    return np.clip(values, seen.min(), seen.max()) if len(seen) else values
+    return np.where(np.isinf(values), values, np.clip(values, seen.min(), seen.max())) if len(seen) else values
 
 
-def _joined(blocks: Sequence[FloatArray], n: int) -> FloatArray:
+def joined(blocks: Sequence[FloatArray], n: int) -> FloatArray:
+    """Columns side by side, shape (n, k); none of none."""
     return np.concatenate(blocks, axis=1) if blocks else np.zeros((n, 0))
 
 
-def _known_scale(coarse: Coarse, terms: Sequence[ModelTerm]) -> FloatArray:
+def known_scale_of(coarse: Coarse, terms: Sequence[ModelTerm]) -> FloatArray:
+    """Log scale that terms know as a whole, shape (n,). [-]"""
     known = [scale for term in terms if (scale := term.known_scale(coarse)) is not None]
     return np.sum(known, axis=0) if known else np.zeros(len(coarse))
 

@@ -1,10 +1,11 @@
 """The residual: where measured drives and a profile's own runs under the same context differ, in metres.
 
 Both are described by the same set of cells: the mean offset and the spread of the faster movement in each fifth of
-every context column, the spread in each sixth of the drive, the movement's size in bands of frequency, and quantiles of
-the local spread. The error is the root mean square over the cells of measured minus expected, with the expectation
-taken over several runs of the profile. If no cell differs by more than the floor (what measured data differs from
-itself), no test of means, spreads, spectra or their dependence on context can tell the profile from the driver.
+every context column, and where it says that there is none; the spread in each sixth of the drive, the movement's size
+in bands of frequency, and quantiles of the local spread. The error is the root mean square over the cells of measured
+minus expected, with the expectation taken over several runs of the profile. If no cell differs by more than the floor
+(what measured data differs from itself), no test of means, spreads, spectra or their dependence on context can tell the
+profile from the driver.
 """
 
 from __future__ import annotations
@@ -117,10 +118,11 @@ def statistics_of(
     """Bins for every quantity, shape (n,) each on the grid, and for time; an oscillation's frequency [1/s], if any."""
     labels, middles = {}, {}
     for name, values in quantities.items():
+        none = np.isnan(values)
         filled = _filled(values, timeline.valid)
         answer = respond(filled, timeline.step, 0.0, ANSWER_S)
         smooth = in_digits(start_anew(answer, filled, float(np.exp(-timeline.step / ANSWER_S)), timeline.drive))
-        label, middle = _binned(smooth, timeline.valid)
+        label, middle = _binned(smooth, timeline.valid, none)
         if len(middle) > 1:
             labels[name], middles[name] = label, middle
     labels["time"], middles["time"] = _time_bins(timeline)
@@ -246,19 +248,17 @@ def _amplitude(offset: FloatArray, used: BoolArray, timeline: Timeline, frequenc
     return float(np.sqrt(squares / max(rows, 1)))
 
 
-def _binned(values: FloatArray, valid: BoolArray) -> tuple[IntArray, FloatArray]:
-    seen = values[valid]
-    edges = np.unique(np.quantile(seen, np.linspace(0.0, 1.0, N_BINS + 1)[1:-1]))
+def _binned(values: FloatArray, valid: BoolArray, none: BoolArray) -> tuple[IntArray, FloatArray]:
+    """Fifths of what there is, then a bin of its own where there is none; with the mean of each, NaN for that one."""
+    seen = values[valid & ~none]
+    edges = np.unique(np.quantile(seen, np.linspace(0.0, 1.0, N_BINS + 1)[1:-1])) if len(seen) else np.zeros(0)
     label = np.searchsorted(edges, values, side="right")
     if len(edges) and float(np.mean(seen >= edges[-1])) < 0.01:
         label = np.minimum(label, len(edges) - 1)
+    label = np.where(none, len(edges) + 1, label)
     used, label = np.unique(label, return_inverse=True)
-    middle = np.array(
-        [
-            values[valid & (label == index)].mean() if np.any(valid & (label == index)) else np.nan
-            for index in range(len(used))
-        ]
-    )
+    inside = [valid & ~none & (label == index) for index in range(len(used))]
+    middle = np.array([values[rows].mean() if rows.any() else np.nan for rows in inside])
     return label.astype(np.intp), middle
 
 
@@ -274,5 +274,7 @@ def _time_bins(timeline: Timeline, parts: int = 6) -> tuple[IntArray, FloatArray
 
 
 def _filled(values: FloatArray, valid: BoolArray) -> FloatArray:
+    """The mean where there is none, the farthest where nobody is within reach."""
     seen = values[valid & np.isfinite(values)]
-    return np.where(np.isfinite(values), values, seen.mean() if len(seen) else 0.0)
+    usual, farthest = (seen.mean(), seen.max()) if len(seen) else (0.0, 0.0)
+    return np.nan_to_num(values, nan=usual, posinf=farthest, neginf=usual)

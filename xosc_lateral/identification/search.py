@@ -93,7 +93,7 @@ class Search:
 
     def level_of(self, component: str) -> float:
         """Family-wise level that a component may spend on these rows."""
-        return level_of(component, self.share)
+        return level_of(component, self.coarse.drives, self.share)
 
     def rng(self, *key: int) -> np.random.Generator:
         """Independent stream by purpose."""

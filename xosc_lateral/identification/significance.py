@@ -24,32 +24,41 @@ BUDGET = 0.05
 TAIL_SHARE = 0.25
 """Share of a null sample that an exponential tail is fitted on. [-]"""
 
+MANY_DRIVES = 20
+"""From so many drives on a table tells what differs between them, and its null is drawn by whole drives."""
+
 WEIGHTS = {
-    "mean": 10.0,
+    "mean": 5.5,
+    "between": 5.5,
     "spread": 3.0,
     "slow_spread": 3.0,
     "fine_noise": 1.0,
     "restoring": 0.5,
-    "between": 1.0,
     "low_frequency": 1.0,
     "cycle": 1.0,
     "variance_trend": 1.0,
     "regimes": 0.5,
 }
-"""Shares of the budget: half for the mean, a quarter for both measures of spread, about equal parts for the rest."""
+"""Shares of the budget: half for the mean, within and between drives in equal parts; a quarter for both measures of
+spread; about equal parts for the rest."""
 
 
-def level_of(component: str, share: float = 1.0) -> float:
+def level_of(component: str, drives: int, share: float = 1.0) -> float:
     """Family-wise level that a component may spend.
 
     Parameters
     ----------
     component : str
+    drives : int
+        In the table. Where nothing can be asked between them, the mean within has that share too.
     share : float
         Of the table's rows. An effect's log p-value is in proportion to them: what is just significant on the table is
         on average just below this level on a share of it.
     """
-    return float((BUDGET * WEIGHTS[component] / sum(WEIGHTS.values())) ** share)
+    weight = WEIGHTS[component]
+    if drives < MANY_DRIVES and component in ("mean", "between"):
+        weight = WEIGHTS["mean"] + WEIGHTS["between"] if component == "mean" else 0.0
+    return float((BUDGET * weight / sum(WEIGHTS.values())) ** share)
 
 
 def upper_tail(score: float, maxima: FloatArray) -> float:

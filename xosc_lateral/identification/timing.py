@@ -1,4 +1,4 @@
-"""How unsure a size is because its lag and time constant were estimated with it."""
+"""How unsure a size is because shape, lag and time constant of the answer were estimated with it."""
 
 from __future__ import annotations
 
@@ -6,11 +6,13 @@ import numpy as np
 from msgspec import structs
 from numpy.typing import NDArray
 
-from xosc_lateral.driver.effects import ColumnEffect
+from xosc_lateral.driver.effects import ColumnEffect, Product
 from xosc_lateral.driver.effects.response import respond
+from xosc_lateral.identification.candidates import shapes_of
+from xosc_lateral.identification.columns import Column, read_column
 from xosc_lateral.identification.ranges import driving_range
 from xosc_lateral.identification.refinement import FINE_RESPONSES, LAG_LIMIT, LAG_STEPS, means_by_second
-from xosc_lateral.identification.regression import Fitted
+from xosc_lateral.identification.regression import Coarse, Fitted
 
 FloatArray = NDArray[np.float64]
 
@@ -24,8 +26,9 @@ CHI_SQUARE = 3.84
 def widening(fitted: Fitted, effect: ColumnEffect, part: slice) -> float:
     """Factor on the standard errors of an effect on the mean, at least 1.
 
-    Half the width of the profile-likelihood interval [1]_ of the change over the driving range, lag and time constant
-    free, over that of the interval with both told.
+    How far the profile-likelihood interval [1]_ of the change over the driving range reaches from the estimate with
+    lag and time constant free, or the shape of its column, over how far it reaches with all of them told. The
+    likelihood is that of independent rows, scaled to the variance that stretches of a minute show [2]_.
 
     Parameters
     ----------
@@ -39,26 +42,52 @@ def widening(fitted: Fitted, effect: ColumnEffect, part: slice) -> float:
     ----------
     .. [1] D. Venzon, S. Moolgavkar, "A method for computing profile-likelihood-based confidence intervals", Applied
        Statistics 37, 1988.
+    .. [2] R. E. Chandler, S. Bate, "Inference for clustered data using the independence loglikelihood", Biometrika 94,
+       2007.
     """
     low, high = driving_range(fitted.coarse, effect)
     contrast = high - low
     white = fitted.whitener.rows
     others, _ = np.linalg.qr(white(np.delete(fitted.columns, np.r_[part], axis=1)))
     left = _beside(others, white(fitted.coarse.offset))
-    told = _profile(_beside(others, white(fitted.columns[:, part])), left, contrast)
+    own = _beside(others, white(fitted.columns[:, part]))
+    told = _profile(own, left, contrast)
     found = [told]
     for answer in _timed(fitted, effect):
         rows = _beside(others, white(answer.reshape(len(answer), -1)))
         width = len(contrast)
         found += [_profile(rows[:, at : at + width], left, contrast) for at in range(0, rows.shape[1], width)]
+    for shape in _shapes(fitted.coarse, effect):
+        low, high = driving_range(fitted.coarse, shape)
+        rows = _beside(others, white(fitted.coarse.answer(shape)))
+        alike = np.sign(float(np.sum(own * rows)))  # nearness falls where distance rises
+        found.append(_profile(rows, left, alike * (high - low)))
     gain, size, variance = np.asarray(found).T
     noise = float(left @ left - gain.max()) / max(1, int(fitted.coarse.valid.sum()))
-    room = CHI_SQUARE - (gain.max() - gain) / noise
+    clustered = float(contrast @ fitted.covariance[part, part] @ contrast)
+    room = CHI_SQUARE * clustered / max(noise * told[2], 1e-300) - (gain.max() - gain) / noise
     inside = room > 0.0
     half = np.sqrt(noise * variance[inside] * room[inside])
-    least, most = (size[inside] - half).min(), (size[inside] + half).max()
-    alone = np.sqrt(CHI_SQUARE * noise * told[2])
-    return float(max(1.0, 0.5 * (most - least) / max(alone, 1e-300)))
+    reach = float(np.max(np.abs(size[inside] - told[1]) + half))
+    return float(max(1.0, reach / max(np.sqrt(CHI_SQUARE * clustered), 1e-300)))
+
+
+def _shapes(coarse: Coarse, effect: ColumnEffect) -> list[ColumnEffect]:
+    """Other shapes of the only column, with one coefficient and the same timing."""
+    if isinstance(effect, Product) or len(effect.columns) > 1 or len(effect.coefficients) > 1:
+        return []
+    (name,) = effect.columns
+    seen = coarse.context[name][coarse.timeline.valid]
+    column = read_column(name, seen, coarse.timeline.periods.get(name, 0.0))
+    if not isinstance(column, Column):
+        return []
+    shapes = shapes_of(column, seen, curves=False)
+    timing = {"lag_s": effect.lag_s, "response_s": effect.response_s}
+    return [
+        structs.replace(shape, **timing)
+        for shape in (*shapes.plain, *shapes.bent)
+        if shape.seen({name: seen[:1]}).shape[1] == 1
+    ]
 
 
 def _timed(fitted: Fitted, effect: ColumnEffect) -> list[FloatArray]:

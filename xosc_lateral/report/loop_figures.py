@@ -201,16 +201,18 @@ def _shown(result: LoopResult, what: str) -> list[str]:
 
 
 def _name_bins(axis: Axes, middles: FloatArray, name: str) -> None:
-    """Fifths stand side by side; the outer ones and the middle one say what the column is there."""
+    """Bins stand side by side; the outer ones and the middle one say what the column is there."""
     last = len(middles) - 1
     marked: Sequence[int] = sorted({0, last // 2, last})
     # what a smoothed switch decays to is as good as 0
-    shown = np.where(np.abs(middles) < NEGLIGIBLE * np.abs(middles).max(), 0.0, middles)
+    shown = np.where(np.abs(middles) < NEGLIGIBLE * np.nanmax(np.abs(middles)), 0.0, middles)
     labels = [f"{100 * shown[k]:.0f} %" if name == "time" else _short(shown[k]) for k in marked]
     axis.set_xticks(list(marked), labels, fontsize=8.0)
     axis.set_xlim(-0.3, last + 0.3)
 
 
 def _short(value: float) -> str:
-    """Two digits, without an exponent up to thousands."""
+    """Two digits, without an exponent up to thousands; a bin of NaN is where there is none."""
+    if np.isnan(value):
+        return "none"
     return f"{value:.0f}" if 10.0 <= abs(value) < 1e4 else f"{value:.2g}"

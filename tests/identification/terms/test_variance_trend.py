@@ -63,8 +63,8 @@ def test_loudness_in_clusters_is_no_trend_more_often_than_it_is_said() -> None:
 
 
 def test_a_steady_growth_is_sure_and_a_steady_drive_is_not() -> None:
-    assert outcome_of(growing(1.8, 76))[1] < level_of("variance_trend")
-    assert outcome_of(growing(1.0, 77))[1] > level_of("variance_trend")
+    assert outcome_of(growing(1.8, 76))[1] < level_of("variance_trend", 1)
+    assert outcome_of(growing(1.0, 77))[1] > level_of("variance_trend", 1)
 
 
 def test_the_factor_is_sized_within_its_error(fitted: Fitted) -> None:

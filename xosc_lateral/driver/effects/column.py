@@ -127,9 +127,13 @@ class ColumnEffect(Effect, frozen=True, kw_only=True):
         """
         return ()
 
+    def seen(self, context: Mapping[str, FloatArray]) -> FloatArray:
+        """The quantity of columns that may be infinite, shape (n, k); NaN where neutral. [unit of the quantity]"""
+        return self.quantity(context if self.levels_off else _finite(context, self.columns))
+
     def known(self, context: Mapping[str, FloatArray]) -> FloatArray:
         """The quantity with what is neutral in place of NaN, shape (n, k). [unit of the quantity]"""
-        values = self.quantity(context if self.levels_off else _finite(context, self.columns))
+        values = self.seen(context)
         missing = np.isnan(values)
         if not missing.any():
             return values
@@ -190,7 +194,8 @@ class ColumnEffect(Effect, frozen=True, kw_only=True):
 
 
 def _finite(context: Mapping[str, FloatArray], columns: Iterable[str]) -> dict[str, FloatArray]:
-    return {name: np.where(np.isinf(context[name]), np.nan, context[name]) for name in columns}
+    read = {name: np.asarray(context[name]) for name in columns}
+    return {name: np.where(far, np.nan, own) if (far := np.isinf(own)).any() else own for name, own in read.items()}
 
 
 def _finite_mean(values: FloatArray) -> float:

@@ -283,7 +283,15 @@ def _context(tracks: pd.DataFrame, placed: _Placed, s: FloatArray, forward: NDAr
 
     kind = _vehicle_class(tracks)
     frame = np.round(tracks["time"].to_numpy() / STEP).astype(np.int64) * 2 + forward
-    near = find_neighbours(frame, placed.lane, s, tracks["dimension_length"].to_numpy(), kind == "truck")
+    near = find_neighbours(
+        frame,
+        placed.lane,
+        s,
+        tracks["dimension_length"].to_numpy(),
+        kind == "truck",
+        lane_on_left=placed.lane < LANES - 1,
+        lane_on_right=placed.lane > 0,
+    )
     return pd.DataFrame(
         {
             "drive": "ht-" + tracks["id"].astype(str),

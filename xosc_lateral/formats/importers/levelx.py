@@ -153,7 +153,15 @@ def _from_highd(
     lane_number = lane.astype(np.int64)
     vehicle, frame = tracks["id"].to_numpy(), tracks["frame"].to_numpy()
     kind = meta["class"].astype(str).str.lower().to_numpy()
-    near = find_neighbours(frame * 2 + rightwards, lane_number, x, tracks["width"].to_numpy(), np.isin(kind, TRUCKS))
+    near = find_neighbours(
+        frame * 2 + rightwards,
+        lane_number,
+        x,
+        tracks["width"].to_numpy(),
+        np.isin(kind, TRUCKS),
+        lane_on_left=lane_number < count - 1,
+        lane_on_right=lane_number > 0,
+    )
     reasons = {
         "no lane": lane_number < 0,
         "lane change": lane_changes(left, offset, lane_number, vehicle, step, settings),
@@ -259,12 +267,13 @@ def _about_mean(values: FloatArray, rows: IntArray, half: int) -> FloatArray:
 
 
 def _exid_neighbours(tracks: pd.DataFrame, is_truck: NDArray[np.bool_]) -> dict[str, FloatArray]:
-    """Leader and neighbours from the ids that come along; distances bumper to bumper."""
+    """Leader and neighbours from the ids that come along; distances bumper to bumper. Which lanes there are is not in
+    the tracks, so beside, NaN is no lane as well as nobody."""
     row_of = _rows_by_frame_and_track(tracks)
     lead, lead_row = tracks["leadDHW"].to_numpy(dtype=np.float64), row_of(_ids(tracks["leadId"]))
     there = (lead_row >= 0) & (lead >= 0.0) & (lead <= REACH)
     near = {
-        "lead_distance": np.where(there, lead, np.nan),
+        "lead_distance": np.where(there, lead, np.inf),
         "lead_is_truck": np.where(there, is_truck[lead_row], False).astype(np.float64),
     }
     for side in ("left", "right"):

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
+BoolArray = NDArray[np.bool_]
 
 REACH = 200.0  # [m]; who is farther away is none, as in `motion.context`
 LONGEST = 30.0  # [m]; no vehicle is longer (German road traffic regulations: 25.25 m)
@@ -16,10 +17,10 @@ LONGEST = 30.0  # [m]; no vehicle is longer (German road traffic regulations: 25
 
 @dataclass(frozen=True, eq=False)
 class Neighbours:
-    """Context of every row, under the names of the drive table; NaN where there is none within `REACH`.
+    """Context of every row, under the names of the drive table.
 
-    Distances are free space, bumper to bumper along the road, 0 while side by side [m]; `*_is_truck` is 1 or 0, and 0
-    where there is nobody.
+    Distances are free space, bumper to bumper along the road, 0 while side by side; infinite where that lane has nobody
+    within `REACH`, NaN where there is no such lane [m]. `*_is_truck` is 1 or 0, and 0 where there is nobody.
     """
 
     lead_distance: FloatArray
@@ -31,7 +32,14 @@ class Neighbours:
 
 
 def find_neighbours(
-    frame: IntArray, lane: IntArray, s: FloatArray, length: FloatArray, is_truck: NDArray[np.bool_]
+    frame: IntArray,
+    lane: IntArray,
+    s: FloatArray,
+    length: FloatArray,
+    is_truck: BoolArray,
+    *,
+    lane_on_left: BoolArray,
+    lane_on_right: BoolArray,
 ) -> Neighbours:
     """Leader in the same lane and nearest vehicle in the lanes beside.
 
@@ -46,6 +54,8 @@ def find_neighbours(
     length : array, shape (n,)
         Of the vehicles. [m]
     is_truck : array of bool, shape (n,)
+    lane_on_left, lane_on_right : array of bool, shape (n,)
+        Whether there is such a lane, driven the same way.
     """
     known = lane >= 0
     group = np.where(known, frame * 64 + lane, -1)
@@ -55,20 +65,20 @@ def find_neighbours(
     base = float(s.min()) if len(s) else 0.0
     axis = group[order] * span + (s[order] - base)
 
-    def nearest(target: IntArray, ahead_only: bool) -> tuple[FloatArray, FloatArray]:
+    def nearest(target: IntArray, there: BoolArray, *, ahead_only: bool = False) -> tuple[FloatArray, FloatArray]:
         place = target * span + (s - base)
         after = np.searchsorted(axis, place, side="right")
         best, truck = np.full(len(s), np.inf), np.zeros(len(s))
         for candidate in (after,) if ahead_only else (after, after - 1):
-            there = (candidate >= 0) & (candidate < len(axis)) & known
+            inside = (candidate >= 0) & (candidate < len(axis)) & known
             who = order[np.clip(candidate, 0, len(axis) - 1)]
             free = np.maximum(np.abs(s[who] - s) - 0.5 * (length[who] + length), 0.0)
-            gap = np.where(there & (group[who] == target), free, np.inf)
+            gap = np.where(inside & (group[who] == target), free, np.inf)
             closer = (gap < best) & (gap <= REACH)
             best, truck = np.where(closer, gap, best), np.where(closer, is_truck[who], truck)
-        return np.where(np.isfinite(best), best, np.nan), truck
+        return np.where(there & known | np.isfinite(best), best, np.nan), truck
 
-    lead, lead_truck = nearest(group, ahead_only=True)
-    left, left_truck = nearest(np.where(known, group + 1, -2), ahead_only=False)
-    right, right_truck = nearest(np.where(known & (lane > 0), group - 1, -2), ahead_only=False)
+    lead, lead_truck = nearest(group, known, ahead_only=True)
+    left, left_truck = nearest(np.where(known, group + 1, -2), lane_on_left)
+    right, right_truck = nearest(np.where(known & (lane > 0), group - 1, -2), lane_on_right)
     return Neighbours(lead, lead_truck, left, left_truck, right, right_truck)

@@ -118,7 +118,16 @@ def placed_table(tracks: PlacedTracks, graph: LaneGraph, settings: CutSettings) 
     instant = np.round(tracks.time / tracks.step).astype(np.int64)
     is_truck = np.isin(tracks.kind, TRUCKS)
     group = instant * (int(part.max()) + 1) + part[piece]
-    near = find_neighbours(group, np.where(inside, level, -1), s, tracks.length, is_truck)
+    is_left = np.bincount(graph.left[graph.left >= 0], minlength=len(graph.left)) > 0  # of another piece
+    near = find_neighbours(
+        group,
+        np.where(inside, level, -1),
+        s,
+        tracks.length,
+        is_truck,
+        lane_on_left=graph.left[piece] >= 0,
+        lane_on_right=is_left[piece],
+    )
     lane, sideways = _own_lanes(tracks, inside)
     reasons = {
         "no lane": ~inside,

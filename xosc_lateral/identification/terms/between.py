@@ -8,7 +8,7 @@ differ anyway. The null deals the drives anew, which is exact: drives know nothi
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, ClassVar, Self
 
 import numpy as np
 from msgspec import structs
@@ -18,7 +18,7 @@ from xosc_lateral.driver.effects import Acts, ColumnEffect, Effect, Linear
 from xosc_lateral.identification.dictionary import NULL_DRAWS
 from xosc_lateral.identification.problem import Problem
 from xosc_lateral.identification.regression import Fitted
-from xosc_lateral.identification.significance import upper_tail
+from xosc_lateral.identification.significance import MANY_DRIVES, upper_tail
 from xosc_lateral.identification.terms.base import Description, Outcome
 from xosc_lateral.identification.terms.column import ColumnTerm, of_kind
 
@@ -29,9 +29,6 @@ FloatArray = NDArray[np.float64]
 
 USUAL_S = 60.0
 """Response time of an effect between drives: what a drive usually meets, as far as a run can know it. [s]"""
-
-MIN_DRIVES = 20
-"""Fewer drives say nothing about what goes with what between them."""
 
 MIN_SECONDS = 10
 """Of road-following in a drive that is counted. [s]"""
@@ -60,7 +57,7 @@ class BetweenTerm(ColumnTerm):
     def test(cls, search: Search, fitted: Fitted) -> Outcome | None:
         """Best candidate over all columns and shapes, against drives dealt anew."""
         coarse, places = fitted.coarse, _Places.of(fitted)
-        if np.count_nonzero(places.weight) < MIN_DRIVES:
+        if np.count_nonzero(places.weight) < MANY_DRIVES:
             return None
         present = {name for term in of_kind(fitted, cls) for name in term.columns}
         candidates, usual = [], []
@@ -88,6 +85,10 @@ class BetweenTerm(ColumnTerm):
         best = int(np.argmax(scores))
         effect = structs.replace(candidates[best].effect, lag_s=0.0, response_s=USUAL_S)
         return Outcome(cls.of(effect), effect.columns, upper_tail(float(scores[best]), null))
+
+    def matches(self, other: Self) -> bool:
+        """Any other: columns that go along with each other from drive to drive stand in for one another."""
+        return isinstance(other, BetweenTerm)
 
     def estimate(self, fitted: Fitted) -> tuple[Effect, ...]:
         """Weighted least squares over drives, all such terms jointly."""

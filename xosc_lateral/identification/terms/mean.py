@@ -50,7 +50,7 @@ class MeanTerm(ColumnTerm):
         return Problem(after.whitener, fitted.coarse.offset, fitted.columns)
 
     def estimate(self, fitted: Fitted) -> tuple[Effect, ...]:
-        """From the joint fit; shrunk as if the timing were known, with errors for one that is not."""
+        """From the joint fit; shrunk as if timing and shape were known, with errors for what is not."""
         part = fitted.mean_part(self)
         errors = np.sqrt(np.maximum(np.diag(fitted.covariance)[part], 0.0))
         effect = self.sized(fitted.coarse, Acts.LOCATION, fitted.sizes[part], errors)

@@ -1,0 +1,48 @@
+"""What a model predicts better than another on rows that neither was fitted on, with the same noise for both."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from xosc_lateral.identification.autocorrelation import Whitener
+from xosc_lateral.identification.log_scale import CLIP, own_levels
+from xosc_lateral.identification.regression import Coarse, Fitted, joined, known_scale_of
+
+FloatArray = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
+
+
+def held_out_gain(fitted: Fitted, rest: Fitted, coarse: Coarse, held: BoolArray) -> FloatArray:
+    """Gain in log-likelihood of `fitted` over `rest`, which has fewer terms, shape (n,); 0 where not held. [nat]
+
+    Both get the autoregression of `fitted`: what is judged is where the car should be and how large its movement is. An
+    autoregression fitted beside a term differs by what the term takes out of the movement, and is judged by *every*
+    held-out row, also where the term does nothing: on the motorway recording it cost 0.3 to 0.5 nat a vehicle, as much
+    as the neighbour on the right gains. The held-out rows' own levels of place and spread are taken from themselves.
+
+    Parameters
+    ----------
+    fitted, rest : Fitted
+        Without the held-out rows.
+    coarse : Coarse
+        With the held-out rows valid.
+    held : bool array, shape (n,)
+    """
+    return _log_likelihood(fitted, fitted, coarse, held) - _log_likelihood(rest, fitted, coarse, held)
+
+
+def _log_likelihood(fitted: Fitted, noise: Fitted, coarse: Coarse, held: BoolArray) -> FloatArray:
+    """Of every valid row in `held`, shape (n,), with the autoregression of `noise`; 0 elsewhere."""
+    rows = coarse.valid & held
+    columns = joined([term.mean_columns(fitted.coarse) for term in fitted.terms], len(coarse))
+    scales = joined([term.scale_columns(fitted.coarse) for term in fitted.terms], len(coarse))
+    scale = np.exp(scales @ fitted.log_sizes + known_scale_of(coarse, fitted.terms))
+    bare = Whitener(noise.whitener.process, rows, coarse.drive, scale)
+    squares = np.square(bare.rows(np.where(rows, coarse.offset - columns @ fitted.sizes, 0.0)))
+    typical = max(float(squares[rows].mean()), 1e-300) if rows.any() else 1.0
+    level = own_levels(np.minimum(squares, CLIP * typical), rows, coarse.drive) * typical
+    own = level[coarse.drive]
+    factor = bare.by_position(noise.starts)
+    deviation = np.sqrt(own) * factor * bare.deviations
+    return np.where(rows, -0.5 * np.minimum(squares / (own * factor**2), CLIP) - np.log(deviation), 0.0)
