@@ -12,6 +12,7 @@ from xosc_lateral.evaluation.cut_in import (
     crosses_in_time,
     first_alarm,
     intrudes,
+    is_perceived,
     leaves_wandering_zone,
 )
 from xosc_lateral.evaluation.r157.braking import evaluate_braking
@@ -59,6 +60,35 @@ def test_the_fsm_compares_lateral_with_longitudinal_headway() -> None:
     assert crosses_in_time(_seen(lateral_speed=0.3))[0]
     assert not crosses_in_time(_seen(lateral_speed=0.3, closing=-1.0))[0]
     assert crosses_in_time(_seen(clearance=-0.1))[0]
+
+
+def test_the_fsm_adds_a_tenth_of_a_second_to_the_time_that_the_ego_needs() -> None:
+    """The ego has passed after (20 + 9) / 5 = 5.8 s: whoever needs 5.89 s is too near, 5.91 s is far enough."""
+    assert crosses_in_time(_seen(lateral_speed=1.6 / 5.89))[0]
+    assert not crosses_in_time(_seen(lateral_speed=1.6 / 5.91))[0]
+    # side by side counts until the middles have passed each other, and from then on no more
+    assert crosses_in_time(_seen(clearance=-0.1, gap=-4.49))[0]
+    assert not crosses_in_time(_seen(clearance=-0.1, gap=-4.51))[0]
+
+
+def test_a_cut_in_is_perceived_beyond_what_one_covers_while_the_risk_is_weighed() -> None:
+    """0.375 m of wandering and 0.72 m more: 1.8 m/s for 0.4 s."""
+    assert is_perceived(_seen(towards=1.096, lateral_speed=0.1))[0]
+    assert not is_perceived(_seen(towards=1.094, lateral_speed=0.1))[0]
+    assert not is_perceived(_seen(towards=1.5, lateral_speed=0.0))[0]
+
+
+def test_who_has_left_his_zone_further_has_left_it_for_every_criterion_that_did_so_before() -> None:
+    """Nearer, faster and more overlapping never ends an alarm."""
+    rng = np.random.default_rng(3)
+    for _ in range(50):
+        towards, lateral, gap, closing = rng.uniform([0.0, 0.01, 1.0, 0.5], [3.0, 1.5, 60.0, 15.0])
+        here = _seen(towards=towards, lateral_speed=lateral, clearance=1.6 - towards, gap=gap, closing=closing)
+        more = _seen(
+            towards=towards + 0.2, lateral_speed=lateral + 0.2, clearance=1.4 - towards, gap=gap, closing=closing
+        )
+        for name, criterion in CRITERIA.items():
+            assert bool(criterion(more)[0]) >= bool(criterion(here)[0]), name
 
 
 def test_alarms_are_beginnings() -> None:

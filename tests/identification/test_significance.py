@@ -39,6 +39,16 @@ def test_rare_scores_have_the_tail_of_the_law_that_maxima_follow() -> None:
         assert np.log(upper_tail(score, maxima)) == pytest.approx(np.log(gumbel_r.sf(score, 20.0, 3.0)), abs=0.3)
 
 
+@pytest.mark.parametrize("score", [30.0, 45.0, 60.0])
+def test_a_tail_heavier_than_that_of_maxima_is_given_its_weight(score: float) -> None:
+    """Exponential scores, whose tail is exp(-score / 5): the law of maxima alone would call them a tenth as likely."""
+    maxima = np.random.default_rng(6).exponential(5.0, 200_000)
+    p_value = upper_tail(score, maxima)
+    assert np.log(p_value) == pytest.approx(-score / 5.0, abs=0.35)
+    place = maxima.mean() - np.euler_gamma * (scale := maxima.std() * np.sqrt(6.0) / np.pi)
+    assert gumbel_r.sf(score, place, scale) < p_value
+
+
 @given(st.floats(0.0, 200.0), st.floats(0.0, 200.0))
 def test_a_larger_score_is_never_likelier(first: float, second: float) -> None:
     maxima = gumbel_r.rvs(20.0, 3.0, size=300, random_state=np.random.default_rng(2))

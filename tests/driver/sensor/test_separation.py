@@ -78,6 +78,22 @@ def test_the_written_path_is_as_calm_as_the_driver_and_not_as_the_camera(truth):
     assert 0.5 * size[0] < size[1] < 1.15 * size[0], "what the driver does above 1 Hz is hidden for good"
 
 
+def test_the_sensors_density_is_that_of_the_noise_that_was_added(truth):
+    """White noise at 20 Hz: 2 sigma² / (20 Hz), at every frequency; what sampling with the sensor gives back."""
+    noise = noises(truth, 1.0, "white")
+    found, _ = split(truth, noise)
+    frequency, density = np.array(found.sensor.frequencies), np.array(found.sensor.densities)
+    seen = (frequency > 0.8) & (frequency < 1.5)  # the driver is faint there, and resampling lets it pass
+    planted = 2.0 * np.concatenate(noise).var() / 20.0
+    assert seen.sum() > 3
+    assert density[seen].mean() == pytest.approx(planted, rel=0.1)
+    sampled = found.sensor.sample(200_000, STEP, np.random.default_rng(5))
+    pieces = sampled.reshape(-1, 500) * np.hanning(500)
+    power = 2.0 * STEP * (np.abs(np.fft.rfft(pieces, axis=1)) ** 2).mean(axis=0) / (np.hanning(500) ** 2).sum()
+    at = np.fft.rfftfreq(500, STEP)
+    assert power[(at > 0.8) & (at < 1.5)].mean() == pytest.approx(planted, rel=0.15)
+
+
 def test_a_clean_sensor_leaves_the_path_alone(truth):
     rng = np.random.default_rng(3)
     found, runs = split(truth, [0.002 * rng.normal(size=len(x)) for x in truth[1]])
