@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from xosc_lateral.errors import XoscLateralError
 from xosc_lateral.templates.motorway import Bend, Motorway, Straight
 from xosc_lateral.templates.parameter import Number
 from xosc_lateral.templates.settings import Settings
@@ -33,6 +34,10 @@ def plot(settings: Settings) -> Plot:
     jam = ego + settings.number("jam_distance")
     stopped = settings.number("jam_gap") + _EGO.front + _QUEUE[0].rear
     braking = (speed - jam_speed) ** 2 / (2.0 * deceleration) + stopped
+    if braking >= jam - ego:
+        raise XoscLateralError(
+            f"jam_distance: {jam - ego:g} has to be more than the {braking:.0f} m that braking takes"
+        )
     reach = jam + jam_speed * duration + 4.0 * _SPACING + 150.0
     bends = (Straight(250.0), Bend(1500.0, 200.0, 120.0))
     motorway = Motorway(
