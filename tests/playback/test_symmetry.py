@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from math import cos, sin
 from pathlib import Path
 from typing import Any
@@ -22,6 +23,8 @@ ALONG_T = {
     "RelativeLanePosition": ("dLane", "offset"),
     "RoadPosition": ("t",),
     "RelativeRoadPosition": ("dt",),
+    "FromRoadCoordinates": ("t",),
+    "FromLaneCoordinates": ("laneId", "laneOffset"),
     "AbsoluteTargetLane": ("value",),
     "AbsoluteTargetLaneOffset": ("value",),
     "RelativeTargetLaneOffset": ("value",),
@@ -29,14 +32,17 @@ ALONG_T = {
 }
 """Attributes that count along the t-axis of a road, or are ids of its lanes."""
 TO_THE_LEFT = {
-    "WorldPosition": ("y", "h"),
+    "WorldPosition": ("y", "h", "r"),
     "RelativeWorldPosition": ("dy",),
     "RelativeObjectPosition": ("dy",),
     "RelativeTargetLane": ("value",),
-    "Orientation": ("h",),
+    "Orientation": ("h", "r"),
     "Center": ("y",),
+    "TrajectoryPosition": ("t",),
+    "Clothoid": ("curvature", "curvatureDot", "curvaturePrime"),
+    "ClothoidSplineSegment": ("curvatureStart", "curvatureEnd", "hOffset"),
 }
-"""Attributes that count to the left of a vehicle, or along y."""
+"""Attributes that count to the left of a vehicle or a path, or along y."""
 SIDES = {"leftToReferencedEntity": "rightToReferencedEntity", "rightToReferencedEntity": "leftToReferencedEntity"}
 
 
@@ -44,13 +50,14 @@ def _negate(root: Any, table: dict[str, tuple[str, ...]]) -> None:
     for element in root.iter(*table):
         for name in table[element.tag]:
             if element.get(name) is not None:
-                value = -float(element.get(name))
-                element.set(
-                    name,
-                    str(int(value))
-                    if name in ("laneId", "dLane") or element.tag[-10:] == "TargetLane"
-                    else repr(value),
-                )
+                element.set(name, _negative(element.get(name)))
+
+
+def _negative(text: str) -> str:
+    """Of a number, a parameter or an expression; a lane's id stays a whole number."""
+    if text.startswith("$"):
+        return f"${{-1 * ({text[2:-1] if text.startswith('${') else text})}}"
+    return text[1:] if text.startswith("-") else f"-{text}"
 
 
 def in_the_mirror(root: Any) -> None:
@@ -58,9 +65,10 @@ def in_the_mirror(root: Any) -> None:
     for action in root.iter("LateralDistanceAction"):
         action.set("displacement", SIDES.get(action.get("displacement"), "any"))
     for lanes in root.iter("RelativeLaneRange"):
-        first, last = lanes.get("from"), lanes.get("to")
-        lanes.set("from", str(-int(last)))
-        lanes.set("to", str(-int(first)))
+        ends = {"to": lanes.attrib.pop("from", None), "from": lanes.attrib.pop("to", None)}
+        for name, lane in ends.items():
+            if lane is not None:
+                lanes.set(name, _negative(lane))
 
 
 def on_turned_roads(root: Any, lengths: dict[str, float]) -> None:
@@ -194,3 +202,29 @@ def test_a_scenario_is_played_alike_at_the_coordinates_of_a_map(played: Played, 
         np.testing.assert_allclose(other.x, x + one.x * cos(turn) - one.y * sin(turn), atol=1e-5)
         np.testing.assert_allclose(other.y, y + one.x * sin(turn) + one.y * cos(turn), atol=1e-5)
         np.testing.assert_allclose(other.offset, one.offset, atol=1e-5)
+
+
+PUBLIC = (
+    "cut-in.xosc", "distance_test.xosc", "highway_merge.xosc", "keep_lateral_distance.xosc",
+    "lane-change_clothoid_spline_based_trajectory.xosc", "lane_change_crest.xosc", "left-hand-traffic_by_heading.xosc",
+    "ltap-od.xosc", "routing-test.xosc", "synchronize.xosc", "trajectory-test.xosc", "two_plus_one_road.xosc",
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("name", PUBLIC)
+def test_public_scenarios_are_played_as_their_mirrors(name: str, shared: Path, tmp_path: Path) -> None:
+    """Routes, trajectories, relative positions, parameters: whatever people write."""
+    (found,) = (shared / "corpus" / "esmini").rglob(name)
+    played = play_scenario(found, time_limit=8.0)
+    folder = tmp_path / "esmini"
+    shutil.copytree(shared / "corpus" / "esmini", folder)
+    here = folder / found.relative_to(shared / "corpus" / "esmini")
+    road = folder / played.scenario.road_file.resolve().relative_to((shared / "corpus" / "esmini").resolve())
+    catalogs = [(path, in_the_mirror) for path in (folder / "xosc" / "Catalogs").rglob("*.xosc")]
+    for path, change in ((here, in_the_mirror), (road, mirrored), *catalogs):
+        tree = etree.parse(str(path))
+        change(tree.getroot())
+        tree.write(str(path))
+    for one, other in the_same(played.motion, play_scenario(here, time_limit=8.0).motion):
+        np.testing.assert_allclose(other.x, one.x, atol=1e-3)
+        np.testing.assert_allclose(other.y, -one.y, atol=1e-3)
