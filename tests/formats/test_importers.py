@@ -279,6 +279,7 @@ def test_dlr_leaders_and_classes_are_those_of_the_recording(dlr_full):
     table = dlr_full.table
     trucks = set(table.loc[table["vehicle_class"] == "truck", "drive"])
     assert 10 < len(trucks) < 45
+    assert table["is_truck"].eq(table["vehicle_class"] == "truck").all(), "as a scenario states it"
     inside = table[table["lane_index"] >= 0]
     assert inside["lead_distance"].replace(np.inf, REACH).between(0, REACH).all(), "infinite: nobody within reach"
     assert inside["left_distance"].isna().eq(inside["lane_index"] == 1).all(), "no lane beyond the left one"

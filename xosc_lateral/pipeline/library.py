@@ -13,7 +13,6 @@ from __future__ import annotations
 import tempfile
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from dataclasses import replace as with_fields
 from pathlib import Path
 from typing import Any
 
@@ -78,18 +77,13 @@ def build_library(source: Path, *, model: str = "best", refine: bool = True) -> 
         table = Path(folder) / "dlr-ht.parquet"
         write_imported(imported, table)
         drives = read_drives(table)
-    runs = [_with_class(run, kind[run.drive]) for run in all_runs(drives)]
+    runs = all_runs(drives)
     seen = Seen(runs, *driver_runs(runs, drives))
     known = Provenance(source=SOURCE, licence=LICENCE, inputs={source.name: parsed_hash(source)})
     population = _population_profile(seen, known, model)
     refined = [_refined_profile(drives, runs, known)] if refine else []
     profiles = [population, *refined, *_single_profiles(seen, kind, known, model)]
     return [replace(profile, metadata=shipped_metadata(profile)) for profile in profiles]
-
-
-def _with_class(run: Run, kind: str) -> Run:
-    """A scenario states its vehicles' classes, so what they do can be part of a profile; tables state them in words."""
-    return with_fields(run, context={**run.context, "is_truck": np.full(len(run), float(kind == "truck"))})
 
 
 @dataclass(frozen=True, eq=False)

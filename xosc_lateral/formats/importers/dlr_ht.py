@@ -304,6 +304,7 @@ def _context(tracks: pd.DataFrame, placed: _Placed, s: FloatArray, forward: NDAr
             "lane_count": LANES,
             **asdict(near),
             "vehicle_class": kind,
+            "is_truck": (kind == "truck").astype(np.float64),
         }
     )
 

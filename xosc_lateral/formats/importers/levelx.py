@@ -179,6 +179,7 @@ def _from_highd(
             "lane_count": count.astype(np.int64),
             **asdict(near),
             "vehicle_class": kind,
+            "is_truck": np.isin(kind, TRUCKS).astype(np.float64),
             RUN: number_runs(state, lane_number, vehicle, frame),
             "state": state,
         }
@@ -221,6 +222,7 @@ def _from_exid(
             "acceleration": tracks["lonAcceleration"].to_numpy(),
             **near,
             "vehicle_class": kind,
+            "is_truck": np.isin(kind, TRUCKS).astype(np.float64),
             RUN: number_runs(state, lane, vehicle, frame),
             "state": state,
         }

@@ -145,6 +145,7 @@ def placed_table(tracks: PlacedTracks, graph: LaneGraph, settings: CutSettings) 
             **tracks.road,
             **asdict(near),
             "vehicle_class": tracks.kind,
+            "is_truck": is_truck.astype(np.float64),
             RUN: number_runs(state, lane, tracks.vehicle, instant),
             "state": state,
         }
