@@ -27,7 +27,8 @@ from xosc_lateral.errors import DriverProfileError
 from xosc_lateral.formats.context_table import read_context
 from xosc_lateral.formats.openscenario import read_scenario
 from xosc_lateral.formats.openscenario.distribution import read_distribution
-from xosc_lateral.formats.profiles import list_profiles, profile_bytes, read_profile
+from xosc_lateral.formats.profile_folders import list_profiles
+from xosc_lateral.formats.profiles import profile_bytes, read_profile
 from xosc_lateral.limits import context_range
 from xosc_lateral.pipeline.convert import convert_scenario
 from xosc_lateral.pipeline.jobs import plan_batch

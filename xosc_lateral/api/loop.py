@@ -160,7 +160,7 @@ class ClosedLoop(Result):
     def write_report(self, folder: PathLike, *, force: bool = False) -> Path:
         """Write `report.html` and `report.json` into a folder."""
         from xosc_lateral.formats.atomic import write_atomically
-        from xosc_lateral.formats.profiles import canonical_json
+        from xosc_lateral.formats.json_text import canonical_json
         from xosc_lateral.report.loop import loop_page
 
         target = folder_target(folder)

@@ -13,12 +13,13 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.driver.effects import Acts, ColumnEffect, EffectTerms
+from xosc_lateral.driver.effects import Acts
 from xosc_lateral.driver.plausibility import check_context
 from xosc_lateral.driver.process import DriveProcess, combine
 from xosc_lateral.driver.profile import DriverProfile, sampling_hash
 from xosc_lateral.driver.records import plain, read_as
-from xosc_lateral.driver.stream_state import AnswerState, SeedState, StreamState, sealed, upgraded
+from xosc_lateral.driver.response_stream import ResponseStream
+from xosc_lateral.driver.stream_state import SeedState, StreamState, sealed, upgraded
 from xosc_lateral.driver.upsampling import extrapolate, piece
 from xosc_lateral.errors import DriverProfileError
 
@@ -79,7 +80,7 @@ class OffsetStream:
         self._start, self._time = start, time
         self._process = DriveProcess(profile, self._seed, ahead=BLOCK)
         self._process.begin_at(time)
-        self._answers = tuple(_ResponseStream(effect, profile.model.step) for effect in self._process.columned)
+        self._answers = tuple(ResponseStream(effect, profile.model.step) for effect in self._process.columned)
         self._ahead = max([0, *(answer.ahead for answer in self._answers)]) + (_NEIGHBOURS if self._factor > 1 else 0)
         self._known: tuple[str, ...] | None = None
         self._widths: deque[float] = deque()
@@ -279,43 +280,6 @@ class OffsetStream:
             answer.restore(own)
         stream._process.restore(saved.process, "state.process")
         return stream
-
-
-class _ResponseStream:
-    """A driver's answer to one effect's columns, row by row."""
-
-    def __init__(self, effect: ColumnEffect, step: float) -> None:
-        self.effect = effect
-        self._response = effect.response(step)
-        self._ready: deque[FloatArray] = deque()
-        self._drop = 0
-
-    @property
-    def ahead(self) -> int:
-        """Rows that the driver looks ahead."""
-        return self._response.ahead
-
-    def take(self, row: Mapping[str, FloatArray], *, before: bool) -> None:
-        """One more row of context, each column of shape (1,); what answers a row before the drive is not given."""
-        self._drop += before
-        self._ready.extend(self._response.take(self.effect.known(row)))
-        while self._drop and self._ready:
-            self._ready.popleft()
-            self._drop -= 1
-
-    def next(self) -> EffectTerms:
-        """Terms at the next row, each of shape (1,)."""
-        return self.effect.acting(self._ready.popleft()[None, :])
-
-    def state(self) -> AnswerState:
-        """Its state."""
-        return AnswerState(self._response.state, tuple(tuple(row.tolist()) for row in self._ready), self._drop)
-
-    def restore(self, state: AnswerState) -> None:
-        """Back to a state."""
-        self._response.state = state.response
-        self._ready.extend(np.array(row) for row in state.ready)
-        self._drop = state.drop
 
 
 def _steps_per_model_step(rate: float | None, step: float) -> int:

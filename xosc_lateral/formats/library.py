@@ -11,7 +11,8 @@ from msgspec.structs import replace
 from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.driver.provenance import Metadata
 from xosc_lateral.errors import FormatError, XoscLateralError
-from xosc_lateral.formats.profiles import SHIPPED, find_profile, list_profiles, read_profile
+from xosc_lateral.formats.profile_folders import SHIPPED, find_profile, list_profiles
+from xosc_lateral.formats.profiles import read_profile
 
 FIELDS = tuple(name for name in Metadata.__struct_fields__ if name != "tags")
 """Metadata of a profile that can be set and searched for, besides its tags."""

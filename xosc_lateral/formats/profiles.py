@@ -1,13 +1,9 @@
-"""Profile files: JSON, canonical to the byte; names looked up in the user's folders, then among those shipped."""
+"""Profile files: JSON, canonical to the byte."""
 
 from __future__ import annotations
 
 import hashlib
-import json
-import math
-import os
-import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -18,30 +14,14 @@ from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.driver.records import plain
 from xosc_lateral.errors import DriverProfileError, FormatError
 from xosc_lateral.formats.atomic import write_atomically
+from xosc_lateral.formats.json_text import canonical_json, parse_json
+from xosc_lateral.formats.profile_folders import find_profile
 from xosc_lateral.formats.source import read_source
 from xosc_lateral.formats.tables import foreign_errors
-from xosc_lateral.limits import JSON_DEPTH, PROFILE_SIZE
-from xosc_lateral.plugins import plugins
-from xosc_lateral.shipped import shipped_folder
-
-SHIPPED = shipped_folder("driver_profiles")
-"""Profiles that come with the package."""
-
-LONGEST_NAME = 200
-"""Characters of a profile's name; file systems take 255 bytes, the suffix included."""
+from xosc_lateral.limits import PROFILE_SIZE
 
 SCHEMA = Path(__file__).resolve().parents[1] / "resources" / "driver_profile.schema.json"
 """JSON Schema of a profile file."""
-
-SUFFIX = ".json"
-
-_STRINGS = re.compile(r'"(?:[^"\\]|\\.)*"')
-_BRACKETS = re.compile(r"[\[\]{}]")
-LIBRARY_VARIABLE = "XOSC_LATERAL_LIBRARY"
-"""Environment variable with folders of profiles, separated as in PATH."""
-
-GROUP = "xosc_lateral.profiles"
-"""Entry points of folders with further profiles."""
 
 
 def read_profile(name_or_path: str | Path, folders: Iterable[str | Path] = ()) -> DriverProfile:
@@ -70,32 +50,6 @@ def read_profile(name_or_path: str | Path, folders: Iterable[str | Path] = ()) -
             return profile
     except DriverProfileError as error:
         raise FormatError(str(error), path=path) from error
-
-
-def parse_json(data: bytes, path: Path) -> Any:
-    """JSON of an input file.
-
-    Raises
-    ------
-    FormatError
-        Not UTF-8, no JSON, NaN or infinity in it, or nested deeper than `limits.JSON_DEPTH`.
-    """
-    try:
-        text = data.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        raise FormatError(f"not JSON: {error}", path=path) from error
-    depth = deepest = 0
-    for bracket in _BRACKETS.finditer(_STRINGS.sub("", text)):
-        depth += 1 if bracket[0] in "[{" else -1
-        deepest = max(deepest, depth)
-    if deepest > JSON_DEPTH.value:
-        raise FormatError(JSON_DEPTH.refusal(deepest), path=path)
-    try:
-        return json.loads(text, parse_constant=_refuse_constant)
-    except json.JSONDecodeError as error:
-        raise FormatError(f"not JSON: {error.msg}", path=path, line=error.lineno) from error
-    except ValueError as error:
-        raise FormatError(f"not JSON: {error}", path=path) from error
 
 
 def write_profile(profile: DriverProfile, path: str | Path) -> None:
@@ -154,138 +108,3 @@ def describe_profile(profile: DriverProfile) -> str:
         f"drives, {len(profile.effects)} effects"
     )
     return said if profile.sensor is None else f"{said}\n{profile.sensor.in_words()}"
-
-
-def find_profile(name_or_path: str | Path, folders: Iterable[str | Path] = ()) -> Path:
-    """Path of a profile; see `read_profile`."""
-    text = str(name_or_path)
-    path = Path(name_or_path)
-    if isinstance(name_or_path, Path) or text.endswith(SUFFIX) or path.name != text:
-        if not path.exists() or path.is_dir():
-            raise FormatError("is a folder, not a profile" if path.is_dir() else "no such file", path=path)
-        return path
-    if len(text) > LONGEST_NAME:
-        raise DriverProfileError(f"{text[:20]!r}...: no profile has a name of {len(text)} characters")
-    for folder in (*library_folders(folders), SHIPPED):
-        found = folder / f"{text}{SUFFIX}"
-        if found.is_file():
-            return found
-    if (offered := _from_plugins().get(text)) is not None:
-        return offered
-    known = sorted({path.stem for path in list_profiles(folders)})
-    raise DriverProfileError(f"no profile {text!r}; known are {', '.join(known) or 'none'}, or give the path of a file")
-
-
-def list_profiles(folders: Iterable[str | Path] = ()) -> list[Path]:
-    """Profile files in the folders (see `library_folders`), among those shipped and of plug-ins, by name within each.
-
-    Raises
-    ------
-    FormatError
-        If a folder isn't one.
-    """
-    searched = _each_once((*library_folders(folders), SHIPPED))
-    found = [path for folder in searched for path in sorted(folder.glob(f"*{SUFFIX}"))]
-    return found + [path for _, path in sorted(_from_plugins().items())]
-
-
-def library_folders(folders: Iterable[str | Path] = ()) -> tuple[Path, ...]:
-    """Folders with profiles besides those shipped: named ones, the environment's, the configuration's.
-
-    ``XOSC_LATERAL_LIBRARY`` holds folders, separated as in PATH. The configuration is ``xosc-lateral/config.toml`` in
-    ``XDG_CONFIG_HOME`` (else ``~/.config``; on Windows ``APPDATA``) with ``library = ["FOLDER", ...]``.
-
-    Raises
-    ------
-    FormatError
-        If one of them isn't there.
-    """
-    said = [Path(name) for name in os.environ.get(LIBRARY_VARIABLE, "").split(os.pathsep) if name]
-    found = [*map(Path, folders), *said, *_configured()]
-    for folder in found:
-        if not folder.is_dir():
-            raise FormatError("no such folder", path=folder)
-    return _each_once(found)
-
-
-def _each_once(folders: Iterable[Path]) -> tuple[Path, ...]:
-    """A folder that is named twice, however it is spelled, counts where it comes first."""
-    found: dict[Path, Path] = {}
-    for folder in folders:
-        found.setdefault(folder.resolve(), folder)
-    return tuple(found.values())
-
-
-def configuration_file() -> Path | None:
-    """Where the user's configuration is looked for; None: whoever runs this has no home (a service in a container)."""
-    named = os.environ.get("APPDATA" if os.name == "nt" else "XDG_CONFIG_HOME")
-    try:
-        home = Path(named) if named else Path.home() / ".config"
-    except RuntimeError:
-        return None
-    return home / "xosc-lateral" / "config.toml"
-
-
-def _configured() -> list[Path]:
-    path = configuration_file()
-    try:
-        if path is None or not path.is_file():
-            return []
-    except PermissionError:  # the home is somebody else's
-        return []
-    import tomllib
-
-    try:
-        values = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise FormatError(f"not TOML: {error}", path=path) from error
-    unknown = sorted(values.keys() - {"library"})
-    library = values.get("library", [])
-    if unknown:
-        raise FormatError(f"unknown key {unknown[0]!r}; there is library", path=path)
-    if isinstance(library, str):
-        library = [library]
-    if not isinstance(library, list) or not all(isinstance(name, str) for name in library):
-        raise FormatError(f"library = {library!r}: expected a list of folders", path=path)
-    try:
-        return [path.parent / Path(name).expanduser() for name in library]
-    except RuntimeError as error:
-        raise FormatError(f"library = {library!r}: there is no home that ~ could stand for", path=path) from error
-
-
-def _from_plugins() -> dict[str, Path]:
-    """Profiles that other packages offer: entry points that are a folder, or a function that gives one."""
-    found: dict[str, Path] = {}
-    for offered in plugins(GROUP).values():
-        folder = Path(offered() if callable(offered) else offered)
-        found |= {path.stem: path for path in sorted(folder.glob(f"*{SUFFIX}"))}
-    return found
-
-
-def canonical_json(value: Any, indent: int = 0) -> str:
-    """JSON text of plain values: keys as they come, one item a line, lists of numbers on one line.
-
-    Raises
-    ------
-    ValueError
-        For a number that is not finite: JSON has none.
-    """
-    pad = " " * (indent + 1)
-    if isinstance(value, Mapping):
-        items = [f"{pad}{json.dumps(str(key))}: {canonical_json(item, indent + 1)}" for key, item in value.items()]
-        return "{\n" + ",\n".join(items) + "\n" + " " * indent + "}" if items else "{}"
-    if isinstance(value, Sequence) and not isinstance(value, str):
-        if all(_is_scalar(item) for item in value):
-            return "[" + ", ".join(canonical_json(item) for item in value) + "]"
-        return "[\n" + ",\n".join(pad + canonical_json(item, indent + 1) for item in value) + "\n" + " " * indent + "]"
-    if isinstance(value, float) and not math.isfinite(value):
-        raise ValueError(f"{value} can't be written as JSON")
-    return json.dumps(value, ensure_ascii=False)
-
-
-def _is_scalar(value: Any) -> bool:
-    return isinstance(value, str | int | float) or value is None
-
-
-def _refuse_constant(name: str) -> float:
-    raise ValueError(f"{name} is not a number in JSON")

@@ -9,17 +9,15 @@ from __future__ import annotations
 
 import ctypes
 import os
-import sys
 import threading
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TypeVar
 
 from xosc_lateral.errors import XoscLateralError
 from xosc_lateral.limits import JOB_MEMORY, JOB_TIMEOUT
+from xosc_lateral.pipeline.memory import address_space, resident
 
 Task = TypeVar("Task")
 Answer = TypeVar("Answer")
@@ -73,7 +71,7 @@ def within_limits(work: Callable[[Task], Answer], task: Task, limits: JobLimits)
     """
     watch = _Watch(limits)
     try:
-        with _address_space(limits.memory), watch:
+        with address_space(limits.memory), watch:
             return work(task)
     except MemoryError as error:
         raise JobLimitError(_too_much(limits)) from error
@@ -88,7 +86,7 @@ class _Watch:
         self._limits, self.why = limits, ""
         self._ended, self._lock = threading.Event(), threading.Lock()
         self._job = threading.get_ident()
-        self._begin, self._resident = time.monotonic(), _resident()
+        self._begin, self._resident = time.monotonic(), resident()
 
     def __enter__(self) -> None:
         threading.Thread(target=self._run, daemon=True, name="watch job").start()
@@ -120,41 +118,10 @@ class _Watch:
     def _exceeded(self) -> str:
         if time.monotonic() - self._begin > self._limits.timeout:
             return f"took longer than {self._limits.timeout:g} s; --job-timeout raises the limit"
-        if _resident() - self._resident > 1e6 * self._limits.memory:
+        if resident() - self._resident > 1e6 * self._limits.memory:
             return _too_much(self._limits)
         return ""
 
 
 def _too_much(limits: JobLimits) -> str:
     return f"took more than {limits.memory:g} MB of memory; --job-memory raises the limit"
-
-
-@contextmanager
-def _address_space(megabytes: float) -> Iterator[None]:
-    """Let this process map so much more memory; without effect where the system has no such limit, or in a thread."""
-    size = _status_bytes(0)
-    if size == 0 or threading.current_thread() is not threading.main_thread():
-        yield
-        return
-    import resource
-
-    soft, hard = resource.getrlimit(resource.RLIMIT_AS)
-    allowed = size + int(1e6 * megabytes)
-    if hard != resource.RLIM_INFINITY:
-        allowed = min(allowed, hard)
-    resource.setrlimit(resource.RLIMIT_AS, (allowed, hard))
-    try:
-        yield
-    finally:
-        resource.setrlimit(resource.RLIMIT_AS, (soft, hard))
-
-
-def _resident() -> int:
-    """Memory that this process holds. [byte]; 0 where the system does not say."""
-    return _status_bytes(1)
-
-
-def _status_bytes(column: int) -> int:
-    if not sys.platform.startswith("linux"):
-        return 0
-    return int(Path("/proc/self/statm").read_bytes().split()[column]) * os.sysconf("SC_PAGE_SIZE")

@@ -14,7 +14,8 @@ from xosc_lateral.errors import FormatError, XoscLateralError
 from xosc_lateral.formats.hashes import file_hash
 from xosc_lateral.formats.openscenario.references import require_folders
 from xosc_lateral.formats.openscenario.write.target import STANDARD
-from xosc_lateral.formats.profiles import find_profile, profile_hash
+from xosc_lateral.formats.profile_folders import find_profile
+from xosc_lateral.formats.profiles import profile_hash
 from xosc_lateral.limits import BATCH_JOBS, VARIANTS
 from xosc_lateral.pipeline.concrete import concrete
 from xosc_lateral.pipeline.convert import numbered

@@ -10,7 +10,8 @@ from typing import Any
 from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.evaluation.distances import Distances
 from xosc_lateral.formats.hashes import parsed_hashes
-from xosc_lateral.formats.profiles import canonical_json, profile_hash
+from xosc_lateral.formats.json_text import canonical_json
+from xosc_lateral.formats.profiles import profile_hash
 from xosc_lateral.identification.close import LoopResult
 from xosc_lateral.identification.findings import Finding
 from xosc_lateral.identification.lack_of_fit import LackOfFit

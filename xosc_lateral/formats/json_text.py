@@ -1,0 +1,72 @@
+"""JSON text: read strictly, and written the same for the same values."""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from xosc_lateral.errors import FormatError
+from xosc_lateral.limits import JSON_DEPTH
+
+_STRINGS = re.compile(r'"(?:[^"\\]|\\.)*"')
+
+_BRACKETS = re.compile(r"[\[\]{}]")
+
+
+def parse_json(data: bytes, path: Path) -> Any:
+    """JSON of an input file.
+
+    Raises
+    ------
+    FormatError
+        Not UTF-8, no JSON, NaN or infinity in it, or nested deeper than `limits.JSON_DEPTH`.
+    """
+    try:
+        text = data.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise FormatError(f"not JSON: {error}", path=path) from error
+    depth = deepest = 0
+    for bracket in _BRACKETS.finditer(_STRINGS.sub("", text)):
+        depth += 1 if bracket[0] in "[{" else -1
+        deepest = max(deepest, depth)
+    if deepest > JSON_DEPTH.value:
+        raise FormatError(JSON_DEPTH.refusal(deepest), path=path)
+    try:
+        return json.loads(text, parse_constant=_refuse_constant)
+    except json.JSONDecodeError as error:
+        raise FormatError(f"not JSON: {error.msg}", path=path, line=error.lineno) from error
+    except ValueError as error:
+        raise FormatError(f"not JSON: {error}", path=path) from error
+
+
+def canonical_json(value: Any, indent: int = 0) -> str:
+    """JSON text of plain values: keys as they come, one item a line, lists of numbers on one line.
+
+    Raises
+    ------
+    ValueError
+        For a number that is not finite: JSON has none.
+    """
+    pad = " " * (indent + 1)
+    if isinstance(value, Mapping):
+        items = [f"{pad}{json.dumps(str(key))}: {canonical_json(item, indent + 1)}" for key, item in value.items()]
+        return "{\n" + ",\n".join(items) + "\n" + " " * indent + "}" if items else "{}"
+    if isinstance(value, Sequence) and not isinstance(value, str):
+        if all(_is_scalar(item) for item in value):
+            return "[" + ", ".join(canonical_json(item) for item in value) + "]"
+        return "[\n" + ",\n".join(pad + canonical_json(item, indent + 1) for item in value) + "\n" + " " * indent + "]"
+    if isinstance(value, float) and not math.isfinite(value):
+        raise ValueError(f"{value} can't be written as JSON")
+    return json.dumps(value, ensure_ascii=False)
+
+
+def _is_scalar(value: Any) -> bool:
+    return isinstance(value, str | int | float) or value is None
+
+
+def _refuse_constant(name: str) -> float:
+    raise ValueError(f"{name} is not a number in JSON")
