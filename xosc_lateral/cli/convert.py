@@ -8,9 +8,11 @@ from typing import Annotated, Any
 import typer
 
 from xosc_lateral.cli.words import (
+    Allow,
     AsJson,
     Force,
     Library,
+    Parameters,
     Quiet,
     Road,
     RoadPath,
@@ -70,10 +72,7 @@ def convert(
     context: Annotated[
         Path | None, typer.Option(help="Table of context over time (columns time, wind_speed, ...).")
     ] = None,
-    parameter: Annotated[
-        list[str] | None,
-        typer.Option("--set", metavar="NAME=VALUE", help="Set a scenario parameter; may be repeated."),
-    ] = None,
+    parameter: Parameters = None,
     library: Library = None,
     mode: Annotated[
         OutputMode, typer.Option(help="trajectory: play the maneuvers out; lane-offset: keep them reactive.")
@@ -87,9 +86,7 @@ def convert(
             metavar="1.0..1.4", help="Version of OpenSCENARIO to write; default: the input's.", show_default=False
         ),
     ] = None,
-    allow: Annotated[
-        list[Path] | None, typer.Option(help="Folder that roads and catalogs may be read from; may be repeated.")
-    ] = None,
+    allow: Allow = None,
     road: Road = None,
     road_path: RoadPath = None,
     resample: Annotated[

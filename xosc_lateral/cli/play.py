@@ -8,8 +8,10 @@ from typing import Annotated
 import typer
 
 from xosc_lateral.cli.words import (
+    Allow,
     AsJson,
     Force,
+    Parameters,
     Quiet,
     Road,
     RoadPath,
@@ -37,13 +39,8 @@ def play(
     ],
     step: Annotated[float, typer.Option(help="Length of a frame [s].", min=0.001, max=1.0)] = 0.02,
     time_limit: TimeLimit = 60.0,
-    parameter: Annotated[
-        list[str] | None,
-        typer.Option("--set", metavar="NAME=VALUE", help="Set a scenario parameter; may be repeated."),
-    ] = None,
-    allow: Annotated[
-        list[Path] | None, typer.Option(help="Folder that roads and catalogs may be read from; may be repeated.")
-    ] = None,
+    parameter: Parameters = None,
+    allow: Allow = None,
     road: Road = None,
     road_path: RoadPath = None,
     strict: Annotated[bool, typer.Option("--strict", help="A missing vehicle catalog is an error.")] = False,

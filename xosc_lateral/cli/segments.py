@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from xosc_lateral.cli.words import AsJson, Quiet, TimeLimit, examples, pairs, say
+from xosc_lateral.cli.words import Allow, AsJson, Parameters, Quiet, TimeLimit, examples, pairs, say
 
 
 def register(app: typer.Typer) -> None:
@@ -19,13 +19,8 @@ def register(app: typer.Typer) -> None:
 def segments(
     scenario: Annotated[Path, typer.Argument(help="Maneuver-based scenario (.xosc).", show_default=False)],
     time_limit: TimeLimit = 60.0,
-    parameter: Annotated[
-        list[str] | None,
-        typer.Option("--set", metavar="NAME=VALUE", help="Set a scenario parameter; may be repeated."),
-    ] = None,
-    allow: Annotated[
-        list[Path] | None, typer.Option(help="Folder that roads and catalogs may be read from; may be repeated.")
-    ] = None,
+    parameter: Parameters = None,
+    allow: Allow = None,
     quiet: Quiet = False,
     as_json: AsJson = False,
 ) -> None:

@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from xosc_lateral.cli.words import Force, Quiet, TimeLimit, examples, pairs
+from xosc_lateral.cli.words import Allow, Force, Parameters, Quiet, TimeLimit, examples, pairs
 
 EXAMPLES = examples("view cut-in.xosc", "view cut-in_lifelike.xosc -o pages/", "view cut-in.xosc -o cut-in.mcap")
 
@@ -24,13 +24,8 @@ def view(
         str | None,
         typer.Option("--output", "-o", help="Page (.html) or recording (.mcap); default: NAME_view.html beside it."),
     ] = None,
-    parameter: Annotated[
-        list[str] | None,
-        typer.Option("--set", metavar="NAME=VALUE", help="Set a scenario parameter; may be repeated."),
-    ] = None,
-    allow: Annotated[
-        list[Path] | None, typer.Option(help="Folder that roads and catalogs may be read from; may be repeated.")
-    ] = None,
+    parameter: Parameters = None,
+    allow: Allow = None,
     time_limit: TimeLimit = 60.0,
     open_page: Annotated[
         bool | None, typer.Option("--open/--no-open", help="Open the page in the browser. Default: from a terminal.")

@@ -31,6 +31,12 @@ Columns = Annotated[
         help="Column under another name or unit, e.g. speed=v_kmh:km/h; may be repeated.",
     ),
 ]
+Parameters = Annotated[
+    list[str] | None, typer.Option("--set", metavar="NAME=VALUE", help="Set a scenario parameter; may be repeated.")
+]
+Allow = Annotated[
+    list[Path] | None, typer.Option(help="Folder that roads and catalogs may be read from; may be repeated.")
+]
 Road = Annotated[
     Path | None, typer.Option("--road", help="OpenDRIVE file, whatever the scenario says.", show_default=False)
 ]

@@ -12,12 +12,12 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.driver.effects.column import ColumnEffect
+from xosc_lateral.driver.effects.single_column import SingleColumnEffect
 
 FloatArray = NDArray[np.float64]
 
 
-class Angular(ColumnEffect, frozen=True, kw_only=True):
+class Angular(SingleColumnEffect, frozen=True, kw_only=True):
     """Sine and cosine of an angle, a coefficient each.
 
     Parameters
@@ -28,13 +28,7 @@ class Angular(ColumnEffect, frozen=True, kw_only=True):
         Full circle in the column's unit: 360 deg or 2 pi rad.
     """
 
-    column: str
     period: float = 360.0
-
-    @property
-    def columns(self) -> tuple[str, ...]:
-        """The one column."""
-        return (self.column,)
 
     @property
     def shape(self) -> str:

@@ -7,12 +7,12 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.driver.effects.column import ColumnEffect
+from xosc_lateral.driver.effects.single_column import SingleColumnEffect
 
 FloatArray = NDArray[np.float64]
 
 
-class Levels(ColumnEffect, frozen=True, kw_only=True):
+class Levels(SingleColumnEffect, frozen=True, kw_only=True):
     """One coefficient for each named level; every other level is the base.
 
     Parameters
@@ -23,13 +23,7 @@ class Levels(ColumnEffect, frozen=True, kw_only=True):
         Those that differ from the rest. [unit of the column]
     """
 
-    column: str
     levels: tuple[float, ...]
-
-    @property
-    def columns(self) -> tuple[str, ...]:
-        """The one column."""
-        return (self.column,)
 
     @property
     def shape(self) -> str:

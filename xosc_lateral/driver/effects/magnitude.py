@@ -7,20 +7,13 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.driver.effects.column import ColumnEffect
+from xosc_lateral.driver.effects.single_column import SingleColumnEffect
 
 FloatArray = NDArray[np.float64]
 
 
-class Magnitude(ColumnEffect, frozen=True, kw_only=True):
+class Magnitude(SingleColumnEffect, frozen=True, kw_only=True):
     """|column|: to the left as to the right; where it is NaN ("there is none"), nothing changes."""
-
-    column: str
-
-    @property
-    def columns(self) -> tuple[str, ...]:
-        """The one column."""
-        return (self.column,)
 
     @property
     def shape(self) -> str:

@@ -7,12 +7,12 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.driver.effects.column import ColumnEffect
+from xosc_lateral.driver.effects.single_column import SingleColumnEffect
 
 FloatArray = NDArray[np.float64]
 
 
-class Nearness(ColumnEffect, frozen=True, kw_only=True):
+class Nearness(SingleColumnEffect, frozen=True, kw_only=True):
     """scale / max(|distance|, scale): 1 from touching up to `scale`, fading beyond, 0 where there is none (NaN).
 
     Parameters
@@ -26,14 +26,8 @@ class Nearness(ColumnEffect, frozen=True, kw_only=True):
         True: 1 wherever there is one, at whatever distance.
     """
 
-    column: str
     scale: float = 1.0
     presence: bool = False
-
-    @property
-    def columns(self) -> tuple[str, ...]:
-        """The one column."""
-        return (self.column,)
 
     @property
     def shape(self) -> str:

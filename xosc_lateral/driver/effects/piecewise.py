@@ -13,14 +13,14 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.driver.effects.column import ColumnEffect
+from xosc_lateral.driver.effects.single_column import SingleColumnEffect
 from xosc_lateral.driver.records import set_once
 from xosc_lateral.errors import DriverProfileError
 
 FloatArray = NDArray[np.float64]
 
 
-class Piecewise(ColumnEffect, frozen=True, kw_only=True):
+class Piecewise(SingleColumnEffect, frozen=True, kw_only=True):
     """The first coefficient is the slope up to the first knot, each further one the change of slope at a knot.
 
     Parameters
@@ -31,7 +31,6 @@ class Piecewise(ColumnEffect, frozen=True, kw_only=True):
         Increasing. [unit of the column]
     """
 
-    column: str
     knots: tuple[float, ...]
 
     def __post_init__(self) -> None:
@@ -40,11 +39,6 @@ class Piecewise(ColumnEffect, frozen=True, kw_only=True):
         set_once(self, knots=tuple(float(knot) for knot in self.knots))
         if not self.knots or not all(low < high for low, high in pairwise(self.knots)):
             raise DriverProfileError(f"effect piecewise of {self.column}: knots {self.knots} must increase")
-
-    @property
-    def columns(self) -> tuple[str, ...]:
-        """The one column."""
-        return (self.column,)
 
     @property
     def shape(self) -> str:

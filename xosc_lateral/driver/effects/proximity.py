@@ -7,13 +7,13 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.driver.effects.column import ColumnEffect
+from xosc_lateral.driver.effects.single_column import SingleColumnEffect
 from xosc_lateral.errors import DriverProfileError
 
 FloatArray = NDArray[np.float64]
 
 
-class Proximity(ColumnEffect, frozen=True, kw_only=True):
+class Proximity(SingleColumnEffect, frozen=True, kw_only=True):
     """exp(-|distance| / scale): 1 alongside, 0 far away and where there is none (NaN).
 
     Parameters
@@ -24,7 +24,6 @@ class Proximity(ColumnEffect, frozen=True, kw_only=True):
         Distance over which the influence falls to 37 %; > 0. [unit of the column]
     """
 
-    column: str
     scale: float
 
     def __post_init__(self) -> None:
@@ -32,11 +31,6 @@ class Proximity(ColumnEffect, frozen=True, kw_only=True):
         super().__post_init__()
         if not self.scale > 0:
             raise DriverProfileError(f"effect proximity of {self.column}: scale {self.scale} must be above 0")
-
-    @property
-    def columns(self) -> tuple[str, ...]:
-        """The one column."""
-        return (self.column,)
 
     @property
     def shape(self) -> str:

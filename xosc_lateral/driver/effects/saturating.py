@@ -7,13 +7,13 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.driver.effects.column import ColumnEffect
+from xosc_lateral.driver.effects.single_column import SingleColumnEffect
 from xosc_lateral.errors import DriverProfileError
 
 FloatArray = NDArray[np.float64]
 
 
-class Saturating(ColumnEffect, frozen=True, kw_only=True):
+class Saturating(SingleColumnEffect, frozen=True, kw_only=True):
     """tanh((column - middle) / scale).
 
     Parameters
@@ -24,7 +24,6 @@ class Saturating(ColumnEffect, frozen=True, kw_only=True):
         scale > 0. [unit of the column]
     """
 
-    column: str
     middle: float
     scale: float
 
@@ -33,11 +32,6 @@ class Saturating(ColumnEffect, frozen=True, kw_only=True):
         super().__post_init__()
         if not self.scale > 0:
             raise DriverProfileError(f"effect saturating of {self.column}: scale {self.scale} must be above 0")
-
-    @property
-    def columns(self) -> tuple[str, ...]:
-        """The one column."""
-        return (self.column,)
 
     @property
     def levels_off(self) -> bool:

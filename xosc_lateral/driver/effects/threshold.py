@@ -7,12 +7,12 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.driver.effects.column import ColumnEffect
+from xosc_lateral.driver.effects.single_column import SingleColumnEffect
 
 FloatArray = NDArray[np.float64]
 
 
-class Threshold(ColumnEffect, frozen=True, kw_only=True):
+class Threshold(SingleColumnEffect, frozen=True, kw_only=True):
     """Acts beyond a limit only.
 
     Parameters
@@ -27,15 +27,9 @@ class Threshold(ColumnEffect, frozen=True, kw_only=True):
         True: as a whole at once; False: in proportion to the distance from the limit.
     """
 
-    column: str
     at: float
     above: bool = True
     jump: bool = True
-
-    @property
-    def columns(self) -> tuple[str, ...]:
-        """The one column."""
-        return (self.column,)
 
     @property
     def levels_off(self) -> bool:
