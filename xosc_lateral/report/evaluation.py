@@ -25,7 +25,7 @@ from xosc_lateral.report.realism import (
     start_fade_note,
 )
 from xosc_lateral.report.render import KeyFigure, Tone, render_page
-from xosc_lateral.report.violins import LABELS
+from xosc_lateral.report.violins import LABELS, violin_figure
 from xosc_lateral.version import __version__
 
 CLOSE, FAR = 1.2, 2.0
@@ -97,6 +97,7 @@ def evaluation_page(scores: ProfileScores, profile: DriverProfile, inputs: Mappi
         part_rows=[_part_row(one) for one in scores.evaluations],
         margin_rows=[_margin_row("measured", scores.margins_real), _margin_row("sampled", scores.margins_sampled)],
         figures=figures,
+        violin_figure=violin_figure,
     )
 
 
