@@ -397,8 +397,21 @@ def test_a_trajectory_and_a_route_of_a_catalog_take_assigned_values(tmp_path: Pa
     assert second.content.route.waypoints[1].position.s == far  # type: ignore[union-attr]
 
 
-def test_a_missing_vehicle_catalog_costs_a_remark_and_a_usual_car(tmp_path: Path) -> None:
+@pytest.mark.parametrize(("tag", "said"), [("TrailerRef", []), ("EntityRef", []), ("CatalogReference", ["Ego"])])
+def test_a_trailer_is_named_as_the_standard_does_or_as_before_it(tmp_path: Path, tag: str, said: list[str]) -> None:
+    hitched = vehicle().replace("</Vehicle>", f'<Trailer><{tag} entityRef="Box"/></Trailer></Vehicle>')
+    scenario = made(tmp_path, entities=entity("Ego", hitched) + entity("Box", vehicle()))
+    assert scenario.entity("Ego").trailer == (None if said else "Box")
+    assert [remark.reason for remark in scenario.remarks] == [
+        f"a trailer of '{name}' by a {tag} is not read" for name in said
+    ]
+
+
+@pytest.mark.parametrize("folder", ["", "/nobody/has/this/folder"])
+def test_a_missing_vehicle_catalog_costs_a_remark_and_a_usual_car(tmp_path: Path, folder: str) -> None:
     parts = {"entities": entity("Ego", reference("sports car"))}
+    if folder:
+        parts["catalogs"] = locations(folder, "VehicleCatalog")
     scenario = made(tmp_path, **parts)
     assert scenario.entity("Ego").bounding_box.length == 5.0
     assert "'Ego' is played as a car of usual size" in scenario.remarks[0].reason

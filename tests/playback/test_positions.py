@@ -140,6 +140,18 @@ def test_a_position_on_a_route_against_the_road_is_along_the_route(tmp_path: Pat
     assert placed(tmp_path, position) == pytest.approx((280.0, 0.5 * WIDTH, 0.2 - pi, 1), abs=1e-6)
 
 
+@pytest.mark.parametrize(("first", "last", "is_said"), [(300.0, 100.0, True), (100.0, 300.0, False)])
+def test_a_route_that_runs_against_s_is_said(tmp_path: Path, first: float, last: float, is_said: bool) -> None:
+    lane = 1 if is_said else -1
+    waypoints = "".join(
+        f'<Waypoint routeStrategy="shortest"><Position>{on_lane(lane, s)}</Position></Waypoint>' for s in (first, last)
+    )
+    place = f'<InRoutePosition><FromLaneCoordinates pathS="20" laneId="{lane}"/></InRoutePosition>'
+    position = f'<RoutePosition><RouteRef><Route name="r" closed="false">{waypoints}</Route></RouteRef>{place}'
+    played = Stage(tmp_path).play(start={"Ego": teleport(f"{position}</RoutePosition>")}, last=0.0)
+    assert any("runs against s" in note.what for note in played.motion.notes) is is_said
+
+
 def test_beyond_the_end_of_the_road_is_its_end_and_said(tmp_path: Path) -> None:
     played = Stage(tmp_path).play(start={"Ego": teleport(on_lane(-1, 1200.0))}, last=0.1)
     assert entity(played).x[0] == pytest.approx(1000.0)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from glob import escape
@@ -49,7 +50,8 @@ class Catalogs:
         Raises
         ------
         FormatError
-            No such entry, or a catalog folder outside the allowed ones; a `MissingFileError` without the catalog.
+            No such entry, or a catalog folder that is there, outside the allowed ones; a `MissingFileError` without the
+            catalog.
         """
         catalog, name = reference.text("catalogName"), reference.text("entryName")
         path = self._file(catalog, reference)
@@ -84,7 +86,7 @@ class Catalogs:
                 folder, candidate = path, path / f"{catalog}.xosc"
             if candidate is not None and candidate.is_file() and self.boundary.holds(candidate):
                 return candidate
-            if self.boundary.holds(folder):
+            if self.boundary.holds(folder) or not os.access(folder, os.F_OK):
                 folders.append(folder)
             else:
                 refused = refused or self.boundary.refusal(written, place)

@@ -123,16 +123,21 @@ def _vehicle_category(vehicle: XmlElement, context: Context) -> VehicleCategory:
 def _read_trailer(vehicle: XmlElement, tractor: str, context: Context) -> tuple[str | None, list[Entity]]:
     """Name of the trailer hitched from the start, and the trailer itself when it is described right here.
 
+    Before version 1.3 had trailers, tools wrote an EntityRef in place of a TrailerRef.
+
     Catalog entries with a trailer are used several times over, so a trailer can't keep the name that it has there: it
     is called like its tractor with a ``+``, as in the reference player.
     """
     owner = vehicle.child("Trailer")
     if owner is None:
         return None, []
-    reference = owner.child("TrailerRef")
+    reference = owner.child("TrailerRef") or owner.child("EntityRef")
+    inner = owner.child("Trailer")
+    for other in owner.children():
+        if other.tag not in ("TrailerRef", "EntityRef", "Trailer"):
+            context.remark(other, f"a trailer of '{tractor}' by a {other.tag} is not read")
     if reference is not None:
         return reference.text("entityRef", "") or None, []
-    inner = owner.child("Trailer")
     if inner is None:
         return None, []
     context.enter(inner)

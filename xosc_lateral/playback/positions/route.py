@@ -33,6 +33,12 @@ def resolve(
             f"no way leads along route '{position.route.name}'", path=place.path, line=place.line, element=place.element
         )
     road, s, direction = route.at(where.path_s)
+    if direction < 0:
+        simulation.note(
+            "the route runs against s here: lanes, offset and heading count along it "
+            "(in esmini only with --align_routepositions)",
+            place,
+        )
     if isinstance(where, FromLaneCoordinates):
         lane, offset = _with_route(simulation, road, where.lane_id, where.lane_offset, direction)
         return lane_placement(simulation, road, lane, s, offset, position.orientation, place)
