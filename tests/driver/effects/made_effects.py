@@ -1,4 +1,4 @@
-"""Effects with round numbers, and their strength on rows of context."""
+"""Effects with round numbers, one of each kind, and their strength on rows of context."""
 
 from __future__ import annotations
 
@@ -6,11 +6,62 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from xosc_lateral.driver.effects import Acts, ColumnEffect
+from xosc_lateral.driver.effects import (
+    Acts,
+    Angular,
+    ColumnEffect,
+    Drift,
+    Effect,
+    Factor,
+    Form,
+    GrowingSpread,
+    Levels,
+    Linear,
+    Magnitude,
+    Nearness,
+    Piecewise,
+    Population,
+    Product,
+    Proximity,
+    Regimes,
+    Saturating,
+    Step,
+    Threshold,
+    Weave,
+)
 
 STEP = 0.2
 
 C = TypeVar("C", bound=ColumnEffect)
+
+ONE: dict[str, Any] = {"coefficients": (0.5,), "errors": (0.1,), "reference": (0.0,)}
+EXAMPLES: tuple[Effect, ...] = (
+    Linear(acts=Acts.LOCATION, column="x", lag_s=-1.2, response_s=2.0, **ONE),
+    Magnitude(acts=Acts.SPREAD, column="x", **ONE),
+    Threshold(acts=Acts.LOCATION, column="x", at=1.0, above=False, jump=False, **ONE),
+    Saturating(acts=Acts.SPREAD, column="x", middle=0.0, scale=2.0, **ONE),
+    Piecewise(
+        acts=Acts.SPREAD, column="x", knots=(1.0,), coefficients=(1.0, -1.0), errors=(0.1, 0.1), reference=(0.0, 0.0)
+    ),
+    Levels(acts=Acts.LOCATION, column="x", levels=(1.0,), **ONE),
+    Nearness(acts=Acts.FINE, column="x", scale=10.0, **ONE),
+    Proximity(acts=Acts.LOCATION, column="x", scale=10.0, **ONE),
+    Angular(
+        acts=Acts.LOCATION, column="x", period=360.0, coefficients=(0.3, 0.1), errors=(0.1, 0.1), reference=(0.0, 0.0)
+    ),
+    Product(
+        acts=Acts.RATE,
+        factors=(Factor(column="x"), Factor(column="y", form=Form.SINE, at=360.0)),
+        **ONE,
+    ),
+    Drift(size=0.2),
+    Step(size=0.2, at_s=40.0),
+    GrowingSpread(factor=2.0, to_s=100.0),
+    Weave(amplitude=0.1, period_s=12.0),
+    Regimes(factor=2.0, on_s=20.0, off_s=40.0),
+    Population(shift=0.1, log_spread=0.2),
+)
+"""One of each kind, of columns `x` and `y`: every test of all effects takes them from here."""
 
 
 def made(kind: type[C], *coefficients: float, acts: Acts = Acts.LOCATION, **fields: Any) -> C:

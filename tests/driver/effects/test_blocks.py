@@ -9,14 +9,13 @@ import numpy as np
 import pytest
 
 from tests.driver.certified import FOLDER, contexts
+from tests.driver.effects.made_effects import EXAMPLES
 from xosc_lateral.driver.effects import (
     EFFECTS,
-    Acts,
     ColumnEffect,
     Effect,
     EffectTerms,
     HiddenEffect,
-    Proximity,
     known_effects,
 )
 from xosc_lateral.driver.effects.response import Response, ResponseState, respond
@@ -27,14 +26,13 @@ STEP = 0.2
 N = 500
 BLOCKS = (1, 1, 2, 40, 1, 155, 300)
 PROFILE = read_profile(FOLDER / "two-level-effects.json")
-LATER: tuple[Effect, ...] = (
-    Proximity(
-        acts=Acts.LOCATION, column="lead_distance", scale=25.0, coefficients=(0.2,), errors=(0.02,), reference=(0.3,)
-    ),
+EFFECTS_HERE: tuple[Effect, ...] = (
+    *PROFILE.effects,
+    *(effect for effect in EXAMPLES if effect.kind not in {there.kind for there in PROFILE.effects}),
 )
-"""One of each kind that version 0.1 did not have."""
-COLUMNED = {f"{k}-{effect.kind}": effect for k, effect in enumerate((*PROFILE.effects, *LATER)) if effect.columns}
-HIDDEN = {effect.kind: effect for effect in (*PROFILE.effects, *LATER) if not effect.columns}
+"""The certified profile's, and one of each kind that version 0.1 did not have."""
+COLUMNED = {f"{k}-{effect.kind}": effect for k, effect in enumerate(EFFECTS_HERE) if effect.columns}
+HIDDEN = {effect.kind: effect for effect in EFFECTS_HERE if not effect.columns}
 
 
 def cut(values: np.ndarray) -> list[np.ndarray]:
@@ -80,6 +78,7 @@ def test_hidden_effects_go_on_from_their_state_and_from_a_saved_one(kind: str) -
 @pytest.mark.parametrize("name", COLUMNED)
 def test_column_effects_answer_in_blocks_as_to_the_whole(name: str) -> None:
     effect, context = cast(ColumnEffect, COLUMNED[name]), contexts(N)
+    context |= {"x": context["lead_distance"], "y": context["speed"]}
     whole = effect.terms(STEP * np.arange(N), context, np.random.default_rng(0))
     response, answers = effect.response(STEP), []
     for rows in cut(np.arange(N)):
