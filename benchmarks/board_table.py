@@ -29,17 +29,26 @@ SHOWN = {
 
 def table(board: dict[str, Any]) -> str:
     names = [name for name in SHOWN if name in board["models"][0]["numbers"]]
-    heads = ["", "model", "score", "95 %", "halves", "ranks", *(SHOWN[name] for name in names)]
+    heads = ["", "model", "score", "95 %", "halves", "ranks", "group", *(SHOWN[name] for name in names)]
     lines = ["| " + " | ".join(heads) + " |", "|" + "---|" * len(heads)]
     for one in board["models"]:
         low, high = one["score_interval"]
         cells = [str(one["rank"]), one["title"], f"{one['score']:.2f}", f"{low:.2f} to {high:.2f}"]
         cells.append(" / ".join(f"{value:.2f}" for value in one["score_by_half"]))
-        cells.append("-".join(map(str, sorted(set(one["rank_interval"])))))
+        cells += ["-".join(map(str, sorted(set(one["rank_interval"])))), str(one["group"])]
         cells += [f"{one['numbers'][name]['value']:.3g}" for name in names]
         lines.append("| " + " | ".join(cells) + " |")
     floors = board["models"][0]["numbers"]
-    bare = ["", "other real drivers (the floor)", "1", "", "", "", *(f"{floors[name]['floor']:.3g}" for name in names)]
+    bare = [
+        "",
+        "other real drivers (the floor)",
+        "1",
+        "",
+        "",
+        "",
+        "",
+        *(f"{floors[name]['floor']:.3g}" for name in names),
+    ]
     data = board["data"]
     lines += [
         "| " + " | ".join(bare) + " |",
@@ -48,7 +57,9 @@ def table(board: dict[str, Any]) -> str:
         f"{data['windows']['10 s, free']} windows of 10 s, {data['windows']['30 s, free']} of 30 s, "
         f"{board['resamples']} resamples of the vehicles.",
         "",
-        f"Kendall's tau between the rankings of the two halves: {board['kendall_tau_between_halves']:.3f}.",
+        f"Kendall's tau between the rankings of the two halves: {board['kendall_tau_between_halves']:.3f}. "
+        f"Resampled vehicles tell {board['pairs_told_apart']} pairs of models apart, and both halves have "
+        f"{board['pairs_that_both_halves_agree_on']} of them in that order; no model is told from its group's best.",
     ]
     lines += [f"\nNot on the board: {name} ({why})." for name, why in board["absent"].items()]
     return "\n".join(lines)

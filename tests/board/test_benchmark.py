@@ -8,7 +8,7 @@ import pytest
 from tests.baselines.made_runs import made_run, smooth_runs
 from xosc_lateral.board.benchmark import benchmark_realism
 from xosc_lateral.board.half import floors, make_half
-from xosc_lateral.board.ranking import kendall_tau, ranks, resampled_rows
+from xosc_lateral.board.ranking import agreeing, kendall_tau, rank_groups, ranks, resampled_rows, told_apart
 from xosc_lateral.board.result import Board
 from xosc_lateral.board.sampled_half import sample_half
 from xosc_lateral.board.units import halves, units_of
@@ -72,7 +72,7 @@ def test_the_truth_itself_is_as_far_as_the_floor() -> None:
         if not condition.same_start and condition.seconds <= 30.0:
             base = floors(half, condition)
             rows = np.arange(len(half.features[condition.seconds]))
-            found = differences(half.features[condition.seconds], sampled.features[condition], rows, rows)
+            found = differences(half.features[condition.seconds], sampled.features[condition][0], rows, rows)
             for family in ("metrics", "lane_keeping", "spectrum"):
                 assert base[family] / 4 < found[family] < 3 * base[family], (condition.name, family)
 
@@ -131,3 +131,21 @@ def test_unknown_models_are_named() -> None:
 
 def _flat() -> Run:
     return made_run(np.zeros(60))
+
+
+def test_models_that_resamples_swap_share_a_group() -> None:
+    rng = np.random.default_rng(0)
+    common, own = rng.normal(0.0, 0.5, 200), rng.normal(0.0, 0.05, (4, 200))
+    score = {"b": 1.1, "a": 1.08, "c": 2.0, "d": 8.0}
+    # All move together over the resamples by more than they lie apart: it is the pairs that count.
+    drawn = {key: value * np.exp(common + noise) for (key, value), noise in zip(score.items(), own, strict=True)}
+    apart = told_apart(score, drawn)
+    assert [pair for pair, clear in apart.items() if not clear] == [("a", "b")]
+    assert rank_groups(score, apart) == {"a": 1, "b": 1, "c": 2, "d": 3}
+    halves_of = {"a": [1.2, 1.0], "b": [1.1, 1.1], "c": [2.0, 2.0], "d": [1.9, 9.0]}
+    assert agreeing(apart, {key: np.array(values) for key, values in halves_of.items()}) == (5, 4)
+
+
+def test_a_group_begins_with_who_is_told_from_its_best_only() -> None:
+    apart = {("a", "b"): False, ("b", "c"): False, ("a", "c"): True}
+    assert rank_groups({"a": 1.0, "b": 1.5, "c": 2.0}, apart) == {"a": 1, "b": 1, "c": 2}

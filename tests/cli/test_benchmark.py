@@ -27,7 +27,9 @@ def test_a_board_is_written_for_machines_documents_and_people(
     table: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(calibration, "FIRST_LOOK", 8)  # what is tested is what is written
-    monkeypatch.setattr(calibration, "STEPS", 10)
+    monkeypatch.setattr(calibration, "DESCENTS", 1)
+    monkeypatch.setattr(calibration, "FIRST_STEPS", 5)
+    monkeypatch.setattr(calibration, "STEPS", 5)
     words = ["benchmark", "realism", str(table), "-o", str(tmp_path / "out"), "--no-classify", "--resamples", "10"]
     assert main([*words, "--model", "lane-centre", "--model", "gaussian-process", "-p", "motorway", "--json"]) == 0
     said = json.loads(capsys.readouterr().out)

@@ -29,7 +29,7 @@ def row(key: str, rank: int, score: float, **more: object) -> Row:
         "key": key, "title": f"{key} & <co>", "source": f"{key} et al.", "departures": "",
         "settings": {"a_m": 0.123456},
         "numbers": numbers, "variance": PARTS, "score": score, "low": 0.9 * score, "high": 1.1 * score, "rank": rank,
-        "best_rank": rank, "worst_rank": rank, "scores_by_half": (0.95 * score, 1.05 * score),
+        "best_rank": rank, "worst_rank": rank, "group": rank, "scores_by_half": (0.95 * score, 1.05 * score),
         "example": np.full((2, 51), 0.1 * rank), "spectrum": np.full(3, 0.01 * rank),
         "autocorrelation": np.full(2, 0.9),
     }  # fmt: skip
@@ -41,7 +41,8 @@ def board() -> Board:
     rows = (row("first", 1, 1.5), row("second", 2, 2.25, worst_rank=3), row("third", 3, 12.0, best_rank=2))
     return Board(
         rows=rows, absent={"sumo": "SUMO is not installed"}, vehicles=40, runs=55, hours=1.25, windows={"10 s": 400},
-        unit="vehicle", tau=1.0 / 3.0, resamples=200, real_example=np.zeros((2, 51)), real_spectrum=np.full(3, 0.02),
+        unit="vehicle", tau=1.0 / 3.0, pairs_apart=2, pairs_agreeing=1, resamples=200,
+        real_example=np.zeros((2, 51)), real_spectrum=np.full(3, 0.02),
         frequency=np.array([0.05, 0.2, 0.8]), real_autocorrelation=np.array([0.95, 0.8]), lags=np.array([1.0, 2.0]),
         real_variance=PARTS, seed=7,
     )  # fmt: skip
@@ -51,7 +52,7 @@ def test_the_terminal_has_a_line_for_each_model_and_one_for_each_that_is_absent(
     lines = board_text(board).splitlines()
     assert lines[0] == headline(board)
     assert "first & <co> first with 1.50 times the floor" in lines[0] and "1.25 h of 40 drives" in lines[0]
-    assert re.split(r"\s{2,}", lines[3].strip()) == ["2", "second & <co>", "2.25", "2.02 - 2.48", "2-3"]
+    assert re.split(r"\s{2,}", lines[3].strip()) == ["2", "second & <co>", "2.25", "2.02 - 2.48", "2-3", "2"]
     assert lines[-1] == "not on the board: sumo (SUMO is not installed)"
     assert len(lines) == 2 + 3 + 1
 
@@ -64,6 +65,7 @@ def test_the_record_is_json_without_nan_and_holds_what_the_board_does(board):
     assert record["kendall_tau_between_halves"] == 0.33333
     second = record["models"][1]
     assert (second["name"], second["rank"], second["rank_interval"]) == ("second", 2, [2, 3])
+    assert second["group"] == 2 and (record["pairs_told_apart"], record["pairs_that_both_halves_agree_on"]) == (2, 1)
     assert second["score_by_half"] == pytest.approx([0.95 * 2.25, 1.05 * 2.25], rel=1e-4)
     assert second["numbers"]["metrics, 10 s, same start"] == {
         "value": 0.6975, "floor": 0.31, "unit": "sd", "ranked": True}  # fmt: skip

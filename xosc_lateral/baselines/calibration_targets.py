@@ -24,6 +24,9 @@ FloatArray = NDArray[np.float64]
 MOST_WINDOWS = 250
 """Of each length; evenly thinned out."""
 
+DRAWS = 4
+"""Sampled windows for each measured one. With one, a fit follows its random numbers: 0.24 where others gave 0.39."""
+
 LEAST = 1e-6
 """Difference below which nothing is gained. [unit of the family]"""
 
@@ -68,9 +71,9 @@ def distance_to(targets: Sequence[CalibrationTarget], model: LateralModel, seed:
     rng = np.random.default_rng(seed)
     logs = []
     for target in targets:
-        sampled = np.array(model.sample(target.segments, target.starts if target.condition.same_start else None, rng))
-        other = features_of(sampled, target.lane_width, STEP)
-        rows = np.arange(len(other))
-        found = differences(target.features, other, rows, rows)
+        starts = np.tile(target.starts, DRAWS) if target.condition.same_start else None
+        sampled = np.array(model.sample(target.segments * DRAWS, starts, rng))
+        other = features_of(sampled, np.tile(target.lane_width, (DRAWS, 1)), STEP)
+        found = differences(target.features, other, np.arange(len(target.features)), np.arange(len(other)))
         logs += [np.log(max(found[family], LEAST)) for family in target.families]
     return float(np.exp(np.mean(logs)))

@@ -62,18 +62,34 @@ def benchmark_realism(
         For a model that there is not, or one that comes twice.
     """
     entries = contestants(models, profiles)
-    units = units_of(runs)
-    one, other = halves(units, seed)
-    rng = np.random.default_rng([seed, 1])
-    split = [make_half(one, other, rng), make_half(other, one, rng)]
-    if any(SHORT not in half.windows for half in split):
-        raise NotEnoughDataError(f"fewer than 20 windows of {SHORT:g} s in half of the runs")
+    split = split_in_halves(runs, seed)
     sampled, absent, seconds = _sample_all(split, entries, seed, progress or (lambda share, what: None))
     parts = [(half, {key: ones[number] for key, ones in sampled.items()}) for number, half in enumerate(split)]
     by_half, drawn = bootstrap(parts, np.random.default_rng([seed, 2]), resamples)
     floors = floors_of(split, classify=classify)
     numbers = {key: numbers_of(parts, key, floors, classify=classify) for key in sampled}
     return make_board(runs, entries, parts, numbers, by_half, drawn, absent, seconds, seed)
+
+
+def split_in_halves(runs: Sequence[Run], seed: int) -> list[Half]:
+    """Each half of the vehicles to be scored on, the other to be fitted to.
+
+    Raises
+    ------
+    NotEnoughDataError
+        See `benchmark_realism`.
+    """
+    one, other = halves(units_of(runs), seed)
+    rng = np.random.default_rng([seed, 1])
+    split = [make_half(one, other, rng), make_half(other, one, rng)]
+    if any(SHORT not in half.windows for half in split):
+        raise NotEnoughDataError(f"fewer than 20 windows of {SHORT:g} s in half of the runs")
+    return split
+
+
+def fit_and_sample(entry: Contestant, half: Half, seed: Sequence[int]) -> SampledHalf:
+    """A model fitted to the other vehicles of a half, sampled under the context of its own."""
+    return sample_half(entry.fit(half.train), half, np.random.default_rng(seed))
 
 
 def _sample_all(
@@ -88,8 +104,7 @@ def _sample_all(
         begin = time.perf_counter()
         try:
             sampled[entry.key] = [
-                sample_half(entry.fit(half.train), half, np.random.default_rng([seed, 3, number, which]))
-                for which, half in enumerate(split)
+                fit_and_sample(entry, half, (seed, 3, number, which)) for which, half in enumerate(split)
             ]
         except XoscLateralError as error:
             absent[entry.key] = str(error)

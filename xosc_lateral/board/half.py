@@ -24,6 +24,10 @@ LEAST_WINDOWS = 20
 ENSEMBLE = 8
 """Sampled windows for each real one of 10 s: proper scores need several."""
 
+DRAWS = 4
+"""Sets of windows that ranked distances are averaged over: as large as the real set each, so that the floor stays fair,
+and several, so that two models are not ranked by the luck of one. The floor with the same start has as many."""
+
 CONDITIONS = tuple(SnippetCondition(seconds, same_start) for seconds in LENGTHS for same_start in (True, False))
 
 

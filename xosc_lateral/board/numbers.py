@@ -45,11 +45,13 @@ def floors_of(split: Sequence[Half], *, classify: bool) -> dict[str, float]:
 def _of_half(half: Half, sampled: SampledHalf) -> dict[str, float]:
     found: dict[str, float] = {}
     for condition in half.conditions:
-        real, other = half.features[condition.seconds], sampled.features[condition]
+        real, drawn = half.features[condition.seconds], sampled.features[condition]
         rows = np.arange(len(real))
-        found |= {f"{family}, {condition.name}": v for family, v in differences(real, other, rows, rows).items()}
+        several = pooled([differences(real, other, rows, rows) for other in drawn])
+        found |= {f"{family}, {condition.name}": value for family, value in several.items()}
         if condition == SnippetCondition(SHORT, True):
-            found |= {f"{name}, {condition.name}": value for name, value in named_distances(real, other).items()}
+            named = pooled([named_distances(real, other) for other in drawn])
+            found |= {f"{name}, {condition.name}": value for name, value in named.items()}
     return found | _proper_scores(half.windows[SHORT].offset, sampled.ensemble)
 
 

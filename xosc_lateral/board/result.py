@@ -61,6 +61,8 @@ class Row:
         95 % interval of the score, vehicles resampled.
     rank, best_rank, worst_rank : int
         1: first; 95 % interval over the same resamples.
+    group : int
+        1: the first; within a group no model is told from the group's best by the resampled vehicles.
     scores_by_half : tuple of float
         Score on each half.
     example : array, shape (k, m)
@@ -83,6 +85,7 @@ class Row:
     rank: int
     best_rank: int
     worst_rank: int
+    group: int
     scores_by_half: tuple[float, ...]
     example: FloatArray
     spectrum: FloatArray
@@ -111,6 +114,8 @@ class Board:
         What halves and resamples are made of: ``vehicle`` or ``block of 120 s``.
     tau : float
         Kendall's rank correlation between the two halves' rankings.
+    pairs_apart, pairs_agreeing : int
+        Pairs of models that the resampled vehicles tell apart, and those of them that both halves have in that order.
     resamples : int
     real_example, real_spectrum, frequency, real_autocorrelation, lags
         Real windows and curves beside the models'. [m], [m2/Hz], [Hz], [-], [s]
@@ -128,6 +133,8 @@ class Board:
     windows: Mapping[str, int]
     unit: str
     tau: float
+    pairs_apart: int
+    pairs_agreeing: int
     resamples: int
     real_example: FloatArray
     real_spectrum: FloatArray

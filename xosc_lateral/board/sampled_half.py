@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.baselines.base import LateralModel
-from xosc_lateral.board.half import ENSEMBLE, Half
+from xosc_lateral.board.half import DRAWS, ENSEMBLE, Half
 from xosc_lateral.driver.snippets import segment_of
 from xosc_lateral.drives.resampling import STEP
 from xosc_lateral.evaluation.condition import SnippetCondition
@@ -28,12 +28,13 @@ class SampledHalf:
     ----------
     settings : mapping
     paths : list of array
-        A free run for each of the half's runs. [m]
+        A free run for each of the half's runs, first draw. [m]
     ensemble : array, shape (n, 8, 51), or None
         Snippets of 10 s with the real starts. [m]
     windows : mapping of SnippetCondition to array, shape (n, m)
-        [m]
-    features : mapping of SnippetCondition to Features
+        First draw. [m]
+    features : mapping of SnippetCondition to tuple of Features
+        Of each draw.
     variance : VarianceParts
     """
 
@@ -41,30 +42,32 @@ class SampledHalf:
     paths: list[FloatArray]
     ensemble: FloatArray
     windows: Mapping[SnippetCondition, FloatArray]
-    features: Mapping[SnippetCondition, Features]
+    features: Mapping[SnippetCondition, tuple[Features, ...]]
     variance: VarianceParts
 
 
 def sample_half(model: LateralModel, half: Half, rng: np.random.Generator) -> SampledHalf:
     """Free runs over the half's runs, and windows with the real starts."""
-    paths = model.sample([segment_of(run) for run in half.test], None, rng)
+    segments = [segment_of(run) for run in half.test]
+    drawn = [model.sample(segments, None, rng) for _ in range(DRAWS)]
     shortest = min(half.windows)
     ensemble = sample_same_start(model, half.windows[shortest], rng, ENSEMBLE)
-    cut: dict[SnippetCondition, FloatArray] = {}
+    cut: dict[SnippetCondition, list[FloatArray]] = {}
     for condition in half.conditions:
         own = half.windows[condition.seconds]
         if not condition.same_start:
-            cut[condition] = own.cut_from(paths)
+            cut[condition] = [own.cut_from(paths) for paths in drawn]
         elif condition.seconds == shortest:
-            cut[condition] = ensemble[:, 0]
+            cut[condition] = [ensemble[:, member] for member in range(DRAWS)]
         else:
-            cut[condition] = sample_same_start(model, own, rng, 1)[:, 0]
+            cut[condition] = [sample_same_start(model, own, rng, 1)[:, 0]]
     features = {
-        condition: features_of(rows, half.windows[condition.seconds].lane_width, STEP)
-        for condition, rows in cut.items()
+        condition: tuple(features_of(rows, half.windows[condition.seconds].lane_width, STEP) for rows in several)
+        for condition, several in cut.items()
     }
-    free = half.windows[shortest].cut_from(paths)
-    return SampledHalf(model.settings, paths, ensemble, cut, features, variance_parts(free, run_names(half)))
+    first = {condition: several[0] for condition, several in cut.items()}
+    free = half.windows[shortest].cut_from(drawn[0])
+    return SampledHalf(model.settings, drawn[0], ensemble, first, features, variance_parts(free, run_names(half)))
 
 
 def run_names(half: Half) -> NDArray[np.str_]:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from xosc_lateral.board.contestants import Contestant
 from xosc_lateral.board.half import Half
-from xosc_lateral.board.ranking import kendall_tau, ranks
+from xosc_lateral.board.ranking import QUANTILES, agreeing, kendall_tau, rank_groups, ranks, told_apart
 from xosc_lateral.board.result import Board, ModelScore, Row
 from xosc_lateral.board.sampled_half import SampledHalf
 from xosc_lateral.drives.drive import Run
@@ -25,8 +25,6 @@ Parts = Sequence[tuple[Half, Mapping[str, SampledHalf]]]
 
 EXAMPLES = 8
 """Windows shown of each model."""
-
-QUANTILES = (0.025, 0.975)
 
 
 def make_board(
@@ -44,7 +42,8 @@ def make_board(
     half, models = parts[0][0], {entry.key: entry for entry in entries}
     score = {key: float(np.exp(np.mean(np.log(values)))) for key, values in by_half.items()}
     order = sorted(score, key=lambda key: score[key])
-    places = ranks(drawn)
+    places, apart = ranks(drawn), told_apart(score, drawn)
+    groups, agreement = rank_groups(score, apart), agreeing(apart, by_half)
     free = ranked_numbers(half.windows)[-1][0]
     shown = np.unique(np.linspace(0, len(half.windows[SHORT]) - 1, EXAMPLES).astype(np.int64))
     rows = []
@@ -55,7 +54,7 @@ def make_board(
         low, high = score[key] * np.exp(np.quantile(spread, QUANTILES) - spread.mean())
         best, worst = np.quantile(places[key], QUANTILES)
         sampled, model = parts[0][1][key], models[key]
-        curves = sampled.features[free]
+        curves = sampled.features[free][0]
         rows.append(
             Row(
                 key=key,
@@ -71,6 +70,7 @@ def make_board(
                 rank=rank,
                 best_rank=int(np.floor(best)),
                 worst_rank=int(np.ceil(worst)),
+                group=groups[key],
                 scores_by_half=tuple(by_half[key].tolist()),
                 example=sampled.ensemble[shown, 0],
                 spectrum=curves.power.mean(axis=0),
@@ -89,6 +89,8 @@ def make_board(
         windows={one.name: sum(len(h.windows[one.seconds]) for h, _ in parts) for one in half.conditions},
         unit="vehicle" if len({run.drive for run in runs}) >= FEW_DRIVES else f"block of {BLOCK:g} s",
         tau=kendall_tau(*np.array([by_half[key] for key in order]).T.tolist()) if len(order) > 1 else float("nan"),
+        pairs_apart=agreement[0],
+        pairs_agreeing=agreement[1],
         resamples=len(next(iter(drawn.values()))),
         real_example=windows.offset[shown],
         real_spectrum=real.power.mean(axis=0),

@@ -21,11 +21,11 @@ FAMILIES = {
 def board_text(board: Board) -> str:
     """A table for the terminal."""
     width = max(len(row.title) for row in board.rows)
-    lines = [headline(board), f"{'':4}{'model':<{width}}  score  95 % interval  rank"]
+    lines = [headline(board), f"{'':4}{'model':<{width}}  score  95 % interval  rank  group"]
     for row in board.rows:
         places = f"{row.best_rank}-{row.worst_rank}" if row.best_rank < row.worst_rank else f"{row.best_rank}"
         span = f"{row.low:6.2f} - {row.high:<6.2f}"
-        lines.append(f"{row.rank:>2}  {row.title:<{width}}  {row.score:5.2f}  {span}  {places}")
+        lines.append(f"{row.rank:>2}  {row.title:<{width}}  {row.score:5.2f}  {span}  {places:<5} {row.group:>5}")
     lines += [f"not on the board: {key} ({why})" for key, why in board.absent.items()]
     return "\n".join(lines)
 

@@ -30,7 +30,11 @@ def board_page(board: Board, inputs: Mapping[str, str]) -> str:
             KeyFigure(
                 f"{first.score:.2f}", first.title, f"95 %: {first.low:.2f} to {first.high:.2f}; 1: as other drivers"
             ),
-            KeyFigure(f"{board.tau:.2f}", "Kendall's tau", "between the rankings of the two halves"),
+            KeyFigure(
+                f"{board.tau:.2f}",
+                "Kendall's tau",
+                f"between the halves, which agree on {board.pairs_agreeing} of {board.pairs_apart} clear pairs",
+            ),
             KeyFigure(f"{board.hours:.1f} h", f"{board.vehicles} drives", f"{sum(board.windows.values())} windows"),
         ],
         number_rows=_number_rows(board),
@@ -46,7 +50,7 @@ def _number_rows(board: Board) -> list[dict[str, object]]:
     """A row per model, and the floors below them."""
     columns = shown_columns(board)
     rows: list[dict[str, object]] = [
-        {"": row.rank, "model": row.title, "score": round(row.score, 3)}
+        {"": row.rank, "group": row.group, "model": row.title, "score": round(row.score, 3)}
         | {head: number.value if (number := known_number(row, name)) else None for name, head in columns.items()}
         for row in board.rows
     ]
