@@ -19,8 +19,6 @@ if TYPE_CHECKING:
     import pandas as pd
 
 SCENARIO_SUFFIX = ".xosc"
-TABLE_COLUMNS = ("scenario", "profile", "seed", "variants", "parameters", "only")
-"""Columns of a table of scenarios; further ones are ``profile:ENTITY`` and ``parameter:NAME``."""
 
 _GLOB_CHARACTERS = frozenset("*?[")
 

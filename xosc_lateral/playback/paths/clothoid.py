@@ -1,30 +1,14 @@
-"""Clothoids and clothoid splines: curvature changes evenly with length on each piece.
-
-References
-----------
-.. [1] M. Abramowitz, I. A. Stegun, "Handbook of Mathematical Functions", 1964, table 25.4: Gauss-Legendre nodes.
-"""
+"""Clothoids and clothoid splines: curvature changes evenly with length on each piece."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from math import cos, nan, pi, sin
+from dataclasses import dataclass, field
+from math import nan, pi
 
 from xosc_lateral.playback.angles import wrap
 from xosc_lateral.playback.paths.base import PathPoint
-
-_GAUSS = (
-    (-0.9061798459386640, 0.2369268850561891),
-    (-0.5384693101056831, 0.4786286704993665),
-    (0.0, 0.5688888888888889),
-    (0.5384693101056831, 0.4786286704993665),
-    (0.9061798459386640, 0.2369268850561891),
-)
-"""Nodes and weights of five-point Gauss-Legendre quadrature on [-1, 1]."""
-
-_TURN_PER_PANEL = 0.2
-"""Angle over which one quadrature panel goes at most; the error then is below 1e-13 of its length. [rad]"""
+from xosc_lateral.road.geometry import Spiral
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,25 +22,18 @@ class TimedClothoid:
     end_curvature: float
     length: float
     start_time: float = nan
+    _spiral: Spiral | None = field(init=False, repr=False, compare=False)
+    """As on a road; None: no length."""
+
+    def __post_init__(self) -> None:
+        """Lay it out."""
+        layout = (self.x, self.y, self.heading, self.length, self.curvature, self.end_curvature)
+        object.__setattr__(self, "_spiral", Spiral.of(*layout) if self.length > 0.0 else None)
 
     def at(self, s: float) -> tuple[float, float, float]:
-        """x, y, heading at a length: the integral of (cos, sin) of the heading."""
-        rate = (self.end_curvature - self.curvature) / self.length if self.length > 0.0 else 0.0
-
-        def heading_at(u: float) -> float:
-            return self.heading + u * (self.curvature + 0.5 * rate * u)
-
-        turn = max(abs(self.curvature), abs(self.end_curvature)) * s
-        panels = int(turn / _TURN_PER_PANEL) + 1
-        half = 0.5 * s / panels
-        x, y = self.x, self.y
-        for panel in range(panels):
-            middle = (2 * panel + 1) * half
-            for node, weight in _GAUSS:
-                heading = heading_at(middle + half * node)
-                x += half * weight * cos(heading)
-                y += half * weight * sin(heading)
-        return x, y, heading_at(s) % (2.0 * pi)
+        """x, y, heading at a length. [m], [rad]"""
+        x, y, heading = (self.x, self.y, self.heading) if self._spiral is None else self._spiral.at(s)
+        return x, y, heading % (2.0 * pi)
 
 
 class ClothoidPath:
