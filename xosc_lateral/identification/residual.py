@@ -31,13 +31,13 @@ IntArray = NDArray[np.intp]
 N_BINS = 5
 """Bins of a column, equally filled."""
 
-ANSWER_S = 2.0
+RESPONSE_S = 2.0
 """Columns are smoothed as a driver answers before they are binned. [s]"""
 
 BANDS_S = (1.0, 3.0, 8.0, 20.0, 60.0, 200.0)
 """Averaging times between which the bands of the movement lie. [s]"""
 
-OSCILLATION, SWING_WIDTH = "movement at the weave's period", 2
+OSCILLATION, LINE_WIDTH = "movement at the weave's period", 2
 """Name of that group, and frequencies to each side that belong to it. [-]"""
 
 LOCAL_QUANTILES = (0.1, 0.3, 0.5, 0.7, 0.9)
@@ -120,8 +120,8 @@ def statistics_of(
     for name, values in quantities.items():
         none = np.isnan(values)
         filled = _filled(values, timeline.valid)
-        answer = respond(filled, timeline.step, 0.0, ANSWER_S)
-        smooth = in_digits(start_anew(answer, filled, float(np.exp(-timeline.step / ANSWER_S)), timeline.drive))
+        answer = respond(filled, timeline.step, 0.0, RESPONSE_S)
+        smooth = in_digits(start_anew(answer, filled, float(np.exp(-timeline.step / RESPONSE_S)), timeline.drive))
         label, middle = _binned(smooth, timeline.valid, none)
         if len(middle) > 1:
             labels[name], middles[name] = label, middle
@@ -241,7 +241,7 @@ def _amplitude(offset: FloatArray, used: BoolArray, timeline: Timeline, frequenc
         if len(inside) == 0:
             continue
         at = (inside - span.start) * timeline.step
-        around = frequency + np.arange(-SWING_WIDTH, SWING_WIDTH + 1) / ((span.stop - span.start) * timeline.step)
+        around = frequency + np.arange(-LINE_WIDTH, LINE_WIDTH + 1) / ((span.stop - span.start) * timeline.step)
         lines = np.exp(-2j * np.pi * np.outer(around, at)) @ (offset[inside] - offset[inside].mean())
         squares += float(np.sum(np.abs(2.0 * lines / len(inside)) ** 2)) * len(inside)
         rows += len(inside)

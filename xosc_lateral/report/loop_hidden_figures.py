@@ -72,23 +72,23 @@ def weave_figure(result: LoopResult, finding: Finding) -> Figure:
 
 @figure_style()
 def spread_figure(result: LoopResult, finding: Finding) -> Figure:
-    """Spread over time, with the fitted course."""
+    """Spread over time, with the fitted trend."""
     effect = finding.effects[0]
     assert isinstance(effect, GrowingSpread)
-    course = moving_spread(result, SPREAD_S)
-    share = np.clip((course.time - effect.from_s) / max(effect.to_s - effect.from_s, 1e-9), 0.0, 1.0) - 0.5
+    moving = moving_spread(result, SPREAD_S)
+    share = np.clip((moving.time - effect.from_s) / max(effect.to_s - effect.from_s, 1e-9), 0.0, 1.0) - 0.5
 
     def fitted(factor: float) -> FloatArray:
         shape = max(factor, 1e-3) ** share
-        return shape * float(np.exp(np.mean(np.log(course.measured / shape))))
+        return shape * float(np.exp(np.mean(np.log(moving.measured / shape))))
 
     figure, axes = new_figure(height=3.2)
     axis = axes[0, 0]
-    _draw_statistic(axis, course)
+    _draw_statistic(axis, moving)
     low, high = (fitted(effect.factor + sign * TWO_ERRORS * effect.factor_error) for sign in (-1.0, 1.0))
-    axis.fill_between(course.time, low, high, color=ORANGE, alpha=0.25, linewidth=0)
+    axis.fill_between(moving.time, low, high, color=ORANGE, alpha=0.25, linewidth=0)
     axis.plot(
-        course.time, fitted(effect.factor), color=ORANGE, label=f"fitted: factor {effect.factor:.2f} over the drive"
+        moving.time, fitted(effect.factor), color=ORANGE, label=f"fitted: factor {effect.factor:.2f} over the drive"
     )
     axis.set_ylim(bottom=0.0)
     axis.set_ylabel(f"spread over {SPREAD_S / 60:.0f} min [m]")
@@ -100,13 +100,13 @@ def spread_figure(result: LoopResult, finding: Finding) -> Figure:
 def regime_figure(result: LoopResult, finding: Finding) -> Figure:
     """Local spread over time with the probability of the loud regime, and how often which spread occurs."""
     figure, axes = new_figure(2, 1, height=4.8, sharex=True, height_ratios=[2.2, 1.0])
-    course, on = moving_spread(result, REGIME_S), regime_probability(result)
+    moving, on = moving_spread(result, REGIME_S), regime_probability(result)
     axis = axes[0, 0]
-    axis.plot(course.time, _gapped(course, course.measured), color=DRIVES, linewidth=0.8, label="measured")
+    axis.plot(moving.time, _gapped(moving, moving.measured), color=DRIVES, linewidth=0.8, label="measured")
     loud = on > 0.5
-    top = float(course.measured.max()) * 1.05
+    top = float(moving.measured.max()) * 1.05
     axis.fill_between(
-        course.time,
+        moving.time,
         0.0,
         top,
         where=list(loud),
@@ -119,7 +119,7 @@ def regime_figure(result: LoopResult, finding: Finding) -> Figure:
     axis.set_ylabel(f"spread within {REGIME_S:.0f} s [m]")
     axis.legend(loc="upper right")
     axis = axes[1, 0]
-    axis.plot(course.time, _gapped(course, on), color=ORANGE, linewidth=0.8)
+    axis.plot(moving.time, _gapped(moving, on), color=ORANGE, linewidth=0.8)
     axis.set_ylim(-0.03, 1.03)
     axis.set_ylabel("probability of large spread [-]")
     axis.set_xlabel("time [s]")
@@ -129,13 +129,13 @@ def regime_figure(result: LoopResult, finding: Finding) -> Figure:
 @figure_style()
 def mean_figure(result: LoopResult, finding: Finding) -> Figure:
     """Moving mean with the fitted step or drift."""
-    course = moving_mean(result, MEAN_S)
+    moving = moving_mean(result, MEAN_S)
     hidden = hidden_mean(result)
     figure, axes = new_figure(height=3.2)
     axis = axes[0, 0]
-    _draw_statistic(axis, course)
+    _draw_statistic(axis, moving)
     word = "step" if isinstance(finding.effects[0], Step) else "drift"
-    axis.plot(course.time, hidden + course.measured.mean(), color=ORANGE, linewidth=2.0, label=f"fitted {word}")
+    axis.plot(moving.time, hidden + moving.measured.mean(), color=ORANGE, linewidth=2.0, label=f"fitted {word}")
     axis.set_ylabel(f"mean over {MEAN_S / 60:.0f} min [m], positive to the left")
     axis.legend()
     return figure
@@ -225,20 +225,20 @@ DRAWINGS: Mapping[str, tuple[Callable[[LoopResult, Finding], Figure], str]] = Ma
 """By kind of effect, or of finding: what draws it, and the caption."""
 
 
-def _draw_statistic(axis: Axes, course: MovingStatistic) -> None:
+def _draw_statistic(axis: Axes, moving: MovingStatistic) -> None:
     for values, color, style, label in (
-        (course.measured, DRIVES, "-", "measured"),
-        (course.before, BEFORE, "-", "profile before, all runs"),
-        (course.after, AFTER, "--", "profile after, all runs"),
+        (moving.measured, DRIVES, "-", "measured"),
+        (moving.before, BEFORE, "-", "profile before, all runs"),
+        (moving.after, AFTER, "--", "profile after, all runs"),
     ):
-        axis.plot(course.time, _gapped(course, values), color=color, linestyle=style, linewidth=1.2, label=label)
+        axis.plot(moving.time, _gapped(moving, values), color=color, linestyle=style, linewidth=1.2, label=label)
     axis.axhline(0.0, color=MUTED, linewidth=0.4)
     axis.set_xlabel("time [s]")
 
 
-def _gapped(course: MovingStatistic, values: FloatArray) -> FloatArray:
+def _gapped(moving: MovingStatistic, values: FloatArray) -> FloatArray:
     """NaN at the first second after a gap, so that no line is drawn across it."""
-    return np.where(np.diff(course.time, prepend=course.time[:1]) > GAP_S, np.nan, values)
+    return np.where(np.diff(moving.time, prepend=moving.time[:1]) > GAP_S, np.nan, values)
 
 
 def _fit_height(axis: Axes, low: float, high: float) -> None:
