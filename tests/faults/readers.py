@@ -20,7 +20,7 @@ from tests.formats.made_scenario import ROAD, declarations, entity, parameter, s
 from tests.profiles import simulated_profile
 from xosc_lateral.api.inputs import given_drives, naming
 from xosc_lateral.datasets import simulate_drive
-from xosc_lateral.driver.snippets import sample_free
+from xosc_lateral.driver.sampled_offsets import sample_free
 from xosc_lateral.driver.stream import OffsetStream
 from xosc_lateral.drives.cuts import all_runs
 from xosc_lateral.errors import DriverProfileError

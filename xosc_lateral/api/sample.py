@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from xosc_lateral.driver.profile import DriverProfile
-    from xosc_lateral.driver.snippets import SampledOffsets
+    from xosc_lateral.driver.sampled_offsets import SampledOffsets
 
 
 def sample(
@@ -61,7 +61,7 @@ def sample(
     library : path or paths
         Folders with further profiles.
     """
-    from xosc_lateral.driver.snippets import sample_context, sample_free, sample_like
+    from xosc_lateral.driver.sampled_offsets import sample_context, sample_free, sample_like
 
     if sum(choice is not None for choice in (like, context, duration)) != 1:
         raise ValueError("one of like, context and duration is needed")

@@ -2,19 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.driver.plausibility import check_offsets
-from xosc_lateral.driver.profile import DriverProfile
-from xosc_lateral.driver.sampling import sample_offsets
-from xosc_lateral.driver.seeds import child
-from xosc_lateral.driver.sensor.error import known_sensor, recorded, sensor_error
-from xosc_lateral.drives.cuts import PAPER_RULES, CutRules, all_runs, whole_run
-from xosc_lateral.drives.drive import Drive, Run
+from xosc_lateral.drives.drive import Run
 from xosc_lateral.drives.resampling import STEP
 from xosc_lateral.errors import NotEnoughDataError
 from xosc_lateral.segment import Segment
@@ -23,12 +17,6 @@ FloatArray = NDArray[np.float64]
 
 PAST, FUTURE = 30.0, 10.0
 """Context before and after a snippet that effects may look at. [s]"""
-
-MEAN_SPEED = 30.0
-"""Of a free run whose speed nobody named: about 108 km/h. [m/s]"""
-
-MAX_DURATION = 1e7
-"""Of a free run [s]: 2 GB of offsets, anything longer is a slip."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,17 +36,6 @@ class Snippet:
     def offset(self) -> FloatArray:
         """As measured, positive left, shape (n,). [m]"""
         return self.run.offset[self.rows]
-
-
-@dataclass(frozen=True, eq=False, slots=True)
-class SampledOffsets:
-    """Sampled offsets of one snippet or drive."""
-
-    drive: str
-    snippet: int
-    time: FloatArray
-    offset: FloatArray
-    offset_real: FloatArray | None
 
 
 def cut_snippets(runs: Sequence[Run], seconds: float, step: float = STEP) -> list[Snippet]:
@@ -100,81 +77,3 @@ def segment_of(run: Run, rows: slice | None = None) -> Segment:
         before=first - begin,
         after=end - last,
     )
-
-
-def sample_like(
-    profile: DriverProfile,
-    drives: Sequence[Drive],
-    seconds: float,
-    seed: int,
-    rules: CutRules = PAPER_RULES,
-    *,
-    with_sensor: bool = False,
-) -> Iterator[SampledOffsets]:
-    """For each snippet of the measured drives a sampled one of the same length, start, lane width and context."""
-    sensor = known_sensor(profile) if with_sensor else None
-    numbers = {drive.name: number for number, drive in enumerate(drives)}
-    root = np.random.SeedSequence(seed)
-    for snippet in cut_snippets(all_runs(drives, rules), seconds):
-        own = child(root, numbers[snippet.run.drive], snippet.index)
-        segment = segment_of(snippet.run, snippet.rows)
-
-        def draw(start: float, segment: Segment = segment, own: np.random.SeedSequence = own) -> FloatArray:
-            return sample_offsets(profile, segment, own, start=start)
-
-        offset = recorded(sensor, draw, len(snippet.time), float(snippet.offset[0]), STEP, own)
-        _check(offset, segment, profile, snippet.run.drive)
-        yield SampledOffsets(snippet.run.drive, snippet.index, snippet.time, offset, snippet.offset)
-
-
-def sample_context(
-    profile: DriverProfile, drives: Sequence[Drive], seed: int, *, with_sensor: bool = False
-) -> Iterator[SampledOffsets]:
-    """One free run per measured drive, under its context from its first row to its last, lane changes included."""
-    sensor = known_sensor(profile) if with_sensor else None
-    root = np.random.SeedSequence(seed)
-    for number, drive in enumerate(drives):
-        run = whole_run(drive)
-        own, segment = child(root, number), segment_of(run)
-        offset = sample_offsets(profile, segment, own)
-        offset = offset + sensor_error(sensor, offset, STEP, own)
-        _check(offset, segment, profile, drive.name)
-        yield SampledOffsets(drive.name, 0, run.time, offset, None)
-
-
-def _check(offset: FloatArray, segment: Segment, profile: DriverProfile, drive: str) -> None:
-    inside = segment.inside
-    who = f"profile {profile.name} under the context of drive {drive}"
-    check_offsets(offset, segment.lane_width[inside], who, segment.time[inside])
-
-
-def sample_free(
-    profile: DriverProfile,
-    duration: float,
-    seed: int,
-    *,
-    speed: float = MEAN_SPEED,
-    lane_width: float | None = None,
-    with_sensor: bool = False,
-) -> Iterator[SampledOffsets]:
-    """One free run in even traffic: constant speed, no other context.
-
-    Parameters
-    ----------
-    duration : float
-        [s]
-    speed : float
-        [m/s]
-    lane_width : float, optional
-        The profile's own where not given. [m]
-    """
-    if not 0 < duration < MAX_DURATION:
-        raise ValueError(f"a free run of {duration} s, expected more than 0 and less than {MAX_DURATION:g} s")
-    n = round(duration / profile.model.step) + 1
-    time: FloatArray = profile.model.step * np.arange(n, dtype=np.float64)
-    width = profile.lane_width if lane_width is None else lane_width
-    segment = Segment(time=time, lane_width=np.full(n, width), speed=np.full(n, speed))
-    own = child(np.random.SeedSequence(seed), 0)
-    offset = sample_offsets(profile, segment, own)
-    offset = offset + sensor_error(known_sensor(profile) if with_sensor else None, offset, STEP, own)
-    yield SampledOffsets(profile.name, 0, time, offset, None)

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from xosc_lateral.driver.snippets import SampledOffsets
+from xosc_lateral.driver.sampled_offsets import SampledOffsets
 
 
 def offset_columns(sampled: Sequence[SampledOffsets], *, snippets: bool) -> dict[str, Any]:

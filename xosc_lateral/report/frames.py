@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import Figure
 
-    from xosc_lateral.driver.snippets import SampledOffsets
+    from xosc_lateral.driver.sampled_offsets import SampledOffsets
     from xosc_lateral.enrich.result import Enriched
 
 
