@@ -4,9 +4,7 @@ import numpy as np
 import pytest
 from scipy.linalg import toeplitz
 
-from xosc_lateral.identification.autocorrelation import fit_autoregression, unbiased
-from xosc_lateral.identification.movement_process import positions_in_run
-from xosc_lateral.identification.whitening import Whitener
+from xosc_lateral.identification.autocorrelation import Whitener, fit_autoregression, positions_in_run, unbiased
 
 
 def second_order(n: int, seed: int) -> np.ndarray:

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from xosc_lateral.drives.drive import Drive
-from xosc_lateral.identification.movement_process import moving_sum, positions_in_run
+from xosc_lateral.identification.autocorrelation import moving_sum, positions_in_run
 from xosc_lateral.identification.timeline import (
     coarse_all,
     coarse_mean,

@@ -1,30 +1,39 @@
-"""The autocorrelation of the movement that no effect explains: fitted, and what short runs do to the fit."""
+"""The movement that no effect explains as an autoregression, and whitening by it, for generalised least squares.
+
+A heterogeneous autoregression [1]_: the last seconds one by one, and the means of longer and longer stretches before
+them. It knows the wander of a minute with few parameters. Whitening is exact within each run: the first rows use the
+lower-order predictors of the same process (the Levinson recursion stepped down [2]_), and runs are independent.
+
+References
+----------
+.. [1] F. Corsi, "A simple approximate long-memory model of realized volatility", J. Financial Econometrics 7, 2009.
+.. [2] P. Brockwell, R. Davis, "Time Series: Theory and Methods", 1991, section 5.2.
+"""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.identification.movement_process import (
-    MAX_REFLECTION,
-    MovementProcess,
-    positions_in_run,
-    reflections,
-    stepped_down,
-)
-from xosc_lateral.identification.whitening import Whitener
+from xosc_lateral.mask import stretches_of
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
 IntArray = NDArray[np.intp]
+
+MAX_REFLECTION = 0.999
+"""Reflection coefficients are kept inside the unit circle: the process is stationary. [-]"""
 
 ENOUGH_ROWS = 0.5
 """The memory is the longest for which this share of the rows has so much past in its own run. [-]"""
 
 ROWS_PER_COEFFICIENT = 20
 """Fewer rows than this per coefficient shorten the memory. [-]"""
+
 
 START_ROWS = 10.0
 """First rows of runs have errors of their own as far as there are more of them than this."""
@@ -34,6 +43,73 @@ BIAS_DRAWS = 4
 
 BIAS_SEED = 0
 """The same numbers each time: fits with and without a term differ by the term alone."""
+
+
+@dataclass(frozen=True, eq=False)
+class MovementProcess:
+    """x_t = sum_k a_k x_{t-k} + sd * white.
+
+    Parameters
+    ----------
+    lags : tuple of array
+        Coefficients of the best predictors from 0, 1, ... p past values; the last one is the process itself.
+    deviations : array, shape (p + 1,)
+        Standard deviation of each predictor's error.
+    """
+
+    lags: tuple[FloatArray, ...]
+    deviations: FloatArray
+
+    @property
+    def order(self) -> int:
+        """Number of past values, p."""
+        return len(self.lags) - 1
+
+    @property
+    def polynomial(self) -> FloatArray:
+        """(1, -a_1, ..., -a_p) / sd, shape (p + 1,): turns the process into white noise of variance 1. [1/m]"""
+        return np.asarray(np.concatenate([[1.0], -self.lags[-1]]) / self.deviations[-1], dtype=np.float64)
+
+    @cached_property
+    def start(self) -> FloatArray:
+        """Whitening of the first p rows of a run, lower triangular, shape (p, p). [1/m]"""
+        matrix = np.zeros((self.order, self.order))
+        for row in range(self.order):
+            matrix[row, row] = 1.0
+            matrix[row, :row] = -self.lags[row][::-1]
+            matrix[row] /= self.deviations[row]
+        return matrix
+
+    def simulate(self, n: int, rng: np.random.Generator, *, runs: int = 1) -> FloatArray:
+        """Stationary sample paths, shape (runs, n). [m]"""
+        from scipy.signal import lfilter
+
+        warm = 20 * self.order + 200
+        noise = rng.normal(size=(runs, n + warm))
+        return np.asarray(lfilter([1.0], self.polynomial, noise, axis=1)[:, warm:])
+
+
+def positions_in_run(valid: BoolArray) -> IntArray:
+    """How many valid rows in a row came before each row, shape (n,); -1 where invalid. [-]"""
+    rows = np.arange(len(valid))
+    start = np.where(valid & ~np.concatenate([[False], valid[:-1]]), rows, 0)
+    return np.where(valid, rows - np.maximum.accumulate(start), -1)
+
+
+def moving_sum(weights: FloatArray, values: FloatArray) -> FloatArray:
+    """sum_k weights[k] values[t - k], zeros before the start; shape and precision of `values`, (n,) or (n, k)."""
+    from scipy.signal import oaconvolve
+
+    weights = weights.astype(values.dtype)
+    if values.ndim == 2 and values.shape[1] == 0:
+        return np.zeros(values.shape)
+    if len(weights) > 16 and len(values) > len(weights):
+        series = np.ascontiguousarray(np.atleast_2d(values.T))
+        return np.asarray(oaconvolve(series, weights[None], axes=1)[:, : len(values)].T.reshape(values.shape))
+    result = weights[0] * values
+    for lag, weight in enumerate(weights[1:], start=1):
+        result[lag:] += weight * values[:-lag]
+    return np.asarray(result)
 
 
 def fit_autoregression(
@@ -83,7 +159,30 @@ def fit_autoregression(
         np.full(high - low, size / (high - low))
         for size, (low, high) in zip(sizes[order:], pairwise(edges), strict=True)
     ]
-    return stepped_down(np.concatenate(lags), max(variance, 1e-300))
+    return _stepped_down(np.concatenate(lags), max(variance, 1e-300))
+
+
+def _reflections(lags: FloatArray) -> FloatArray:
+    """Reflection coefficients, first to last, kept inside the unit circle: the Levinson recursion backwards."""
+    reflections = []
+    current = lags.copy()
+    for order in range(len(lags), 0, -1):
+        last = float(np.clip(current[order - 1], -MAX_REFLECTION, MAX_REFLECTION))
+        reflections.append(last)
+        current = (current[: order - 1] + last * current[order - 2 :: -1][: order - 1]) / (1.0 - last**2)
+    return np.array(reflections[::-1])
+
+
+def _stepped_down(lags: FloatArray, variance: float) -> MovementProcess:
+    """All lower-order predictors, forwards from safe reflections."""
+    predictors: list[FloatArray] = [np.zeros(0)]
+    shares = [1.0]
+    for last in _reflections(lags):
+        before = predictors[-1]
+        predictors.append(np.concatenate([before - last * before[::-1], [last]]))
+        shares.append(shares[-1] * (1.0 - last**2))
+    deviations = np.sqrt(variance * np.asarray(shares) / shares[-1])
+    return MovementProcess(tuple(predictors), deviations)
 
 
 def start_factors(rows: FloatArray, valid: BoolArray, order: int) -> FloatArray:
@@ -120,7 +219,7 @@ def unbiased(
 
     A level that is estimated takes part of the slow movement with it, so that the process looks less persistent than it
     is (Nickell's bias: the errors of effects in runs of a minute come out an eighth too small). The same is done to
-    drives simulated from the fitted process, and the difference taken off: indirect inference for panels [1]_.
+    drives simulated from the fitted process, and the difference taken off: indirect inference for panels [3]_.
 
     Parameters
     ----------
@@ -131,7 +230,7 @@ def unbiased(
 
     References
     ----------
-    .. [1] C. Gourieroux, P. Phillips, J. Yu, "Indirect inference for dynamic panel models", J. Econometrics 157, 2010.
+    .. [3] C. Gourieroux, P. Phillips, J. Yu, "Indirect inference for dynamic panel models", J. Econometrics 157, 2010.
     """
     if process.order == 0:
         return process
@@ -148,6 +247,104 @@ def unbiased(
     own = 2.0 * float(np.log(process.deviations[-1]))
     for share in (1.0, 0.5, 0.25):
         better = process.lags[-1] + share * (process.lags[-1] - lags)
-        if np.abs(reflections(better)).max() < MAX_REFLECTION:
-            return stepped_down(better, float(np.exp(own + share * (own - log_variance))))
+        if np.abs(_reflections(better)).max() < MAX_REFLECTION:
+            return _stepped_down(better, float(np.exp(own + share * (own - log_variance))))
     return process
+
+
+@dataclass(frozen=True, eq=False)
+class Whitener:
+    """Turns series on the grid into independent rows of variance 1, the drives' own levels taken out.
+
+    Parameters
+    ----------
+    process : MovementProcess
+        Of the movement divided by `scale`.
+    valid : bool array, shape (n,)
+    drive : int array, shape (n,)
+        Which level a row has; increasing.
+    scale : array, shape (n,)
+        Factor on the movement at each row.
+    runs : tuple of slice, optional
+        Rows of each run, where they stand side by side without anything invalid in between.
+    """
+
+    process: MovementProcess
+    valid: BoolArray
+    drive: IntArray
+    scale: FloatArray
+    runs: tuple[slice, ...] = ()
+
+    @cached_property
+    def compact(self) -> Whitener:
+        """The same for the valid rows alone, put side by side: half the work where drives are short."""
+        ends = np.cumsum([run.stop - run.start for run in self._runs])
+        runs = tuple(
+            slice(int(end) - (run.stop - run.start), int(end)) for run, end in zip(self._runs, ends, strict=True)
+        )
+        _, drive = np.unique(self.drive[self.valid], return_inverse=True)
+        valid = np.ones(int(self.valid.sum()), dtype=np.bool_)
+        return Whitener(self.process, valid, drive.astype(np.intp), self.scale[self.valid], runs)
+
+    @cached_property
+    def _runs(self) -> list[slice]:
+        if self.runs:
+            return list(self.runs)
+        return stretches_of(self.valid)
+
+    @cached_property
+    def _edges(self) -> IntArray:
+        return np.searchsorted(self.drive, np.arange(int(self.drive.max()) + 1)).astype(np.intp)
+
+    def by_position(self, values: FloatArray) -> FloatArray:
+        """What belongs to a row by its place in its run, shape (n,); `values`: shape (order + 1,), the last for all
+        later rows."""
+        return values[np.clip(positions_in_run(self.valid), 0, self.process.order)]
+
+    @property
+    def deviations(self) -> FloatArray:
+        """What each row is divided by, predictor and scale, shape (n,). [m]"""
+        return self.by_position(self.process.deviations) * self.scale
+
+    @cached_property
+    def ones(self) -> FloatArray:
+        """A level of 1 m, whitened, shape (n,). [-]"""
+        return self.white(np.ones(len(self.valid)))
+
+    @cached_property
+    def power(self) -> FloatArray:
+        """What every drive tells of its level: 1 / variance, > 0, shape (drives,). [1/m2]"""
+        return np.add.reduceat(self.ones**2, self._edges)
+
+    def white(self, values: FloatArray) -> FloatArray:
+        """Whitened, levels still in; 0 at invalid rows; shape and precision of `values`, (n,) or (n, k)."""
+        columns = values[:, None] if values.ndim == 1 else values
+        scaled = columns / self.scale[:, None].astype(columns.dtype)
+        start = self.process.start.astype(columns.dtype)
+        if not self.runs:
+            scaled = np.where(self.valid[:, None], scaled, 0.0)
+        result = moving_sum(self.process.polynomial, scaled)
+        for run in self._runs:
+            stop = min(run.stop, run.start + self.process.order)
+            known = stop - run.start
+            result[run.start : stop] = start[:known, :known] @ scaled[run.start : stop]
+        if not self.runs:
+            result[~self.valid] = 0.0
+        return np.asarray(result[:, 0] if values.ndim == 1 else result)
+
+    def without_levels(self, white: FloatArray) -> FloatArray:
+        """Take the drives' levels out of whitened rows [-], shape (n,) or (n, k)."""
+        columns = white[:, None] if white.ndim == 1 else white
+        ones, power = (of.astype(columns.dtype)[:, None] for of in (self.ones, np.maximum(self.power, 1e-30)))
+        mean = np.add.reduceat(ones * columns, self._edges, axis=0) / power
+        result = columns - ones * mean[self.drive]
+        return np.asarray(result[:, 0] if white.ndim == 1 else result)
+
+    def levels(self, values: FloatArray) -> FloatArray:
+        """Level of every drive by generalised least squares, shape (drives,). [m]"""
+        sums = np.add.reduceat(self.ones * self.white(values), self._edges)
+        return np.asarray(sums / np.maximum(self.power, 1e-300))
+
+    def rows(self, values: FloatArray) -> FloatArray:
+        """Whitened, levels out; shape of `values` [m], the rows of variance 1. [-]"""
+        return self.without_levels(self.white(values))

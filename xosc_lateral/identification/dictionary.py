@@ -11,10 +11,10 @@ from msgspec import structs
 from numpy.typing import NDArray
 
 from xosc_lateral.driver.effects import ColumnEffect
+from xosc_lateral.identification.autocorrelation import Whitener
 from xosc_lateral.identification.candidates import Candidate
 from xosc_lateral.identification.significance import MANY_DRIVES
 from xosc_lateral.identification.timeline import COARSE, Timeline, coarse_mean, coarse_middle, start_anew
-from xosc_lateral.identification.whitening import Whitener
 
 FloatArray = NDArray[np.float64]
 SingleArray = NDArray[np.float32]

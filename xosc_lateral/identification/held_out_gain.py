@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from xosc_lateral.identification.autocorrelation import Whitener
 from xosc_lateral.identification.log_scale import CLIP, own_levels
 from xosc_lateral.identification.regression import Coarse, Fitted, joined, known_scale_of
-from xosc_lateral.identification.whitening import Whitener
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]

@@ -24,10 +24,9 @@ from itertools import islice
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.identification.autocorrelation import fit_autoregression
+from xosc_lateral.identification.autocorrelation import Whitener, fit_autoregression
 from xosc_lateral.identification.regression import MIN_DRIFT_S, ORDER, Coarse, Fitted
 from xosc_lateral.identification.significance import upper_tail
-from xosc_lateral.identification.whitening import Whitener
 
 FloatArray = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]

@@ -8,10 +8,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.identification.autocorrelation import fit_autoregression
-from xosc_lateral.identification.movement_process import MovementProcess
+from xosc_lateral.identification.autocorrelation import MovementProcess, Whitener, fit_autoregression
 from xosc_lateral.identification.regression import LONGEST, ORDER, Coarse
-from xosc_lateral.identification.whitening import Whitener
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]

@@ -21,7 +21,7 @@ from msgspec import structs
 from numpy.typing import NDArray
 
 from xosc_lateral.driver.effects import Acts, ColumnEffect
-from xosc_lateral.identification.autocorrelation import fit_autoregression, start_factors, unbiased
+from xosc_lateral.identification.autocorrelation import Whitener, fit_autoregression, start_factors, unbiased
 from xosc_lateral.identification.least_squares import clustered_least_squares
 from xosc_lateral.identification.log_scale import (
     bounded,
@@ -31,7 +31,6 @@ from xosc_lateral.identification.log_scale import (
     scoring_step,
 )
 from xosc_lateral.identification.timeline import Timeline, coarse_all, coarse_mean, coarse_middle, means_by_drive
-from xosc_lateral.identification.whitening import Whitener
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
