@@ -2,7 +2,7 @@
 
 References
 ----------
-.. [1] L. Piegl, W. Tiller, "The NURBS Book", 2nd ed., 1997, eqs. 2.5 (Cox and de Boor) and 4.1 (the curve).
+.. [1] L. Piegl, W. Tiller, "The NURBS Book", 2nd ed., 1997, eq. 4.1.
 """
 
 from __future__ import annotations
@@ -10,12 +10,17 @@ from __future__ import annotations
 import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import atan2, hypot, nan
+from math import hypot, nan
+
+import numpy as np
+from numpy.typing import NDArray
 
 from xosc_lateral.playback.angles import wrap
 from xosc_lateral.playback.paths.base import PathPoint
 from xosc_lateral.playback.paths.polyline import Corner, PolylinePath
 from xosc_lateral.playback.transition import EPSILON
+
+FloatArray = NDArray[np.float64]
 
 SAMPLE = 1.0
 """Length of the control polygon per sample. [m]"""
@@ -45,16 +50,18 @@ class NurbsPath:
     controls : sequence of Control
         At least `order`.
     knots : sequence of float
-        As many as control points and order together.
+        As many as control points and order together, none smaller than the one before, spanning a curve.
     order : int
     """
 
     def __init__(self, controls: Sequence[Control], knots: Sequence[float], order: int) -> None:
+        from scipy.interpolate import BSpline  # takes a while to import, and few scenarios have a curve
+
         self.controls = tuple(controls)
-        self.knots = tuple(knots)
-        self.order = order
-        self._parameters: list[float] = []
-        self._line = self._sample()
+        self._knots, self._degree = np.asarray(knots, dtype=np.float64), order - 1
+        weighed = np.array([(c.weight * c.x, c.weight * c.y, c.weight) for c in self.controls])
+        self._curve = BSpline(self._knots, weighed, self._degree)
+        self._parameters, self._line = self._sample()
         self.length = self._line.length
         self.start_time = self.controls[0].time
         self.end_time = self.controls[-1].time
@@ -64,7 +71,7 @@ class NurbsPath:
         i, u = self._line._piece(s)
         following = min(i + 1, len(self._parameters) - 1)
         parameter = self._parameters[i] + u * (self._parameters[following] - self._parameters[i])
-        x, y, _ = self.point(parameter)
+        ((x, y),) = self.points(np.array([parameter])).tolist()
         sampled = self._line.at(s)
         return PathPoint(x, y, nan, sampled.heading, nan, nan, sampled.heading)
 
@@ -89,54 +96,53 @@ class NurbsPath:
         dt = self._line.corners[i + 1].time - self._line.corners[i].time
         return (self._line.lengths[i + 1] - self._line.lengths[i]) / dt if dt > EPSILON else 0.0
 
-    def point(self, parameter: float) -> tuple[float, float, list[float]]:
-        """x, y and the share of each control point at a parameter."""
-        # Outside of these knots the shares don't sum to 1 (an unclamped curve begins after its first knot).
-        first, last = self.knots[self.order - 1], self.knots[len(self.controls)]
-        t = min(max(parameter, first), max(first, last - EPSILON))
-        shares = basis(t, self.order, self.knots)
-        total = sum(share * control.weight for share, control in zip(shares, self.controls, strict=True))
-        x = sum(share * c.weight * c.x for share, c in zip(shares, self.controls, strict=True)) / total
-        y = sum(share * c.weight * c.y for share, c in zip(shares, self.controls, strict=True)) / total
-        return x, y, shares
+    def points(self, parameters: FloatArray) -> FloatArray:
+        """x and y at parameters of shape (n,), shape (n, 2). [m]"""
+        curve = self._curve(self._inside(parameters))
+        return np.asarray(curve[:, :2] / curve[:, 2:])
 
     # ---- in detail ---------------------------------------------------------------------------------------------------
-    def _sample(self) -> PolylinePath:
+    def _inside(self, parameters: FloatArray) -> FloatArray:
+        """Within the knots between which shares sum to 1 (an unclamped curve begins after its first knot)."""
+        first, last = self._knots[self._degree], self._knots[len(self.controls)]
+        return np.clip(parameters, first, max(first, last - EPSILON))
+
+    def _sample(self) -> tuple[FloatArray, PolylinePath]:
         polygon = sum(hypot(b.x - a.x, b.y - a.y) for a, b in itertools.pairwise(self.controls))
         steps = min(int(1 + polygon / SAMPLE), MOST_SAMPLES)
-        step = self.knots[-1] / steps
-        self._parameters = [i * step for i in range(steps + 1)]
-        samples = [self.point(t) for t in self._parameters]
-        delta = min(_TANGENT_STEP, step)
-        beside = [self.point(t + delta if i < steps else t - delta) for i, t in enumerate(self._parameters)]
-        times = self._times([shares for _, _, shares in beside])
-        corners = [
-            Corner(x, y, heading=self._heading(i, x, y, step, steps), time=time)
-            for i, ((x, y, _), time) in enumerate(zip(samples, times, strict=True))
-        ]
-        return PolylinePath(corners, follow=True)
+        step = float(self._knots[-1]) / steps
+        parameters = np.arange(steps + 1, dtype=np.float64) * step
+        places = self.points(parameters)
+        headings, times = self._headings(parameters, places, step), self._times(parameters, step)
+        rows = zip(places.tolist(), headings, times, strict=True)
+        corners = [Corner(x, y, heading=wrap(heading), time=time) for (x, y), heading, time in rows]
+        return parameters, PolylinePath(corners, follow=True)
 
-    def _heading(self, i: int, x: float, y: float, step: float, steps: int) -> float:
-        delta = min(_TANGENT_STEP, step)
-        forward = i < steps
-        u, v, _ = self.point(self._parameters[i] + (delta if forward else -delta))
-        dx, dy = (u - x, v - y) if forward else (x - u, y - v)
-        if hypot(dx, dy) < EPSILON:
-            u, v, _ = self.point(self._parameters[i] + (step if forward else -step))
-            dx, dy = (u - x, v - y) if forward else (x - u, y - v)
-        return wrap(atan2(dy, dx))
+    def _headings(self, parameters: FloatArray, places: FloatArray, step: float) -> list[float]:
+        """Directions towards a point just ahead, at the end from one just behind; a sample on where these coincide."""
+        ahead = np.where(np.arange(len(parameters)) < len(parameters) - 1, 1.0, -1.0)
+        way = ahead[:, None] * (self.points(parameters + ahead * min(_TANGENT_STEP, step)) - places)
+        longer = ahead[:, None] * (self.points(parameters + ahead * step) - places)
+        way = (
+            np.where(np.hypot(way[:, :1], way[:, 1:]) < EPSILON, longer, way) + 0.0
+        )  # no minus zero: it has a direction
+        return [float(angle) for angle in np.arctan2(way[:, 1], way[:, 0])]
 
-    def _times(self, shares: Sequence[Sequence[float]]) -> list[float]:
+    def _times(self, parameters: FloatArray, step: float) -> list[float]:
         """Times of the samples: those of the control points where each weighs most, evenly in between."""
-        count = len(self.controls)
-        weights = [[row[i] for row in shares] for i in range(count)]
-        peak_parameters = [self._parameters[weight.index(max(weight))] for weight in weights]
+        from scipy.interpolate import BSpline
+
+        delta = min(_TANGENT_STEP, step)
+        beside = np.r_[parameters[:-1] + delta, parameters[-1] - delta]
+        shares = BSpline.design_matrix(self._inside(beside), self._knots, self._degree).tocsc()
+        shares.data = shares.data.round(12)  # of two samples as good as each other the first
+        peaks = parameters[np.asarray(shares.argmax(axis=0)).ravel()].tolist()
         times, k = [], 0
-        for parameter in self._parameters:
-            while k < count - 2 and parameter >= peak_parameters[k + 1]:
+        for parameter in parameters.tolist():
+            while k < len(peaks) - 2 and parameter >= peaks[k + 1]:
                 k += 1
-            span = peak_parameters[k + 1] - peak_parameters[k]
-            share = (parameter - peak_parameters[k]) / span if span > 0.0 else 1.0
+            span = peaks[k + 1] - peaks[k]
+            share = (parameter - peaks[k]) / span if span > 0.0 else 1.0
             a, b = self.controls[k].time, self.controls[k + 1].time
             times.append(a + share * (b - a))
         return times
@@ -146,19 +152,3 @@ def clamped_knots(count: int, order: int) -> tuple[float, ...]:
     """Even knots from 0 to 1 that make the curve begin and end in its first and last control point."""
     inner = max(count + 1 - order, 1)
     return tuple(min(max((i + 1 - order) / inner, 0.0), 1.0) for i in range(count + order))
-
-
-def basis(t: float, order: int, knots: Sequence[float]) -> list[float]:
-    """All B-spline basis functions of an order at a parameter, by the recursion of Cox and de Boor."""
-    row = [1.0 if a <= t < b else 0.0 for a, b in itertools.pairwise(knots)]
-    for k in range(2, order + 1):
-        row = [
-            _ratio(t - knots[i], knots[i + k - 1] - knots[i]) * row[i]
-            + _ratio(knots[i + k] - t, knots[i + k] - knots[i + 1]) * row[i + 1]
-            for i in range(len(knots) - k)
-        ]
-    return row
-
-
-def _ratio(part: float, whole: float) -> float:
-    return part / whole if whole > 0.0 else 0.0
