@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.errors import DriverProfileError
-from xosc_lateral.limits import DISTANCES, OFFSET_LANES, context_range
+from xosc_lateral.limits import DISTANCES, OFFSET_LANES, Range, context_range
 from xosc_lateral.segment import Segment
 
 if TYPE_CHECKING:
@@ -91,9 +91,12 @@ def first_implausible(name: str, values: FloatArray) -> int | None:
     return int(wrong[0]) if len(wrong) else None
 
 
-def implausible_rows(name: str, values: FloatArray) -> NDArray[np.bool_]:
-    """Which context values can't be, shape (n,) as `values` [unit of the column]; NaN ("there is none") can."""
-    believed = context_range(name)
+def implausible_rows(name: str, values: FloatArray, believed: Range | None = None) -> NDArray[np.bool_]:
+    """Which values can't be, shape (n,) as `values` [unit of the column]; NaN ("there is none") can.
+
+    By what a context column of that name is believed to be, or by the range given.
+    """
+    believed = believed or context_range(name)
     return (values < believed.low) | ((values > believed.high) & ~nobody(name, values))
 
 

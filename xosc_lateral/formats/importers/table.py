@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, TypeVar, cast
 
 import numpy as np
 
-from xosc_lateral.driver.plausibility import nobody
+from xosc_lateral.driver.plausibility import implausible_rows
 from xosc_lateral.drives.cleaning import LANE_WIDTHS, MAX_OUTSIDE
 from xosc_lateral.errors import FormatError, NotEnoughDataError
 from xosc_lateral.formats.hashes import parsed_hash
@@ -116,7 +116,7 @@ def _refuse_nonsense(table: pd.DataFrame, path: Path) -> None:
             continue
         values = table[name].to_numpy(dtype=np.float64)
         believed = {"time": Range(-TIME.value, TIME.value, TIME.reason), **_POSITIONS}.get(name, context_range(name))
-        wrong = kept & ((values < believed.low) | (values > believed.high)) & ~nobody(name, values)
+        wrong = kept & implausible_rows(name, values, believed)
         if name in _POSITIONS or name == "time":
             wrong |= kept & np.isnan(values)
         allowed = 0.0 if name == "time" else MAX_OUTSIDE
