@@ -10,14 +10,13 @@ motorway, and cameras do see worse at some.
 from __future__ import annotations
 
 import argparse
-import re
 from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.formats.atomic import write_atomically
+from benchmarks.markers import write_between_markers
 from xosc_lateral.formats.importers.dlr_ht import STEP, fit_reference_line, import_dlr_ht, read_tracks
 
 FloatArray = NDArray[np.float64]
@@ -80,9 +79,7 @@ def main() -> None:
     text = loud_pieces(args.source)
     print(text)
     if args.write is not None:
-        page = args.write.read_text(encoding="utf-8")
-        marked = re.compile(r"(<!-- camera-noise: begin -->\n).*(<!-- camera-noise: end -->)", re.DOTALL)
-        write_atomically(args.write, marked.sub(lambda match: f"{match[1]}{text}\n{match[2]}", page))
+        write_between_markers(args.write, text, "camera-noise")
 
 
 if __name__ == "__main__":

@@ -9,12 +9,11 @@ Starts from a two-level model of the same drives, as `make loop-dlr` does.
 from __future__ import annotations
 
 import argparse
-import re
 import time
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from xosc_lateral.formats.atomic import write_atomically
+from benchmarks.markers import write_between_markers
 from xosc_lateral.formats.drives import read_drives
 from xosc_lateral.identification.close import LoopResult
 from xosc_lateral.identification.lack_of_fit import LackOfFit, lack_of_fit_of
@@ -46,9 +45,7 @@ def main() -> None:
     text = f"```\n{loop_text(result, lack_of_fit)}\n```\n\nIn {took:.0f} s.\n\n{group_table(lack_of_fit)}"
     print(text)
     if args.write is not None:
-        page = args.write.read_text(encoding="utf-8")
-        marked = re.compile(r"(<!-- loop-dlr: begin -->\n).*(<!-- loop-dlr: end -->)", re.DOTALL)
-        write_atomically(args.write, marked.sub(lambda match: f"{match[1]}{text}\n{match[2]}", page))
+        write_between_markers(args.write, text, "loop-dlr")
     if args.figures is not None:
         draw(result, lack_of_fit, args.figures)
 
