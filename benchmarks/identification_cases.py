@@ -13,7 +13,8 @@ from benchmarks.identification_drives import answered, long_drive, quantity, sho
 from xosc_lateral.identification.regression import Coarse, fit_model
 from xosc_lateral.identification.timeline import coarse_mean
 
-SETS = tuple(name + suffix for suffix in ("", "_2", "_3", "_4", "_5") for name in ("design", "validation", "test"))
+ROUNDS = ("", "_2", "_3", "_4", "_5", "_6")
+SETS = tuple(name + suffix for suffix in ROUNDS for name in ("design", "validation", "test"))
 PROTOCOL = Path(__file__).parents[1] / "docs" / "validation" / "identification.toml"
 
 

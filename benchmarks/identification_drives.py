@@ -18,6 +18,7 @@ from xosc_lateral.datasets.movements import (
     bursts,
     clustered,
     delayed_control,
+    free_play,
     heavy_tailed,
     long_memory,
     lopsided,
@@ -42,6 +43,7 @@ MOVEMENTS = {
     "oscillating": oscillating,
     "sawtooth": sawtooth,
     "long_memory": long_memory,
+    "free_play": free_play,
 }
 FOLLOWING = ["steering_wheel_angle", "yaw_rate"]
 

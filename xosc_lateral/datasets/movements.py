@@ -180,6 +180,18 @@ def long_memory(n: int, rng: np.random.Generator) -> np.ndarray:
     return 0.25 * _scaled(_smooth(sum(parts, start=np.zeros(n))))
 
 
+def free_play(n: int, rng: np.random.Generator) -> np.ndarray:
+    """A damped mass under coloured pushes, free within a play and held by a spring beyond it. Shape (n,). [m]"""
+    play = rng.uniform(0.1, 0.2)
+    push = 0.07 * _wander(n, rng, rng.uniform(1.0, 2.0))
+    place, speed = np.zeros(n), np.zeros(n)
+    for t in range(1, n):
+        beyond = place[t - 1] - np.clip(place[t - 1], -play, play)
+        speed[t] = speed[t - 1] + PACE * (push[t] - 0.6 * speed[t - 1] - 0.4 * beyond)
+        place[t] = place[t - 1] + PACE * speed[t]
+    return place
+
+
 def in_regimes(n: int, rng: np.random.Generator) -> np.ndarray:
     """For a minute at a time, pushed 2.5 times as hard; and then quiet for two. Shape (n,). [m]"""
     loud = np.ones(n)
