@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from benchmarks.identification_drives import answered, long_drive, quantity, short_drives, unit
+from benchmarks.identification_drives import long_drive, quantity, responded, short_drives, unit
 from xosc_lateral.identification.regression import Coarse, fit_model
 from xosc_lateral.identification.timeline import coarse_mean
 
@@ -47,7 +47,7 @@ def bare_drive(case: dict[str, Any], protocol: dict[str, Any], seconds: float) -
 
 
 def oracle(case: dict[str, Any], table: pd.DataFrame, coarse: Coarse, seed: int) -> dict[str, float]:
-    """z of the planted answer itself in the same regression, its timing told."""
+    """z of the planted response itself in the same regression, its timing told."""
     from dataclasses import dataclass
 
     from xosc_lateral.identification.terms.mean import MeanTerm
@@ -60,9 +60,9 @@ def oracle(case: dict[str, Any], table: pd.DataFrame, coarse: Coarse, seed: int)
         rows = [np.arange(len(table))]
     fine = np.zeros(len(coarse.timeline))
     for span, own in zip(coarse.timeline.spans, rows, strict=True):
-        answer = answered(values[own], time_[own], np.random.default_rng([7, seed]))
+        response = responded(values[own], time_[own], np.random.default_rng([7, seed]))
         grid = time_[own][0] + coarse.timeline.step * (np.arange(span.stop - span.start) - 75)
-        fine[span] = np.interp(grid, time_[own], answer)
+        fine[span] = np.interp(grid, time_[own], response)
     told = coarse_mean(fine)
     told = told - told[coarse.valid].mean()
 

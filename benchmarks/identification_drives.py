@@ -1,7 +1,7 @@
 """Drives with planted effects for the protocol of proof (docs/validation/identification.toml).
 
 Effects are planted on the table itself: what the car does is a movement that knows nothing of the context, plus the
-answer to a quantity through a delay and two first-order lags, which no candidate of the method is.
+response to a quantity through a delay and two first-order lags, which no candidate of the method is.
 """
 
 from __future__ import annotations
@@ -125,7 +125,7 @@ def unit(values: Values) -> Values:
     return (values - middle) / max(high - low, 1e-12)
 
 
-def answered(values: Values, time: Values, rng: np.random.Generator) -> Values:
+def responded(values: Values, time: Values, rng: np.random.Generator) -> Values:
     """Through a delay between 1.5 s ahead and 0.8 s behind, and lags of 0.8-3 s and 0.3 s."""
     step = float(np.median(np.diff(time)))
     grid = np.arange(time[0], time[-1] + step, step)
@@ -137,20 +137,20 @@ def answered(values: Values, time: Values, rng: np.random.Generator) -> Values:
 
 
 def with_mean(table: pd.DataFrame, kind: str, size: float, seed: int) -> pd.DataFrame:
-    """Plant an effect on the mean, drive by drive with one driver's answer."""
+    """Plant an effect on the mean, drive by drive with one driver's response."""
     shift = np.zeros(len(table))
     values = unit(quantity(kind, table))
     drives = table["drive"].to_numpy() if "drive" in table else np.zeros(len(table), dtype=int)
     for name in pd.unique(drives):
         rows = drives == name
-        shift[rows] = size * answered(values[rows], table["time"].to_numpy()[rows], np.random.default_rng([7, seed]))
+        shift[rows] = size * responded(values[rows], table["time"].to_numpy()[rows], np.random.default_rng([7, seed]))
     return table.assign(offset=table["offset"] + shift) if "offset" in table else moved(table, shift)
 
 
 def with_spread(table: pd.DataFrame, kind: str, factor: float, seed: int) -> pd.DataFrame:
     """Plant an effect on the size of the movement."""
     time, rng = table["time"].to_numpy(), np.random.default_rng([8, seed])
-    strength = np.log(factor) * unit(answered(unit(quantity(kind, table)), time, rng))
+    strength = np.log(factor) * unit(responded(unit(quantity(kind, table)), time, rng))
     offset = offset_of(table)
     return moved(table, (offset - np.median(offset)) * (np.exp(strength) - 1.0))
 

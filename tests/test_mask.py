@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from xosc_lateral.mask import stretches_of
+from xosc_lateral.mask import true_slices
 
 
 @pytest.mark.parametrize(
@@ -14,4 +14,4 @@ from xosc_lateral.mask import stretches_of
 )
 def test_stretches_are_the_longest_slices_of_true(mask, expected):
     values = np.array([one == "1" for one in mask], dtype=bool)
-    assert [(part.start, part.stop) for part in stretches_of(values)] == expected
+    assert [(part.start, part.stop) for part in true_slices(values)] == expected

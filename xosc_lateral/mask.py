@@ -1,4 +1,4 @@
-"""Stretches of True in a mask."""
+"""Where a mask is True."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 
-def stretches_of(mask: NDArray[np.bool_]) -> list[slice]:
+def true_slices(mask: NDArray[np.bool_]) -> list[slice]:
     """The longest slices in which a mask is True throughout, in order.
 
     Parameters

@@ -145,10 +145,10 @@ def test_a_preference_by_lane_is_a_level_for_each_lane(motorway: Context) -> Non
 
 def test_a_lag_is_exponential_and_begins_settled() -> None:
     step = np.where(np.arange(N) * STEP < 10.0, 1.0, 3.0)
-    answer = lagged(step, 2.0)
+    response = lagged(step, 2.0)
     begin = round(10.0 / STEP)
-    assert (answer[:begin] == pytest.approx(1.0)) is True
-    after = answer[begin - 1 + round(2.0 / STEP)]
+    assert (response[:begin] == pytest.approx(1.0)) is True
+    after = response[begin - 1 + round(2.0 / STEP)]
     assert after == pytest.approx(3.0 - 2.0 * np.exp(-1.0), abs=1e-9)
     np.testing.assert_array_equal(lagged(step, 0.0), step)
 

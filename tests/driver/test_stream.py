@@ -182,9 +182,9 @@ def test_a_saved_stream_goes_on_bit_by_bit(rate: float, stop: int) -> None:
 def test_every_kind_of_effect_is_covered_here() -> None:
     assert {type(effect) for effect in HIDDEN} == {kind for kind in EFFECTS if not issubclass(kind, ColumnEffect)}
     for kind in EFFECTS:
-        if issubclass(kind, ColumnEffect):  # the stream knows their quantity, and how they all answer to it
-            assert (kind.answer, kind.strength, kind.terms) == (
-                ColumnEffect.answer,
+        if issubclass(kind, ColumnEffect):  # the stream knows their quantity, and how they all respond to it
+            assert (kind.response, kind.strength, kind.terms) == (
+                ColumnEffect.response,
                 ColumnEffect.strength,
                 ColumnEffect.terms,
             )

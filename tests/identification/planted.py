@@ -1,4 +1,4 @@
-"""Half an hour of a movement that no driver model made, with columns that answer to nothing and effects of them."""
+"""Half an hour of a movement that no driver model made, with columns that nobody responds to and effects of them."""
 
 from collections.abc import Callable, Mapping
 
@@ -20,7 +20,7 @@ Shift = Callable[[Mapping[str, FloatArray]], FloatArray]
 
 def planted_drive(shift: Shift, seed: int, names: tuple[str, ...] = ("gust",), smooth: int = 0) -> Coarse:
     """Offsets moved by what `shift` makes of the columns, each of unit variance with a memory of 10 s, as a driver
-    answers within 2 s; smoothed by a Gaussian of so many steps in the end."""
+    responds within 2 s; smoothed by a Gaussian of so many steps in the end."""
     from scipy.ndimage import gaussian_filter1d
 
     table = record_movement(wandering, 1800.0, seed)

@@ -53,11 +53,11 @@ def test_what_is_left_out_on_request_is_told_so(timeline: Timeline) -> None:
 
 
 def test_a_base_s_effects_are_fitted_anew_from_nothing(timeline: Timeline) -> None:
-    shift = made(Linear, 0.3, column="grade", lag_s=0.4, answer_range=((0.0, 1.0),))
+    shift = made(Linear, 0.3, column="grade", lag_s=0.4, response_range=((0.0, 1.0),))
     (term,) = initial(timeline, shift)
     assert isinstance(term, MeanTerm)
     assert term.effect.lag_s == 0.4
-    assert (term.effect.coefficients, term.effect.reference, term.effect.answer_range) == ((), (), ())
+    assert (term.effect.coefficients, term.effect.reference, term.effect.response_range) == ((), (), ())
 
 
 def test_each_part_of_the_movement_has_its_term(timeline: Timeline) -> None:

@@ -22,7 +22,7 @@ def coarse() -> Coarse:
 def test_rows_of_valid_seconds_are_those_of_the_whole_grid(coarse: Coarse) -> None:
     """Put side by side without what is cut out, they whiten to the same numbers."""
     problem = MeanTerm.problem(fit_model(coarse, ()))
-    np.testing.assert_allclose(problem.response, problem.whitener.rows(problem.series)[problem.valid], atol=1e-10)
+    np.testing.assert_allclose(problem.observed, problem.whitener.rows(problem.series)[problem.valid], atol=1e-10)
     assert problem.known.shape == (int(coarse.valid.sum()), 0)
 
 
@@ -30,7 +30,7 @@ def test_squares_that_come_in_clusters_are_made_white(coarse: Coarse) -> None:
     rng = np.random.default_rng(2)
     loud = np.asarray(lfilter([1.0], [1.0, -0.8], rng.normal(size=len(coarse))))
     squares = np.where(coarse.valid, loud, 0.0)
-    rows = of_squares(coarse, squares, coarse.valid, np.zeros((len(coarse), 0))).response
+    rows = of_squares(coarse, squares, coarse.valid, np.zeros((len(coarse), 0))).observed
     related = float(rows[1:] @ rows[:-1]) / float(rows @ rows)
     assert abs(related) < 4.0 / np.sqrt(len(rows))
 
@@ -52,7 +52,7 @@ def test_products_are_taken_as_they_are_about_one_level(coarse: Coarse) -> None:
     problem = of_products(coarse, rows, columns, factor)
     inside = coarse.valid
     product = (rows * factor)[inside]
-    np.testing.assert_allclose(problem.response, product - product.mean(), atol=1e-12)
+    np.testing.assert_allclose(problem.observed, product - product.mean(), atol=1e-12)
     np.testing.assert_allclose(problem.known, columns[inside] - columns[inside].mean(axis=0), atol=1e-12)
 
 
@@ -61,5 +61,5 @@ def test_a_size_in_the_squares_is_that_of_least_squares(coarse: Coarse) -> None:
     x = rng.normal(size=len(coarse))
     squares = np.where(coarse.valid, 0.2 * x + rng.normal(size=len(coarse)), 0.0)
     problem = of_squares(coarse, squares, coarse.valid, x[:, None])
-    size = float(problem.known[:, 0] @ problem.response) / float(problem.known[:, 0] @ problem.known[:, 0])
+    size = float(problem.known[:, 0] @ problem.observed) / float(problem.known[:, 0] @ problem.known[:, 0])
     assert size == pytest.approx(0.2, abs=4.0 / np.sqrt(coarse.valid.sum()))

@@ -1,4 +1,4 @@
-"""Drivers that differ in their answer: the spread of their slopes is recovered, and is not seen where there is none."""
+"""Drivers that differ in their response: the spread of their slopes is recovered; where there is none, none is seen."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from xosc_lateral.identification.terms.mean import MeanTerm
 from xosc_lateral.identification.timeline import join_drives
 
 
-def answering(deviation: float, smooth: float = 0.0, movement: float = 0.1, memory: float = 4.0) -> Coarse:
+def responding(deviation: float, smooth: float = 0.0, movement: float = 0.1, memory: float = 4.0) -> Coarse:
     """Drivers who move by 0.15 m for a unit of `near`, give or take `deviation`; tracks through a Gaussian [rows]."""
     rng = np.random.default_rng(11)
     made = []
@@ -34,12 +34,12 @@ def answering(deviation: float, smooth: float = 0.0, movement: float = 0.1, memo
 @pytest.mark.parametrize("deviation", [0.0, 0.08], ids=["alike", "different"])
 def test_the_spread_of_slopes_is_recovered(deviation: float) -> None:
     term = MeanTerm.of(Linear(acts="location", column="near"))  # type: ignore[arg-type]
-    found = slope_deviation(fit_model(answering(deviation), (term,)), term)
+    found = slope_deviation(fit_model(responding(deviation), (term,)), term)
     assert found == pytest.approx(deviation, rel=0.3)
 
 
 def test_drivers_who_are_alike_stay_so_although_their_tracks_were_smoothed() -> None:
     """A floor leaves memory in the whitened rows: taken for independent, they would be drivers that differ."""
     term = MeanTerm.of(Linear(acts="location", column="near", response_s=0.3))  # type: ignore[arg-type]
-    coarse = answering(0.0, smooth=0.7 / STEP, movement=0.05, memory=8.0)
+    coarse = responding(0.0, smooth=0.7 / STEP, movement=0.05, memory=8.0)
     assert slope_deviation(fit_model(coarse, (term,)), term) == 0.0

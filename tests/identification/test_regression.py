@@ -45,21 +45,21 @@ def test_columns_are_clipped_to_what_occurs_while_road_following() -> None:
     assert seen.max() == pytest.approx(7.0, abs=0.01)
 
 
-def test_an_answer_is_about_its_mean_over_the_valid_seconds() -> None:
+def test_a_response_is_about_its_mean_over_the_valid_seconds() -> None:
     coarse = planted(1)
-    answer = coarse.answer(mean_term().effect)
-    assert answer[coarse.valid].mean() == pytest.approx(0.0, abs=1e-12)
-    assert answer.shape == (len(coarse), 1)
+    response = coarse.response(mean_term().effect)
+    assert response[coarse.valid].mean() == pytest.approx(0.0, abs=1e-12)
+    assert response.shape == (len(coarse), 1)
 
 
-def test_answers_are_kept_by_what_is_asked_and_not_by_sizes() -> None:
+def test_responses_are_kept_by_what_is_asked_and_not_by_sizes() -> None:
     coarse = planted(1)
     bare = mean_term().effect
-    first = coarse.answer(bare, keep=True)
+    first = coarse.response(bare, keep=True)
     sized = Linear(acts=Acts.SPREAD, column="x", coefficients=(0.3,), errors=(0.1,), reference=(5.0,))
-    assert coarse.answer(sized) is first
-    assert coarse.answer(mean_term(lag_s=-1.0).effect) is not first
-    assert coarse.only(coarse.valid).answer(bare) is not first
+    assert coarse.response(sized) is first
+    assert coarse.response(mean_term(lag_s=-1.0).effect) is not first
+    assert coarse.only(coarse.valid).response(bare) is not first
 
 
 def test_fewer_rows_are_those_of_both() -> None:

@@ -67,7 +67,7 @@ def test_a_shift_is_named_by_its_column_and_its_shape(
     assert isinstance(effect_of(selection, plant.columns), shape)
 
 
-def test_an_answer_that_lags_is_told_from_one_that_does_not(driven: Driven) -> None:
+def test_a_response_that_lags_is_told_from_one_that_does_not(driven: Driven) -> None:
     effect = effect_of(selected(driven(401, [plants.truck_avoidance(0.5, lag=4.0)], 2000.0)), ("truck_right",))
     assert effect.lag_s + effect.response_s == pytest.approx(4.0, abs=1.5)
 

@@ -1,4 +1,4 @@
-"""What a size is told to be, and how sure: planted answers through a delay and a first-order lag."""
+"""What a size is told to be, and how sure: planted responses through a delay and a first-order lag."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def test_a_time_constant_is_found_between_the_dictionarys(passed: Coarse) -> Non
     """A grid of half as long again would put the size 15 % off."""
     bare = fit_model(passed, ())
     problem = MeanTerm.problem(bare)
-    refinement = Refinement(passed, problem, np.zeros((len(problem.response), 0)), {})
+    refinement = Refinement(passed, problem, np.zeros((len(problem.observed), 0)), {})
     columns = {"truck": Column("truck", Role.SWITCH, gaps=False, levels=(0.0, 1.0))}
     found = refinement.refine(structs.replace(term().effect, lag_s=0.0, response_s=4.0), 0.0, columns).effect
     assert found.lag_s == pytest.approx(LAG, abs=0.4)

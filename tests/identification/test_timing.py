@@ -1,4 +1,4 @@
-"""When and how slowly a driver answers: the profile's answer at 1 Hz, and what not knowing it adds to an error."""
+"""When and how slowly a driver responds: the profile's response at 1 Hz, and what not knowing it adds to an error."""
 
 from __future__ import annotations
 
@@ -15,12 +15,14 @@ from xosc_lateral.identification.terms.mean import MeanTerm
 from xosc_lateral.identification.timing import _beside, _profile, widening
 
 
-@pytest.mark.parametrize("response", [0.6, 1.5, 4.0])
-def test_an_answer_by_the_second_is_the_mean_of_the_answer_within_it(response: float) -> None:
+@pytest.mark.parametrize("response_s", [0.6, 1.5, 4.0])
+def test_a_response_by_the_second_is_the_mean_of_the_response_within_it(response_s: float) -> None:
     quantity = np.random.default_rng(5).normal(size=(60, 2))
-    fine = respond(np.repeat(quantity, 1000, axis=0), 0.001, 0.0, response)
+    fine = respond(np.repeat(quantity, 1000, axis=0), 0.001, 0.0, response_s)
     expected = fine.reshape(60, 1000, 2).mean(axis=1)
-    np.testing.assert_allclose(respond_by_second(quantity, response, np.zeros(60, dtype=np.intp)), expected, atol=2e-3)
+    np.testing.assert_allclose(
+        respond_by_second(quantity, response_s, np.zeros(60, dtype=np.intp)), expected, atol=2e-3
+    )
 
 
 def test_a_size_beside_known_columns_is_that_of_least_squares() -> None:
@@ -42,7 +44,7 @@ def test_a_size_beside_known_columns_is_that_of_least_squares() -> None:
 def test_not_knowing_the_timing_widens_the_error_of_a_quick_column_and_hardly_of_a_slow_one(
     memory: float, least: float, most: float
 ) -> None:
-    """A column that stays for minutes is answered alike whatever the delay."""
+    """A column that stays for minutes is responded to alike whatever the delay."""
     rng = np.random.default_rng(7)
     x = wander(rng, 4500, memory)
     shift = 0.15 * respond(x, 0.2, 0.4, 1.5)
@@ -53,13 +55,13 @@ def test_not_knowing_the_timing_widens_the_error_of_a_quick_column_and_hardly_of
     assert least <= widening(fitted, effect, part) < most
 
 
-@pytest.mark.parametrize("response", [1.0, 4.0])
-def test_an_answer_starts_anew_with_every_drive(response: float) -> None:
+@pytest.mark.parametrize("response_s", [1.0, 4.0])
+def test_a_response_starts_anew_with_every_drive(response_s: float) -> None:
     rng = np.random.default_rng(6)
     lengths = (7, 1, 30)
     parts = [rng.normal(size=(n, 3)) + 10.0 * number for number, n in enumerate(lengths)]
     drive = np.repeat(np.arange(3), lengths).astype(np.intp)
-    alone = [respond_by_second(part, response, np.zeros(len(part), dtype=np.intp)) for part in parts]
+    alone = [respond_by_second(part, response_s, np.zeros(len(part), dtype=np.intp)) for part in parts]
     np.testing.assert_allclose(
-        respond_by_second(np.concatenate(parts), response, drive), np.concatenate(alone), atol=1e-12
+        respond_by_second(np.concatenate(parts), response_s, drive), np.concatenate(alone), atol=1e-12
     )

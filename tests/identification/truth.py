@@ -1,6 +1,6 @@
 """What a plant did to a drive: the same drive with and without it, compared.
 
-The simulator's road, traffic and noise don't depend on effects. A driver answers to his target only in part, and his
+The simulator's road, traffic and noise don't depend on effects. A driver responds to his target only in part, and his
 spread is not his tolerance: what a loop can find is what the plant did, not the number that it was given.
 """
 

@@ -136,7 +136,7 @@ def test_the_population_and_single_vehicles_are_shipped():
 
 
 def test_shipped_profiles_differ_beyond_their_floor():
-    """But for the refined one: what it adds are answers to neighbours and bends, and even traffic has none."""
+    """But for the refined one: what it adds are responses to neighbours and bends, and even traffic has none."""
     compared = compare([read_profile(path.stem) for path in list_profiles() if path.stem != "motorway-refined"], 0)
     assert all(len(group) == 1 for group in compared.groups)
 

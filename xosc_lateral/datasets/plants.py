@@ -33,7 +33,7 @@ class ShiftBy:
     kind: str = "location"
 
     def quantity(self, context: Context) -> np.ndarray:
-        """What the driver answers to. Shape (n,). [unit of the column]"""
+        """What the driver responds to. Shape (n,). [unit of the column]"""
         product = np.ones_like(context["speed"])
         for column in self.columns:
             product = product * context[column]

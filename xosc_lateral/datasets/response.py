@@ -1,4 +1,4 @@
-"""How a simulated driver answers to a column: of what shape, how early, how slowly."""
+"""How a simulated driver responds to a column: of what shape, how early, how slowly."""
 
 from __future__ import annotations
 
@@ -30,16 +30,16 @@ def threshold(at: float) -> Shape:
 
 @dataclass(frozen=True)
 class SimulatedResponse:
-    """How a driver answers to a quantity: of what shape, how early, how slowly.
+    """How a driver responds to a quantity: of what shape, how early, how slowly.
 
     Parameters
     ----------
     shape : callable
         Applied to the product of the columns: `linear`, `saturating(scale)`, `threshold(at)` or your own.
     look_ahead : float
-        The driver answers to what will be so much later. [s]
+        The driver responds to what will be so much later. [s]
     lag : float
-        First-order lag of the answer. [s]
+        First-order lag of the response. [s]
     """
 
     shape: Shape = linear
@@ -47,7 +47,7 @@ class SimulatedResponse:
     lag: float = 0.0
 
     def scaled(self, quantity: np.ndarray) -> np.ndarray:
-        """Answer, scaled so that it changes by 1 between the 5 % and 95 % quantile of itself, about its median.
+        """Response, scaled so that it changes by 1 between the 5 % and 95 % quantile of itself, about its median.
 
         Shape (n,). [-]
         """

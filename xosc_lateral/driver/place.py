@@ -67,8 +67,8 @@ def fit_place(runs: Sequence[Run]) -> tuple[ColumnEffect, ...]:
         return ()
     pieces = _pieces(runs, shapes)
     found: list[ColumnEffect] = []
-    for acts, response in ((Acts.LOCATION, pieces.mean), (Acts.SPREAD, pieces.spread)):
-        found += _kept(shapes, acts, response, pieces)
+    for acts, observed in ((Acts.LOCATION, pieces.mean), (Acts.SPREAD, pieces.spread)):
+        found += _kept(shapes, acts, observed, pieces)
     return tuple(found)
 
 
@@ -135,12 +135,12 @@ def _pieces(runs: Sequence[Run], shapes: Sequence[ColumnEffect]) -> _Pieces:
     return _Pieces(np.array(mean), np.array(spread), np.array(rows).reshape(shape), np.array(drive, dtype=np.int64))
 
 
-def _kept(shapes: Sequence[ColumnEffect], acts: Acts, response: FloatArray, pieces: _Pieces) -> list[ColumnEffect]:
+def _kept(shapes: Sequence[ColumnEffect], acts: Acts, observed: FloatArray, pieces: _Pieces) -> list[ColumnEffect]:
     """The least certain column is dropped until all left earn their place."""
     left = list(range(len(shapes)))
     drives = len(np.unique(pieces.drive))
     while left:
-        slopes, errors = _regressed(response, pieces.quantities[:, left], pieces.drive)
+        slopes, errors = _regressed(observed, pieces.quantities[:, left], pieces.drive)
         certainty = (slopes / errors) ** 2
         worst = int(np.argmin(certainty))
         if certainty[worst] > np.log(drives):
@@ -153,16 +153,16 @@ def _kept(shapes: Sequence[ColumnEffect], acts: Acts, response: FloatArray, piec
     return []
 
 
-def _regressed(response: FloatArray, quantities: FloatArray, drive: NDArray[np.int64]) -> tuple[FloatArray, FloatArray]:
+def _regressed(observed: FloatArray, quantities: FloatArray, drive: NDArray[np.int64]) -> tuple[FloatArray, FloatArray]:
     """Slopes and their errors, shape (k,) each."""
-    design = np.column_stack([np.ones(len(response)), quantities])
+    design = np.column_stack([np.ones(len(observed)), quantities])
     counts = np.bincount(drive).astype(np.float64)
-    rest = response - design @ np.linalg.lstsq(design, response, rcond=None)[0]
+    rest = observed - design @ np.linalg.lstsq(design, observed, rcond=None)[0]
     own = np.bincount(drive, rest) / counts
     within = float(((rest - own[drive]) ** 2).sum() / max(len(rest) - len(counts), 1))
     between = max(float(rest.var()) - within, 0.0)
     theta = (1.0 - np.sqrt(within / (within + counts * between + 1e-30)))[drive]
-    columns = [column - theta * (np.bincount(drive, column) / counts)[drive] for column in (*design.T, response)]
+    columns = [column - theta * (np.bincount(drive, column) / counts)[drive] for column in (*design.T, observed)]
     x, y = np.column_stack(columns[:-1]), columns[-1]
     inverse = np.linalg.pinv(x.T @ x)
     slopes = inverse @ x.T @ y

@@ -9,17 +9,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.driver.effects import ColumnEffect, EffectTerms
-from xosc_lateral.driver.stream_state import AnswerState
+from xosc_lateral.driver.stream_state import ResponseStreamState
 
 FloatArray = NDArray[np.float64]
 
 
 class ResponseStream:
-    """A driver's answer to one effect's columns, row by row."""
+    """A driver's response to one effect's columns, row by row."""
 
     def __init__(self, effect: ColumnEffect, step: float) -> None:
         self.effect = effect
-        self._response = effect.response(step)
+        self._response = effect.response_in_blocks(step)
         self._ready: deque[FloatArray] = deque()
         self._drop = 0
 
@@ -29,7 +29,7 @@ class ResponseStream:
         return self._response.ahead
 
     def take(self, row: Mapping[str, FloatArray], *, before: bool) -> None:
-        """One more row of context, each column of shape (1,); what answers a row before the drive is not given."""
+        """One more row of context, each column of shape (1,); what responds to a row before the drive is not given."""
         self._drop += before
         self._ready.extend(self._response.take(self.effect.known(row)))
         while self._drop and self._ready:
@@ -40,11 +40,11 @@ class ResponseStream:
         """Terms at the next row, each of shape (1,)."""
         return self.effect.acting(self._ready.popleft()[None, :])
 
-    def state(self) -> AnswerState:
+    def state(self) -> ResponseStreamState:
         """Its state."""
-        return AnswerState(self._response.state, tuple(tuple(row.tolist()) for row in self._ready), self._drop)
+        return ResponseStreamState(self._response.state, tuple(tuple(row.tolist()) for row in self._ready), self._drop)
 
-    def restore(self, state: AnswerState) -> None:
+    def restore(self, state: ResponseStreamState) -> None:
         """Back to a state."""
         self._response.state = state.response
         self._ready.extend(np.array(row) for row in state.ready)

@@ -39,7 +39,7 @@ class OffsetStream:
     rate, those that `upsample` makes of them. A driver who looks ahead, and a curve between samples, need to know what
     comes: `step` is therefore given the context `preview` seconds ahead of the offset that it returns, and `look`
     the context before that. A bench that doesn't know the future gives `step` the present context without a `look`:
-    then the driver answers to it `preview` seconds later; what is random is the same.
+    then the driver responds to it `preview` seconds later; what is random is the same.
 
     Parameters
     ----------
@@ -80,8 +80,10 @@ class OffsetStream:
         self._start, self._time = start, time
         self._process = DriveProcess(profile, self._seed, ahead=BLOCK)
         self._process.begin_at(time)
-        self._answers = tuple(ResponseStream(effect, profile.model.step) for effect in self._process.columned)
-        self._ahead = max([0, *(answer.ahead for answer in self._answers)]) + (_NEIGHBOURS if self._factor > 1 else 0)
+        self._responses = tuple(ResponseStream(effect, profile.model.step) for effect in self._process.columned)
+        self._ahead = max([0, *(response.ahead for response in self._responses)]) + (
+            _NEIGHBOURS if self._factor > 1 else 0
+        )
         self._known: tuple[str, ...] | None = None
         self._widths: deque[float] = deque()
         self._recalled = 0
@@ -104,7 +106,7 @@ class OffsetStream:
     def recall(self, context: Mapping[str, float]) -> None:
         """Context before time 0, one call per model step (0.2 s), oldest first; before anything else.
 
-        Without it, what comes first is taken to have lasted: the driver's answers start settled.
+        Without it, what comes first is taken to have lasted: the driver's responses start settled.
         """
         self._check(context)
         if self._looked or self._samples:
@@ -129,7 +131,7 @@ class OffsetStream:
         context : mapping of str to float, optional
             Under DESIGN's names, among them `lane_width` [m] (the profile's where absent) and `speed` [m/s]; NaN:
             there is none (no vehicle ahead). The names of the first call are those that count; a driver whose column
-            is not among them does not answer to it. Read once per model step.
+            is not among them does not respond to it. Read once per model step.
 
         Returns
         -------
@@ -194,24 +196,26 @@ class OffsetStream:
     def _see(self, context: Mapping[str, float], *, before: bool = False) -> None:
         """Let the effects see one more row of context, of the drive or from before it."""
         if self._known is None:
-            columns = {column for answer in self._answers for column in answer.effect.columns}
+            columns = {column for response in self._responses for column in response.effect.columns}
             self._know(tuple(sorted(columns & context.keys())))
         assert self._known is not None
         row = {column: np.array([context[column]], dtype=np.float64) for column in self._known}
-        for answer in self._answers:
-            answer.take(row, before=before)
+        for response in self._responses:
+            response.take(row, before=before)
 
     def _know(self, columns: tuple[str, ...]) -> None:
         """From now on these columns of the context count."""
         self._known = columns
-        self._answers = tuple(answer for answer in self._answers if set(answer.effect.columns) <= set(columns))
-        if any(answer.effect.acts is Acts.RATE for answer in self._answers):
+        self._responses = tuple(
+            response for response in self._responses if set(response.effect.columns) <= set(columns)
+        )
+        if any(response.effect.acts is Acts.RATE for response in self._responses):
             self._process.draw_nothing_ahead()
 
     def _sample(self) -> float:
         """The next offset at the model's step; the context that it needs has been taken."""
         hidden = self._process.hidden_terms_at(np.array([self._row]))
-        terms = combine([hidden, *(answer.next() for answer in self._answers)])
+        terms = combine([hidden, *(response.next() for response in self._responses)])
         offset = self._process.take(terms, np.array([self._widths.popleft()]), None if self._row else self._start)
         self._row += 1
         return float(offset[0])
@@ -233,7 +237,7 @@ class OffsetStream:
                 phase=self._phase,
                 samples=tuple(self._samples),
                 curve=self._curve,
-                answers=tuple(answer.state() for answer in self._answers),
+                responses=tuple(response.state() for response in self._responses),
                 process=self._process.state,
             )
         )
@@ -276,8 +280,8 @@ class OffsetStream:
             saved.recalled, saved.looked, saved.row, saved.phase,
         )  # fmt: skip
         stream._samples, stream._curve = list(saved.samples), saved.curve
-        for answer, own in zip(stream._answers, saved.answers, strict=True):
-            answer.restore(own)
+        for response, own in zip(stream._responses, saved.responses, strict=True):
+            response.restore(own)
         stream._process.restore(saved.process, "state.process")
         return stream
 

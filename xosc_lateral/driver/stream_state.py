@@ -7,6 +7,8 @@ import json
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+import msgspec
+
 from xosc_lateral.driver.effects.response import ResponseState
 from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.driver.records import Record
@@ -25,8 +27,8 @@ class SeedState(Record, frozen=True):
     spawn_key: tuple[int, ...]
 
 
-class AnswerState(Record, frozen=True):
-    """The answer to one effect's columns: its response, answers that are ready, and how many of these are dropped."""
+class ResponseStreamState(Record, frozen=True):
+    """The response to one effect's columns: where it is, rows that are ready, and how many of these are dropped."""
 
     response: ResponseState
     ready: tuple[tuple[float, ...], ...]
@@ -55,7 +57,7 @@ class StreamState(Record, frozen=True, kw_only=True):
         Rows before the drive, steps looked ahead, next model step, step within it.
     samples, curve : tuple of float
         Model samples about the present piece, and its coefficients. [m]
-    answers : tuple of AnswerState
+    responses : tuple of ResponseStreamState
         Of the effects whose columns are known.
     process : DriveState as plain values
     """
@@ -73,7 +75,7 @@ class StreamState(Record, frozen=True, kw_only=True):
     phase: int
     samples: tuple[float, ...]
     curve: tuple[float, ...]
-    answers: tuple[AnswerState, ...]
+    responses: tuple[ResponseStreamState, ...] = msgspec.field(name="answers")
     process: Any
 
 

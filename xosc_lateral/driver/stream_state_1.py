@@ -41,7 +41,7 @@ def from_version_1(state: Mapping[str, Any], profile: DriverProfile) -> dict[str
     return {name: state[name] for name in same} | {
         "profile": sampling_hash(profile),
         "row": movement["row"],
-        "answers": [_answer(answer, state["recalled"]) for answer in state["answers"]],
+        "answers": [_response(response, state["recalled"]) for response in state["answers"]],
         "process": _process(movement, profile, state),
     }
 
@@ -50,10 +50,10 @@ def _hash(profile: DriverProfile) -> str:
     return hashlib.sha256(json.dumps(as_version_1(profile.to_dict()), sort_keys=True).encode()).hexdigest()
 
 
-def _answer(answer: Mapping[str, Any], recalled: int) -> dict[str, Any]:
-    rows = answer["rows"]
-    response = {name: answer[name] for name in ("taken", "given", "settled")} | {"held": rows or None}
-    return {"response": response, "ready": [], "drop": max(0, recalled - answer["given"])}
+def _response(saved: Mapping[str, Any], recalled: int) -> dict[str, Any]:
+    rows = saved["rows"]
+    response = {name: saved[name] for name in ("taken", "given", "settled")} | {"held": rows or None}
+    return {"response": response, "ready": [], "drop": max(0, recalled - saved["given"])}
 
 
 def _process(movement: Mapping[str, Any], profile: DriverProfile, state: Mapping[str, Any]) -> dict[str, Any]:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from xosc_lateral.enrich.result import EntityResult, LaneDeparture
-from xosc_lateral.mask import stretches_of
+from xosc_lateral.mask import true_slices
 from xosc_lateral.motion.gaps import BoxPath, Gap, smallest_gaps
 from xosc_lateral.motion.nominal import Activity, EntityMotion, NominalMotion
 from xosc_lateral.motion.trajectory import WorldTrajectory
@@ -41,7 +41,7 @@ def _lateral_within_a_lane(motion: EntityMotion) -> list[tuple[int, int]]:
     lateral = (
         ((motion.activity & Activity.LATERAL) != 0) & ((motion.activity & Activity.ACTIVE) != 0) & (motion.road >= 0)
     )
-    return [(part.start, part.stop - 1) for part in stretches_of(lateral) if len(set(motion.lane[part].tolist())) == 1]
+    return [(part.start, part.stop - 1) for part in true_slices(lateral) if len(set(motion.lane[part].tolist())) == 1]
 
 
 def gaps_of(motion: NominalMotion, trajectories: Sequence[WorldTrajectory]) -> tuple[Gap, ...]:

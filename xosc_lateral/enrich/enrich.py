@@ -38,7 +38,7 @@ PAST, FUTURE = 30.0, 10.0
 NEIGHBOURS = frozenset(
     f"{side}_{what}" for side in ("left", "right") for what in ("distance", "is_truck", "truck", "car")
 ) | {"truck_left", "truck_right", "car_left", "car_right"}
-"""Columns by which a profile answers to neighbours by itself."""
+"""Columns by which a profile responds to neighbours by itself."""
 
 Drivers = Mapping[str, DriverProfile | str]
 """Per entity the profile that drives it, or the reason why it gets none."""

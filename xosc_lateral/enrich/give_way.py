@@ -41,8 +41,8 @@ FADES = 60.0
 ENTERING = 0.5
 """Nominal lateral gap over which a vehicle that crosses into a lane becomes its neighbour. [m]"""
 
-ANSWER = 1.0
-"""Standard deviation of the kernel by which drivers answer: steering takes a second or two. [s]"""
+RESPONSE = 1.0
+"""Standard deviation of the kernel by which drivers respond: steering takes a second or two. [s]"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,7 +58,7 @@ class SampledVehicle:
     can_move : array of bool, shape (rows,)
         Where its path is sampled and may be moved.
     heeds : bool
-        Whether its profile answers to neighbours by itself: then only gaps that hardly ever occur are widened.
+        Whether its profile responds to neighbours by itself: then only gaps that hardly ever occur are widened.
     """
 
     motion: EntityMotion
@@ -99,12 +99,12 @@ def give_way(
                 right[own] = np.maximum(right[own], np.where(is_left, share * aside, 0.0))
                 left[own] = np.maximum(left[own], np.where(is_left, 0.0, share * aside))
     every = max(1, int(rows[1] - rows[0])) if n > 1 else 1
-    width = ANSWER / (motion.step * every)
+    width = RESPONSE / (motion.step * every)
     all_rows = np.arange(len(motion.entities[0].time)) if count else np.empty(0)
     result: list[FloatArray | None] = []
     for k in range(count):
         aside = left[k] - right[k]
-        result.append(np.interp(all_rows, rows, _answered(aside, width)) if aside.any() else None)
+        result.append(np.interp(all_rows, rows, _smoothed(aside, width)) if aside.any() else None)
     return result
 
 
@@ -174,7 +174,7 @@ def _fading(share: FloatArray) -> FloatArray:
     return np.asarray(1.0 - u**2 * (3.0 - 2.0 * u))
 
 
-def _answered(values: FloatArray, width: float) -> FloatArray:
+def _smoothed(values: FloatArray, width: float) -> FloatArray:
     half = min(int(np.ceil(4.0 * width)), max(len(values) - 1, 0))
     kernel = np.exp(-0.5 * (np.arange(-half, half + 1) / width) ** 2)
     return np.asarray(np.convolve(np.pad(values, half, mode="edge"), kernel / kernel.sum(), "valid"))

@@ -19,7 +19,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.mask import stretches_of
+from xosc_lateral.mask import true_slices
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
@@ -290,7 +290,7 @@ class Whitener:
     def _runs(self) -> list[slice]:
         if self.runs:
             return list(self.runs)
-        return stretches_of(self.valid)
+        return true_slices(self.valid)
 
     @cached_property
     def _edges(self) -> IntArray:

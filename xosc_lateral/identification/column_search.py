@@ -42,8 +42,8 @@ HEREDITY = 3.84
 """A product is preferred to one of its columns alone if it scores higher by more than this: what a factor that does
 nothing gives in one table of twenty (chi-square, one degree of freedom). [squared score]"""
 
-STRETCH_S = 120
-"""Stretches that count as independent where movement with and without a term is compared: longer than the memory of a
+CLUSTER_S = 120
+"""Windows that count as independent where movement with and without a term is compared: longer than the memory of a
 minute and a half. [s]"""
 
 GROWN = 2.0
@@ -173,7 +173,7 @@ def _look(
         return None
     known = _known(problem, dictionary, [term for term in fitted.terms if isinstance(term, kind)], spared)
     drive = search.coarse.drive[problem.valid]
-    scores = score_entries(dictionary, problem.response, known, barred, drive, search.rng(0), draws=draws)
+    scores = score_entries(dictionary, problem.observed, known, barred, drive, search.rng(0), draws=draws)
     return _Look(problem, dictionary, known, scores)
 
 
@@ -222,8 +222,8 @@ def _grows(before: Fitted, after: Fitted) -> bool:
     coarse = before.coarse
     rows = np.flatnonzero(coarse.valid)
     saved = np.square(before.movement * before.scale)[rows] - np.square(after.movement * after.scale)[rows]
-    stretch = rows // STRETCH_S
-    sums = np.bincount(stretch, saved)[np.unique(stretch)]
+    cluster = rows // CLUSTER_S
+    sums = np.bincount(cluster, saved)[np.unique(cluster)]
     return len(sums) > 1 and float(sums.sum()) < -GROWN * float(np.std(sums, ddof=1)) * np.sqrt(len(sums))
 
 

@@ -33,7 +33,7 @@ NULL_DRAWS = 400
 """Rotated or re-signed residuals that the null is taken from."""
 
 LEAST_SHIFT_S = 60
-"""No rotation is shorter: a driver's answer must be out of reach. [s]"""
+"""No rotation is shorter: a driver's response must be out of reach. [s]"""
 
 MIN_SUPPORT_S = 45.0
 """A quantity that rests on fewer seconds than this is not looked at: anything may have happened just then. [s]"""
@@ -89,9 +89,9 @@ class Quantities:
         stacked = np.stack(rows) if rows else np.zeros((0, len(valid)), dtype=np.float32)
         return cls(kept, stacked, coarse_middle(timeline.drive)[: len(valid)])
 
-    def answers(self, members: Sequence[int], response: float) -> FloatArray:
+    def responses(self, members: Sequence[int], response_s: float) -> FloatArray:
         """Some of them through a first-order lag, each drive on its own, shape (n, members)."""
-        return respond_by_second(self.values[members].T, response, self.drive)
+        return respond_by_second(self.values[members].T, response_s, self.drive)
 
 
 @dataclass(frozen=True, eq=False)
@@ -145,15 +145,15 @@ def build_dictionary(quantities: Quantities, whitener: Whitener) -> Dictionary:
     for members, timings in families:
         for first in range(0, len(members), CHUNK):
             chunk = members[first : first + CHUNK]
-            for response, lags in timings.items():
-                answer = quantities.answers(chunk, response)
+            for response_s, lags in timings.items():
+                response = quantities.responses(chunk, response_s)
                 for lag in lags:
                     # drives are padded by more than any lag
-                    moved = answer[np.clip(seconds - lag, 0, len(answer) - 1)]
+                    moved = response[np.clip(seconds - lag, 0, len(response) - 1)]
                     rows, support, kept = _unit_rows(compact.rows(moved), moved)
                     kept &= support >= MIN_SUPPORT_S
                     blocks.append(rows.T[kept].astype(np.float32, copy=False))
-                    entries += [(quantities.candidates[chunk[i]], float(lag), response) for i in np.flatnonzero(kept)]
+                    entries += [(quantities.candidates[chunk[i]], float(lag), response_s) for i in np.flatnonzero(kept)]
     stacked = np.concatenate(blocks) if blocks else np.zeros((0, len(seconds)), dtype=np.float32)
     return Dictionary(
         [entry[0] for entry in entries],
@@ -163,18 +163,18 @@ def build_dictionary(quantities: Quantities, whitener: Whitener) -> Dictionary:
     )
 
 
-def respond_by_second(values: Reals, response: float, drive: IntArray) -> FloatArray:
+def respond_by_second(values: Reals, response_s: float, drive: IntArray) -> FloatArray:
     """Means over each second of a first-order lag of gain 1, settled where a drive starts; like `values`, (n, k).
 
     Exact for values that stay the same for the second. `drive`: of each row, shape (n,), increasing.
     """
     from scipy.signal import lfilter
 
-    keep = float(np.exp(-1.0 / response))
-    late = response * (1.0 - keep)
+    keep = float(np.exp(-1.0 / response_s))
+    late = response_s * (1.0 - keep)
     later, earlier = np.array([[1.0 - late, late - keep], [1.0, -keep]], dtype=values.dtype)
-    answer = lfilter(later, earlier, values, axis=0, zi=late * values[:1])[0]
-    return start_anew(answer, values, keep, drive)
+    response = lfilter(later, earlier, values, axis=0, zi=late * values[:1])[0]
+    return start_anew(response, values, keep, drive)
 
 
 def _unit_rows(rows: FloatArray, before: FloatArray) -> tuple[FloatArray, FloatArray, BoolArray]:

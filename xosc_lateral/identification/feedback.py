@@ -2,7 +2,7 @@
 
 Two marks, either of them enough.
 
-*Coherence.* A driver answers to a cause within seconds, as through a low-pass: above 0.2 Hz an offset shares next to
+*Coherence.* A driver responds to a cause within seconds, as through a low-pass: above 0.2 Hz an offset shares next to
 nothing with its causes. A steering angle or a yaw rate is the movement's own derivative, and shares nearly all.
 
 *Direction of time.* Given its own past, a cause owes nothing to what the car did just before; a column that a system
@@ -37,7 +37,7 @@ SEGMENT = 128
 """Samples per segment of the spectral estimate: 25.6 s."""
 
 BAND = (0.2, 0.3, 0.4, 0.6, 0.8)
-"""Edges of the parts of the band where a driver no longer answers, and sensors still see the car move. [Hz]"""
+"""Edges of the parts of the band where a driver no longer responds, and sensors still see the car move. [Hz]"""
 
 CLEAR, ALONE = 0.2, 0.5
 """Squared coherence from which a column is feedback if the movement foretells it too, and from which it is doubtful if

@@ -127,7 +127,7 @@ def initial_terms(base: DriverProfile, timeline: Timeline) -> tuple[Term, ...]:
     for effect in base.effects:
         if isinstance(effect, ColumnEffect) and set(effect.columns) <= there:
             bare = structs.replace(
-                effect, coefficients=(), errors=(), reference=(), between_drivers=(), answer_range=()
+                effect, coefficients=(), errors=(), reference=(), between_drivers=(), response_range=()
             )
             if effect.acts is Acts.LOCATION:
                 terms.append(BetweenTerm.of(bare) if is_between(effect) else MeanTerm.of(bare))

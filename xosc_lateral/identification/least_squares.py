@@ -10,9 +10,9 @@ IntArray = NDArray[np.intp]
 
 
 def clustered_least_squares(
-    design: FloatArray, response: FloatArray, stretch: IntArray
+    design: FloatArray, observed: FloatArray, cluster: IntArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Sizes, and a sandwich for their covariance, clustered by stretch [1]_.
+    """Sizes, and a sandwich for their covariance, clustered [1]_.
 
     Loud seconds come together, and a column may come with them; and what whitening leaves of the memory counts too.
 
@@ -20,9 +20,9 @@ def clustered_least_squares(
     ----------
     design : array, shape (n, k)
         Whitened columns.
-    response : array, shape (n,)
+    observed : array, shape (n,)
         Whitened.
-    stretch : int array, shape (n,)
+    cluster : int array, shape (n,)
         Cluster of each row.
 
     Returns
@@ -37,9 +37,9 @@ def clustered_least_squares(
     if design.shape[1] == 0:
         return np.zeros(0), np.zeros((0, 0))
     inverse = np.linalg.pinv(design.T @ design)
-    sizes = inverse @ (design.T @ response)
-    scores = design * (response - design @ sizes)[:, None]
-    scores = np.stack([np.bincount(stretch, column) for column in scores.T], axis=1)
+    sizes = inverse @ (design.T @ observed)
+    scores = design * (observed - design @ sizes)[:, None]
+    scores = np.stack([np.bincount(cluster, column) for column in scores.T], axis=1)
     clusters = int(np.count_nonzero(scores.any(axis=1)))
-    freedom = clusters / max(1, clusters - 1) * (len(response) - 1) / max(1, len(response) - design.shape[1])
+    freedom = clusters / max(1, clusters - 1) * (len(observed) - 1) / max(1, len(observed) - design.shape[1])
     return sizes, np.asarray(inverse @ (scores.T @ scores) @ inverse * freedom, dtype=np.float64)

@@ -27,7 +27,7 @@ MOST_LOG_SCALE = 3.0
 that the movement contradicts grow without end. [-]"""
 
 CLUSTER_S = 60
-"""Length of the stretches whose squares count as one cluster in errors of the log scale. [s]"""
+"""Length of one cluster of squares in errors of the log scale. [s]"""
 
 OWN_LEVEL_S = 30.0
 """A drive's level of the scale is its own as far as it lasts longer than this. [s]"""
@@ -76,7 +76,7 @@ def bounded(log_sizes: FloatArray, scales: FloatArray) -> FloatArray:
 
 
 def covariance_of_log_sizes(scales: FloatArray, rows: FloatArray, valid: BoolArray, drive: IntArray) -> FloatArray:
-    """Sandwich with stretches as clusters [1]_: squares have heavy tails and come in clusters.
+    """Sandwich, clustered [1]_: squares have heavy tails and come in clusters.
 
     References
     ----------
@@ -88,7 +88,7 @@ def covariance_of_log_sizes(scales: FloatArray, rows: FloatArray, valid: BoolArr
     bread = np.linalg.pinv(2.0 * design.T @ design)
     squares = clipped_squares(rows, valid)[valid]
     scores = design * (squares / squares.mean() - 1.0)[:, None]
-    stretch = np.flatnonzero(valid) // CLUSTER_S
-    edges = np.flatnonzero(np.diff(stretch, prepend=-1))
+    cluster = np.flatnonzero(valid) // CLUSTER_S
+    edges = np.flatnonzero(np.diff(cluster, prepend=-1))
     sums = np.add.reduceat(scores, edges, axis=0)
     return np.asarray(bread @ (sums.T @ sums) @ bread * len(sums) / max(1, len(sums) - 1))

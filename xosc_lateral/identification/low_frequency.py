@@ -56,7 +56,7 @@ N_FIRST, HOPELESS = 200, 0.05
 """After so many samples a score is given up that chance reaches in more than this share of them. [-]"""
 
 SIGN_S = 60
-"""Length of the stretches whose sign is drawn anew. [s]"""
+"""Length of the windows whose sign is drawn anew. [s]"""
 
 SLOW_BAND = (50.0, 600.0)
 """Periods that are slow, but no drift yet. [s]"""
@@ -149,11 +149,11 @@ class _Scores:
 
     def __call__(self, rows: FloatArray) -> tuple[float, float, int]:
         """Best scores of a drift and of a step [chi-square], and which step."""
-        response = self._transform(rows)
+        observed = self._transform(rows)
         # each frequency stands for itself and its mirror image
         weight = 2.0 / self._n / _OrdinaryDrift.of(rows).typical()[self._kept]
         weighed = np.conj(self._drift) * weight[:, None]
-        gram, moments = (weighed.T @ self._drift).real, (weighed.T @ response).real
+        gram, moments = (weighed.T @ self._drift).real, (weighed.T @ observed).real
         best = 0.0
         for size in DRIFT_SIZES:
             chosen = (DRIFT_TERMS * np.arange(self._drives)[:, None] + np.arange(size)).ravel()
@@ -161,7 +161,7 @@ class _Scores:
             best = max(best, _as_one_degree(gained, len(chosen)) - DRIFT_COST)
         if self._steps.shape[1] == 0:
             return best, 0.0, 0
-        jumped = (np.conj(self._steps).T @ (weight * response)).real
+        jumped = (np.conj(self._steps).T @ (weight * observed)).real
         chi_square = jumped**2 / np.maximum(np.square(np.abs(self._steps)).T @ weight, 1e-12)
         at = int(np.argmax(chi_square))
         return best, float(chi_square[at]) - STEP_COST, at
@@ -180,11 +180,11 @@ def _simulated(rows: FloatArray, whitener: Whitener, rng: np.random.Generator) -
 
 
 def _resigned(rows: FloatArray, whitener: Whitener, rng: np.random.Generator) -> Iterator[FloatArray]:
-    """The same rows with the sign of whole stretches drawn anew."""
+    """The same rows with the sign of whole windows drawn anew."""
     for _ in range(N_NULL):
-        stretch = (np.arange(len(rows)) + rng.integers(SIGN_S)) // SIGN_S
-        signs = rng.choice([-1.0, 1.0], size=int(stretch[-1]) + 1)
-        yield whitener.without_levels(rows * signs[stretch])
+        window = (np.arange(len(rows)) + rng.integers(SIGN_S)) // SIGN_S
+        signs = rng.choice([-1.0, 1.0], size=int(window[-1]) + 1)
+        yield whitener.without_levels(rows * signs[window])
 
 
 @dataclass(frozen=True, eq=False)

@@ -93,13 +93,13 @@ def _ends(values: FloatArray) -> tuple[float, float]:
 
 
 def _driving(result: LoopResult, effect: ColumnEffect) -> tuple[FloatArray, FloatArray]:
-    """Column (or product) as the driver answers to it, where that can be said, and the effect's strength; at 1 Hz."""
+    """Column (or product) as the driver responds to it, where that can be said, and the effect's strength; at 1 Hz."""
     coarse = result.coarse
     step = coarse.timeline.step
     own = effect.strength(step, coarse.context)
     assert own is not None, "the effect was found in these columns"
     if isinstance(effect, Product):
-        return coarse_mean(effect.answer(step, coarse.context)[:, 0]), coarse_mean(own)
+        return coarse_mean(effect.response(step, coarse.context)[:, 0]), coarse_mean(own)
     column = coarse.context[effect.columns[0]]
     if isinstance(effect, Angular) or not np.isfinite(column).all():  # neither angles nor "none" can be averaged
         return coarse_middle(column), coarse_mean(own)

@@ -39,7 +39,7 @@ class Problem:
         return self.whitener.valid
 
     @cached_property
-    def response(self) -> FloatArray:
+    def observed(self) -> FloatArray:
         """White series, levels out, shape (seconds,), valid ones only. [-]"""
         return self.rows(self.series)
 

@@ -1,4 +1,4 @@
-"""How much drivers differ in their answer to a column: the variance of the slopes between drives.
+"""How much drivers differ in their response to a column: the variance of the slopes between drives.
 
 Method of moments [1]_: slopes of single drives scatter by more than their standard errors explain, or they do not.
 

@@ -84,7 +84,7 @@ class Refinement:
     ) -> None:
         self._coarse, self._problem, self._costs, self._single = coarse, problem, costs, single
         self._basis = known.astype(np.float32)
-        left = problem.response
+        left = problem.observed
         left = left - known @ (known.T @ left)
         self._left = left / max(float(np.sqrt(np.mean(left**2))), 1e-300)
         self._quantities: dict[ColumnEffect, FloatArray] = {}
@@ -102,10 +102,10 @@ class Refinement:
 
     def scores(self, effects: Sequence[ColumnEffect]) -> list[float]:
         """Squared score of each effect, all its coefficients free, less log n for each beyond the first."""
-        answers = [self._answer(effect) for effect in effects]
-        widths = [answer.shape[1] for answer in answers]
-        # single precision tells answers apart as well, in half the time
-        rows = self._problem.rows(np.concatenate(answers, axis=1).astype(np.float32))
+        responses = [self._response(effect) for effect in effects]
+        widths = [response.shape[1] for response in responses]
+        # single precision tells responses apart as well, in half the time
+        rows = self._problem.rows(np.concatenate(responses, axis=1).astype(np.float32))
         rows -= self._basis @ (self._basis.T @ rows)
         found, at = [], 0
         for width in widths:
@@ -124,15 +124,15 @@ class Refinement:
         gain: float = float(np.square(unit.T @ self._left).sum())
         return gain - float((rows.shape[1] - 1) * np.log(len(self._left)))
 
-    def _answer(self, effect: ColumnEffect) -> FloatArray:
-        """Answer at 1 Hz, standardised, shape (n, k); on the fine grid, as the fit has it, and in whole steps of it.
+    def _response(self, effect: ColumnEffect) -> FloatArray:
+        """Response at 1 Hz, standardised, shape (n, k); on the fine grid, as the fit has it, and in whole steps of it.
 
-        Answering at 1 Hz is another filter, whose best time constant is too short and whose size is too small.
+        Responding at 1 Hz is another filter, whose best time constant is too short and whose size is too small.
         """
         step = self._coarse.timeline.step
         shape = structs.replace(effect, lag_s=0.0, response_s=0.0)
         if shape not in self._quantities:
-            values = shape.answer(step, self._coarse.context)
+            values = shape.response(step, self._coarse.context)
             inside = values[self._coarse.timeline.valid]
             self._quantities[shape] = (values - inside.mean(axis=0)) / np.maximum(inside.std(axis=0), 1e-12)
         key = (shape, effect.response_s)
@@ -171,10 +171,10 @@ class Refinement:
 
 def _timings(effect: ColumnEffect, step: float, reach: float, responses: Sequence[float]) -> Iterator[ColumnEffect]:
     lags = effect.lag_s + np.arange(-reach, reach + 0.5 * step, step)
-    near = sorted(responses, key=lambda response: abs(np.log(response / max(effect.response_s, 0.1))))[:5]
+    near = sorted(responses, key=lambda response_s: abs(np.log(response_s / max(effect.response_s, 0.1))))[:5]
     for lag in lags[np.abs(lags) <= LAG_LIMIT]:
-        for response in near:
-            yield structs.replace(effect, lag_s=round(float(lag), 1), response_s=response)
+        for response_s in near:
+            yield structs.replace(effect, lag_s=round(float(lag), 1), response_s=response_s)
 
 
 def means_by_second(sums: FloatArray, late: int) -> FloatArray:

@@ -44,11 +44,11 @@ LONGEST = 96
 
 FLOOR = 0.03
 """White noise that the model of a drive has beside what it shows: no table knows the lane better (in the motorway
-recording the standard error of a lane's centre is 0.03 m; docs/real_data.md). Providers smooth their tracks, answers
+recording the standard error of a lane's centre is 0.03 m; docs/real_data.md). Providers smooth their tracks, responses
 and all; without a floor an effect is sized where the smoothing left nothing of it. Sensitivity:
 docs/design/identification.md. [m]"""
 
-STRETCH_S = 60
+CLUSTER_S = 60
 """Stretches of a drive that count as independent in the errors of sizes: far beyond what whitening leaves of the
 memory, and the whole of a passing vehicle. [s]"""
 
@@ -61,7 +61,7 @@ MIN_DRIFT_S = 600.0
 
 @dataclass(frozen=True, eq=False)
 class Coarse:
-    """The timeline at 1 Hz, and every column effect's answer on it.
+    """The timeline at 1 Hz, and every column effect's response on it.
 
     Parameters
     ----------
@@ -83,7 +83,7 @@ class Coarse:
     drive: IntArray
     time: FloatArray
     context: Mapping[str, FloatArray]
-    _answers: dict[ColumnEffect, FloatArray] = field(default_factory=dict, repr=False)
+    _responses: dict[ColumnEffect, FloatArray] = field(default_factory=dict, repr=False)
 
     @classmethod
     def of(cls, timeline: Timeline) -> Coarse:
@@ -103,7 +103,7 @@ class Coarse:
 
     def only(self, rows: BoolArray) -> Coarse:
         """The same with fewer valid rows; `rows`: shape (n,)."""
-        return replace(self, valid=self.valid & rows, _answers={})
+        return replace(self, valid=self.valid & rows, _responses={})
 
     @property
     def drives(self) -> int:
@@ -111,30 +111,30 @@ class Coarse:
         return int(self.drive.max()) + 1
 
     @cached_property
-    def stretch(self) -> IntArray:
-        """Stretches of a minute within drives, numbered, shape (n,); they count as independent of each other."""
+    def cluster(self) -> IntArray:
+        """Clusters: minutes within drives, numbered, shape (n,); they count as independent of each other."""
         _, first = np.unique(self.drive, return_index=True)
-        minute = (np.arange(len(self)) - first[self.drive]) // STRETCH_S
-        _, stretch = np.unique(self.drive * len(self) + minute, return_inverse=True)
-        return stretch.astype(np.intp)
+        minute = (np.arange(len(self)) - first[self.drive]) // CLUSTER_S
+        _, cluster = np.unique(self.drive * len(self) + minute, return_inverse=True)
+        return cluster.astype(np.intp)
 
     @property
     def lasts(self) -> bool:
         """Whether a drive is long enough to change with time: minutes, not the minute of a passing vehicle."""
         return bool(np.bincount(self.drive, self.valid.astype(float)).max() >= MIN_DRIFT_S)
 
-    def answer(self, effect: ColumnEffect, *, keep: bool = False) -> FloatArray:
-        """The effect's quantity [own unit] as the driver answers to it, less its mean where valid; shape (n, k)."""
+    def response(self, effect: ColumnEffect, *, keep: bool = False) -> FloatArray:
+        """The effect's quantity [own unit] as the driver responds to it, less its mean where valid; shape (n, k)."""
         key = structs.replace(
-            effect, acts=Acts.LOCATION, coefficients=(), errors=(), reference=(), between_drivers=(), answer_range=()
+            effect, acts=Acts.LOCATION, coefficients=(), errors=(), reference=(), between_drivers=(), response_range=()
         )
-        if key in self._answers:
-            return self._answers[key]
-        answer = coarse_mean(key.answer(self.timeline.step, self.context))
-        answer = answer - answer[self.valid].mean(axis=0)
+        if key in self._responses:
+            return self._responses[key]
+        response = coarse_mean(key.response(self.timeline.step, self.context))
+        response = response - response[self.valid].mean(axis=0)
         if keep:
-            self._answers[key] = answer
-        return np.asarray(answer, dtype=np.float64)
+            self._responses[key] = response
+        return np.asarray(response, dtype=np.float64)
 
     def by_drive(self, values: FloatArray) -> FloatArray:
         """Mean over the valid rows of each drive, shape (drives,), in the values' unit; 0 where there are none."""
@@ -251,9 +251,9 @@ def fit_model(coarse: Coarse, terms: Sequence[ModelTerm]) -> Fitted:
         if not coarse.lasts:
             process = unbiased(process, coarse.valid, coarse.drive, ORDER, longest=LONGEST)
         whitener = Whitener(process, coarse.valid, coarse.drive, scale)
-        response, design = whitener.rows(coarse.offset), whitener.rows(columns)
-        sizes, covariance = clustered_least_squares(design, response, coarse.stretch)
-        rows = response - design @ sizes
+        observed, design = whitener.rows(coarse.offset), whitener.rows(columns)
+        sizes, covariance = clustered_least_squares(design, observed, coarse.cluster)
+        rows = observed - design @ sizes
         levels = whitener.levels(coarse.offset - columns @ sizes)
         if scales.shape[1]:
             log_sizes = bounded(log_sizes + scoring_step(scales, rows, valid, drive), scales[valid])

@@ -14,7 +14,7 @@ from xosc_lateral.drives.resampling import STEP
 from xosc_lateral.identification.regression import Fitted
 from xosc_lateral.identification.terms.base import Removal, Term
 from xosc_lateral.identification.timeline import Timeline
-from xosc_lateral.mask import stretches_of
+from xosc_lateral.mask import true_slices
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
@@ -48,7 +48,7 @@ def bare_runs(timeline: Timeline, removal: Removal, used: BoolArray) -> list[Run
     """Runs of the movement [m] without effects, from the valid rows in `used`, shape (n,); at least `MIN_RUN` long."""
     runs: list[Run] = []
     for index, name in enumerate(timeline.names):
-        for rows in stretches_of(timeline.valid & used & (timeline.drive == index)):
+        for rows in true_slices(timeline.valid & used & (timeline.drive == index)):
             if (rows.stop - rows.start) * STEP >= MIN_RUN:
                 runs.append(_run(timeline, removal, rows, name, len(runs)))
     return runs

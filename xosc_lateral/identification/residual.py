@@ -32,7 +32,7 @@ N_BINS = 5
 """Bins of a column, equally filled."""
 
 RESPONSE_S = 2.0
-"""Columns are smoothed as a driver answers before they are binned. [s]"""
+"""Columns are smoothed as a driver responds before they are binned. [s]"""
 
 BANDS_S = (1.0, 3.0, 8.0, 20.0, 60.0, 200.0)
 """Averaging times between which the bands of the movement lie. [s]"""
@@ -120,8 +120,8 @@ def statistics_of(
     for name, values in quantities.items():
         none = np.isnan(values)
         filled = _filled(values, timeline.valid)
-        answer = respond(filled, timeline.step, 0.0, RESPONSE_S)
-        smooth = in_digits(start_anew(answer, filled, float(np.exp(-timeline.step / RESPONSE_S)), timeline.drive))
+        response = respond(filled, timeline.step, 0.0, RESPONSE_S)
+        smooth = in_digits(start_anew(response, filled, float(np.exp(-timeline.step / RESPONSE_S)), timeline.drive))
         label, middle = _binned(smooth, timeline.valid, none)
         if len(middle) > 1:
             labels[name], middles[name] = label, middle

@@ -85,9 +85,11 @@ class Search:
         known = frozenset(columns)
         own = [i for i, one in enumerate(self.quantities.candidates) if known.issuperset(one.columns)]
         seconds, valid = np.arange(len(self.coarse)), self.coarse.valid[:, None]
-        answers = [(self.quantities.answers(own, response), lags) for response, lags in TIMINGS.items()]
+        responses = [(self.quantities.responses(own, response_s), lags) for response_s, lags in TIMINGS.items()]
         blocks = [
-            answer[np.clip(seconds - lag, 0, len(seconds) - 1)] * valid for answer, lags in answers for lag in lags
+            response[np.clip(seconds - lag, 0, len(seconds) - 1)] * valid
+            for response, lags in responses
+            for lag in lags
         ]
         return orthonormal(np.concatenate(blocks, axis=1).astype(np.float64), CROSS_BASIS)
 

@@ -54,21 +54,21 @@ class Squares:
 def fine_squares(fitted: Fitted) -> Squares:
     """Squared innovations of the 0.2 s grid, averaged to 1 Hz; drives are each compared with themselves.
 
-    Answers to columns are taken out as far as the innovations show them: where the provider of the tracks smoothed them
-    away, they would be put in, and look like noise.
+    Responses to columns are taken out as far as the innovations show them: where the provider of the tracks smoothed
+    them away, they would be put in, and look like noise.
     """
     coarse, timeline = fitted.coarse, fitted.coarse.timeline
     n = len(timeline)
     valid = timeline.valid & np.repeat(coarse.valid, COARSE)[:n] if len(coarse) * COARSE >= n else timeline.valid
     level = fitted.levels[timeline.drive]
     moved = np.where(valid, timeline.offset - level, 0.0)
-    answers = np.where(valid, fitted.explained - level, 0.0)
+    responses = np.where(valid, fitted.explained - level, 0.0)
     process = fit_autoregression(moved, valid, FINE_ORDER)
-    innovations, answers = moving_sum(process.polynomial, moved), moving_sum(process.polynomial, answers)
+    innovations, responses = moving_sum(process.polynomial, moved), moving_sum(process.polynomial, responses)
     settled = moving_sum(np.ones(process.order + 1), valid.astype(np.float64)) > process.order + 0.5
-    power = float(answers[settled] @ answers[settled])
-    seen = float(np.clip(answers[settled] @ innovations[settled] / power, 0.0, 1.0)) if power > 0.0 else 0.0
-    innovations = innovations - seen * answers
+    power = float(responses[settled] @ responses[settled])
+    seen = float(np.clip(responses[settled] @ innovations[settled] / power, 0.0, 1.0)) if power > 0.0 else 0.0
+    innovations = innovations - seen * responses
     squares = coarse_mean(np.where(settled, np.square(innovations), 0.0))
     whole = coarse_all(settled)
     return Squares(squares / own_levels(squares, whole, coarse.drive)[coarse.drive], whole)

@@ -161,7 +161,7 @@ def in_digits(values: FloatArray) -> FloatArray:
 
 
 def start_anew(
-    answer: FloatArray, values: NDArray[np.floating[Any]], keep: float, drive: NDArray[np.intp]
+    response: FloatArray, values: NDArray[np.floating[Any]], keep: float, drive: NDArray[np.intp]
 ) -> FloatArray:
     """A first-order lag over drives in a row, less what it carries over: settled where each drive starts.
 
@@ -170,7 +170,7 @@ def start_anew(
 
     Parameters
     ----------
-    answer : array, shape (n,) or (n, k)
+    response : array, shape (n,) or (n, k)
         Of the lag, to `values` of the same shape.
     keep : float
         What the lag keeps of itself from row to row.
@@ -180,7 +180,7 @@ def start_anew(
     _, starts, own = np.unique(drive, return_index=True, return_inverse=True)
     first = starts[own]
     left = keep ** (np.arange(len(values)) - first).astype(values.dtype)
-    return np.asarray(answer - (answer - values)[first] * (left[:, None] if values.ndim == 2 else left))
+    return np.asarray(response - (response - values)[first] * (left[:, None] if values.ndim == 2 else left))
 
 
 def on_fine_grid(values: FloatArray, timeline: Timeline) -> FloatArray:

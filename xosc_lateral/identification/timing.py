@@ -1,4 +1,4 @@
-"""How unsure a size is because shape, lag and time constant of the answer were estimated with it."""
+"""How unsure a size is because shape, lag and time constant of the response were estimated with it."""
 
 from __future__ import annotations
 
@@ -53,13 +53,13 @@ def widening(fitted: Fitted, effect: ColumnEffect, part: slice) -> float:
     own = _beside(others, white(fitted.columns[:, part]))
     told = _profile(own, left, contrast)
     found = [told]
-    for answer in _timed(fitted, effect):
-        rows = _beside(others, white(answer.reshape(len(answer), -1)))
+    for response in _timed(fitted, effect):
+        rows = _beside(others, white(response.reshape(len(response), -1)))
         width = len(contrast)
         found += [_profile(rows[:, at : at + width], left, contrast) for at in range(0, rows.shape[1], width)]
     for shape in _shapes(fitted.coarse, effect):
         low, high = driving_range(fitted.coarse, shape)
-        rows = _beside(others, white(fitted.coarse.answer(shape)))
+        rows = _beside(others, white(fitted.coarse.response(shape)))
         alike = np.sign(float(np.sum(own * rows)))  # nearness falls where distance rises
         found.append(_profile(rows, left, alike * (high - low)))
     gain, size, variance = np.asarray(found).T
@@ -91,17 +91,17 @@ def _shapes(coarse: Coarse, effect: ColumnEffect) -> list[ColumnEffect]:
 
 
 def _timed(fitted: Fitted, effect: ColumnEffect) -> list[FloatArray]:
-    """Answers at 1 Hz per time constant, shape (n, lags, k)."""
+    """Responses at 1 Hz per time constant, shape (n, lags, k)."""
     step, finest = fitted.coarse.timeline.step, LAG_STEPS[-1]
     lags = effect.lag_s + np.arange(-NEAR_S, NEAR_S + 0.5 * finest, finest)
     late = [round(float(lag) / step) for lag in lags[np.abs(lags) <= LAG_LIMIT]]
-    bare = structs.replace(effect, lag_s=0.0, response_s=0.0, answer_range=())
-    quantity = bare.answer(step, fitted.coarse.context)
-    answers = []
-    for response in FINE_RESPONSES:
-        sums = np.cumsum(np.pad(respond(quantity, step, 0.0, response), ((1, 0), (0, 0))), axis=0)
-        answers.append(np.stack([means_by_second(sums, one) for one in late], axis=1))
-    return answers
+    bare = structs.replace(effect, lag_s=0.0, response_s=0.0, response_range=())
+    quantity = bare.response(step, fitted.coarse.context)
+    responses = []
+    for response_s in FINE_RESPONSES:
+        sums = np.cumsum(np.pad(respond(quantity, step, 0.0, response_s), ((1, 0), (0, 0))), axis=0)
+        responses.append(np.stack([means_by_second(sums, one) for one in late], axis=1))
+    return responses
 
 
 def _beside(others: FloatArray, rows: FloatArray) -> FloatArray:

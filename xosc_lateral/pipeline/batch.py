@@ -157,8 +157,8 @@ def _outcomes(
                     yield JobOutcome(JobState.UP_TO_DATE, row, 0.0)
             if todo:
                 with open_pool(min(workers, len(todo)), cluster) as pool:
-                    for job, answer in run_tasks(pool, work, todo):
-                        yield _noted(job, answer, journal)
+                    for job, reply in run_tasks(pool, work, todo):
+                        yield _noted(job, reply, journal)
                 _sweep(batch.folder)
             _forget_missing(batch, journal)
             journal.finish()
@@ -196,16 +196,16 @@ def _run(converter: Converter, limits: JobLimits, job: Job) -> _Reply:
     return _Reply(row, time.perf_counter() - start)
 
 
-def _noted(job: Job, answer: _Reply | WorkerDiedError, journal: Journal) -> JobOutcome:
-    if isinstance(answer, WorkerDiedError):
-        answer = _Reply(job.row(f"{job.source}: {answer}"), 0.0)
-    if answer.stop:
-        raise BatchStoppedError(f"{answer.stop}; {_KEPT}")
-    row = answer.row
+def _noted(job: Job, reply: _Reply | WorkerDiedError, journal: Journal) -> JobOutcome:
+    if isinstance(reply, WorkerDiedError):
+        reply = _Reply(job.row(f"{job.source}: {reply}"), 0.0)
+    if reply.stop:
+        raise BatchStoppedError(f"{reply.stop}; {_KEPT}")
+    row = reply.row
     if row.error and job.name in journal:
         row = _kept(job, journal.row(job.name), row)
-    journal.add(row, answer.seconds)
-    return JobOutcome(JobState.FAILED if row.error else JobState.WRITTEN, row, answer.seconds)
+    journal.add(row, reply.seconds)
+    return JobOutcome(JobState.FAILED if row.error else JobState.WRITTEN, row, reply.seconds)
 
 
 def _kept(job: Job, former: ManifestRow, failed: ManifestRow) -> ManifestRow:

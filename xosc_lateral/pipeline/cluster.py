@@ -8,7 +8,7 @@ from concurrent.futures import CancelledError, Executor, Future
 from types import TracebackType
 from typing import Any, Self
 
-from xosc_lateral.pipeline.tasks import AHEAD, Answer, ClusterError, Task
+from xosc_lateral.pipeline.tasks import AHEAD, ClusterError, Result, Task
 from xosc_lateral.version import __version__
 
 CONNECT_TIMEOUT = 10.0
@@ -66,7 +66,7 @@ class Cluster:
         """A few per thread of the workers that there are now; workers may come and go."""
         return AHEAD * max(1, sum(map(int, self._client.nthreads().values())))
 
-    def submit(self, work: Callable[[Task], Answer], task: Task) -> Future[Answer]:
+    def submit(self, work: Callable[[Task], Result], task: Task) -> Future[Result]:
         """Hand out a task."""
         self._check()
         return self._executor.submit(work, task)

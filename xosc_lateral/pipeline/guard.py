@@ -20,7 +20,7 @@ from xosc_lateral.limits import JOB_MEMORY, JOB_TIMEOUT
 from xosc_lateral.pipeline.memory import address_space, resident
 
 Task = TypeVar("Task")
-Answer = TypeVar("Answer")
+Result = TypeVar("Result")
 
 POLL = 0.2
 """How often time and memory are looked at. [s]"""
@@ -61,7 +61,7 @@ def let_worker_die() -> None:
     _worker_may_die = True
 
 
-def within_limits(work: Callable[[Task], Answer], task: Task, limits: JobLimits) -> Answer:
+def within_limits(work: Callable[[Task], Result], task: Task, limits: JobLimits) -> Result:
     """Run ``work(task)``.
 
     Raises

@@ -14,7 +14,7 @@ from types import TracebackType
 from typing import Any, Self
 
 from xosc_lateral.pipeline.guard import let_worker_die
-from xosc_lateral.pipeline.tasks import AHEAD, TRIES_ALONE, Answer, Task
+from xosc_lateral.pipeline.tasks import AHEAD, TRIES_ALONE, Result, Task
 
 PARENT_CHECK = 0.5
 """How often a worker looks whether its run is still there. [s]"""
@@ -50,9 +50,9 @@ class LocalProcesses:
         """A few per worker."""
         return AHEAD * self._count
 
-    def submit(self, work: Callable[[Task], Answer], task: Task) -> Future[Answer]:
+    def submit(self, work: Callable[[Task], Result], task: Task) -> Future[Result]:
         """Hand out a task."""
-        future: Future[Answer] = self._executor.submit(work, task)
+        future: Future[Result] = self._executor.submit(work, task)
         return future
 
     def recover(self) -> None:

@@ -16,7 +16,7 @@ from typing import Protocol, TypeVar
 from xosc_lateral.errors import XoscLateralError
 
 Task = TypeVar("Task")
-Answer = TypeVar("Answer")
+Result = TypeVar("Result")
 
 AHEAD = 2
 """Tasks handed out per worker: one at work, one to begin with at once."""
@@ -58,7 +58,7 @@ class Pool(AbstractContextManager["Pool"], Protocol):
         """How many tasks may be handed out at once."""
         ...
 
-    def submit(self, work: Callable[[Task], Answer], task: Task) -> Future[Answer]:
+    def submit(self, work: Callable[[Task], Result], task: Task) -> Future[Result]:
         """Hand out a task."""
         ...
 
@@ -71,17 +71,17 @@ class Pool(AbstractContextManager["Pool"], Protocol):
         ...
 
     def check(self) -> None:
-        """Raise `ClusterError` when no answer can come any more; called every few seconds without one."""
+        """Raise `ClusterError` when no result can come any more; called every few seconds without one."""
         ...
 
 
 def run_tasks(
-    pool: Pool, work: Callable[[Task], Answer], tasks: Iterable[Task]
-) -> Iterator[tuple[Task, Answer | WorkerDiedError]]:
-    """Answers as they come, in any order.
+    pool: Pool, work: Callable[[Task], Result], tasks: Iterable[Task]
+) -> Iterator[tuple[Task, Result | WorkerDiedError]]:
+    """Results as they come, in any order.
 
     When a worker dies, whatever had been handed out is tried again, one by one: what kills its worker then as well is
-    the culprit and is answered by a `WorkerDiedError`; the rest is fine.
+    the culprit and gives a `WorkerDiedError`; the rest is fine.
 
     Raises
     ------
@@ -91,7 +91,7 @@ def run_tasks(
         What `work` raises.
     """
     waiting = iter(tasks)
-    running: dict[Future[Answer], Task] = {}
+    running: dict[Future[Result], Task] = {}
     suspects: list[Task] = []
     while True:
         if not suspects:
@@ -110,17 +110,17 @@ def run_tasks(
         for future in done:
             task = running.pop(future)
             try:
-                answer = future.result()
+                result = future.result()
             except (Exception, CancelledError) as error:
                 if not pool.lost(error):
                     raise
                 suspects.append(task)
             else:
-                yield task, answer
+                yield task, result
 
 
 def _feed(
-    pool: Pool, work: Callable[[Task], Answer], waiting: Iterator[Task], running: dict[Future[Answer], Task]
+    pool: Pool, work: Callable[[Task], Result], waiting: Iterator[Task], running: dict[Future[Result], Task]
 ) -> list[Task]:
     """Hand out as many as may be; returns the task during whose submission the pool turned out to be broken."""
     while len(running) < pool.capacity():
@@ -135,7 +135,7 @@ def _feed(
     return []
 
 
-def _alone(pool: Pool, work: Callable[[Task], Answer], task: Task) -> Answer | WorkerDiedError:
+def _alone(pool: Pool, work: Callable[[Task], Result], task: Task) -> Result | WorkerDiedError:
     deaths = 1
     for _ in range(pool.tries_alone):
         begin = time.monotonic()

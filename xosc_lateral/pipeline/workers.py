@@ -8,7 +8,7 @@ from types import TracebackType
 from typing import Self
 
 from xosc_lateral.pipeline.local_processes import LocalProcesses
-from xosc_lateral.pipeline.tasks import TRIES_ALONE, Answer, Pool, Task
+from xosc_lateral.pipeline.tasks import TRIES_ALONE, Pool, Result, Task
 
 
 class ThisProcess:
@@ -28,9 +28,9 @@ class ThisProcess:
         """One."""
         return 1
 
-    def submit(self, work: Callable[[Task], Answer], task: Task) -> Future[Answer]:
+    def submit(self, work: Callable[[Task], Result], task: Task) -> Future[Result]:
         """Run it."""
-        future: Future[Answer] = Future()
+        future: Future[Result] = Future()
         future.set_result(work(task))
         return future
 

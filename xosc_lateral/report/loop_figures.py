@@ -16,7 +16,7 @@ from xosc_lateral.identification.close import LoopResult
 from xosc_lateral.identification.findings import Finding
 from xosc_lateral.identification.lack_of_fit import LackOfFit
 from xosc_lateral.identification.partial import curve_of
-from xosc_lateral.mask import stretches_of
+from xosc_lateral.mask import true_slices
 from xosc_lateral.report.figures import BLUE, GRID, MUTED, VERMILLION, figure_style, new_figure, new_panels
 from xosc_lateral.report.loop_words import SPREAD, column_label, product_label
 from xosc_lateral.report.violins import LABELS, density_over
@@ -113,7 +113,7 @@ def draw_spectra(axis: Axes, result: LoopResult, segment: int, *, within_blocks:
     timeline = result.coarse.timeline
     seams = hold_out_blocks(timeline) if within_blocks else timeline.drive
     together = timeline.valid & np.r_[True, seams[1:] == seams[:-1]]
-    segment = min(segment, max(part.stop - part.start for part in stretches_of(together)))  # runs may all be shorter
+    segment = min(segment, max(part.stop - part.start for part in true_slices(together)))  # runs may all be shorter
     frequency, density, number = gapped_spectrum(timeline.offset[None], timeline.valid, seams, timeline.step, segment)
     # the mean of so many independent periodograms, which overlap by half
     about = TWO_ERRORS / np.sqrt(max(0.75 * number, 1.0))

@@ -76,17 +76,19 @@ def test_hidden_effects_go_on_from_their_state_and_from_a_saved_one(kind: str) -
 
 
 @pytest.mark.parametrize("name", COLUMNED)
-def test_column_effects_answer_in_blocks_as_to_the_whole(name: str) -> None:
+def test_column_effects_respond_in_blocks_as_to_the_whole(name: str) -> None:
     effect, context = cast(ColumnEffect, COLUMNED[name]), contexts(N)
     context |= {"x": context["lead_distance"], "y": context["speed"]}
     whole = effect.terms(STEP * np.arange(N), context, np.random.default_rng(0))
-    response, answers = effect.response(STEP), []
+    response, parts = effect.response_in_blocks(STEP), []
     for rows in cut(np.arange(N)):
-        answers.append(response.take(effect.known({column: values[rows] for column, values in context.items()})))
-        response = effect.response(STEP, read_as(ResponseState, json.loads(json.dumps(plain(response.state)))))
+        parts.append(response.take(effect.known({column: values[rows] for column, values in context.items()})))
+        response = effect.response_in_blocks(
+            STEP, read_as(ResponseState, json.loads(json.dumps(plain(response.state))))
+        )
     last = effect.known({column: values[:0] for column, values in context.items()})
-    answers.append(response.finish(last))
-    same(effect.acting(np.concatenate(answers)), whole)
+    parts.append(response.finish(last))
+    same(effect.acting(np.concatenate(parts)), whole)
 
 
 @pytest.mark.parametrize("lag_s", [-3.0, -1.3, -0.1, 0.0, 0.1, 0.2, 2.5, 40.0, -150.0, 150.0])

@@ -1,4 +1,4 @@
-"""What effects of columns share: a reference, answers within those seen, one driver's own coefficients."""
+"""What effects of columns share: a reference, responses within those seen, one driver's own coefficients."""
 
 from __future__ import annotations
 
@@ -13,15 +13,15 @@ WRONG: dict[str, tuple[dict, str]] = {
     "no number": ({"coefficients": (np.nan,)}, "not finite"),
     "endless error": ({"errors": (np.inf,)}, "not finite"),
     "endless lag": ({"lag_s": np.inf}, "not finite"),
-    "answers before it is asked": ({"response_s": -0.1}, "below 0 s"),
+    "responds before it is asked": ({"response_s": -0.1}, "below 0 s"),
     "errors of something else": ({"errors": (0.1, 0.1)}, "as many coefficients"),
     "a reference too few": ({"reference": ()}, "as many coefficients"),
     "deviations of something else": ({"between_drivers": (0.1, 0.1)}, "between_drivers"),
     "negative deviation": ({"between_drivers": (-0.1,)}, "between_drivers"),
     "endless deviation": ({"between_drivers": (np.inf,)}, "between_drivers"),
-    "ranges of something else": ({"answer_range": ((0.0, 1.0), (0.0, 1.0))}, "answer_range"),
-    "range upside down": ({"answer_range": ((1.0, 0.0),)}, "answer_range"),
-    "endless range": ({"answer_range": ((0.0, np.inf),)}, "answer_range"),
+    "ranges of something else": ({"response_range": ((0.0, 1.0), (0.0, 1.0))}, "answer_range"),
+    "range upside down": ({"response_range": ((1.0, 0.0),)}, "answer_range"),
+    "endless range": ({"response_range": ((0.0, np.inf),)}, "answer_range"),
 }
 
 
@@ -61,22 +61,22 @@ def test_nothing_changes_at_the_reference() -> None:
     np.testing.assert_allclose(strength(effect, x=np.full(40, 31.5)), 0.0, atol=1e-14)
 
 
-def test_answers_beyond_those_that_were_seen_count_as_the_outermost() -> None:
-    effect = made(Linear, 0.1, column="x", answer_range=((-1.0, 2.0),))
+def test_responses_beyond_those_that_were_seen_count_as_the_outermost() -> None:
+    effect = made(Linear, 0.1, column="x", response_range=((-1.0, 2.0),))
     np.testing.assert_allclose(strength(effect, x=[-9.0, -1.0, 0.5, 2.0, 9.0]), [-0.1, -0.1, 0.05, 0.2, 0.2])
 
 
 def test_each_component_has_a_range_of_its_own() -> None:
-    effect = made(Angular, 1.0, 10.0, column="x", answer_range=((-0.5, 0.5), (-1.0, 0.2)))
+    effect = made(Angular, 1.0, 10.0, column="x", response_range=((-0.5, 0.5), (-1.0, 0.2)))
     np.testing.assert_allclose(strength(effect, x=[90.0, 0.0, 270.0]), [0.5 + 10.0 * 0.0, 0.0 + 2.0, -0.5], atol=1e-12)
 
 
-def test_the_range_bounds_the_answer_and_not_the_column() -> None:
+def test_the_range_bounds_the_response_and_not_the_column() -> None:
     """A spike of one sample is smoothed away by a slow driver: it is not cut off before."""
     spike = np.zeros(100)
     spike[50] = 10.0
     free = made(Linear, 0.1, column="x", response_s=10.0)
-    bounded = made(Linear, 0.1, column="x", response_s=10.0, answer_range=((0.0, 1.0),))
+    bounded = made(Linear, 0.1, column="x", response_s=10.0, response_range=((0.0, 1.0),))
     assert strength(free, x=spike).max() < 0.1
     np.testing.assert_array_equal(strength(bounded, x=spike), strength(free, x=spike))
 
@@ -103,9 +103,9 @@ def test_a_threshold_levels_off_only_as_a_step(jump: bool) -> None:
 
 def test_one_row_weighs_what_it_weighs_among_many() -> None:
     effect = made(Angular, 0.3, -0.7, column="x")
-    answer = np.random.default_rng(4).normal(size=(50, 2))
-    whole = effect.weighed(answer)
-    np.testing.assert_array_equal(np.concatenate([effect.weighed(row[None, :]) for row in answer]), whole)
+    response = np.random.default_rng(4).normal(size=(50, 2))
+    whole = effect.weighed(response)
+    np.testing.assert_array_equal(np.concatenate([effect.weighed(row[None, :]) for row in response]), whole)
 
 
 def test_without_coefficients_there_is_no_strength() -> None:
@@ -136,7 +136,7 @@ def test_the_generator_is_left_as_it_is() -> None:
 
 def test_fields_that_say_nothing_are_not_written() -> None:
     assert not {"between_drivers", "answer_range"} & set(made(Linear, 0.1, column="x").to_dict())
-    full = made(Linear, 0.1, column="x", between_drivers=(0.05,), answer_range=((0.0, 1.0),)).to_dict()
+    full = made(Linear, 0.1, column="x", between_drivers=(0.05,), response_range=((0.0, 1.0),)).to_dict()
     assert full["between_drivers"] == [0.05]
     assert full["answer_range"] == [[0.0, 1.0]]
 

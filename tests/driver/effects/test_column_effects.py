@@ -37,23 +37,23 @@ def strength(effect: ColumnEffect, **context: np.ndarray) -> np.ndarray:
     return found
 
 
-def test_a_step_is_answered_like_a_first_order_lag_after_the_delay() -> None:
+def test_a_step_is_responseed_like_a_first_order_lag_after_the_delay() -> None:
     jump = (TIME >= 20.0).astype(float)
-    answer = respond(jump, STEP, 3.0, 2.0)
+    response = respond(jump, STEP, 3.0, 2.0)
     late = TIME - 23.0
-    # the discrete lag answers within the sample in which the input moves: half a step ahead of the continuous one
+    # the discrete lag responds within the sample in which the input moves: half a step ahead of the continuous one
     expected = np.where(late >= -1e-9, 1.0 - np.exp(-(late + STEP) / 2.0), 0.0)
-    assert answer == pytest.approx(expected, abs=1e-9)
+    assert response == pytest.approx(expected, abs=1e-9)
 
 
 def test_a_negative_lag_looks_ahead_and_holds_the_last_value() -> None:
     ramp = TIME.copy()
-    answer = respond(ramp, STEP, -1.0, 0.0)
-    assert answer[:-5] == pytest.approx(ramp[5:])
-    assert answer[-5:] == pytest.approx(np.full(5, ramp[-1]))
+    response = respond(ramp, STEP, -1.0, 0.0)
+    assert response[:-5] == pytest.approx(ramp[5:])
+    assert response[-5:] == pytest.approx(np.full(5, ramp[-1]))
 
 
-def test_the_answer_starts_settled() -> None:
+def test_the_response_starts_settled() -> None:
     assert respond(np.full(50, 7.0), STEP, 0.5, 4.0) == pytest.approx(np.full(50, 7.0))
 
 

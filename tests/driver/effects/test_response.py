@@ -1,4 +1,4 @@
-"""The driver's answer against numpy's interpolation and scipy's filter, which it does without."""
+"""The driver's response against numpy's interpolation and scipy's filter, which it does without."""
 
 import subprocess
 import sys
@@ -35,7 +35,7 @@ def test_a_lag_is_scipys_filter_started_settled(response_s: float, n: int) -> No
     np.testing.assert_allclose(respond(values, STEP, 0.0, response_s), expected, rtol=0, atol=1e-12)
 
 
-def test_every_component_is_answered_by_itself() -> None:
+def test_every_component_is_responseed_by_itself() -> None:
     values = quantity(300, 3)
     apart = [respond(column, STEP, 0.53, 2.0) for column in values.T]
     np.testing.assert_array_equal(respond(values, STEP, 0.53, 2.0), np.stack(apart, axis=1))
@@ -49,7 +49,7 @@ def test_the_quantity_itself_is_left_as_it_was() -> None:
         np.testing.assert_array_equal(values, kept)
 
 
-def test_nothing_is_answered_with_nothing() -> None:
+def test_nothing_is_responseed_with_nothing() -> None:
     assert respond(np.empty((0, 2)), STEP, 0.3, 1.0).shape == (0, 2)
 
 

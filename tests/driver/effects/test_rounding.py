@@ -37,4 +37,4 @@ def test_the_refined_profile_is_shipped_rounded() -> None:
     assert again.lane_width == shipped.lane_width
     for one, other in zip(shipped.effects, again.effects, strict=True):
         np.testing.assert_equal(one.coefficients, other.coefficients)  # type: ignore[attr-defined]
-        np.testing.assert_equal(one.answer_range, other.answer_range)  # type: ignore[attr-defined]
+        np.testing.assert_equal(one.response_range, other.response_range)  # type: ignore[attr-defined]

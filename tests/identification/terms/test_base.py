@@ -10,7 +10,7 @@ from xosc_lateral.driver.effects import Acts, Linear
 from xosc_lateral.identification.regression import Coarse, fit_model
 from xosc_lateral.identification.removal import estimate_all, removal_of
 from xosc_lateral.identification.terms.base import Removal, centred
-from xosc_lateral.identification.terms.column import answers, columns_acting, columns_on_size, of_kind, shrunk
+from xosc_lateral.identification.terms.column import columns_acting, columns_on_size, of_kind, responses, shrunk
 from xosc_lateral.identification.terms.mean import MeanTerm
 from xosc_lateral.identification.terms.spread import SpreadTerm
 from xosc_lateral.identification.terms.step import StepTerm
@@ -91,11 +91,11 @@ def test_several_sizes_are_shrunk_together() -> None:
 
 
 def test_a_shift_counts_all_that_was_seen_and_a_factor_its_inner_nine_tenths(coarse: Coarse) -> None:
-    answer = coarse.answer(term().effect)[coarse.valid, 0]  # type: ignore[attr-defined]
+    response = coarse.response(term().effect)[coarse.valid, 0]  # type: ignore[attr-defined]
     low, high = term().ends(coarse)
-    assert (low[0], high[0]) == (answer.min(), answer.max())
+    assert (low[0], high[0]) == (response.min(), response.max())
     low, high = term(SpreadTerm).ends(coarse)
-    np.testing.assert_allclose([low[0], high[0]], np.quantile(answer, [0.05, 0.95]))
+    np.testing.assert_allclose([low[0], high[0]], np.quantile(response, [0.05, 0.95]))
 
 
 def test_a_switch_that_is_hardly_ever_on_keeps_its_two_ends(coarse: Coarse) -> None:
@@ -103,7 +103,7 @@ def test_a_switch_that_is_hardly_ever_on_keeps_its_two_ends(coarse: Coarse) -> N
     assert high[0] > low[0]
 
 
-def test_bounded_answers_have_no_mean(coarse: Coarse) -> None:
+def test_bounded_responses_have_no_mean(coarse: Coarse) -> None:
     assert term(SpreadTerm).bounded(coarse)[coarse.valid].mean() == pytest.approx(0.0, abs=1e-12)
 
 
@@ -113,7 +113,7 @@ def test_a_sized_effect_is_neutral_on_average_and_holds_its_range(coarse: Coarse
     assert effect.coefficients[0] == pytest.approx(0.15, abs=4.0 * effect.errors[0])
     strength = effect.strength(0.2, coarse.context)
     assert strength[coarse.timeline.valid].mean() == pytest.approx(0.0, abs=1e-9)
-    assert len(effect.answer_range) == 1
+    assert len(effect.response_range) == 1
 
 
 def test_lists_of_terms_by_what_they_act_on(coarse: Coarse) -> None:
@@ -121,8 +121,8 @@ def test_lists_of_terms_by_what_they_act_on(coarse: Coarse) -> None:
     assert len(of_kind(fitted, MeanTerm)) == len(of_kind(fitted, SpreadTerm)) == 1
     assert columns_on_size(fitted) == {"rare"}
     assert columns_acting(fitted) == {"x", "rare"}
-    assert answers(fitted, MeanTerm).shape == (len(coarse), 1)
-    assert answers(fit_model(coarse, ()), MeanTerm).shape == (len(coarse), 0)
+    assert responses(fitted, MeanTerm).shape == (len(coarse), 1)
+    assert responses(fit_model(coarse, ()), MeanTerm).shape == (len(coarse), 0)
 
 
 def test_terms_of_one_component_are_numbered_and_what_they_did_adds_up(coarse: Coarse) -> None:

@@ -8,6 +8,7 @@ from functools import reduce
 from operator import add
 from typing import Any, Self
 
+import msgspec
 import numpy as np
 from msgspec.structs import replace
 from numpy.typing import NDArray
@@ -35,13 +36,13 @@ class ColumnEffect(Effect, frozen=True, kw_only=True):
     errors : tuple of float
         Standard errors of the coefficients.
     lag_s, response_s : float
-        Delay (negative: looks ahead) and first-order lag of the answer. [s]
+        Delay (negative: looks ahead) and first-order lag of the response. [s]
     reference : tuple of float
         Value of the quantity at which nothing changes: its mean over the drives it was fitted on.
     between_drivers : tuple of float
-        Standard deviations of the coefficients between drivers (random slopes); empty: all drivers answer alike.
-    answer_range : tuple of (float, float)
-        Lowest and highest answer, per component, that the effect was fitted on; answers beyond are taken as these.
+        Standard deviations of the coefficients between drivers (random slopes); empty: all drivers respond alike.
+    response_range : tuple of (float, float)
+        Lowest and highest response, per component, that the effect was fitted on; responses beyond are taken as these.
         Empty: no bounds. [unit of the quantity]
 
     Raises
@@ -61,7 +62,7 @@ class ColumnEffect(Effect, frozen=True, kw_only=True):
     response_s: float = 0.0
     reference: tuple[float, ...] = ()
     between_drivers: tuple[float, ...] = ()
-    answer_range: tuple[tuple[float, float], ...] = ()
+    response_range: tuple[tuple[float, float], ...] = msgspec.field(name="answer_range", default=())
 
     def __post_init__(self) -> None:
         """Coerce and validate once."""
@@ -82,8 +83,8 @@ class ColumnEffect(Effect, frozen=True, kw_only=True):
                 f"effect {self.kind}: between_drivers {self.between_drivers}, expected none or a number >= 0 for each "
                 "coefficient"
             )
-        ranges = tuple((float(low), float(high)) for low, high in self.answer_range)
-        set_once(self, answer_range=ranges)
+        ranges = tuple((float(low), float(high)) for low, high in self.response_range)
+        set_once(self, response_range=ranges)
         if ranges and (
             len(ranges) != len(self.coefficients) or not all(-np.inf < low <= high < np.inf for low, high in ranges)
         ):
@@ -140,35 +141,35 @@ class ColumnEffect(Effect, frozen=True, kw_only=True):
         stand_in = self.reference if self.reference else tuple(_finite_mean(column) for column in values.T)
         return np.where(missing, np.asarray(stand_in), values)
 
-    def answer(self, step: float, context: Mapping[str, FloatArray]) -> FloatArray:
-        """Driving quantity as the driver answers to it, shape (n, k), on a grid of the given step [s]."""
+    def response(self, step: float, context: Mapping[str, FloatArray]) -> FloatArray:
+        """Driving quantity as the driver responds to it, shape (n, k), on a grid of the given step [s]."""
         return respond(self.known(context), step, self.lag_s, self.response_s)
 
-    def response(self, step: float, state: ResponseState | None = None) -> Response:
-        """The answer block by block, shape (n, k) each, from the start of a drive or from a state; `step` in [s]."""
+    def response_in_blocks(self, step: float, state: ResponseState | None = None) -> Response:
+        """The response block by block, shape (n, k) each, from the start of a drive or from a state; `step` in [s]."""
         return Response(step, self.lag_s, self.response_s, state)
 
     def strength(self, step: float, context: Mapping[str, FloatArray]) -> FloatArray | None:
         """[m] or natural logarithm of a factor, shape (n,); None when a column is missing."""
         if any(column not in context for column in self.columns):
             return None
-        return self.weighed(self.answer(step, context))
+        return self.weighed(self.response(step, context))
 
-    def weighed(self, answer: FloatArray) -> FloatArray:
-        """Strength of answers, shape (n, k): coefficients . (answer - reference), shape (n,). [m] or [-]"""
+    def weighed(self, response: FloatArray) -> FloatArray:
+        """Strength of responses, shape (n, k): coefficients . (response - reference), shape (n,). [m] or [-]"""
         # Component by component: a matrix product adds in another order for one row than for many.
         parts = [
-            (self._within(answer[:, k], k) - reference) * coefficient
+            (self._within(response[:, k], k) - reference) * coefficient
             for k, (coefficient, reference) in enumerate(zip(self.coefficients, self.reference, strict=True))
         ]
-        return np.asarray(reduce(add, parts) if parts else np.zeros(len(answer)))
+        return np.asarray(reduce(add, parts) if parts else np.zeros(len(response)))
 
-    def _within(self, answer: FloatArray, component: int) -> FloatArray:
-        return np.clip(answer, *self.answer_range[component]) if self.answer_range else answer
+    def _within(self, response: FloatArray, component: int) -> FloatArray:
+        return np.clip(response, *self.response_range[component]) if self.response_range else response
 
-    def acting(self, answer: FloatArray) -> EffectTerms:
-        """Terms [m], [-] of answers, shape (n, k), in the unit of the quantity."""
-        return terms_of(self.acts, self.weighed(answer))
+    def acting(self, response: FloatArray) -> EffectTerms:
+        """Terms [m], [-] of responses, shape (n, k), in the unit of the quantity."""
+        return terms_of(self.acts, self.weighed(response))
 
     def terms(self, time: FloatArray, context: Mapping[str, FloatArray], rng: np.random.Generator) -> EffectTerms:
         """Evaluate on an even time grid [s], shape (n,); `rng` is left untouched. See `Effect.terms`."""
@@ -188,7 +189,7 @@ class ColumnEffect(Effect, frozen=True, kw_only=True):
         values: dict[str, Any] = plain(self)
         if not self.between_drivers:
             del values["between_drivers"]
-        if not self.answer_range:
+        if not self.response_range:
             del values["answer_range"]
         return values
 

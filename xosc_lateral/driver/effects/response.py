@@ -1,4 +1,4 @@
-"""How a driver answers to a quantity: when, and how slowly. Block by block; a whole drive is one long block.
+"""How a driver responds to a quantity: when, and how slowly. Block by block; a whole drive is one long block.
 
 References
 ----------
@@ -19,16 +19,16 @@ FloatArray = NDArray[np.float64]
 
 
 class ResponseState(msgspec.Struct):
-    """Where an answer is.
+    """Where a response is.
 
     Parameters
     ----------
     held : array, shape (m, k), optional
         Last rows of the quantity, as far back as they are still needed.
     taken, given : int
-        Rows of the quantity seen, and of the answer given.
+        Rows of the quantity seen, and of the response given.
     settled : array, shape (k,), optional
-        Last answer of the first-order lag.
+        Last response of the first-order lag.
     """
 
     held: FloatArray | None = None
@@ -40,7 +40,7 @@ class ResponseState(msgspec.Struct):
 class Response:
     """A shift in time, then a first-order lag of gain 1, of a quantity given block by block.
 
-    Row i of the answer is due once all rows that it looks ahead to were given; before the first row and, at the end,
+    Row i of the response is due once all rows that it looks ahead to were given; before the first row and, at the end,
     beyond the last one, the outermost row holds. The lag starts settled.
 
     Parameters
@@ -63,36 +63,36 @@ class Response:
         """Rows that it looks ahead."""
 
     def take(self, values: FloatArray) -> FloatArray:
-        """Answers that are due after more rows, shape (n, k), of the quantity; shape (m, k). [unit of the quantity]"""
+        """What is due of the response after more rows of the quantity, shape (n, k); (m, k). [unit of the quantity]"""
         self._add(values)
-        return self._answer(max(self.state.given, self.state.taken - self.ahead))
+        return self._due(max(self.state.given, self.state.taken - self.ahead))
 
     def finish(self, values: FloatArray) -> FloatArray:
-        """All answers that are left once the last rows are given, shape (m, k). [unit of the quantity]"""
+        """All responses that are left once the last rows are given, shape (m, k). [unit of the quantity]"""
         self._add(values)
-        return self._answer(self.state.taken)
+        return self._due(self.state.taken)
 
     def _add(self, values: FloatArray) -> None:
         state = self.state
         state.held = values if state.held is None else np.concatenate([state.held, values])
         state.taken += len(values)
 
-    def _answer(self, until: int) -> FloatArray:
-        """Rows of the answer from the first that wasn't given."""
+    def _due(self, until: int) -> FloatArray:
+        """Rows of the response from the first that wasn't given."""
         state = self.state
         assert state.held is not None
         if until == state.given + 1:
-            answer = self._single(state.held, state.given)
+            response = self._single(state.held, state.given)
         else:
-            answer = self._lagged(self._shifted(state.held, state.given, until))
+            response = self._lagged(self._shifted(state.held, state.given, until))
         state.given = until
         done = min(until + self._whole, state.taken - 1) - (state.taken - len(state.held))
         if done > 0:
             state.held = state.held[done:]
-        return answer
+        return response
 
     def _single(self, held: FloatArray, row: int) -> FloatArray:
-        """One row of the answer, by the operations of many, without their cost; shape (1, k)."""
+        """One row of the response, by the operations of many, without their cost; shape (1, k)."""
         at = row + self._whole
         if at < 0:
             value = held[0]
@@ -136,7 +136,7 @@ class Response:
 
 
 def respond(values: FloatArray, step: float, lag_s: float, response_s: float) -> FloatArray:
-    """Answer to a whole drive; see `Response`.
+    """Response to a whole drive; see `Response`.
 
     Parameters
     ----------

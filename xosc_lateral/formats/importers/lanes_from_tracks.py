@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.errors import NotEnoughDataError
-from xosc_lateral.mask import stretches_of
+from xosc_lateral.mask import true_slices
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -189,5 +189,5 @@ def _covered(s: FloatArray, stretch: IntArray, window: float = 100.0) -> tuple[f
 
 def _longest(good: NDArray[np.bool_]) -> tuple[int, int]:
     """First index and one past the last of the longest stretch of True; (0, 0) if there is none."""
-    longest = max(stretches_of(good), key=lambda part: part.stop - part.start, default=slice(0, 0))
+    longest = max(true_slices(good), key=lambda part: part.stop - part.start, default=slice(0, 0))
     return longest.start, longest.stop

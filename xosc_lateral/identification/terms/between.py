@@ -75,12 +75,12 @@ class BetweenTerm(ColumnTerm):
         if not candidates:
             return None
         quantities, costs = np.stack(usual, axis=1), np.array([candidate.cost for candidate in candidates])
-        response, rng = places.left(places.place), search.rng(5)
-        scores = np.square(response @ quantities) - costs
+        observed, rng = places.left(places.place), search.rng(5)
+        scores = np.square(observed @ quantities) - costs
         rows, null = np.flatnonzero(places.weight), np.empty(NULL_DRAWS)
         for index in range(NULL_DRAWS):
-            dealt = np.zeros_like(response)
-            dealt[rows] = response[rng.permutation(rows)]
+            dealt = np.zeros_like(observed)
+            dealt[rows] = observed[rng.permutation(rows)]
             null[index] = float((np.square(dealt @ quantities) - costs).max())
         best = int(np.argmax(scores))
         effect = structs.replace(candidates[best].effect, lag_s=0.0, response_s=USUAL_S)
@@ -141,7 +141,7 @@ class _Places:
         power = fitted.whitener.power
         counted = (seconds >= MIN_SECONDS) & (power > 0.0)
         noise = np.where(counted, 1.0 / np.maximum(power, 1e-300), np.inf)
-        usual = [coarse.by_drive(coarse.answer(_at_once(term.effect))[:, 0]) for term in of_kind(fitted, BetweenTerm)]
+        usual = [coarse.by_drive(coarse.response(_at_once(term.effect))[:, 0]) for term in of_kind(fitted, BetweenTerm)]
         known = np.column_stack([np.ones(groups), *usual])
         scatter = 0.0
         for _ in range(20):

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 FloatArray = NDArray[np.float64]
 
 FACTOR_QUANTILES = (0.05, 0.95)
-"""Answers between which a factor on the movement is believed; the report tells its size between the same. [-]"""
+"""Responses between which a factor on the movement is believed; the report tells its size between the same. [-]"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,27 +120,27 @@ class ColumnTerm(Term):
         )
 
     def ends(self, coarse: Coarse) -> tuple[FloatArray, FloatArray]:
-        """Lowest and highest answer that counts, about the mean answer, shape (k,) each.
+        """Lowest and highest response that counts, about the mean response, shape (k,) each.
 
         All that was seen, for a shift. For what multiplies the movement the 5 % and 95 % quantile: a log-linear factor
         would be anything at a column's few extremes.
         """
-        answer = coarse.answer(self.effect, keep=True)[coarse.valid]
-        least, most = answer.min(axis=0), answer.max(axis=0)
+        response = coarse.response(self.effect, keep=True)[coarse.valid]
+        least, most = response.min(axis=0), response.max(axis=0)
         if self.acts is Acts.LOCATION:
             return least, most
-        low, high = np.quantile(answer, FACTOR_QUANTILES, axis=0)
+        low, high = np.quantile(response, FACTOR_QUANTILES, axis=0)
         varies = high > low  # not so for a switch that is hardly ever on
         return np.where(varies, low, least), np.where(varies, high, most)
 
     def bounded(self, coarse: Coarse) -> FloatArray:
-        """Answers within `ends`, about their mean, shape (n, k). [unit of the quantity]"""
-        answer = np.clip(coarse.answer(self.effect, keep=True), *self.ends(coarse))
-        return np.asarray(answer - answer[coarse.valid].mean(axis=0))
+        """Responses within `ends`, about their mean, shape (n, k). [unit of the quantity]"""
+        response = np.clip(coarse.response(self.effect, keep=True), *self.ends(coarse))
+        return np.asarray(response - response[coarse.valid].mean(axis=0))
 
     def sized(self, coarse: Coarse, acts: Acts, sizes: FloatArray, errors: FloatArray) -> ColumnEffect:
         """The effect with its sizes, shrunk by how sure they are, bounded, neutral at its mean."""
-        raw = self.effect.answer(coarse.timeline.step, coarse.context)[coarse.timeline.valid]
+        raw = self.effect.response(coarse.timeline.step, coarse.context)[coarse.timeline.valid]
         usual, (low, high) = raw.mean(axis=0), self.ends(coarse)
         within = np.clip(raw, usual + low, usual + high)
         return structs.replace(
@@ -149,7 +149,7 @@ class ColumnTerm(Term):
             coefficients=tuple(shrunk(sizes, errors)),
             errors=tuple(errors),
             reference=tuple(within.mean(axis=0)),
-            answer_range=tuple(zip((usual + low).tolist(), (usual + high).tolist(), strict=True)),
+            response_range=tuple(zip((usual + low).tolist(), (usual + high).tolist(), strict=True)),
         )
 
 
@@ -164,9 +164,9 @@ def of_kind(fitted: Fitted, kind: type[ColumnTerm]) -> list[ColumnTerm]:
     return [term for term in fitted.terms if isinstance(term, kind)]
 
 
-def answers(fitted: Fitted, kind: type[ColumnTerm]) -> FloatArray:
-    """Answers of all terms of one kind, side by side, shape (n, k)."""
-    own = [fitted.coarse.answer(term.effect, keep=True) for term in of_kind(fitted, kind)]
+def responses(fitted: Fitted, kind: type[ColumnTerm]) -> FloatArray:
+    """Responses of all terms of one kind, side by side, shape (n, k)."""
+    own = [fitted.coarse.response(term.effect, keep=True) for term in of_kind(fitted, kind)]
     return np.concatenate(own, axis=1) if own else np.zeros((len(fitted.coarse), 0))
 
 

@@ -11,7 +11,7 @@ from xosc_lateral.driver.effects import Acts, Effect
 from xosc_lateral.identification.problem import Problem, of_squares
 from xosc_lateral.identification.regression import Fitted
 from xosc_lateral.identification.squares import fine_squares
-from xosc_lateral.identification.terms.column import ColumnTerm, answers, columns_acting
+from xosc_lateral.identification.terms.column import ColumnTerm, columns_acting, responses
 from xosc_lateral.identification.terms.mean import MeanTerm
 from xosc_lateral.identification.terms.spread import fine_twin, known_log_scale
 
@@ -35,8 +35,8 @@ class FineNoiseTerm(ColumnTerm):
         rate of change where its timing is.
         """
         squares = fine_squares(fitted)
-        moved = answers(fitted, MeanTerm)
-        known = [known_log_scale(fitted), answers(fitted, cls), np.abs(moved)]
+        moved = responses(fitted, MeanTerm)
+        known = [known_log_scale(fitted), responses(fitted, cls), np.abs(moved)]
         if moved.shape[1]:
             known.append(np.abs(np.gradient(moved, axis=0)))
         return of_squares(fitted.coarse, squares.standardised, squares.valid, np.concatenate(known, axis=1))

@@ -31,13 +31,13 @@ class MeanTerm(ColumnTerm):
     group: ClassVar[str] = "mean"
 
     def mean_columns(self, coarse: Coarse) -> FloatArray:
-        """The answer, shape (n, k). [unit of the quantity]"""
-        return coarse.answer(self.effect, keep=True)
+        """The response, shape (n, k). [unit of the quantity]"""
+        return coarse.response(self.effect, keep=True)
 
     def fine_mean_columns(self, coarse: Coarse) -> FloatArray:
-        """The answer as the profile gives it: steps of a second would be noise."""
-        answer = self.effect.answer(coarse.timeline.step, coarse.context)
-        return np.asarray(answer - coarse_mean(answer)[coarse.valid].mean(axis=0))
+        """The response as the profile gives it: steps of a second would be noise."""
+        response = self.effect.response(coarse.timeline.step, coarse.context)
+        return np.asarray(response - coarse_mean(response)[coarse.valid].mean(axis=0))
 
     @classmethod
     def problem(cls, fitted: Fitted) -> Problem:

@@ -13,7 +13,7 @@ from xosc_lateral.driver.effects import Acts, Effect
 from xosc_lateral.identification.problem import Problem, of_products
 from xosc_lateral.identification.ranges import driving_range
 from xosc_lateral.identification.regression import Fitted
-from xosc_lateral.identification.terms.column import ColumnTerm, answers, columns_acting
+from xosc_lateral.identification.terms.column import ColumnTerm, columns_acting, responses
 
 FloatArray = NDArray[np.float64]
 
@@ -38,7 +38,7 @@ class RestoringTerm(ColumnTerm):
     @classmethod
     def problem(cls, fitted: Fitted) -> Problem:
         """Innovations on quantity times recent offset."""
-        return of_products(fitted.coarse, fitted.innovations, answers(fitted, cls), recent_offset(fitted))
+        return of_products(fitted.coarse, fitted.innovations, responses(fitted, cls), recent_offset(fitted))
 
     @classmethod
     def barred(cls, fitted: Fitted) -> frozenset[str]:
@@ -48,9 +48,9 @@ class RestoringTerm(ColumnTerm):
     def estimate(self, fitted: Fitted) -> tuple[Effect, ...]:
         """Innovations stay the same, so a stronger pull also narrows the spread by its square root."""
         coarse, recent = fitted.coarse, recent_offset(fitted)
-        answer = coarse.answer(self.effect)[:, 0]
+        response = coarse.response(self.effect)[:, 0]
         inside = coarse.valid & np.concatenate([[False], coarse.valid[:-1]])
-        design = np.stack([recent, recent * answer], axis=1)[inside]
+        design = np.stack([recent, recent * response], axis=1)[inside]
         change = np.diff(fitted.movement, prepend=0.0)[inside] / fitted.whitener.process.deviations[-1]
         base = float(design[:, 0] @ change) / max(float(design[:, 0] @ design[:, 0]), 1e-12)
         inverse = np.linalg.pinv(design.T @ design)

@@ -12,7 +12,7 @@ from xosc_lateral.driver.effects import Acts, Effect
 from xosc_lateral.identification.problem import Problem, of_squares
 from xosc_lateral.identification.regression import Coarse, Fitted
 from xosc_lateral.identification.squares import SLOW_S, log_sizes, slow_squares
-from xosc_lateral.identification.terms.column import ColumnTerm, answers, columns_on_size
+from xosc_lateral.identification.terms.column import ColumnTerm, columns_on_size, responses
 from xosc_lateral.identification.terms.mean import MeanTerm
 from xosc_lateral.identification.terms.spread import known_log_scale
 
@@ -30,14 +30,14 @@ class SlowSpreadTerm(ColumnTerm):
     what: ClassVar[str] = "spread"
 
     def size_columns(self, coarse: Coarse) -> FloatArray:
-        """The bounded answer, although the innovations' own scale does not follow it."""
+        """The bounded response, although the innovations' own scale does not follow it."""
         return self.bounded(coarse)
 
     @classmethod
     def problem(cls, fitted: Fitted) -> Problem:
         """Squares of running sums; an effect on the mean whose size is a little wrong leaves some where it is large."""
         squares = slow_squares(fitted)
-        known = np.concatenate([known_log_scale(fitted), np.abs(answers(fitted, MeanTerm))], axis=1)
+        known = np.concatenate([known_log_scale(fitted), np.abs(responses(fitted, MeanTerm))], axis=1)
         return of_squares(fitted.coarse, squares.standardised, squares.valid, known)
 
     @classmethod

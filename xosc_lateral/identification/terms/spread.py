@@ -32,7 +32,7 @@ class SpreadTerm(ColumnTerm):
     what: ClassVar[str] = "spread"
 
     def scale_columns(self, coarse: Coarse) -> FloatArray:
-        """The bounded answer, shape (n, k). [unit of the quantity]"""
+        """The bounded response, shape (n, k). [unit of the quantity]"""
         return self.bounded(coarse)
 
     @classmethod

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.enrich.result import Enriched, EntityResult
-from xosc_lateral.mask import stretches_of
+from xosc_lateral.mask import true_slices
 from xosc_lateral.motion.nominal import Activity, EntityMotion, NominalMotion
 from xosc_lateral.motion.trajectory import WorldTrajectory
 from xosc_lateral.report.path_dynamics import lateral_dynamics
@@ -98,7 +98,7 @@ def _entity(
         "ahead": box.center_x,
         "left": box.center_y,
         "vehicle": motion.entity.is_vehicle,
-        "present": [[part.start, part.stop - 1] for part in stretches_of(_present(motion)[rows])],
+        "present": [[part.start, part.stop - 1] for part in true_slices(_present(motion)[rows])],
         "jumps": _jumps(motion, rows),
         "lanes": _lane_changes(network, motion, rows),
         "track": [pack(track[:, k], TRACK_RESOLUTION) for k in (0, 1)],

@@ -16,7 +16,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.mask import stretches_of
+from xosc_lateral.mask import true_slices
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
@@ -78,7 +78,7 @@ def cut_path(
         The entity exists; it was placed anew in the step that ends with this row.
     """
     pieces: list[PathPiece] = []
-    for part in stretches_of(active):
+    for part in true_slices(active):
         cuts = [part.start, *(row for row in range(part.start + 1, part.stop) if teleported[row]), part.stop]
         for begin, end in pairwise(cuts):
             placed = begin > 0
@@ -182,7 +182,7 @@ def _cut_at_stops(
     still = np.hypot(np.diff(x[rows]), np.diff(y[rows])) < STANDSTILL_SPEED * step
     stops = [
         (first + part.start, first + part.stop)
-        for part in stretches_of(still)
+        for part in true_slices(still)
         if part.start == 0
         or first + part.stop == last
         or time[first + part.stop] - time[first + part.start] >= STANDSTILL_TIME
@@ -226,7 +226,7 @@ def _is_cut(times: Sequence[float], time: FloatArray, x: FloatArray, y: FloatArr
     chord = np.diff(ends)
     away = np.array([np.interp(middle, time, x), np.interp(middle, time, y)]) - ends[:, :-1]
     aside = np.abs(chord[0] * away[1] - chord[1] * away[0]) / np.maximum(np.hypot(*chord), LEAST_STEP)
-    return any(part.stop - part.start >= BEND for part in stretches_of(aside > TOLERANCE / 2.0))
+    return any(part.stop - part.start >= BEND for part in true_slices(aside > TOLERANCE / 2.0))
 
 
 def _head(time: FloatArray, way: FloatArray, until: float, step: float) -> list[float]:
