@@ -1,4 +1,4 @@
-"""The one thing that the driver model and the scenario player share: a stretch of road-following driving."""
+"""The one thing that the driver model and the scenario player share: a road-following segment."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ CONTEXT_UNITS: Mapping[str, str] = MappingProxyType(
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Segment:
-    """A stretch of one vehicle's motion with no lateral action running, on a uniform time grid.
+    """A road-following segment: a part of one vehicle's motion with no lateral action running, on a uniform time grid.
 
     Parameters
     ----------
@@ -57,7 +57,7 @@ class Segment:
         What the driver may react to, under DESIGN's names or any other; NaN where there is nothing (no leader).
         A name that is absent is neutral.
     before, after : int
-        Rows at the start and at the end of the arrays that lie outside the stretch: context only, no offsets are
+        Rows at the start and at the end of the arrays that lie outside the segment: context only, no offsets are
         sampled there. Effects that look ahead or respond slowly need what comes after and what went before.
     """
 
@@ -76,14 +76,14 @@ class Segment:
         context = {name: _frozen(values, name, n) for name, values in self.context.items()}
         object.__setattr__(self, "context", MappingProxyType(context))
         if self.before < 0 or self.after < 0 or self.before + self.after > n:
-            raise ValueError(f"{self.before} rows before and {self.after} after a stretch in {n} rows")
+            raise ValueError(f"{self.before} rows before and {self.after} after a segment in {n} rows")
 
     def __len__(self) -> int:
         return len(self.time)
 
     @property
     def inside(self) -> slice:
-        """Rows of the stretch itself."""
+        """Rows of the segment itself."""
         return slice(self.before, len(self.time) - self.after)
 
 

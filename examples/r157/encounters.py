@@ -12,7 +12,7 @@ from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.enrich.enrich import enrich
 from xosc_lateral.evaluation.cut_in import Encounter
 from xosc_lateral.motion.nominal import EntityMotion
-from xosc_lateral.motion.segments import cut_stretches
+from xosc_lateral.motion.segments import cut_segments
 from xosc_lateral.pipeline.load import Played, play_scenario
 
 FloatArray = NDArray[np.float64]
@@ -121,13 +121,13 @@ def _target(scenario: str, played: Played, entity: EntityMotion, deviation: Floa
     side = float(np.sign(centre[0]))
     lateral = centre + entity.offset[rows] + deviation
     width = float(network.lane_width(road[:1], lane[:1], s[:1])[0])
-    stretches = cut_stretches(entity, network)
+    spans = cut_segments(entity, network)
     keeps = np.zeros(len(entity.time), dtype=bool)
-    for stretch in stretches:
-        if stretch.is_road_following:
-            keeps[stretch.first : stretch.last + 1] = True
+    for span in spans:
+        if span.is_road_following:
+            keeps[span.first : span.last + 1] = True
     beside = np.abs(lane - ego.lane[0]) == 1
-    acts = [entity.time[one.first] for one in stretches if "lateral" in one.kind.value]
+    acts = [entity.time[one.first] for one in spans if "lateral" in one.kind.value]
     box, own = entity.entity.bounding_box, ego.entity.bounding_box
     return Target(
         scenario=scenario,

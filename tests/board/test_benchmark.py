@@ -8,7 +8,7 @@ import pytest
 from tests.baselines.made_runs import made_run, smooth_runs
 from xosc_lateral.board.benchmark import benchmark_realism
 from xosc_lateral.board.half import floors, make_half
-from xosc_lateral.board.ranking import agreeing, kendall_tau, rank_groups, ranks, resampled_rows, told_apart
+from xosc_lateral.board.ranking import agreeing, differing_pairs, kendall_tau, rank_groups, ranks, resampled_rows
 from xosc_lateral.board.result import Board
 from xosc_lateral.board.sampled_half import sample_half
 from xosc_lateral.board.units import halves, units_of
@@ -139,7 +139,7 @@ def test_models_that_resamples_swap_share_a_group() -> None:
     score = {"b": 1.1, "a": 1.08, "c": 2.0, "d": 8.0}
     # All move together over the resamples by more than they lie apart: it is the pairs that count.
     drawn = {key: value * np.exp(common + noise) for (key, value), noise in zip(score.items(), own, strict=True)}
-    apart = told_apart(score, drawn)
+    apart = differing_pairs(score, drawn)
     assert [pair for pair, clear in apart.items() if not clear] == [("a", "b")]
     assert rank_groups(score, apart) == {"a": 1, "b": 1, "c": 2, "d": 3}
     halves_of = {"a": [1.2, 1.0], "b": [1.1, 1.1], "c": [2.0, 2.0], "d": [1.9, 9.0]}

@@ -124,7 +124,7 @@ def _drifting(n: int, memory: float, spread: float, rng: np.random.Generator) ->
 def test_lane_centre_is_recovered_within_its_standard_error():
     rng = np.random.default_rng(5)
     wave = lambda s: 0.3 * np.sin(2 * np.pi * s / 240)  # noqa: E731
-    s, d, height, stretch = [], [], [], []
+    s, d, height, passage = [], [], [], []
     for vehicle in range(150):
         place = np.arange(rng.uniform(0, 600), rng.uniform(1400, 2000), 30.0)
         tall = rng.choice([1.5, 3.5])
@@ -132,8 +132,8 @@ def test_lane_centre_is_recovered_within_its_standard_error():
         s.append(place)
         d.append(wave(place) + tilt + _drifting(len(place), 0.9, 0.28, rng))
         height.append(np.full(len(place), tall))
-        stretch.append(np.full(len(place), vehicle))
-    lane = fit_lane_centre(*map(np.concatenate, (s, d, height, stretch)))
+        passage.append(np.full(len(place), vehicle))
+    lane = fit_lane_centre(*map(np.concatenate, (s, d, height, passage)))
     at = np.arange(lane.start, lane.end, 5.0)
     low, high = np.full(len(at), 1.5), np.full(len(at), 3.5)
     error = (lane.at(at, low) - wave(at)) / lane.standard_error(at)
@@ -146,8 +146,8 @@ def test_lane_centre_is_recovered_within_its_standard_error():
 def test_vehicles_of_one_height_are_enough():
     rng = np.random.default_rng(6)
     s = np.tile(np.arange(0, 1000, 30.0), 40)
-    stretch = np.repeat(np.arange(40), len(s) // 40)
-    lane = fit_lane_centre(s, 0.1 + rng.normal(0, 0.1, len(s)), np.full(len(s), 1.5), stretch)
+    passage = np.repeat(np.arange(40), len(s) // 40)
+    lane = fit_lane_centre(s, 0.1 + rng.normal(0, 0.1, len(s)), np.full(len(s), 1.5), passage)
     assert lane.at(np.array([500.0]), np.array([1.5])) == pytest.approx(0.1, abs=0.05)
 
 

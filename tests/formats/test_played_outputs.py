@@ -20,7 +20,7 @@ from xosc_lateral.formats.openscenario.write.offset_chain import ramps
 from xosc_lateral.formats.openscenario.write.path_pieces import vertex_times
 from xosc_lateral.formats.openscenario.write.ramp_targets import FRAME, Ramp, acceleration, fitted
 from xosc_lateral.motion.nominal import Activity
-from xosc_lateral.motion.segments import Stretch, StretchKind
+from xosc_lateral.motion.segments import SegmentKind, SegmentSpan
 
 
 def test_a_car_that_begins_with_the_scenario_is_put_down_at_its_offset(tmp_path: Path) -> None:
@@ -39,14 +39,14 @@ def test_a_car_that_begins_with_the_scenario_is_put_down_at_its_offset(tmp_path:
 
 @pytest.mark.parametrize(("between", "second"), [(0, 0.3), (Activity.LATERAL, 0.0), (Activity.TELEPORTED, 0.0)])
 def test_a_chain_begins_where_the_one_before_has_left_the_car(tmp_path: Path, between: int, second: float) -> None:
-    """Where nothing but a slow stretch lies in between; else at the nominal offset."""
+    """Where nothing but a slow segment lies in between; else at the nominal offset."""
     network = two_roads(tmp_path)
     activity = np.full(1001, int(Activity.ACTIVE), dtype=np.uint8)
     activity[500] |= between
     motion = drive(network, entity(), duration=20.0, speed=20.0, activity=activity)
     rows = ((10, 400), (600, 900))
-    stretches = [Stretch(StretchKind.ROAD_FOLLOWING, a, b, STEP * a, STEP * b) for a, b in rows]
-    chains = offset_chains(motion, network, np.full(1001, 0.3), stretches, pulls=False)
+    spans = [SegmentSpan(SegmentKind.ROAD_FOLLOWING, a, b, STEP * a, STEP * b) for a, b in rows]
+    chains = offset_chains(motion, network, np.full(1001, 0.3), spans, tows=False)
     assert [chain.start_t for chain in chains] == pytest.approx([0.0, second], abs=1e-9)
 
 
@@ -72,11 +72,11 @@ def _worst(found: list[Ramp], time: np.ndarray, side: np.ndarray) -> float:
 def test_whoever_pulls_a_trailer_is_not_put_down_aside(tmp_path: Path) -> None:
     network = two_roads(tmp_path)
     motion = drive(network, entity(), duration=10.0)
-    stretch = Stretch(StretchKind.ROAD_FOLLOWING, 0, 500, 0.0, 10.0)
-    for pulls in (True, False):
-        (chain,) = offset_chains(motion, network, np.full(501, 0.3), [stretch], pulls=pulls)
-        assert chain.is_placed is not pulls
-        assert chain.start_t == pytest.approx(0.0 if pulls else 0.3)
+    span = SegmentSpan(SegmentKind.ROAD_FOLLOWING, 0, 500, 0.0, 10.0)
+    for tows in (True, False):
+        (chain,) = offset_chains(motion, network, np.full(501, 0.3), [span], tows=tows)
+        assert chain.is_placed is not tows
+        assert chain.start_t == pytest.approx(0.0 if tows else 0.3)
 
 
 def test_the_offsets_come_to_rest_before_a_maneuver_may_begin() -> None:

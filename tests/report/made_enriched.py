@@ -10,7 +10,7 @@ from tests.motion.made_motion import drive, entity, together, two_roads
 from xosc_lateral.enrich.result import Enriched, EntityResult, SampledSegment
 from xosc_lateral.motion.gaps import BoxPath, Gap, smallest_gaps
 from xosc_lateral.motion.nominal import Activity, EntityMotion, Note
-from xosc_lateral.motion.segments import cut_stretches
+from xosc_lateral.motion.segments import cut_segments
 from xosc_lateral.motion.trajectory import WorldTrajectory, displace
 from xosc_lateral.road import RoadNetwork
 
@@ -81,19 +81,19 @@ def _lane_changer(network: RoadNetwork) -> EntityMotion:
 
 def _swerving(motion: EntityMotion, network: RoadNetwork, amplitude: float) -> EntityResult:
     deviation = amplitude * np.sin(2.0 * np.pi * motion.time / 10.0)
-    stretches = cut_stretches(motion, network)
+    spans = cut_segments(motion, network)
     segments = tuple(
         SampledSegment(each, motion.time[each.first : each.last + 1 : 10], deviation[each.first : each.last + 1 : 10])
-        for each in stretches
+        for each in spans
         if each.is_road_following
     )
-    return EntityResult(motion, stretches, None, "", segments, deviation, displace(motion, network, deviation))
+    return EntityResult(motion, spans, None, "", segments, deviation, displace(motion, network, deviation))
 
 
 def _untouched(motion: EntityMotion, network: RoadNetwork) -> EntityResult:
-    stretches = cut_stretches(motion, network)
+    spans = cut_segments(motion, network)
     return EntityResult(
-        motion, stretches, None, "below 40 km/h throughout", (), np.zeros(len(motion.time)), _nominal(motion)
+        motion, spans, None, "below 40 km/h throughout", (), np.zeros(len(motion.time)), _nominal(motion)
     )
 
 

@@ -199,8 +199,8 @@ class BatchResult(Result):
 
     def __str__(self) -> str:
         report = [] if self.report is None else [f"report: {self.report}"]
-        said = [self.headline() + _left_out(self._batch), *self.notes, *self._summary.remarks(), *report]
-        return "\n".join(said)
+        lines = [self.headline() + _left_out(self._batch), *self.notes, *self._summary.remarks(), *report]
+        return "\n".join(lines)
 
     def to_frame(self) -> pd.DataFrame:
         """One row per output: the manifest's columns, with `state` and `seconds`."""

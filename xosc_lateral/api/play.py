@@ -82,7 +82,7 @@ def segments(
     parameters: Mapping[str, object] | None = None,
     allow: Paths = (),
 ) -> Segments:
-    """Road-following stretches of every entity, and why the rest is none; see `play`."""
+    """Road-following segments of every entity, and why the rest is none; see `play`."""
     played = (
         scenario
         if isinstance(scenario, Playback)
@@ -209,7 +209,7 @@ class Playback(Result):
 
 
 class Segments(Result):
-    """Stretches of all entities, road-following or not."""
+    """Segments of all entities, road-following or not."""
 
     __slots__ = ("_rows",)
 
@@ -232,7 +232,7 @@ class Segments(Result):
         return as_text(self._rows)
 
     def to_frame(self) -> pd.DataFrame:
-        """One row per stretch: `entity`, `start`, `end` [s], `road_following`, `why`, `road`, `lane`."""
+        """One row per segment: `entity`, `start`, `end` [s], `road_following`, `why`, `road`, `lane`."""
         import pandas as pd
 
         names = ("entity", "start", "end", "road_following", "why", "road", "lane")

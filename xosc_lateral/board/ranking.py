@@ -104,7 +104,7 @@ def ranks(scores: Mapping[str, FloatArray]) -> dict[str, IntArray]:
     return dict(zip(scores, places, strict=True))
 
 
-def told_apart(score: Mapping[str, float], drawn: Mapping[str, FloatArray]) -> dict[tuple[str, str], bool]:
+def differing_pairs(score: Mapping[str, float], drawn: Mapping[str, FloatArray]) -> dict[tuple[str, str], bool]:
     """Whether a model's score is better than another's beyond what resampled vehicles change, by (better, worse).
 
     The 95 % interval of the ratio of their scores, both seeing the same vehicles, lies below 1. As in the intervals of
@@ -119,20 +119,20 @@ def told_apart(score: Mapping[str, float], drawn: Mapping[str, FloatArray]) -> d
     }
 
 
-def rank_groups(score: Mapping[str, float], apart: Mapping[tuple[str, str], bool]) -> dict[str, int]:
+def rank_groups(score: Mapping[str, float], differ: Mapping[tuple[str, str], bool]) -> dict[str, int]:
     """Group of each model, 1 the best: a new one begins with the first model that is told from the last one's best."""
     groups: dict[str, int] = {}
     best, number = "", 0
     for key in sorted(score, key=lambda key: score[key]):
-        if not best or apart[best, key]:
+        if not best or differ[best, key]:
             best, number = key, number + 1
         groups[key] = number
     return groups
 
 
-def agreeing(apart: Mapping[tuple[str, str], bool], by_half: Mapping[str, FloatArray]) -> tuple[int, int]:
+def agreeing(differ: Mapping[tuple[str, str], bool], by_half: Mapping[str, FloatArray]) -> tuple[int, int]:
     """Pairs of models that are told apart, and how many of them every half has in that order."""
-    pairs = [pair for pair, clear in apart.items() if clear]
+    pairs = [pair for pair, clear in differ.items() if clear]
     return len(pairs), sum(bool(np.all(by_half[better] < by_half[worse])) for better, worse in pairs)
 
 

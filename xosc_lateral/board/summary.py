@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from xosc_lateral.board.contestants import Contestant
 from xosc_lateral.board.half import Half
-from xosc_lateral.board.ranking import QUANTILES, agreeing, kendall_tau, rank_groups, ranks, told_apart
+from xosc_lateral.board.ranking import QUANTILES, agreeing, differing_pairs, kendall_tau, rank_groups, ranks
 from xosc_lateral.board.result import Board, ModelScore, Row
 from xosc_lateral.board.sampled_half import SampledHalf
 from xosc_lateral.drives.drive import Run
@@ -42,8 +42,8 @@ def make_board(
     half, models = parts[0][0], {entry.key: entry for entry in entries}
     score = {key: float(np.exp(np.mean(np.log(values)))) for key, values in by_half.items()}
     order = sorted(score, key=lambda key: score[key])
-    places, apart = ranks(drawn), told_apart(score, drawn)
-    groups, agreement = rank_groups(score, apart), agreeing(apart, by_half)
+    places, differ = ranks(drawn), differing_pairs(score, drawn)
+    groups, agreement = rank_groups(score, differ), agreeing(differ, by_half)
     free = ranked_numbers(half.windows)[-1][0]
     shown = np.unique(np.linspace(0, len(half.windows[SHORT]) - 1, EXAMPLES).astype(np.int64))
     rows = []

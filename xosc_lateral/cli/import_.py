@@ -191,6 +191,6 @@ def _plain_command(name: str) -> Any:
     ) -> None:
         _import(name, sources, output, dict(pairs(settings, "--set")), force, quiet, as_json)
 
-    said = (find_importer(name).__doc__ or "Another format.").strip()
-    one.command(name, help=said, short_help=said.splitlines()[0])(command)
+    help_text = (find_importer(name).__doc__ or "Another format.").strip()
+    one.command(name, help=help_text, short_help=help_text.splitlines()[0])(command)
     return typer.main.get_command(one)

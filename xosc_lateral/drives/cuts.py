@@ -61,8 +61,8 @@ PAPER_RULES = CutRules()
 def cut_runs(drive: Drive, rules: CutRules = PAPER_RULES) -> list[Run]:
     """Road-following runs of one drive at an even step; empty when nothing is left."""
     keep = ~(lane_change_rows(drive, rules) | slow_rows(drive, rules))
-    stretches = [rows for rows in _stretches(drive, keep, rules.max_gap) if _lasts(drive, rows, rules)]
-    return [_run(drive, index, rows, rules.step) for index, rows in enumerate(stretches)]
+    parts = [rows for rows in _uninterrupted(drive, keep, rules.max_gap) if _lasts(drive, rows, rules)]
+    return [_run(drive, index, rows, rules.step) for index, rows in enumerate(parts)]
 
 
 def all_runs(drives: Sequence[Drive], rules: CutRules = PAPER_RULES) -> list[Run]:
@@ -129,7 +129,7 @@ def _run(drive: Drive, index: int, rows: slice, step: float) -> Run:
     return Run(drive.name, index, grid, offset, lane_width, context, drive.levels)
 
 
-def _stretches(drive: Drive, keep: BoolArray, max_gap: float) -> list[slice]:
+def _uninterrupted(drive: Drive, keep: BoolArray, max_gap: float) -> list[slice]:
     """Runs of kept rows without a gap."""
     if not keep.any():
         return []

@@ -19,9 +19,9 @@ from xosc_lateral.enrich.give_way import SampledVehicle, give_way
 from xosc_lateral.enrich.other_hand import mirrored
 from xosc_lateral.enrich.result import Enriched, EntityResult, SampledSegment
 from xosc_lateral.motion.context import entity_context
-from xosc_lateral.motion.deviation import SETTLING_TIME, SampledStretch, deviation_through
+from xosc_lateral.motion.deviation import SETTLING_TIME, SampledDeviation, deviation_through
 from xosc_lateral.motion.nominal import Activity, EntityMotion, NominalMotion
-from xosc_lateral.motion.segments import Stretch, cut_stretches
+from xosc_lateral.motion.segments import SegmentSpan, cut_segments
 from xosc_lateral.motion.trajectory import WorldTrajectory, displace, distance_driven
 from xosc_lateral.road.network import RoadNetwork
 from xosc_lateral.segment import Segment
@@ -90,8 +90,8 @@ def enrich(
         When the sensor is asked for and a profile knows of none.
     """
     trailers, words = trailers or {}, entropy or {}
-    stretches = {
-        entity.name: cut_stretches(entity, network, is_trailer=entity.name in trailers) for entity in motion.entities
+    spans = {
+        entity.name: cut_segments(entity, network, is_trailer=entity.name in trailers) for entity in motion.entities
     }
     gaps_before = gaps_of(motion, [_nominal(entity) for entity in motion.entities])
     best: Enriched | None = None
@@ -101,7 +101,7 @@ def enrich(
                 motion,
                 network,
                 index,
-                stretches[entity.name],
+                spans[entity.name],
                 drivers.get(entity.name, "not chosen"),
                 np.random.SeedSequence(
                     [seed, variant, attempt, zlib.crc32(entity.name.encode()), *words.get(entity.name, ())]
@@ -134,8 +134,8 @@ class _Drawn:
 
     Parameters
     ----------
-    stretches : tuple of Stretch
-        All; `segments` are those that were sampled: stretch, rows of its samples, offsets there [m].
+    spans : tuple of SegmentSpan
+        All; `segments` are those that were sampled: span, rows of its samples, offsets there [m].
     why : str
         It was not sampled.
     errors : tuple of array
@@ -143,18 +143,18 @@ class _Drawn:
     """
 
     motion: EntityMotion
-    stretches: tuple[Stretch, ...]
+    spans: tuple[SegmentSpan, ...]
     profile: DriverProfile | None
     why: str
-    segments: tuple[tuple[Stretch, IntArray, FloatArray], ...] = ()
+    segments: tuple[tuple[SegmentSpan, IntArray, FloatArray], ...] = ()
     neutral: tuple[str, ...] = ()
     errors: tuple[FloatArray, ...] = ()
 
     def deviation(self, distance: FloatArray) -> FloatArray:
         """On every row, positive left. [m]"""
-        speed = self.motion.speed
+        settling = SETTLING_TIME * self.motion.speed
         parts = [
-            SampledStretch(distance[knots], offset, (SETTLING_TIME * speed[knots[0]], SETTLING_TIME * speed[knots[-1]]))
+            SampledDeviation(distance[knots], offset, (settling[knots[0]], settling[knots[-1]]))
             for _, knots, offset in self.segments
         ]
         return deviation_through(parts)(distance)
@@ -164,7 +164,7 @@ def _draw(
     motion: NominalMotion,
     network: RoadNetwork,
     index: int,
-    stretches: tuple[Stretch, ...],
+    spans: tuple[SegmentSpan, ...],
     driver: DriverProfile | str,
     seed: np.random.SeedSequence,
     foreign_context: Mapping[str, tuple[FloatArray, FloatArray]],
@@ -172,15 +172,15 @@ def _draw(
 ) -> _Drawn:
     entity = motion.entities[index]
     if isinstance(driver, str):
-        return _Drawn(entity, stretches, None, driver)
+        return _Drawn(entity, spans, None, driver)
     sampler, sensor = OffsetSampler(driver, seed), known_sensor(driver) if with_sensor else None
     every = max(1, round(SAMPLE_STEP / motion.step))
-    segments: list[tuple[Stretch, IntArray, FloatArray]] = []
+    segments: list[tuple[SegmentSpan, IntArray, FloatArray]] = []
     errors: list[FloatArray] = []
     neutral: set[str] = set()
-    for stretch in stretches:
-        knots = np.arange(stretch.first, stretch.last + 1, every)
-        if not stretch.is_road_following or len(knots) < 2:
+    for span in spans:
+        knots = np.arange(span.first, span.last + 1, every)
+        if not span.is_road_following or len(knots) < 2:
             continue
         segment = _segment(motion, network, index, knots, every, foreign_context)
         neutral |= _unknown(driver, segment)
@@ -190,10 +190,10 @@ def _draw(
         who = f"profile {driver.name} for {entity.name!r}"
         check_offsets(wanted, segment.lane_width[inside], who, segment.time[inside])
         errors.append(sensor_error(sensor, wanted, SAMPLE_STEP, seed, part=len(segments)))
-        segments.append((stretch, knots, wanted))
+        segments.append((span, knots, wanted))
     if not segments:
-        return _Drawn(entity, stretches, None, "no road-following segment")
-    return _Drawn(entity, stretches, driver, "", tuple(segments), tuple(sorted(neutral)), tuple(errors))
+        return _Drawn(entity, spans, None, "no road-following segment")
+    return _Drawn(entity, spans, driver, "", tuple(segments), tuple(sorted(neutral)), tuple(errors))
 
 
 def _apart(drawn: Sequence[_Drawn], motion: NominalMotion, network: RoadNetwork) -> list[_Drawn]:
@@ -206,8 +206,8 @@ def _apart(drawn: Sequence[_Drawn], motion: NominalMotion, network: RoadNetwork)
         deviation, can_move = np.zeros(rows), np.zeros(rows, dtype=np.bool_)
         if one.segments:
             deviation = one.deviation(distance_driven(one.motion))
-            for stretch, _, _ in one.segments:
-                can_move[stretch.first : stretch.last + 1] = True
+            for span, _, _ in one.segments:
+                can_move[span.first : span.last + 1] = True
         heeds = one.profile is not None and any(column in NEIGHBOURS for column in one.profile.columns)
         sampled.append(SampledVehicle(one.motion, deviation, can_move, heeds))
     every = max(1, round(SAMPLE_STEP / motion.step))
@@ -215,9 +215,7 @@ def _apart(drawn: Sequence[_Drawn], motion: NominalMotion, network: RoadNetwork)
     return [
         one
         if move is None
-        else replace(
-            one, segments=tuple((stretch, knots, offset + move[knots]) for stretch, knots, offset in one.segments)
-        )
+        else replace(one, segments=tuple((span, knots, offset + move[knots]) for span, knots, offset in one.segments))
         for one, move in zip(drawn, moves, strict=True)
     ]
 
@@ -226,20 +224,20 @@ def _result(drawn: _Drawn, network: RoadNetwork) -> EntityResult:
     """Paths through the offsets, smoothed where nobody could drive them."""
     entity = drawn.motion
     if not drawn.segments:
-        return _untouched(entity, drawn.stretches, drawn.why)
+        return _untouched(entity, drawn.spans, drawn.why)
     bounded = [drivable(offset, SAMPLE_STEP, entity.speed[knots]) for _, knots, offset in drawn.segments]
     worst = max((bound for _, bound in bounded if bound), key=lambda bound: bound.before.excess, default=None)
     segments = tuple(
-        (stretch, knots, offset + error)
-        for (stretch, knots, _), (offset, _), error in zip(drawn.segments, bounded, drawn.errors, strict=True)
+        (span, knots, offset + error)
+        for (span, knots, _), (offset, _), error in zip(drawn.segments, bounded, drawn.errors, strict=True)
     )
     deviation = replace(drawn, segments=segments).deviation(distance_driven(entity))
     return EntityResult(
         entity,
-        drawn.stretches,
+        drawn.spans,
         drawn.profile,
         "",
-        tuple(SampledSegment(stretch, entity.time[knots], offset) for stretch, knots, offset in segments),
+        tuple(SampledSegment(span, entity.time[knots], offset) for span, knots, offset in segments),
         deviation,
         displace(entity, network, deviation),
         drawn.neutral,
@@ -265,8 +263,8 @@ def _with_trailers(
     return tuple(results.values())
 
 
-def _untouched(entity: EntityMotion, stretches: tuple[Stretch, ...], why: str) -> EntityResult:
-    return EntityResult(entity, stretches, None, why, (), np.zeros(len(entity.time)), _nominal(entity))
+def _untouched(entity: EntityMotion, spans: tuple[SegmentSpan, ...], why: str) -> EntityResult:
+    return EntityResult(entity, spans, None, why, (), np.zeros(len(entity.time)), _nominal(entity))
 
 
 def _nominal(entity: EntityMotion) -> WorldTrajectory:
@@ -306,7 +304,7 @@ def _segment(
 
 
 def _filled(values: FloatArray, inside: slice) -> FloatArray:
-    """Lane widths with the nearest one inside the stretch where the margins hold none (off the road)."""
+    """Lane widths with the nearest one inside the segment where the margins hold none (off the road)."""
     filled = values.copy()
     filled[: inside.start][np.isnan(filled[: inside.start])] = values[inside.start]
     filled[inside.stop :][np.isnan(filled[inside.stop :])] = values[inside.stop - 1]

@@ -12,7 +12,7 @@ from xosc_lateral.driver.drivability import Bound
 from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.motion.gaps import Gap
 from xosc_lateral.motion.nominal import EntityMotion, NominalMotion
-from xosc_lateral.motion.segments import Stretch
+from xosc_lateral.motion.segments import SegmentSpan
 from xosc_lateral.motion.trajectory import WorldTrajectory, leaps
 from xosc_lateral.road.network import RoadNetwork
 
@@ -25,7 +25,7 @@ class SampledSegment:
 
     Parameters
     ----------
-    stretch : Stretch
+    span : SegmentSpan
         The segment.
     time : array, shape (n,)
         Every 0.2 s from the segment's start. [s]
@@ -33,7 +33,7 @@ class SampledSegment:
         Added to the nominal offset, positive left. [m]
     """
 
-    stretch: Stretch
+    span: SegmentSpan
     time: FloatArray
     offset: FloatArray
 
@@ -46,7 +46,7 @@ class EntityResult:
     ----------
     motion : EntityMotion
         Nominal.
-    stretches : tuple of Stretch
+    spans : tuple of SegmentSpan
         All of its motion, road-following or not.
     profile : DriverProfile or None
         None: not enriched, `why` says the reason.
@@ -64,7 +64,7 @@ class EntityResult:
     """
 
     motion: EntityMotion
-    stretches: tuple[Stretch, ...]
+    spans: tuple[SegmentSpan, ...]
     profile: DriverProfile | None
     why: str
     segments: tuple[SampledSegment, ...]
@@ -86,7 +86,7 @@ class EntityResult:
     @property
     def segment_seconds(self) -> float:
         """Time in road-following segments that got offsets. [s]"""
-        return sum(segment.stretch.end - segment.stretch.start for segment in self.segments)
+        return sum(segment.span.end - segment.span.start for segment in self.segments)
 
     @property
     def offset_spread(self) -> float:

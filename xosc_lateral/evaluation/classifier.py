@@ -23,7 +23,7 @@ from xosc_lateral.evaluation.snippets import Snippets
 
 FloatArray = NDArray[np.float64]
 
-MEMORY_LAGS = (1, 2, 3, 5, 8, 12)  # steps; of the first difference's autocorrelation
+AUTOCORRELATION_LAGS = (1, 2, 3, 5, 8, 12)  # steps; of the first difference's autocorrelation
 FOLDS = 5
 BANDS = 16
 """Of the log spectrum, from one period a snippet to the highest frequency, evenly on a logarithmic scale."""
@@ -68,9 +68,9 @@ def snippet_features(snippets: FloatArray) -> FloatArray:
     every = max(1, snippets.shape[1] // VALUES)
     thin = snippets[:, ::every]
     energy = (difference**2).mean(axis=1) + 1e-15
-    memory = [
+    autocorrelation = [
         (difference[:, lag:] * difference[:, :-lag]).mean(axis=1) / energy
-        for lag in MEMORY_LAGS
+        for lag in AUTOCORRELATION_LAGS
         if lag < difference.shape[1]
     ]
     acceleration = np.abs(np.diff(difference, axis=1))
@@ -78,7 +78,7 @@ def snippet_features(snippets: FloatArray) -> FloatArray:
     differences = DIFFERENCE_SCALE * np.diff(thin, axis=1)
     metrics = snippet_metrics(snippets)
     return np.column_stack(
-        [thin, differences, _log_power(snippets), metrics, roughness, *memory, shape_features(snippets)]
+        [thin, differences, _log_power(snippets), metrics, roughness, *autocorrelation, shape_features(snippets)]
     )
 
 
@@ -176,8 +176,8 @@ def classifier_two_sample_test(
     label = np.r_[np.zeros(len(rows)), np.ones(len(others))]
     # One thread: on a machine that is busy otherwise, its threads waiting for one another take twenty times as long.
     with threadpool_limits(1):
-        chance = cross_val_predict(model, features, label, groups=groups, cv=GroupKFold(FOLDS), method=method, n_jobs=1)
-    score = chance[:, 1] if chance.ndim > 1 else chance
+        found = cross_val_predict(model, features, label, groups=groups, cv=GroupKFold(FOLDS), method=method, n_jobs=1)
+    score = found[:, 1] if found.ndim > 1 else found
     return _judged(score, label.astype(bool), groups, seed)
 
 
@@ -203,16 +203,16 @@ def spread_out(count: int) -> NDArray[np.int64]:
     return np.unique(np.linspace(0, count - 1, min(count, MOST)).astype(np.int64))
 
 
-def _judged(chance: FloatArray, label: NDArray[np.bool_], groups: NDArray[np.generic], seed: int) -> TwoSampleResult:
+def _judged(score: FloatArray, label: NDArray[np.bool_], groups: NDArray[np.generic], seed: int) -> TwoSampleResult:
     names, member = np.unique(groups, return_inverse=True)
     rng = np.random.default_rng(seed)
     drawn = []
     for _ in range(RESAMPLES):
         weight = np.bincount(rng.integers(len(names), size=len(names)), minlength=len(names))[member]
         if weight[label].any() and weight[~label].any():
-            drawn.append(area_under_roc(chance, label, weight.astype(np.float64)))
+            drawn.append(area_under_roc(score, label, weight.astype(np.float64)))
     low, high = np.quantile(drawn, [0.025, 0.975]) if drawn else (np.nan, np.nan)
-    return TwoSampleResult(area_under_roc(chance, label, np.ones(len(label))), float(low), float(high))
+    return TwoSampleResult(area_under_roc(score, label, np.ones(len(label))), float(low), float(high))
 
 
 def area_under_roc(score: FloatArray, label: NDArray[np.bool_], weight: FloatArray) -> float:

@@ -63,15 +63,15 @@ def shape_features(snippets: FloatArray) -> FloatArray:
     spread = x.std(axis=1, keepdims=True)
     z = (x - x.mean(axis=1, keepdims=True)) / np.where(spread > 0.0, spread, 1.0)
     change = np.diff(z, axis=1)
-    memory = _autocorrelation(z)
+    lagged = _autocorrelation(z)
     return np.column_stack(
         [
             _mode(z, 5),
             _mode(z, 10),
             longest_true(z > 0.0),
             longest_true(change < 0.0),
-            _first(memory < np.exp(-1.0)),
-            _first((memory[:, 1:-1] < memory[:, :-2]) & (memory[:, 1:-1] < memory[:, 2:])),
+            _first(lagged < np.exp(-1.0)),
+            _first((lagged[:, 1:-1] < lagged[:, :-2]) & (lagged[:, 1:-1] < lagged[:, 2:])),
             (change**3).mean(axis=1),
             (np.abs(change) > LARGE_CHANGE).mean(axis=1),
             *_spectral(z),

@@ -70,8 +70,8 @@ def library_folders(folders: Iterable[str | Path] = ()) -> tuple[Path, ...]:
     FormatError
         If one of them isn't there.
     """
-    said = [Path(name) for name in os.environ.get(LIBRARY_VARIABLE, "").split(os.pathsep) if name]
-    found = [*map(Path, folders), *said, *configured_libraries()]
+    from_environment = [Path(name) for name in os.environ.get(LIBRARY_VARIABLE, "").split(os.pathsep) if name]
+    found = [*map(Path, folders), *from_environment, *configured_libraries()]
     for folder in found:
         if not folder.is_dir():
             raise FormatError("no such folder", path=folder)

@@ -103,8 +103,8 @@ def profile_record(profile: DriverProfile) -> dict[str, Any]:
 def describe_profile(profile: DriverProfile) -> str:
     """What was fitted, in a line; another for what of it is the sensor's."""
     known = profile.provenance
-    said = (
+    text = (
         f"{profile.name}: {profile.model.kind} model from {known.hours:.2f} h in {known.runs} runs of {known.drives} "
         f"drives, {len(profile.effects)} effects"
     )
-    return said if profile.sensor is None else f"{said}\n{profile.sensor.in_words()}"
+    return text if profile.sensor is None else f"{text}\n{profile.sensor.in_words()}"

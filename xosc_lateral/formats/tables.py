@@ -95,8 +95,8 @@ def foreign_errors(path: Path, what: str) -> Iterator[None]:
     except MemoryError as error:
         raise FormatError(f"{what}: not enough memory to read it", path=path) from error
     except Exception as error:  # readers of binary formats raise anything, damaged bytes being what they are
-        said = " ".join(str(error).split())[:LONGEST_MESSAGE]
-        raise FormatError(f"{what}: {said or type(error).__name__}", path=path) from error
+        reason = " ".join(str(error).split())[:LONGEST_MESSAGE]
+        raise FormatError(f"{what}: {reason or type(error).__name__}", path=path) from error
 
 
 def unpacked_text(source: Source) -> IO[bytes]:

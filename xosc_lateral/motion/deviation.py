@@ -22,7 +22,7 @@ SETTLING_TIME = 3.0
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class SampledStretch:
+class SampledDeviation:
     """Offsets sampled on one road-following segment.
 
     Parameters
@@ -47,9 +47,9 @@ class Deviation:
     Parameters
     ----------
     splines : tuple of NaturalSpline
-        One per sampled stretch, in order of distance.
+        One per sampled segment, in order of distance.
     settling : tuple of (float, float)
-        As in `SampledStretch`.
+        As in `SampledDeviation`.
     """
 
     splines: tuple[NaturalSpline, ...]
@@ -97,14 +97,14 @@ class Deviation:
 
 
 _TOUCHING = 1e-6
-"""Two stretches less than this apart meet in a point (the entity was placed anew). [m]"""
+"""Two segments less than this apart meet in a point (the entity was placed anew). [m]"""
 
 
-def deviation_through(stretches: Sequence[SampledStretch]) -> Deviation:
-    """Deviation that runs through the sampled offsets of all stretches, which must not overlap."""
+def deviation_through(segments: Sequence[SampledDeviation]) -> Deviation:
+    """Deviation that runs through the sampled offsets of all segments, which must not overlap."""
     return Deviation(
-        splines=tuple(NaturalSpline.natural(part.distance, part.deviation) for part in stretches),
-        settling=tuple(part.settling for part in stretches),
+        splines=tuple(NaturalSpline.natural(part.distance, part.deviation) for part in segments),
+        settling=tuple(part.settling for part in segments),
     )
 
 

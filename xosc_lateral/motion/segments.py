@@ -1,4 +1,4 @@
-"""Which stretches of an entity's motion are road-following, and why the rest is none."""
+"""Which segments of an entity's motion are road-following, and why the rest is none."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ _SPEED_SLACK = 1e-6
 """40 km/h written as 11.1111 in a scenario is meant as 40 km/h. [m/s, relative]"""
 
 
-class StretchKind(Enum):
-    """What a stretch is; every value but the first is a reason why no offsets are sampled there."""
+class SegmentKind(Enum):
+    """What a segment is; every value but the first is a reason why no offsets are sampled there."""
 
     ROAD_FOLLOWING = "road-following"
     ABSENT = "not in the scenario at that time"
@@ -37,23 +37,23 @@ class StretchKind(Enum):
     ROAD_END = "at the end of the road"
 
 
-_KINDS = tuple(StretchKind)
+_KINDS = tuple(SegmentKind)
 
 
 @dataclass(frozen=True, slots=True)
-class Stretch:
-    """Rows ``first`` to ``last`` (both included) of one entity, of one kind throughout.
+class SegmentSpan:
+    """A segment as the rows ``first`` to ``last`` (both included) of one entity, of one kind throughout.
 
     Parameters
     ----------
-    kind : StretchKind
+    kind : SegmentKind
     first, last : int
         Rows of the entity's motion.
     start, end : float
         Time of those rows. [s]
     """
 
-    kind: StretchKind
+    kind: SegmentKind
     first: int
     last: int
     start: float
@@ -62,12 +62,12 @@ class Stretch:
     @property
     def is_road_following(self) -> bool:
         """Whether offsets are sampled here."""
-        return self.kind is StretchKind.ROAD_FOLLOWING
+        return self.kind is SegmentKind.ROAD_FOLLOWING
 
 
 @dataclass(frozen=True, slots=True)
 class SegmentRow:
-    """One stretch of one entity.
+    """One segment of one entity.
 
     Parameters
     ----------
@@ -90,8 +90,8 @@ class SegmentRow:
     lane: int
 
 
-def cut_stretches(motion: EntityMotion, network: RoadNetwork, *, is_trailer: bool = False) -> tuple[Stretch, ...]:
-    """Cut an entity's whole motion into stretches; teleports always cut.
+def cut_segments(motion: EntityMotion, network: RoadNetwork, *, is_trailer: bool = False) -> tuple[SegmentSpan, ...]:
+    """Cut an entity's whole motion into segments; teleports always cut.
 
     Parameters
     ----------
@@ -103,7 +103,7 @@ def cut_stretches(motion: EntityMotion, network: RoadNetwork, *, is_trailer: boo
 
     Returns
     -------
-    tuple of Stretch
+    tuple of SegmentSpan
         In order of time, without gaps: each row belongs to exactly one.
     """
     kinds = row_kinds(motion, network, is_trailer=is_trailer)
@@ -112,13 +112,13 @@ def cut_stretches(motion: EntityMotion, network: RoadNetwork, *, is_trailer: boo
     firsts = np.concatenate(([0], cut))
     lasts = np.concatenate((cut - 1, [len(kinds) - 1]))
     return tuple(
-        Stretch(_KINDS[kinds[a]], int(a), int(b), float(motion.time[a]), float(motion.time[b]))
+        SegmentSpan(_KINDS[kinds[a]], int(a), int(b), float(motion.time[a]), float(motion.time[b]))
         for a, b in zip(firsts, lasts, strict=True)
     )
 
 
 def row_kinds(motion: EntityMotion, network: RoadNetwork, *, is_trailer: bool = False) -> NDArray[np.int64]:
-    """Kind of every row, as its index in `StretchKind`; the first reason that applies, in the enum's order.
+    """Kind of every row, as its index in `SegmentKind`; the first reason that applies, in the enum's order.
 
     Shape (n,). [-]
     """
@@ -128,16 +128,16 @@ def row_kinds(motion: EntityMotion, network: RoadNetwork, *, is_trailer: bool = 
     in_driving_lane = np.zeros(n, dtype=bool)
     in_driving_lane[on_road] = network.lane_index(motion.road[on_road], motion.lane[on_road], motion.s[on_road])[0] >= 0
     reasons = {
-        StretchKind.ABSENT: (activity & Activity.ACTIVE) == 0,
-        StretchKind.NOT_A_VEHICLE: np.full(n, not entity.is_vehicle),
-        StretchKind.TRAILER: np.full(n, is_trailer),
-        StretchKind.OFF_ROAD: ~on_road,
-        StretchKind.TRAJECTORY: (activity & Activity.TRAJECTORY) != 0,
-        StretchKind.LATERAL_ACTION: (activity & Activity.LATERAL) != 0,
-        StretchKind.NOT_DRIVING_LANE: on_road & ~in_driving_lane,
-        StretchKind.AGAINST_LANE: np.abs(motion.heading_relative) > _AGAINST_LANE,
-        StretchKind.SLOW: motion.speed < MINIMUM_SPEED * (1.0 - _SPEED_SLACK),
-        StretchKind.ROAD_END: (activity & Activity.ROAD_END) != 0,
+        SegmentKind.ABSENT: (activity & Activity.ACTIVE) == 0,
+        SegmentKind.NOT_A_VEHICLE: np.full(n, not entity.is_vehicle),
+        SegmentKind.TRAILER: np.full(n, is_trailer),
+        SegmentKind.OFF_ROAD: ~on_road,
+        SegmentKind.TRAJECTORY: (activity & Activity.TRAJECTORY) != 0,
+        SegmentKind.LATERAL_ACTION: (activity & Activity.LATERAL) != 0,
+        SegmentKind.NOT_DRIVING_LANE: on_road & ~in_driving_lane,
+        SegmentKind.AGAINST_LANE: np.abs(motion.heading_relative) > _AGAINST_LANE,
+        SegmentKind.SLOW: motion.speed < MINIMUM_SPEED * (1.0 - _SPEED_SLACK),
+        SegmentKind.ROAD_END: (activity & Activity.ROAD_END) != 0,
     }
     kinds = np.zeros(n, dtype=np.int64)
     for kind, applies in reversed(reasons.items()):

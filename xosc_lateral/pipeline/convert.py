@@ -184,10 +184,10 @@ def _refuse_lanes_without_width(played: Played, enriched: Enriched) -> None:
     for entity in enriched.entities:
         motion = entity.motion
         for segment in entity.segments:
-            rows = slice(segment.stretch.first, segment.stretch.last + 1)
+            rows = slice(segment.span.first, segment.span.last + 1)
             width = played.network.lane_width(motion.road[rows], motion.lane[rows], motion.s[rows])
             if width.max() < NO_WIDTH:
-                first = segment.stretch.first
+                first = segment.span.first
                 raise FormatError(
                     f"lane {motion.lane[first]} has no width where {entity.name!r} follows it",
                     path=played.scenario.road_file,
@@ -222,8 +222,8 @@ def _write(
                 entity.motion,
                 played.network,
                 entity.deviation,
-                [segment.stretch for segment in entity.segments],
-                pulls=entity.name in played.trailers.values(),
+                [segment.span for segment in entity.segments],
+                tows=entity.name in played.trailers.values(),
             )
         ]
         return write_lane_offset_scenario(

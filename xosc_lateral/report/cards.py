@@ -164,9 +164,9 @@ def _evaluation_items(evaluation: Mapping[str, Any]) -> list[tuple[str, str]]:
             )
         )
     if evaluation.get("spectrum_error_db") is not None:
-        apart = f"{evaluation['spectrum_error_db']:.1f} dB"
+        difference = f"{evaluation['spectrum_error_db']:.1f} dB"
         items.append(
-            ("spectrum", f"the driver alone differs from what was recorded by {apart} (rms over frequency bands)")
+            ("spectrum", f"the driver alone differs from what was recorded by {difference} (rms over frequency bands)")
         )
     if evaluation.get("told_apart"):
         items.append(("own driver", str(evaluation["told_apart"])))

@@ -27,7 +27,7 @@ FloatArray = NDArray[np.float64]
 SHOWN_S = 120.0
 """Length of the sample paths in the figure. [s]"""
 
-APART = 0.8
+SPACING = 0.8
 """Between the zero lines of two sample paths. [m]"""
 
 SHOWN = 12
@@ -192,11 +192,11 @@ def comparison_figure(compared: Compared) -> Figure:
         step = profile.model.step
         rows = slice(0, round(SHOWN_S / step))
         paths.plot(
-            step * np.arange(len(runs[0][rows])), runs[0][rows] + APART * (len(shown) - number), dashes, color=color
+            step * np.arange(len(runs[0][rows])), runs[0][rows] + SPACING * (len(shown) - number), dashes, color=color
         )
     place.set(xlabel="offset [m], positive to the left", ylabel="density [1/m]", title="Distribution")
     power.set(xlabel="frequency [Hz]", ylabel="power density [m²/Hz]", title="Spectrum")
-    paths.set(xlabel="time [s]", title=f"Sample paths, {APART:g} m apart", yticks=[])
+    paths.set(xlabel="time [s]", title=f"Sample paths, {SPACING:g} m apart", yticks=[])
     figure.legend(*place.get_legend_handles_labels(), loc="outside lower center", ncols=4)
     return figure
 

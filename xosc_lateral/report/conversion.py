@@ -45,9 +45,7 @@ def facts(conversion: ConvertedScenario, report: Path | None = None) -> dict[str
                 "name": entity.name,
                 "profile": entity.profile.name if entity.is_enriched and entity.profile is not None else None,
                 "why_not": entity.why,
-                "segments": [
-                    [round(segment.stretch.start, 6), round(segment.stretch.end, 6)] for segment in entity.segments
-                ],
+                "segments": [[round(segment.span.start, 6), round(segment.span.end, 6)] for segment in entity.segments],
                 "offset_spread": round(entity.offset_spread, 6),
                 "neutral_context": list(entity.neutral),
             }

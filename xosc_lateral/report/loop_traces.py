@@ -27,27 +27,27 @@ def traces_figure(result: LoopResult) -> Figure:
     from matplotlib.ticker import MultipleLocator
 
     timeline = result.coarse.timeline
-    stretches = longest_stretches(result)
+    parts = longest_parts(result)
     columns = (
         ("measured", timeline.offset, DRIVES),
         ("profile before", result.runs_before[0], BEFORE),
         ("profile after", result.runs_after[0], AFTER),
     )
-    figure, axes = new_panels(len(stretches), len(columns), panel_height=0.75, sharex=True, sharey=True)
-    for row, rows in zip(axes, stretches, strict=True):
+    figure, axes = new_panels(len(parts), len(columns), panel_height=0.75, sharex=True, sharey=True)
+    for row, rows in zip(axes, parts, strict=True):
         name = timeline.names[timeline.drive[rows.start]]
         for axis, (label, offset, color) in zip(row, columns, strict=True):
             axis.plot(timeline.time[rows] - timeline.time[rows.start], offset[rows], color=color, label=label)
             axis.axhline(0.0, color=GRID, linewidth=0.8)
             axis.set_title(f"{name}, {label}")
     axes[0, 0].yaxis.set_major_locator(MultipleLocator(TICK_M))
-    axes[len(stretches) // 2, 0].set_ylabel("offset [m]")
+    axes[len(parts) // 2, 0].set_ylabel("offset [m]")
     for axis in axes[-1]:
         axis.set_xlabel("time [s]")
     return figure
 
 
-def longest_stretches(result: LoopResult) -> list[slice]:
+def longest_parts(result: LoopResult) -> list[slice]:
     """Rows of the longest stretch within one held-out block, of the drives that have the longest; drives in order."""
     timeline = result.coarse.timeline
     block = np.where(timeline.valid, hold_out_blocks(timeline), -1)

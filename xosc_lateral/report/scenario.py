@@ -191,9 +191,9 @@ def _gap_row(before: Gap | None, after: Gap | None) -> dict[str, object]:
 
 def _segment_rows(enriched: Enriched) -> list[dict[str, object]]:
     return [
-        {"entity": entity.name, "from [s]": stretch.start, "to [s]": stretch.end, "what": stretch.kind.value}
+        {"entity": entity.name, "from [s]": span.start, "to [s]": span.end, "what": span.kind.value}
         for entity in enriched.entities
-        for stretch in entity.stretches
+        for span in entity.spans
     ]
 
 

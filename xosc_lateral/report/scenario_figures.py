@@ -76,7 +76,7 @@ def paths_from_above(enriched: Enriched) -> Figure | None:
     view = view_along(moving.motion.x, moving.motion.y)
     figure, axes = new_figure(1, 1, height=2.0)
     ax = axes[0, 0]
-    for road, (first, last) in _stretches_of_road(enriched).items():
+    for road, (first, last) in _extents_on_roads(enriched).items():
         draw_from_above(ax, enriched.network, road, first - MARGIN, last + MARGIN, view)
     extent = _draw_paths(ax, enriched, view)
     ax.set_aspect("equal", adjustable="datalim")
@@ -114,7 +114,7 @@ def _draw_paths(ax: Any, enriched: Enriched, view: View) -> float:
     return float(np.ptp(seen_y) / max(float(np.ptp(seen_x)), 1.0))
 
 
-def _stretches_of_road(enriched: Enriched) -> dict[int, tuple[float, float]]:
+def _extents_on_roads(enriched: Enriched) -> dict[int, tuple[float, float]]:
     """Road -> the s that vehicles cover on it; most time spent first."""
     covered: dict[int, tuple[float, float]] = {}
     spent: dict[int, int] = {}
@@ -131,7 +131,7 @@ def _stretches_of_road(enriched: Enriched) -> dict[int, tuple[float, float]]:
 @figure_style()
 def paths_stretched(enriched: Enriched, *, most_roads: int = 3) -> Figure | None:
     """Paths as t over s on the roads on which most time is spent; across is drawn far larger than along."""
-    roads = list(_stretches_of_road(enriched).items())[:most_roads]
+    roads = list(_extents_on_roads(enriched).items())[:most_roads]
     if not roads:
         return None
     figure, axes = new_figure(len(roads), 1, height=3.1 * len(roads))
@@ -219,9 +219,9 @@ def offsets_over_time(enriched: Enriched, entities: Sequence[EntityResult]) -> F
     figure, axes = new_panels(len(entities), sharex=True, sharey=True)
     for ax, entity in zip(axes[:, 0], entities, strict=True):
         rows = _rows(entity.motion)
-        for stretch in entity.stretches:
-            if stretch.is_road_following:
-                ax.axvspan(stretch.start, stretch.end, color=SHADE, linewidth=0, zorder=0)
+        for span in entity.spans:
+            if span.is_road_following:
+                ax.axvspan(span.start, span.end, color=SHADE, linewidth=0, zorder=0)
         ax.axhline(0.0, color=NOMINAL, linewidth=0.9, dashes=(3, 2))
         number = [each.name for each in enriched.entities].index(entity.name)
         ax.plot(entity.motion.time[rows], entity.deviation[rows], color=color_of(number), label=label_of(entity.name))
@@ -292,18 +292,18 @@ def timeline(enriched: Enriched) -> Figure:
     figure, axes = new_figure(1, 1, height=0.8 + 0.32 * n)
     ax = axes[0, 0]
     for number, entity in enumerate(enriched.entities):
-        for stretch in entity.stretches:
+        for span in entity.spans:
             ax.plot(
-                [stretch.start, stretch.end],
+                [span.start, span.end],
                 [number, number],
-                color=color_of(number) if stretch.is_road_following else GRID,
+                color=color_of(number) if span.is_road_following else GRID,
                 linewidth=9,
                 solid_capstyle="butt",
-                label=stretch.kind.value,
+                label=span.kind.value,
             )
-            if not stretch.is_road_following and stretch.end - stretch.start > 0.08 * enriched.motion.end_time:
-                middle = 0.5 * (stretch.start + stretch.end)
-                ax.text(middle, number, stretch.kind.value, ha="center", va="center", fontsize=7.5)
+            if not span.is_road_following and span.end - span.start > 0.08 * enriched.motion.end_time:
+                middle = 0.5 * (span.start + span.end)
+                ax.text(middle, number, span.kind.value, ha="center", va="center", fontsize=7.5)
     ax.set_yticks(range(n), [label_of(entity.name) for entity in enriched.entities])
     ax.set_ylim(n - 0.4, -0.6)
     ax.grid(axis="y", visible=False)
@@ -325,8 +325,8 @@ def gaps_before_and_after(pairs: Sequence[tuple[Gap | None, Gap | None]]) -> Fig
             ax.plot([a, b], [number, number], color=GRID, linewidth=3, zorder=1)
         for gap, color, label in ((before, BEFORE, "nominal"), (after, AFTER, "enriched")):
             if gap is not None:
-                said = f"{label} {gap.distance:.2f} m at {gap.time:.1f} s"
-                (drawn[label],) = ax.plot(gap.distance, number, "o", color=color, label=said, zorder=2)
+                text = f"{label} {gap.distance:.2f} m at {gap.time:.1f} s"
+                (drawn[label],) = ax.plot(gap.distance, number, "o", color=color, label=text, zorder=2)
     ax.set_yticks(range(len(pairs)), names)
     ax.set_ylim(len(pairs) - 0.4, -0.6)
     left, right = min(0.0, ax.get_xlim()[0]), ax.get_xlim()[1]

@@ -8,7 +8,7 @@ from xosc_lateral.motion.segments import SegmentRow
 
 
 def as_text(rows: Sequence[SegmentRow]) -> str:
-    """One line per stretch."""
+    """One line per segment."""
     width = max((len(row.entity) for row in rows), default=0)
     return "\n".join(
         f"{row.entity:<{width}}  {row.start:8.2f} - {row.end:8.2f} s  "

@@ -1,4 +1,4 @@
-"""Samples laid over all lanes, in a grid: which stretches of road are near a point.
+"""Samples laid over all lanes, in a grid: which pieces of road are near a point.
 
 References
 ----------
@@ -55,8 +55,8 @@ class Samples:
             raise PlaybackError(f"no road has a lane of these types: {', '.join(sorted(lane_types or ('any',)))}")
         self.road = np.concatenate([np.full(len(s), road, dtype=np.int32) for road, s, _, _ in parts])
         self.s, self.x, self.y = (np.concatenate([part[k] for part in parts]) for k in (1, 2, 3))
-        # The stretches of a road that pass a cell apart from each other (a loop, a hairpin) are separate candidates.
-        self.stretch = np.concatenate(
+        # The pieces of a road that pass a cell apart from each other (a loop, a hairpin) are separate candidates.
+        self.piece = np.concatenate(
             [np.full(len(part[1]), k, dtype=np.int64) for k, part in enumerate(parts)]
         ) * 1_000_000 + (self.s // (4.0 * CELL)).astype(np.int64)
         self._x0, self._y0 = float(self.x.min()) - CELL, float(self.y.min()) - CELL
@@ -68,7 +68,7 @@ class Samples:
                 keys.append((column + across) * self._lines + line + along)
                 samples.append(np.arange(len(self.x)))
         key, sample = np.concatenate(keys), np.concatenate(samples)
-        order = np.lexsort((self.stretch[sample], key))
+        order = np.lexsort((self.piece[sample], key))
         self._sample = sample[order]
         self._cells, first = np.unique(key[order], return_index=True)
         self._first = np.append(first, len(order))
@@ -77,7 +77,7 @@ class Samples:
         return ((x - self._x0) // CELL).astype(np.int64), ((y - self._y0) // CELL).astype(np.int64)
 
     def near(self, x: FloatArray, y: FloatArray) -> Candidates:
-        """Every stretch of road that may be the nearest one, once per point; at least one for every point.
+        """Every piece of road that may be the nearest one, once per point; at least one for every point.
 
         `x`, `y` of shape (n,). [m]
         """
@@ -100,7 +100,7 @@ class Samples:
         count = self._first[cells + 1] - first
         start = np.cumsum(count) - count
         sample = self._sample[np.arange(int(count.sum())) + np.repeat(first - start, count)]
-        return self._closest_per_stretch(np.repeat(points, count), sample, x, y)
+        return self._closest_per_piece(np.repeat(points, count), sample, x, y)
 
     def _nearest(self, points: NDArray[np.int64], x: FloatArray, y: FloatArray) -> Candidates:
         """Far from any lane: the nearest 16 samples by brute force for a few points, by a tree for many."""
@@ -113,20 +113,20 @@ class Samples:
 
             tree = cKDTree(np.stack([self.x, self.y], axis=1))
             sample = tree.query(np.stack([x[points], y[points]], axis=1), k=k)[1].reshape(len(points), k)
-        order = np.argsort(self.stretch[sample], axis=1)
+        order = np.argsort(self.piece[sample], axis=1)
         sample = np.take_along_axis(sample, order, axis=1)
-        return self._closest_per_stretch(np.repeat(points, k), sample.ravel(), x, y)
+        return self._closest_per_piece(np.repeat(points, k), sample.ravel(), x, y)
 
-    def _closest_per_stretch(
+    def _closest_per_piece(
         self, point: NDArray[np.int64], sample: NDArray[np.int64], x: FloatArray, y: FloatArray
     ) -> Candidates:
-        """Of (point, sample) pairs sorted by point and stretch: the closest of each stretch, unless out of reach."""
+        """Of (point, sample) pairs sorted by point and piece: the closest of each piece, unless out of reach."""
         if not len(point):
             return Candidates(point, self.road[:0], self.s[:0])
         distance = np.hypot(x[point] - self.x[sample], y[point] - self.y[sample])
-        stretch = self.stretch[sample]
+        piece = self.piece[sample]
         new_point = np.append(True, point[1:] != point[:-1])
-        new = new_point | np.append(True, stretch[1:] != stretch[:-1])
+        new = new_point | np.append(True, piece[1:] != piece[:-1])
         begin = np.flatnonzero(new)
         group = np.cumsum(new) - 1
         smallest = np.minimum.reduceat(distance, begin)

@@ -129,8 +129,8 @@ def _period(rows: Sequence[FloatArray], rate: float) -> int | None:
         lines += power[at] / resolution
         around += level / resolution
     ratio = lines / around
-    chance = DEVIATIONS * np.sqrt((1.0 + 0.5 / len(BESIDE)) / len(pieces))
-    lines_at = sizes[ratio > max(LINE, 1.0 + chance)]
+    by_chance = DEVIATIONS * np.sqrt((1.0 + 0.5 / len(BESIDE)) / len(pieces))
+    lines_at = sizes[ratio > max(LINE, 1.0 + by_chance)]
     if not len(lines_at):
         return None
     clearest = int(sizes[np.argmax(ratio)])

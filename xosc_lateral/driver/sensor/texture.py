@@ -37,7 +37,7 @@ TRANSITION, ATTENUATION = 0.3, 40.0
 PIECE = 2.4
 """Pieces whose log power is compared: several periods, and shorter than a vehicle takes through a noisy zone. [s]"""
 
-APART = 4
+LAG_PIECES = 4
 """Pieces between those whose covariance tells how long a level lasts: the high-pass is shorter than that. [-]"""
 
 LONGEST = 60.0
@@ -99,16 +99,16 @@ def level_variation(runs: Sequence[FloatArray], noise: FloatArray, step: float) 
     """
     rows = round(PIECE / step)
     levels = [_log_power(run, rows, step) for run in runs]
-    levels = [one for one in levels if len(one) > APART]
+    levels = [one for one in levels if len(one) > LAG_PIECES]
     if not levels:
         return 0.0, LONGEST
     mean = float(np.concatenate(levels).mean())
     variance = float(np.concatenate(levels).var() - _log_power(noise, rows, step).var())
     if variance <= 0.0:
         return 0.0, LONGEST
-    products = np.concatenate([(one[APART:] - mean) * (one[:-APART] - mean) for one in levels])
-    kept = np.clip(products.mean() / variance, 1e-3, np.exp(-APART * PIECE / LONGEST))
-    return variance, float(-APART * PIECE / np.log(kept))
+    products = np.concatenate([(one[LAG_PIECES:] - mean) * (one[:-LAG_PIECES] - mean) for one in levels])
+    kept = np.clip(products.mean() / variance, 1e-3, np.exp(-LAG_PIECES * PIECE / LONGEST))
+    return variance, float(-LAG_PIECES * PIECE / np.log(kept))
 
 
 def amplitude_factor(variance: float, duration: float, n: int, step: float, rng: np.random.Generator) -> FloatArray:

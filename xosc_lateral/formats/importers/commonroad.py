@@ -115,8 +115,8 @@ def _opened(path: Path) -> Any:
     try:
         scenario, _ = CommonRoadFileReader(str(path)).open()
     except Exception as error:  # whatever its parser meets in a foreign file
-        said = " ".join(str(error).split())[:200]
-        raise FormatError(f"not a CommonRoad scenario that commonroad-io can read: {said}", path=path) from error
+        reason = " ".join(str(error).split())[:200]
+        raise FormatError(f"not a CommonRoad scenario that commonroad-io can read: {reason}", path=path) from error
     return scenario
 
 
@@ -173,8 +173,8 @@ def _find(
         near = np.flatnonzero(shape.may_hold(x, y))
         if not len(near):
             continue
-        way, aside, wide, course, bend = shape.place(x[near], y[near])
-        inside = (np.abs(aside) <= 0.5 * wide) & np.isfinite(way) & (np.cos(heading[near] - course) > LEAST_AGREEMENT)
+        way, aside, wide, ahead, bend = shape.place(x[near], y[near])
+        inside = (np.abs(aside) <= 0.5 * wide) & np.isfinite(way) & (np.cos(heading[near] - ahead) > LEAST_AGREEMENT)
         better = inside & (np.abs(aside) < nearest[near])
         rows = near[better]
         piece[rows], nearest[rows] = number, np.abs(aside[better])
@@ -209,7 +209,7 @@ class _Shape:
         self.size = np.hypot(*self.step.T)
         self.start = np.concatenate([[0.0], np.cumsum(self.size)])
         self.length = float(self.start[-1])
-        self.course = np.unwrap(np.arctan2(self.step[:, 1], self.step[:, 0]))
+        self.direction = np.unwrap(np.arctan2(self.step[:, 1], self.step[:, 0]))
         both = np.concatenate([self.left, self.right])
         self.low, self.high = both.min(axis=0), both.max(axis=0)
 
@@ -218,7 +218,7 @@ class _Shape:
         return np.asarray((x >= self.low[0]) & (x <= self.high[0]) & (y >= self.low[1]) & (y <= self.high[1]))
 
     def place(self, x: FloatArray, y: FloatArray) -> tuple[FloatArray, ...]:
-        """Way along the middle (NaN beyond its ends), offset and width across it, its course and curvature there."""
+        """Way along the middle (NaN beyond its ends), offset and width across it, its direction and curvature there."""
         about = np.stack([x, y], axis=1)[:, None] - self.centre[None, :-1]
         size2 = np.maximum(self.size**2, 1e-12)
         share = np.clip((about * self.step).sum(axis=2) / size2, 0.0, 1.0)
@@ -228,8 +228,8 @@ class _Shape:
         u = share[rows, k][:, None]
         left = self.left[k] + u * (self.left[k + 1] - self.left[k])
         right = self.right[k] + u * (self.right[k + 1] - self.right[k])
-        course = self.course[k]
-        normal = np.stack([-np.sin(course), np.cos(course)], axis=1)
+        direction = self.direction[k]
+        normal = np.stack([-np.sin(direction), np.cos(direction)], axis=1)
         middle = 0.5 * (left + right)
         offset = ((np.stack([x, y], axis=1) - middle) * normal).sum(axis=1)
         width = ((left - right) * normal).sum(axis=1)
@@ -237,9 +237,9 @@ class _Shape:
         at_start = (k == 0) & (((np.stack([x, y], axis=1) - self.centre[0]) @ self.step[0]) < 0)
         at_end = (k == len(self.size) - 1) & (((np.stack([x, y], axis=1) - self.centre[-1]) @ self.step[-1]) > 0)
         middles = 0.5 * (self.start[1:] + self.start[:-1])
-        bend = np.interp(way + 0.5 * SMOOTHED, middles, self.course) - np.interp(
-            way - 0.5 * SMOOTHED, middles, self.course
+        bend = np.interp(way + 0.5 * SMOOTHED, middles, self.direction) - np.interp(
+            way - 0.5 * SMOOTHED, middles, self.direction
         )
         span = np.minimum(way + 0.5 * SMOOTHED, middles[-1]) - np.maximum(way - 0.5 * SMOOTHED, middles[0])
         curvature = np.where(span > 1.0, bend / np.maximum(span, 1.0), 0.0)
-        return np.where(at_start | at_end, np.nan, way), offset, width, course, curvature
+        return np.where(at_start | at_end, np.nan, way), offset, width, direction, curvature

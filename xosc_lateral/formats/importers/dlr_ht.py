@@ -224,9 +224,9 @@ def _place_in_lanes(
         lanes = []
         for index in range(LANES):
             rows = np.flatnonzero((lane == index) & ~changing & ~gap)
-            stretch = np.cumsum(np.r_[True, (np.diff(rows) != 1) | (np.diff(vehicle[rows]) != 0)])
-            second = _each(stretch, round(1.0 / STEP))
-            lanes.append(fit_lane_centre(s[rows][second], d[rows][second], height[rows][second], stretch[second]))
+            passage = np.cumsum(np.r_[True, (np.diff(rows) != 1) | (np.diff(vehicle[rows]) != 0)])
+            second = _each(passage, round(1.0 / STEP))
+            lanes.append(fit_lane_centre(s[rows][second], d[rows][second], height[rows][second], passage[second]))
         centre = np.array([one.at(s, height) for one in lanes])
         # Past a lane's known part its last value stands in, so that no lane change is lost sight of there.
         bend = np.mean([one.at(np.clip(s, one.start, one.end), height) for one in lanes], axis=0)
@@ -270,10 +270,10 @@ def _nearest_lane(d: FloatArray, centre: FloatArray, width: float) -> IntArray:
     return np.where(away.min(axis=0) <= width * 0.55, nearest, -1)
 
 
-def _each(stretch: IntArray, every: int) -> NDArray[np.bool_]:
-    """True for every n-th row of each stretch, from its first."""
-    start = np.flatnonzero(np.r_[True, stretch[1:] != stretch[:-1]])
-    position = np.arange(len(stretch)) - np.repeat(start, np.diff(np.r_[start, len(stretch)]))
+def _each(passage: IntArray, every: int) -> NDArray[np.bool_]:
+    """True for every n-th row of each passage, from its first."""
+    start = np.flatnonzero(np.r_[True, passage[1:] != passage[:-1]])
+    position = np.arange(len(passage)) - np.repeat(start, np.diff(np.r_[start, len(passage)]))
     return np.asarray(position % every == 0)
 
 
@@ -321,7 +321,7 @@ def _describe(carriageway: str, index: int, lane: LaneCentreLine) -> dict[str, o
         "carriageway": carriageway,
         "lane_index": index,
         "length_m": round(lane.end - lane.start, 1),
-        "stretches": lane.stretches,
+        "stretches": lane.passages,
         "centre_standard_error_m": {"median": round(float(np.median(error)), 4), "max": round(float(error.max()), 4)},
     }
 

@@ -3,7 +3,7 @@
 What every vehicle does at the same place is the lane (and the camera's calibration error); what single vehicles do is
 driving. So the centre is the mean over vehicles as a function of s. Rows of one vehicle are no independent
 measurements, so the fit is weighted as if its residual were a first-order autoregression (generalised least squares),
-and the standard error is computed from whole stretches (sandwich estimator), which holds whatever the correlation is.
+and the standard error is computed from whole passages (sandwich estimator), which holds whatever the correlation is.
 
 A camera that looks along the road sees tall vehicles displaced (parallax), by an amount that varies with the place: a
 second line, the tilt, per metre of height above the lane's mean. Its own mean along the road is not taken out: it can't
@@ -25,12 +25,12 @@ IntArray = NDArray[np.int64]
 
 KNOT_SPACING = 50.0  # [m]; chosen by leave-vehicles-out error on DLR HT (docs/real_data.md)
 MAX_ERROR = 0.15  # [m]; where the centre's standard error is larger (ends of the road), rows are cut
-TILT_PULL = 4.0  # ridge on the tilt's coefficients [-]; chosen likewise, 1 to 10 give the same within 1 %
-MEMORY = 0.9  # correlation of a driver's offset after 1 s, as assumed by the weights; 1 would let the level drift
+TILT_PENALTY = 4.0  # ridge on the tilt's coefficients [-]; chosen likewise, 1 to 10 give the same within 1 %
+CORRELATION = 0.9  # correlation of a driver's offset after 1 s, as assumed by the weights; 1 would let the level drift
 ROUNDS = 4  # of reweighting; the line moves by under 1 mm after three
 HUBER = 2.0  # residuals beyond this many standard deviations count less: undetected lane changes
-BEND_PULL = 0.1  # [-]
-MIN_STRETCHES = 10  # per 100 m of road, below which the lane ends
+BEND_PENALTY = 0.1  # [-]
+MIN_PASSAGES = 10  # per 100 m of road, below which the lane ends
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,7 +62,7 @@ class LaneCentreLine:
     tilt: FloatArray
     height: float
     covariance: FloatArray
-    stretches: int
+    passages: int
 
     def at(self, s: FloatArray, height: FloatArray) -> FloatArray:
         """Lateral position of the centre as seen on a vehicle of that height [m]; NaN outside of start..end."""
@@ -79,18 +79,18 @@ class LaneCentreLine:
 
 
 def fit_lane_centre(
-    s: FloatArray, d: FloatArray, height: FloatArray, stretch: IntArray, *, knot_spacing: float = KNOT_SPACING
+    s: FloatArray, d: FloatArray, height: FloatArray, passage: IntArray, *, knot_spacing: float = KNOT_SPACING
 ) -> LaneCentreLine:
     """Fit one lane's centre.
 
     Parameters
     ----------
     s, d : array, shape (n,)
-        Positions of vehicles that keep to this lane, one row a second, sorted by stretch and time. [m]
+        Positions of vehicles that keep to this lane, one row a second, sorted by passage and time. [m]
     height : array, shape (n,)
         Of the vehicles. [m]
-    stretch : array of int, shape (n,)
-        Which uninterrupted stretch of which vehicle a row belongs to.
+    passage : array of int, shape (n,)
+        Which uninterrupted passage of which vehicle a row belongs to.
     knot_spacing : float
         Between the splines' knots. Longer: blind to the bends that camera calibration puts into the tracks; shorter:
         follows single drivers. [m]
@@ -98,24 +98,24 @@ def fit_lane_centre(
     Raises
     ------
     NotEnoughDataError
-        If fewer than `MIN_STRETCHES` share any 100 m.
+        If fewer than `MIN_PASSAGES` share any 100 m.
     """
-    start, end = _covered(s, stretch)
+    start, end = _covered(s, passage)
     keep = (s >= start) & (s <= end)
     mean_height = float(height[keep].mean())
-    s, d, taller, stretch = s[keep], d[keep], height[keep] - mean_height, stretch[keep]
+    s, d, taller, passage = s[keep], d[keep], height[keep] - mean_height, passage[keep]
     inner = np.linspace(start, end, max(2, round((end - start) / knot_spacing) + 1))
     knots = np.r_[[start] * 3, inner, [end] * 3]
     basis = _basis(s, knots)
     size = basis.shape[1]
     design = np.hstack([basis, basis * taller[:, None], taller[:, None]])
-    follows = np.r_[False, stretch[1:] == stretch[:-1]]
+    follows = np.r_[False, passage[1:] == passage[:-1]]
     coefficients, covariance = _robust_least_squares(
-        _whiten(design, follows), _whiten(d, follows), _pull(size), stretch
+        _whiten(design, follows), _whiten(d, follows), _penalty(size), passage
     )
     centre, tilt = coefficients[:size], coefficients[size : 2 * size]
     lane = LaneCentreLine(
-        start, end, knots, centre, tilt, mean_height, covariance[:size, :size], len(np.unique(stretch))
+        start, end, knots, centre, tilt, mean_height, covariance[:size, :size], len(np.unique(passage))
     )
     return _sure_part(lane)
 
@@ -129,13 +129,13 @@ def _sure_part(lane: LaneCentreLine) -> LaneCentreLine:
     return replace(lane, start=float(s[first]), end=float(s[last - 1]))
 
 
-def _pull(size: int) -> FloatArray:
+def _penalty(size: int) -> FloatArray:
     """Penalty on the coefficients: centre (weakly) smooth, tilt small, tilt's mean free."""
-    # The pull to smoothness carries the line over places where nobody was measured.
-    bend = BEND_PULL * np.diff(np.eye(size), n=2, axis=0)
+    # The penalty on bends carries the line over places where nobody was measured.
+    bend = BEND_PENALTY * np.diff(np.eye(size), n=2, axis=0)
     penalty = np.zeros((2 * size + 1, 2 * size + 1))
     penalty[:size, :size] = bend.T @ bend
-    penalty[size : 2 * size, size : 2 * size] = TILT_PULL * np.eye(size)
+    penalty[size : 2 * size, size : 2 * size] = TILT_PENALTY * np.eye(size)
     penalty[-1, -1] = 1e-6  # where all vehicles are equally tall it is anything: then 0
     return penalty
 
@@ -165,29 +165,29 @@ def _basis(s: FloatArray, knots: FloatArray) -> FloatArray:
 
 
 def _whiten(values: FloatArray, follows: NDArray[np.bool_]) -> FloatArray:
-    """Innovations of a first-order autoregression; a stretch's first row is scaled to the same variance."""
-    innovation = values * np.sqrt(1.0 - MEMORY**2)
+    """Innovations of a first-order autoregression; a passage's first row is scaled to the same variance."""
+    innovation = values * np.sqrt(1.0 - CORRELATION**2)
     later = np.flatnonzero(follows)
-    innovation[later] = values[later] - MEMORY * values[later - 1]
+    innovation[later] = values[later] - CORRELATION * values[later - 1]
     return np.asarray(innovation, dtype=np.float64)
 
 
-def _covered(s: FloatArray, stretch: IntArray, window: float = 100.0) -> tuple[float, float]:
-    """Longest range of s in which every window has enough stretches."""
+def _covered(s: FloatArray, passage: IntArray, window: float = 100.0) -> tuple[float, float]:
+    """Longest range of s in which every window has enough passages."""
     number = np.floor(s / window).astype(np.int64)
-    pairs = np.unique(np.column_stack([number, stretch]), axis=0)
+    pairs = np.unique(np.column_stack([number, passage]), axis=0)
     if len(pairs) == 0:
         raise NotEnoughDataError("no vehicle keeps to this lane")
     count = np.bincount(pairs[:, 0] - pairs[0, 0])
-    first, last = _longest(count >= MIN_STRETCHES)
+    first, last = _longest(count >= MIN_PASSAGES)
     if last <= first:
         raise NotEnoughDataError(
-            f"at most {count.max()} drives share {window:.0f} m of a lane; {MIN_STRETCHES} are needed"
+            f"at most {count.max()} drives share {window:.0f} m of a lane; {MIN_PASSAGES} are needed"
         )
     return float((pairs[0, 0] + first + 0.5) * window), float((pairs[0, 0] + last - 0.5) * window)
 
 
 def _longest(good: NDArray[np.bool_]) -> tuple[int, int]:
-    """First index and one past the last of the longest stretch of True; (0, 0) if there is none."""
+    """First index and one past the last of the longest slice of True; (0, 0) if there is none."""
     longest = max(true_slices(good), key=lambda part: part.stop - part.start, default=slice(0, 0))
     return longest.start, longest.stop

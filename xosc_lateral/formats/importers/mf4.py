@@ -190,7 +190,7 @@ def _said(error: Exception) -> str:
 
     asammdf's half-made objects complain on standard error when they are disposed of: here, and unheard.
     """
-    said = " ".join(str(error).split())[:LONGEST_MESSAGE] or type(error).__name__
+    reason = " ".join(str(error).split())[:LONGEST_MESSAGE] or type(error).__name__
     hook, sys.unraisablehook = sys.unraisablehook, lambda _: None
     try:
         traceback.clear_frames(error.__traceback__)
@@ -198,7 +198,7 @@ def _said(error: Exception) -> str:
         gc.collect()
     finally:
         sys.unraisablehook = hook
-    return said
+    return reason
 
 
 def _read_channel(log: Any, name: str, wanted: ColumnSource, source: Path) -> Channel:

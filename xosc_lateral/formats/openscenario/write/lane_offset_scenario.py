@@ -1,7 +1,7 @@
 """Write a scenario that keeps its maneuvers and gets the offsets as lane offset actions on top.
 
 For scenarios that have to stay reactive: triggers look at what happens, an ego under test may drive itself. Each
-stretch of road-following gets an act of its own. It starts when the lateral action before it has ended (or at its
+road-following segment gets an act of its own. It starts when the lateral action before it has ended (or at its
 time), and is stopped by any lateral action of the same entity that has not run yet: a lane change overrules it,
 whenever it comes. Times inside an act count from the act's start where a lateral action starts it.
 """
@@ -41,7 +41,7 @@ from xosc_lateral.scenario import Scenario
 from xosc_lateral.scenario.enums import Priority
 
 AT_ONCE = 0.1
-"""A stretch that begins within this after a lateral action begins because of it. [s]"""
+"""A segment that begins within this after a lateral action begins because of it. [s]"""
 PLACED = 1e-3
 """What begins with the scenario begins only now: it would overrule an init action that has not been stepped yet. [s]"""
 
@@ -214,6 +214,6 @@ def _is_lateral(played: PlayedAction, entity: str) -> bool:
 
 
 def _cause(before: Sequence[PlayedAction], begin: float) -> PlayedAction | None:
-    """The lateral action whose end begins the stretch."""
+    """The lateral action whose end begins the segment."""
     ended = [played for played in before if played.end is not None and abs(begin - played.end) <= AT_ONCE]
     return ended[-1] if ended else None

@@ -1,4 +1,4 @@
-"""Offsets of one stretch of road-following as a few smooth transitions between lane offsets.
+"""Offsets of one segment as a few smooth transitions between lane offsets.
 
 A lane offset action begins and ends with no lateral speed, whatever its shape, but for the linear one, which begins and
 ends with a kink. So the offsets are followed by half cosines from one place to the next: as few as stay within the
@@ -17,13 +17,13 @@ from numpy.typing import NDArray
 
 from xosc_lateral.formats.openscenario.write.ramp_targets import Ramp, fitted, slowing, turning
 from xosc_lateral.motion.nominal import Activity, EntityMotion
-from xosc_lateral.motion.segments import Stretch
+from xosc_lateral.motion.segments import SegmentSpan
 from xosc_lateral.road import RoadNetwork
 
 FloatArray = NDArray[np.float64]
 
 SETTLING_TIME = 2.0
-"""From the nominal offset at a stretch's start to the sampled one, where the turn allows it. [s]"""
+"""From the nominal offset at a segment's start to the sampled one, where the turn allows it. [s]"""
 TOLERANCE = 0.010
 """How far transitions that lead from sampled offset to sampled offset may be from it. 1.3 cm takes a tenth fewer of
 them, and 1 % of the chains more err by over 2 cm. [m]"""
@@ -43,7 +43,7 @@ FLIP_MARGIN = 0.3
 PLACED_ASIDE = np.array([0.01 * sign * k for k in range(11) for sign in (1, -1)])
 """From the sampled offset, the nearest first, where a chain begins with the scenario: a drift is met half way. [m]"""
 REST = 0.1
-"""Before a stretch's end in which nothing turns the car any more: the maneuver that ends it may come a little early,
+"""Before a segment's end in which nothing turns the car any more: the maneuver that ends it may come a little early,
 and begins with no lateral speed. [s]"""
 _TOO_FAST = 1e6
 """What turning faster than allowed costs: more than any number of transitions or centimetres. [-]"""
@@ -53,7 +53,7 @@ _SLOW = 3.0
 
 @dataclass(frozen=True, eq=False, slots=True)
 class OffsetChain:
-    """Offsets of one entity on one stretch of road-following.
+    """Offsets of one entity on one segment.
 
     Parameters
     ----------
@@ -82,26 +82,26 @@ class OffsetChain:
 
 
 def offset_chains(
-    motion: EntityMotion, network: RoadNetwork, deviation: FloatArray, stretches: Sequence[Stretch], *, pulls: bool
+    motion: EntityMotion, network: RoadNetwork, deviation: FloatArray, spans: Sequence[SegmentSpan], *, tows: bool
 ) -> list[OffsetChain]:
     """Chains of one entity, with a deviation positive to the left of travel. [m]
 
     A chain begins where the one before has left the entity, unless something else moved it aside in between. One that
-    pulls a trailer is not put down beside the middle: the trailer would swing.
+    tows a trailer is not put down beside the middle: the trailer would swing.
     """
     chains: list[OffsetChain] = []
     held, end = 0.0, -1
-    for stretch in stretches:
-        chain = _offset_chain(motion, network, deviation, stretch.first, stretch.last)
-        if stretch.first == 0 and not pulls:
+    for span in spans:
+        chain = _offset_chain(motion, network, deviation, span.first, span.last)
+        if span.first == 0 and not tows:
             chain = replace(chain, start_t=float(chain.offset_t[0]), is_placed=True)
-        if end >= 0 and not _moved_aside(motion, end + 1, stretch.first):
-            chain = replace(chain, start_t=_direction(motion, network, stretch.first) * held)
+        if end >= 0 and not _moved_aside(motion, end + 1, span.first):
+            chain = replace(chain, start_t=_direction(motion, network, span.first) * held)
         chains.append(chain)
         found = ramps(chain)
-        at = int(np.searchsorted(motion.time, found[-1].start)) if found else stretch.first
+        at = int(np.searchsorted(motion.time, found[-1].start)) if found else span.first
         held = _direction(motion, network, at) * (found[-1].target if found else chain.start_t)
-        end = stretch.last
+        end = span.last
     return chains
 
 
@@ -188,7 +188,7 @@ def _transitions(
     found: list[Ramp] = []
     i = 0
     if cost[0] >= _TOO_FAST:
-        return found  # too short a stretch to get anywhere
+        return found  # too short a segment to get anywhere
     while i < n - 1:
         k = int(following[i])
         found.append(Ramp(float(time[i]), float(time[k]) - SLACK, at, float(offset[k])))
