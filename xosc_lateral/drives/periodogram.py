@@ -35,11 +35,11 @@ def hann(size: int) -> FloatArray:
 
 
 def periodograms(values: FloatArray, size: int, *, detrend: Detrend = Detrend.NOTHING) -> FloatArray:
-    """Power of half-overlapping Hann windows of one run.
+    """Power of half-overlapping Hann windows of one run, or of several that are equally long.
 
     Parameters
     ----------
-    values : array, shape (n,)
+    values : array, shape (n,) or (runs, n)
         Evenly sampled.
     size : int
         Samples of a window, >= 2.
@@ -51,9 +51,10 @@ def periodograms(values: FloatArray, size: int, *, detrend: Detrend = Detrend.NO
         At `numpy.fft.rfftfreq(size)` cycles per sample; white noise of variance 1 gives 1 everywhere. No rows where the
         run is shorter than a window. [square of the values' unit]
     """
-    if len(values) < size:
+    if values.shape[-1] < size:
         return np.empty((0, size // 2 + 1))
-    return window_powers(np.lib.stride_tricks.sliding_window_view(values, size)[:: max(1, size // 2)], detrend=detrend)
+    windows = np.lib.stride_tricks.sliding_window_view(values, size, axis=-1)[..., :: max(1, size // 2), :]
+    return window_powers(windows.reshape(-1, size), detrend=detrend)
 
 
 def window_powers(pieces: FloatArray, *, detrend: Detrend = Detrend.NOTHING) -> FloatArray:

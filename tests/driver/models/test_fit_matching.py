@@ -10,8 +10,11 @@ from xosc_lateral.driver.models.autoregressive.fit_matching import (
     LARGEST_STEP,
     MOST_CORRELATED,
     NUDGE,
+    SIMULATED,
+    SNIPPETS_EACH,
     _asked,
     _corrected,
+    _drives_of,
     _gain,
     _log_spectrum,
     _moments,
@@ -51,8 +54,27 @@ def test_snippets_that_stand_still_have_finite_moments() -> None:
 
 def test_twice_the_size_adds_the_log_of_four_to_the_spectrum() -> None:
     # a straight line from end to end is taken out: the slowest ordinate is nothing but rounding
-    change = (_log_spectrum(2.0 * snippets()) - _log_spectrum(snippets()))[1:]
+    change = (_log_spectrum([2.0 * snippets()], 50) - _log_spectrum([snippets()], 50))[1:]
     np.testing.assert_allclose(change, np.log(4.0), atol=1e-6)
+
+
+def test_the_spectrum_of_a_stack_is_that_of_its_runs() -> None:
+    stack = snippets(n=20)
+    np.testing.assert_allclose(_log_spectrum([stack], 20), _log_spectrum(list(stack), 20), rtol=1e-9)
+
+
+def test_windows_of_half_a_minute_show_a_fall_that_those_of_ten_seconds_blur() -> None:
+    """Power that falls by 14 dB from 0.3 to 0.5 Hz, as drivers' does: how much of it is seen. [dB]"""
+    hertz = np.fft.rfftfreq(3000, 0.2)
+    noise = np.random.default_rng(3).normal(size=(60, 3000))
+    runs = list(np.fft.irfft(np.fft.rfft(noise) * 10.0 ** (-3.5 * (np.clip(hertz, 0.3, 0.5) - 0.3)), n=3000))
+
+    def fall(size: int) -> float:
+        at = np.interp([0.3, 0.5], np.fft.rfftfreq(size, 0.2), _log_spectrum(runs, size))
+        return float(10.0 / np.log(10.0) * (at[0] - at[1]))
+
+    assert fall(150) == pytest.approx(13.0, abs=0.5)
+    assert fall(50) < 11.0
 
 
 def test_what_is_asked_is_half_way_between_spread_and_speed_and_the_roughness() -> None:
@@ -103,6 +125,13 @@ def test_a_straight_path_has_no_wiggle_and_a_parabola_the_same_everywhere() -> N
     t = np.arange(60.0)
     np.testing.assert_allclose(_wiggle((3.0 + 0.1 * t, t)), 0.0, atol=1e-12)
     np.testing.assert_allclose(_wiggle((t**2, t)), 2.0 * 5.0**2)
+
+
+def test_drives_beyond_one_batch_are_others() -> None:
+    few, many = (_drives_of(STEADY, 51, 7, drivers) for drivers in (SIMULATED, SIMULATED + 3))
+    np.testing.assert_array_equal(many[:SIMULATED], few)
+    assert many.shape == (SIMULATED + 3, SNIPPETS_EACH * 51)
+    assert not np.array_equal(many[SIMULATED:], many[:3])
 
 
 def test_simulated_drives_are_the_model_s_drives() -> None:

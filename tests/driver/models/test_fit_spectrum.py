@@ -10,7 +10,7 @@ from scipy.signal import welch
 from tests.driver.models.made_models import STEADY
 from xosc_lateral.driver.models.autoregressive.autoregression import Autoregression
 from xosc_lateral.driver.models.autoregressive.fit_settings import DEFAULT_SETTINGS
-from xosc_lateral.driver.models.autoregressive.fit_spectrum import _shaped, _typical_power, fit_spectrum
+from xosc_lateral.driver.models.autoregressive.fit_spectrum import _shaped, _typical_power, fit_spectrum, window_of
 from xosc_lateral.driver.models.fit_noise import NOISE_VARIANCE
 from xosc_lateral.driver.models.noise import ShapedNoise
 
@@ -53,6 +53,23 @@ def test_short_runs_are_seen_through_shorter_windows() -> None:
     short, _ = _typical_power([rng.normal(size=60) for _ in range(30)], DEFAULT_SETTINGS)
     assert len(long) == 51  # 20 s at 5 Hz
     assert len(short) == 26
+
+
+@pytest.mark.parametrize(
+    ("samples", "seconds"),
+    [
+        ([300] * 10, 30.0),
+        ([300] * 9, 20.0),  # 18 windows of 30 s
+        ([149] * 100, 20.0),
+        ([99] * 100, 10.0),
+        ([60], 10.0),  # the last, although there are few
+        ([150] * 20 + [80] * 100, 10.0),  # a few long runs don't speak for many short ones
+        ([150] * 60 + [80] * 100, 30.0),
+    ],
+)
+def test_windows_are_the_longest_of_which_enough_hold_half_the_time(samples: list[int], seconds: float) -> None:
+    size = window_of([np.zeros(n) for n in samples], (30.0, 20.0, 10.0), DEFAULT_SETTINGS)
+    assert size * DEFAULT_SETTINGS.step == pytest.approx(seconds)
 
 
 @pytest.mark.parametrize("shape", ["flat", "falling", "bump"])

@@ -25,6 +25,9 @@ class FitSettings:
         The fine noise has nothing below the first frequency, all that the coarse movement lacks above the second. [Hz]
     spectrum_windows : tuple of float
         Lengths of spectral windows, the first that enough runs are as long as. [s]
+    compared_windows : tuple of float
+        Lengths of the windows whose spectra are compared, likewise. The power falls by 14 dB from 0.3 to 0.5 Hz, which
+        windows of 10 s can't show: each of their frequencies is 0.4 Hz wide. [s]
     fine_window, coarse_window : float
         Windows that volatility is seen by. [s]
     far : tuple of float
@@ -46,6 +49,7 @@ class FitSettings:
     scale_band: tuple[float, float] = (0.1, 0.3)
     fine_from: tuple[float, float] = (0.2, 0.33)
     spectrum_windows: tuple[float, ...] = (20.0, 10.0, 5.0)
+    compared_windows: tuple[float, ...] = (30.0, 20.0, 10.0)
     fine_window: float = 2.0
     coarse_window: float = 5.0
     far: tuple[float, float] = (0.5, 1.0)
