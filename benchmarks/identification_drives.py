@@ -22,17 +22,17 @@ from xosc_lateral.datasets.movements import (
     heavy_tailed,
     long_memory,
     lopsided,
+    ornstein_uhlenbeck,
     oscillating,
     pursuit,
     record_movement,
     reflected,
     sawtooth,
-    wandering,
 )
 
 Values = np.ndarray
 MOVEMENTS = {
-    "wandering": wandering,
+    "wandering": ornstein_uhlenbeck,
     "heavy_tailed": heavy_tailed,
     "reflected": reflected,
     "delayed_control": delayed_control,

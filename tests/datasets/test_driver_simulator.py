@@ -13,6 +13,7 @@ from xosc_lateral.datasets import (
     Companion,
     CyclicTarget,
     Distraction,
+    DriftingTarget,
     Fatigue,
     LanePreference,
     RestoringBy,
@@ -21,7 +22,6 @@ from xosc_lateral.datasets import (
     SideWind,
     SimulatedDrive,
     SpreadBy,
-    TargetWander,
     curve_cutting,
     simulate_drive,
     simulate_population,
@@ -157,7 +157,7 @@ def test_fatigue_spreads_the_second_half():
 
 
 @pytest.mark.parametrize(
-    "plant", [Distraction(), CyclicTarget(0.3), TargetWander(0.3)], ids=["regime", "weave", "wander"]
+    "plant", [Distraction(), CyclicTarget(0.3), DriftingTarget(0.3)], ids=["regime", "weave", "wander"]
 )
 def test_hidden_effects_widen_the_spread(plant):
     everywhere = [

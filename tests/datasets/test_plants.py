@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from xosc_lateral.datasets.camera_plants import CameraStep, SensorDrift
-from xosc_lateral.datasets.hidden_plants import Companion, CyclicTarget, Distraction, Fatigue, TargetWander
+from xosc_lateral.datasets.hidden_plants import Companion, CyclicTarget, Distraction, DriftingTarget, Fatigue
 from xosc_lateral.datasets.intent import Context, Intent, Plant
 from xosc_lateral.datasets.motorway import STEP, draw_motorway
 from xosc_lateral.datasets.plants import LanePreference, ShiftBy
@@ -38,7 +38,7 @@ def motorway() -> Context:
 
 # ---- hidden effects --------------------------------------------------------------------------------------------------
 def test_a_wander_has_its_size_and_its_correlation_time() -> None:
-    intent = planted(TargetWander(0.2, 30.0))
+    intent = planted(DriftingTarget(0.2, 30.0))
     assert changed(intent) == {"target"}
     assert intent.target.std() == pytest.approx(0.2)
     assert intent.target.mean() == pytest.approx(0.0, abs=1e-12)

@@ -9,7 +9,7 @@ import pytest
 from msgspec.structs import replace
 
 from tests.driver.certified import FOLDER, MODELS, SEED
-from xosc_lateral.driver.effects import Acts, Drift, EffectTerms, Linear, Population, Regimes, Weave
+from xosc_lateral.driver.effects import Acts, Cycle, Drift, EffectTerms, Linear, Population, Regimes
 from xosc_lateral.driver.process import DriveProcess, combine
 from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.driver.records import plain
@@ -17,7 +17,7 @@ from xosc_lateral.formats.profiles import read_profile
 
 HIDDEN = (
     Drift(size=0.15, correlation_s=60.0),
-    Weave(amplitude=0.1, period_s=9.0, coherence_s=200.0),
+    Cycle(amplitude=0.1, period_s=9.0, coherence_s=200.0),
     Regimes(factor=1.6, fine_factor=1.2, on_s=15.0, off_s=30.0),
     Population(shift=0.12, log_spread=0.2),
 )

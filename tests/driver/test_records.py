@@ -73,7 +73,7 @@ def test_parameters_are_shared_by_copies() -> None:
     assert deepcopy(record) is record
 
 
-@pytest.mark.parametrize(("name", "kind"), [("GrowingSpread", "growing-spread"), ("TwoLevelModel", "two-level")])
+@pytest.mark.parametrize(("name", "kind"), [("LeadDistance", "lead-distance"), ("TwoLevelModel", "two-level")])
 def test_kinds_are_the_classes_names(name: str, kind: str) -> None:
     assert kebab(name) == kind
 

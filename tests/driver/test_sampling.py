@@ -7,7 +7,7 @@ import pytest
 from msgspec.structs import replace
 
 from tests.profiles import simulated_profile
-from xosc_lateral.driver.effects import Acts, Drift, EffectTerms, Linear, Regimes, Weave
+from xosc_lateral.driver.effects import Acts, Cycle, Drift, EffectTerms, Linear, Regimes
 from xosc_lateral.driver.models.base import Start
 from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.driver.sampling import OffsetSampler, combine, sample_offsets
@@ -85,7 +85,7 @@ def test_a_drive_with_effects_starts_where_it_is_told_to(profile: DriverProfile,
 
 
 def test_segments_cut_in_pieces_give_the_whole(profile: DriverProfile) -> None:
-    effects = (CURVE, Drift(size=0.1), Weave(amplitude=0.1, period_s=20.0), Regimes(factor=2.0, on_s=5.0, off_s=20.0))
+    effects = (CURVE, Drift(size=0.1), Cycle(amplitude=0.1, period_s=20.0), Regimes(factor=2.0, on_s=5.0, off_s=20.0))
     rich = replace(profile, effects=effects)
     whole = OffsetSampler(rich, 3).sample(segment(900))
     sampler = OffsetSampler(rich, 3)

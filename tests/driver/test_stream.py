@@ -13,16 +13,16 @@ from xosc_lateral.driver.effects import (
     EFFECTS,
     Acts,
     ColumnEffect,
+    Cycle,
     Drift,
     Effect,
-    GrowingSpread,
     Levels,
     Linear,
     Nearness,
     Population,
     Regimes,
     Step,
-    Weave,
+    VarianceTrend,
 )
 from xosc_lateral.driver.models.two_level.fit import fit_two_level
 from xosc_lateral.driver.profile import DriverProfile
@@ -66,10 +66,10 @@ COLUMNED: tuple[Effect, ...] = (
 )
 HIDDEN: tuple[Effect, ...] = (
     Drift(size=0.1, correlation_s=120.0),
-    Weave(amplitude=0.05, period_s=12.0, coherence_s=300.0),
+    Cycle(amplitude=0.05, period_s=12.0, coherence_s=300.0),
     Regimes(factor=1.8, fine_factor=1.5, on_s=20.0, off_s=60.0),
     Population(shift=0.1, log_spread=0.2, log_fine=0.1),
-    GrowingSpread(factor=1.5, to_s=600.0),
+    VarianceTrend(factor=1.5, to_s=600.0),
     Step(size=0.2, at_s=130.0),
 )
 PACED: tuple[Effect, ...] = (

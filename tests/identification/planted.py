@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from xosc_lateral.datasets.movements import record_movement, wandering
+from xosc_lateral.datasets.movements import ornstein_uhlenbeck, record_movement
 from xosc_lateral.drives.filters import first_order
 from xosc_lateral.formats.drives import drives_of_table
 from xosc_lateral.identification.regression import Coarse
@@ -23,7 +23,7 @@ def planted_drive(shift: Shift, seed: int, names: tuple[str, ...] = ("gust",), s
     responds within 2 s; smoothed by a Gaussian of so many steps in the end."""
     from scipy.ndimage import gaussian_filter1d
 
-    table = record_movement(wandering, 1800.0, seed)
+    table = record_movement(ornstein_uhlenbeck, 1800.0, seed)
     time = table["time"].to_numpy()
     grid = np.arange(time[0], time[-1] + STEP, STEP)
     columns = {}

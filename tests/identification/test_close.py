@@ -15,7 +15,7 @@ from tests.identification.conftest import driver_in
 from xosc_lateral import datasets as plants
 from xosc_lateral.cli import main
 from xosc_lateral.datasets.driver_simulator import Driver, simulate_drive
-from xosc_lateral.datasets.movements import record_movement, wandering
+from xosc_lateral.datasets.movements import ornstein_uhlenbeck, record_movement
 from xosc_lateral.driver.effects import Linear, Product
 from xosc_lateral.driver.fitting import fit_profile
 from xosc_lateral.drives.drive import Drive
@@ -63,7 +63,7 @@ def test_wind_is_sized_as_the_product_that_it_is(driven: Driven) -> None:
 
 
 def test_a_spread_by_a_column_is_sized_and_closes_the_gap(tmp_path: Path) -> None:
-    table, factor = record_movement(wandering, 3000.0, 503), 2.0
+    table, factor = record_movement(ornstein_uhlenbeck, 3000.0, 503), 2.0
     grade, offset = table["grade"], 0.5 * (table["distance_right"] - table["distance_left"])
     offset -= offset.median()
     strength = (grade - grade.median()) / (grade.quantile(0.95) - grade.quantile(0.05))

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from xosc_lateral.driver.effects import Step
-from xosc_lateral.identification.findings import describe_finding, memory_finding, population_finding
-from xosc_lateral.identification.memory import TIMES_S, Memory
+from xosc_lateral.identification.findings import describe_finding, population_finding, spectrum_finding
 from xosc_lateral.identification.population import DriverVariance
 from xosc_lateral.identification.selection import Accepted
+from xosc_lateral.identification.spectrum_shape import TIMES_S, SpectrumShape
 from xosc_lateral.identification.terms.step import StepTerm
 
 REAL = {"mean by effect: step 0": np.array([0.1, -0.1]), "movement by band": np.array([0.2, 0.1, np.nan])}
@@ -35,7 +35,7 @@ def test_a_group_that_nobody_described_has_no_error() -> None:
 
 @pytest.mark.parametrize(("ratio", "worst"), [((1.0, 1.1, 0.5, 1.0, 1.0), 2), ((1.0, 3.0, 0.5, 1.0, 1.0), 1)])
 def test_memory_is_told_by_the_band_that_is_farthest_off_either_way(ratio: tuple[float, ...], worst: int) -> None:
-    found = memory_finding(Memory(TIMES_S, np.array(ratio), 1e-5), COMPARED)
+    found = spectrum_finding(SpectrumShape(TIMES_S, np.array(ratio), 1e-5), COMPARED)
     assert found.size_m == ratio[worst]
     assert f"within {TIMES_S[worst]:g} s is {ratio[worst]:.2f} times" in found.shape
     # 0.3 off in one of two cells that both know; the third was never measured

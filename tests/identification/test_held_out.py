@@ -17,7 +17,7 @@ from xosc_lateral.identification.regression import Coarse, fit_model
 from xosc_lateral.identification.removal import estimate_all
 from xosc_lateral.identification.selection import Accepted, Selection
 from xosc_lateral.identification.terms.base import Term
-from xosc_lateral.identification.terms.cycle import Cycle
+from xosc_lateral.identification.terms.cycle import CycleTerm
 from xosc_lateral.identification.terms.mean import MeanTerm
 from xosc_lateral.identification.terms.step import StepTerm
 
@@ -129,4 +129,4 @@ def test_the_residual_is_cut_by_every_column_and_by_what_was_found(coarse: Coars
 
 def test_a_cycle_s_frequency_is_known_where_there_is_one(coarse: Coarse) -> None:
     assert _frequency(fit_model(coarse, (X,))) is None
-    assert _frequency(fit_model(coarse, (Cycle(1.0 / 12.0),))) == 1.0 / 12.0
+    assert _frequency(fit_model(coarse, (CycleTerm(1.0 / 12.0),))) == 1.0 / 12.0

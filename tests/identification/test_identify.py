@@ -8,13 +8,13 @@ import pytest
 from tests.driver.effects.made_effects import made
 from tests.driver.models.made_models import POPULATION
 from tests.identification.made_coarse import movement, timeline_of, wander
-from xosc_lateral.driver.effects import Acts, Drift, Effect, GrowingSpread, Linear, Weave
+from xosc_lateral.driver.effects import Acts, Cycle, Drift, Effect, Linear, VarianceTrend
 from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.identification.identify import initial_terms, usable_columns
 from xosc_lateral.identification.terms.drift import DriftTerm
 from xosc_lateral.identification.terms.mean import MeanTerm
 from xosc_lateral.identification.terms.spread import SpreadTerm
-from xosc_lateral.identification.terms.variance_trend import VarianceTrend
+from xosc_lateral.identification.terms.variance_trend import VarianceTrendTerm
 from xosc_lateral.identification.timeline import Timeline
 
 SECONDS = 900.0
@@ -64,13 +64,13 @@ def test_each_part_of_the_movement_has_its_term(timeline: Timeline) -> None:
     effects = (
         made(Linear, 0.2, column="grade", acts=Acts.SPREAD),
         made(Linear, 0.2, column="rain"),
-        GrowingSpread(factor=1.5),
+        VarianceTrend(factor=1.5),
         Drift(size=0.1),
     )
     terms = initial(timeline, *effects)
-    assert [type(term) for term in terms] == [SpreadTerm, MeanTerm, VarianceTrend, DriftTerm]
+    assert [type(term) for term in terms] == [SpreadTerm, MeanTerm, VarianceTrendTerm, DriftTerm]
 
 
 def test_effects_of_columns_that_the_table_lacks_and_cycles_begin_nothing(timeline: Timeline) -> None:
-    assert initial(timeline, made(Linear, 0.2, column="wind"), Weave(amplitude=0.1, period_s=9.0)) == ()
+    assert initial(timeline, made(Linear, 0.2, column="wind"), Cycle(amplitude=0.1, period_s=9.0)) == ()
     assert initial(timeline) == ()

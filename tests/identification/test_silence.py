@@ -32,8 +32,8 @@ def test_hardly_ever_is_anything_named_where_nothing_was_planted(driven: Driven)
 @pytest.mark.parametrize(
     ("movement", "resolution"),
     [
-        (movements.wandering, None),
-        (movements.wandering, 0.05),
+        (movements.ornstein_uhlenbeck, None),
+        (movements.ornstein_uhlenbeck, 0.05),
         (movements.heavy_tailed, None),
         (movements.reflected, None),
         (movements.delayed_control, None),

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from msgspec import structs
 
-from xosc_lateral.datasets.movements import record_movement, wandering
+from xosc_lateral.datasets.movements import ornstein_uhlenbeck, record_movement
 from xosc_lateral.driver.effects import Acts, Linear, Proximity
 from xosc_lateral.driver.effects.response import respond
 from xosc_lateral.formats.drives import drives_of_table
@@ -23,7 +23,7 @@ LAG, RESPONSE, SIZE = -0.6, 1.7, 0.25
 @pytest.fixture(scope="module")
 def passed() -> Coarse:
     """A car that trucks pass on the right, briefly; it moves 0.25 m left for each."""
-    table = record_movement(wandering, 1800.0, 3)
+    table = record_movement(ornstein_uhlenbeck, 1800.0, 3)
     time = table["time"].to_numpy()
     truck = (np.sin(2 * np.pi * time / 47.0) > 0.9).astype(float)
     shift = SIZE * respond(truck[:, None], float(time[1] - time[0]), LAG, RESPONSE)[:, 0]
@@ -65,7 +65,7 @@ def test_what_a_term_explains_is_on_the_fine_grid_what_the_profile_gives(passed:
 
 
 def test_values_between_seconds_are_straight_lines() -> None:
-    table = record_movement(wandering, 200.0, 1)
+    table = record_movement(ornstein_uhlenbeck, 200.0, 1)
     timeline = join_drives(drives_of_table(table, {}))
     line = 3.0 * np.arange(len(timeline) // 5) + 1.0
     fine = on_fine_grid(line, timeline)

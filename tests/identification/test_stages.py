@@ -10,7 +10,7 @@ from xosc_lateral.identification import terms
 from xosc_lateral.identification.significance import WEIGHTS
 from xosc_lateral.identification.stages import STAGES
 from xosc_lateral.identification.terms.base import Term
-from xosc_lateral.identification.terms.cycle import Cycle
+from xosc_lateral.identification.terms.cycle import CycleTerm
 from xosc_lateral.identification.terms.drift import DriftTerm
 from xosc_lateral.identification.terms.mean import MeanTerm
 from xosc_lateral.identification.terms.regimes import RegimesTerm
@@ -42,7 +42,7 @@ def test_every_component_has_a_share_of_the_error_budget_and_none_is_left_over()
 def test_the_mean_comes_first_and_again_once_hidden_movement_is_known() -> None:
     assert STAGES[0] == (MeanTerm,)
     assert LISTED.count(MeanTerm) == 2
-    assert LISTED.index(Cycle) < len(LISTED) - LISTED[::-1].index(MeanTerm) - 1
+    assert LISTED.index(CycleTerm) < len(LISTED) - LISTED[::-1].index(MeanTerm) - 1
 
 
 def test_what_explains_anything_that_clusters_comes_after_the_spread() -> None:

@@ -17,11 +17,11 @@ from xosc_lateral.driver.effects import (
     Acts,
     Angular,
     ColumnEffect,
+    Cycle,
     Drift,
     Effect,
     Factor,
     Form,
-    GrowingSpread,
     Levels,
     Linear,
     Magnitude,
@@ -32,7 +32,7 @@ from xosc_lateral.driver.effects import (
     Saturating,
     Step,
     Threshold,
-    Weave,
+    VarianceTrend,
 )
 from xosc_lateral.formats.drives import read_drives
 from xosc_lateral.identification.close import LoopResult, close_loop
@@ -49,8 +49,8 @@ from xosc_lateral.report.loop_words import lack_of_fit_words, meaning, p_value_w
 SHIFT = 0.4  # [m]
 
 HIDDEN: tuple[Effect, ...] = (
-    Weave(amplitude=0.1, period_s=12.0),
-    GrowingSpread(factor=2.0, factor_error=0.2, from_s=0.0, to_s=1500.0),
+    Cycle(amplitude=0.1, period_s=12.0),
+    VarianceTrend(factor=2.0, factor_error=0.2, from_s=0.0, to_s=1500.0),
     Regimes(factor=2.0, on_s=20.0, off_s=50.0),
     Step(size=0.3, at_s=700.0),
     Drift(size=0.2),

@@ -13,7 +13,7 @@ from xosc_lateral.datasets.driver_simulator import (
     simulate_drive,
     simulate_population,
 )
-from xosc_lateral.datasets.hidden_plants import Companion, CyclicTarget, Distraction, Fatigue, TargetWander
+from xosc_lateral.datasets.hidden_plants import Companion, CyclicTarget, Distraction, DriftingTarget, Fatigue
 from xosc_lateral.datasets.intent import Plant
 from xosc_lateral.datasets.plants import LanePreference, ShiftBy, SideWind, curve_cutting, truck_avoidance
 from xosc_lateral.datasets.response import Shape, SimulatedResponse, linear, saturating, threshold
@@ -24,6 +24,7 @@ __all__ = [
     "Companion",
     "CyclicTarget",
     "Distraction",
+    "DriftingTarget",
     "Driver",
     "Fatigue",
     "LanePreference",
@@ -37,7 +38,6 @@ __all__ = [
     "SimulatedDrive",
     "SimulatedResponse",
     "SpreadBy",
-    "TargetWander",
     "Truth",
     "curve_cutting",
     "draw_driver",

@@ -48,13 +48,13 @@ class ShakyCamera:
     column : str
     size : float
         Standard deviation of the error at the 95 % quantile less that at the 5 % quantile; none at the smallest. [m]
-    memory : float
-        Correlation time of the error. [s]
+    correlation_time : float
+        Of the error. [s]
     """
 
     column: str
     size: float = 0.04
-    memory: float = 0.3
+    correlation_time: float = 0.3
     kind: str = "scale"
 
     @property
@@ -65,6 +65,6 @@ class ShakyCamera:
     def apply(self, intent: Intent, context: Context, rng: np.random.Generator) -> None:
         """Blur the measurement."""
         strength = SimulatedResponse().scaled(context[self.column])
-        keep = np.exp(-STEP / self.memory)
+        keep = np.exp(-STEP / self.correlation_time)
         error = first_order(rng.normal(size=len(strength)), keep, gain=np.sqrt(1.0 - keep**2))
         intent.camera += self.size * (strength - strength.min()) * error

@@ -92,12 +92,12 @@ class Driver:
     motor_noise: float = 0.25
     """Standard deviation of a correction over its size. [-]"""
     tremor: float = 0.001
-    """Wandering of the hand within a second: standard deviation of the yaw rate that it would give. [rad/s]"""
+    """Movement of the hand within a second: standard deviation of the yaw rate that it would give. [rad/s]"""
     blur: float = 0.05
     """Error of the eye about the place in a second. [m]"""
-    mood: float = 0.11
-    """Wandering of what feels like the middle. [m]"""
-    mood_time: float = 55.0
+    target_drift: float = 0.11
+    """Drift of what feels like the middle: standard deviation. [m]"""
+    target_drift_time: float = 55.0
     """Correlation time of it. [s]"""
     gusts: float = 0.095
     """Sideways velocity that road and air give the car. [m/s]"""
@@ -231,7 +231,7 @@ def _eased(values: np.ndarray) -> np.ndarray:
 @njit
 def _loop(aim, aim_rate, path, curvature, speed, tolerance, gain, care, attention, noise, traits):  # type: ignore[no-untyped-def]
     """Car and human, step by step: place [m] in the frame of lane 0's centre, wheel angle [rad], yaw rate [rad/s]."""
-    base_tolerance, preview, delay, base_gain, refractory, motor, tremor, blur, mood, mood_time, gusts = traits
+    base_tolerance, preview, delay, base_gain, refractory, motor, tremor, blur, drift_size, drift_time, gusts = traits
     n = len(aim)
     place, steering, yaw = np.empty(n), np.empty(n), np.empty(n)
     y, heading, rate = aim[0], 0.0, curvature[0] * speed[0]
@@ -242,9 +242,9 @@ def _loop(aim, aim_rate, path, curvature, speed, tolerance, gain, care, attentio
     wait, limit, count = 0.0, base_tolerance, 0
     for i in range(n):
         v, past = speed[i], max(0, i - back)
-        # what the human sees is old and blurred, and what feels like the middle of the lane wanders
+        # what the human sees is old and blurred, and what feels like the middle of the lane drifts
         error_of_eye += -STEP * error_of_eye + blur * care[i] * math.sqrt(2.0 * STEP) * noise[0, i]
-        drift += -STEP / mood_time * drift + mood * care[i] * math.sqrt(2.0 * STEP / mood_time) * noise[5, i]
+        drift += -STEP / drift_time * drift + drift_size * care[i] * math.sqrt(2.0 * STEP / drift_time) * noise[5, i]
         seen = place[past] if i > 0 else y
         slope = (y - seen) / (back * STEP) if i > back else 0.0
         foreseen = seen + error_of_eye + slope * preview - aim[min(n - 1, i + ahead)] - drift

@@ -27,8 +27,8 @@ class Fatigue:
 
 
 @dataclass(frozen=True)
-class TargetWander:
-    """What the driver holds for the middle wanders slowly.
+class DriftingTarget:
+    """What the driver holds for the middle drifts slowly.
 
     Parameters
     ----------
@@ -53,7 +53,7 @@ class TargetWander:
 
 @dataclass(frozen=True)
 class CyclicTarget:
-    """The driver weaves: the target swings with a period.
+    """The target goes from side to side with a period.
 
     Parameters
     ----------
@@ -69,7 +69,7 @@ class CyclicTarget:
     columns: tuple[str, ...] = ()
 
     def apply(self, intent: Intent, context: Context, rng: np.random.Generator) -> None:
-        """Swing the target."""
+        """Add a sine to the target."""
         time = STEP * np.arange(len(intent.target))
         intent.target += self.amplitude * np.sin(2.0 * np.pi * (time / self.period + rng.random()))
 

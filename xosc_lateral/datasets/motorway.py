@@ -33,17 +33,17 @@ def draw_motorway(duration: float, rng: np.random.Generator) -> dict[str, np.nda
         "truck_right": truck.astype(float),
         "car_left": car.astype(float),
         "lead_distance": _leader(n, rng),
-        "wind_speed": np.abs(6.0 + 4.5 * _wander(n, rng, 25.0)),
-        "wind_direction": np.mod(180.0 + 110.0 * _wander(n, rng, 200.0), 360.0),
+        "wind_speed": np.abs(6.0 + 4.5 * _first_order_noise(n, rng, 25.0)),
+        "wind_direction": np.mod(180.0 + 110.0 * _first_order_noise(n, rng, 200.0), 360.0),
         "crossfall": crossfall,
         "rain": _ramped(_levels(n, rng, [0.0, 0.0, 2.0, 6.0], mean_length=300.0), 20.0),
-        "air_temperature": 17.0 + 3.0 * _wander(n, rng, 900.0),
-        "grade": 3.0 * _wander(n, rng, 40.0),
+        "air_temperature": 17.0 + 3.0 * _first_order_noise(n, rng, 900.0),
+        "grade": 3.0 * _first_order_noise(n, rng, 40.0),
         "illuminance": _ramped(daylight, 5.0),
     }
 
 
-def _wander(n: int, rng: np.random.Generator, time_constant: float) -> np.ndarray:
+def _first_order_noise(n: int, rng: np.random.Generator, time_constant: float) -> np.ndarray:
     """Stationary noise of unit variance with the given correlation time [s]."""
     keep = np.exp(-STEP / time_constant)
     noise = rng.normal(size=n) * np.sqrt(1.0 - keep**2)
@@ -73,7 +73,7 @@ def _ramped(values: np.ndarray, length: float) -> np.ndarray:
 
 def _speed(n: int, rng: np.random.Generator) -> np.ndarray:
     cruise = _ramped(_levels(n, rng, [24.0, 27.0, 30.0, 33.0, 36.0, 39.0], mean_length=150.0), 12.0)
-    return cruise + 0.35 * _wander(n, rng, 12.0)
+    return cruise + 0.35 * _first_order_noise(n, rng, 12.0)
 
 
 def _curves(distance: np.ndarray, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
@@ -137,7 +137,7 @@ def _events(n: int, rng: np.random.Generator, gap: float, length: float) -> np.n
 def _leader(n: int, rng: np.random.Generator) -> np.ndarray:
     """Distance to the car ahead [m]; NaN where there is none."""
     present = _events(n, rng, gap=28.0, length=32.0)
-    distance = 62.0 + 16.0 * _wander(n, rng, 25.0)
+    distance = 62.0 + 16.0 * _first_order_noise(n, rng, 25.0)
     began = np.maximum.accumulate(np.where(np.diff(present, prepend=False) & present, np.arange(n), 0))
     other = rng.normal(scale=14.0, size=n)[began]  # every leader has a distance of his own
     return np.where(present, np.maximum(distance + other, 8.0), np.nan)

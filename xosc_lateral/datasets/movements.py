@@ -22,11 +22,11 @@ from xosc_lateral.datasets.driver_simulator import measure, sample_times
 from xosc_lateral.datasets.motorway import N_LANES, STEP, draw_motorway
 from xosc_lateral.drives.filters import first_order
 
-PACE = 0.1
+MOVEMENT_STEP = 0.1
 """Step of the movements [s]; the table interpolates between."""
 
 Movement = Callable[..., np.ndarray]
-"""Offset from the lane centre [m] at `n` steps of `PACE`, from `n` and a generator; and a column that it is told of."""
+"""Offset from the lane centre [m] at `n` steps of `MOVEMENT_STEP`, from `n` and a generator; and a told column."""
 
 
 def record_movement(
@@ -48,7 +48,7 @@ def record_movement(
     streams = np.random.default_rng([20262, seed]).spawn(3)
     context = draw_motorway(duration, streams[0])
     n = len(context["speed"])
-    grid = np.arange(0.0, n * STEP + PACE, PACE)
+    grid = np.arange(0.0, n * STEP + MOVEMENT_STEP, MOVEMENT_STEP)
     told = []
     if told_of is not None:
         column = context[told_of]
@@ -65,9 +65,9 @@ def record_movement(
     return table
 
 
-def wandering(n: int, rng: np.random.Generator) -> np.ndarray:
-    """Ornstein-Uhlenbeck wander of seconds about a mood of a minute. Shape (n,). [m]"""
-    return 0.15 * _smooth(_wander(n, rng, 4.0)) + 0.12 * _wander(n, rng, 60.0)
+def ornstein_uhlenbeck(n: int, rng: np.random.Generator) -> np.ndarray:
+    """Ornstein-Uhlenbeck movement of seconds about one of a minute. Shape (n,). [m]"""
+    return 0.15 * _smooth(_first_order_noise(n, rng, 4.0)) + 0.12 * _first_order_noise(n, rng, 60.0)
 
 
 def heavy_tailed(n: int, rng: np.random.Generator) -> np.ndarray:
@@ -80,10 +80,10 @@ def reflected(n: int, rng: np.random.Generator) -> np.ndarray:
 
     Shape (n,). [m]
     """
-    tolerance, length = 0.35, round(2.0 / PACE)
+    tolerance, length = 0.35, round(2.0 / MOVEMENT_STEP)
     done = np.arange(1, length + 1) / length
     ease = done**3 * (10.0 - 15.0 * done + 6.0 * done**2)
-    steps = 0.09 * np.sqrt(PACE) * rng.normal(size=n)
+    steps = 0.09 * np.sqrt(MOVEMENT_STEP) * rng.normal(size=n)
     out = np.empty(n)
     place, at = 0.0, 0
     while at < n:
@@ -100,20 +100,20 @@ def reflected(n: int, rng: np.random.Generator) -> np.ndarray:
 
 def delayed_control(n: int, rng: np.random.Generator) -> np.ndarray:
     """A mass that is pulled to the middle and damped, both 0.4 s late, and pushed by coloured noise. Shape (n,). [m]"""
-    late = round(0.4 / PACE)
-    push = 0.1 * _wander(n, rng, 1.0)
+    late = round(0.4 / MOVEMENT_STEP)
+    push = 0.1 * _first_order_noise(n, rng, 1.0)
     place, speed = np.zeros(n), np.zeros(n)
     for t in range(1, n):
         seen = max(t - 1 - late, 0)
-        pull = -0.22 * place[seen] - 1.0 * speed[seen] + push[t]
-        speed[t] = speed[t - 1] + PACE * pull
-        place[t] = place[t - 1] + PACE * speed[t]
+        acceleration = -0.22 * place[seen] - 1.0 * speed[seen] + push[t]
+        speed[t] = speed[t - 1] + MOVEMENT_STEP * acceleration
+        place[t] = place[t - 1] + MOVEMENT_STEP * speed[t]
     return place
 
 
 def clustered(n: int, rng: np.random.Generator) -> np.ndarray:
     """Loud and quiet by turns of seconds: how people correct, and no regime. Shape (n,). [m]"""
-    loudness = np.exp(0.6 * _wander(n, rng, rng.uniform(2.0, 6.0)))
+    loudness = np.exp(0.6 * _first_order_noise(n, rng, rng.uniform(2.0, 6.0)))
     return 0.2 * _scaled(_smooth(_filtered(loudness * rng.normal(size=n), 5.0)))
 
 
@@ -122,7 +122,7 @@ def bursts(n: int, rng: np.random.Generator) -> np.ndarray:
     loud = np.empty(n)
     start, on = 0, False
     while start < n:
-        stop = start + round((rng.uniform(1.0, 5.0) if on else rng.uniform(2.0, 15.0)) / PACE)
+        stop = start + round((rng.uniform(1.0, 5.0) if on else rng.uniform(2.0, 15.0)) / MOVEMENT_STEP)
         loud[start:stop] = 3.0 if on else 1.0
         start, on = stop, not on
     return 0.2 * _scaled(_smooth(_filtered(loud * rng.normal(size=n), 5.0)))
@@ -131,7 +131,7 @@ def bursts(n: int, rng: np.random.Generator) -> np.ndarray:
 def lopsided(n: int, rng: np.random.Generator) -> np.ndarray:
     """Pushed to one side seldom and far, to the other often and little: gamma with shape 0.7. Shape (n,). [m]"""
     pushes = rng.gamma(0.7, size=n) - 0.7
-    return 0.2 * _scaled(_smooth(_filtered(pushes, 4.0)) + 0.4 * _wander(n, rng, 40.0))
+    return 0.2 * _scaled(_smooth(_filtered(pushes, 4.0)) + 0.4 * _first_order_noise(n, rng, 40.0))
 
 
 def pursuit(n: int, rng: np.random.Generator) -> np.ndarray:
@@ -143,20 +143,20 @@ def pursuit(n: int, rng: np.random.Generator) -> np.ndarray:
     place, at = 0.0, 0
     while at < n:
         goal = 0.15 * rng.normal()
-        move, stay = round(rng.uniform(2.0, 8.0) / PACE), round(rng.uniform(0.0, 10.0) / PACE)
+        move, stay = round(rng.uniform(2.0, 8.0) / MOVEMENT_STEP), round(rng.uniform(0.0, 10.0) / MOVEMENT_STEP)
         done = np.arange(1, move + 1) / move
         path = np.concatenate([place + (goal - place) * done**3 * (10.0 - 15.0 * done + 6.0 * done**2), [goal] * stay])
         out[at : at + len(path)] = path[: n - at]
         place, at = goal, at + len(path)
-    return out + 0.02 * _smooth(_wander(n, rng, 1.0))
+    return out + 0.02 * _smooth(_first_order_noise(n, rng, 1.0))
 
 
 def oscillating(n: int, rng: np.random.Generator) -> np.ndarray:
-    """Swings about the middle with a period of 14 s, a third of critically damped, kept up by noise. Shape (n,). [m]"""
-    turn = 2.0 * np.pi * PACE / 14.0
+    """Oscillates with a period of 14 s, a third of critically damped, kept up by noise. Shape (n,). [m]"""
+    turn = 2.0 * np.pi * MOVEMENT_STEP / 14.0
     keep = np.exp(-0.33 * turn)
-    swing = lfilter([1.0], [1.0, -2.0 * keep * np.cos(turn), keep**2], rng.normal(size=n))
-    return 0.2 * _scaled(_scaled(swing) + 0.5 * _wander(n, rng, 40.0))
+    cycle = lfilter([1.0], [1.0, -2.0 * keep * np.cos(turn), keep**2], rng.normal(size=n))
+    return 0.2 * _scaled(_scaled(cycle) + 0.5 * _first_order_noise(n, rng, 40.0))
 
 
 def sawtooth(n: int, rng: np.random.Generator) -> np.ndarray:
@@ -165,30 +165,30 @@ def sawtooth(n: int, rng: np.random.Generator) -> np.ndarray:
     at, place = 0, 0.0
     while at < n:
         rate, end = 0.03 * rng.normal(), rng.uniform(0.1, 0.5)
-        drift = max(1, round(min((end - np.sign(rate) * place) / max(abs(rate), 5e-3), 40.0) / PACE))
-        back = round(rng.uniform(1.0, 2.0) / PACE)
-        top = place + rate * PACE * drift
+        drift = max(1, round(min((end - np.sign(rate) * place) / max(abs(rate), 5e-3), 40.0) / MOVEMENT_STEP))
+        back = round(rng.uniform(1.0, 2.0) / MOVEMENT_STEP)
+        top = place + rate * MOVEMENT_STEP * drift
         path = np.concatenate([np.linspace(place, top, drift), np.linspace(top, 0.05 * rng.normal(), back)])
         out[at : at + len(path)] = path[: n - at]
         at, place = at + len(path), path[-1]
-    return _smooth(out) + 0.03 * _smooth(_wander(n, rng, 1.0))
+    return _smooth(out) + 0.03 * _smooth(_first_order_noise(n, rng, 1.0))
 
 
 def long_memory(n: int, rng: np.random.Generator) -> np.ndarray:
-    """Flicker noise: wandering of 1 to 200 s in equal parts [2]_, smoothed as a car's mass does. Shape (n,). [m]"""
-    parts = (_wander(n, rng, constant) for constant in (1.0, 3.0, 8.0, 20.0, 60.0, 200.0))
+    """Flicker noise: movements of 1 to 200 s in equal parts [2]_, smoothed as a car's mass does. Shape (n,). [m]"""
+    parts = (_first_order_noise(n, rng, constant) for constant in (1.0, 3.0, 8.0, 20.0, 60.0, 200.0))
     return 0.25 * _scaled(_smooth(sum(parts, start=np.zeros(n))))
 
 
 def free_play(n: int, rng: np.random.Generator) -> np.ndarray:
     """A damped mass under coloured pushes, free within a play and held by a spring beyond it. Shape (n,). [m]"""
     play = rng.uniform(0.1, 0.2)
-    push = 0.07 * _wander(n, rng, rng.uniform(1.0, 2.0))
+    push = 0.07 * _first_order_noise(n, rng, rng.uniform(1.0, 2.0))
     place, speed = np.zeros(n), np.zeros(n)
     for t in range(1, n):
         beyond = place[t - 1] - np.clip(place[t - 1], -play, play)
-        speed[t] = speed[t - 1] + PACE * (push[t] - 0.6 * speed[t - 1] - 0.4 * beyond)
-        place[t] = place[t - 1] + PACE * speed[t]
+        speed[t] = speed[t - 1] + MOVEMENT_STEP * (push[t] - 0.6 * speed[t - 1] - 0.4 * beyond)
+        place[t] = place[t - 1] + MOVEMENT_STEP * speed[t]
     return place
 
 
@@ -197,7 +197,7 @@ def in_regimes(n: int, rng: np.random.Generator) -> np.ndarray:
     loud = np.ones(n)
     start, on = 0, False
     while start < n:
-        stop = start + max(1, round(rng.exponential(60.0 if on else 120.0) / PACE))
+        stop = start + max(1, round(rng.exponential(60.0 if on else 120.0) / MOVEMENT_STEP))
         loud[start:stop] = 2.5 if on else 1.0
         start, on = stop, not on
     return 0.2 * _scaled(_smooth(_filtered(loud * rng.normal(size=n), 5.0)))
@@ -209,24 +209,24 @@ def held(n: int, rng: np.random.Generator, strength: np.ndarray) -> np.ndarray:
     The rate is 0.05 1/s where there is none, and thirty times that where there is all of it.
     """
     rate = 0.05 * 30.0**strength
-    pushes = 0.12 * np.sqrt(PACE) * rng.normal(size=n)
+    pushes = 0.12 * np.sqrt(MOVEMENT_STEP) * rng.normal(size=n)
     place = np.zeros(n)
     for t in range(1, n):
-        place[t] = place[t - 1] * (1.0 - PACE * rate[t]) + pushes[t]
+        place[t] = place[t - 1] * (1.0 - MOVEMENT_STEP * rate[t]) + pushes[t]
     return _smooth(place)
 
 
-def _wander(n: int, rng: np.random.Generator, time_constant: float) -> np.ndarray:
+def _first_order_noise(n: int, rng: np.random.Generator, time_constant: float) -> np.ndarray:
     return _scaled(_filtered(rng.normal(size=n), time_constant))
 
 
 def _filtered(values: np.ndarray, time_constant: float) -> np.ndarray:
-    return first_order(values, np.exp(-PACE / time_constant))
+    return first_order(values, np.exp(-MOVEMENT_STEP / time_constant))
 
 
 def _smooth(values: np.ndarray) -> np.ndarray:
     """Through two lags of 0.4 s: cars have mass."""
-    keep = np.exp(-PACE / 0.4)
+    keep = np.exp(-MOVEMENT_STEP / 0.4)
     return np.asarray(lfilter([(1.0 - keep) ** 2], np.convolve([1.0, -keep], [1.0, -keep]), values))
 
 

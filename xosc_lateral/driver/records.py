@@ -26,7 +26,7 @@ class Record(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 def kebab(name: str) -> str:
-    """`GrowingSpread` as `growing-spread`, `TwoLevelModel` as `two-level`: what a class is called in files."""
+    """`VarianceTrend` as `variance-trend`, `TwoLevelModel` as `two-level`: what a class is called in files."""
     return re.sub(r"(?<!^)(?=[A-Z])", "-", name.removesuffix("Model")).lower()
 
 

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from xosc_lateral.driver.effects import Drift, HiddenEffect, Population, Regimes, Weave
+from xosc_lateral.driver.effects import Cycle, Drift, HiddenEffect, Population, Regimes
 from xosc_lateral.driver.models.autoregressive.driver import draw_drivers
 from xosc_lateral.driver.models.autoregressive.model import AutoregressiveModel
 from xosc_lateral.driver.models.base import Start
@@ -81,7 +81,7 @@ def _process(movement: Mapping[str, Any], profile: DriverProfile, state: Mapping
 def _hidden(effect: HiddenEffect, old: Mapping[str, Any]) -> dict[str, Any]:
     if isinstance(effect, Drift):
         return {"rng": _rng(old["_rng"]), "value": old["_wander"], "begun": old["_keep"] is not None}
-    if isinstance(effect, Weave):
+    if isinstance(effect, Cycle):
         return {"rng": _rng(old["_rng"]), "phase": old["_start"], "kicks": old["_kicks"], "begun_at": old["_begin"]}
     if isinstance(effect, Regimes):
         return {"rng": _rng(old["_rng"]), "on": old["_on"], "end": old["_end"], "begun_at": old["_begin"]}

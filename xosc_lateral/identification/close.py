@@ -15,10 +15,15 @@ from xosc_lateral.drives.drive import Drive
 from xosc_lateral.identification.blocks import held_out_words, hold_out_blocks
 from xosc_lateral.identification.columns import Column
 from xosc_lateral.identification.feedback import Feedback
-from xosc_lateral.identification.findings import Compared, Finding, describe_finding, memory_finding, population_finding
+from xosc_lateral.identification.findings import (
+    Compared,
+    Finding,
+    describe_finding,
+    population_finding,
+    spectrum_finding,
+)
 from xosc_lateral.identification.held_out import Setting, fit_without, score_held_out
 from xosc_lateral.identification.identify import Progress, identify, initial_terms
-from xosc_lateral.identification.memory import Memory, test_memory
 from xosc_lateral.identification.nested import Gain
 from xosc_lateral.identification.population import DriverVariance, test_population
 from xosc_lateral.identification.regression import Coarse, Fitted, fit_model
@@ -26,6 +31,7 @@ from xosc_lateral.identification.removal import Estimates, estimate_all, removal
 from xosc_lateral.identification.residual import SummaryStatistics, floor_of
 from xosc_lateral.identification.scorecard import Scorecard, score_runs
 from xosc_lateral.identification.selection import Rejected, Selection
+from xosc_lateral.identification.spectrum_shape import SpectrumShape, compare_spectrum_shapes
 from xosc_lateral.identification.terms.between import between_shift
 from xosc_lateral.identification.timeline import join_drives
 
@@ -62,7 +68,7 @@ class LoopResult:
         Nested held-out gain of all findings together; None: nothing was found.
     returned_base : str
         Why the base is returned although effects were found; empty otherwise.
-    memory : Memory
+    spectrum : SpectrumShape
         How the base's own runs compare with the drives from band to band.
     population : DriverVariance or None
         How much the drives differ; None with too few of them.
@@ -95,7 +101,7 @@ class LoopResult:
     unused: dict[str, str]
     gain: Gain | None
     returned_base: str
-    memory: Memory
+    spectrum: SpectrumShape
     population: DriverVariance | None
     held_out: str
     statistics: SummaryStatistics
@@ -154,11 +160,11 @@ def close_loop(
     if base is None:
         progress(0.02, "fitting the base profile")
         base = fit_without(fit_model(coarse, ()), {}, everything, kind, f"{name}-base", provenance)
-    memory = test_memory(base, timeline, root)
+    spectrum = compare_spectrum_shapes(base, timeline, root)
     found = identify(coarse, root, initial=initial_terms(base, timeline), excluded=excluded, progress=progress)
     population = test_population(found.selection.final, between_shift(found.selection.final))
     differ = population is not None and population.found
-    refined_kind = ModelKind.AUTOREGRESSIVE if memory.found or differ else kind
+    refined_kind = ModelKind.AUTOREGRESSIVE if spectrum.found or differ else kind
     blocks = hold_out_blocks(timeline)
     setting = Setting(coarse, blocks, base if given else None, kind, refined_kind, root)
     scored = score_held_out(setting, found.selection, found.nested, found.columns, progress)
@@ -179,7 +185,7 @@ def close_loop(
     findings = _findings(selection, estimates, found.gains, compared)
     if kind is ModelKind.TWO_LEVEL:
         # what the core model lacks is found once, by replacing it; the autoregressive one has both
-        findings += [memory_finding(memory, compared)] if memory.found else []
+        findings += [spectrum_finding(spectrum, compared)] if spectrum.found else []
         findings += [population_finding(population, compared)] if population is not None and population.found else []
     rng = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(9,)))
     floor = floor_of(scored.statistics, unmoved, blocks, rng)
@@ -188,7 +194,7 @@ def close_loop(
     return LoopResult(
         timeline.names, base, refined, given, tuple(findings), coarse, selection.final, found.columns, found.feedback,
         selection.rejected, dict(found.unused), found.total if found.gains else None,
-        found.returned_base, memory, population, held_out_words(timeline, blocks), scored.statistics,
+        found.returned_base, spectrum, population, held_out_words(timeline, blocks), scored.statistics,
         unmoved, scored.real,
         scored.before, scored.after, *scored.errors, floor, scores, scored.runs_before, scored.runs_after, seed,
     )  # fmt: skip

@@ -9,11 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.driver.effects import Effect
-from xosc_lateral.identification.memory import Memory
 from xosc_lateral.identification.nested import Gain
 from xosc_lateral.identification.population import DriverVariance
 from xosc_lateral.identification.regression import Fitted
 from xosc_lateral.identification.selection import Accepted
+from xosc_lateral.identification.spectrum_shape import SpectrumShape
 
 FloatArray = NDArray[np.float64]
 Compared = tuple[Mapping[str, FloatArray], Mapping[str, FloatArray], Mapping[str, FloatArray]]
@@ -84,15 +84,15 @@ def describe_finding(
     )  # fmt: skip
 
 
-def memory_finding(memory: Memory, compared: Compared) -> Finding:
+def spectrum_finding(spectrum: SpectrumShape, compared: Compared) -> Finding:
     """The core model is replaced: the first-order chain forgets too fast."""
-    worst = int(np.argmax(np.abs(np.log(memory.ratio))))
+    worst = int(np.argmax(np.abs(np.log(spectrum.ratio))))
     statistic = "movement by band"
     before, after = _errors(compared, statistic)
-    shape = f"movement within {memory.bands_s[worst]:g} s is {memory.ratio[worst]:.2f} times the measured"
+    shape = f"movement within {spectrum.bands_s[worst]:g} s is {spectrum.ratio[worst]:.2f} times the measured"
     return Finding(
-        "memory beyond one step", "memory", (), (), None, None, shape, float(memory.ratio[worst]), 0.0,
-        memory.p_value, before, after, "size of the movement by frequency band", (), statistic,
+        "memory beyond one step", "memory", (), (), None, None, shape, float(spectrum.ratio[worst]), 0.0,
+        spectrum.p_value, before, after, "size of the movement by frequency band", (), statistic,
     )  # fmt: skip
 
 

@@ -29,7 +29,7 @@ from xosc_lateral.identification.residual import (
 )
 from xosc_lateral.identification.selection import Selection
 from xosc_lateral.identification.terms.base import Term
-from xosc_lateral.identification.terms.cycle import Cycle
+from xosc_lateral.identification.terms.cycle import CycleTerm
 from xosc_lateral.identification.terms.step import StepTerm
 from xosc_lateral.identification.timeline import COARSE
 
@@ -153,4 +153,4 @@ def _quantities(selection: Selection, columns: list[Column]) -> dict[str, FloatA
 
 
 def _frequency(fitted: Fitted) -> float | None:
-    return next((term.frequency for term in fitted.terms if isinstance(term, Cycle)), None)
+    return next((term.frequency for term in fitted.terms if isinstance(term, CycleTerm)), None)

@@ -9,7 +9,7 @@ import numpy as np
 from msgspec import structs
 from numpy.typing import NDArray
 
-from xosc_lateral.driver.effects import Acts, ColumnEffect, Drift, GrowingSpread
+from xosc_lateral.driver.effects import Acts, ColumnEffect, Drift, VarianceTrend
 from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.identification.blocks import hold_out_blocks
 from xosc_lateral.identification.columns import Column, known_columns
@@ -24,7 +24,7 @@ from xosc_lateral.identification.terms.drift import DriftTerm
 from xosc_lateral.identification.terms.mean import MeanTerm
 from xosc_lateral.identification.terms.spread import SpreadTerm
 from xosc_lateral.identification.terms.step import StepTerm
-from xosc_lateral.identification.terms.variance_trend import VarianceTrend
+from xosc_lateral.identification.terms.variance_trend import VarianceTrendTerm
 from xosc_lateral.identification.timeline import Timeline
 
 Progress = Callable[[float, str], None]
@@ -133,8 +133,8 @@ def initial_terms(base: DriverProfile, timeline: Timeline) -> tuple[Term, ...]:
                 terms.append(BetweenTerm.of(bare) if is_between(effect) else MeanTerm.of(bare))
             elif effect.acts is Acts.SPREAD:
                 terms.append(SpreadTerm.of(bare))
-        elif isinstance(effect, GrowingSpread):
-            terms.append(VarianceTrend())
+        elif isinstance(effect, VarianceTrend):
+            terms.append(VarianceTrendTerm())
         elif isinstance(effect, Drift):
             terms.append(DriftTerm())
     return tuple(terms)

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.identification.close import LoopResult
-from xosc_lateral.identification.terms.cycle import Cycle, latent_path
+from xosc_lateral.identification.terms.cycle import CycleTerm, latent_path
 from xosc_lateral.identification.terms.drift import DriftTerm
 from xosc_lateral.identification.terms.regimes import RegimesTerm
 from xosc_lateral.identification.terms.step import StepTerm
@@ -63,7 +63,7 @@ def moving_spread(result: LoopResult, seconds: float) -> MovingStatistic:
 def hidden_mean(result: LoopResult) -> FloatArray:
     """Step, drift and oscillation as fitted, about their mean; 0: none. [m] Shape as a `MovingStatistic`'s times."""
     coarse, fitted = result.coarse, result.final
-    own = [term for term in fitted.terms if isinstance(term, Cycle | StepTerm | DriftTerm)]
+    own = [term for term in fitted.terms if isinstance(term, CycleTerm | StepTerm | DriftTerm)]
     hidden = np.sum([np.zeros(len(coarse)), *(latent_path(term, fitted) for term in own)], axis=0)
     return np.asarray((hidden - hidden[coarse.valid].mean())[_longest(result)])
 

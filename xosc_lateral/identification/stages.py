@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from xosc_lateral.identification.terms.base import Term
 from xosc_lateral.identification.terms.between import BetweenTerm
-from xosc_lateral.identification.terms.cycle import Cycle
+from xosc_lateral.identification.terms.cycle import CycleTerm
 from xosc_lateral.identification.terms.fine_noise import FineNoiseTerm
 from xosc_lateral.identification.terms.mean import MeanTerm
 from xosc_lateral.identification.terms.regimes import RegimesTerm
@@ -12,13 +12,13 @@ from xosc_lateral.identification.terms.restoring import RestoringTerm
 from xosc_lateral.identification.terms.slow_spread import SlowSpreadTerm
 from xosc_lateral.identification.terms.spread import SpreadTerm
 from xosc_lateral.identification.terms.step import StepTerm
-from xosc_lateral.identification.terms.variance_trend import VarianceTrend
+from xosc_lateral.identification.terms.variance_trend import VarianceTrendTerm
 
 STAGES: tuple[tuple[type[Term], ...], ...] = (
     (MeanTerm,),
-    (Cycle, StepTerm),
+    (CycleTerm, StepTerm),
     (MeanTerm,),
-    (VarianceTrend, SpreadTerm, SlowSpreadTerm),
+    (VarianceTrendTerm, SpreadTerm, SlowSpreadTerm),
     (RegimesTerm,),
     (FineNoiseTerm, RestoringTerm),
     (BetweenTerm,),

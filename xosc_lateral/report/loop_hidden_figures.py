@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.driver.effects import Drift, GrowingSpread, Regimes, Step, Weave
+from xosc_lateral.driver.effects import Cycle, Drift, Regimes, Step, VarianceTrend
 from xosc_lateral.identification.close import LoopResult
 from xosc_lateral.identification.findings import Finding
 from xosc_lateral.identification.moving_statistics import (
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 FloatArray = NDArray[np.float64]
 
-WEAVE_ROWS = 4096
+CYCLE_ROWS = 4096
 """Samples per segment of a weave's spectrum at most: 14 min, or a line would be smeared. [-]"""
 
 SURROUNDINGS_HZ = 0.07
@@ -50,14 +50,14 @@ QUANTILES = (0.1, 0.3, 0.5, 0.7, 0.9)
 
 
 @figure_style()
-def weave_figure(result: LoopResult, finding: Finding) -> Figure:
+def cycle_figure(result: LoopResult, finding: Finding) -> Figure:
     """Spectrum about the weave's frequency, the line marked."""
     effect = finding.effects[0]
-    assert isinstance(effect, Weave)
+    assert isinstance(effect, Cycle)
     figure, axes = new_figure(height=3.3)
     axis = axes[0, 0]
     longest = int(np.bincount(result.statistics.timeline.drive).max())
-    segment = min(WEAVE_ROWS, 2 ** int(np.log2(longest)))
+    segment = min(CYCLE_ROWS, 2 ** int(np.log2(longest)))
     draw_spectra(axis, result, segment, within_blocks=False)
     line = 1.0 / effect.period_s
     axis.set_yscale("log")
@@ -74,7 +74,7 @@ def weave_figure(result: LoopResult, finding: Finding) -> Figure:
 def spread_figure(result: LoopResult, finding: Finding) -> Figure:
     """Spread over time, with the fitted trend."""
     effect = finding.effects[0]
-    assert isinstance(effect, GrowingSpread)
+    assert isinstance(effect, VarianceTrend)
     moving = moving_spread(result, SPREAD_S)
     share = np.clip((moving.time - effect.from_s) / max(effect.to_s - effect.from_s, 1e-9), 0.0, 1.0) - 0.5
 
@@ -201,11 +201,11 @@ def quantiles_figure(result: LoopResult) -> Figure:
 
 DRAWINGS: Mapping[str, tuple[Callable[[LoopResult, Finding], Figure], str]] = MappingProxyType(
     {
-        Weave.kind: (
-            weave_figure,
+        Cycle.kind: (
+            cycle_figure,
             "Power spectral density about the fitted oscillation, a peak that the profile before does not have.",
         ),
-        GrowingSpread.kind: (spread_figure, "Spread over the drive; orange: the fitted trend."),
+        VarianceTrend.kind: (spread_figure, "Spread over the drive; orange: the fitted trend."),
         Regimes.kind: (
             regime_figure,
             "Local spread over the drive; shaded: the regime of large spread is more likely than not.",

@@ -10,11 +10,11 @@ from xosc_lateral.driver.effects import (
     Acts,
     Angular,
     ColumnEffect,
+    Cycle,
     Drift,
     Effect,
     Factor,
     Form,
-    GrowingSpread,
     Levels,
     Linear,
     Magnitude,
@@ -27,7 +27,7 @@ from xosc_lateral.driver.effects import (
     Saturating,
     Step,
     Threshold,
-    Weave,
+    VarianceTrend,
 )
 
 STEP = 0.2
@@ -56,8 +56,8 @@ EXAMPLES: tuple[Effect, ...] = (
     ),
     Drift(size=0.2),
     Step(size=0.2, at_s=40.0),
-    GrowingSpread(factor=2.0, to_s=100.0),
-    Weave(amplitude=0.1, period_s=12.0),
+    VarianceTrend(factor=2.0, to_s=100.0),
+    Cycle(amplitude=0.1, period_s=12.0),
     Regimes(factor=2.0, on_s=20.0, off_s=40.0),
     Population(shift=0.1, log_spread=0.2),
 )

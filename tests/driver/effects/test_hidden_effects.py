@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from xosc_lateral.driver.effects import Drift, GrowingSpread, Population, Regimes, Step, Weave
+from xosc_lateral.driver.effects import Cycle, Drift, Population, Regimes, Step, VarianceTrend
 
 STEP = 0.2
 
@@ -25,7 +25,7 @@ def test_hidden_effects_draw_in_the_order_of_time() -> None:
     short, long = grid(60.0), grid(600.0)
     for effect in (
         Drift(size=0.2),
-        Weave(amplitude=0.1, period_s=9.0, coherence_s=50.0),
+        Cycle(amplitude=0.1, period_s=9.0, coherence_s=50.0),
         Regimes(factor=2.0, on_s=9.0, off_s=9.0),
     ):
         one = effect.terms(short, {}, np.random.default_rng(1))
@@ -44,7 +44,7 @@ def test_a_step_keeps_the_mean_of_the_drive_and_jumps_by_its_size() -> None:
 
 
 def test_growing_spread_grows_by_its_factor_and_holds_outside() -> None:
-    effect = GrowingSpread(factor=2.0, fine_factor=1.5, from_s=10.0, to_s=110.0)
+    effect = VarianceTrend(factor=2.0, fine_factor=1.5, from_s=10.0, to_s=110.0)
     terms = effect.terms(np.array([0.0, 10.0, 60.0, 110.0, 500.0]), {}, np.random.default_rng(0))
     assert terms.spread == pytest.approx([2**-0.5, 2**-0.5, 1.0, 2**0.5, 2**0.5])
     assert terms.fine is not None
@@ -52,7 +52,7 @@ def test_growing_spread_grows_by_its_factor_and_holds_outside() -> None:
 
 
 def test_a_weave_has_its_period_and_amplitude() -> None:
-    location = Weave(amplitude=0.1, period_s=12.0).terms(grid(1200.0), {}, np.random.default_rng(2)).location
+    location = Cycle(amplitude=0.1, period_s=12.0).terms(grid(1200.0), {}, np.random.default_rng(2)).location
     assert location is not None
     power = np.abs(np.fft.rfft(location))
     assert np.fft.rfftfreq(len(location), STEP)[np.argmax(power)] == pytest.approx(1.0 / 12.0)

@@ -13,7 +13,7 @@ from scipy.linalg import toeplitz
 from tests.driver.models.made_models import POPULATION, STEADY
 from xosc_lateral.driver.models.autoregressive.filters import COARSE_EVERY, interpolate
 from xosc_lateral.driver.models.autoregressive.model import AutoregressiveModel
-from xosc_lateral.driver.models.autoregressive.parameters import MEMORY_OF_START
+from xosc_lateral.driver.models.autoregressive.parameters import START_LAGS
 from xosc_lateral.driver.models.fit_noise import NOISE_VARIANCE
 from xosc_lateral.driver.records import plain, read_as
 from xosc_lateral.errors import DriverProfileError
@@ -45,7 +45,7 @@ def test_fine_covariance_is_numpys_correlation_of_the_kernel() -> None:
     kernel = POPULATION.kernel
     expected = np.correlate(kernel, kernel, "full")[len(kernel) - 1 :] * NOISE_VARIANCE
     np.testing.assert_allclose(POPULATION.fine_covariance[: len(kernel)], expected, atol=1e-18)
-    assert POPULATION.fine_covariance.shape == (MEMORY_OF_START,)
+    assert POPULATION.fine_covariance.shape == (START_LAGS,)
     assert (POPULATION.fine_covariance[len(kernel) :] == 0.0).all()
 
 

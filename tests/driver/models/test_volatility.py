@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from xosc_lateral.driver.models.autoregressive.fit_volatility import autocovariance, fit_volatility, log_power
-from xosc_lateral.driver.models.autoregressive.volatility import Volatility, averaged_memory
+from xosc_lateral.driver.models.autoregressive.volatility import Volatility, averaged_covariance
 from xosc_lateral.errors import DriverProfileError
 
 
@@ -22,7 +22,7 @@ def test_covariance_of_window_means_is_that_of_an_averaged_wander() -> None:
     fine = wander(2_000_000, 60.0, np.random.default_rng(0))  # memory 6 s at 10 Hz
     means = fine.reshape(-1, 20).mean(axis=1)  # windows of 2 s
     found, _ = autocovariance([means], 5)
-    assert np.allclose(found, averaged_memory(5, 2.0, 6.0), atol=0.03)
+    assert np.allclose(found, averaged_covariance(5, 2.0, 6.0), atol=0.03)
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -38,7 +38,7 @@ def test_fit_recovers_what_was_planted(seed: int) -> None:
     found = fit_volatility(covariance - autocovariance(steady, 20)[0], counts, 2.0, population=True)
     assert found.between == pytest.approx(0.10, abs=5 * 0.10 * np.sqrt(2 / 300))
     assert found.within == pytest.approx(0.15, abs=0.05)
-    assert 3.0 <= found.memory <= 12.0
+    assert 3.0 <= found.correlation_time <= 12.0
 
 
 def test_what_lasts_in_one_drive_wanders_slowly_and_differs_between_several() -> None:

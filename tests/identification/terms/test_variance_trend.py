@@ -9,12 +9,12 @@ import pytest
 from scipy import stats
 
 from tests.identification.made_coarse import coarse_of, movement
-from xosc_lateral.driver.effects import GrowingSpread
+from xosc_lateral.driver.effects import VarianceTrend
 from xosc_lateral.identification.regression import Coarse, Fitted, fit_model
 from xosc_lateral.identification.search import Search
 from xosc_lateral.identification.significance import level_of
 from xosc_lateral.identification.terms.base import Removal
-from xosc_lateral.identification.terms.variance_trend import VarianceTrend, _probability
+from xosc_lateral.identification.terms.variance_trend import VarianceTrendTerm, _probability
 
 SECONDS = 2400.0
 N = round(SECONDS / 0.2)
@@ -26,16 +26,16 @@ def growing(factor: float, seed: int) -> Coarse:
     return coarse_of(own * factor ** (np.arange(N) / N - 0.5))
 
 
-def outcome_of(coarse: Coarse) -> tuple[VarianceTrend, float]:
-    outcome = VarianceTrend.test(Search.over(coarse, [], np.random.SeedSequence(1)), fit_model(coarse, ()))
+def outcome_of(coarse: Coarse) -> tuple[VarianceTrendTerm, float]:
+    outcome = VarianceTrendTerm.test(Search.over(coarse, [], np.random.SeedSequence(1)), fit_model(coarse, ()))
     assert outcome is not None
-    assert isinstance(outcome.term, VarianceTrend)
+    assert isinstance(outcome.term, VarianceTrendTerm)
     return outcome.term, outcome.p_value
 
 
 @pytest.fixture(scope="module")
 def fitted() -> Fitted:
-    return fit_model(growing(1.8, 71), (VarianceTrend(),))
+    return fit_model(growing(1.8, 71), (VarianceTrendTerm(),))
 
 
 def test_p_values_of_white_rows_are_even() -> None:
@@ -69,7 +69,7 @@ def test_a_steady_growth_is_sure_and_a_steady_drive_is_not() -> None:
 
 def test_the_factor_is_sized_within_its_error(fitted: Fitted) -> None:
     (effect,) = fitted.terms[0].estimate(fitted)  # type: ignore[attr-defined]
-    assert isinstance(effect, GrowingSpread)
+    assert isinstance(effect, VarianceTrend)
     assert effect.factor == pytest.approx(1.8, abs=4.0 * effect.factor_error)
     assert effect.factor_error < 0.25
     assert effect.fine_factor == pytest.approx(1.8, rel=0.1)
@@ -78,7 +78,7 @@ def test_the_factor_is_sized_within_its_error(fitted: Fitted) -> None:
 
 
 def test_backwards_it_shrinks_by_the_inverse() -> None:
-    there, back = (fit_model(coarse, (VarianceTrend(),)) for coarse in (growing(1.8, 78), growing(1.0 / 1.8, 78)))
+    there, back = (fit_model(coarse, (VarianceTrendTerm(),)) for coarse in (growing(1.8, 78), growing(1.0 / 1.8, 78)))
     grown, shrunk = (one.terms[0].estimate(one)[0] for one in (there, back))  # type: ignore[attr-defined]
     assert grown.factor * shrunk.factor == pytest.approx(1.0, abs=0.15)
 
@@ -96,20 +96,20 @@ def test_taken_out_it_is_a_function_of_time_alone(fitted: Fitted) -> None:
 
 @pytest.mark.parametrize(("factor", "name"), [(1.5, "growing spread"), (0.7, "shrinking spread")])
 def test_it_is_told_by_which_way_it_goes(factor: float, name: str) -> None:
-    told = VarianceTrend().describe(None, (GrowingSpread(factor=factor, factor_error=0.1),), "")  # type: ignore[arg-type]
+    told = VarianceTrendTerm().describe(None, (VarianceTrend(factor=factor, factor_error=0.1),), "")  # type: ignore[arg-type]
     assert (told.name, told.size, told.error) == (name, factor, 0.1)
 
 
 def test_slow_and_quick_growth_are_one_finding_and_looked_for_once(fitted: Fitted) -> None:
-    assert VarianceTrend().matches(VarianceTrend(slow=True))
-    assert VarianceTrend.test(Search.over(fitted.coarse, [], np.random.SeedSequence(1)), fitted) is None
+    assert VarianceTrendTerm().matches(VarianceTrendTerm(slow=True))
+    assert VarianceTrendTerm.test(Search.over(fitted.coarse, [], np.random.SeedSequence(1)), fitted) is None
 
 
 def test_only_growth_of_the_innovations_can_be_predicted() -> None:
-    assert VarianceTrend().predictable
-    assert not VarianceTrend(slow=True).predictable
+    assert VarianceTrendTerm().predictable
+    assert not VarianceTrendTerm(slow=True).predictable
 
 
 def test_drives_of_minutes_have_no_trend() -> None:
     coarse = coarse_of(movement(np.random.default_rng(79), 400.0))
-    assert VarianceTrend.test(Search.over(coarse, [], np.random.SeedSequence(1)), fit_model(coarse, ())) is None
+    assert VarianceTrendTerm.test(Search.over(coarse, [], np.random.SeedSequence(1)), fit_model(coarse, ())) is None

@@ -12,8 +12,8 @@ from xosc_lateral.driver.effects.acts import Acts
 from xosc_lateral.driver.effects.angular import Angular
 from xosc_lateral.driver.effects.base import Effect, EffectTerms
 from xosc_lateral.driver.effects.column import ColumnEffect
+from xosc_lateral.driver.effects.cycle import Cycle
 from xosc_lateral.driver.effects.drift import Drift
-from xosc_lateral.driver.effects.growing_spread import GrowingSpread
 from xosc_lateral.driver.effects.hidden import HiddenEffect
 from xosc_lateral.driver.effects.levels import Levels
 from xosc_lateral.driver.effects.linear import Linear
@@ -27,7 +27,7 @@ from xosc_lateral.driver.effects.regimes import Regimes
 from xosc_lateral.driver.effects.saturating import Saturating
 from xosc_lateral.driver.effects.step import Step
 from xosc_lateral.driver.effects.threshold import Threshold
-from xosc_lateral.driver.effects.weave import Weave
+from xosc_lateral.driver.effects.variance_trend import VarianceTrend
 from xosc_lateral.driver.records import read_as
 from xosc_lateral.errors import DriverProfileError
 
@@ -44,8 +44,8 @@ EFFECTS: tuple[type[Effect], ...] = (
     Product,
     Drift,
     Step,
-    GrowingSpread,
-    Weave,
+    VarianceTrend,
+    Cycle,
     Regimes,
     Population,
 )
@@ -107,12 +107,12 @@ __all__ = [
     "Acts",
     "Angular",
     "ColumnEffect",
+    "Cycle",
     "Drift",
     "Effect",
     "EffectTerms",
     "Factor",
     "Form",
-    "GrowingSpread",
     "HiddenEffect",
     "Levels",
     "Linear",
@@ -126,7 +126,7 @@ __all__ = [
     "Saturating",
     "Step",
     "Threshold",
-    "Weave",
+    "VarianceTrend",
     "any_effect",
     "effect_from_dict",
     "known_effects",

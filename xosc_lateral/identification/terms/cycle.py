@@ -1,4 +1,4 @@
-"""A periodic weave of the mean that no column explains.
+"""A cycle of the mean that no column explains.
 
 References
 ----------
@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, ClassVar, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.driver.effects import Effect, Weave
+from xosc_lateral.driver.effects import Cycle, Effect
 from xosc_lateral.identification.regression import MIN_DRIFT_S, Coarse, Fitted
 from xosc_lateral.identification.significance import LEAST
 from xosc_lateral.identification.terms.base import Description, Outcome, Removal, Term, centred
@@ -37,7 +37,7 @@ CELL = "movement at the weave's period"
 
 
 @dataclass(frozen=True, eq=False)
-class Cycle(Term):
+class CycleTerm(Term):
     """Sines and cosines of neighbouring frequencies.
 
     Parameters
@@ -86,7 +86,7 @@ class Cycle(Term):
 
     def matches(self, other: Self) -> bool:
         """About the same period."""
-        return isinstance(other, Cycle) and bool(abs(np.log(self.frequency / other.frequency)) < 0.1)
+        return isinstance(other, CycleTerm) and bool(abs(np.log(self.frequency / other.frequency)) < 0.1)
 
     def estimate(self, fitted: Fitted) -> tuple[Effect, ...]:
         """Amplitude from the power of all its sines, noise taken out."""
@@ -97,7 +97,7 @@ class Cycle(Term):
         coherence = 1e6 if self.width == 1 else seconds / (np.pi * self.width)
         amplitude, error = float(np.sqrt(power)), float(np.sqrt(np.mean(errors**2)))
         period = 1.0 / self.frequency
-        return (Weave(amplitude=amplitude, amplitude_error=error, period_s=period, coherence_s=float(coherence)),)
+        return (Cycle(amplitude=amplitude, amplitude_error=error, period_s=period, coherence_s=float(coherence)),)
 
     def remove(self, fitted: Fitted, effects: tuple[Effect, ...], removal: Removal) -> None:
         """As fitted."""
@@ -106,7 +106,7 @@ class Cycle(Term):
     def describe(self, fitted: Fitted, effects: tuple[Effect, ...], key: str) -> Description:
         """Amplitude and period."""
         effect = effects[0]
-        assert isinstance(effect, Weave)
+        assert isinstance(effect, Cycle)
         shape = f"period {effect.period_s:.1f} s"
         return Description("weave", shape, effect.amplitude, effect.amplitude_error, CELL, CELL)
 

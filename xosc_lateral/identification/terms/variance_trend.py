@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, ClassVar, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.driver.effects import Effect, GrowingSpread
+from xosc_lateral.driver.effects import Effect, VarianceTrend
 from xosc_lateral.identification.dictionary import orthonormal
 from xosc_lateral.identification.log_scale import squared_innovations
 from xosc_lateral.identification.regression import Coarse, Fitted, elapsed
@@ -28,7 +28,7 @@ COSINES = 0.4
 
 
 @dataclass(frozen=True, eq=False)
-class VarianceTrend(Term):
+class VarianceTrendTerm(Term):
     """Log scale linear in time.
 
     Parameters
@@ -68,7 +68,7 @@ class VarianceTrend(Term):
 
     def matches(self, other: Self) -> bool:
         """Either of the two."""
-        return isinstance(other, VarianceTrend)
+        return isinstance(other, VarianceTrendTerm)
 
     def estimate(self, fitted: Fitted) -> tuple[Effect, ...]:
         """Factor from the first to the last second."""
@@ -84,7 +84,7 @@ class VarianceTrend(Term):
             fine = float(log_sizes(fine_squares(fitted), time[:, None])[0][0])
         factor = float(np.exp(size))
         ends = {"from_s": float(seen.min()), "to_s": float(seen.max())}
-        return (GrowingSpread(factor=factor, factor_error=factor * error, fine_factor=float(np.exp(fine)), **ends),)
+        return (VarianceTrend(factor=factor, factor_error=factor * error, fine_factor=float(np.exp(fine)), **ends),)
 
     def remove(self, fitted: Fitted, effects: tuple[Effect, ...], removal: Removal) -> None:
         """A plain function of time."""
@@ -95,7 +95,7 @@ class VarianceTrend(Term):
     def describe(self, fitted: Fitted, effects: tuple[Effect, ...], key: str) -> Description:
         """Factor over the drive."""
         effect = effects[0]
-        assert isinstance(effect, GrowingSpread)
+        assert isinstance(effect, VarianceTrend)
         name = f"{'growing' if effect.factor > 1 else 'shrinking'} spread"
         statistic = "spread by time"
         return Description(name, "log-linear in time", effect.factor, effect.factor_error, statistic, statistic)

@@ -85,7 +85,7 @@ def _rounded(model: AutoregressiveModel) -> AutoregressiveModel:
         return np.array([tidy(value) for value in values])
 
     def tidy_part(part: Volatility) -> Volatility:
-        return Volatility(tidy(part.between), tidy(part.within), tidy(part.memory), tidy(part.slow))
+        return Volatility(tidy(part.between), tidy(part.within), tidy(part.correlation_time), tidy(part.slow))
 
     return AutoregressiveModel(
         mean=tidy(model.mean),

@@ -11,11 +11,11 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.driver.models.autoregressive.volatility import Volatility, averaged_memory
+from xosc_lateral.driver.models.autoregressive.volatility import Volatility, averaged_covariance
 
 FloatArray = NDArray[np.float64]
 
-MEMORIES = (2.0, 3.0, 4.0, 6.0, 8.0, 12.0, 16.0, 24.0, 32.0, 48.0, 64.0)
+CORRELATION_TIMES = (2.0, 3.0, 4.0, 6.0, 8.0, 12.0, 16.0, 24.0, 32.0, 48.0, 64.0)
 """Correlation times of the wandering part that are tried; one value a second can't hold shorter ones. [s]"""
 
 MAX_LAG = 60.0
@@ -58,8 +58,8 @@ def fit_volatility(excess: FloatArray, counts: FloatArray, seconds: float, *, po
     """
     best, least = Volatility(), np.inf
     weights = np.sqrt(counts / max(counts.max(), 1.0))
-    for memory in MEMORIES:
-        shape = averaged_memory(len(excess), seconds, memory)
+    for time in CORRELATION_TIMES:
+        shape = averaged_covariance(len(excess), seconds, time)
         for basis in ([shape, np.ones(len(excess))], [shape]):
             columns = np.stack(basis, axis=1)
             found = np.linalg.lstsq(columns * weights[:, None], excess * weights, rcond=None)[0]
@@ -68,6 +68,6 @@ def fit_volatility(excess: FloatArray, counts: FloatArray, seconds: float, *, po
             error = float((((columns @ found - excess) * weights) ** 2).sum())
             if error < least - 1e-12:
                 lasting = float(found[1]) if len(found) > 1 else 0.0
-                best, least = Volatility(lasting, float(found[0]), memory), error
+                best, least = Volatility(lasting, float(found[0]), time), error
             break
-    return best if population else Volatility(0.0, best.within, best.memory, best.between)
+    return best if population else Volatility(0.0, best.within, best.correlation_time, best.between)

@@ -18,7 +18,7 @@ from xosc_lateral.errors import DriverProfileError
 
 FloatArray = NDArray[np.float64]
 
-MEMORY_OF_START = 300
+START_LAGS = 300
 """Steps after which a drive has forgotten the offset that it was made to start at: 60 s. [-]"""
 
 
@@ -76,9 +76,9 @@ class AutoregressiveParameters(CoreModel, frozen=True, eq=False, dict=True):
     def coarse_covariance(self) -> FloatArray:
         """Of the coarse movement about the driver's mean at lags of 0.2 s, mean over the phases of a coarse step.
 
-        Shape (MEMORY_OF_START,). [lane widths squared]
+        Shape (START_LAGS,). [lane widths squared]
         """
-        n_ticks = MEMORY_OF_START // COARSE_EVERY + 20
+        n_ticks = START_LAGS // COARSE_EVERY + 20
         ticks = self.coarse.covariance(n_ticks)
         spread = np.zeros(2 * n_ticks * COARSE_EVERY - 1)
         middle = n_ticks * COARSE_EVERY - 1
@@ -86,15 +86,15 @@ class AutoregressiveParameters(CoreModel, frozen=True, eq=False, dict=True):
         spread[middle::-COARSE_EVERY][:n_ticks] = ticks
         kernel = building_low_pass()
         both = np.convolve(kernel, kernel) / COARSE_EVERY
-        return np.asarray(np.convolve(spread, both, "same")[middle : middle + MEMORY_OF_START])
+        return np.asarray(np.convolve(spread, both, "same")[middle : middle + START_LAGS])
 
     @cached_property
     def fine_covariance(self) -> FloatArray:
-        """Of the fine movement at lags of 0.2 s, shape (MEMORY_OF_START,). [lane widths squared]"""
+        """Of the fine movement at lags of 0.2 s, shape (START_LAGS,). [lane widths squared]"""
         kernel = self.kernel
         full = np.convolve(kernel, kernel)[len(kernel) - 1 :] * NOISE_VARIANCE
-        result = np.zeros(MEMORY_OF_START)
-        result[: len(full)] = full[:MEMORY_OF_START]
+        result = np.zeros(START_LAGS)
+        result[: len(full)] = full[:START_LAGS]
         return result
 
     @cached_property

@@ -1,7 +1,7 @@
 """Volatility: a factor on a driver's movement that differs between drivers and varies while driving.
 
-The logarithm of the factor is the sum of three normal parts: one that a driver keeps, one that wanders over minutes and
-one that wanders over seconds (both first-order autoregressions). Factors are scaled so that their mean square is 1.
+The logarithm of the factor is the sum of three normal parts: one that a driver keeps, one that varies within minutes,
+and one that varies within seconds (both first-order autoregressions). Factors have a mean square of 1.
 
 References
 ----------
@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from math import isfinite
 
+import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
@@ -20,8 +21,8 @@ from xosc_lateral.errors import DriverProfileError
 
 FloatArray = NDArray[np.float64]
 
-SLOW_MEMORY = 300.0
-"""Correlation time of the slow wander. [s]"""
+SLOW_CORRELATION_TIME = 300.0
+"""Of the part that varies within minutes. [s]"""
 
 
 class Volatility(Record, frozen=True):
@@ -32,27 +33,31 @@ class Volatility(Record, frozen=True):
     between : float
         Variance of the logarithm between drivers. [-]
     within : float
-        Variance of its wandering part. [-]
-    memory : float
-        Correlation time of the wandering part. [s]
+        Variance of the part that varies within seconds. [-]
+    correlation_time : float
+        Of the part that varies within seconds; `memory` in files. [s]
     slow : float
-        Variance of the part that wanders with the correlation time `SLOW_MEMORY`. [-]
+        Variance of the part that varies with the correlation time `SLOW_CORRELATION_TIME`. [-]
 
     Raises
     ------
     DriverProfileError
-        If a variance is negative or the memory not above 0.
+        If a variance is negative or the correlation time not above 0.
     """
 
     between: float = 0.0
     within: float = 0.0
-    memory: float = 10.0
+    correlation_time: float = msgspec.field(name="memory", default=10.0)
     slow: float = 0.0
 
     def __post_init__(self) -> None:
         """Check."""
-        numbers = (self.between, self.within, self.memory, self.slow)
-        if not all(map(isfinite, numbers)) or min(self.between, self.within, self.slow) < 0 or self.memory <= 0:
+        numbers = (self.between, self.within, self.correlation_time, self.slow)
+        if (
+            not all(map(isfinite, numbers))
+            or min(self.between, self.within, self.slow) < 0
+            or self.correlation_time <= 0
+        ):
             raise DriverProfileError(f"volatility: {self}")
 
     @property
@@ -61,21 +66,23 @@ class Volatility(Record, frozen=True):
         return self.between + self.within + self.slow
 
     def over(self, seconds: float) -> float:
-        """Variance of the logarithm's mean over so long a stretch [s], over all drivers and times. [-]"""
-        within, slow = (float(averaged_memory(1, seconds, memory)[0]) for memory in (self.memory, SLOW_MEMORY))
+        """Variance of the logarithm's mean over so long a window [s], over all drivers and times. [-]"""
+        within, slow = (
+            float(averaged_covariance(1, seconds, time)[0]) for time in (self.correlation_time, SLOW_CORRELATION_TIME)
+        )
         return self.between + within * self.within + slow * self.slow
 
     def scaled(self, factor: float) -> Volatility:
         """All variances times a factor [-] >= 0."""
-        return Volatility(self.between * factor, self.within * factor, self.memory, self.slow * factor)
+        return Volatility(self.between * factor, self.within * factor, self.correlation_time, self.slow * factor)
 
 
-def averaged_memory(n_lags: int, seconds: float, memory: float) -> FloatArray:
+def averaged_covariance(n_lags: int, seconds: float, time: float) -> FloatArray:
     """Covariance [-] of window means of a first-order autoregression of variance 1, at lags of whole windows.
 
-    Windows and memory in [s]; shape (n_lags,).
+    Times in [s]; shape (n_lags,).
     """
-    ratio = seconds / memory
+    ratio = seconds / time
     shape = 2.0 * (np.cosh(ratio) - 1.0) / ratio**2 * np.exp(-ratio * np.arange(n_lags))
     shape[0] = 2.0 * (ratio - 1.0 + np.exp(-ratio)) / ratio**2
     return np.asarray(shape)

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from xosc_lateral.driver.models.autoregressive.filters import COARSE_EVERY
 from xosc_lateral.driver.models.autoregressive.parameters import AutoregressiveParameters
-from xosc_lateral.driver.models.autoregressive.volatility import SLOW_MEMORY
+from xosc_lateral.driver.models.autoregressive.volatility import SLOW_CORRELATION_TIME
 from xosc_lateral.driver.recursion import recur
 from xosc_lateral.driver.seeds import AutoregressiveSeed, generator
 
@@ -23,7 +23,7 @@ COARSE, FINE = 0, 1
 """Index of a part wherever both stand side by side."""
 
 
-class WanderState(msgspec.Struct):
+class PairState(msgspec.Struct):
     """Two correlated first-order autoregressions: generator, and last values of shape (2, drivers). [-]"""
 
     rng: np.random.Generator
@@ -35,14 +35,14 @@ class FactorState(msgspec.Struct):
 
     Parameters
     ----------
-    quick, slow : WanderState
+    quick, slow : PairState
         What varies within seconds, and within minutes.
     coarse, fine : array, shape (k, drivers)
         Factors that are drawn and not yet taken. [-]
     """
 
-    quick: WanderState
-    slow: WanderState
+    quick: PairState
+    slow: PairState
     coarse: FloatArray
     fine: FloatArray
 
@@ -56,9 +56,9 @@ class Factors:
         parts = (model.coarse_volatility, model.fine_volatility)
         within, slow = (np.array([getattr(part, name) for part in parts]) for name in ("within", "slow"))
         self._offsets = (within + slow)[:, None, None]
-        memory = np.array([part.memory for part in parts])
-        self._quick = _Wander(state.quick, within, np.exp(-step / memory), model.correlation)
-        self._slow = _Wander(state.slow, slow, np.exp(-step / np.full(2, SLOW_MEMORY)), model.correlation)
+        time = np.array([part.correlation_time for part in parts])
+        self._quick = _Pair(state.quick, within, np.exp(-step / time), model.correlation)
+        self._slow = _Pair(state.slow, slow, np.exp(-step / np.full(2, SLOW_CORRELATION_TIME)), model.correlation)
         self._varies_slowly = bool((slow > 0.0).any())
 
     def take(self, part: int, n: int) -> FloatArray:
@@ -83,8 +83,8 @@ class Factors:
         return factors[COARSE], factors[FINE]
 
 
-class _Wander:
-    def __init__(self, state: WanderState, variance: FloatArray, keep: FloatArray, correlation: float) -> None:
+class _Pair:
+    def __init__(self, state: PairState, variance: FloatArray, keep: FloatArray, correlation: float) -> None:
         self._state, self._keep, self._correlation = state, keep, correlation
         self._gain = np.sqrt(variance * (1.0 - keep**2))[:, None, None]
 
@@ -101,14 +101,14 @@ class _Wander:
 def begin_factors(model: AutoregressiveParameters, seed: np.random.SeedSequence, drivers: int) -> FactorState:
     """Stationary from the start."""
 
-    def wander(key: int, name: str) -> WanderState:
+    def begin(key: int, name: str) -> PairState:
         rng = generator(seed, AutoregressiveSeed.VOLATILITY, key)
         spread = np.sqrt([getattr(part, name) for part in (model.coarse_volatility, model.fine_volatility)])
         first = _correlated(rng, 1, drivers, model.correlation)[:, 0]
-        return WanderState(rng, first * spread[:, None])
+        return PairState(rng, first * spread[:, None])
 
     nothing = np.empty((0, drivers))
-    return FactorState(wander(0, "within"), wander(1, "slow"), nothing, nothing)
+    return FactorState(begin(0, "within"), begin(1, "slow"), nothing, nothing)
 
 
 def _correlated(rng: np.random.Generator, n: int, drivers: int, correlation: float) -> FloatArray:

@@ -1,4 +1,4 @@
-"""Whether a profile's own runs move as the drives do, from tenths of seconds to minutes: memory.
+"""Whether a profile's own runs move as the drives do, from tenths of seconds to minutes.
 
 References
 ----------
@@ -40,7 +40,7 @@ WORTH_ADDING = 0.05
 
 
 @dataclass(frozen=True, eq=False)
-class Memory:
+class SpectrumShape:
     """Comparison of the movement's size in bands of time, with its overall size divided out.
 
     Parameters
@@ -59,11 +59,11 @@ class Memory:
 
     @property
     def found(self) -> bool:
-        """Whether the profile's memory is wrong, beyond chance and by enough to matter."""
+        """Whether the profile's spectrum has another shape, beyond chance and by enough to matter."""
         return self.p_value < LEVEL and bool(np.max(np.abs(np.log(self.ratio))) > WORTH_ADDING)
 
 
-def test_memory(profile: DriverProfile, timeline: Timeline, seed: np.random.SeedSequence) -> Memory:
+def compare_spectrum_shapes(profile: DriverProfile, timeline: Timeline, seed: np.random.SeedSequence) -> SpectrumShape:
     """Compare a profile's free runs with the drives, block by block."""
     from scipy.stats import f
 
@@ -71,13 +71,13 @@ def test_memory(profile: DriverProfile, timeline: Timeline, seed: np.random.Seed
     real = _shapes(timeline.offset, timeline)
     own = np.concatenate([_shapes(run, timeline) for run in runs])
     if len(real) < 2 * len(TIMES_S) + 4:
-        return Memory(TIMES_S, np.ones(len(TIMES_S)), 1.0)
+        return SpectrumShape(TIMES_S, np.ones(len(TIMES_S)), 1.0)
     difference = own.mean(axis=0) - real.mean(axis=0)
     covariance = np.cov(real.T) / len(real) + np.cov(own.T) / len(own)
     k, n = len(difference), len(real)
     statistic = float(difference @ np.linalg.pinv(covariance) @ difference)
     p_value = float(f.sf(statistic * (n - k) / (k * (n - 1)), k, n - k))
-    return Memory(TIMES_S, np.exp(difference), max(p_value, LEAST))
+    return SpectrumShape(TIMES_S, np.exp(difference), max(p_value, LEAST))
 
 
 def _shapes(offset: FloatArray, timeline: Timeline) -> FloatArray:

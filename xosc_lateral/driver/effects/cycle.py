@@ -1,4 +1,4 @@
-"""A periodic weave.
+"""A cycle: movement with a period that no column explains.
 
 References
 ----------
@@ -20,7 +20,7 @@ from xosc_lateral.driver.effects.hidden import HiddenEffect
 FloatArray = NDArray[np.float64]
 
 
-class WeaveState(msgspec.Struct):
+class CycleState(msgspec.Struct):
     """Generator, first phase [turns], sum of the normal kicks so far [-], when the drive began [s]."""
 
     rng: np.random.Generator
@@ -29,8 +29,8 @@ class WeaveState(msgspec.Struct):
     begun_at: float | None = None
 
 
-class Weave(HiddenEffect, frozen=True, kw_only=True):
-    """A swing of constant amplitude whose phase starts anywhere and wanders.
+class Cycle(HiddenEffect, frozen=True, kw_only=True):
+    """A sine of constant amplitude whose phase starts anywhere and drifts.
 
     Parameters
     ----------
@@ -50,18 +50,18 @@ class Weave(HiddenEffect, frozen=True, kw_only=True):
     period_s: float
     coherence_s: float = 1e6
 
-    State: ClassVar[type[msgspec.Struct]] = WeaveState
+    State: ClassVar[type[msgspec.Struct]] = CycleState
 
-    def begin(self, rng: np.random.Generator, step: float) -> WeaveState:
+    def begin(self, rng: np.random.Generator, step: float) -> CycleState:
         """Any phase; terms have shape (n,). `step` in [s]."""
-        return WeaveState(rng, float(rng.random()))
+        return CycleState(rng, float(rng.random()))
 
-    def advance(self, state: WeaveState, time: FloatArray, step: float) -> EffectTerms:
-        """A swing [m], shape (n,), whose phase wanders as Brownian motion does."""
+    def advance(self, state: CycleState, time: FloatArray, step: float) -> EffectTerms:
+        """A sine [m], shape (n,), whose phase drifts as Brownian motion does."""
         if state.begun_at is None:
             state.begun_at = float(time[0])
         kicks = np.cumsum(np.concatenate([[state.kicks], state.rng.normal(size=len(time))]))[1:]
         state.kicks = float(kicks[-1])
-        wander = kicks * np.sqrt(step / self.coherence_s)
-        phase = 2.0 * np.pi * (state.phase + (time - state.begun_at) / self.period_s) + wander
+        drift = kicks * np.sqrt(step / self.coherence_s)
+        phase = 2.0 * np.pi * (state.phase + (time - state.begun_at) / self.period_s) + drift
         return EffectTerms(location=self.amplitude * np.sin(phase))

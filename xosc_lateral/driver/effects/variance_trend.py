@@ -1,4 +1,4 @@
-"""Growing spread: fatigue, say.
+"""Variance trend: the movement grows with time on the road; fatigue, say.
 
 Our own form: the logarithm of the spread is linear in time, the one form of a factor that depends on no choice of zero.
 """
@@ -16,7 +16,7 @@ from xosc_lateral.driver.effects.hidden import HiddenEffect, NoState
 FloatArray = NDArray[np.float64]
 
 
-class GrowingSpread(HiddenEffect, frozen=True, kw_only=True):
+class VarianceTrend(HiddenEffect, frozen=True, kw_only=True):
     """Spread and fine noise change steadily with time on the road; outside the fitted time the outermost value holds.
 
     Parameters

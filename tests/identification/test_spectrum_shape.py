@@ -1,4 +1,4 @@
-"""Memory: the profile's own movement passes, another's is found, and the size alone is no matter."""
+"""Spectrum shape: the profile's own movement passes, another's is found, and the size alone is no matter."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from msgspec.structs import replace
 from tests.driver.models.made_models import STEADY
 from tests.identification.made_coarse import movement, timeline_of
 from xosc_lateral.driver.profile import DriverProfile
-from xosc_lateral.identification import memory
-from xosc_lateral.identification.memory import BLOCK, TIMES_S, WORTH_ADDING, Memory, _shapes
+from xosc_lateral.identification import spectrum_shape
+from xosc_lateral.identification.spectrum_shape import BLOCK, TIMES_S, WORTH_ADDING, SpectrumShape, _shapes
 from xosc_lateral.identification.timeline import Timeline
 
 WIDTH = 3.6
@@ -29,8 +29,11 @@ def profile() -> DriverProfile:
     return DriverProfile(name="own", model=STEADY)
 
 
-def test_a_profile_s_own_drives_show_its_memory(profile: DriverProfile) -> None:
-    found = [memory.test_memory(profile, driven(STEADY, seed), np.random.SeedSequence(1)) for seed in (21, 22, 23)]
+def test_a_profile_s_own_drives_show_its_spectrum(profile: DriverProfile) -> None:
+    found = [
+        spectrum_shape.compare_spectrum_shapes(profile, driven(STEADY, seed), np.random.SeedSequence(1))
+        for seed in (21, 22, 23)
+    ]
     assert not any(one.found for one in found)
     assert max(one.p_value for one in found) > 0.05
     for one in found:
@@ -39,13 +42,13 @@ def test_a_profile_s_own_drives_show_its_memory(profile: DriverProfile) -> None:
 
 def test_a_drive_with_more_fine_movement_is_found_and_the_band_told(profile: DriverProfile) -> None:
     rough = replace(STEADY, fine=replace(STEADY.fine, damping=3.0 * STEADY.fine.damping))
-    found = memory.test_memory(profile, driven(rough, 24), np.random.SeedSequence(1))
+    found = spectrum_shape.compare_spectrum_shapes(profile, driven(rough, 24), np.random.SeedSequence(1))
     assert found.found
     assert found.ratio[0] == pytest.approx(1.0 / 3.0, rel=0.2)
     np.testing.assert_allclose(found.ratio[-1], 1.0, atol=0.15)
 
 
-def test_twice_the_size_is_no_other_memory(profile: DriverProfile) -> None:
+def test_twice_the_size_is_no_other_shape(profile: DriverProfile) -> None:
     timeline = driven(STEADY, 25)
     np.testing.assert_allclose(_shapes(2.0 * timeline.offset, timeline), _shapes(timeline.offset, timeline), atol=1e-9)
 
@@ -73,20 +76,22 @@ def test_movement_that_stands_still_has_no_blocks() -> None:
 
 def test_too_short_a_drive_says_nothing(profile: DriverProfile) -> None:
     timeline = timeline_of(movement(np.random.default_rng(2), 300.0))
-    found = memory.test_memory(profile, timeline, np.random.SeedSequence(1))
+    found = spectrum_shape.compare_spectrum_shapes(profile, timeline, np.random.SeedSequence(1))
     assert found.p_value == 1.0
     assert not found.found
 
 
 @pytest.mark.parametrize(("p_value", "ratio", "found"), [(1e-6, 1.2, True), (1e-6, 1.03, False), (0.2, 3.0, False)])
 def test_a_difference_is_sure_and_large_enough_or_none(p_value: float, ratio: float, found: bool) -> None:
-    assert Memory(TIMES_S, np.array([1.0, ratio]), p_value).found is found
-    assert Memory(TIMES_S, np.array([1.0, 1.0 / ratio]), p_value).found is found
+    assert SpectrumShape(TIMES_S, np.array([1.0, ratio]), p_value).found is found
+    assert SpectrumShape(TIMES_S, np.array([1.0, 1.0 / ratio]), p_value).found is found
     assert np.log(1.03) < WORTH_ADDING < np.log(1.2)
 
 
 def test_the_same_seed_says_the_same(profile: DriverProfile) -> None:
     timeline = driven(STEADY, 26)
-    one, other = (memory.test_memory(profile, timeline, np.random.SeedSequence(7)) for _ in range(2))
+    one, other = (
+        spectrum_shape.compare_spectrum_shapes(profile, timeline, np.random.SeedSequence(7)) for _ in range(2)
+    )
     assert one.p_value == other.p_value
     np.testing.assert_array_equal(one.ratio, other.ratio)
