@@ -26,7 +26,7 @@ _fitted: dict[str, LateralModel] = {}
 def _model(name: str) -> LateralModel:
     if name not in _fitted:
         with patch.multiple(
-            calibration, FIRST_LOOK=16, DESCENTS=1, FIRST_STEPS=20, STEPS=20
+            calibration, FIRST_POINTS=16, DESCENTS=1, FIRST_STEPS=20, STEPS=20
         ):  # enough to be nearer than no movement
             _fitted[name] = MODELS[name].fit(RUNS)
     return _fitted[name]

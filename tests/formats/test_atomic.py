@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from xosc_lateral.errors import FormatError
-from xosc_lateral.formats.atomic import refuse_targets, replace_atomically, write_atomically
+from xosc_lateral.formats.atomic import refuse_outputs, replace_atomically, write_atomically
 
 
 def test_text_and_bytes_arrive(tmp_path: Path) -> None:
@@ -16,19 +16,19 @@ def test_text_and_bytes_arrive(tmp_path: Path) -> None:
 
 
 def test_a_failing_writer_leaves_the_old_file_and_nothing_else(tmp_path: Path) -> None:
-    target = write_atomically(tmp_path / "a.txt", "old")
+    output = write_atomically(tmp_path / "a.txt", "old")
 
     def fail(path: Path) -> None:
         path.write_text("half")
         raise OSError("disk full")
 
     with pytest.raises(OSError, match="disk full"):
-        replace_atomically(target, fail)
-    assert target.read_text() == "old"
+        replace_atomically(output, fail)
+    assert output.read_text() == "old"
     assert [path.name for path in tmp_path.iterdir()] == ["a.txt"]
 
 
-def test_the_temporary_file_has_the_targets_suffix_and_folder(tmp_path: Path) -> None:
+def test_the_temporary_file_has_the_outputs_suffix_and_folder(tmp_path: Path) -> None:
     seen: list[Path] = []
 
     def write(path: Path) -> None:
@@ -51,25 +51,25 @@ def test_a_missing_folder_is_made(tmp_path: Path) -> None:
     assert write_atomically(tmp_path / "no" / "such" / "a", "x").read_text() == "x"
 
 
-def test_targets_that_would_destroy_an_input_or_one_another_are_refused(tmp_path: Path) -> None:
+def test_outputs_that_would_destroy_an_input_or_one_another_are_refused(tmp_path: Path) -> None:
     source, link = write_atomically(tmp_path / "in.xosc", "x"), tmp_path / "link.xosc"
     link.symlink_to(source)
-    refuse_targets([tmp_path / "out.xosc", tmp_path / "out.html", None], [source])
-    for target in (source, link, tmp_path / "sub" / ".." / "in.xosc"):
+    refuse_outputs([tmp_path / "out.xosc", tmp_path / "out.html", None], [source])
+    for output in (source, link, tmp_path / "sub" / ".." / "in.xosc"):
         with pytest.raises(FormatError, match="is an input"):
-            refuse_targets([target], [source])
+            refuse_outputs([output], [source])
     with pytest.raises(FormatError, match="named for two outputs"):
-        refuse_targets([tmp_path / "out", tmp_path / "out"])
+        refuse_outputs([tmp_path / "out", tmp_path / "out"])
     with pytest.raises(FormatError, match="is a folder"):
-        refuse_targets([tmp_path], [source])
+        refuse_outputs([tmp_path], [source])
 
 
-def test_a_target_whose_folder_can_not_be_made_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    refuse_targets([tmp_path / "new" / "folder" / "out.html"])
+def test_an_output_whose_folder_can_not_be_made_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    refuse_outputs([tmp_path / "new" / "folder" / "out.html"])
     file = write_atomically(tmp_path / "file", "x")
-    for target in (file / "out.html", file / "deeper" / "out.html"):
+    for output in (file / "out.html", file / "deeper" / "out.html"):
         with pytest.raises(FormatError, match=r"out\.html: can't be written: .*file is a file, not a folder"):
-            refuse_targets([target])
+            refuse_outputs([output])
     monkeypatch.setattr("os.access", lambda *_: False)  # permissions don't bind the user that runs many a test
     with pytest.raises(FormatError, match="no permission to write to"):
-        refuse_targets([tmp_path / "out.html"])
+        refuse_outputs([tmp_path / "out.html"])

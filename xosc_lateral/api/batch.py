@@ -10,7 +10,7 @@ from xosc_lateral.api.convert import convert_settings
 from xosc_lateral.api.inputs import PathLike, Paths, ProfileLike
 from xosc_lateral.api.result import Result
 from xosc_lateral.errors import FormatError
-from xosc_lateral.formats.targets import claim, folder_target
+from xosc_lateral.formats.output_paths import claim, output_folder
 from xosc_lateral.limits import JOB_MEMORY, JOB_TIMEOUT
 from xosc_lateral.pipeline.batch import JobOutcome, JobState
 from xosc_lateral.pipeline.batch import convert_many as outcomes_of
@@ -121,7 +121,7 @@ def convert_many(
         inputs = list(scenarios)
     else:
         inputs = list(frame_requests(scenarios, settings, variants=variants))
-    batch = plan_batch(inputs, folder_target(output), settings, variants=variants, report=report)
+    batch = plan_batch(inputs, output_folder(output), settings, variants=variants, report=report)
     if not len(batch):
         raise FormatError(f"no scenario to convert{_left_out(batch)}", path=", ".join(map(str, inputs[:3])) or output)
     # A folder in an output's place is that output's failure alone.

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from xosc_lateral.api.inputs import DrivesLike, GivenDrives, PathLike, Paths, ProfileLike, given_drives, given_profile
 from xosc_lateral.api.result import Result
-from xosc_lateral.formats.targets import claim, folder_target
+from xosc_lateral.formats.output_paths import claim, output_folder
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -142,4 +142,4 @@ class RealismBoard(Result):
 
 def board_files(folder: PathLike) -> list[Path]:
     """Paths of a board's files in a folder."""
-    return [folder_target(folder) / name for name in FILES]
+    return [output_folder(folder) / name for name in FILES]

@@ -10,7 +10,7 @@ from xosc_lateral.api.inputs import PathLike, Paths, ProfileLike, as_paths, road
 from xosc_lateral.api.result import Result
 from xosc_lateral.errors import FormatError
 from xosc_lateral.formats.openscenario.write.target import target
-from xosc_lateral.formats.targets import claim, file_target
+from xosc_lateral.formats.output_paths import claim, output_file
 from xosc_lateral.pipeline.convert import convert_scenario
 from xosc_lateral.pipeline.settings import AUTO, TIME_LIMIT, ConvertSettings, OutputMode
 
@@ -121,8 +121,8 @@ def convert(
         strict=strict,
     )
     source = Path(scenario)
-    written = source if output is None else scenario_target(output, source)
-    page = None if report is None else file_target(report, f"{written.stem}.html", REPORT_SUFFIXES)
+    written = source if output is None else output_scenario(output, source)
+    page = None if report is None else output_file(report, f"{written.stem}.html", REPORT_SUFFIXES)
     claim([None if output is None else written, page], [source], force=force)
     made = convert_scenario(source, written, settings, variant=variant, report=page, save=output is not None)
     result = Conversion(made)
@@ -131,11 +131,11 @@ def convert(
     return result
 
 
-def scenario_target(output: PathLike, source: Path) -> Path:
+def output_scenario(output: PathLike, source: Path) -> Path:
     """Path of a converted scenario; in a folder its source's name, `_lifelike` where that would be the source."""
     if not source.exists():
         raise FormatError("no such file or folder", path=source)
-    path = file_target(output, source.name, SCENARIO_SUFFIXES)
+    path = output_file(output, source.name, SCENARIO_SUFFIXES)
     same = path.parent.resolve() == source.parent.resolve() and path.name == source.name
     return lifelike(source) if same and path != Path(output) else path
 
@@ -287,7 +287,7 @@ class Conversion(Result):
         from xosc_lateral.formats.atomic import write_atomically
         from xosc_lateral.report.scenario import conversion_page
 
-        page = file_target(path, f"{self._made.output.stem}.html", REPORT_SUFFIXES)
+        page = output_file(path, f"{self._made.output.stem}.html", REPORT_SUFFIXES)
         claim([page], [self.source], force=force)
         self.report = write_atomically(page, conversion_page(self._made))
         return page

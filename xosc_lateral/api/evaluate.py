@@ -18,7 +18,7 @@ from xosc_lateral.api.inputs import (
     naming,
 )
 from xosc_lateral.api.result import Result
-from xosc_lateral.formats.targets import claim, file_target
+from xosc_lateral.formats.output_paths import claim, output_file
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -134,7 +134,7 @@ class Evaluation(Result):
         from xosc_lateral.formats.atomic import write_atomically
         from xosc_lateral.report.evaluation import evaluation_page
 
-        target = file_target(path, f"{self.profile.name}_evaluation.html", REPORT_SUFFIXES)
-        claim([target], self._given.files, force=force)
-        write_atomically(target, evaluation_page(self._scores, self.profile, self._given.inputs))
-        return target
+        output = output_file(path, f"{self.profile.name}_evaluation.html", REPORT_SUFFIXES)
+        claim([output], self._given.files, force=force)
+        write_atomically(output, evaluation_page(self._scores, self.profile, self._given.inputs))
+        return output

@@ -9,7 +9,7 @@ from xosc_lateral.api.inputs import PathLike, Paths, as_paths
 from xosc_lateral.api.result import Result
 from xosc_lateral.formats.importers import find_importer
 from xosc_lateral.formats.importers.table import as_imported
-from xosc_lateral.formats.targets import claim, file_target
+from xosc_lateral.formats.output_paths import claim, output_file
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -80,7 +80,7 @@ class ImportedDrives(Result):
         from xosc_lateral.formats.importers.table import write_imported
         from xosc_lateral.formats.output_tables import output_suffixes
 
-        target = file_target(path, f"{self.sources[0].name.split('.')[0]}.parquet", output_suffixes())
-        claim([target], [source for source in self.sources if source.is_file()], force=force)
-        write_imported(self._imported, target)
-        return target
+        output = output_file(path, f"{self.sources[0].name.split('.')[0]}.parquet", output_suffixes())
+        claim([output], [source for source in self.sources if source.is_file()], force=force)
+        write_imported(self._imported, output)
+        return output

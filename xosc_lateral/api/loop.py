@@ -17,7 +17,7 @@ from xosc_lateral.api.inputs import (
     naming,
 )
 from xosc_lateral.api.result import Result
-from xosc_lateral.formats.targets import claim, folder_target
+from xosc_lateral.formats.output_paths import claim, output_folder
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -163,11 +163,11 @@ class ClosedLoop(Result):
         from xosc_lateral.formats.json_text import canonical_json
         from xosc_lateral.report.loop import loop_page
 
-        target = folder_target(folder)
-        claim(self.report_files(target), self._given.files, force=force)
-        write_atomically(target / "report.json", canonical_json(self.to_dict()) + "\n")
-        write_atomically(target / "report.html", loop_page(self._result, self._lack_of_fit, self._given.files))
-        return target
+        output = output_folder(folder)
+        claim(self.report_files(output), self._given.files, force=force)
+        write_atomically(output / "report.json", canonical_json(self.to_dict()) + "\n")
+        write_atomically(output / "report.html", loop_page(self._result, self._lack_of_fit, self._given.files))
+        return output
 
     @staticmethod
     def report_files(folder: Path) -> tuple[Path, Path]:

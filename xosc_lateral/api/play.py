@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from xosc_lateral.api.inputs import PathLike, Paths, as_paths, road_search
 from xosc_lateral.api.result import Result
 from xosc_lateral.formats.hashes import parsed_hashes
-from xosc_lateral.formats.targets import claim, file_target
+from xosc_lateral.formats.output_paths import claim, output_file
 from xosc_lateral.motion.segments import SegmentRow
 from xosc_lateral.pipeline.load import Played, play_scenario
 from xosc_lateral.pipeline.segments import scenario_segments
@@ -168,10 +168,10 @@ class Playback(Result):
         """Write the table: ``.csv``, ``.csv.gz`` or ``.parquet``."""
         from xosc_lateral.formats.output_tables import output_suffixes, write_table
 
-        target = file_target(path, f"{self.scenario.stem}.csv", output_suffixes())
-        claim([target], self._inputs(), force=force)
-        write_table(target, self._provenance(), frame=self.to_frame, text=self.csv)
-        return target
+        output = output_file(path, f"{self.scenario.stem}.csv", output_suffixes())
+        claim([output], self._inputs(), force=force)
+        write_table(output, self._provenance(), frame=self.to_frame, text=self.csv)
+        return output
 
     def page(self) -> str:
         """A self-contained HTML page that plays the scenario."""
@@ -192,13 +192,13 @@ class Playback(Result):
         """
         from xosc_lateral.formats.atomic import write_atomically
 
-        target = file_target(path, f"{self.scenario.stem}_view.html", (*PAGE_SUFFIXES, RECORDING_SUFFIX))
-        claim([target], self._inputs(), force=force)
-        if target.name.lower().endswith(RECORDING_SUFFIX):
+        output = output_file(path, f"{self.scenario.stem}_view.html", (*PAGE_SUFFIXES, RECORDING_SUFFIX))
+        claim([output], self._inputs(), force=force)
+        if output.name.lower().endswith(RECORDING_SUFFIX):
             from xosc_lateral.report.recording import scene_recording
 
-            return write_atomically(target, scene_recording(self._played.motion, self._played.network))
-        return write_atomically(target, self.page())
+            return write_atomically(output, scene_recording(self._played.motion, self._played.network))
+        return write_atomically(output, self.page())
 
     def _inputs(self) -> list[Path]:
         scenario = self._played.scenario

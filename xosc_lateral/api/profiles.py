@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from xosc_lateral.api.inputs import PathLike, Paths, ProfileLike, as_paths, given_profile
 from xosc_lateral.api.result import Result
 from xosc_lateral.errors import FormatError
-from xosc_lateral.formats.targets import claim, file_target, folder_target
+from xosc_lateral.formats.output_paths import claim, output_file, output_folder
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -53,10 +53,10 @@ def write_profile(profile: DriverProfile, path: PathLike, *, force: bool = False
     """
     from xosc_lateral.formats import profiles
 
-    target = file_target(path, f"{profile.name}.json", PROFILE_SUFFIXES)
-    claim([target], force=force)
-    profiles.write_profile(profile, target)
-    return target
+    output = output_file(path, f"{profile.name}.json", PROFILE_SUFFIXES)
+    claim([output], force=force)
+    profiles.write_profile(profile, output)
+    return output
 
 
 def write_card(profile: DriverProfile, path: PathLike, *, force: bool = False) -> Path:
@@ -64,9 +64,9 @@ def write_card(profile: DriverProfile, path: PathLike, *, force: bool = False) -
     from xosc_lateral.formats.atomic import write_atomically
     from xosc_lateral.report.card_page import card_page
 
-    target = file_target(path, f"{profile.name}.html", (".html", ".htm"))
-    claim([target], force=force)
-    return write_atomically(target, card_page(profile))
+    output = output_file(path, f"{profile.name}.html", (".html", ".htm"))
+    claim([output], force=force)
+    return write_atomically(output, card_page(profile))
 
 
 def list_profiles(
@@ -126,11 +126,11 @@ def add_profile(
 
     folders = [library] if Path(library).is_dir() else []
     added = described(given_profile(profile, folders), name=name, add_tags=tags, fields=metadata)
-    target = folder_target(library) / f"{added.name}.json"
-    if target.exists() and not force:
-        raise FormatError("there is a profile of this id; --name gives it another, --force replaces it", path=target)
-    profiles.write_profile(added, target)
-    return target
+    output = output_folder(library) / f"{added.name}.json"
+    if output.exists() and not force:
+        raise FormatError("there is a profile of this id; --name gives it another, --force replaces it", path=output)
+    profiles.write_profile(added, output)
+    return output
 
 
 def tag_profile(
@@ -261,6 +261,6 @@ class ProfileComparison(Result):
         from xosc_lateral.formats.atomic import write_atomically
         from xosc_lateral.report.comparison import comparison_page
 
-        target = file_target(path, "profiles.html", (".html", ".htm"))
-        claim([target], force=force)
-        return write_atomically(target, comparison_page(self._compared))
+        output = output_file(path, "profiles.html", (".html", ".htm"))
+        claim([output], force=force)
+        return write_atomically(output, comparison_page(self._compared))

@@ -17,7 +17,7 @@ from xosc_lateral.api.inputs import (
     naming,
 )
 from xosc_lateral.api.result import Result
-from xosc_lateral.formats.targets import claim, file_target
+from xosc_lateral.formats.output_paths import claim, output_file
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -155,10 +155,10 @@ class Offsets(Result):
         """Write the table: ``.csv``, ``.csv.gz`` or ``.parquet``, with its provenance."""
         from xosc_lateral.formats.output_tables import output_suffixes, write_frame
 
-        target = file_target(path, f"{self.profile.name}.csv", output_suffixes())
-        claim([target], () if self._given is None else self._given.files, force=force)
-        write_frame(self.to_frame(), target, self._provenance())
-        return target
+        output = output_file(path, f"{self.profile.name}.csv", output_suffixes())
+        claim([output], () if self._given is None else self._given.files, force=force)
+        write_frame(self.to_frame(), output, self._provenance())
+        return output
 
     def _provenance(self) -> dict[str, Any]:
         from xosc_lateral.formats.profiles import profile_hash

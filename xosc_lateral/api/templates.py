@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 from xosc_lateral.api.inputs import PathLike
 from xosc_lateral.api.result import Result
+from xosc_lateral.formats.output_paths import claim, output_folder
 from xosc_lateral.formats.own_files import template_mark
-from xosc_lateral.formats.targets import claim, folder_target
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -58,8 +58,8 @@ def write_template(name: str, folder: PathLike, *, force: bool = False, **settin
     from xosc_lateral.templates import find_template
 
     files = find_template(name).files({key: str(value) for key, value in settings.items()})
-    target = folder_target(folder)
-    paths = {target / file: text for file, text in files.items()}
+    output = output_folder(folder)
+    paths = {output / file: text for file, text in files.items()}
     claim(paths, force=force)
     for path, text in paths.items():
         write_atomically(path, text.rstrip() + "\n" + template_mark(text))

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from xosc_lateral.api.inputs import PathLike
 from xosc_lateral.formats.openscenario.write import Player, VariantFiles, write_variant_set
-from xosc_lateral.formats.targets import claim
+from xosc_lateral.formats.output_paths import claim
 from xosc_lateral.pipeline.settings import OutputMode
 
 

@@ -16,7 +16,7 @@ from xosc_lateral.drives.drive import Run
 FloatArray = NDArray[np.float64]
 M = TypeVar("M", bound=LateralModel)
 
-FIRST_LOOK, DESCENTS, FIRST_STEPS, STEPS = 64, 3, 40, 80
+FIRST_POINTS, DESCENTS, FIRST_STEPS, STEPS = 64, 3, 40, 80
 """Points at which the box is first looked over; how many of the best of them are gone down from; evaluations of each of
 these descents, and of the one that goes on from where the best of them ends. From a single point, two Sobol sequences
 ended at distances of 0.39 and 0.52 for the potential field on one half of the vehicles; from three, 0.38 and 0.38."""
@@ -80,7 +80,7 @@ def calibrate(
         )
         return float(found.fun), np.clip(found.x, 0.0, 1.0)
 
-    points = qmc.Sobol(len(names), seed=seed).random(FIRST_LOOK if len(names) > 1 else FIRST_LOOK // 2)
+    points = qmc.Sobol(len(names), seed=seed).random(FIRST_POINTS if len(names) > 1 else FIRST_POINTS // 2)
     nearest = points[np.argsort([cost(point) for point in points], kind="stable")[:DESCENTS]]
     first = min((descent(point, FIRST_STEPS) for point in nearest), key=_value)
     return model_at(min(first, descent(first[1], STEPS), key=_value)[1])

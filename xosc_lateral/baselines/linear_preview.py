@@ -27,7 +27,7 @@ nearly the same, and their difference would be fitted to noise. [-]"""
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class LinearPreview(SimulatedModel):
-    """Offset = habit + gains for left curves, or for right curves, times the mean curvatures ahead.
+    """Offset = the vehicle's mean + gains for left curves, or for right curves, times the mean curvatures ahead.
 
     Parameters
     ----------
@@ -73,7 +73,7 @@ class LinearPreview(SimulatedModel):
         return np.asarray(plan - plan[:, :1] + batch.start[:, None])
 
     def plan(self, curvature: FloatArray, speed: FloatArray) -> FloatArray:
-        """Offset from the habit, shape (m,). [m]"""
+        """Offset from the vehicle's mean, shape (m,). [m]"""
         return np.asarray(_columns(curvature, speed) @ np.concatenate([self.left, self.right]))
 
     @property

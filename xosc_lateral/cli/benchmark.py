@@ -44,7 +44,7 @@ def realism(
     """Fit every model to half of the drives and rank it on the other half: distances, floors, intervals."""
     from xosc_lateral.api.benchmark import benchmark_realism, board_files
     from xosc_lateral.baselines.catalogue import MODELS
-    from xosc_lateral.formats.targets import claim
+    from xosc_lateral.formats.output_paths import claim
     from xosc_lateral.report.progress import no_progress, shown_progress
 
     for name in model or ():

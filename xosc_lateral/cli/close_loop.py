@@ -41,22 +41,22 @@ def close_loop(
     from xosc_lateral import close_loop, write_profile
     from xosc_lateral.api.loop import ClosedLoop
     from xosc_lateral.api.profiles import PROFILE_SUFFIXES
-    from xosc_lateral.formats.targets import claim, file_target, folder_target
+    from xosc_lateral.formats.output_paths import claim, output_file, output_folder
     from xosc_lateral.report.progress import no_progress, shown_progress
 
-    target = file_target(output, "refined.json", PROFILE_SUFFIXES)
-    claim([target, *ClosedLoop.report_files(folder_target(report))], tables, force=force)
+    written = output_file(output, "refined.json", PROFILE_SUFFIXES)
+    claim([written, *ClosedLoop.report_files(output_folder(report))], tables, force=force)
     with no_progress() if quiet else shown_progress("closing the loop") as progress:
         result = close_loop(
             tables,
             profile,
             seed=seed,
-            name=target.stem,
+            name=written.stem,
             leave_out=leave_out or (),
             columns=pairs(columns, "--map"),
             library=library or (),
             progress=progress,
         )
-    write_profile(result.profile, target, force=force)
+    write_profile(result.profile, written, force=force)
     result.write_report(report, force=force)
     say(result, as_json=as_json, quiet=quiet)

@@ -183,9 +183,9 @@ def _convert_one(
     quiet: bool,
     as_json: bool,
 ) -> None:
-    from xosc_lateral.api.convert import REPORT_SUFFIXES, convert, lifelike, scenario_target
+    from xosc_lateral.api.convert import REPORT_SUFFIXES, convert, lifelike, output_scenario
     from xosc_lateral.api.variants import variant_files, variant_set
-    from xosc_lateral.formats.targets import STDOUT, claim, file_target
+    from xosc_lateral.formats.output_paths import STDOUT, claim, output_file
     from xosc_lateral.pipeline.convert import numbered
 
     if output == STDOUT:
@@ -196,11 +196,11 @@ def _convert_one(
         say(result, as_json=False, quiet=quiet, aside=True)
         unclean = bool(result.warnings) or not result.enriched
     else:
-        target = lifelike(source) if output is None else scenario_target(output, source)
-        page = None if report is None else file_target(report, f"{target.stem}.html", REPORT_SUFFIXES)
-        outputs = [numbered(target, variant, variants) for variant in range(variants)]
+        written = lifelike(source) if output is None else output_scenario(output, source)
+        page = None if report is None else output_file(report, f"{written.stem}.html", REPORT_SUFFIXES)
+        outputs = [numbered(written, variant, variants) for variant in range(variants)]
         pages = [None if page is None else numbered(page, variant, variants) for variant in range(variants)]
-        files = variant_files(target, variants, settings["mode"], settings["player"])
+        files = variant_files(written, variants, settings["mode"], settings["player"])
         claim([*outputs, *pages, *(files.all(variants) if files else ())], [source], force=settings["force"])
         unclean = False
         for variant, (path, its_page) in enumerate(zip(outputs, pages, strict=True)):
@@ -208,7 +208,7 @@ def _convert_one(
             say(result, as_json=as_json, quiet=quiet)
             unclean |= bool(result.warnings) or not result.enriched
         if files is not None:
-            found = variant_set(outputs, target, source=source, force=True)
+            found = variant_set(outputs, written, source=source, force=True)
             if not (quiet or as_json):
                 typer.echo(str(found))
     if strict and unclean:

@@ -30,9 +30,9 @@ def evaluate(
     """Score a profile on measured drives and on a floor of other real drivers: metrics, spectrum, classifiers."""
     from xosc_lateral import evaluate
     from xosc_lateral.api.convert import REPORT_SUFFIXES
-    from xosc_lateral.formats.targets import claim, file_target
+    from xosc_lateral.formats.output_paths import claim, output_file
 
-    page = None if report is None else file_target(report, "evaluation.html", REPORT_SUFFIXES)
+    page = None if report is None else output_file(report, "evaluation.html", REPORT_SUFFIXES)
     claim([page], tables, force=force)
     mapping = pairs(columns, "--map")
     result = evaluate(profile, tables, seed=seed, classify=classify, columns=mapping, library=library or ())

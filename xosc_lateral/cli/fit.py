@@ -58,13 +58,13 @@ def fit(
     from xosc_lateral import fit, write_profile
     from xosc_lateral.api.profiles import PROFILE_SUFFIXES
     from xosc_lateral.driver.drivability import fit_warnings
+    from xosc_lateral.formats.output_paths import STDOUT, claim, output_file
     from xosc_lateral.formats.profiles import describe_profile, profile_bytes, profile_record
-    from xosc_lateral.formats.targets import STDOUT, claim, file_target
 
     usual = name or tables[0].name.split(".")[0]
-    target = None if output == STDOUT else file_target(output, f"{usual}.json", PROFILE_SUFFIXES)
-    claim([target], tables, force=force)
-    called = name or (usual if target is None else target.stem)
+    written = None if output == STDOUT else output_file(output, f"{usual}.json", PROFILE_SUFFIXES)
+    claim([written], tables, force=force)
+    called = name or (usual if written is None else written.stem)
     mapping = pairs(columns, "--map")
     profile = fit(
         tables,
@@ -76,12 +76,12 @@ def fit(
         sensor_noise=sensor_noise,
         left_hand=left_hand,
     )
-    if target is None:
+    if written is None:
         write_stdout(profile_bytes(profile))
     else:
-        write_profile(profile, target, force=force)
-    if as_json and target is not None:
-        say_json({"output": str(target), **profile_record(profile)})
+        write_profile(profile, written, force=force)
+    if as_json and written is not None:
+        say_json({"output": str(written), **profile_record(profile)})
     elif not quiet:
         typer.echo(describe_profile(profile), err=True)
     for warning in fit_warnings(profile):

@@ -139,12 +139,12 @@ def _import(
     as_json: bool,
 ) -> None:
     from xosc_lateral import import_drives
+    from xosc_lateral.formats.output_paths import STDOUT, claim, output_file
     from xosc_lateral.formats.tables import TABLE_SUFFIXES
-    from xosc_lateral.formats.targets import STDOUT, claim, file_target
 
     if output != STDOUT:
         files = [source for source in sources if source.is_file()]
-        claim([file_target(output, "drives.parquet", TABLE_SUFFIXES)], files, force=force)
+        claim([output_file(output, "drives.parquet", TABLE_SUFFIXES)], files, force=force)
     imported = import_drives(name, sources[0] if len(sources) == 1 else sources, **options)
     written = None
     if output == STDOUT:

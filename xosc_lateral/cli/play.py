@@ -50,11 +50,11 @@ def play(
 ) -> None:
     """Play a scenario without offsets and write every entity's position at every step."""
     from xosc_lateral import play
+    from xosc_lateral.formats.output_paths import STDOUT, claim, output_file
     from xosc_lateral.formats.tables import TABLE_SUFFIXES
-    from xosc_lateral.formats.targets import STDOUT, claim, file_target
 
     if output != STDOUT:
-        claim([file_target(output, f"{scenario.stem}.csv", TABLE_SUFFIXES)], [scenario], force=force)
+        claim([output_file(output, f"{scenario.stem}.csv", TABLE_SUFFIXES)], [scenario], force=force)
     played = play(
         scenario,
         step=step,

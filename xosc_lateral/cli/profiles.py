@@ -165,8 +165,8 @@ def export(
 ) -> None:
     """Write profiles to a file or a folder, to pass them on."""
     from xosc_lateral import read_profile, write_profile
+    from xosc_lateral.formats.output_paths import STDOUT, is_folder
     from xosc_lateral.formats.profiles import profile_bytes
-    from xosc_lateral.formats.targets import STDOUT, is_folder
 
     chosen = [read_profile(name, library or ()) for name in names]
     if len(chosen) > 1 and not is_folder(output):

@@ -1,4 +1,4 @@
-"""Planted effects of columns on how much a driver wanders, and how hard he comes back."""
+"""Planted effects of columns on how much a driver moves, and how hard he comes back."""
 
 from __future__ import annotations
 

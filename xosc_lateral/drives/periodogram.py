@@ -25,7 +25,7 @@ class Detrend(Enum):
     NOTHING = "nothing"
     MEAN = "mean"
     ENDS = "ends"
-    """The straight line through its first and its last value: what wanders slowly then leaks into no frequency."""
+    """The straight line through its first and its last value: what drifts slowly then leaks into no frequency."""
 
 
 def hann(size: int) -> FloatArray:

@@ -14,7 +14,7 @@ from xosc_lateral.formats.source import refuse_guarded
 
 
 def write_atomically(path: Path | str, data: bytes | str, *, durable: bool = False) -> Path:
-    """Write bytes or UTF-8 text to a temporary file beside the target, then move it there; missing folders are made.
+    """Write bytes or UTF-8 text to a temporary file beside the output, then move it there; missing folders are made.
 
     Parameters
     ----------
@@ -27,7 +27,7 @@ def write_atomically(path: Path | str, data: bytes | str, *, durable: bool = Fal
     Raises
     ------
     OSError
-        Disk full, no permission: the target is as it was, and no temporary file stays behind.
+        Disk full, no permission: the output is as it was, and no temporary file stays behind.
     """
     content = data.encode() if isinstance(data, str) else data
 
@@ -64,12 +64,12 @@ def write_pieces_atomically(path: Path | str, pieces: Iterable[bytes]) -> str:
 
 
 def replace_atomically(path: Path | str, write: Callable[[Path], object]) -> Path:
-    """Let `write` fill a temporary file beside the target, then move it there: for writers that want a path.
+    """Let `write` fill a temporary file beside the output, then move it there: for writers that want a path.
 
     Raises
     ------
     FormatError
-        The target is a file that was opened as an input (`source.guarding_inputs`).
+        The output is a file that was opened as an input (`source.guarding_inputs`).
     OSError
         As for `write_atomically`.
     """
@@ -81,12 +81,12 @@ def replace_atomically(path: Path | str, write: Callable[[Path], object]) -> Pat
     return path
 
 
-def refuse_targets(targets: Iterable[Path | None], inputs: Iterable[Path] = ()) -> None:
+def refuse_outputs(outputs: Iterable[Path | None], inputs: Iterable[Path] = ()) -> None:
     """Refuse outputs that can't be meant, before any work is done and anything is written.
 
     Parameters
     ----------
-    targets : iterable of Path or None
+    outputs : iterable of Path or None
         Files to be written; None: not wanted.
     inputs : iterable of Path
         Files that are read.
@@ -94,22 +94,22 @@ def refuse_targets(targets: Iterable[Path | None], inputs: Iterable[Path] = ()) 
     Raises
     ------
     FormatError
-        If a target is a folder, an input (links resolved), or named twice, or its folder can't be made or written to.
+        If an output is a folder, an input (links resolved), or named twice, or its folder can't be made or written to.
     """
     taken = {path.resolve(): "is an input; choose another output" for path in inputs}
-    for target in targets:
-        if target is None:
+    for output in outputs:
+        if output is None:
             continue
-        if target.is_dir():
-            raise FormatError("is a folder, not a file to write to", path=target)
-        if (why := taken.get(target.resolve())) is not None:
-            raise FormatError(why, path=target)
-        taken[target.resolve()] = "is named for two outputs"
-        parent = next(folder for folder in target.absolute().parents if folder.exists())
+        if output.is_dir():
+            raise FormatError("is a folder, not a file to write to", path=output)
+        if (why := taken.get(output.resolve())) is not None:
+            raise FormatError(why, path=output)
+        taken[output.resolve()] = "is named for two outputs"
+        parent = next(folder for folder in output.absolute().parents if folder.exists())
         if not parent.is_dir():
-            raise FormatError(f"can't be written: {parent} is a file, not a folder", path=target)
+            raise FormatError(f"can't be written: {parent} is a file, not a folder", path=output)
         if not os.access(parent, os.W_OK | os.X_OK):
-            raise FormatError(f"can't be written: no permission to write to {parent}", path=target)
+            raise FormatError(f"can't be written: no permission to write to {parent}", path=output)
 
 
 @contextmanager

@@ -1,7 +1,7 @@
 """The movement that no effect explains as an autoregression, and whitening by it, for generalised least squares.
 
 A heterogeneous autoregression [1]_: the last seconds one by one, and the means of longer and longer stretches before
-them. It knows the wander of a minute with few parameters. Whitening is exact within each run: the first rows use the
+them. It knows drifts of a minute with few parameters. Whitening is exact within each run: the first rows use the
 lower-order predictors of the same process (the Levinson recursion stepped down [2]_), and runs are independent.
 
 References

@@ -54,7 +54,7 @@ ROUNDING = 1e-6
 """A term may lower the likelihood of the rows that it is fitted to by so much. More, and the model contradicts it: a
 factor on the movement that changes faster than the movement does, say, which its innovations alone allow. [nat]"""
 
-LOOKS = 2
+ROUNDS = 2
 """Times that what acts is looked for beside what was found before; the first changes most."""
 
 
@@ -105,13 +105,13 @@ def find_column(search: Search, kind: type[ColumnKind], fitted: Fitted) -> Outco
     dictionary = search.dictionary(kind, fitted, problem)
     refused: set[tuple[str, ...]] = set()
     while True:
-        look = _look(search, kind, fitted, problem, dictionary, refused, draws=NULL_DRAWS)
-        if look is None:
+        scored = _score(search, kind, fitted, problem, dictionary, refused, draws=NULL_DRAWS)
+        if scored is None:
             return Outcome(None, min(refused), 1.0) if refused else None
-        p_value = upper_tail(float(look.scores.scores[look.scores.best]), look.scores.maxima)
+        p_value = upper_tail(float(scored.scores.scores[scored.scores.best]), scored.scores.maxima)
         if p_value > search.level_of(kind.component):  # refined, it would not be accepted either
-            return Outcome(None, dictionary.candidates[look.scores.best].columns, p_value)
-        term, after = _best(search, kind, fitted, look, refused)
+            return Outcome(None, dictionary.candidates[scored.scores.best].columns, p_value)
+        term, after = _best(search, kind, fitted, scored, refused)
         if not _grows(fitted, after) and after.log_likelihood >= fitted.log_likelihood - ROUNDING:
             assert isinstance(term, Term)
             return Outcome(term, term.columns, p_value, after)
@@ -127,28 +127,28 @@ def probability_of(search: Search, kind: type[ColumnKind], fitted: Fitted, colum
         Without a term of these columns. Where it has a product with one of them, that product is known as it is, not
         with every shape of its factors: nothing would be left to test.
     """
-    look = _first_look(search, kind, fitted, spared=columns)
-    if look is None:
+    scored = _score_all(search, kind, fitted, spared=columns)
+    if scored is None:
         return 1.0
-    own = [i for i, candidate in enumerate(look.dictionary.candidates) if candidate.columns == columns]
-    return upper_tail(float(look.scores.scores[own].max()), look.scores.maxima) if own else 1.0
+    own = [i for i, candidate in enumerate(scored.dictionary.candidates) if candidate.columns == columns]
+    return upper_tail(float(scored.scores.scores[own].max()), scored.scores.maxima) if own else 1.0
 
 
 def best_probability(search: Search, kind: type[ColumnKind], fitted: Fitted) -> float:
     """p-value of the best candidate of all, before refinement."""
-    look = _first_look(search, kind, fitted)
-    return 1.0 if look is None else upper_tail(float(look.scores.scores.max()), look.scores.maxima)
+    scored = _score_all(search, kind, fitted)
+    return 1.0 if scored is None else upper_tail(float(scored.scores.scores.max()), scored.scores.maxima)
 
 
-def _first_look(search: Search, kind: type[ColumnKind], fitted: Fitted, spared: tuple[str, ...] = ()) -> _Look | None:
+def _score_all(search: Search, kind: type[ColumnKind], fitted: Fitted, spared: tuple[str, ...] = ()) -> _Scored | None:
     problem = kind.problem(fitted)
     dictionary = search.dictionary(kind, fitted, problem)
-    return _look(search, kind, fitted, problem, dictionary, (), draws=NULL_DRAWS, spared=spared)
+    return _score(search, kind, fitted, problem, dictionary, (), draws=NULL_DRAWS, spared=spared)
 
 
 @dataclass(frozen=True, eq=False)
-class _Look:
-    """One look at all candidates."""
+class _Scored:
+    """All candidates, scored."""
 
     problem: Problem
     dictionary: Dictionary
@@ -156,7 +156,7 @@ class _Look:
     scores: Scores
 
 
-def _look(
+def _score(
     search: Search,
     kind: type[ColumnKind],
     fitted: Fitted,
@@ -166,7 +166,7 @@ def _look(
     *,
     draws: int,
     spared: tuple[str, ...] = (),
-) -> _Look | None:
+) -> _Scored | None:
     """Score what is not barred or refused; None: nothing is left."""
     barred = _barred(dictionary, kind, fitted, refused)
     if len(dictionary) == 0 or barred.all():
@@ -174,11 +174,11 @@ def _look(
     known = _known(problem, dictionary, [term for term in fitted.terms if isinstance(term, kind)], spared)
     drive = search.coarse.drive[problem.valid]
     scores = score_entries(dictionary, problem.observed, known, barred, drive, search.rng(0), draws=draws)
-    return _Look(problem, dictionary, known, scores)
+    return _Scored(problem, dictionary, known, scores)
 
 
 def _best(
-    search: Search, kind: type[ColumnKind], fitted: Fitted, look: _Look, refused: Collection[tuple[str, ...]]
+    search: Search, kind: type[ColumnKind], fitted: Fitted, scored: _Scored, refused: Collection[tuple[str, ...]]
 ) -> tuple[ColumnKind, Fitted]:
     """The term that the best candidate becomes, and the fit with it.
 
@@ -186,15 +186,15 @@ def _best(
     looked for once more with the noise that is left beside what was found: a strong slow effect makes the noise look
     slow, and against slow noise a quicker look-alike stands out better than the effect itself.
     """
-    term: ColumnKind = kind.of(look.dictionary.timed(look.scores.best))
+    term: ColumnKind = kind.of(scored.dictionary.timed(scored.scores.best))
     after = fit_model(fitted.coarse, (*fitted.terms, term))
     best: Refined | None = None
-    for _ in range(LOOKS):
+    for _ in range(ROUNDS):
         problem = kind.reweighted(fitted, after)
-        here: _Look | None = look
+        here: _Scored | None = scored
         if problem is not None:
             dictionary = build_dictionary(search.quantities, problem.whitener)
-            here = _look(search, kind, fitted, problem, dictionary, refused, draws=0)
+            here = _score(search, kind, fitted, problem, dictionary, refused, draws=0)
         if here is None:
             break
         refined, other = _refined(search, kind, here)
@@ -241,14 +241,14 @@ def _known(problem: Problem, dictionary: Dictionary, own: Sequence[ColumnKind], 
     return orthonormal(np.concatenate(blocks, axis=1), 1e-6)
 
 
-def _refined(search: Search, kind: type[ColumnKind], look: _Look) -> tuple[Refined, ColumnKind]:
+def _refined(search: Search, kind: type[ColumnKind], scored: _Scored) -> tuple[Refined, ColumnKind]:
     """Refine the best sets of columns; the best of them, which knows what others explain as much."""
-    candidates = look.dictionary.candidates
+    candidates = scored.dictionary.candidates
     costs = {candidate.family: candidate.cost for candidate in candidates}
-    refinement = Refinement(search.coarse, look.problem, look.known, costs, single=kind.single)
+    refinement = Refinement(search.coarse, scored.problem, scored.known, costs, single=kind.single)
     outcomes = [
-        refinement.refine(look.dictionary.timed(index), candidates[index].cost, search.columns)
-        for index in _contenders(look.dictionary, look.scores)
+        refinement.refine(scored.dictionary.timed(index), candidates[index].cost, search.columns)
+        for index in _contenders(scored.dictionary, scored.scores)
     ]
     outcomes.sort(key=lambda outcome: -outcome.score)
     parts = {(column,) for column in outcomes[0].effect.columns}

@@ -1,4 +1,4 @@
-"""What a closed loop leaves unexplained: every group of cells beside its own floor, and whether all of it is chance."""
+"""What a closed loop leaves unexplained: groups of statistics beside their own floor, and whether all of it is chance."""
 
 from __future__ import annotations
 
@@ -17,18 +17,18 @@ BoolArray = NDArray[np.bool_]
 IntArray = NDArray[np.intp]
 
 SPLITS = 64
-"""Random halves of the blocks that a cell's floor is averaged over, and that the whole error is compared with."""
+"""Random halves of the blocks that a statistic's floor is averaged over, and that the whole error is compared with."""
 
 LEVEL = 0.05
 """Share of those splits that may be as far apart as the refined profile and the drives are. [-]"""
 
 STANDS_OUT = 2.0
-"""A group of cells with so many times its own floor is named when something is left. [-]"""
+"""A group of summary statistics with so many times its own floor is named when something is left. [-]"""
 
 
 @dataclass(frozen=True, slots=True)
 class GroupError:
-    """Root mean square over the cells of one group, on held-out blocks. [m]
+    """Root mean square over the statistics of one group, on held-out blocks. [m]
 
     Parameters
     ----------
@@ -58,9 +58,9 @@ class LackOfFit:
     Parameters
     ----------
     floors : mapping of str to array
-        Standard error of every cell: what blocks of the same drives make it differ by. [m]
+        Standard error of every statistic: what blocks of the same drives make it differ by. [m]
     groups : tuple of GroupError
-        In the order of the cells.
+        In the order of the statistics.
     unexplained : float
         Part of the error after that the floor does not cover. [m]
     p_value : float
@@ -85,7 +85,7 @@ class LackOfFit:
 
 
 def lack_of_fit_of(result: LoopResult) -> LackOfFit:
-    """Compare every group of cells, and all of them, with what the drives differ from themselves by (seeded)."""
+    """Compare every group of statistics, and all of them, with what the drives differ from themselves by (seeded)."""
     timeline = result.statistics.timeline
     rng = np.random.default_rng(np.random.SeedSequence(result.seed, spawn_key=(11,)))
     splits = split_differences(result.statistics, result.unmoved, hold_out_blocks(timeline), rng, SPLITS)

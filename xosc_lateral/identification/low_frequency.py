@@ -1,12 +1,12 @@
 """A slow drift or a step of the mean that no column explains.
 
-People wander about what they take for the middle within a minute or two; that is memory, and any core model's business.
-So the whitened rows' spectrum between 50 s and 10 min says how likely each wander of up to 160 s is, and only what goes
+People drift about what they take for the middle within a minute or two; that is memory, and any core model's business.
+So the whitened rows' spectrum between 50 s and 10 min says how likely each drift of up to 160 s is, and only what goes
 beyond their continuation to longer periods counts. Everything is scored at low frequencies, where sums over time are
 sums over frequencies, weighted by that spectrum.
 
-Two nulls, and the less convinced one is believed: simulated rows with such a wander, and the drive's own rows with
-the sign of whole minutes drawn anew. The first knows how a wander goes on from minute to minute; the second knows how
+Two nulls, and the less convinced one is believed: simulated rows with such a drift, and the drive's own rows with
+the sign of whole minutes drawn anew. The first knows how a drift goes on from minute to minute; the second knows how
 large a single odd minute may be (a driver who sits on the marking for a while is no drift).
 
 References
@@ -47,7 +47,7 @@ NEAR_S = 90
 """A step is dated to the second within so much of where slow movement has it. [s]"""
 
 UNREMARKABLE = 6.0
-"""A wander with a lower score is not compared with chance: chance gives it in every few. [chi-square]"""
+"""A drift with a lower score is not compared with chance: chance gives it in every few. [chi-square]"""
 
 N_NULL = 600
 """Samples of either null: a mixture's tail takes many."""
@@ -65,7 +65,7 @@ SHORTEST_S = 12.0
 """Drifts and steps are scored at periods from here on. [s]"""
 
 ORDINARY_S = np.array([20.0, 40.0, 70.0, 110.0, 160.0])
-"""Correlation times of a wander that counts as ordinary. [s]"""
+"""Correlation times of a drift that counts as ordinary. [s]"""
 
 DRIFT_SIZES = (1, 2, 4, 8)
 """Numbers of half cosines tried for a drift."""
@@ -92,7 +92,7 @@ class LowFrequency:
 
     @property
     def is_step(self) -> bool:
-        """Whether one step explains more than a slow wander."""
+        """Whether one step explains more than a slow drift."""
         return self.step >= self.drift
 
 
@@ -171,7 +171,7 @@ class _Scores:
 
 
 def _simulated(rows: FloatArray, whitener: Whitener, rng: np.random.Generator) -> Iterator[FloatArray]:
-    """Rows with an ordinary wander, each with one drawn by how likely it is."""
+    """Rows with an ordinary drift, each with one drawn by how likely it is."""
     ordinary = _OrdinaryDrift.of(rows)
     for drawn in rng.choice(len(ordinary.share), size=N_NULL, p=ordinary.share):
         white = np.where(whitener.valid, rng.normal(size=len(rows)), 0.0)
@@ -189,13 +189,13 @@ def _resigned(rows: FloatArray, whitener: Whitener, rng: np.random.Generator) ->
 
 @dataclass(frozen=True, eq=False)
 class _OrdinaryDrift:
-    """What ordinary wanders would add to the spectrum of rows, and how likely each of them is.
+    """What ordinary drifts would add to the spectrum of rows, and how likely each of them is.
 
     Parameters
     ----------
-    levels : array, shape (wanders, n // 2 + 1)
-        Power of the rows with that wander, 1 without any.
-    share : array, shape (wanders,)
+    levels : array, shape (drifts, n // 2 + 1)
+        Power of the rows with that drift, 1 without any.
+    share : array, shape (drifts,)
         Probability of each, all being as likely beforehand.
     """
 

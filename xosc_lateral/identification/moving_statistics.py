@@ -1,4 +1,4 @@
-"""Hidden effects as they most likely were on the measured drives: the courses that figures show beside the data."""
+"""Hidden effects as they most likely were on measured drives: the latent paths that figures show beside the data."""
 
 from __future__ import annotations
 

@@ -57,7 +57,7 @@ class DriverVariance:
 def test_population(fitted: Fitted, known: FloatArray) -> DriverVariance | None:
     """Analysis of variance with every drive's halves as the noise; None with too few drives.
 
-    Halves of a drive are as far apart in time as a drive is long: what wanders slowly counts as noise, not as a driver.
+    Halves of a drive are as far apart in time as a drive is long: what drifts slowly counts as noise, not as a driver.
     `known`, shape (drives,): where the drives keep by effects between them. [m]
     """
     whitener = fitted.whitener

@@ -40,7 +40,7 @@ ORDER = 12
 """Past seconds that have a coefficient each in the movement's autoregression. [s]"""
 
 LONGEST = 96
-"""Past seconds that it sees as means of doubling stretches: the wander of a minute and a half. [s]"""
+"""Past seconds that it sees as means over doubling times: drifts of a minute and a half. [s]"""
 
 FLOOR = 0.03
 """White noise that the model of a drive has beside what it shows: no table knows the lane better (in the motorway

@@ -68,7 +68,7 @@ def _run(timeline: Timeline, removal: Removal, rows: slice, name: str, index: in
     width = timeline.lane_width[rows]
     rate = np.exp(removal.rate[rows])
     if np.any(rate != 1.0):
-        # the base's own clock runs at the effect's pace: read the movement at even ticks of that clock
+        # the base's own clock runs at the effect's rate: read the movement at even ticks of that clock
         ticks = np.concatenate([[0.0], np.cumsum(0.5 * (rate[1:] + rate[:-1]))])
         even = np.arange(int(ticks[-1]) + 1, dtype=np.float64)
         movement, width = np.interp(even, ticks, movement), np.interp(even, ticks, width)

@@ -1,9 +1,9 @@
 """The residual: where measured drives and a profile's own runs under the same context differ, in metres.
 
-Both are described by the same set of cells: the mean offset and the spread of the faster movement in each fifth of
-every context column, and where it says that there is none; the spread in each sixth of the drive, the movement's size
-in bands of frequency, and quantiles of the local spread. The error is the root mean square over the cells of measured
-minus expected, with the expectation taken over several runs of the profile. If no cell differs by more than the floor
+Both are described by the same summary statistics: the mean offset and the spread of the faster movement in each fifth
+of every context column, and where it says that there is none; the spread in each sixth of the drive, the movement's
+size in bands of frequency, and quantiles of the local spread. The error is the root mean square over them of measured
+minus expected, with the expectation taken over several runs of the profile. If none differs by more than the floor
 (what measured data differs from itself), no test of means, spreads, spectra or their dependence on context can tell the
 profile from the driver.
 """
@@ -95,7 +95,7 @@ class SummaryStatistics:
         return found
 
     def balance(self, half: BoolArray) -> dict[str, FloatArray]:
-        """Square root of the product of both parts' shares of the rows, by cell: 1/2 for equal halves."""
+        """Square root of the product of both parts' shares of the rows, by statistic: 1/2 for equal halves."""
         valid = self.timeline.valid
         overall = float(np.sqrt(np.mean(half[valid]) * np.mean(~half[valid])))
         found: dict[str, FloatArray] = {}
@@ -165,7 +165,7 @@ def simulated_runs(
 
 
 def expected(statistics: SummaryStatistics, runs: FloatArray, used: BoolArray) -> dict[str, FloatArray]:
-    """Mean of the cells over a profile's runs, shape (runs, n). [m]"""
+    """Mean of the statistics over a profile's runs, shape (runs, n). [m]"""
     several = [statistics.describe(run, used) for run in runs]
     return {name: np.mean([one[name] for one in several], axis=0) for name in several[0]}
 
@@ -178,10 +178,10 @@ def error_between(first: Mapping[str, FloatArray], second: Mapping[str, FloatArr
 def split_differences(
     statistics: SummaryStatistics, offset: FloatArray, blocks: IntArray, rng: np.random.Generator, splits: int
 ) -> list[dict[str, FloatArray]]:
-    """What measured data differs from itself: cells of random halves of the blocks against each other; NaN: no rows.
+    """What measured data differs from itself: those of random halves of the blocks against each other; NaN: no rows.
 
     Two parts of a and b rows differ by a standard deviation of sigma sqrt(1/a + 1/b); all n = a + b rows against an
-    exact expectation have sigma / sqrt(n). So every cell's difference is scaled by sqrt(a b) / n: 1/2 for halves.
+    exact expectation have sigma / sqrt(n). So every difference is scaled by sqrt(a b) / n: 1/2 for halves.
 
     Parameters
     ----------
@@ -204,7 +204,7 @@ def split_differences(
 
 
 def size_of(differences: Mapping[str, FloatArray]) -> float:
-    """Root mean square over groups of cells, >= 0, each group's mean square counting the same. [m]"""
+    """Root mean square over groups of summary statistics, >= 0, each group's mean square counting the same. [m]"""
     squares = [float(np.mean(seen**2)) for values in differences.values() if len(seen := values[np.isfinite(values)])]
     return float(np.sqrt(np.mean(squares))) if squares else 0.0
 

@@ -14,7 +14,7 @@ from xosc_lateral.enrich.conversion import ConversionProvenance, ConvertedScenar
 from xosc_lateral.enrich.enrich import enrich
 from xosc_lateral.enrich.result import Enriched
 from xosc_lateral.errors import FormatError
-from xosc_lateral.formats.atomic import refuse_targets
+from xosc_lateral.formats.atomic import refuse_outputs
 from xosc_lateral.formats.context_table import read_context
 from xosc_lateral.formats.openscenario.write import (
     Player,
@@ -93,7 +93,7 @@ def _convert(
     inputs = dict(input_hashes(played.scenario, played.network))
     if context is not None and settings.context is not None:
         inputs[settings.context] = context.sha256
-    refuse_targets([output if save else None, report], inputs)
+    refuse_outputs([output if save else None, report], inputs)
     drivers = choose_drivers(played.scenario, settings)
     enriched = enrich(
         played.motion,

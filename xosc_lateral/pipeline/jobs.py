@@ -159,8 +159,8 @@ def plan_batch(
             file_hash(
                 find_profile(name, settings.libraries)
             )  # wrong for all is said once, wrong in a table's row there
-    target = _normal(Path(folder))
-    requests = [_absolute(request) for request in _all_requests(inputs, settings, variants, target)]
+    root = _normal(Path(folder))
+    requests = [_absolute(request) for request in _all_requests(inputs, settings, variants, root)]
     base = _common_folder(requests)
     fingerprints = _Fingerprints()
     jobs: dict[str, Job] = {}
@@ -180,7 +180,7 @@ def plan_batch(
             continue  # named twice, by a folder and by itself, say
         repeat = f"_r{len(before):03d}" if before else ""
         before[key] = None
-        for job in _jobs(request, kind, base, target, fingerprints, repeat):
+        for job in _jobs(request, kind, base, root, fingerprints, repeat):
             earlier = jobs.setdefault(job.name, job)
             if earlier is not job:
                 what = f"would be written twice: from {earlier.scenario} and from {job.scenario}"
@@ -192,7 +192,7 @@ def plan_batch(
     planned = (jobs[name] if pages is None else _with_page(jobs[name], pages) for name in sorted(jobs))
     libraries = dict.fromkeys(request.settings.libraries for request in requests if uses_auto(request.settings))
     notes = dict.fromkeys(note for folders in libraries for note in hidden_by_libraries(folders))
-    return Batch(target, base, tuple(planned), tuple(left_out), tuple(notes))
+    return Batch(root, base, tuple(planned), tuple(left_out), tuple(notes))
 
 
 def _with_page(job: Job, pages: Path) -> Job:
@@ -200,13 +200,13 @@ def _with_page(job: Job, pages: Path) -> Job:
 
 
 def _all_requests(
-    inputs: Sequence[str | Path | Request], settings: ConvertSettings, variants: int, target: Path
+    inputs: Sequence[str | Path | Request], settings: ConvertSettings, variants: int, root: Path
 ) -> Iterator[Request]:
     for given in inputs:
         if isinstance(given, Request):
             yield given
         else:
-            yield from find_requests([given], settings, variants=variants, leave_out=target)
+            yield from find_requests([given], settings, variants=variants, leave_out=root)
 
 
 def _absolute(request: Request) -> Request:
@@ -231,7 +231,7 @@ def _common_folder(requests: Sequence[Request]) -> Path:
 
 
 def _jobs(
-    request: Request, kind: DocumentKind, base: Path, target: Path, fingerprints: _Fingerprints, repeat: str
+    request: Request, kind: DocumentKind, base: Path, root: Path, fingerprints: _Fingerprints, repeat: str
 ) -> Iterator[Job]:
     relative = request.scenario.relative_to(base)
     for one in concrete(request, kind):
@@ -247,7 +247,7 @@ def _jobs(
                 name=name,
                 scenario=printable(Path(os.path.relpath(source, base)).as_posix()),
                 source=source,
-                output=target / output,
+                output=root / output,
                 base=base,
                 settings=settings,
                 variant=variant,

@@ -193,7 +193,7 @@ def _describes(profile: DriverProfile, runs: Sequence[Run]) -> bool:
 
 
 def most_different(snippets: Mapping[str, FloatArray], count: int = SINGLE_VEHICLES) -> list[str]:
-    """Names of drivers that differ visibly and keep their habits: each next one is farthest from all before it.
+    """Names of drivers that differ visibly and stay themselves: each next one is farthest from all before it.
 
     Drivers are compared by the mean of their ten metrics, in units of what one driver's mean changes by from the first
     half of the drive to the second. The half of the drivers that changes most is left out: a profile of somebody who

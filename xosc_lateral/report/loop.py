@@ -15,7 +15,7 @@ from xosc_lateral.identification.lack_of_fit import GroupError, LackOfFit, lack_
 from xosc_lateral.identification.scorecard import SNIPPET_ROWS
 from xosc_lateral.report.loop_words import (
     CERTAIN,
-    LOOKS,
+    COMPONENT_WORDS,
     SPREAD,
     feedback_words,
     group_words,
@@ -102,7 +102,7 @@ def loop_page(result: LoopResult, lack_of_fit: LackOfFit, tables: Sequence[Path]
         feedback_rows=[{"column": item.column, "reason": feedback_words(item)} for item in result.feedback],
         rejected_rows=[
             {
-                "component": LOOKS.get(item.component, item.component),
+                "component": COMPONENT_WORDS.get(item.component, item.component),
                 "strongest candidate": ", ".join(item.columns) or None,
                 "p-value": item.p_value,
                 "reason": item.why,

@@ -37,7 +37,7 @@ SURROUNDINGS_HZ = 0.07
 """To either side of a weave's line. [Hz]"""
 
 MEAN_S, SPREAD_S, REGIME_S = 120.0, 240.0, 20.0
-"""Averaging times of the courses of the mean, of the spread, and of the spread with regimes. [s]"""
+"""Averaging times of the paths of the mean, of the spread, and of the spread with regimes. [s]"""
 
 GAP_S = 5.0
 """Longer gaps in a drive interrupt a line. [s]"""

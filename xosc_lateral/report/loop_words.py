@@ -35,7 +35,7 @@ HINTS: Mapping[str, str] = MappingProxyType(
 )
 """Signs that a reader of a figure has to know."""
 
-LOOKS: Mapping[str, str] = MappingProxyType(
+COMPONENT_WORDS: Mapping[str, str] = MappingProxyType(
     {
         "mean": "a column that changes the mean offset",
         "between": "a column that goes with the mean offset of whole drives",

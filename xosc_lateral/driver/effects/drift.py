@@ -1,4 +1,4 @@
-"""Slow drift: what is held for the middle of the lane wanders over minutes.
+"""Slow drift: what is held for the middle of the lane drifts over minutes.
 
 References
 ----------
@@ -30,7 +30,7 @@ class DriftState(msgspec.Struct):
 
 
 class Drift(HiddenEffect, frozen=True, kw_only=True):
-    """Ornstein-Uhlenbeck wander of the mean offset.
+    """Ornstein-Uhlenbeck process of the mean offset.
 
     Parameters
     ----------
@@ -54,7 +54,7 @@ class Drift(HiddenEffect, frozen=True, kw_only=True):
         return DriftState(rng)
 
     def advance(self, state: DriftState, time: FloatArray, step: float) -> EffectTerms:
-        """A wander of its own for every drive, shape (n,) [m]: the Ornstein-Uhlenbeck process, sampled exactly."""
+        """A path of its own for every drive, shape (n,) [m]: the Ornstein-Uhlenbeck process, sampled exactly."""
         keep = float(np.exp(-step / self.correlation_s))
         noise = state.rng.standard_normal(len(time))
         noise *= self.size

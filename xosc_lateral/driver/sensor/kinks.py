@@ -5,7 +5,7 @@ meet. Between the kinks such an error is a straight line, and its second derivat
 `every` seconds. Therefore its power density at any frequency is that of the jumps over the fourth power of the
 frequency (derived here): with zeros at all multiples of 1 / `every`, and images of what is slow between them. No
 vehicle moves like that. Below half a kink a period, an error is as smooth as driving, and is left to the driver; above,
-all is the sensor's. What is above hangs on what is below, so that part of the jumps is told by the path that was
+all is the sensor's. What is above depends on what is below, so that part of the jumps is told by the path that was
 sampled, as much as the error has in the power there, and the rest is drawn.
 """
 

@@ -192,7 +192,7 @@ def _no_density(frequency: FloatArray) -> FloatArray:
 
 
 def _rounding(data: Periodogram, grain: float, variance: float) -> Callable[[FloatArray], FloatArray]:
-    """Density of rounding, which hangs on the driver's, which hangs on it: a few rounds."""
+    """Density of rounding, which depends on the driver's, which depends on it: a few rounds."""
     level = grain**2 / 12.0 / 10.0  # white over 10 Hz, to begin with
     shape: Callable[[FloatArray], FloatArray] = lambda frequency: np.full(np.shape(frequency), level)  # noqa: E731
     for _ in range(ROUNDING_ROUNDS):

@@ -39,7 +39,7 @@ LAGS = 1.0
 """Corners: of lane keeping at will, of corrections, of muscles and vehicle. [Hz]"""
 
 SLOPE_SD, BEND_SD, FREE_BEND_SD = 0.9, 1.0, 1.5
-"""Of log power over log frequency. `docs/design/sensor.md` shows how little the split hangs on them. [-]"""
+"""Of log power over log frequency. `docs/design/sensor.md` shows how little the split depends on them. [-]"""
 
 STEEPEST_KNOWN = -4.0
 """Beyond the last knot the density falls at least like this. [-]"""

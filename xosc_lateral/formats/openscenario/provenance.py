@@ -1,6 +1,6 @@
 """The mark that a file of ours carries: what made it, and from what.
 
-It is for people and for the check that nothing is converted twice. Anybody can write one: no permission hangs on it.
+It is for people and for the check that nothing is converted twice. Anybody can write one: no permission depends on it.
 """
 
 from __future__ import annotations

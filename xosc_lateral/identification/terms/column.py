@@ -42,7 +42,7 @@ class ColumnTerm(Term):
     what: ClassVar[str]
     """What it acts on, in words."""
     group: ClassVar[str] = "spread"
-    """Mean or spread: which cells show it."""
+    """Mean or spread: which summary statistics show it."""
     single: ClassVar[bool] = False
     """Only effects with one coefficient will do."""
     effect: ColumnEffect

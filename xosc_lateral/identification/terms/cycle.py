@@ -33,7 +33,7 @@ WIDTHS = (1, 3, 7)
 SURROUNDINGS = 60
 """Frequencies to each side that say how high the spectrum is without a cycle. [-]"""
 
-CELL = "movement at the weave's period"
+STATISTIC = "movement at the weave's period"
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,7 +45,7 @@ class CycleTerm(Term):
     frequency : float
         [1/s]
     width : int
-        Number of neighbouring frequencies: its phase wanders.
+        Number of neighbouring frequencies: its phase drifts.
     """
 
     component: ClassVar[str] = "cycle"
@@ -108,7 +108,7 @@ class CycleTerm(Term):
         effect = effects[0]
         assert isinstance(effect, Cycle)
         shape = f"period {effect.period_s:.1f} s"
-        return Description("weave", shape, effect.amplitude, effect.amplitude_error, CELL, CELL)
+        return Description("weave", shape, effect.amplitude, effect.amplitude_error, STATISTIC, STATISTIC)
 
 
 def latent_path(term: Term, fitted: Fitted) -> FloatArray:

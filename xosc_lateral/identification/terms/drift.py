@@ -1,4 +1,4 @@
-"""A slow drift of the mean over minutes: a driver's mood, or a camera that warms up. Tested beside a step (`step`).
+"""A slow drift of the mean over minutes: a driver changes, or a camera warms up. Tested beside a step (`step`).
 
 References
 ----------

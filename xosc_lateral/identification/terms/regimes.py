@@ -1,6 +1,6 @@
 """Loud and quiet stretches that no column tells apart: distraction, say.
 
-A two-state Markov chain [1]_. The null is a movement whose loudness wanders for seconds, a log-normal stochastic
+A two-state Markov chain [1]_. The null is a movement whose loudness varies within seconds, a log-normal stochastic
 volatility [2]_: fitted to the logarithms of the squares [3]_ by their autocovariance, with a memory of at most
 `CLUSTER_S`.
 
@@ -134,8 +134,8 @@ def probability_of_clusters(rows: FloatArray, valid: BoolArray, known: FloatArra
     if known.shape[1]:
         basis = np.linalg.qr((known - known[valid].mean(axis=0)) * valid[:, None])[0]
         squares = squares - basis @ (basis.T @ squares)
-    variance, memory = fit_clusters(rows, valid)
-    keep = float(np.exp(-1.0 / memory))
+    variance, time = fit_clusters(rows, valid)
+    keep = float(np.exp(-1.0 / time))
     pushes = np.sqrt(variance * (1.0 - keep**2))
     inside, drawn, null = np.flatnonzero(valid), np.zeros(len(squares)), []
     ordered = np.sort(squares[inside])
@@ -162,7 +162,7 @@ def fit_clusters(rows: FloatArray, valid: BoolArray) -> tuple[float, float]:
     -------
     variance : float
         Of the log scale. [-]
-    memory : float
+    time : float
         Time constant, 1 to `CLUSTER_S`. [s]
     """
     squares = np.square(rows[valid])

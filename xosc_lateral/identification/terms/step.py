@@ -46,14 +46,14 @@ class StepTerm(Term):
 
     @classmethod
     def test(cls, search: Search, fitted: Fitted) -> Outcome | None:
-        """Step or drift, whichever explains more, beyond what ordinary wander continues to."""
+        """Step or drift, whichever explains more, beyond what an ordinary drift continues to."""
         if any(isinstance(term, StepTerm | DriftTerm) for term in fitted.terms):
             return None
-        wander = find_low_frequency(fitted.coarse, fitted, search.rng(4))
-        if wander is None:
+        found = find_low_frequency(fitted.coarse, fitted, search.rng(4))
+        if found is None:
             return None
-        term: Term = cls(wander.at) if wander.is_step else DriftTerm()
-        return Outcome(term, (), wander.p_value)
+        term: Term = cls(found.at) if found.is_step else DriftTerm()
+        return Outcome(term, (), found.p_value)
 
     def matches(self, other: Self) -> bool:
         """About the same moment."""

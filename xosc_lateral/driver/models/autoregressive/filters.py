@@ -25,7 +25,7 @@ HALF_LENGTH = 4.0
 """Of the measuring low-pass. [s]"""
 
 MEASURING_WINDOW = 6.0
-"""Kaiser shape of the measuring low-pass: 63 dB, so that noise five decades below the wander stays apart. [-]"""
+"""Kaiser shape of the measuring low-pass: 63 dB, so that noise five decades below the slow movement stays apart. [-]"""
 
 BUILDING_WINDOW = 7.0
 """Kaiser shape of the building low-pass: images of slow movement are 75 dB down. [-]"""

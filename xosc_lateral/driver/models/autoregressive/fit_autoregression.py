@@ -31,7 +31,7 @@ def fit_autoregression(
     """Fit by least squares, all moments alike but those of wild drivers, who are measured by their own size.
 
     Weights by how calm a moment is would drop the return of whoever drifts calmly and corrects briskly, and the rest is
-    an endless wander.
+    an endless drift.
 
     Drivers' own means are a random effect of variance `between`: it is taken out of the normal equations, where it adds
     the same to every product. Taking each driver's estimated mean out of his runs instead would take slow movement with

@@ -90,7 +90,7 @@ def simulate(
 
 
 def _wiggle(pair: tuple[FloatArray, FloatArray]) -> FloatArray:
-    """Second difference of the slow part over a second: coarse movement without its slow wander."""
+    """Second difference of the slow part over a second: coarse movement without its slow drift."""
     slow, every = pair[0], COARSE_EVERY
     return np.asarray(slow[2 * every :] - 2.0 * slow[every:-every] + slow[: -2 * every])
 

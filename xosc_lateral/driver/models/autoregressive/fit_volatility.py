@@ -1,7 +1,7 @@
 """How volatile drivers are, from the power of their movement window by window.
 
-One drive alone can't tell what its driver keeps from what wanders slowly: all that lasts longer than the lags looked at
-counts as slow wander there, and as a difference between drivers where there are several.
+One drive alone can't tell what its driver keeps from what varies slowly: all that lasts longer than the lags looked at
+counts as slow variation there, and as a difference between drivers where there are several.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from xosc_lateral.driver.models.autoregressive.volatility import Volatility, ave
 FloatArray = NDArray[np.float64]
 
 CORRELATION_TIMES = (2.0, 3.0, 4.0, 6.0, 8.0, 12.0, 16.0, 24.0, 32.0, 48.0, 64.0)
-"""Correlation times of the wandering part that are tried; one value a second can't hold shorter ones. [s]"""
+"""Of the part that varies within seconds, as tried; one value a second can't hold shorter ones. [s]"""
 
 MAX_LAG = 60.0
 """Lags up to this are looked at. [s]"""
@@ -54,7 +54,7 @@ def fit_volatility(excess: FloatArray, counts: FloatArray, seconds: float, *, po
     seconds : float
         Length of a window. [s]
     population : bool
-        Whether there are several drivers: what lasts is then a difference between them, else slow wander.
+        Whether there are several drivers: what lasts is then a difference between them, else slow variation.
     """
     best, least = Volatility(), np.inf
     weights = np.sqrt(counts / max(counts.max(), 1.0))

@@ -11,14 +11,14 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from xosc_lateral.errors import FormatError
-from xosc_lateral.formats.atomic import refuse_targets
+from xosc_lateral.formats.atomic import refuse_outputs
 from xosc_lateral.formats.own_files import is_own
 
 STDOUT = "-"
 """Name of the standard output where an output is asked for."""
 
 
-def file_target(output: str | Path, usual_name: str, suffixes: Sequence[str]) -> Path:
+def output_file(output: str | Path, usual_name: str, suffixes: Sequence[str]) -> Path:
     """Path of an output file.
 
     Parameters
@@ -35,7 +35,7 @@ def file_target(output: str | Path, usual_name: str, suffixes: Sequence[str]) ->
     FormatError
         For another suffix.
     """
-    path = folder_target(output) / usual_name if is_folder(output) else Path(output)
+    path = output_folder(output) / usual_name if is_folder(output) else Path(output)
     if not path.name.lower().endswith(tuple(suffixes)):
         kind = path.suffix or "a file without suffix"
         raise FormatError(f"can't write {kind}: expected a name ending in {' or '.join(suffixes)}", path=path)
@@ -48,7 +48,7 @@ def is_folder(output: str | Path) -> bool:
     return text.endswith(("/", os.sep)) or Path(output).is_dir()
 
 
-def folder_target(output: str | Path) -> Path:
+def output_folder(output: str | Path) -> Path:
     """Path of an output folder, which need not be there yet.
 
     Raises
@@ -62,12 +62,12 @@ def folder_target(output: str | Path) -> Path:
     return path
 
 
-def claim(targets: Iterable[Path | None], inputs: Iterable[Path] = (), *, force: bool = False) -> None:
+def claim(outputs: Iterable[Path | None], inputs: Iterable[Path] = (), *, force: bool = False) -> None:
     """Refuse outputs that can't be meant, or that would replace somebody else's file, before any work is done.
 
     Parameters
     ----------
-    targets : iterable of Path or None
+    outputs : iterable of Path or None
         Files to be written; None: not wanted.
     inputs : iterable of Path
         Files that are read.
@@ -77,10 +77,10 @@ def claim(targets: Iterable[Path | None], inputs: Iterable[Path] = (), *, force:
     Raises
     ------
     FormatError
-        See `refuse_targets`; or a target is there that this package did not write.
+        See `refuse_outputs`; or a file is there that this package did not write.
     """
-    wanted = [target for target in targets if target is not None]
-    refuse_targets(wanted, inputs)
-    for target in wanted:
-        if not force and target.exists() and not is_own(target):
-            raise FormatError("exists and was not written by xosc-lateral; --force replaces it", path=target)
+    wanted = [output for output in outputs if output is not None]
+    refuse_outputs(wanted, inputs)
+    for output in wanted:
+        if not force and output.exists() and not is_own(output):
+            raise FormatError("exists and was not written by xosc-lateral; --force replaces it", path=output)
