@@ -1,4 +1,4 @@
-"""What a closed loop leaves unexplained: groups of statistics beside their own floor, and whether all of it is chance."""
+"""What a closed loop leaves unexplained: groups of statistics beside their floors, and whether all of it is chance."""
 
 from __future__ import annotations
 
