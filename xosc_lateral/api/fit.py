@@ -28,7 +28,7 @@ def read_drives(drives: DrivesLike, columns: Mapping[str, str] | None = None) ->
     FormatError
         A column is missing, or its values can't be in the unit meant.
     NotEnoughDataError
-        No drive of 10 s.
+        A table without two rows of time, offset and lane width.
     """
     return given_drives(drives, columns).drives
 

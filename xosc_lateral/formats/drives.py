@@ -86,7 +86,7 @@ def read_drives(
     FormatError
         When a file can't be read, a column is missing, or its values can't be in the unit meant.
     NotEnoughDataError
-        When a file holds no drive of 10 s.
+        When a file holds no drive with two rows of time, offset and lane width.
     """
     files = [Path(path) for path in ([paths] if isinstance(paths, str | Path) else paths)]
     if twice := {str(path) for path in files if files.count(path) > 1}:
