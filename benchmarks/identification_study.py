@@ -33,6 +33,7 @@ from benchmarks.identification_tables import calibration, summary, table
 from xosc_lateral.formats.drives import drives_of_table
 from xosc_lateral.identification.identify import identify
 from xosc_lateral.identification.regression import Coarse
+from xosc_lateral.identification.significance import WEIGHTS
 from xosc_lateral.identification.timeline import join_drives
 
 
@@ -63,6 +64,7 @@ def run(case: dict[str, Any], protocol: dict[str, Any], seconds: float) -> dict[
         [one.column, round(one.coherence, 3), round(one.predicted_share, 3), one.doubtful] for one in found.feedback
     ]
     outcome["p_mean"] = found.least("mean")
+    outcome["p"] = {name: p for name in WEIGHTS if (p := found.least(name)) is not None}
     if case["name"].startswith("slow vehicles"):
         outcome |= _oracle_between(case, table)
     elif "size" in case:
