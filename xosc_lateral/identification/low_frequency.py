@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 
 from xosc_lateral.identification.autocorrelation import Whitener, fit_autoregression
 from xosc_lateral.identification.regression import MIN_DRIFT_S, ORDER, Coarse, Fitted
-from xosc_lateral.identification.significance import upper_tail
+from xosc_lateral.identification.significance import as_one_degree, upper_tail
 
 FloatArray = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
@@ -158,7 +158,7 @@ class _Scores:
         for size in DRIFT_SIZES:
             chosen = (DRIFT_TERMS * np.arange(self._drives)[:, None] + np.arange(size)).ravel()
             gained = float(moments[chosen] @ np.linalg.pinv(gram[np.ix_(chosen, chosen)]) @ moments[chosen])
-            best = max(best, _as_one_degree(gained, len(chosen)) - DRIFT_COST)
+            best = max(best, float(as_one_degree(np.asarray(gained), len(chosen))) - DRIFT_COST)
         if self._steps.shape[1] == 0:
             return best, 0.0, 0
         jumped = (np.conj(self._steps).T @ (weight * observed)).real
@@ -257,10 +257,3 @@ def half_cosines(coarse: Coarse) -> FloatArray:
             column[rows] = np.cos(np.pi * term * share)
             columns.append(column)
     return np.stack(columns, axis=1) if columns else np.zeros((len(coarse), 0))
-
-
-def _as_one_degree(chi_square: float, degrees: int) -> float:
-    """Chi-square of one degree of freedom with the same tail probability as one of `degrees`."""
-    from scipy.stats import chi2
-
-    return float(chi2.isf(max(float(chi2.sf(chi_square, degrees)), 1e-300), 1))

@@ -84,3 +84,10 @@ def upper_tail(score: float, maxima: FloatArray) -> float:
     scale = max(float(np.std(maxima, ddof=1)) * np.sqrt(6.0) / np.pi, 1e-12)
     place = float(np.mean(maxima)) - np.euler_gamma * scale
     return max(float(gumbel_r.sf(score, place, scale)), exponential, LEAST)
+
+
+def as_one_degree(chi_square: FloatArray, degrees: int) -> FloatArray:
+    """Chi-square with one degree of freedom that is as rare as one with `degrees`, of the same shape."""
+    from scipy.stats import chi2
+
+    return np.asarray(chi2.isf(np.maximum(chi2.sf(chi_square, degrees), LEAST), 1))

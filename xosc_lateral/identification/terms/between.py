@@ -2,7 +2,9 @@
 
 Every drive has a level of its own, so what hardly changes within drives can't act on the mean there. Here the levels
 themselves are regressed on what each drive usually meets, weighted by how well each is known beside how much drives
-differ anyway. The null deals the drives anew, which is exact: drives know nothing of one another.
+differ anyway. The null deals the drives anew, which is exact: drives know nothing of one another. Columns of whole
+drives go along with each other (the left lane is the fast one), and two may act against each other and show together
+only: so pairs are looked at, too.
 """
 
 from __future__ import annotations
@@ -15,10 +17,10 @@ from msgspec import structs
 from numpy.typing import NDArray
 
 from xosc_lateral.driver.effects import Acts, ColumnEffect, Effect, Linear
-from xosc_lateral.identification.dictionary import NULL_DRAWS
+from xosc_lateral.identification.best_of_drives import best_of_drives
 from xosc_lateral.identification.problem import Problem
 from xosc_lateral.identification.regression import Fitted
-from xosc_lateral.identification.significance import MANY_DRIVES, upper_tail
+from xosc_lateral.identification.significance import MANY_DRIVES
 from xosc_lateral.identification.terms.base import Description, Outcome
 from xosc_lateral.identification.terms.column import ColumnTerm, of_kind
 
@@ -55,7 +57,7 @@ class BetweenTerm(ColumnTerm):
 
     @classmethod
     def test(cls, search: Search, fitted: Fitted) -> Outcome | None:
-        """Best candidate over all columns and shapes, against drives dealt anew."""
+        """Best candidate, or pair of candidates, over all columns and shapes, against drives dealt anew."""
         coarse, places = fitted.coarse, _Places.of(fitted)
         if np.count_nonzero(places.weight) < MANY_DRIVES:
             return None
@@ -74,17 +76,19 @@ class BetweenTerm(ColumnTerm):
                 usual.append(mean / np.sqrt(power))
         if not candidates:
             return None
-        quantities, costs = np.stack(usual, axis=1), np.array([candidate.cost for candidate in candidates])
-        observed, rng = places.left(places.place), search.rng(5)
-        scores = np.square(observed @ quantities) - costs
-        rows, null = np.flatnonzero(places.weight), np.empty(NULL_DRAWS)
-        for index in range(NULL_DRAWS):
-            dealt = np.zeros_like(observed)
-            dealt[rows] = observed[rng.permutation(rows)]
-            null[index] = float((np.square(dealt @ quantities) - costs).max())
-        best = int(np.argmax(scores))
-        effect = structs.replace(candidates[best].effect, lag_s=0.0, response_s=USUAL_S)
-        return Outcome(cls.of(effect), effect.columns, upper_tail(float(scores[best]), null))
+        best = best_of_drives(
+            places.left(places.place),
+            places.weight > 0.0,
+            np.stack(usual, axis=1),
+            np.array([candidate.cost for candidate in candidates]),
+            [candidate.columns[0] for candidate in candidates],
+            search.rng(5),
+        )
+        terms = [
+            cls.of(structs.replace(candidates[index].effect, lag_s=0.0, response_s=USUAL_S)) for index in best.members
+        ]
+        columns = tuple(term.columns[0] for term in terms)
+        return Outcome(terms[0], columns, best.p_value, together=tuple(terms[1:]))
 
     def matches(self, other: Self) -> bool:
         """Any other: columns that go along with each other from drive to drive stand in for one another."""
