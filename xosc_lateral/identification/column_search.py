@@ -38,10 +38,6 @@ WITHIN = 12.0
 ALIKE = 1.0
 """A set of columns whose refined score differs by less can't be told from the best. [squared score]"""
 
-HEREDITY = 3.84
-"""A product is preferred to one of its columns alone if it scores higher by more than this: what a factor that does
-nothing gives in one table of twenty (chi-square, one degree of freedom). [squared score]"""
-
 CLUSTER_S = 120
 """Windows that count as independent where movement with and without a term is compared: longer than the memory of a
 minute and a half. [s]"""
@@ -243,6 +239,8 @@ def _known(problem: Problem, dictionary: Dictionary, own: Sequence[ColumnKind], 
 
 def _refined(search: Search, kind: type[ColumnKind], scored: _Scored) -> tuple[Refined, ColumnKind]:
     """Refine the best sets of columns; the best of them, which knows what others explain as much."""
+    from scipy.stats import chi2
+
     candidates = scored.dictionary.candidates
     costs = {candidate.family: candidate.cost for candidate in candidates}
     refinement = Refinement(search.coarse, scored.problem, scored.known, costs, single=kind.single)
@@ -252,7 +250,9 @@ def _refined(search: Search, kind: type[ColumnKind], scored: _Scored) -> tuple[R
     ]
     outcomes.sort(key=lambda outcome: -outcome.score)
     parts = {(column,) for column in outcomes[0].effect.columns}
-    simpler = [one for one in outcomes if one.effect.columns in parts and one.score > outcomes[0].score - HEREDITY]
+    # a second factor is a finding of its own, and has to be as sure as any
+    chance = float(chi2.isf(search.level_of(kind.component), 1))
+    simpler = [one for one in outcomes if one.effect.columns in parts and one.score > outcomes[0].score - chance]
     best = simpler[0] if simpler else outcomes[0]
     close = [outcome.effect.columns for outcome in outcomes if outcome.score > best.score - ALIKE]
     alike = {name for columns in close for name in columns} - set(best.effect.columns)
