@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from xosc_lateral.driver.effects import Acts, Linear
 from xosc_lateral.drives.drive import Drive
 from xosc_lateral.identification.autocorrelation import moving_sum, positions_in_run
 from xosc_lateral.identification.timeline import (
@@ -132,3 +133,29 @@ def test_equal_numbers_that_were_averaged_are_equal() -> None:
     assert rounded[3] == pytest.approx(3.85, abs=1e-12)
     assert np.isnan(rounded[4])
     assert in_digits(np.zeros(2)) == pytest.approx([0.0, 0.0])
+
+
+@pytest.mark.parametrize("lag_s", [-4.2, 0.0, 1.5])
+@pytest.mark.parametrize("response_s", [0.0, 2.0, 60.0])
+def test_a_drive_responds_to_nothing_that_another_drive_met(lag_s: float, response_s: float) -> None:
+    rng = np.random.default_rng(3)
+    made = [_drive(f"drive-{index}", rng.normal(10.0 * index, 1.0, size=500)) for index in range(4)]
+    timeline = join_drives(made)
+    effect = Linear(acts=Acts.LOCATION, column="speed", lag_s=lag_s, response_s=response_s)
+    joined = timeline.response(effect, timeline.context)
+    for span in timeline.spans:
+        alone = effect.response(STEP, {"speed": timeline.context["speed"][span]})
+        inside = timeline.valid[span]
+        np.testing.assert_allclose(joined[span][inside], alone[inside], rtol=0.0, atol=1e-9)
+
+
+def _drive(name: str, speed: np.ndarray) -> Drive:
+    n = len(speed)
+    return Drive(
+        name=name,
+        time=STEP * np.arange(n),
+        offset=0.1 * np.sin(np.arange(n)),
+        lane_width=np.full(n, 3.6),
+        context={"speed": speed},
+        levels=frozenset(),
+    )

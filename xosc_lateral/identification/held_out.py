@@ -144,9 +144,7 @@ def _quantities(selection: Selection, columns: list[Column]) -> dict[str, FloatA
     for key, (term, effects) in estimate_all(fitted).items():
         effect = effects[0] if effects else None
         if isinstance(effect, ColumnEffect):
-            strength = effect.strength(coarse.timeline.step, coarse.context)
-            if strength is not None:
-                quantities[f"effect: {key}"] = strength
+            quantities[f"effect: {key}"] = coarse.strength(effect)
         elif isinstance(term, StepTerm):
             quantities[f"effect: {key}"] = (np.arange(len(coarse.timeline)) >= term.at * COARSE).astype(float)
     return quantities

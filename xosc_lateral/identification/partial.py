@@ -13,7 +13,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.driver.effects import Acts, Angular, ColumnEffect, Product
-from xosc_lateral.driver.effects.response import respond
 from xosc_lateral.identification.blocks import hold_out_blocks
 from xosc_lateral.identification.close import LoopResult
 from xosc_lateral.identification.terms.between import is_between
@@ -95,15 +94,14 @@ def _ends(values: FloatArray) -> tuple[float, float]:
 def _driving(result: LoopResult, effect: ColumnEffect) -> tuple[FloatArray, FloatArray]:
     """Column (or product) as the driver responds to it, where that can be said, and the effect's strength; at 1 Hz."""
     coarse = result.coarse
-    step = coarse.timeline.step
-    own = effect.strength(step, coarse.context)
-    assert own is not None, "the effect was found in these columns"
+    own = coarse.strength(effect)
     if isinstance(effect, Product):
-        return coarse_mean(effect.response(step, coarse.context)[:, 0]), coarse_mean(own)
+        return coarse_mean(coarse.fine_response(effect)[:, 0]), coarse_mean(own)
     column = coarse.context[effect.columns[0]]
     if isinstance(effect, Angular) or not np.isfinite(column).all():  # neither angles nor "none" can be averaged
         return coarse_middle(column), coarse_mean(own)
-    return coarse_mean(respond(column, step, effect.lag_s, effect.response_s)), coarse_mean(own)
+    responded = coarse.timeline.respond(column[:, None], effect.lag_s, effect.response_s)
+    return coarse_mean(responded[:, 0]), coarse_mean(own)
 
 
 def _alone(result: LoopResult, effect: ColumnEffect) -> FloatArray:
@@ -113,9 +111,7 @@ def _alone(result: LoopResult, effect: ColumnEffect) -> FloatArray:
     if is_between(effect):  # the places that the drives keep are what it explains
         return np.asarray(rest)
     rest = rest - fitted.levels[coarse.drive]
-    strength = effect.strength(coarse.timeline.step, coarse.context)
-    assert strength is not None, "the effect was found in these columns"
-    return np.asarray(rest + coarse_mean(strength))
+    return np.asarray(rest + coarse_mean(coarse.strength(effect)))
 
 
 def _squares(result: LoopResult, acts: Acts) -> FloatArray:

@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 
 from xosc_lateral.driver.effects import ColumnEffect, Product
 from xosc_lateral.driver.effects.product import Form
-from xosc_lateral.driver.effects.response import respond
 from xosc_lateral.identification.candidates import FINE_SCALES, Family, shapes_of
 from xosc_lateral.identification.columns import Column
 from xosc_lateral.identification.dictionary import orthonormal
@@ -137,7 +136,7 @@ class Refinement:
             self._quantities[shape] = (values - inside.mean(axis=0)) / np.maximum(inside.std(axis=0), 1e-12)
         key = (shape, effect.response_s)
         if key not in self._responses:
-            responded = respond(self._quantities[shape], step, 0.0, effect.response_s)
+            responded = self._coarse.timeline.respond(self._quantities[shape], 0.0, effect.response_s)
             self._responses[key] = np.cumsum(np.pad(responded, ((1, 0), (0, 0))), axis=0)
         return means_by_second(self._responses[key], round(effect.lag_s / step))
 

@@ -130,11 +130,19 @@ class Coarse:
         )
         if key in self._responses:
             return self._responses[key]
-        response = coarse_mean(key.response(self.timeline.step, self.context))
+        response = coarse_mean(self.fine_response(key))
         response = response - response[self.valid].mean(axis=0)
         if keep:
             self._responses[key] = response
         return np.asarray(response, dtype=np.float64)
+
+    def fine_response(self, effect: ColumnEffect) -> FloatArray:
+        """The same on the 0.2 s grid, as it is, shape (fine n, k). [own unit]"""
+        return self.timeline.response(effect, self.context)
+
+    def strength(self, effect: ColumnEffect) -> FloatArray:
+        """What an effect of columns that the table has does on the 0.2 s grid, shape (fine n,). [m], or log factor"""
+        return effect.weighed(self.fine_response(effect))
 
     def by_drive(self, values: FloatArray) -> FloatArray:
         """Mean over the valid rows of each drive, shape (drives,), in the values' unit; 0 where there are none."""

@@ -15,6 +15,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from xosc_lateral.driver.effects import ColumnEffect
+from xosc_lateral.driver.effects.response import respond
 from xosc_lateral.drives.cuts import CutRules, cut_runs
 from xosc_lateral.drives.drive import Drive
 from xosc_lateral.drives.resampling import STEP, average, nearest, resample
@@ -91,6 +93,26 @@ class Timeline:
         """Rows of each drive, pads included."""
         edges = np.searchsorted(self.drive, np.arange(len(self.names) + 1))
         return [slice(int(first), int(last)) for first, last in pairwise(edges)]
+
+    def response(self, effect: ColumnEffect, context: Mapping[str, FloatArray]) -> FloatArray:
+        """An effect's quantity of columns on this grid as each drive responds to it, shape (n, k). [own unit]"""
+        return self.respond(effect.known(context), effect.lag_s, effect.response_s)
+
+    def respond(self, values: FloatArray, lag_s: float, response_s: float) -> FloatArray:
+        """`driver.effects.response.respond` drive by drive, shape (n, k) of `values`, in their unit.
+
+        A lag of a minute would outlast the pad between two drives, so that one would respond to what the other met.
+        """
+        joined = respond(values, self.step, lag_s, response_s)
+        if response_s <= 0.0 or len(self.names) < 2:
+            return joined
+        # amid the pad everything shifted is the drive's own; the lag's memory of what came before dies away linearly
+        starts = np.array([span.start + PAD // 2 for span in self.spans[1:]])
+        surplus = np.zeros((len(self.names), joined.shape[1]))
+        surplus[1:] = joined[starts] - values[starts]
+        since = np.arange(len(joined)) - np.concatenate([[0], starts])[self.drive]
+        left = np.exp(-np.maximum(since, 0) * (self.step / response_s))
+        return np.asarray(joined - left[:, None] * surplus[self.drive])
 
 
 def join_drives(drives: Sequence[Drive], rules: CutRules = TRACE_RULES) -> Timeline:

@@ -7,7 +7,6 @@ from msgspec import structs
 from numpy.typing import NDArray
 
 from xosc_lateral.driver.effects import ColumnEffect, Product
-from xosc_lateral.driver.effects.response import respond
 from xosc_lateral.identification.candidates import shapes_of
 from xosc_lateral.identification.columns import Column, read_column
 from xosc_lateral.identification.ranges import driving_range
@@ -96,10 +95,11 @@ def _timed(fitted: Fitted, effect: ColumnEffect) -> list[FloatArray]:
     lags = effect.lag_s + np.arange(-NEAR_S, NEAR_S + 0.5 * finest, finest)
     late = [round(float(lag) / step) for lag in lags[np.abs(lags) <= LAG_LIMIT]]
     bare = structs.replace(effect, lag_s=0.0, response_s=0.0, response_range=())
-    quantity = bare.response(step, fitted.coarse.context)
+    quantity = fitted.coarse.fine_response(bare)
     responses = []
     for response_s in FINE_RESPONSES:
-        sums = np.cumsum(np.pad(respond(quantity, step, 0.0, response_s), ((1, 0), (0, 0))), axis=0)
+        response = fitted.coarse.timeline.respond(quantity, 0.0, response_s)
+        sums = np.cumsum(np.pad(response, ((1, 0), (0, 0))), axis=0)
         responses.append(np.stack([means_by_second(sums, one) for one in late], axis=1))
     return responses
 

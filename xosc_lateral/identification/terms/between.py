@@ -145,7 +145,7 @@ class _Places:
         power = fitted.whitener.power
         counted = (seconds >= MIN_SECONDS) & (power > 0.0)
         noise = np.where(counted, 1.0 / np.maximum(power, 1e-300), np.inf)
-        usual = [coarse.by_drive(coarse.response(_at_once(term.effect))[:, 0]) for term in of_kind(fitted, BetweenTerm)]
+        usual = [coarse.by_drive(coarse.response(term.effect)[:, 0]) for term in of_kind(fitted, BetweenTerm)]
         known = np.column_stack([np.ones(groups), *usual])
         scatter = 0.0
         for _ in range(20):
@@ -168,7 +168,3 @@ class _Places:
         weighed = self.known * self.weight[:, None]
         inverse = np.linalg.pinv(weighed.T @ self.known)
         return (inverse @ (weighed.T @ self.place))[1:], np.sqrt(np.diag(inverse))[1:]
-
-
-def _at_once(effect: ColumnEffect) -> ColumnEffect:
-    return structs.replace(effect, lag_s=0.0, response_s=0.0)

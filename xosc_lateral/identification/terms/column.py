@@ -87,9 +87,7 @@ class ColumnTerm(Term):
         coarse = fitted.coarse
         for effect in effects:
             assert isinstance(effect, ColumnEffect)
-            strength = effect.strength(coarse.timeline.step, coarse.context)
-            if strength is None:
-                continue
+            strength = coarse.strength(effect)
             if effect.acts is Acts.LOCATION:
                 removal.location += strength
             elif effect.acts is Acts.SPREAD:
@@ -140,7 +138,7 @@ class ColumnTerm(Term):
 
     def sized(self, coarse: Coarse, acts: Acts, sizes: FloatArray, errors: FloatArray) -> ColumnEffect:
         """The effect with its sizes, shrunk by how sure they are, bounded, neutral at its mean."""
-        raw = self.effect.response(coarse.timeline.step, coarse.context)[coarse.timeline.valid]
+        raw = coarse.fine_response(self.effect)[coarse.timeline.valid]
         usual, (low, high) = raw.mean(axis=0), self.ends(coarse)
         within = np.clip(raw, usual + low, usual + high)
         return structs.replace(

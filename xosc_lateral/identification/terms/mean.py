@@ -36,7 +36,7 @@ class MeanTerm(ColumnTerm):
 
     def fine_mean_columns(self, coarse: Coarse) -> FloatArray:
         """The response as the profile gives it: steps of a second would be noise."""
-        response = self.effect.response(coarse.timeline.step, coarse.context)
+        response = coarse.fine_response(self.effect)
         return np.asarray(response - coarse_mean(response)[coarse.valid].mean(axis=0))
 
     @classmethod
