@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.identification.autocorrelation import MovementProcess, Whitener, fit_autoregression
-from xosc_lateral.identification.regression import LONGEST, ORDER, Coarse
+from xosc_lateral.identification.regression import ORDER, Coarse
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
@@ -56,13 +56,15 @@ class Problem:
 def of_squares(coarse: Coarse, squares: FloatArray, valid: BoolArray, columns: FloatArray) -> Problem:
     """Regression of squares [-], shape (n,), on columns, shape (n, k), that may make them larger.
 
-    Squares come in clusters, as far as no column explains them.
+    Squares come in clusters of seconds, which whitening takes out. Loud and quiet minutes it leaves: they are what a
+    slow column does (an autoregression that sees them takes half of the effect of rain for memory), and where no column
+    does it, the null keeps them too.
     """
     left = squares
     if columns.shape[1]:
         design = columns - columns[valid].mean(axis=0)
         left = squares - design @ np.linalg.lstsq(design[valid], squares[valid], rcond=None)[0]
-    process = fit_autoregression(np.where(valid, left, 0.0), valid, ORDER, longest=LONGEST)
+    process = fit_autoregression(np.where(valid, left, 0.0), valid, ORDER)
     return Problem(Whitener(process, valid, coarse.drive, np.ones(len(coarse))), squares, columns)
 
 
