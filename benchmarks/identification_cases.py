@@ -9,7 +9,17 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from benchmarks.identification_drives import long_drive, quantity, responded, short_drives, unit
+from benchmarks.identification_drives import (
+    baited,
+    long_drive,
+    quantity,
+    responded,
+    short_drives,
+    smoothed_tracks,
+    unit,
+    with_mean,
+    with_spread,
+)
 from xosc_lateral.identification.regression import Coarse, fit_model
 from xosc_lateral.identification.timeline import coarse_mean
 
@@ -44,6 +54,22 @@ def bare_drive(case: dict[str, Any], protocol: dict[str, Any], seconds: float) -
     if case["type"].endswith("short"):
         return short_drives(protocol["drives"]["short_drives"], tuple(protocol["drives"]["short_s"]), case["seed"])
     return long_drive(case["movement"], seconds, case["seed"])
+
+
+def planted_drive(case: dict[str, Any], protocol: dict[str, Any], seconds: float) -> tuple[pd.DataFrame, pd.DataFrame]:
+    """A case's table before and after its effect or bait is planted, smoothed where the case says so."""
+    seed = case["seed"]
+    table = bare = bare_drive(case, protocol, seconds)
+    if case["type"] == "bait":
+        table = baited(table, case["name"], seed)
+    elif case["name"].startswith("slow vehicles"):
+        usual = table.groupby("drive")["speed"].transform("mean")
+        table = table.assign(offset=table["offset"] + case["size"] * unit(usual.to_numpy()))
+    elif "size" in case:
+        table = with_mean(table, case["name"], case["size"], seed)
+    elif "factor" in case:
+        table = with_spread(table, case["name"], case["factor"], seed)
+    return bare, smoothed_tracks(table) if "smoothed" in case else table
 
 
 def oracle(case: dict[str, Any], table: pd.DataFrame, coarse: Coarse, seed: int) -> dict[str, float]:

@@ -21,14 +21,8 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from benchmarks.identification_cases import PROTOCOL, SETS, bare_drive, cases, oracle
-from benchmarks.identification_drives import (
-    baited,
-    smoothed_tracks,
-    unit,
-    with_mean,
-    with_spread,
-)
+from benchmarks.identification_cases import PROTOCOL, SETS, cases, oracle, planted_drive
+from benchmarks.identification_drives import unit
 from benchmarks.identification_tables import calibration, summary, table
 from xosc_lateral.formats.drives import drives_of_table
 from xosc_lateral.identification.identify import identify
@@ -39,19 +33,7 @@ from xosc_lateral.identification.timeline import join_drives
 
 def run(case: dict[str, Any], protocol: dict[str, Any], seconds: float) -> dict[str, Any]:
     """Make one drive, identify, and compare with the truth."""
-    seed = case["seed"]
-    table = bare = bare_drive(case, protocol, seconds)
-    if case["type"] == "bait":
-        table = baited(table, case["name"], seed)
-    elif case["name"].startswith("slow vehicles"):
-        usual = table.groupby("drive")["speed"].transform("mean")
-        table = table.assign(offset=table["offset"] + case["size"] * unit(usual.to_numpy()))
-    elif "size" in case:
-        table = with_mean(table, case["name"], case["size"], seed)
-    elif "factor" in case:
-        table = with_spread(table, case["name"], case["factor"], seed)
-    if "smoothed" in case:
-        table = smoothed_tracks(table)
+    bare, table = planted_drive(case, protocol, seconds)
     started = time.process_time()
     coarse = Coarse.of(join_drives(drives_of_table(table, {})))
     found = identify(coarse, np.random.SeedSequence(1))
@@ -68,7 +50,7 @@ def run(case: dict[str, Any], protocol: dict[str, Any], seconds: float) -> dict[
     if case["name"].startswith("slow vehicles"):
         outcome |= _oracle_between(case, table)
     elif "size" in case:
-        outcome |= oracle(case, bare, coarse, seed)
+        outcome |= oracle(case, bare, coarse, case["seed"])
         outcome |= _size(case, found, coarse)
     return outcome
 
