@@ -89,6 +89,7 @@ def _held_out_runs(
     blocks, coarse = setting.blocks, setting.coarse
     folds = folds_of(blocks)
     same = setting.kind is setting.refined_kind and not kept
+    own = None if nested is None else nested.only(kept)
     sides: list[FloatArray | None] = [None, None]
     for fold in range(folds):
         progress(0.6 + 0.3 * fold / folds, f"held-out fold {fold + 1} of {folds}")
@@ -99,7 +100,7 @@ def _held_out_runs(
         before = setting.fixed or fit_without(bare, estimate_all(bare), used, setting.kind, "before", None)
         profiles = [before]
         if not same:
-            fitted = bare if nested is None else _as_kept(nested.selections[fold], kept)
+            fitted = bare if own is None else own.selections[fold].final
             profiles.append(fit_without(fitted, estimate_all(fitted), used, setting.refined_kind, "after", None))
         for side, profile in enumerate(profiles):
             # the same luck for both sides and all folds: what differs is the profile, and runs go on from fold to fold
@@ -112,12 +113,6 @@ def _held_out_runs(
     before_runs, after_runs = sides
     assert before_runs is not None
     return before_runs, before_runs if after_runs is None else after_runs
-
-
-def _as_kept(selection: Selection, kept: tuple[Term, ...]) -> Fitted:
-    """A fold's own fit, less what was not kept in the end."""
-    extra = [one.term for one in selection.accepted if not any(one.term.matches(term) for term in kept)]
-    return selection.without(extra, "").final if extra else selection.final
 
 
 def fit_without(

@@ -156,11 +156,16 @@ def _judged(
         components,
         lambda share: progress(0.3 + 0.3 * share, "selecting without a fold"),
     )
-    gains = {id(one.term): nested.of(one.term) for one in selection.accepted if one.term.predictable}
-    useless = [one.term for one in selection.accepted if id(one.term) in gains and gains[id(one.term)].mean <= 0.0]
-    if useless:
-        why = "significant, but chosen and estimated on other blocks it does not predict the held-out ones"
-        selection = selection.without(useless, why)
+    why = "significant, but chosen and estimated on other blocks it does not predict the held-out ones"
+    while True:
+        # each beside those that are kept, and nothing else: a fold's misfit would be blamed on what is right
+        nested = nested.only([one.term for one in selection.accepted])
+        gains = {id(one.term): nested.of(one.term) for one in selection.accepted if one.term.predictable}
+        judged = [one.term for one in selection.accepted if id(one.term) in gains]
+        worst = min(judged, key=lambda term: gains[id(term)].mean, default=None)
+        if worst is None or gains[id(worst)].mean > 0.0:
+            break
+        selection = selection.without([worst], why)
     reason, total = "", nested.together([one.term for one in selection.accepted if one.term.predictable])
     if any(one.term.predictable for one in selection.accepted) and total.mean <= 0.0:
         low, high = total.interval

@@ -64,6 +64,14 @@ class Nested:
     _by_row: tuple[tuple[BoolArray, Coarse], ...]
     _blocks: IntArray
 
+    def only(self, terms: Sequence[Term]) -> Nested:
+        """The same without what a fold chose that is none of these terms."""
+        reduced = []
+        for selection in self.selections:
+            extra = [one.term for one in selection.accepted if not _any_matches(one.term, terms)]
+            reduced.append(selection.without(extra, "") if extra else selection)
+        return replace(self, selections=tuple(reduced))
+
     def of(self, term: Term) -> Gain:
         """What one accepted term gains: each fold's own version of it, in or out; nothing where it was not chosen."""
         rows = np.zeros(len(self._blocks))
@@ -81,11 +89,7 @@ class Nested:
         """What several accepted terms gain over the start: in each fold those of them that were chosen there."""
         rows = np.zeros(len(self._blocks))
         for selection, (held, coarse) in zip(self.selections, self._by_row, strict=True):
-            own = [
-                one.term
-                for one in selection.accepted
-                if any(type(one.term) is type(t) and one.term.matches(t) for t in terms)
-            ]
+            own = [one.term for one in selection.accepted if _any_matches(one.term, terms)]
             if own:
                 fitted = fit_model(selection.final.coarse, (*selection.start.terms, *own))
                 rows += held_out_gain(fitted, selection.start, coarse, held)
@@ -127,6 +131,10 @@ def nest(
             selections.append(selection)
             progress(len(selections) / folds)
     return Nested(tuple(selections), tuple((seconds % folds == fold, coarse) for fold in range(folds)), seconds)
+
+
+def _any_matches(term: Term, others: Sequence[Term]) -> bool:
+    return any(type(term) is type(other) and term.matches(other) for other in others)
 
 
 def _over_blocks(rows: FloatArray, blocks: IntArray, where: Sequence[tuple[BoolArray, Coarse]], folds: int) -> Gain:
