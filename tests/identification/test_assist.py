@@ -18,13 +18,13 @@ from xosc_lateral.formats.drives import parse_map, read_drives
 from xosc_lateral.formats.profiles import read_profile
 
 WORDS = [word for one in OPENLKA_MAP for word in ("--map", one)]
-PLACE, SECONDS = 0.2, 1800.0
+PLACE, TIGHTNESS, SECONDS = 0.2, 0.4, 1800.0
 
 
 @pytest.fixture(scope="module")
 def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("assist") / "route.csv"
-    drive = simulate_drive(SECONDS, 1, effects=[LaneKeepingAssist(place=PLACE, tightness=0.4)])
+    drive = simulate_drive(SECONDS, 1, effects=[LaneKeepingAssist(place=PLACE, tightness=TIGHTNESS)])
     openlka_layout(drive.table).to_csv(path, index=False)
     return path
 
@@ -44,9 +44,10 @@ def test_the_loop_names_the_assist_and_not_what_follows_from_steering(log: Path,
     ]
     assert main([*words, *WORDS]) == 0
     report = json.loads((tmp_path / "report.json").read_text())
-    found = {tuple(one["columns"]): one for one in report["findings"]}
-    assert set(found) == {(FLAG,)}
-    assert found[FLAG,]["size_m"] == pytest.approx(PLACE, abs=0.1)  # slow drift over a minute: 0.11 m over 15 spells
+    found = {(one["kind"], *one["columns"]): one for one in report["findings"]}
+    assert set(found) == {("location", FLAG), ("scale", FLAG)}
+    assert found["location", FLAG]["size_m"] == pytest.approx(PLACE, abs=0.1)  # slow drift: 0.11 m over 15 spells
+    assert found["scale", FLAG]["size_m"] == pytest.approx(TIGHTNESS, abs=0.15)
     assert {one["column"] for one in report["consequences"]} >= {"op_curvature_actual", "op_state_steer_angle"}
     assert report["error"]["after"] < 0.75 * report["error"]["before"]
 

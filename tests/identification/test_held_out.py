@@ -11,7 +11,7 @@ from xosc_lateral.driver.models.kinds import ModelKind
 from xosc_lateral.driver.provenance import Provenance
 from xosc_lateral.errors import NotEnoughDataError
 from xosc_lateral.identification.columns import Column, Role
-from xosc_lateral.identification.held_out import _as_kept, _frequency, _quantities, fit_without
+from xosc_lateral.identification.held_out import _frequency, _quantities, fit_without
 from xosc_lateral.identification.nested import Gain, Nested, _over_blocks
 from xosc_lateral.identification.regression import Coarse, fit_model
 from xosc_lateral.identification.removal import estimate_all
@@ -91,9 +91,10 @@ def test_a_gain_is_the_mean_over_blocks_with_its_standard_error(coarse: Coarse) 
 
 def test_a_fold_is_scored_with_its_own_version_of_what_was_kept(coarse: Coarse) -> None:
     fold = chosen(coarse, X, IDLE)
-    assert _as_kept(fold, (mean_term("x"), mean_term("idle"))) is fold.final
-    assert _as_kept(fold, (mean_term("x"),)).terms == (X,)
-    assert _as_kept(fold, ()).terms == ()
+    nested = Nested((fold,), ((coarse.valid, coarse),), np.zeros(len(coarse), dtype=np.intp))
+    assert nested.only((mean_term("x"), mean_term("idle"))).selections[0].final is fold.final
+    assert nested.only((mean_term("x"),)).selections[0].final.terms == (X,)
+    assert nested.only(()).selections[0].final.terms == ()
 
 
 def test_a_base_is_fitted_to_what_is_left_without_the_effects(coarse: Coarse) -> None:
