@@ -14,6 +14,10 @@ from xosc_lateral.identification.regression import ORDER, Coarse
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
 
+SQUARES_S = 12
+"""Past seconds of the squares that whitening sees: two time constants of the clusters of 6 s that are no regime. Beyond
+`ORDER`, as means. Sensitivity: docs/design/identification.md. [s]"""
+
 
 @dataclass(frozen=True, eq=False)
 class Problem:
@@ -64,7 +68,7 @@ def of_squares(coarse: Coarse, squares: FloatArray, valid: BoolArray, columns: F
     if columns.shape[1]:
         design = columns - columns[valid].mean(axis=0)
         left = squares - design @ np.linalg.lstsq(design[valid], squares[valid], rcond=None)[0]
-    process = fit_autoregression(np.where(valid, left, 0.0), valid, ORDER)
+    process = fit_autoregression(np.where(valid, left, 0.0), valid, min(ORDER, SQUARES_S), longest=SQUARES_S)
     return Problem(Whitener(process, valid, coarse.drive, np.ones(len(coarse))), squares, columns)
 
 
