@@ -10,12 +10,15 @@ from tests.driver.models.made_models import POPULATION
 from tests.identification.made_coarse import movement, timeline_of, wander
 from xosc_lateral.driver.effects import Acts, Cycle, Drift, Effect, Linear, VarianceTrend
 from xosc_lateral.driver.profile import DriverProfile
+from xosc_lateral.drives.drive import Drive
 from xosc_lateral.identification.identify import initial_terms, usable_columns
+from xosc_lateral.identification.regression import Coarse, fit_model
+from xosc_lateral.identification.terms.between import BetweenTerm
 from xosc_lateral.identification.terms.drift import DriftTerm
 from xosc_lateral.identification.terms.mean import MeanTerm
 from xosc_lateral.identification.terms.spread import SpreadTerm
 from xosc_lateral.identification.terms.variance_trend import VarianceTrendTerm
-from xosc_lateral.identification.timeline import Timeline
+from xosc_lateral.identification.timeline import Timeline, join_drives
 
 SECONDS = 900.0
 N = round(SECONDS / 0.2)
@@ -74,3 +77,23 @@ def test_each_part_of_the_movement_has_its_term(timeline: Timeline) -> None:
 def test_effects_of_columns_that_the_table_lacks_and_cycles_begin_nothing(timeline: Timeline) -> None:
     assert initial(timeline, made(Linear, 0.2, column="wind"), Cycle(amplitude=0.1, period_s=9.0)) == ()
     assert initial(timeline) == ()
+
+
+def test_the_effect_of_a_vehicle_s_class_is_fitted_between_vehicles() -> None:
+    rng = np.random.default_rng(7)
+    trucks = np.arange(60) % 3 == 0
+    drives = []
+    for index, truck in enumerate(trucks):
+        n = 300
+        own = 0.1 * rng.normal() - 0.15 * truck + 0.1 * wander(rng, n, 4.0)
+        context = {"is_truck": np.full(n, float(truck)), "speed": 30.0 + wander(rng, n, 20.0)}
+        drives.append(Drive(f"v{index}", 0.2 * np.arange(n), own, np.full(n, 3.6), context, frozenset({"is_truck"})))
+    timeline = join_drives(drives)
+    by_class, by_speed = initial(timeline, made(Linear, -0.1, column="is_truck"), made(Linear, 0.01, column="speed"))
+    assert isinstance(by_class, BetweenTerm)
+    assert isinstance(by_speed, MeanTerm)
+    (effect,) = by_class.estimate(fit_model(Coarse.of(timeline), (by_class, by_speed)))
+    assert isinstance(effect, Linear)
+    # a third are trucks, levels differ by 0.1 m: 0.1 * sqrt(1 / 20 + 1 / 40) = 0.03 m
+    assert effect.coefficients[0] == pytest.approx(-0.15, abs=0.09)
+    assert effect.errors[0] == pytest.approx(0.03, rel=0.5)

@@ -130,7 +130,8 @@ def initial_terms(base: DriverProfile, timeline: Timeline) -> tuple[Term, ...]:
                 effect, coefficients=(), errors=(), reference=(), between_drivers=(), response_range=()
             )
             if effect.acts is Acts.LOCATION:
-                terms.append(BetweenTerm.of(bare) if is_between(effect) else MeanTerm.of(bare))
+                between = is_between(effect) or _same_throughout(effect, timeline)
+                terms.append(BetweenTerm.of(bare) if between else MeanTerm.of(bare))
             elif effect.acts is Acts.SPREAD:
                 terms.append(SpreadTerm.of(bare))
         elif isinstance(effect, VarianceTrend):
@@ -138,6 +139,14 @@ def initial_terms(base: DriverProfile, timeline: Timeline) -> tuple[Term, ...]:
         elif isinstance(effect, Drift):
             terms.append(DriftTerm())
     return tuple(terms)
+
+
+def _same_throughout(effect: ColumnEffect, timeline: Timeline) -> bool:
+    """Whether an effect's quantity is the same all through every drive, as a vehicle's class is."""
+    context = {"lane_width": timeline.lane_width, **timeline.context}
+    values = effect.known({name: context[name] for name in effect.columns})
+    inside = [values[rows][timeline.valid[rows]] for rows in timeline.spans]
+    return all(np.ptp(own, axis=0).max() == 0.0 for own in inside if len(own))
 
 
 def _judged(
