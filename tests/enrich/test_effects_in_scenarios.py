@@ -14,7 +14,7 @@ from xosc_lateral.enrich.enrich import enrich
 from xosc_lateral.motion.nominal import NominalMotion, PlayedAction
 from xosc_lateral.road.network import RoadNetwork
 from xosc_lateral.scenario import Action, Place
-from xosc_lateral.scenario.actions import EnvironmentAction
+from xosc_lateral.scenario.actions.environment import EnvironmentAction
 from xosc_lateral.scenario.enums import VehicleCategory
 from xosc_lateral.scenario.environment import Environment, Weather
 

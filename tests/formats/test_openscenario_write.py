@@ -43,7 +43,7 @@ from xosc_lateral.motion.nominal import NominalMotion
 from xosc_lateral.motion.trajectory import WorldTrajectory
 from xosc_lateral.playback.player import play
 from xosc_lateral.scenario import Scenario
-from xosc_lateral.scenario.actions import FollowTrajectoryAction
+from xosc_lateral.scenario.actions.routing import FollowTrajectoryAction
 from xosc_lateral.scenario.position import Polyline, WorldPosition
 
 XSD = Path(__file__).parents[1] / "data" / "xsd"

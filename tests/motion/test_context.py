@@ -12,7 +12,7 @@ from tests.motion.made_motion import LANE_WIDTH, RADIUS, drive, entity, together
 from xosc_lateral.motion.context import entity_context
 from xosc_lateral.motion.nominal import PlayedAction
 from xosc_lateral.scenario import Action, Place
-from xosc_lateral.scenario.actions import EnvironmentAction
+from xosc_lateral.scenario.actions.environment import EnvironmentAction
 from xosc_lateral.scenario.enums import VehicleCategory
 from xosc_lateral.scenario.environment import Environment, TimeOfDay, Weather
 

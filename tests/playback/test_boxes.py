@@ -27,7 +27,7 @@ from xosc_lateral.playback.signals import TrafficSignals
 from xosc_lateral.playback.values import Values, holds, holds_exactly
 from xosc_lateral.road.positions import Pose
 from xosc_lateral.scenario import Parameter, Performance, Place
-from xosc_lateral.scenario.actions import ModifyOperation
+from xosc_lateral.scenario.actions.values import ModifyOperation
 from xosc_lateral.scenario.dynamics import DynamicConstraints
 from xosc_lateral.scenario.enums import ParameterType, Rule
 from xosc_lateral.scenario.scenario import TrafficSignalController, TrafficSignalPhase

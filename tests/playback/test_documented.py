@@ -3,7 +3,11 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
+from importlib import import_module
 from pathlib import Path
+from pkgutil import iter_modules
+from types import ModuleType
 
 import pytest
 
@@ -13,11 +17,10 @@ from xosc_lateral.playback.actions.appearance import RunningAnimation, RunningAp
 from xosc_lateral.playback.actions.controllers import RunningController
 from xosc_lateral.playback.actions.environment import RunningEnvironment
 from xosc_lateral.playback.actions.population import RunningTraffic
-from xosc_lateral.playback.actions.registry import ACTIONS
+from xosc_lateral.playback.actions.registry import RUNNING
 from xosc_lateral.playback.actions.unsupported import RunningUnsupported
 from xosc_lateral.playback.conditions import user_defined
-from xosc_lateral.playback.conditions.registry import ENTITY_CONDITIONS as ENTITY_CHECKS
-from xosc_lateral.playback.conditions.registry import VALUE_CONDITIONS as VALUE_CHECKS
+from xosc_lateral.playback.conditions.registry import ENTITY_CHECKS, VALUE_CHECKS
 from xosc_lateral.playback.positions.resolve import POSITIONS
 from xosc_lateral.scenario import Unsupported, actions, conditions, position
 
@@ -53,6 +56,7 @@ def test_every_element_of_the_standard_has_a_row_without_an_empty_cell(name: str
 
 PARTS = {"CustomCommandAction": "UserDefinedAction", "RandomRouteAction": "Unsupported"}
 """Actions that the model holds inside another one, or by name alone."""
+ACTIONS = {content.__name__: running for content, running in RUNNING.items()}
 NAMED, PASSED_ON, HONOURED = "named, not played", "passed on, no effect on motion", "honoured"
 
 
@@ -61,13 +65,13 @@ def _said(name: str) -> str:
     if name.endswith("Position"):
         return HONOURED if getattr(position, name) in dict(POSITIONS) else NAMED
     if name.endswith("Condition"):
-        checks = dict((*ENTITY_CHECKS, *VALUE_CHECKS))
-        return NAMED if checks.get(getattr(conditions, name)) in (None, user_defined.prepare) else HONOURED
+        checks = {content.__name__: check for content, check in (ENTITY_CHECKS | VALUE_CHECKS).items()}
+        return NAMED if checks.get(name) in (None, user_defined.prepare) else HONOURED
     if name.startswith("Override"):
         name = "OverrideControllerValueAction"
     elif name.startswith("Traffic") and not name.startswith("TrafficSignal"):
         name = "TrafficAction"
-    runner = dict(ACTIONS)[getattr(actions, PARTS.get(name, name), Unsupported)]
+    runner = ACTIONS.get(PARTS.get(name, name), RUNNING[Unsupported])
     if issubclass(runner, RunningController | RunningUnsupported | RunningTraffic):
         return NAMED
     aside = (RunningAppearance, RunningLightState, RunningAnimation, RunningEnvironment)
@@ -86,7 +90,28 @@ def test_every_condition_and_private_action_that_has_a_row_is_read() -> None:
     rows = {name for name, (what, _) in _rows().items() if what.startswith(HONOURED)}
     read = {*PRIVATE_ACTIONS, *ENTITY_CONDITIONS, *VALUE_CONDITIONS}
     assert {name for name in rows if name.endswith("Condition")} <= read
-    assert {name for name in rows & set(dir(actions)) if hasattr(getattr(actions, name), "entity_ref")} - read <= {
+    private = {content.__name__ for content in RUNNING if hasattr(content, "entity_ref")}
+    assert (rows & private) - read <= {
         "AddEntityAction",
         "DeleteEntityAction",
     }
+
+
+@pytest.mark.parametrize(
+    ("package", "known"),
+    [(actions, RUNNING), (conditions, ENTITY_CHECKS | VALUE_CHECKS)],
+    ids=["actions", "conditions"],
+)
+def test_whatever_the_model_holds_is_played(package: ModuleType, known: Mapping[type, object]) -> None:
+    """Structs of `scenario/` with a place of their own, but for parts of others."""
+    modules = [import_module(f"{package.__name__}.{found.name}") for found in iter_modules(package.__path__)]
+    held = {
+        value
+        for module in modules
+        for value in vars(module).values()
+        if isinstance(value, type)
+        and value.__module__ == module.__name__
+        and value.__name__.endswith(("Action", "Condition"))
+    }
+    assert len(held) > 20
+    assert held <= set(known)

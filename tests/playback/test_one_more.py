@@ -70,11 +70,11 @@ def prepare_beyond(content: BeyondCondition, simulation: Simulation) -> EntityCh
 
 @pytest.fixture
 def _known(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A line in each list."""
+    """A line in the reader's table, and one in the table of the module that plays it."""
     monkeypatch.setitem(private_actions.PRIVATE_ACTIONS, "HurryAction", read_hurry)
-    monkeypatch.setitem(running_actions._RUNNING, HurryAction, RunningHurry)
+    monkeypatch.setitem(running_actions.RUNNING, HurryAction, RunningHurry)
     monkeypatch.setitem(condition_readers.ENTITY_CONDITIONS, "BeyondCondition", read_beyond)
-    monkeypatch.setitem(running_conditions._ENTITY, BeyondCondition, prepare_beyond)
+    monkeypatch.setitem(running_conditions.ENTITY_CHECKS, BeyondCondition, prepare_beyond)
 
 
 HURRY = private_action('<HurryAction acceleration="2" duration="3"/>')

@@ -26,7 +26,8 @@ from xosc_lateral.playback.trailers import align_trailers, connect, pull_trailer
 from xosc_lateral.playback.transition import EPSILON
 from xosc_lateral.road import RoadNetwork
 from xosc_lateral.scenario import Scenario
-from xosc_lateral.scenario.actions import FollowTrajectoryAction, TeleportAction
+from xosc_lateral.scenario.actions.routing import FollowTrajectoryAction
+from xosc_lateral.scenario.actions.teleport import TeleportAction
 
 STANDING = 1e-3
 """Below this speed an entity stands. [m/s]"""

@@ -11,7 +11,7 @@ from xosc_lateral.playback.simulation import Simulation
 from xosc_lateral.playback.storyboard import ActionElement, EventElement, StoryboardElement, storyboard_root
 from xosc_lateral.playback.trigger import RunningTrigger
 from xosc_lateral.scenario import Act, Action, Event, Init, Maneuver, ManeuverGroup, Private, Story, Storyboard
-from xosc_lateral.scenario.actions import TeleportAction
+from xosc_lateral.scenario.actions.teleport import TeleportAction
 from xosc_lateral.scenario.enums import StoryboardElementType
 
 

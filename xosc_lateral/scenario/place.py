@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Protocol
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,3 +45,12 @@ class Unsupported:
     kind: str
     place: Place
     reason: str = ""
+
+
+class Content(Protocol):
+    """What an action or a condition says: any frozen struct that knows where it stands."""
+
+    @property
+    def place(self) -> Place:
+        """Where it stands."""
+        ...

@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from xosc_lateral.scenario.actions import ActionContent
 from xosc_lateral.scenario.enums import Priority
-from xosc_lateral.scenario.place import Place
+from xosc_lateral.scenario.place import Content, Place
 from xosc_lateral.scenario.trigger import Trigger
 
 
@@ -19,7 +18,7 @@ class Action:
     ----------
     name : str
         Empty in init.
-    content : one of `ActionContent`
+    content : one of `Content`
         What it does.
     place : Place
         Of the Action, PrivateAction, GlobalAction or UserDefinedAction element.
@@ -31,7 +30,7 @@ class Action:
     """
 
     name: str
-    content: ActionContent
+    content: Content
     place: Place
     is_private: bool
     scope: Mapping[str, str] = field(default_factory=dict, repr=False, compare=False)

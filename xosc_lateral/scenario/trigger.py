@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from xosc_lateral.scenario.conditions import EntityCondition, ValueCondition
 from xosc_lateral.scenario.enums import ConditionEdge, TriggeringEntitiesRule
-from xosc_lateral.scenario.place import Place
+from xosc_lateral.scenario.place import Content, Place
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,7 +23,7 @@ class Condition:
     name: str
     delay: float
     edge: ConditionEdge
-    content: EntityCondition | ValueCondition
+    content: Content
     triggering_entities: TriggeringEntities | None
     place: Place
 

@@ -10,23 +10,19 @@ from xosc_lateral.formats.openscenario.element import XmlElement
 from xosc_lateral.formats.openscenario.environment import read_environment
 from xosc_lateral.formats.openscenario.positions import read_position_in
 from xosc_lateral.formats.openscenario.private_actions import PRIVATE_ACTIONS
-from xosc_lateral.scenario.actions import (
-    ActionContent,
-    AddEntityAction,
-    DeleteEntityAction,
-    EnvironmentAction,
+from xosc_lateral.scenario.actions.environment import EnvironmentAction
+from xosc_lateral.scenario.actions.infrastructure import TrafficSignalControllerAction, TrafficSignalStateAction
+from xosc_lateral.scenario.actions.population import AddEntityAction, DeleteEntityAction, TrafficAction
+from xosc_lateral.scenario.actions.userdefined import UserDefinedAction
+from xosc_lateral.scenario.actions.values import (
     ModifyOperation,
     ParameterModifyAction,
     ParameterSetAction,
     SetMonitorAction,
-    TrafficAction,
-    TrafficSignalControllerAction,
-    TrafficSignalStateAction,
-    UserDefinedAction,
     VariableModifyAction,
     VariableSetAction,
 )
-from xosc_lateral.scenario.place import Unsupported
+from xosc_lateral.scenario.place import Content, Unsupported
 from xosc_lateral.scenario.storyboard import Action
 
 # Elements that only group others; what they hold is the action.
@@ -68,11 +64,11 @@ def _contents(owner: XmlElement) -> list[XmlElement]:
     return found
 
 
-def _environment(e: XmlElement, context: Context) -> ActionContent:
+def _environment(e: XmlElement, context: Context) -> Content:
     return EnvironmentAction(read_environment(e, context), e.place())
 
 
-def _entity(e: XmlElement, context: Context) -> ActionContent:
+def _entity(e: XmlElement, context: Context) -> Content:
     add = e.child("AddEntityAction")
     if add is not None:
         return AddEntityAction(context.entity(e), read_position_in(add, context), e.place())
@@ -80,7 +76,7 @@ def _entity(e: XmlElement, context: Context) -> ActionContent:
     return DeleteEntityAction(context.entity(e), e.place())
 
 
-def _parameter(e: XmlElement, _: Context) -> ActionContent:
+def _parameter(e: XmlElement, _: Context) -> Content:
     name = parameter_name(e.raw("parameterRef") or e.text("parameterRef"))
     change = e.child("SetAction")
     if change is not None:
@@ -89,7 +85,7 @@ def _parameter(e: XmlElement, _: Context) -> ActionContent:
     return ParameterModifyAction(name, operation, value, e.place())
 
 
-def _variable(e: XmlElement, _: Context) -> ActionContent:
+def _variable(e: XmlElement, _: Context) -> Content:
     name = parameter_name(e.raw("variableRef") or e.text("variableRef"))
     change = e.child("SetAction")
     if change is not None:
@@ -103,31 +99,31 @@ def _modification(e: XmlElement) -> tuple[ModifyOperation, float]:
     return ModifyOperation(rule.tag), rule.number("value")
 
 
-def _monitor(e: XmlElement, _: Context) -> ActionContent:
+def _monitor(e: XmlElement, _: Context) -> Content:
     return SetMonitorAction(e.text("monitorRef"), e.boolean("value"), e.place())
 
 
-def _signal_state(e: XmlElement, _: Context) -> ActionContent:
+def _signal_state(e: XmlElement, _: Context) -> Content:
     return TrafficSignalStateAction(e.text("name"), e.text("state"), e.place())
 
 
-def _signal_controller(e: XmlElement, _: Context) -> ActionContent:
+def _signal_controller(e: XmlElement, _: Context) -> Content:
     return TrafficSignalControllerAction(e.text("trafficSignalControllerRef"), e.text("phase"), e.place())
 
 
-def _traffic(e: XmlElement, _: Context) -> ActionContent:
+def _traffic(e: XmlElement, _: Context) -> Content:
     content = e.child()
     return TrafficAction(content.tag if content else e.tag, e.place())
 
 
-def _user_defined(e: XmlElement, _: Context) -> ActionContent:
+def _user_defined(e: XmlElement, _: Context) -> Content:
     command = e.child("CustomCommandAction")
     if command is None:
         return UserDefinedAction("", "", e.place())
     return UserDefinedAction(command.text("type", ""), (command.xml.text or "").strip(), e.place())
 
 
-GLOBAL_ACTIONS: dict[str, Callable[[XmlElement, Context], ActionContent]] = {
+GLOBAL_ACTIONS: dict[str, Callable[[XmlElement, Context], Content]] = {
     "EnvironmentAction": _environment,
     "EntityAction": _entity,
     "ParameterAction": _parameter,

@@ -9,33 +9,33 @@ from xosc_lateral.formats.openscenario.declarations import parameter_name
 from xosc_lateral.formats.openscenario.element import XmlElement
 from xosc_lateral.formats.openscenario.environment import read_date_time
 from xosc_lateral.formats.openscenario.positions import read_position_in
-from xosc_lateral.scenario.conditions import (
+from xosc_lateral.scenario.conditions.entity import (
     AccelerationCondition,
     AngleCondition,
     CollisionCondition,
     DistanceCondition,
     EndOfRoadCondition,
-    EntityCondition,
     OffroadCondition,
-    ParameterCondition,
     ReachPositionCondition,
     RelativeAngleCondition,
     RelativeClearanceCondition,
     RelativeDistanceCondition,
     RelativeLaneRange,
     RelativeSpeedCondition,
-    SimulationTimeCondition,
     SpeedCondition,
     StandStillCondition,
-    StoryboardElementStateCondition,
     TimeHeadwayCondition,
-    TimeOfDayCondition,
     TimeToCollisionCondition,
+    TraveledDistanceCondition,
+)
+from xosc_lateral.scenario.conditions.value import (
+    ParameterCondition,
+    SimulationTimeCondition,
+    StoryboardElementStateCondition,
+    TimeOfDayCondition,
     TrafficSignalCondition,
     TrafficSignalControllerCondition,
-    TraveledDistanceCondition,
     UserDefinedValueCondition,
-    ValueCondition,
     VariableCondition,
 )
 from xosc_lateral.scenario.enums import (
@@ -51,7 +51,7 @@ from xosc_lateral.scenario.enums import (
     StoryboardElementType,
     TriggeringEntitiesRule,
 )
-from xosc_lateral.scenario.place import Unsupported
+from xosc_lateral.scenario.place import Content, Unsupported
 from xosc_lateral.scenario.trigger import Condition, ConditionGroup, Trigger, TriggeringEntities
 
 # `cartesianDistance` is the name of 1.0; the misspelt one is the standard's.
@@ -75,11 +75,11 @@ def read_trigger(element: XmlElement | None, context: Context) -> Trigger | None
 def _read_condition(element: XmlElement, context: Context) -> Condition:
     owner = element.required("ByEntityCondition", "ByValueCondition")
     triggering: TriggeringEntities | None = None
-    content: EntityCondition | ValueCondition
+    content: Content
     if owner.tag == "ByEntityCondition":
         triggering = _triggering_entities(owner.required("TriggeringEntities"), context)
         kind = owner.required("EntityCondition").child()
-        readers: dict[str, Callable[[XmlElement, Context], EntityCondition | ValueCondition]] = {**ENTITY_CONDITIONS}
+        readers: dict[str, Callable[[XmlElement, Context], Content]] = {**ENTITY_CONDITIONS}
     else:
         kind = owner.child()
         readers = {**VALUE_CONDITIONS}
@@ -124,11 +124,11 @@ def _direction(e: XmlElement) -> DirectionalDimension | None:
     return e.optional_choice("direction", DirectionalDimension)
 
 
-def _end_of_road(e: XmlElement, _: Context) -> EntityCondition:
+def _end_of_road(e: XmlElement, _: Context) -> Content:
     return EndOfRoadCondition(e.number("duration"), e.place())
 
 
-def _collision(e: XmlElement, context: Context) -> EntityCondition:
+def _collision(e: XmlElement, context: Context) -> Content:
     reference, by_type = e.child("EntityRef"), e.child("ByType")
     if reference is None and by_type is None:
         e.fail("contains neither EntityRef nor ByType")
@@ -139,11 +139,11 @@ def _collision(e: XmlElement, context: Context) -> EntityCondition:
     )
 
 
-def _offroad(e: XmlElement, _: Context) -> EntityCondition:
+def _offroad(e: XmlElement, _: Context) -> Content:
     return OffroadCondition(e.number("duration"), e.place())
 
 
-def _time_headway(e: XmlElement, context: Context) -> EntityCondition:
+def _time_headway(e: XmlElement, context: Context) -> Content:
     return TimeHeadwayCondition(
         context.entity(e),
         _value(e),
@@ -157,7 +157,7 @@ def _time_headway(e: XmlElement, context: Context) -> EntityCondition:
     )
 
 
-def _time_to_collision(e: XmlElement, context: Context) -> EntityCondition:
+def _time_to_collision(e: XmlElement, context: Context) -> Content:
     target = e.required("TimeToCollisionConditionTarget")
     reference = target.child("EntityRef")
     return TimeToCollisionCondition(
@@ -173,31 +173,31 @@ def _time_to_collision(e: XmlElement, context: Context) -> EntityCondition:
     )
 
 
-def _acceleration(e: XmlElement, _: Context) -> EntityCondition:
+def _acceleration(e: XmlElement, _: Context) -> Content:
     return AccelerationCondition(_value(e), _rule(e), e.place(), _direction(e))
 
 
-def _stand_still(e: XmlElement, _: Context) -> EntityCondition:
+def _stand_still(e: XmlElement, _: Context) -> Content:
     return StandStillCondition(e.number("duration"), e.place())
 
 
-def _speed(e: XmlElement, _: Context) -> EntityCondition:
+def _speed(e: XmlElement, _: Context) -> Content:
     return SpeedCondition(_value(e), _rule(e), e.place(), _direction(e))
 
 
-def _relative_speed(e: XmlElement, context: Context) -> EntityCondition:
+def _relative_speed(e: XmlElement, context: Context) -> Content:
     return RelativeSpeedCondition(context.entity(e), _value(e), _rule(e), e.place(), _direction(e))
 
 
-def _traveled_distance(e: XmlElement, _: Context) -> EntityCondition:
+def _traveled_distance(e: XmlElement, _: Context) -> Content:
     return TraveledDistanceCondition(_value(e), e.place())
 
 
-def _reach_position(e: XmlElement, context: Context) -> EntityCondition:
+def _reach_position(e: XmlElement, context: Context) -> Content:
     return ReachPositionCondition(read_position_in(e, context), e.number("tolerance"), e.place())
 
 
-def _distance(e: XmlElement, context: Context) -> EntityCondition:
+def _distance(e: XmlElement, context: Context) -> Content:
     return DistanceCondition(
         read_position_in(e, context),
         _value(e),
@@ -211,7 +211,7 @@ def _distance(e: XmlElement, context: Context) -> EntityCondition:
     )
 
 
-def _relative_distance(e: XmlElement, context: Context) -> EntityCondition:
+def _relative_distance(e: XmlElement, context: Context) -> Content:
     return RelativeDistanceCondition(
         context.entity(e),
         _value(e),
@@ -224,7 +224,7 @@ def _relative_distance(e: XmlElement, context: Context) -> EntityCondition:
     )
 
 
-def _relative_clearance(e: XmlElement, context: Context) -> EntityCondition:
+def _relative_clearance(e: XmlElement, context: Context) -> Content:
     return RelativeClearanceCondition(
         e.boolean("oppositeLanes", False),
         e.boolean("freeSpace", e.boolean("freespace", False)),
@@ -239,41 +239,41 @@ def _relative_clearance(e: XmlElement, context: Context) -> EntityCondition:
     )
 
 
-def _angle(e: XmlElement, _: Context) -> EntityCondition:
+def _angle(e: XmlElement, _: Context) -> Content:
     return AngleCondition(
         e.choice("angleType", AngleType), e.number("angle"), e.number("angleTolerance"), e.place(), _system(e)
     )
 
 
-def _relative_angle(e: XmlElement, context: Context) -> EntityCondition:
+def _relative_angle(e: XmlElement, context: Context) -> Content:
     kind = e.choice("angleType", AngleType)
     return RelativeAngleCondition(
         context.entity(e), kind, e.number("angle"), e.number("angleTolerance"), e.place(), _system(e)
     )
 
 
-def _parameter(e: XmlElement, _: Context) -> ValueCondition:
+def _parameter(e: XmlElement, _: Context) -> Content:
     name = parameter_name(e.raw("parameterRef") or e.text("parameterRef"))
     return ParameterCondition(name, e.text("value"), _rule(e), e.place())
 
 
-def _variable(e: XmlElement, _: Context) -> ValueCondition:
+def _variable(e: XmlElement, _: Context) -> Content:
     name = parameter_name(e.raw("variableRef") or e.text("variableRef"))
     return VariableCondition(name, e.text("value"), _rule(e), e.place())
 
 
-def _simulation_time(e: XmlElement, _: Context) -> ValueCondition:
+def _simulation_time(e: XmlElement, _: Context) -> Content:
     return SimulationTimeCondition(_value(e), _rule(e), e.place())
 
 
-def _time_of_day(e: XmlElement, _: Context) -> ValueCondition:
+def _time_of_day(e: XmlElement, _: Context) -> Content:
     moment = read_date_time(e)
     if moment is None:
         e.fail(f"dateTime='{e.text('dateTime')}' is not a date and time")
     return TimeOfDayCondition(moment, _rule(e), e.place())
 
 
-def _element_state(e: XmlElement, _: Context) -> ValueCondition:
+def _element_state(e: XmlElement, _: Context) -> Content:
     return StoryboardElementStateCondition(
         e.choice("storyboardElementType", StoryboardElementType),
         e.text("storyboardElementRef"),
@@ -282,19 +282,19 @@ def _element_state(e: XmlElement, _: Context) -> ValueCondition:
     )
 
 
-def _traffic_signal(e: XmlElement, _: Context) -> ValueCondition:
+def _traffic_signal(e: XmlElement, _: Context) -> Content:
     return TrafficSignalCondition(e.text("name"), e.text("state"), e.place())
 
 
-def _traffic_signal_controller(e: XmlElement, _: Context) -> ValueCondition:
+def _traffic_signal_controller(e: XmlElement, _: Context) -> Content:
     return TrafficSignalControllerCondition(e.text("trafficSignalControllerRef"), e.text("phase"), e.place())
 
 
-def _user_defined(e: XmlElement, _: Context) -> ValueCondition:
+def _user_defined(e: XmlElement, _: Context) -> Content:
     return UserDefinedValueCondition(e.text("name"), e.text("value"), _rule(e), e.place())
 
 
-ENTITY_CONDITIONS: dict[str, Callable[[XmlElement, Context], EntityCondition]] = {
+ENTITY_CONDITIONS: dict[str, Callable[[XmlElement, Context], Content]] = {
     "EndOfRoadCondition": _end_of_road,
     "CollisionCondition": _collision,
     "OffroadCondition": _offroad,
@@ -312,7 +312,7 @@ ENTITY_CONDITIONS: dict[str, Callable[[XmlElement, Context], EntityCondition]] =
     "AngleCondition": _angle,
     "RelativeAngleCondition": _relative_angle,
 }
-VALUE_CONDITIONS: dict[str, Callable[[XmlElement, Context], ValueCondition]] = {
+VALUE_CONDITIONS: dict[str, Callable[[XmlElement, Context], Content]] = {
     "ParameterCondition": _parameter,
     "VariableCondition": _variable,
     "SimulationTimeCondition": _simulation_time,

@@ -13,38 +13,38 @@ from xosc_lateral.formats.openscenario.positions import (
     read_route,
     read_trajectory,
 )
-from xosc_lateral.scenario.actions import (
-    AbsoluteSpeed,
+from xosc_lateral.scenario.actions.appearance import AnimationAction, LightStateAction, VisibilityAction
+from xosc_lateral.scenario.actions.controller import (
+    ActivateControllerAction,
+    AssignControllerAction,
+    OverrideControllerValueAction,
+)
+from xosc_lateral.scenario.actions.lateral import (
     AbsoluteTargetLane,
     AbsoluteTargetLaneOffset,
-    AbsoluteTargetSpeed,
-    AcquirePositionAction,
-    ActionContent,
-    ActivateControllerAction,
-    AnimationAction,
-    AssignControllerAction,
-    AssignRouteAction,
-    ConnectTrailerAction,
-    DisconnectTrailerAction,
-    FollowTrajectoryAction,
     LaneChangeAction,
     LaneOffsetAction,
     LateralDistanceAction,
-    LightStateAction,
-    LongitudinalDistanceAction,
-    OverrideControllerValueAction,
-    RelativeSpeedToMaster,
     RelativeTargetLane,
     RelativeTargetLaneOffset,
+)
+from xosc_lateral.scenario.actions.longitudinal import (
+    AbsoluteTargetSpeed,
+    LongitudinalDistanceAction,
     RelativeTargetSpeed,
     SpeedAction,
     SpeedProfileAction,
     SpeedProfileEntry,
+)
+from xosc_lateral.scenario.actions.routing import AcquirePositionAction, AssignRouteAction, FollowTrajectoryAction
+from xosc_lateral.scenario.actions.synchronize import (
+    AbsoluteSpeed,
+    RelativeSpeedToMaster,
     SteadyState,
     SynchronizeAction,
-    TeleportAction,
-    VisibilityAction,
 )
+from xosc_lateral.scenario.actions.teleport import TeleportAction
+from xosc_lateral.scenario.actions.trailer import ConnectTrailerAction, DisconnectTrailerAction
 from xosc_lateral.scenario.dynamics import DynamicConstraints, TransitionDynamics
 from xosc_lateral.scenario.enums import (
     CoordinateSystem,
@@ -56,16 +56,17 @@ from xosc_lateral.scenario.enums import (
     ReferenceContext,
     SpeedTargetValueType,
 )
+from xosc_lateral.scenario.place import Content
 from xosc_lateral.scenario.position import Timing
 
 
-def _teleport(e: XmlElement, context: Context) -> ActionContent:
+def _teleport(e: XmlElement, context: Context) -> Content:
     # 1.0 files in the field put the position right into the action.
     owner = e.child("Position")
     return TeleportAction(read_position(owner or e, context), e.place())
 
 
-def _speed(e: XmlElement, context: Context) -> ActionContent:
+def _speed(e: XmlElement, context: Context) -> Content:
     target = e.required("SpeedActionTarget").required("AbsoluteTargetSpeed", "RelativeTargetSpeed")
     dynamics = _transition(e.required("SpeedActionDynamics"))
     if target.tag == "AbsoluteTargetSpeed":
@@ -79,7 +80,7 @@ def _speed(e: XmlElement, context: Context) -> ActionContent:
     return SpeedAction(relative, dynamics, e.place())
 
 
-def _speed_profile(e: XmlElement, context: Context) -> ActionContent:
+def _speed_profile(e: XmlElement, context: Context) -> Content:
     entries = tuple(
         SpeedProfileEntry(entry.number("speed"), entry.optional_number("time"))
         for entry in e.children("SpeedProfileEntry")
@@ -95,7 +96,7 @@ def _speed_profile(e: XmlElement, context: Context) -> ActionContent:
     )
 
 
-def _longitudinal_distance(e: XmlElement, context: Context) -> ActionContent:
+def _longitudinal_distance(e: XmlElement, context: Context) -> Content:
     return LongitudinalDistanceAction(
         context.entity(e),
         e.boolean("continuous", False),
@@ -109,7 +110,7 @@ def _longitudinal_distance(e: XmlElement, context: Context) -> ActionContent:
     )
 
 
-def _lane_change(e: XmlElement, context: Context) -> ActionContent:
+def _lane_change(e: XmlElement, context: Context) -> Content:
     target = e.required("LaneChangeTarget").required("AbsoluteTargetLane", "RelativeTargetLane")
     lane: AbsoluteTargetLane | RelativeTargetLane
     if target.tag == "AbsoluteTargetLane":
@@ -124,7 +125,7 @@ def _lane_change(e: XmlElement, context: Context) -> ActionContent:
     )
 
 
-def _lane_offset(e: XmlElement, context: Context) -> ActionContent:
+def _lane_offset(e: XmlElement, context: Context) -> Content:
     target = e.required("LaneOffsetTarget").required("AbsoluteTargetLaneOffset", "RelativeTargetLaneOffset")
     offset: AbsoluteTargetLaneOffset | RelativeTargetLaneOffset
     value = -target.number("value") if context.left_handed else target.number("value")
@@ -142,7 +143,7 @@ def _lane_offset(e: XmlElement, context: Context) -> ActionContent:
     )
 
 
-def _lateral_distance(e: XmlElement, context: Context) -> ActionContent:
+def _lateral_distance(e: XmlElement, context: Context) -> Content:
     return LateralDistanceAction(
         context.entity(e),
         e.boolean("continuous", False),
@@ -155,7 +156,7 @@ def _lateral_distance(e: XmlElement, context: Context) -> ActionContent:
     )
 
 
-def _synchronize(e: XmlElement, context: Context) -> ActionContent:
+def _synchronize(e: XmlElement, context: Context) -> Content:
     return SynchronizeAction(
         context.entity(e, "masterEntityRef"),
         read_position(e.required("TargetPositionMaster"), context),
@@ -180,7 +181,7 @@ def _final_speed(e: XmlElement) -> AbsoluteSpeed | RelativeSpeedToMaster | None:
     return RelativeSpeedToMaster(speed.number("value"), kind, state)
 
 
-def _follow_trajectory(e: XmlElement, context: Context) -> ActionContent:
+def _follow_trajectory(e: XmlElement, context: Context) -> Content:
     mode = e.child("TrajectoryFollowingMode")
     return FollowTrajectoryAction(
         read_trajectory(e, context),
@@ -203,15 +204,15 @@ def _timing(e: XmlElement) -> Timing | None:
     )
 
 
-def _assign_route(e: XmlElement, context: Context) -> ActionContent:
+def _assign_route(e: XmlElement, context: Context) -> Content:
     return AssignRouteAction(read_route(e, context), e.place())
 
 
-def _acquire_position(e: XmlElement, context: Context) -> ActionContent:
+def _acquire_position(e: XmlElement, context: Context) -> Content:
     return AcquirePositionAction(read_position_in(e, context), e.place())
 
 
-def _assign_controller(e: XmlElement, context: Context) -> ActionContent:
+def _assign_controller(e: XmlElement, context: Context) -> Content:
     return AssignControllerAction(
         read_controller(e, context),
         e.place(),
@@ -220,7 +221,7 @@ def _assign_controller(e: XmlElement, context: Context) -> ActionContent:
     )
 
 
-def _activate_controller(e: XmlElement, _: Context) -> ActionContent:
+def _activate_controller(e: XmlElement, _: Context) -> Content:
     return ActivateControllerAction(
         e.place(),
         e.optional_boolean("lateral"),
@@ -229,18 +230,18 @@ def _activate_controller(e: XmlElement, _: Context) -> ActionContent:
     )
 
 
-def _override(e: XmlElement, _: Context) -> ActionContent:
+def _override(e: XmlElement, _: Context) -> Content:
     overrides = tuple((item.tag, item.boolean("active", False), item.optional_number("value")) for item in e.children())
     return OverrideControllerValueAction(overrides, e.place())
 
 
-def _visibility(e: XmlElement, _: Context) -> ActionContent:
+def _visibility(e: XmlElement, _: Context) -> Content:
     return VisibilityAction(
         e.boolean("graphics", True), e.boolean("sensors", True), e.boolean("traffic", True), e.place()
     )
 
 
-def _light_state(e: XmlElement, _: Context) -> ActionContent:
+def _light_state(e: XmlElement, _: Context) -> Content:
     kind, state = e.child("LightType"), e.child("LightState")
     light = None if kind is None else kind.child()
     name = "" if light is None else light.optional_text("vehicleLightType") or light.text("userDefinedLightType", "")
@@ -248,7 +249,7 @@ def _light_state(e: XmlElement, _: Context) -> ActionContent:
     return LightStateAction(name, mode, e.place(), e.number("transitionTime", 0.0))
 
 
-def _animation(e: XmlElement, _: Context) -> ActionContent:
+def _animation(e: XmlElement, _: Context) -> Content:
     owner = e.child("AnimationType")
     content = None if owner is None else owner.child()
     return AnimationAction(
@@ -256,11 +257,11 @@ def _animation(e: XmlElement, _: Context) -> ActionContent:
     )
 
 
-def _connect_trailer(e: XmlElement, context: Context) -> ActionContent:
+def _connect_trailer(e: XmlElement, context: Context) -> Content:
     return ConnectTrailerAction(context.entity(e, "trailerRef"), e.place())
 
 
-def _disconnect_trailer(e: XmlElement, _: Context) -> ActionContent:
+def _disconnect_trailer(e: XmlElement, _: Context) -> Content:
     return DisconnectTrailerAction(e.place())
 
 
@@ -280,7 +281,7 @@ def _constraints(owner: XmlElement) -> DynamicConstraints | None:
     return DynamicConstraints(*(element.optional_number(name, finite=False) for name in names))
 
 
-PRIVATE_ACTIONS: dict[str, Callable[[XmlElement, Context], ActionContent]] = {
+PRIVATE_ACTIONS: dict[str, Callable[[XmlElement, Context], Content]] = {
     "TeleportAction": _teleport,
     "SpeedAction": _speed,
     "SpeedProfileAction": _speed_profile,

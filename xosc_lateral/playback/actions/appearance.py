@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from xosc_lateral.playback.actions.base import RunningAction
-from xosc_lateral.scenario.actions import AnimationAction, LightStateAction
+from xosc_lateral.scenario.actions.appearance import AnimationAction, LightStateAction, VisibilityAction
+from xosc_lateral.scenario.actions.userdefined import UserDefinedAction
+from xosc_lateral.scenario.actions.values import SetMonitorAction
 
 
 class RunningAppearance(RunningAction):
@@ -40,3 +42,12 @@ class RunningAnimation(RunningAction):
         if self._left <= 0.0 and not self.content.loop:
             self.end()
         self._left -= step
+
+
+RUNNING: dict[type, type[RunningAction]] = {
+    AnimationAction: RunningAnimation,
+    LightStateAction: RunningLightState,
+    SetMonitorAction: RunningAppearance,
+    UserDefinedAction: RunningAppearance,
+    VisibilityAction: RunningAppearance,
+}

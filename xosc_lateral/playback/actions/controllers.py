@@ -3,7 +3,11 @@
 from __future__ import annotations
 
 from xosc_lateral.playback.actions.base import RunningAction
-from xosc_lateral.scenario.actions import AssignControllerAction
+from xosc_lateral.scenario.actions.controller import (
+    ActivateControllerAction,
+    AssignControllerAction,
+    OverrideControllerValueAction,
+)
 
 
 class RunningController(RunningAction):
@@ -16,3 +20,10 @@ class RunningController(RunningAction):
             name = f" '{self.content.controller.name}'"
         self.note(f"controller{name} of '{self.state.name}': the default driver drives instead")
         self.end()
+
+
+RUNNING: dict[type, type[RunningAction]] = {
+    ActivateControllerAction: RunningController,
+    AssignControllerAction: RunningController,
+    OverrideControllerValueAction: RunningController,
+}

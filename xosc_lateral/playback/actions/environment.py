@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from xosc_lateral.playback.actions.base import RunningAction
-from xosc_lateral.scenario.actions import EnvironmentAction
+from xosc_lateral.scenario.actions.environment import EnvironmentAction
 
 
 class RunningEnvironment(RunningAction):
@@ -16,3 +16,6 @@ class RunningEnvironment(RunningAction):
         clock = self.content.environment.time_of_day
         if clock is not None:
             self.simulation.time_of_day = (clock.date_time, clock.animation, self.simulation.time)
+
+
+RUNNING: dict[type, type[RunningAction]] = {EnvironmentAction: RunningEnvironment}

@@ -12,7 +12,7 @@ from xosc_lateral.playback.paths.registry import duration, path_of
 from xosc_lateral.playback.positions.resolve import pose_of
 from xosc_lateral.playback.state import free
 from xosc_lateral.playback.transition import EPSILON
-from xosc_lateral.scenario.actions import FollowTrajectoryAction
+from xosc_lateral.scenario.actions.routing import FollowTrajectoryAction
 from xosc_lateral.scenario.enums import FollowingMode, ReferenceContext
 
 
@@ -165,3 +165,6 @@ class RunningFollowTrajectory(RunningAction):
 def _way(heading: float, point: PathPoint) -> float:
     """+1 for a heading along the path, -1 for one against it."""
     return -1.0 if abs(difference(heading, point.tangent)) > HALF_PI + EPSILON else 1.0
+
+
+RUNNING: dict[type, type[RunningAction]] = {FollowTrajectoryAction: RunningFollowTrajectory}

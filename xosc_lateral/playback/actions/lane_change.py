@@ -11,7 +11,7 @@ from xosc_lateral.playback.placement import NOWHERE, Placement
 from xosc_lateral.playback.positions.relative_lane import beside
 from xosc_lateral.playback.state import EntityState
 from xosc_lateral.playback.transition import EPSILON, Transition
-from xosc_lateral.scenario.actions import AbsoluteTargetLane, LaneChangeAction
+from xosc_lateral.scenario.actions.lateral import AbsoluteTargetLane, LaneChangeAction
 from xosc_lateral.scenario.enums import DynamicsDimension, DynamicsShape
 
 
@@ -158,3 +158,6 @@ class RunningLaneChange(RunningAction):
         transition = self._transition
         rest = (transition.target - offset) * side
         return abs(rest) < EPSILON or (transition.parameter > 0.0 and rest < 0.0)
+
+
+RUNNING: dict[type, type[RunningAction]] = {LaneChangeAction: RunningLaneChange}

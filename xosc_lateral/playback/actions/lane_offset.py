@@ -8,7 +8,7 @@ from xosc_lateral.motion.nominal import Activity
 from xosc_lateral.playback.actions.base import Domain, RunningAction
 from xosc_lateral.playback.placement import NOWHERE
 from xosc_lateral.playback.transition import EPSILON, Transition
-from xosc_lateral.scenario.actions import AbsoluteTargetLaneOffset, LaneOffsetAction
+from xosc_lateral.scenario.actions.lateral import AbsoluteTargetLaneOffset, LaneOffsetAction
 from xosc_lateral.scenario.enums import DynamicsDimension, DynamicsShape
 
 DEFAULT_LATERAL_ACCELERATION = 0.5
@@ -94,3 +94,6 @@ class RunningLaneOffset(RunningAction):
         reference.locate()
         wanted_t = reference.t + (target.value if reference.is_forward else -target.value)
         return wanted_t - (state.t - state.offset_t)
+
+
+RUNNING: dict[type, type[RunningAction]] = {LaneOffsetAction: RunningLaneOffset}

@@ -10,7 +10,7 @@ from xosc_lateral.playback.actions.beside_entity import BesideEntity
 from xosc_lateral.playback.actions.beside_on_road import BesideOnRoad
 from xosc_lateral.playback.distances import ahead_and_left
 from xosc_lateral.playback.placement import NOWHERE
-from xosc_lateral.scenario.actions import LateralDistanceAction
+from xosc_lateral.scenario.actions.lateral import LateralDistanceAction
 from xosc_lateral.scenario.enums import CoordinateSystem, LateralDisplacement
 
 CLOSE_ENOUGH = 0.01
@@ -83,3 +83,6 @@ class RunningLateralDistance(RunningAction):
         if content.displacement is LateralDisplacement.ANY and self.simulation.scenario.header.version == (1, 0):
             return wanted  # version 1.0 has no displacement: the sign of the distance tells the side
         return -abs(wanted) if content.displacement is LateralDisplacement.RIGHT else abs(wanted)
+
+
+RUNNING: dict[type, type[RunningAction]] = {LateralDistanceAction: RunningLateralDistance}

@@ -8,7 +8,7 @@ from xosc_lateral.playback.actions.base import Domain, RunningAction
 from xosc_lateral.playback.actions.constraints import limits_of
 from xosc_lateral.playback.distances import ahead_and_left, entity_distance
 from xosc_lateral.playback.drive import drive
-from xosc_lateral.scenario.actions import LongitudinalDistanceAction
+from xosc_lateral.scenario.actions.longitudinal import LongitudinalDistanceAction
 from xosc_lateral.scenario.enums import CoordinateSystem, LongitudinalDisplacement, RelativeDistanceType
 
 CLOSE_ENOUGH = 0.1
@@ -111,3 +111,6 @@ class RunningLongitudinalDistance(RunningAction):
 def _grown(rate: float, step: float) -> float:
     """How far an acceleration may change; nothing in no time, even without a limit."""
     return 0.0 if step <= 0.0 else rate * step
+
+
+RUNNING: dict[type, type[RunningAction]] = {LongitudinalDistanceAction: RunningLongitudinalDistance}

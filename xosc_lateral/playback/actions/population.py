@@ -7,7 +7,7 @@ from xosc_lateral.playback.actions.base import RunningAction
 from xosc_lateral.playback.positions.resolve import resolve
 from xosc_lateral.playback.storyboard import ActionElement, ElementState
 from xosc_lateral.playback.trailers import disconnect
-from xosc_lateral.scenario.actions import AddEntityAction, DeleteEntityAction, TrafficAction
+from xosc_lateral.scenario.actions.population import AddEntityAction, DeleteEntityAction, TrafficAction
 
 
 class RunningAddEntity(RunningAction):
@@ -54,3 +54,10 @@ class RunningTraffic(RunningAction):
     def start(self) -> None:
         """Say that there is none."""
         self.note(f"{self.content.kind}: its vehicles are made by the simulator and are not played")
+
+
+RUNNING: dict[type, type[RunningAction]] = {
+    AddEntityAction: RunningAddEntity,
+    DeleteEntityAction: RunningDeleteEntity,
+    TrafficAction: RunningTraffic,
+}

@@ -6,7 +6,7 @@ from xosc_lateral.playback.actions.base import Domain, RunningAction
 from xosc_lateral.playback.placement import Placement
 from xosc_lateral.playback.positions.resolve import resolve, route_guide
 from xosc_lateral.playback.routes import guide
-from xosc_lateral.scenario.actions import AcquirePositionAction, AssignRouteAction
+from xosc_lateral.scenario.actions.routing import AcquirePositionAction, AssignRouteAction
 from xosc_lateral.scenario.enums import RouteStrategy
 
 
@@ -42,3 +42,9 @@ class RunningAcquirePosition(RunningAction):
         if route is None:
             self.note("no way leads to the position: it is not acquired")
         state.route = route
+
+
+RUNNING: dict[type, type[RunningAction]] = {
+    AcquirePositionAction: RunningAcquirePosition,
+    AssignRouteAction: RunningAssignRoute,
+}

@@ -6,7 +6,7 @@ from math import copysign
 
 from xosc_lateral.playback.actions.base import Domain, RunningAction
 from xosc_lateral.playback.transition import EPSILON, Transition
-from xosc_lateral.scenario.actions import AbsoluteTargetSpeed, RelativeTargetSpeed, SpeedAction
+from xosc_lateral.scenario.actions.longitudinal import AbsoluteTargetSpeed, RelativeTargetSpeed, SpeedAction
 from xosc_lateral.scenario.enums import DynamicsDimension, SpeedTargetValueType
 
 
@@ -110,3 +110,6 @@ def duration_of(start: float, target: float, distance: float) -> float:
         before = start * start / (start * start + target * target) * distance
         return 2.0 * before / abs(start) + 2.0 * (distance - before) / abs(target)
     return 2.0 * distance / abs(start + target)
+
+
+RUNNING: dict[type, type[RunningAction]] = {SpeedAction: RunningSpeed}

@@ -10,7 +10,7 @@ from xosc_lateral.playback.actions.base import Domain, RunningAction
 from xosc_lateral.playback.actions.constraints import Limits, limits_of
 from xosc_lateral.playback.actions.jerk_limited import NoSolutionError, SpeedTarget, follow
 from xosc_lateral.playback.transition import EPSILON
-from xosc_lateral.scenario.actions import SpeedProfileAction
+from xosc_lateral.scenario.actions.longitudinal import SpeedProfileAction
 from xosc_lateral.scenario.enums import FollowingMode
 
 
@@ -106,3 +106,6 @@ def _fastest(change: float, limits: Limits) -> float:
     """Time for a change of speed within the limits; none where there are no limits. [s]"""
     limit = limits.acceleration if change > 0.0 else limits.deceleration
     return 0.0 if limit == inf else abs(change) / max(limit, EPSILON)
+
+
+RUNNING: dict[type, type[RunningAction]] = {SpeedProfileAction: RunningSpeedProfile}

@@ -16,7 +16,7 @@ from xosc_lateral.playback.paths.base import Path, PathProgress, nearest_s
 from xosc_lateral.playback.positions.resolve import spot_at
 from xosc_lateral.playback.state import EntityState
 from xosc_lateral.playback.transition import EPSILON
-from xosc_lateral.scenario.actions import AbsoluteSpeed, SynchronizeAction
+from xosc_lateral.scenario.actions.synchronize import AbsoluteSpeed, SynchronizeAction
 from xosc_lateral.scenario.enums import SpeedTargetValueType
 from xosc_lateral.scenario.position import Position, TrajectoryPosition
 
@@ -231,3 +231,6 @@ def _two_accelerations(now: float, final: float, s: float, t: float) -> tuple[fl
             apex = (2.0 * s + sign * root) / (2.0 * t)
             return apex, (apex - now) / at
     return 0.0, 0.0
+
+
+RUNNING: dict[type, type[RunningAction]] = {SynchronizeAction: RunningSynchronize}

@@ -6,7 +6,7 @@ from xosc_lateral.motion.nominal import Activity
 from xosc_lateral.playback.actions.base import Domain, RunningAction
 from xosc_lateral.playback.positions.resolve import resolve
 from xosc_lateral.playback.trailers import align_trailers
-from xosc_lateral.scenario.actions import TeleportAction
+from xosc_lateral.scenario.actions.teleport import TeleportAction
 
 
 class RunningTeleport(RunningAction):
@@ -27,3 +27,6 @@ class RunningTeleport(RunningAction):
         state.longitudinal_taken = state.speed_taken = True
         state.activity |= Activity.TELEPORTED
         align_trailers(state)
+
+
+RUNNING: dict[type, type[RunningAction]] = {TeleportAction: RunningTeleport}

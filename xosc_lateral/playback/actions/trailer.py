@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from xosc_lateral.playback.actions.base import RunningAction
 from xosc_lateral.playback.trailers import connect, disconnect
-from xosc_lateral.scenario.actions import ConnectTrailerAction
+from xosc_lateral.scenario.actions.trailer import ConnectTrailerAction, DisconnectTrailerAction
 
 
 class RunningConnectTrailer(RunningAction):
@@ -29,3 +29,9 @@ class RunningDisconnectTrailer(RunningAction):
         if self.state.trailer is None:
             self.note(f"'{self.state.name}' has no trailer")
         disconnect(self.state)
+
+
+RUNNING: dict[type, type[RunningAction]] = {
+    ConnectTrailerAction: RunningConnectTrailer,
+    DisconnectTrailerAction: RunningDisconnectTrailer,
+}

@@ -14,3 +14,6 @@ class RunningUnsupported(RunningAction):
     def start(self) -> None:
         """Say so."""
         self.note(self.content.reason or f"{self.content.kind} is not played")
+
+
+RUNNING: dict[type, type[RunningAction]] = {Unsupported: RunningUnsupported}

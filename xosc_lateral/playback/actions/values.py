@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from xosc_lateral.playback.actions.base import RunningAction
-from xosc_lateral.scenario.actions import (
+from xosc_lateral.scenario.actions.infrastructure import TrafficSignalControllerAction, TrafficSignalStateAction
+from xosc_lateral.scenario.actions.values import (
     ParameterModifyAction,
     ParameterSetAction,
-    TrafficSignalControllerAction,
-    TrafficSignalStateAction,
     VariableModifyAction,
     VariableSetAction,
 )
@@ -88,3 +87,13 @@ class RunningSignalController(RunningAction):
             self.content.controller_ref, self.content.phase, self.simulation.time
         ):
             self.note(f"no signal controller '{self.content.controller_ref}' with a phase '{self.content.phase}'")
+
+
+RUNNING: dict[type, type[RunningAction]] = {
+    ParameterModifyAction: RunningParameterModify,
+    ParameterSetAction: RunningParameterSet,
+    TrafficSignalControllerAction: RunningSignalController,
+    TrafficSignalStateAction: RunningSignalState,
+    VariableModifyAction: RunningVariableModify,
+    VariableSetAction: RunningVariableSet,
+}

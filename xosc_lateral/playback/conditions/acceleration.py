@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from math import copysign, hypot
 
-from xosc_lateral.playback.conditions.base import EntityCheck
+from xosc_lateral.playback.conditions.base import EntityCheck, EntityChecks
 from xosc_lateral.playback.conditions.direction import component, watch_motion
 from xosc_lateral.playback.simulation import Simulation
 from xosc_lateral.playback.state import EntityState
 from xosc_lateral.playback.values import holds
-from xosc_lateral.scenario.conditions import AccelerationCondition
+from xosc_lateral.scenario.conditions.entity import AccelerationCondition
 
 
 def prepare(content: AccelerationCondition, simulation: Simulation) -> EntityCheck:
@@ -23,3 +23,6 @@ def prepare(content: AccelerationCondition, simulation: Simulation) -> EntityChe
         return holds(value, content.rule, content.value)
 
     return check
+
+
+CHECKS: EntityChecks = {AccelerationCondition: prepare}

@@ -5,13 +5,13 @@ from __future__ import annotations
 from math import pi
 
 from xosc_lateral.playback.angles import difference
-from xosc_lateral.playback.conditions.base import EntityCheck
+from xosc_lateral.playback.conditions.base import EntityCheck, EntityChecks
 from xosc_lateral.playback.placement import NOWHERE
 from xosc_lateral.playback.simulation import Simulation
 from xosc_lateral.playback.state import EntityState
 from xosc_lateral.playback.transition import EPSILON
 from xosc_lateral.road import Pose
-from xosc_lateral.scenario.conditions import AngleCondition, RelativeAngleCondition
+from xosc_lateral.scenario.conditions.entity import AngleCondition, RelativeAngleCondition
 from xosc_lateral.scenario.enums import AngleType, CoordinateSystem
 
 
@@ -96,3 +96,6 @@ def _of_kind(pose: Pose, kind: AngleType) -> float:
     if kind is AngleType.HEADING:
         return pose.heading
     return pose.pitch if kind is AngleType.PITCH else pose.roll
+
+
+CHECKS: EntityChecks = {AngleCondition: prepare_angle, RelativeAngleCondition: prepare_relative_angle}

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any, TypeAlias
 
+from xosc_lateral.playback.simulation import Simulation
 from xosc_lateral.playback.state import EntityState
 
 EntityCheck = Callable[[EntityState], bool]
@@ -11,3 +13,7 @@ EntityCheck = Callable[[EntityState], bool]
 
 ValueCheck = Callable[[], bool]
 """Whether the condition holds, now."""
+
+EntityChecks: TypeAlias = dict[type, Callable[[Any, Simulation], EntityCheck]]
+ValueChecks: TypeAlias = dict[type, Callable[[Any, Simulation], ValueCheck]]
+"""What a file says -> a function that makes the check of it."""

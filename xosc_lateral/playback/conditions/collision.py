@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from xosc_lateral.playback.boxes import overlap
-from xosc_lateral.playback.conditions.base import EntityCheck
+from xosc_lateral.playback.conditions.base import EntityCheck, EntityChecks
 from xosc_lateral.playback.simulation import Simulation
 from xosc_lateral.playback.state import EntityState
-from xosc_lateral.scenario.conditions import CollisionCondition
+from xosc_lateral.scenario.conditions.entity import CollisionCondition
 
 
 def prepare(content: CollisionCondition, simulation: Simulation) -> EntityCheck:
@@ -24,3 +24,6 @@ def prepare(content: CollisionCondition, simulation: Simulation) -> EntityCheck:
         return any((is_named or other is not state) and other.active and overlap(state, other) for other in others)
 
     return check
+
+
+CHECKS: EntityChecks = {CollisionCondition: prepare}

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from xosc_lateral.playback.conditions.base import EntityCheck
+from xosc_lateral.playback.conditions.base import EntityCheck, EntityChecks
 from xosc_lateral.playback.conditions.measure import measure_of
 from xosc_lateral.playback.distances import FAR, apart, spot_distance
 from xosc_lateral.playback.positions.resolve import spot_at
 from xosc_lateral.playback.simulation import Simulation
 from xosc_lateral.playback.state import EntityState
 from xosc_lateral.playback.values import holds
-from xosc_lateral.scenario.conditions import DistanceCondition
+from xosc_lateral.scenario.conditions.entity import DistanceCondition
 from xosc_lateral.scenario.enums import RelativeDistanceType
 
 
@@ -31,3 +31,6 @@ def prepare(content: DistanceCondition, simulation: Simulation) -> EntityCheck:
         return holds(FAR if distance is None else abs(distance), content.rule, content.value)
 
     return check
+
+
+CHECKS: EntityChecks = {DistanceCondition: prepare}

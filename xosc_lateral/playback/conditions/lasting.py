@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from xosc_lateral.playback.conditions.base import EntityCheck
+from xosc_lateral.playback.conditions.base import EntityCheck, EntityChecks
 from xosc_lateral.playback.simulation import Simulation
 from xosc_lateral.playback.transition import EPSILON
-from xosc_lateral.scenario.conditions import EndOfRoadCondition, OffroadCondition, StandStillCondition
+from xosc_lateral.scenario.conditions.entity import EndOfRoadCondition, OffroadCondition, StandStillCondition
 
 
 def prepare_stand_still(content: StandStillCondition, simulation: Simulation) -> EntityCheck:
@@ -28,3 +28,10 @@ def prepare_offroad(content: OffroadCondition, simulation: Simulation) -> Entity
     """Beside the road for longer than the duration. [s]"""
     simulation.derives_states = simulation.derives_off_road = True
     return lambda state: state.off_road_since is not None and simulation.time - state.off_road_since > content.duration
+
+
+CHECKS: EntityChecks = {
+    EndOfRoadCondition: prepare_end_of_road,
+    OffroadCondition: prepare_offroad,
+    StandStillCondition: prepare_stand_still,
+}

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from xosc_lateral.playback.conditions.base import ValueCheck
+from xosc_lateral.playback.conditions.base import ValueCheck, ValueChecks
 from xosc_lateral.playback.simulation import Simulation
-from xosc_lateral.scenario.conditions import ParameterCondition
+from xosc_lateral.scenario.conditions.value import ParameterCondition
 
 
 def prepare(content: ParameterCondition, simulation: Simulation) -> ValueCheck:
@@ -19,3 +19,6 @@ def prepare(content: ParameterCondition, simulation: Simulation) -> ValueCheck:
         return simulation.parameters.compare(content.parameter_ref, content.rule, content.value)
 
     return check
+
+
+CHECKS: ValueChecks = {ParameterCondition: prepare}

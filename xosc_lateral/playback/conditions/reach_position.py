@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from xosc_lateral.playback.angles import difference
-from xosc_lateral.playback.conditions.base import EntityCheck
+from xosc_lateral.playback.conditions.base import EntityCheck, EntityChecks
 from xosc_lateral.playback.distances import apart
 from xosc_lateral.playback.positions.resolve import pose_of, spot_at
 from xosc_lateral.playback.simulation import Simulation
 from xosc_lateral.playback.state import EntityState
-from xosc_lateral.scenario.conditions import ReachPositionCondition
+from xosc_lateral.scenario.conditions.entity import ReachPositionCondition
 
 ANGULAR_TOLERANCE = 0.05
 """How far heading, pitch and roll may be from an orientation that is given; the reference player's value. [rad]"""
@@ -32,3 +32,6 @@ def prepare(content: ReachPositionCondition, simulation: Simulation) -> EntityCh
         )
 
     return check
+
+
+CHECKS: EntityChecks = {ReachPositionCondition: prepare}

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any
-
 from xosc_lateral.playback.conditions import (
     acceleration,
     angle,
@@ -27,46 +24,41 @@ from xosc_lateral.playback.conditions import (
     user_defined,
     variable,
 )
-from xosc_lateral.playback.conditions.base import EntityCheck
+from xosc_lateral.playback.conditions.base import EntityCheck, EntityChecks, ValueChecks
 from xosc_lateral.playback.conditions.storyboard_element_state import StateWatch
 from xosc_lateral.playback.simulation import Simulation
 from xosc_lateral.playback.state import EntityState
 from xosc_lateral.playback.trigger import Check, RunningCondition, RunningTrigger
 from xosc_lateral.scenario import Condition, Trigger, Unsupported
-from xosc_lateral.scenario import conditions as written
 from xosc_lateral.scenario.enums import TriggeringEntitiesRule
 
-ENTITY_CONDITIONS: tuple[tuple[type, Callable[[Any, Simulation], EntityCheck]], ...] = (
-    (written.AccelerationCondition, acceleration.prepare),
-    (written.AngleCondition, angle.prepare_angle),
-    (written.CollisionCondition, collision.prepare),
-    (written.DistanceCondition, distance.prepare),
-    (written.EndOfRoadCondition, lasting.prepare_end_of_road),
-    (written.OffroadCondition, lasting.prepare_offroad),
-    (written.ReachPositionCondition, reach_position.prepare),
-    (written.RelativeAngleCondition, angle.prepare_relative_angle),
-    (written.RelativeClearanceCondition, relative_clearance.prepare),
-    (written.RelativeDistanceCondition, relative_distance.prepare),
-    (written.RelativeSpeedCondition, relative_speed.prepare),
-    (written.SpeedCondition, speed.prepare),
-    (written.StandStillCondition, lasting.prepare_stand_still),
-    (written.TimeHeadwayCondition, time_headway.prepare),
-    (written.TimeToCollisionCondition, time_to_collision.prepare),
-    (written.TraveledDistanceCondition, traveled_distance.prepare),
+ON_ENTITIES = (
+    acceleration,
+    angle,
+    collision,
+    distance,
+    lasting,
+    reach_position,
+    relative_clearance,
+    relative_distance,
+    relative_speed,
+    speed,
+    time_headway,
+    time_to_collision,
+    traveled_distance,
 )
-VALUE_CONDITIONS: tuple[tuple[type, Callable[[Any, Simulation], Check]], ...] = (
-    (written.ParameterCondition, parameter.prepare),
-    (written.SimulationTimeCondition, simulation_time.prepare),
-    (written.StoryboardElementStateCondition, storyboard_element_state.prepare),
-    (written.TimeOfDayCondition, time_of_day.prepare),
-    (written.TrafficSignalCondition, traffic_signal.prepare_signal),
-    (written.TrafficSignalControllerCondition, traffic_signal.prepare_controller),
-    (written.UserDefinedValueCondition, user_defined.prepare),
-    (written.VariableCondition, variable.prepare),
+ON_VALUES = (
+    parameter,
+    simulation_time,
+    storyboard_element_state,
+    time_of_day,
+    traffic_signal,
+    user_defined,
+    variable,
 )
 
-_ENTITY = dict(ENTITY_CONDITIONS)
-_VALUE = dict(VALUE_CONDITIONS)
+ENTITY_CHECKS: EntityChecks = {content: check for family in ON_ENTITIES for content, check in family.CHECKS.items()}
+VALUE_CHECKS: ValueChecks = {content: check for family in ON_VALUES for content, check in family.CHECKS.items()}
 
 
 def prepare_trigger(trigger: Trigger, simulation: Simulation, *, when_empty: bool) -> RunningTrigger:
@@ -86,9 +78,9 @@ def _check(condition: Condition, simulation: Simulation) -> Check:
     if isinstance(content, Unsupported):
         simulation.note(content.reason or f"{content.kind} can't be played: the condition stays false", content.place)
         return lambda: False
-    if type(content) in _VALUE:
-        return _VALUE[type(content)](content, simulation)
-    check = _ENTITY[type(content)](content, simulation)
+    if type(content) in VALUE_CHECKS:
+        return VALUE_CHECKS[type(content)](content, simulation)
+    check = ENTITY_CHECKS[type(content)](content, simulation)
     who = condition.triggering_entities
     states = () if who is None else tuple(simulation.entity(name, condition.place) for name in who.entity_refs)
     if who is not None and who.rule is TriggeringEntitiesRule.ALL:

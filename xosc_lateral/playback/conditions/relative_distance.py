@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from xosc_lateral.playback.conditions.base import EntityCheck
+from xosc_lateral.playback.conditions.base import EntityCheck, EntityChecks
 from xosc_lateral.playback.conditions.measure import measure_of
 from xosc_lateral.playback.distances import FAR, apart, train_distance
 from xosc_lateral.playback.simulation import Simulation
 from xosc_lateral.playback.state import EntityState
 from xosc_lateral.playback.values import holds
-from xosc_lateral.scenario.conditions import RelativeDistanceCondition
+from xosc_lateral.scenario.conditions.entity import RelativeDistanceCondition
 from xosc_lateral.scenario.enums import RelativeDistanceType
 
 
@@ -28,3 +28,6 @@ def prepare(content: RelativeDistanceCondition, simulation: Simulation) -> Entit
         return holds(FAR if distance is None else abs(distance), content.rule, content.value)
 
     return check
+
+
+CHECKS: EntityChecks = {RelativeDistanceCondition: prepare}

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from xosc_lateral.playback.conditions.base import EntityCheck
+from xosc_lateral.playback.conditions.base import EntityCheck, EntityChecks
 from xosc_lateral.playback.conditions.direction import component, watch_motion
 from xosc_lateral.playback.simulation import Simulation
 from xosc_lateral.playback.state import EntityState
 from xosc_lateral.playback.values import holds
-from xosc_lateral.scenario.conditions import RelativeSpeedCondition
+from xosc_lateral.scenario.conditions.entity import RelativeSpeedCondition
 
 
 def prepare(content: RelativeSpeedCondition, simulation: Simulation) -> EntityCheck:
@@ -28,3 +28,6 @@ def prepare(content: RelativeSpeedCondition, simulation: Simulation) -> EntityCh
         return holds(value, content.rule, content.value)
 
     return check
+
+
+CHECKS: EntityChecks = {RelativeSpeedCondition: prepare}

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from xosc_lateral.playback.conditions.base import EntityCheck
+from xosc_lateral.playback.conditions.base import EntityCheck, EntityChecks
 from xosc_lateral.playback.conditions.direction import component, watch_motion
 from xosc_lateral.playback.simulation import Simulation
 from xosc_lateral.playback.state import EntityState
 from xosc_lateral.playback.values import holds
-from xosc_lateral.scenario.conditions import SpeedCondition
+from xosc_lateral.scenario.conditions.entity import SpeedCondition
 
 
 def prepare(content: SpeedCondition, simulation: Simulation) -> EntityCheck:
@@ -21,3 +21,6 @@ def prepare(content: SpeedCondition, simulation: Simulation) -> EntityCheck:
         return holds(component(state.body_frame(state.velocity), direction), content.rule, content.value)
 
     return check
+
+
+CHECKS: EntityChecks = {SpeedCondition: prepare}

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from xosc_lateral.playback.conditions.base import ValueCheck
+from xosc_lateral.playback.conditions.base import ValueCheck, ValueChecks
 from xosc_lateral.playback.simulation import Simulation
 from xosc_lateral.playback.storyboard import ElementState, ElementTransition, StoryboardElement
-from xosc_lateral.scenario.conditions import StoryboardElementStateCondition
+from xosc_lateral.scenario.conditions.value import StoryboardElementStateCondition
 from xosc_lateral.scenario.enums import StoryboardElementState
 
 _STATES = {
@@ -77,3 +77,6 @@ def prepare(content: StoryboardElementStateCondition, simulation: Simulation) ->
     watch = StateWatch(content, simulation)
     simulation.when_built.append(watch.find)
     return watch
+
+
+CHECKS: ValueChecks = {StoryboardElementStateCondition: prepare}

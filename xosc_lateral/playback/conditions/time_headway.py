@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from xosc_lateral.playback.conditions.base import EntityCheck
+from xosc_lateral.playback.conditions.base import EntityCheck, EntityChecks
 from xosc_lateral.playback.conditions.measure import measure_of
 from xosc_lateral.playback.distances import FAR, train_distance
 from xosc_lateral.playback.simulation import Simulation
 from xosc_lateral.playback.state import EntityState
 from xosc_lateral.playback.transition import EPSILON
 from xosc_lateral.playback.values import holds
-from xosc_lateral.scenario.conditions import TimeHeadwayCondition
+from xosc_lateral.scenario.conditions.entity import TimeHeadwayCondition
 
 
 def prepare(content: TimeHeadwayCondition, simulation: Simulation) -> EntityCheck:
@@ -25,3 +25,6 @@ def prepare(content: TimeHeadwayCondition, simulation: Simulation) -> EntityChec
         return distance >= 0.0 and holds(distance / state.speed, content.rule, content.value)
 
     return check
+
+
+CHECKS: EntityChecks = {TimeHeadwayCondition: prepare}

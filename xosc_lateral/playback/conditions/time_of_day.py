@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from xosc_lateral.playback.conditions.base import ValueCheck
+from xosc_lateral.playback.conditions.base import ValueCheck, ValueChecks
 from xosc_lateral.playback.simulation import Simulation
 from xosc_lateral.playback.values import holds
-from xosc_lateral.scenario.conditions import TimeOfDayCondition
+from xosc_lateral.scenario.conditions.value import TimeOfDayCondition
 
 
 def prepare(content: TimeOfDayCondition, simulation: Simulation) -> ValueCheck:
@@ -22,3 +22,6 @@ def prepare(content: TimeOfDayCondition, simulation: Simulation) -> ValueCheck:
         return holds((now - then).total_seconds(), content.rule, 0.0)
 
     return check
+
+
+CHECKS: ValueChecks = {TimeOfDayCondition: prepare}

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from math import copysign, hypot
 
-from xosc_lateral.playback.conditions.base import EntityCheck
+from xosc_lateral.playback.conditions.base import EntityCheck, EntityChecks
 from xosc_lateral.playback.conditions.measure import measure_of
 from xosc_lateral.playback.distances import FAR, spot_distance, train_distance
 from xosc_lateral.playback.positions.resolve import spot_at
@@ -17,7 +17,7 @@ from xosc_lateral.playback.simulation import Simulation
 from xosc_lateral.playback.state import EntityState
 from xosc_lateral.playback.transition import EPSILON
 from xosc_lateral.playback.values import holds
-from xosc_lateral.scenario.conditions import TimeToCollisionCondition
+from xosc_lateral.scenario.conditions.entity import TimeToCollisionCondition
 
 
 def prepare(content: TimeToCollisionCondition, simulation: Simulation) -> EntityCheck:
@@ -60,3 +60,6 @@ def _closing_speed(state: EntityState, other: EntityState) -> float:
         return state.speed
     along = (state.velocity[0] * vx + state.velocity[1] * vy) / length
     return copysign(1.0, state.speed) * copysign(1.0, along) * (along - abs(other.speed))
+
+
+CHECKS: EntityChecks = {TimeToCollisionCondition: prepare}

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from xosc_lateral.playback.conditions.base import ValueCheck
+from xosc_lateral.playback.conditions.base import ValueCheck, ValueChecks
 from xosc_lateral.playback.simulation import Simulation
-from xosc_lateral.scenario.conditions import TrafficSignalCondition, TrafficSignalControllerCondition
+from xosc_lateral.scenario.conditions.value import TrafficSignalCondition, TrafficSignalControllerCondition
 
 
 def prepare_signal(content: TrafficSignalCondition, simulation: Simulation) -> ValueCheck:
@@ -15,3 +15,6 @@ def prepare_signal(content: TrafficSignalCondition, simulation: Simulation) -> V
 def prepare_controller(content: TrafficSignalControllerCondition, simulation: Simulation) -> ValueCheck:
     """Whether the controller is in that phase."""
     return lambda: simulation.signals.phase(content.controller_ref, simulation.time) == content.phase
+
+
+CHECKS: ValueChecks = {TrafficSignalCondition: prepare_signal, TrafficSignalControllerCondition: prepare_controller}

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from xosc_lateral.playback.conditions.base import ValueCheck
+from xosc_lateral.playback.conditions.base import ValueCheck, ValueChecks
 from xosc_lateral.playback.simulation import Simulation
-from xosc_lateral.scenario.conditions import VariableCondition
+from xosc_lateral.scenario.conditions.value import VariableCondition
 
 
 def prepare(content: VariableCondition, simulation: Simulation) -> ValueCheck:
@@ -19,3 +19,6 @@ def prepare(content: VariableCondition, simulation: Simulation) -> ValueCheck:
         return simulation.variables.compare(content.variable_ref, content.rule, content.value)
 
     return check
+
+
+CHECKS: ValueChecks = {VariableCondition: prepare}

@@ -13,7 +13,7 @@ from xosc_lateral.scenario.enums import (
     RoutingAlgorithm,
     Rule,
 )
-from xosc_lateral.scenario.place import Place, Unsupported
+from xosc_lateral.scenario.place import Place
 from xosc_lateral.scenario.position import Position
 
 
@@ -199,24 +199,3 @@ class RelativeAngleCondition:
     tolerance: float
     place: Place
     coordinate_system: CoordinateSystem | None = None
-
-
-EntityCondition = (
-    EndOfRoadCondition
-    | CollisionCondition
-    | OffroadCondition
-    | TimeHeadwayCondition
-    | TimeToCollisionCondition
-    | AccelerationCondition
-    | StandStillCondition
-    | SpeedCondition
-    | RelativeSpeedCondition
-    | TraveledDistanceCondition
-    | ReachPositionCondition
-    | DistanceCondition
-    | RelativeDistanceCondition
-    | RelativeClearanceCondition
-    | AngleCondition
-    | RelativeAngleCondition
-    | Unsupported
-)

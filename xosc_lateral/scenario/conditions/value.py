@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from datetime import datetime
 
 from xosc_lateral.scenario.enums import Rule, StoryboardElementState, StoryboardElementType
-from xosc_lateral.scenario.place import Place, Unsupported
+from xosc_lateral.scenario.place import Place
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,16 +83,3 @@ class UserDefinedValueCondition:
     value: str
     rule: Rule
     place: Place
-
-
-ValueCondition = (
-    ParameterCondition
-    | VariableCondition
-    | SimulationTimeCondition
-    | TimeOfDayCondition
-    | StoryboardElementStateCondition
-    | TrafficSignalCondition
-    | TrafficSignalControllerCondition
-    | UserDefinedValueCondition
-    | Unsupported
-)

@@ -7,12 +7,8 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 from xosc_lateral.scenario import Action, Event, Scenario
-from xosc_lateral.scenario.actions import (
-    FollowTrajectoryAction,
-    LaneChangeAction,
-    LaneOffsetAction,
-    LateralDistanceAction,
-)
+from xosc_lateral.scenario.actions.lateral import LaneChangeAction, LaneOffsetAction, LateralDistanceAction
+from xosc_lateral.scenario.actions.routing import FollowTrajectoryAction
 
 LATERAL = (LaneChangeAction, LaneOffsetAction, LateralDistanceAction, FollowTrajectoryAction)
 
