@@ -2,22 +2,28 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from tests.baselines.made_runs import made_run, smooth_runs
-from xosc_lateral.driver.effects import Acts
+from xosc_lateral.driver.effects import Acts, Linear
 from xosc_lateral.driver.fitting import fit_population
-from xosc_lateral.driver.place import LEAST_DRIVES, fit_place, without_place
+from xosc_lateral.driver.models.autoregressive.filters import split_bands
+from xosc_lateral.driver.place import LEAST_DRIVES, _shrunk, fit_place, without_place
 from xosc_lateral.driver.sampling import sample_offsets
 from xosc_lateral.driver.snippets import segment_of
 from xosc_lateral.drives.drive import Run
 
 
 def population(
-    seed: int, *, truck: float = 0.0, lane: float = 0.0, spread: float = 0.0, drivers: int = 60
+    seed: int, *, truck: float = 0.0, lane: float = 0.0, spread: float = 0.0, fine: float = 0.0, drivers: int = 60
 ) -> list[Run]:
-    """Drivers of 60 s: every third a truck, at most 25 m/s; lanes at random, overtaking ones faster. [m], [-]"""
+    """Drivers of 60 s: every third a truck, at most 25 m/s; lanes at random, overtaking ones faster. [m], [-]
+
+    Fine movement is white and has a standard deviation of 1 cm at 28 m/s.
+    """
     rng = np.random.default_rng([seed, 1])
     runs = []
     for k, run in enumerate(smooth_runs(drivers, 60.0, seed=seed)):
@@ -26,18 +32,20 @@ def population(
         level = run.offset.mean()
         moved = level + (run.offset - level) * np.exp(spread * (speed - 28.0)) + truck * is_truck + lane * in_right
         n = len(run)
+        moved += 0.01 * np.exp(fine * (speed - 28.0)) * rng.normal(size=n)
         context = {"is_truck": np.full(n, is_truck), "lane_index": np.full(n, 1.0 - in_right)}
         runs.append(made_run(moved, drive=run.drive, speed=speed, **context))
     return runs
 
 
 def test_what_is_planted_is_found_with_its_size():
-    found = fit_place(population(1, truck=-0.5, lane=0.35, spread=0.08))
+    found = fit_place(population(1, truck=-0.5, lane=0.35, spread=0.08, fine=-0.05))
     by = {(effect.acts, effect.columns): effect for effect in found}
     for key, size in (
         ((Acts.LOCATION, ("is_truck",)), -0.5),
         ((Acts.LOCATION, ("lane_index",)), 0.35),
         ((Acts.SPREAD, ("speed",)), 0.08),
+        ((Acts.FINE, ("speed",)), -0.05),
     ):
         effect = by[key]
         slope, error = effect.coefficients[-1], effect.errors[-1]
@@ -46,9 +54,20 @@ def test_what_is_planted_is_found_with_its_size():
         assert error < 0.3 * abs(size)
 
 
-def test_nothing_is_found_where_nothing_is():
-    # Six candidates a population, each kept by chance with p = 0.04 (a z of the root of log 60): 20 make 5.
-    assert sum(len(fit_place(population(seed))) for seed in range(10, 30)) <= 11
+def test_where_nothing_is_most_find_nothing_and_none_finds_much():
+    # The three slopes of a response are kept when their squared size is above three, by chance with p = 0.39; of 60
+    # responses 23 on average, with a standard deviation of 4.
+    found = [fit_place(population(seed)) for seed in range(10, 30)]
+    assert sum(map(len, found)) <= 3 * (23 + 3 * 4)
+    # Shrunk by three over that size, one of 180 slopes is hardly ever beyond two and a half of its own errors.
+    assert sum(abs(effect.coefficients[-1]) > 2.5 * effect.errors[-1] for one in found for effect in one) <= 2
+
+
+@pytest.mark.parametrize(("size", "share"), [(1.0, 0.0), (3.0, 0.0), (4.0, 0.25), (300.0, 0.99)])
+def test_slopes_lose_what_chance_makes_of_their_squared_size(size: float, share: float):
+    covariance = np.array([[4.0, 1.0, 0.0], [1.0, 2.0, 0.5], [0.0, 0.5, 1.0]])
+    slopes = np.linalg.cholesky(covariance) @ np.full(3, np.sqrt(size / 3.0))
+    np.testing.assert_allclose(_shrunk(slopes, covariance), share * slopes, atol=1e-12)
 
 
 def test_too_few_drives_and_missing_columns_give_none():
@@ -59,8 +78,23 @@ def test_too_few_drives_and_missing_columns_give_none():
 
 
 def test_what_is_taken_out_is_gone():
-    runs = population(3, truck=-0.5, lane=0.35, spread=0.08)
-    assert fit_place(without_place(runs, fit_place(runs))) == ()
+    runs = population(3, truck=-0.5, lane=0.35, spread=0.08, fine=-0.05)
+    for effect in fit_place(without_place(runs, fit_place(runs))):
+        assert abs(effect.coefficients[-1]) < 2.5 * effect.errors[-1]
+
+
+def test_slow_and_fast_movement_are_freed_each_of_its_own():
+    run = population(5)[0]
+    shape = {"column": "is_truck", "reference": (0.0,), "errors": (0.1,)}
+    context = {**run.context, "is_truck": np.ones(len(run))}
+    effects = [
+        Linear(acts=Acts.SPREAD, coefficients=(0.7,), **shape),
+        Linear(acts=Acts.FINE, coefficients=(-0.4,), **shape),
+    ]
+    (freed,) = without_place([replace(run, context=context)], effects)
+    level = run.offset.mean()
+    slow, fast = split_bands(run.offset - level, 0.2)
+    np.testing.assert_allclose(freed.offset - level, slow * np.exp(-0.7) + fast * np.exp(0.4), atol=1e-12)
 
 
 @pytest.mark.parametrize("is_truck", [0.0, 1.0])

@@ -35,7 +35,7 @@ def fit_profile(
 ) -> DriverProfile:
     """Cut drives into runs, tell driver and sensor apart, and fit a profile.
 
-    Of a population it holds what class, lane and speed do to level and spread (`place`), else no effects.
+    Of a population it holds what class, lane and speed do to level, spread and fine movement (`place`), else none.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What class, lane and speed do to a population's level and spread, fitted before the rest.
+"""What class, lane and speed do to a population's level, spread and fine movement, fitted before the rest.
 
 Trucks, cars and lanes of one recording differ. What of it is beyond chance becomes effects of the profile, so that one
 profile gives each its own, wherever class, lane and speed are known.
@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from xosc_lateral.driver.effects import Acts, ColumnEffect, Levels, Linear, Piecewise
 from xosc_lateral.driver.effects.rounding import rounded_number
+from xosc_lateral.driver.models.autoregressive.filters import split_bands
 from xosc_lateral.drives.drive import Run
 from xosc_lateral.drives.resampling import STEP
 
@@ -38,8 +39,10 @@ class _Pieces:
 
     Parameters
     ----------
-    mean, spread : array, shape (n,)
-        Of the offset; the logarithm of its standard deviation. [m], [-]
+    mean : array, shape (n,)
+        Of the offset. [m]
+    spread, fine : array, shape (n,)
+        Logarithms of the standard deviations of the slow and of the fast part. [-]
     quantities : array, shape (n, k)
         Mean of each quantity.
     drive : array of int, shape (n,)
@@ -47,28 +50,32 @@ class _Pieces:
 
     mean: FloatArray
     spread: FloatArray
+    fine: FloatArray
     quantities: FloatArray
     drive: NDArray[np.int64]
 
 
 def fit_place(runs: Sequence[Run]) -> tuple[ColumnEffect, ...]:
-    """Effects of class, lane and speed that are beyond chance; none where there are too few drives or columns.
+    """Effects of class, lane and speed; none where there are too few drives or columns.
 
-    Drivers' own levels are a random effect, errors are robust against whatever else the snippets of one drive share,
-    and a column is kept where that lowers Schwarz's criterion with the drives as the number of observations.
+    Drivers' own levels are a random effect, and errors are robust against whatever else the snippets of one drive
+    share [1]_. The slopes of all columns are shrunk together, by the share of their size that chance would not make
+    (`_shrunk`): dropping the uncertain ones predicts other vehicles worse. Nothing is left where chance makes all.
 
     References
     ----------
     .. [1] B. H. Baltagi, "Econometric Analysis of Panel Data", sections 2.3 and 2.4.2: random effects by a
        quasi-demeaned regression; errors clustered by individual.
+    .. [2] B. Efron, C. Morris, "Stein's estimation rule and its competitors - an empirical Bayes approach", J. American
+       Statistical Association 68 (1973).
     """
     shapes = _shapes(runs)
     if not shapes or len({run.drive for run in runs}) < LEAST_DRIVES:
         return ()
     pieces = _pieces(runs, shapes)
     found: list[ColumnEffect] = []
-    for acts, observed in ((Acts.LOCATION, pieces.mean), (Acts.SPREAD, pieces.spread)):
-        found += _kept(shapes, acts, observed, pieces)
+    for acts, response in ((Acts.LOCATION, pieces.mean), (Acts.SPREAD, pieces.spread), (Acts.FINE, pieces.fine)):
+        found += _effects(shapes, acts, response, pieces)
     return tuple(found)
 
 
@@ -80,16 +87,15 @@ def without_place(runs: Sequence[Run], effects: Sequence[ColumnEffect]) -> list[
 
 
 def _neutral(run: Run, effects: Sequence[ColumnEffect]) -> Run:
-    location, log_factor = np.zeros(len(run)), np.zeros(len(run))
+    strength = {acts: np.zeros(len(run)) for acts in (Acts.LOCATION, Acts.SPREAD, Acts.FINE)}
     for effect in effects:
-        strength = effect.strength(STEP, run.context)
-        if strength is not None and effect.acts is Acts.LOCATION:
-            location += strength
-        elif strength is not None:
-            log_factor += strength
-    moved = run.offset - location
+        own = effect.strength(STEP, run.context)
+        if own is not None:
+            strength[effect.acts] += own
+    moved = run.offset - strength[Acts.LOCATION]
     level = float(moved.mean())
-    return replace(run, offset=level + (moved - level) * np.exp(-log_factor))
+    slow, fast = split_bands(moved - level, STEP)
+    return replace(run, offset=level + slow * np.exp(-strength[Acts.SPREAD]) + fast * np.exp(-strength[Acts.FINE]))
 
 
 def _shapes(runs: Sequence[Run]) -> list[ColumnEffect]:
@@ -122,39 +128,51 @@ def _quantity(effect: ColumnEffect, run: Run) -> FloatArray:
 def _pieces(runs: Sequence[Run], shapes: Sequence[ColumnEffect]) -> _Pieces:
     size = round(PIECE / STEP)
     number = {name: k for k, name in enumerate(dict.fromkeys(run.drive for run in runs))}
-    mean, spread, rows, drive = [], [], [], []
+    mean, spread, fine, rows, drive = [], [], [], [], []
     for run in runs:
+        slow, fast = split_bands(run.offset, STEP)
         quantities = np.stack([_quantity(effect, run) for effect in shapes], axis=1)
         for first in range(0, len(run) - size + 1, size):
             piece = slice(first, first + size)
             mean.append(run.offset[piece].mean())
-            spread.append(np.log(run.offset[piece].std() + 1e-6))
+            spread.append(np.log(slow[piece].std() + 1e-6))
+            fine.append(np.log(fast[piece].std() + 1e-6))
             rows.append(quantities[piece].mean(axis=0))
             drive.append(number[run.drive])
     shape = (len(rows), len(shapes))
-    return _Pieces(np.array(mean), np.array(spread), np.array(rows).reshape(shape), np.array(drive, dtype=np.int64))
+    return _Pieces(
+        np.array(mean),
+        np.array(spread),
+        np.array(fine),
+        np.array(rows).reshape(shape),
+        np.array(drive, dtype=np.int64),
+    )
 
 
-def _kept(shapes: Sequence[ColumnEffect], acts: Acts, observed: FloatArray, pieces: _Pieces) -> list[ColumnEffect]:
-    """The least certain column is dropped until all left earn their place."""
-    left = list(range(len(shapes)))
-    drives = len(np.unique(pieces.drive))
-    while left:
-        slopes, errors = _regressed(observed, pieces.quantities[:, left], pieces.drive)
-        certainty = (slopes / errors) ** 2
-        worst = int(np.argmin(certainty))
-        if certainty[worst] > np.log(drives):
-            reference = pieces.quantities.mean(axis=0)
-            return [
-                _effect(shapes[k], acts, float(slope), float(error), float(reference[k]))
-                for k, slope, error in zip(left, slopes, errors, strict=True)
-            ]
-        del left[worst]
-    return []
+def _effects(shapes: Sequence[ColumnEffect], acts: Acts, response: FloatArray, pieces: _Pieces) -> list[ColumnEffect]:
+    """One of each column, or none."""
+    slopes, covariance = _regressed(response, pieces.quantities, pieces.drive)
+    errors, reference = np.sqrt(np.maximum(np.diag(covariance), 1e-30)), pieces.quantities.mean(axis=0)
+    shrunk = _shrunk(slopes, covariance)
+    if not shrunk.any():
+        return []
+    return [
+        _effect(shape, acts, float(slope), float(error), float(middle))
+        for shape, slope, error, middle in zip(shapes, shrunk, errors, reference, strict=True)
+    ]
+
+
+def _shrunk(slopes: FloatArray, covariance: FloatArray) -> FloatArray:
+    """Slopes, shape (k,), times the share of their size that is not chance's, at least 0.
+
+    Chance alone gives a squared size, in units of the covariance, of k on average.
+    """
+    size = float(slopes @ np.linalg.pinv(covariance) @ slopes)
+    return np.asarray(slopes * max(0.0, 1.0 - len(slopes) / max(size, 1e-30)))
 
 
 def _regressed(observed: FloatArray, quantities: FloatArray, drive: NDArray[np.int64]) -> tuple[FloatArray, FloatArray]:
-    """Slopes and their errors, shape (k,) each."""
+    """Slopes, shape (k,), and their covariance, shape (k, k)."""
     design = np.column_stack([np.ones(len(observed)), quantities])
     counts = np.bincount(drive).astype(np.float64)
     rest = observed - design @ np.linalg.lstsq(design, observed, rcond=None)[0]
@@ -169,7 +187,7 @@ def _regressed(observed: FloatArray, quantities: FloatArray, drive: NDArray[np.i
     scores = x * (y - x @ slopes)[:, None]
     by_drive = np.column_stack([np.bincount(drive, column) for column in scores.T])
     covariance = inverse @ (by_drive.T @ by_drive) @ inverse
-    return slopes[1:], np.sqrt(np.maximum(np.diag(covariance)[1:], 1e-30))
+    return slopes[1:], covariance[1:, 1:]
 
 
 def _effect(shape: ColumnEffect, acts: Acts, slope: float, error: float, reference: float) -> ColumnEffect:
