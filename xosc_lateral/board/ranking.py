@@ -1,4 +1,12 @@
-"""Score, its interval over resampled vehicles, and how stable the ranking is."""
+"""Score, its interval over resampled vehicles, and how stable the ranking is.
+
+Rankings are compared by Kendall's tau [1]_; intervals are those of the bootstrap [2]_.
+
+References
+----------
+.. [1] M. G. Kendall, "A new measure of rank correlation", Biometrika 30, 1938.
+.. [2] B. Efron, "Bootstrap methods: another look at the jackknife", Annals of Statistics 7, 1979.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,9 @@
-"""Snippets of measured runs, and sampled ones beside them; free runs under the context of measured drives."""
+"""Snippets of measured runs, and sampled ones beside them; free runs under the context of measured drives.
+
+References
+----------
+.. [1] N. Neis, J. Beyerer, arXiv:2405.17080, 2024: offsets are compared in snippets of equal length.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,9 @@
-"""What a profile samples beside measured driving: snippets with the same starts, parts of them, runs, sensor noise."""
+"""What a profile samples beside measured driving: snippets with the same starts, parts of them, runs, sensor noise.
+
+References
+----------
+.. [1] N. Neis, J. Beyerer, arXiv:2405.17080, 2024: sampled snippets beside measured ones with the same starts.
+"""
 
 from __future__ import annotations
 

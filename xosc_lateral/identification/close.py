@@ -30,6 +30,7 @@ from xosc_lateral.identification.regression import Coarse, Fitted, fit_model
 from xosc_lateral.identification.removal import Estimates, estimate_all, removal_of
 from xosc_lateral.identification.residual import SummaryStatistics, floor_of
 from xosc_lateral.identification.scorecard import Scorecard, score_runs
+from xosc_lateral.identification.seeds import LoopSeed
 from xosc_lateral.identification.selection import Rejected, Selection
 from xosc_lateral.identification.spectrum_shape import SpectrumShape, compare_spectrum_shapes
 from xosc_lateral.identification.terms.between import between_shift
@@ -187,7 +188,7 @@ def close_loop(
         # what the core model lacks is found once, by replacing it; the autoregressive one has both
         findings += [spectrum_finding(spectrum, compared)] if spectrum.found else []
         findings += [population_finding(population, compared)] if population is not None and population.found else []
-    rng = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(9,)))
+    rng = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(LoopSeed.BLOCKS,)))
     floor = floor_of(scored.statistics, unmoved, blocks, rng)
     scores = score_runs(timeline, scored.runs_before, scored.runs_after, blocks, rng)
     progress(1.0, "done")

@@ -23,6 +23,7 @@ from xosc_lateral.identification.problem import Problem
 from xosc_lateral.identification.refinement import Refined, Refinement
 from xosc_lateral.identification.regression import Fitted, ModelTerm, fit_model
 from xosc_lateral.identification.search import Search
+from xosc_lateral.identification.seeds import LoopSeed
 from xosc_lateral.identification.significance import upper_tail
 from xosc_lateral.identification.terms.base import Outcome, Term
 
@@ -169,7 +170,8 @@ def _score(
         return None
     known = _known(problem, dictionary, [term for term in fitted.terms if isinstance(term, kind)], spared)
     drive = search.coarse.drive[problem.valid]
-    scores = score_entries(dictionary, problem.observed, known, barred, drive, search.rng(0), draws=draws)
+    rng = search.rng(LoopSeed.COLUMNS)
+    scores = score_entries(dictionary, problem.observed, known, barred, drive, rng, draws=draws)
     return _Scored(problem, dictionary, known, scores)
 
 

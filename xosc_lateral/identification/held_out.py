@@ -27,6 +27,7 @@ from xosc_lateral.identification.residual import (
     simulated_runs,
     statistics_of,
 )
+from xosc_lateral.identification.seeds import LoopSeed
 from xosc_lateral.identification.selection import Selection
 from xosc_lateral.identification.terms.base import Term
 from xosc_lateral.identification.terms.cycle import CycleTerm
@@ -104,7 +105,7 @@ def _held_out_runs(
             profiles.append(fit_without(fitted, estimate_all(fitted), used, setting.refined_kind, "after", None))
         for side, profile in enumerate(profiles):
             # the same luck for both sides and all folds: what differs is the profile, and runs go on from fold to fold
-            seed = np.random.SeedSequence(setting.root.entropy, spawn_key=(5,))
+            seed = np.random.SeedSequence(setting.root.entropy, spawn_key=(LoopSeed.FOLDS,))
             runs = simulated_runs(profile, coarse.timeline, seed, held=held)
             whole = sides[side]
             if whole is None:

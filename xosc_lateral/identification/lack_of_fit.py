@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from xosc_lateral.identification.blocks import hold_out_blocks
 from xosc_lateral.identification.close import LoopResult
 from xosc_lateral.identification.residual import size_of, split_differences
+from xosc_lateral.identification.seeds import LoopSeed
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
@@ -87,7 +88,7 @@ class LackOfFit:
 def lack_of_fit_of(result: LoopResult) -> LackOfFit:
     """Compare every group of statistics, and all of them, with what the drives differ from themselves by (seeded)."""
     timeline = result.statistics.timeline
-    rng = np.random.default_rng(np.random.SeedSequence(result.seed, spawn_key=(11,)))
+    rng = np.random.default_rng(np.random.SeedSequence(result.seed, spawn_key=(LoopSeed.LACK_OF_FIT,)))
     splits = split_differences(result.statistics, result.unmoved, hold_out_blocks(timeline), rng, SPLITS)
     floors = {name: np.sqrt(_mean_of_finite(np.stack([split[name] for split in splits]) ** 2)) for name in result.real}
     groups = tuple(

@@ -20,6 +20,7 @@ from xosc_lateral.identification.held_out_gain import held_out_gain
 from xosc_lateral.identification.regression import Coarse, fit_model
 from xosc_lateral.identification.search import Search
 from xosc_lateral.identification.selection import Selection, select
+from xosc_lateral.identification.significance import NORMAL_95
 from xosc_lateral.identification.terms.base import Term
 from xosc_lateral.identification.timeline import coarse_middle
 
@@ -47,7 +48,7 @@ class Gain:
     @property
     def interval(self) -> tuple[float, float]:
         """95 % interval of the mean gain."""
-        return self.mean - 1.96 * self.error, self.mean + 1.96 * self.error
+        return self.mean - NORMAL_95 * self.error, self.mean + NORMAL_95 * self.error
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,4 +1,11 @@
-"""One linear regression on white rows: what every test of a column comes down to."""
+"""One linear regression on white rows: what every test of a column comes down to.
+
+Generalised least squares [1]_: both sides are whitened, then it is an ordinary one.
+
+References
+----------
+.. [1] A. C. Aitken, "On least squares and linear combination of observations", Proc. R. Soc. Edinburgh 55, 1936.
+"""
 
 from __future__ import annotations
 

@@ -6,6 +6,13 @@ size in bands of frequency, and quantiles of the local spread. The error is the 
 minus expected, with the expectation taken over several runs of the profile. If none differs by more than the floor
 (what measured data differs from itself), no test of means, spreads, spectra or their dependence on context can tell the
 profile from the driver.
+
+Moments of what is measured beside moments of what is simulated, as in the method of simulated moments [1]_.
+
+References
+----------
+.. [1] D. McFadden, "A method of simulated moments for estimation of discrete response models without numerical
+       integration", Econometrica 57, 1989.
 """
 
 from __future__ import annotations

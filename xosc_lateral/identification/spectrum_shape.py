@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.identification.residual import simulated_runs
+from xosc_lateral.identification.seeds import LoopSeed
 from xosc_lateral.identification.significance import LEAST
 from xosc_lateral.identification.timeline import Timeline, local_mean
 
@@ -67,7 +68,8 @@ def compare_spectrum_shapes(profile: DriverProfile, timeline: Timeline, seed: np
     """Compare a profile's free runs with the drives, block by block."""
     from scipy.stats import f
 
-    runs = simulated_runs(profile, timeline, np.random.SeedSequence(seed.entropy, spawn_key=(7,)), runs=N_RUNS)
+    own_seed = np.random.SeedSequence(seed.entropy, spawn_key=(LoopSeed.SPECTRUM,))
+    runs = simulated_runs(profile, timeline, own_seed, runs=N_RUNS)
     real = _shapes(timeline.offset, timeline)
     own = np.concatenate([_shapes(run, timeline) for run in runs])
     if len(real) < 2 * len(TIMES_S) + 4:

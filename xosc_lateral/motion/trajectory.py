@@ -1,4 +1,12 @@
-"""From nominal motion and a lateral deviation to the path that is written."""
+"""From nominal motion and a lateral deviation to the path that is written.
+
+The shift is one across the lane; headings and speeds follow from the shifted path [1]_.
+
+References
+----------
+.. [1] M. Werling, J. Ziegler, S. Kammel, S. Thrun, "Optimal trajectory generation for dynamic street scenarios
+       in a Frenét frame", IEEE ICRA 2010.
+"""
 
 from __future__ import annotations
 

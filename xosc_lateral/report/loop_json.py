@@ -16,6 +16,7 @@ from xosc_lateral.identification.close import LoopResult
 from xosc_lateral.identification.findings import Finding
 from xosc_lateral.identification.lack_of_fit import LackOfFit
 from xosc_lateral.identification.nested import Gain
+from xosc_lateral.identification.significance import NORMAL_95
 from xosc_lateral.report.loop_words import feedback_words, lack_of_fit_words, meaning
 from xosc_lateral.version import __version__
 
@@ -99,7 +100,7 @@ def finding_record(finding: Finding) -> dict[str, Any]:
         "error_after": finding.error_after,
         "measure": f"{finding.measure}, m",
         "alike": list(finding.alike),
-        "interval": [finding.size_m - 1.96 * finding.size_error, finding.size_m + 1.96 * finding.size_error],
+        "interval": [finding.size_m - NORMAL_95 * finding.size_error, finding.size_m + NORMAL_95 * finding.size_error],
         "held_out_gain": _gain(finding.gain),
         "added": [effect.to_dict() for effect in finding.effects],
     }

@@ -1,8 +1,8 @@
 """The road network: (road, lane, s, offset) <-> (x, y, z, heading), and where lanes lead.
 
 Signs. `offset` is positive to the LEFT of travel everywhere; `t` is positive to the left of the road's reference line
-(OpenDRIVE); `offset_t` counts along +t from the lane centre (OpenSCENARIO ``LanePosition/@offset``). They are converted
-here and nowhere else. In every call `road` is the int32 INDEX of a road in `RoadNetwork.road_ids`.
+(ASAM OpenDRIVE 1.8, 2023); `offset_t` counts along +t from the lane centre (OpenSCENARIO ``LanePosition/@offset``).
+They are converted here and nowhere else. In every call `road` is the int32 INDEX of a road in `RoadNetwork.road_ids`.
 
 Batch calls take scalars or arrays that broadcast, and answer with arrays. Names that end in ``_at`` take and give plain
 floats and are made for stepping one vehicle at a time: a few microseconds each, without numpy.

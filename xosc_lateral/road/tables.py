@@ -2,6 +2,10 @@
 
 A line at the distance t to the left of a reference line of curvature k has the curvature k / (1 - k t): the angle that
 a stretch turns by is the same, its length is (1 - k t) of the reference line's.
+
+References
+----------
+.. [1] ASAM OpenDRIVE 1.8, 2023: road reference line, lane sections, elevation and superelevation.
 """
 
 from __future__ import annotations

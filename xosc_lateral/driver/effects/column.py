@@ -1,4 +1,13 @@
-"""What all effects of context columns share: a quantity, the driver's response to it, and how strong it acts."""
+"""What all effects of context columns share: a quantity, the driver's response to it, and how strong it acts.
+
+A distributed lag of a function of the column [1]_, the lags as a delay and a first-order lag; coefficients may differ
+between drivers as random effects do [2]_.
+
+References
+----------
+.. [1] A. Gasparrini, B. Armstrong, M. G. Kenward, "Distributed lag non-linear models", Statistics in Medicine 29, 2010.
+.. [2] N. M. Laird, J. H. Ware, "Random-effects models for longitudinal data", Biometrics 38, 1982.
+"""
 
 from __future__ import annotations
 

@@ -37,6 +37,9 @@ BLOCKS = 8
 
 ROUNDING_ROUNDS = 3
 
+NORMAL_95 = 1.96
+"""Standard errors to either side that a 95 % interval of the normal distribution has. [-]"""
+
 
 @dataclass(frozen=True, eq=False)
 class Separation:
@@ -235,6 +238,6 @@ def _interval(
             left_out.append(_in_band(solve(part, colour, base, known, best), colour, part))
     error = np.sqrt((len(blocks) - 1) * np.var(left_out)) if len(left_out) > 1 else seen
     span = share / max(seen, 1e-30)
-    low = share - span * (float(levels.max()) + 1.96 * float(error))
-    high = share - span * (float(levels.min()) - 1.96 * float(error))
+    low = share - span * (float(levels.max()) + NORMAL_95 * float(error))
+    high = share - span * (float(levels.min()) - NORMAL_95 * float(error))
     return float(np.clip(low, 0.0, share)), float(np.clip(high, share, 1.0))

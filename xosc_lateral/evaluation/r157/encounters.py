@@ -1,4 +1,9 @@
-"""Encounters with a vehicle that cuts in, many at once, what the ego sees of them, and what became of them."""
+"""Encounters with a vehicle that cuts in, many at once, what the ego sees of them, and what became of them.
+
+References
+----------
+.. [1] UN Regulation No. 157, Automated Lane Keeping Systems, Annex 4: a vehicle that cuts in.
+"""
 
 from __future__ import annotations
 

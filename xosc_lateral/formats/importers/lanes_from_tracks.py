@@ -29,6 +29,7 @@ TILT_PENALTY = 4.0  # ridge on the tilt's coefficients [-]; chosen likewise, 1 t
 CORRELATION = 0.9  # correlation of a driver's offset after 1 s, as assumed by the weights; 1 would let the level drift
 ROUNDS = 4  # of reweighting; the line moves by under 1 mm after three
 HUBER = 2.0  # residuals beyond this many standard deviations count less: undetected lane changes
+MAD_TO_SD = 1.4826  # of the normal distribution: one over the 75 % quantile [-]
 BEND_PENALTY = 0.1  # [-]
 MIN_PASSAGES = 10  # per 100 m of road, below which the lane ends
 
@@ -149,7 +150,7 @@ def _robust_least_squares(
         normal = rows.T @ (rows * weight[:, None]) + penalty
         coefficients = np.linalg.solve(normal, rows.T @ (weight * values))
         innovation = values - rows @ coefficients
-        spread = 1.4826 * np.median(np.abs(innovation))
+        spread = MAD_TO_SD * np.median(np.abs(innovation))
         weight = np.minimum(1.0, HUBER * spread / np.maximum(np.abs(innovation), 1e-12))
     names, number = np.unique(cluster, return_inverse=True)
     scores = np.zeros((len(names), rows.shape[1]))

@@ -20,6 +20,7 @@ from xosc_lateral.driver.effects import Acts, ColumnEffect, Effect, Linear
 from xosc_lateral.identification.best_of_drives import best_of_drives
 from xosc_lateral.identification.problem import Problem
 from xosc_lateral.identification.regression import Fitted
+from xosc_lateral.identification.seeds import LoopSeed
 from xosc_lateral.identification.significance import MANY_DRIVES
 from xosc_lateral.identification.terms.base import Description, Outcome
 from xosc_lateral.identification.terms.column import ColumnTerm, of_kind
@@ -82,7 +83,7 @@ class BetweenTerm(ColumnTerm):
             np.stack(usual, axis=1),
             np.array([candidate.cost for candidate in candidates]),
             [candidate.columns[0] for candidate in candidates],
-            search.rng(5),
+            search.rng(LoopSeed.BETWEEN),
         )
         terms = [
             cls.of(structs.replace(candidates[index].effect, lag_s=0.0, response_s=USUAL_S)) for index in best.members

@@ -24,6 +24,7 @@ from xosc_lateral.driver.effects import Effect, Regimes
 from xosc_lateral.identification.log_scale import squared_innovations
 from xosc_lateral.identification.markov_switching import RegimeFit, fit_regimes
 from xosc_lateral.identification.regression import Coarse, Fitted
+from xosc_lateral.identification.seeds import LoopSeed
 from xosc_lateral.identification.significance import upper_tail
 from xosc_lateral.identification.squares import SLOW_S, fine_squares, log_sizes, slow_squares
 from xosc_lateral.identification.terms.base import Description, Outcome, Removal, Term
@@ -83,7 +84,7 @@ class RegimesTerm(Term):
         # what a column does to the size in another shape than the one that was found is no regime either
         known = [known_log_scale(fitted), search.cross_basis(columns_on_size(fitted))]
         p_value = probability_of_clusters(
-            fitted.innovations, coarse.valid, np.concatenate(known, axis=1), search.rng(3)
+            fitted.innovations, coarse.valid, np.concatenate(known, axis=1), search.rng(LoopSeed.REGIMES)
         )
         return Outcome(cls(fit_regimes(fitted.innovations, coarse.valid)), (), p_value)
 

@@ -1,4 +1,11 @@
-"""A column that changes the spread of all movement about the mean."""
+"""A column that changes the spread of all movement about the mean.
+
+The logarithm of the standard deviation is linear in the column [1]_.
+
+References
+----------
+.. [1] A. C. Harvey, "Estimating regression models with multiplicative heteroscedasticity", Econometrica 44, 1976.
+"""
 
 from __future__ import annotations
 

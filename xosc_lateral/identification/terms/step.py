@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from xosc_lateral.driver.effects import Effect, Step
 from xosc_lateral.identification.low_frequency import find_low_frequency
 from xosc_lateral.identification.regression import Coarse, Fitted
+from xosc_lateral.identification.seeds import LoopSeed
 from xosc_lateral.identification.terms.base import Description, Outcome, Removal, Term, centred
 from xosc_lateral.identification.terms.cycle import latent_path
 from xosc_lateral.identification.terms.drift import DriftTerm
@@ -49,7 +50,7 @@ class StepTerm(Term):
         """Step or drift, whichever explains more, beyond what an ordinary drift continues to."""
         if any(isinstance(term, StepTerm | DriftTerm) for term in fitted.terms):
             return None
-        found = find_low_frequency(fitted.coarse, fitted, search.rng(4))
+        found = find_low_frequency(fitted.coarse, fitted, search.rng(LoopSeed.LOW_FREQUENCY))
         if found is None:
             return None
         term: Term = cls(found.at) if found.is_step else DriftTerm()

@@ -1,4 +1,11 @@
-"""A spread that grows or shrinks steadily with time on the road: fatigue, say."""
+"""A spread that grows or shrinks steadily with time on the road: fatigue, say.
+
+The logarithm of the standard deviation is linear in time [1]_.
+
+References
+----------
+.. [1] A. C. Harvey, "Estimating regression models with multiplicative heteroscedasticity", Econometrica 44, 1976.
+"""
 
 from __future__ import annotations
 

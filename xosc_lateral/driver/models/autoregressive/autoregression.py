@@ -1,4 +1,9 @@
-"""Linear prediction of a series from its past: kept stable, its spectrum known."""
+"""Linear prediction of a series from its past: kept stable, its spectrum known.
+
+References
+----------
+.. [1] G. E. P. Box, G. M. Jenkins, "Time Series Analysis: Forecasting and Control", 1970.
+"""
 
 from __future__ import annotations
 

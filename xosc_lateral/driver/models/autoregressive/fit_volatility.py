@@ -2,6 +2,10 @@
 
 One drive alone can't tell what its driver keeps from what varies slowly: all that lasts longer than the lags looked at
 counts as slow variation there, and as a difference between drivers where there are several.
+
+References
+----------
+.. [1] S. J. Taylor, "Modelling Financial Time Series", Wiley 1986: stochastic volatility.
 """
 
 from __future__ import annotations

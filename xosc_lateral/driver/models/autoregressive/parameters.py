@@ -1,4 +1,9 @@
-"""Parameters of the autoregressive model, and what follows from them."""
+"""Parameters of the autoregressive model, and what follows from them.
+
+References
+----------
+.. [1] N. Neis, J. Beyerer, arXiv:2405.17080, 2024: coarse and fine part of the offset, here with other processes.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,9 @@
-"""Sampling of the two-level model, in pieces of any length, of one driver or of several at once."""
+"""Sampling of the two-level model, in pieces of any length, of one driver or of several at once.
+
+References
+----------
+.. [1] N. Neis, J. Beyerer, arXiv:2405.17080, 2024: coarse positions as a chain, fine ones as noise.
+"""
 
 from __future__ import annotations
 
