@@ -12,5 +12,5 @@ from xosc_lateral.baselines import calibration
 
 @pytest.fixture(scope="module", autouse=True)
 def small_budget() -> Iterator[None]:
-    with patch.multiple(calibration, FIRST_LOOK=8, DESCENTS=1, FIRST_STEPS=5, STEPS=5):
+    with patch.multiple(calibration, FIRST_POINTS=8, DESCENTS=1, FIRST_STEPS=5, STEPS=5):
         yield

@@ -26,7 +26,7 @@ def table(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_a_board_is_written_for_machines_documents_and_people(
     table: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(calibration, "FIRST_LOOK", 8)  # what is tested is what is written
+    monkeypatch.setattr(calibration, "FIRST_POINTS", 8)  # what is tested is what is written
     monkeypatch.setattr(calibration, "DESCENTS", 1)
     monkeypatch.setattr(calibration, "FIRST_STEPS", 5)
     monkeypatch.setattr(calibration, "STEPS", 5)
