@@ -74,7 +74,8 @@ def test_a_null_that_never_varies_is_no_reason_for_certainty() -> None:
 
 def test_a_share_of_the_rows_is_given_the_level_that_an_effect_reaches_there() -> None:
     assert level_of("mean", 1, share=1.0) == level_of("mean", 1)
-    # log p in proportion to the rows: hidden effects are one candidate each; the best of many pays for their number on a share of the rows as on all
+    # log p in proportion to the rows: hidden effects are one candidate each; the best of many pays for their number
+    # on a share of the rows as on all
     assert np.log(level_of("cycle", 1, share=0.75)) == pytest.approx(0.75 * np.log(level_of("cycle", 1)))
     each = level_of("mean", 1) / CANDIDATES
     assert np.log(level_of("mean", 1, share=0.75) / CANDIDATES) == pytest.approx(0.75 * np.log(each))
