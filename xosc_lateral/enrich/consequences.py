@@ -21,8 +21,8 @@ def lane_departures(entity: EntityResult, network: RoadNetwork) -> list[LaneDepa
     """Where the enriched reference point is outside the nominal lane although the nominal one is inside: worst row."""
     found = []
     motion = entity.motion
-    stretches = [(segment.span.first, segment.span.last) for segment in entity.segments]
-    for first, last in stretches + _lateral_within_a_lane(motion):
+    spans = [(segment.span.first, segment.span.last) for segment in entity.segments]
+    for first, last in spans + _lateral_within_a_lane(motion):
         rows = slice(first, last + 1)
         half = 0.5 * network.lane_width(motion.road[rows], motion.lane[rows], motion.s[rows])
         beyond = np.abs(motion.offset[rows] + entity.deviation[rows]) - half
