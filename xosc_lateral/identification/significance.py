@@ -37,13 +37,13 @@ WEIGHTS = {
     "slow_spread": 3.0,
     "fine_noise": 1.0,
     "restoring": 0.5,
-    "low_frequency": 1.0,
+    "low_frequency": 2.0,
     "cycle": 1.0,
     "variance_trend": 1.0,
     "regimes": 0.5,
 }
 """Shares of the budget: half for the mean, within and between drives in equal parts; a quarter for both measures of
-spread; about equal parts for the rest."""
+spread; about equal parts for the rest, one for each kind of hidden effect: a step and a drift share a component."""
 
 OF_COLUMNS = frozenset({"mean", "between", "spread", "slow_spread", "fine_noise", "restoring"})
 """Components that look for the best of many candidates."""
