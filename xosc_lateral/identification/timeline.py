@@ -103,16 +103,12 @@ class Timeline:
 
         A lag of a minute would outlast the pad between two drives, so that one would respond to what the other met.
         """
-        joined = respond(values, self.step, lag_s, response_s)
-        if response_s <= 0.0 or len(self.names) < 2:
-            return joined
-        # amid the pad everything shifted is the drive's own; the lag's memory of what came before dies away linearly
-        starts = np.array([span.start + PAD // 2 for span in self.spans[1:]])
-        surplus = np.zeros((len(self.names), joined.shape[1]))
-        surplus[1:] = joined[starts] - values[starts]
-        since = np.arange(len(joined)) - np.concatenate([[0], starts])[self.drive]
-        left = np.exp(-np.maximum(since, 0) * (self.step / response_s))
-        return np.asarray(joined - left[:, None] * surplus[self.drive])
+        response = respond(values, self.step, lag_s, response_s)
+        if response_s <= 0.0:
+            return response
+        # amid the pad, what is shifted is the drive's own
+        amid = self.drive[np.maximum(np.arange(len(values)) - PAD // 2, 0)]
+        return start_anew(response, values, float(np.exp(-self.step / response_s)), amid)
 
 
 def join_drives(drives: Sequence[Drive], rules: CutRules = TRACE_RULES) -> Timeline:
