@@ -148,7 +148,7 @@ def test_what_is_beyond_a_floor_is_what_adds_to_it_in_squares() -> None:
 def test_a_score_of_several_degrees_becomes_one_of_one_degree_as_rare(degrees: int) -> None:
     for p_value in (0.5, 1e-2, 1e-8):
         score = float(chi2.isf(p_value, degrees))
-        assert chi2.sf(as_one_degree(np.array(score), degrees), 1) == pytest.approx(p_value, rel=1e-6)
+        assert chi2.sf(as_one_degree(score, degrees), 1) == pytest.approx(p_value, rel=1e-6)
 
 
 def coarse(*seconds: int) -> Any:

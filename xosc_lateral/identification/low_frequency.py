@@ -158,7 +158,7 @@ class _Scores:
         for size in DRIFT_SIZES:
             chosen = (DRIFT_TERMS * np.arange(self._drives)[:, None] + np.arange(size)).ravel()
             gained = float(moments[chosen] @ np.linalg.pinv(gram[np.ix_(chosen, chosen)]) @ moments[chosen])
-            best = max(best, float(as_one_degree(np.asarray(gained), len(chosen))) - DRIFT_COST)
+            best = max(best, float(as_one_degree(gained, len(chosen))) - DRIFT_COST)
         if self._steps.shape[1] == 0:
             return best, 0.0, 0
         jumped = (np.conj(self._steps).T @ (weight * observed)).real

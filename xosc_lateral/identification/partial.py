@@ -100,8 +100,7 @@ def _driving(result: LoopResult, effect: ColumnEffect) -> tuple[FloatArray, Floa
     column = coarse.context[effect.columns[0]]
     if isinstance(effect, Angular) or not np.isfinite(column).all():  # neither angles nor "none" can be averaged
         return coarse_middle(column), coarse_mean(own)
-    responded = coarse.timeline.respond(column[:, None], effect.lag_s, effect.response_s)
-    return coarse_mean(responded[:, 0]), coarse_mean(own)
+    return coarse_mean(coarse.timeline.respond(column, effect.lag_s, effect.response_s)), coarse_mean(own)
 
 
 def _alone(result: LoopResult, effect: ColumnEffect) -> FloatArray:

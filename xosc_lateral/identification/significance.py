@@ -98,7 +98,7 @@ def upper_tail(score: float, maxima: FloatArray) -> float:
     return max(float(gumbel_r.sf(score, place, scale)), exponential, LEAST)
 
 
-def as_one_degree(chi_square: FloatArray, degrees: int) -> FloatArray:
+def as_one_degree(chi_square: FloatArray | float, degrees: int) -> FloatArray:
     """Chi-square with one degree of freedom that is as rare as one with `degrees`, of the same shape."""
     from scipy.stats import chi2
 

@@ -99,7 +99,7 @@ class Timeline:
         return self.respond(effect.known(context), effect.lag_s, effect.response_s)
 
     def respond(self, values: FloatArray, lag_s: float, response_s: float) -> FloatArray:
-        """`driver.effects.response.respond` drive by drive, shape (n, k) of `values`, in their unit.
+        """`driver.effects.response.respond` drive by drive: shape of `values`, (n,) or (n, k), in their unit.
 
         A lag of a minute would outlast the pad between two drives, so that one would respond to what the other met.
         """
