@@ -71,3 +71,18 @@ def test_few_drives_and_short_ones_say_nothing():
     assert drivers(4, MIN_DRIVES - 1)[0] is None
     assert drivers(4, 20, seconds=2 * MIN_SECONDS)[0] is not None
     assert drivers(4, 20, seconds=2 * MIN_SECONDS - 1)[0] is None
+
+
+def test_scatter_is_tested_as_in_an_analysis_of_variance() -> None:
+    halves = np.random.default_rng(2).normal(size=(12, 2)) + np.random.default_rng(3).normal(size=(12, 1))
+    _, p_value = population._scatter(halves)
+    assert p_value == pytest.approx(f_oneway(*halves).pvalue, rel=1e-9)
+
+
+def test_scatter_between_drives_is_freed_of_noise() -> None:
+    rng = np.random.default_rng(4)
+    halves = 0.3 * rng.normal(size=(4000, 1)) + 0.5 * rng.normal(size=(4000, 2))
+    deviation, p_value = population._scatter(halves)
+    assert deviation == pytest.approx(0.3, abs=0.02)
+    assert p_value < 1e-6
+    assert population._scatter(0.5 * rng.normal(size=(10, 2)))[0] >= 0.0

@@ -11,12 +11,12 @@ from hypothesis import strategies as st
 
 from xosc_lateral.driver.effects import Acts, Linear
 from xosc_lateral.drives.drive import Drive
+from xosc_lateral.drives.resampling import in_digits
 from xosc_lateral.identification.autocorrelation import moving_sum, positions_in_run
 from xosc_lateral.identification.timeline import (
     coarse_all,
     coarse_mean,
     coarse_middle,
-    in_digits,
     join_drives,
     local_mean,
     means_by_drive,

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.drives.drive import Drive, Run
-from xosc_lateral.drives.resampling import STEP, average, nearest, resample
+from xosc_lateral.drives.resampling import STEP, column_on_grid, resample
 from xosc_lateral.errors import NotEnoughDataError
 
 BoolArray = NDArray[np.bool_]
@@ -121,10 +121,10 @@ def _run(drive: Drive, index: int, rows: slice, step: float) -> Run:
     time = drive.time[rows]
     grid = time[0] + step * np.arange(int((time[-1] - time[0]) / step + 1e-6) + 1)
     context = {
-        name: (nearest if name in drive.levels else average)(time, values[rows], grid)
+        name: column_on_grid(time, values[rows], grid, held=name in drive.levels)
         for name, values in drive.context.items()
     }
-    lane_width = average(time, drive.lane_width[rows], grid)
+    lane_width = column_on_grid(time, drive.lane_width[rows], grid, held=False)
     offset = resample(time, drive.offset[rows], grid)
     return Run(drive.name, index, grid, offset, lane_width, context, drive.levels)
 

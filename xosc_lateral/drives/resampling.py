@@ -101,6 +101,17 @@ def nearest(time: FloatArray, values: FloatArray, grid: FloatArray) -> FloatArra
     return values[np.where(grid - time[left] <= time[right] - grid, left, right)]
 
 
+def column_on_grid(time: FloatArray, values: FloatArray, grid: FloatArray, *, held: bool) -> FloatArray:
+    """A context column, shape (n,), at `grid` [s], shape (m,), in its unit: averaged, or `held` to what is there."""
+    return (nearest if held else average)(time, values, grid)
+
+
+def in_digits(values: FloatArray) -> FloatArray:
+    """Twelve digits of the largest: averages of equal numbers are equal, and no threshold tells their errors apart."""
+    largest = float(np.max(np.abs(values), initial=0.0, where=np.isfinite(values)))
+    return np.round(values, 12 - int(np.ceil(np.log10(largest)))) if largest > 0.0 else values
+
+
 def passed(frequency: FloatArray) -> FloatArray:
     """What the low-pass of `resample` leaves of the amplitude at the model's step. Shape as `frequency` [Hz]. [-]"""
     return np.asarray(np.interp(frequency, *_gains(), right=0.0))

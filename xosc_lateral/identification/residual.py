@@ -28,7 +28,8 @@ from xosc_lateral.driver.effects.response import respond
 from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.driver.sampling import OffsetSampler
 from xosc_lateral.driver.seeds import child
-from xosc_lateral.identification.timeline import LOCAL_S, PAD, Timeline, in_digits, local_mean, start_anew
+from xosc_lateral.drives.resampling import in_digits
+from xosc_lateral.identification.timeline import LOCAL_S, PAD, Timeline, local_mean, start_anew
 from xosc_lateral.segment import Segment
 
 FloatArray = NDArray[np.float64]

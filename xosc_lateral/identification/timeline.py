@@ -7,7 +7,7 @@ seconds never brings in another drive's values.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from itertools import pairwise
 from types import MappingProxyType
 from typing import Any
@@ -17,11 +17,11 @@ from numpy.typing import NDArray
 
 from xosc_lateral.driver.effects import ColumnEffect
 from xosc_lateral.driver.effects.response import respond
-from xosc_lateral.drives.cuts import CutRules, cut_runs
+from xosc_lateral.drives.cuts import CutRules
 from xosc_lateral.drives.drive import Drive
-from xosc_lateral.drives.resampling import STEP, average, nearest, resample
+from xosc_lateral.drives.gridding import GriddedDrive, grid_drives
+from xosc_lateral.drives.resampling import STEP
 from xosc_lateral.errors import NotEnoughDataError
-from xosc_lateral.identification.circular import circular_period
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
@@ -119,10 +119,7 @@ def join_drives(drives: Sequence[Drive], rules: CutRules = TRACE_RULES) -> Timel
     NotEnoughDataError
         When less than two minutes of road-following are left.
     """
-    periods = _periods(drives)
-    kept = [part for drive in drives if (part := _gridded(drive, rules, periods)) is not None]
-    if kept:
-        kept[-1] = _lengthened(kept[-1], sum(len(part) for part in kept))
+    kept, periods = grid_drives(drives, rules, pad=PAD, multiple=COARSE)
     valid_s = STEP * sum(float(part.valid.sum()) for part in kept)
     if valid_s < MIN_VALID_S:
         raise NotEnoughDataError(
@@ -130,7 +127,7 @@ def join_drives(drives: Sequence[Drive], rules: CutRules = TRACE_RULES) -> Timel
         )
     names = sorted({name for part in kept for name in part.context})
     return Timeline(
-        names=tuple(part.names[0] for part in kept),
+        names=tuple(part.name for part in kept),
         drive=np.repeat(np.arange(len(kept)), [len(part) for part in kept]),
         time=np.concatenate([part.time for part in kept]),
         offset=np.concatenate([part.offset for part in kept]),
@@ -142,7 +139,7 @@ def join_drives(drives: Sequence[Drive], rules: CutRules = TRACE_RULES) -> Timel
     )
 
 
-def _column(part: Timeline, name: str) -> FloatArray:
+def _column(part: GriddedDrive, name: str) -> FloatArray:
     """A drive that never met one has no such column: there is none, all along."""
     return part.context[name] if name in part.context else np.full(len(part), np.nan)
 
@@ -170,12 +167,6 @@ def means_by_drive(values: FloatArray, valid: BoolArray, drive: IntArray) -> Flo
     count = np.bincount(drive, valid.astype(float), minlength=drives)
     sums = np.bincount(drive, np.where(valid, values, 0.0), minlength=drives)
     return np.asarray(sums / np.maximum(count, 1.0))
-
-
-def in_digits(values: FloatArray) -> FloatArray:
-    """Twelve digits of the largest: averages of equal numbers are equal, and no threshold tells their errors apart."""
-    largest = float(np.max(np.abs(values), initial=0.0, where=np.isfinite(values)))
-    return np.round(values, 12 - int(np.ceil(np.log10(largest)))) if largest > 0.0 else values
 
 
 def start_anew(
@@ -219,64 +210,3 @@ def local_mean(values: FloatArray, valid: BoolArray, seconds: float, step: float
     low, high = np.maximum(index - half, 0), np.minimum(index + half + 1, len(values))
     count = counts[high] - counts[low]
     return np.asarray((sums[high] - sums[low]) / np.maximum(count, 1.0))
-
-
-def _gridded(drive: Drive, rules: CutRules, periods: Mapping[str, float]) -> Timeline | None:
-    runs = cut_runs(drive, rules)
-    if not runs:
-        return None
-    inner = int((drive.time[-1] - drive.time[0]) / STEP) + 1
-    total = -(-(inner + 2 * PAD) // COARSE) * COARSE
-    grid = drive.time[0] + STEP * np.arange(inner)
-    offset, valid = np.zeros(inner), np.zeros(inner, dtype=np.bool_)
-    for run in runs:
-        first, last = np.searchsorted(grid, [run.time[0] - 1e-9, run.time[-1] + 1e-9])
-        rows = slice(*np.searchsorted(drive.time, [run.time[0] - 1e-9, run.time[-1] + STEP]))
-        offset[first:last] = resample(drive.time[rows], drive.offset[rows], grid[first:last])
-        valid[first:last] = True
-    pads = (PAD, total - inner - PAD)
-    context = {name: np.pad(_on_grid(drive, name, grid, periods), pads, mode="edge") for name in drive.context}
-    return Timeline(
-        names=(drive.name,),
-        drive=np.zeros(total, dtype=np.intp),
-        time=drive.time[0] + STEP * (np.arange(total) - PAD),
-        offset=np.pad(offset, pads),
-        valid=np.pad(valid, pads),
-        lane_width=np.pad(_averaged(drive.time, drive.lane_width, grid), pads, mode="edge"),
-        context=context,
-        levels=drive.levels,
-    )
-
-
-def _lengthened(part: Timeline, total: int) -> Timeline:
-    """Pad the last drive until the coarse grid has a length whose Fourier transform is quick."""
-    from scipy.fft import next_fast_len
-
-    more = COARSE * next_fast_len(total // COARSE, real=True) - total
-    return replace(
-        part,
-        drive=np.pad(part.drive, (0, more), mode="edge"),
-        time=np.concatenate([part.time, part.time[-1] + STEP * np.arange(1, more + 1)]),
-        offset=np.pad(part.offset, (0, more)),
-        valid=np.pad(part.valid, (0, more)),
-        lane_width=np.pad(part.lane_width, (0, more), mode="edge"),
-        context={name: np.pad(values, (0, more), mode="edge") for name, values in part.context.items()},
-    )
-
-
-def _on_grid(drive: Drive, name: str, grid: FloatArray, periods: Mapping[str, float]) -> FloatArray:
-    values = drive.context[name]
-    held = name in drive.levels or name in periods
-    return nearest(drive.time, values, grid) if held else _averaged(drive.time, values, grid)
-
-
-def _averaged(time: FloatArray, values: FloatArray, grid: FloatArray) -> FloatArray:
-    return in_digits(average(time, values, grid))
-
-
-def _periods(drives: Sequence[Drive]) -> dict[str, float]:
-    """Full circle of every column that all drives have and that wraps around."""
-    names = set(drives[0].context).intersection(*(drive.context for drive in drives))
-    numbers = [name for name in sorted(names) if not any(name in drive.levels for drive in drives)]
-    periods = {name: circular_period([drive.context[name] for drive in drives]) for name in numbers}
-    return {name: period for name, period in periods.items() if period > 0.0}

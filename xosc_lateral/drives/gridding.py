@@ -1,0 +1,134 @@
+"""Whole drives on the model's grid, context throughout, offsets where road-following; each with room around it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from xosc_lateral.drives.circular import circular_period
+from xosc_lateral.drives.cuts import CutRules, cut_runs
+from xosc_lateral.drives.drive import Drive, Run
+from xosc_lateral.drives.resampling import STEP, column_on_grid, in_digits, resample
+
+FloatArray = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
+
+ROUNDING_S = 1e-9
+"""Rows this far outside a run are in it: times are sums of steps. [s]"""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class GriddedDrive:
+    """One drive on the 0.2 s grid, its context held at its outermost values in the pads before and after it.
+
+    Parameters
+    ----------
+    name : str
+    time : array, shape (n,)
+        The drive's own clock. [s]
+    offset : array, shape (n,)
+        Positive to the LEFT of travel; 0 outside `valid`. [m]
+    valid : bool array, shape (n,)
+        Road-following, not cut out.
+    lane_width : array, shape (n,)
+        [m]
+    context : mapping of str to array, shape (n,)
+        NaN: there is none.
+    levels : frozenset of str
+        Columns of whole numbers.
+    """
+
+    name: str
+    time: FloatArray
+    offset: FloatArray
+    valid: BoolArray
+    lane_width: FloatArray
+    context: Mapping[str, FloatArray]
+    levels: frozenset[str]
+
+    def __len__(self) -> int:
+        return len(self.time)
+
+    def padded(self, before: int, after: int, time: FloatArray) -> GriddedDrive:
+        """With so many more rows, in which nothing is valid and context holds; `time` is the whole new one. [s]"""
+        pads = (before, after)
+        return replace(
+            self,
+            time=time,
+            offset=np.pad(self.offset, pads),
+            valid=np.pad(self.valid, pads),
+            lane_width=np.pad(self.lane_width, pads, mode="edge"),
+            context={name: np.pad(values, pads, mode="edge") for name, values in self.context.items()},
+        )
+
+
+def grid_drives(
+    drives: Sequence[Drive], rules: CutRules, *, pad: int, multiple: int
+) -> tuple[list[GriddedDrive], dict[str, float]]:
+    """Every drive that has road-following in it, gridded, and the full circle of the columns that wrap around.
+
+    Parameters
+    ----------
+    drives : sequence of Drive
+    rules : CutRules
+        What is not road-following.
+    pad : int
+        Rows before and after each drive, at least. [-]
+    multiple : int
+        Each one's rows are a multiple of it, and all of them together a number whose Fourier transform is quick. [-]
+    """
+    periods = circular_columns(drives)
+    cut = [(drive, cut_runs(drive, rules)) for drive in drives]
+    kept = [_with_room(_gridded(drive, runs, frozenset(periods)), pad, multiple) for drive, runs in cut if runs]
+    if kept:
+        kept[-1] = _lengthened(kept[-1], sum(map(len, kept)), multiple)
+    return kept, periods
+
+
+def circular_columns(drives: Sequence[Drive]) -> dict[str, float]:
+    """Full circle of every column that all drives have and that wraps around. [unit of the column]"""
+    names = set(drives[0].context).intersection(*(drive.context for drive in drives))
+    numbers = [name for name in sorted(names) if not any(name in drive.levels for drive in drives)]
+    periods = {name: circular_period([drive.context[name] for drive in drives]) for name in numbers}
+    return {name: period for name, period in periods.items() if period > 0.0}
+
+
+def _gridded(drive: Drive, runs: Sequence[Run], circular: frozenset[str]) -> GriddedDrive:
+    grid = drive.time[0] + STEP * np.arange(int((drive.time[-1] - drive.time[0]) / STEP) + 1)
+    offset, valid = _offsets(drive, runs, grid)
+    held = drive.levels | circular
+    context = {name: _column(drive.time, values, grid, held=name in held) for name, values in drive.context.items()}
+    lane_width = _column(drive.time, drive.lane_width, grid, held=False)
+    return GriddedDrive(drive.name, grid, offset, valid, lane_width, context, drive.levels)
+
+
+def _column(time: FloatArray, values: FloatArray, grid: FloatArray, *, held: bool) -> FloatArray:
+    on_grid = column_on_grid(time, values, grid, held=held)
+    return on_grid if held else in_digits(on_grid)
+
+
+def _offsets(drive: Drive, runs: Sequence[Run], grid: FloatArray) -> tuple[FloatArray, BoolArray]:
+    """Offsets within the runs, each resampled from its own rows alone, 0 elsewhere; and where that is."""
+    offset, valid = np.zeros(len(grid)), np.zeros(len(grid), dtype=np.bool_)
+    for run in runs:
+        first, last = np.searchsorted(grid, [run.time[0] - ROUNDING_S, run.time[-1] + ROUNDING_S])
+        rows = slice(*np.searchsorted(drive.time, [run.time[0] - ROUNDING_S, run.time[-1] + STEP]))
+        offset[first:last] = resample(drive.time[rows], drive.offset[rows], grid[first:last])
+        valid[first:last] = True
+    return offset, valid
+
+
+def _with_room(part: GriddedDrive, pad: int, multiple: int) -> GriddedDrive:
+    total = -(-(len(part) + 2 * pad) // multiple) * multiple
+    return part.padded(pad, total - len(part) - pad, part.time[0] + STEP * (np.arange(total) - pad))
+
+
+def _lengthened(part: GriddedDrive, total: int, multiple: int) -> GriddedDrive:
+    """Pad the last drive until the coarse grid has a length whose Fourier transform is quick."""
+    from scipy.fft import next_fast_len
+
+    more = multiple * next_fast_len(total // multiple, real=True) - total
+    return part.padded(0, more, np.concatenate([part.time, part.time[-1] + STEP * np.arange(1, more + 1)]))
