@@ -28,6 +28,7 @@ from xosc_lateral.datasets.movements import (
     record_movement,
     reflected,
     sawtooth,
+    zigzag,
 )
 
 Values = np.ndarray
@@ -44,6 +45,7 @@ MOVEMENTS = {
     "sawtooth": sawtooth,
     "long_memory": long_memory,
     "free_play": free_play,
+    "zigzag": zigzag,
 }
 FOLLOWING = ["steering_wheel_angle", "yaw_rate"]
 

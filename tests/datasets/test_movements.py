@@ -27,6 +27,7 @@ PLAIN: dict[str, Movement] = {
         "sawtooth",
         "long_memory",
         "free_play",
+        "zigzag",
         "in_regimes",
     )
 }

@@ -192,6 +192,19 @@ def free_play(n: int, rng: np.random.Generator) -> np.ndarray:
     return place
 
 
+def zigzag(n: int, rng: np.random.Generator) -> np.ndarray:
+    """Goes to one side at a rate of its own until it turns, the sooner the further out it is. Shape (n,). [m]"""
+    velocity, place = np.empty(n), 0.0
+    rate, side = 0.07, 1.0
+    draws = rng.random(n)
+    for t in range(n):
+        if draws[t] < 0.2 * MOVEMENT_STEP * np.exp(np.clip(side * place / 0.1, -3.0, 3.0)):
+            rate, side = 0.07 * np.exp(0.5 * rng.normal()), -side
+        velocity[t] = side * rate
+        place += MOVEMENT_STEP * velocity[t]
+    return np.cumsum(_smooth(velocity)) * MOVEMENT_STEP + 0.02 * _smooth(_first_order_noise(n, rng, 1.0))
+
+
 def in_regimes(n: int, rng: np.random.Generator) -> np.ndarray:
     """For a minute at a time, pushed 2.5 times as hard; and then quiet for two. Shape (n,). [m]"""
     loud = np.ones(n)
