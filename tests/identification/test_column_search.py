@@ -14,7 +14,7 @@ from xosc_lateral.identification.column_search import find_column
 from xosc_lateral.identification.columns import Column, Role
 from xosc_lateral.identification.regression import Coarse, fit_model
 from xosc_lateral.identification.search import Search
-from xosc_lateral.identification.significance import level_of
+from xosc_lateral.identification.stages import ERROR_BUDGET
 from xosc_lateral.identification.terms.base import Outcome
 from xosc_lateral.identification.terms.mean import MeanTerm
 from xosc_lateral.identification.terms.restoring import RestoringTerm
@@ -34,7 +34,7 @@ def drive(seed: int, shift: float = 0.0, *, lag_s: float = 0.0, log_spread: floa
 
 
 def outcome(coarse: Coarse, kind: type, columns: list[Column] = COLUMNS, seed: int = 1) -> Outcome | None:
-    search = Search.over(coarse, columns, np.random.SeedSequence(seed))
+    search = Search.over(coarse, columns, np.random.SeedSequence(seed), ERROR_BUDGET)
     return find_column(search, kind, fit_model(coarse, ()))
 
 
@@ -49,7 +49,7 @@ def found() -> Outcome:
 def test_a_shift_of_15_centimetres_is_named_with_its_delay(found: Outcome) -> None:
     assert isinstance(found.term, MeanTerm)
     assert found.columns == ("x",)
-    assert found.p_value < level_of("mean", 1)
+    assert found.p_value < ERROR_BUDGET.level_of("mean", 1)
     assert found.term.effect.lag_s == pytest.approx(1.0, abs=1.0)
     assert found.after is not None
     assert found.after.terms == (found.term,)
@@ -60,7 +60,7 @@ def test_idle_columns_are_hardly_ever_sure_to_do_anything() -> None:
     told = [outcome(drive(seed), MeanTerm) for seed in (32, 33, 34)]
     values = [one.p_value for one in told if one is not None]
     assert len(values) == 3
-    assert sum(value < level_of("mean", 1) for value in values) <= 1
+    assert sum(value < ERROR_BUDGET.level_of("mean", 1) for value in values) <= 1
     assert max(values) > 0.1
 
 
@@ -69,15 +69,15 @@ def test_a_spread_is_found_as_a_spread_and_not_as_a_shift() -> None:
     spread, shift = outcome(coarse, SpreadTerm), outcome(coarse, MeanTerm)
     assert spread is not None
     assert spread.columns == ("x",)
-    assert spread.p_value < level_of("spread", 1)
+    assert spread.p_value < ERROR_BUDGET.level_of("spread", 1)
     assert shift is not None
-    assert shift.p_value > level_of("mean", 1)
+    assert shift.p_value > ERROR_BUDGET.level_of("mean", 1)
 
 
 def test_a_column_that_is_barred_is_not_taken_up() -> None:
     """What moves the mean already is no candidate for the rate of return."""
     coarse = drive(37, 0.15)
-    search = Search.over(coarse, COLUMNS, np.random.SeedSequence(1))
+    search = Search.over(coarse, COLUMNS, np.random.SeedSequence(1), ERROR_BUDGET)
     term = MeanTerm.of(Linear(acts=Acts.LOCATION, column="x", response_s=2.0))
     found = find_column(search, RestoringTerm, fit_model(coarse, (term,)))
     assert found is None or "x" not in found.columns

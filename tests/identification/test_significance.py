@@ -8,12 +8,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.stats import gumbel_r, kstest
 
-from xosc_lateral.identification.significance import BUDGET, CANDIDATES, MANY_DRIVES, WEIGHTS, level_of, upper_tail
+from xosc_lateral.identification.significance import BUDGET, CANDIDATES, MANY_DRIVES, upper_tail
+from xosc_lateral.identification.stages import ERROR_BUDGET
+
+level_of = ERROR_BUDGET.level_of
 
 
 @pytest.mark.parametrize("drives", [1, MANY_DRIVES])
 def test_all_levels_together_are_the_budget(drives: int) -> None:
-    assert sum(level_of(component, drives) for component in WEIGHTS) == pytest.approx(BUDGET)
+    assert sum(level_of(component, drives) for component in ERROR_BUDGET.weights) == pytest.approx(BUDGET)
     assert level_of("mean", drives) > level_of("regimes", drives) > 0.0
 
 

@@ -18,6 +18,7 @@ from xosc_lateral.identification.nested import Gain, Nested, nest
 from xosc_lateral.identification.regression import Coarse
 from xosc_lateral.identification.search import Search
 from xosc_lateral.identification.selection import Selection, select
+from xosc_lateral.identification.stages import ERROR_BUDGET
 from xosc_lateral.identification.terms.base import Term
 from xosc_lateral.identification.terms.between import BetweenTerm, is_between
 from xosc_lateral.identification.terms.drift import DriftTerm
@@ -102,7 +103,7 @@ def identify(
     columns, feedback, unused = usable_columns(coarse.timeline, excluded)
     # products of small matrices gain nothing from threads, and lose a factor of ten to them where all cores are busy
     with threadpool_limits(1, user_api="blas"):
-        search = Search.over(coarse, columns, seed, lambda what: progress(0.1, what))
+        search = Search.over(coarse, columns, seed, ERROR_BUDGET, lambda what: progress(0.1, what))
         selection = select(search, initial)
         blocks = hold_out_blocks(coarse.timeline)
         kept, nested, gains, total, reason = _judged(search, selection, blocks, initial, progress)

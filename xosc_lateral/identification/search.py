@@ -20,7 +20,7 @@ from xosc_lateral.identification.dictionary import (
 )
 from xosc_lateral.identification.problem import Problem
 from xosc_lateral.identification.regression import Coarse
-from xosc_lateral.identification.significance import level_of
+from xosc_lateral.identification.significance import Budget
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
@@ -41,6 +41,8 @@ class Search:
         That may act.
     quantities : Quantities
     seed : SeedSequence
+    budget : Budget
+        How surely each component has to be found.
     progress : callable
         Told what is being done, in a few words.
     share : float
@@ -51,6 +53,7 @@ class Search:
     columns: Mapping[str, Column]
     quantities: Quantities
     seed: np.random.SeedSequence
+    budget: Budget
     progress: Callable[[str], None]
     share: float = 1.0
     _built: list[tuple[object, object, Dictionary]] = field(default_factory=list, repr=False)
@@ -61,6 +64,7 @@ class Search:
         coarse: Coarse,
         columns: list[Column],
         seed: np.random.SeedSequence,
+        budget: Budget,
         progress: Callable[[str], None] = lambda _: None,
     ) -> Search:
         """Evaluate all candidates once."""
@@ -68,7 +72,7 @@ class Search:
         seen = {column.name: coarse.context[column.name][inside] for column in columns}
         candidates = candidates_of(columns, seen, most=MAX_PRODUCT_COLUMNS)
         quantities = Quantities.of(candidates, coarse.timeline, coarse.context, coarse.valid)
-        return cls(coarse, {column.name: column for column in columns}, quantities, seed, progress)
+        return cls(coarse, {column.name: column for column in columns}, quantities, seed, budget, progress)
 
     def dictionary(self, kind: object, fitted: object, problem: Problem) -> Dictionary:
         """Whitened candidates of one kind of term beside one fit; the last two are kept."""
@@ -95,7 +99,7 @@ class Search:
 
     def level_of(self, component: str) -> float:
         """Family-wise level that a component may spend on these rows."""
-        return level_of(component, self.coarse.drives, self.share)
+        return self.budget.level_of(component, self.coarse.drives, self.share)
 
     def rng(self, *key: int) -> np.random.Generator:
         """Independent stream by purpose."""

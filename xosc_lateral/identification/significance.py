@@ -10,6 +10,9 @@ References
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -30,47 +33,45 @@ TAIL_SHARE = 0.25
 MANY_DRIVES = 20
 """From so many drives on a table tells what differs between them, and its null is drawn by whole drives."""
 
-WEIGHTS = {
-    "mean": 5.5,
-    "between": 5.5,
-    "spread": 3.0,
-    "slow_spread": 3.0,
-    "fine_noise": 1.0,
-    "restoring": 0.5,
-    "low_frequency": 2.0,
-    "cycle": 1.0,
-    "variance_trend": 1.0,
-    "regimes": 0.5,
-}
-"""Shares of the budget: half for the mean, within and between drives in equal parts; a quarter for both measures of
-spread; about equal parts for the rest, one for each kind of hidden effect: a step and a drift share a component."""
-
-OF_COLUMNS = frozenset({"mean", "between", "spread", "slow_spread", "fine_noise", "restoring"})
-"""Components that look for the best of many candidates."""
-
 CANDIDATES = 500.0
 """Independent candidates that a dictionary of 2000 is worth, in orders of magnitude: on three quarters of the rows the
 mean has a level of 0.15 with 250, 0.17 with 500 and 0.21 with 1000. [-]"""
 
 
-def level_of(component: str, drives: int, share: float = 1.0) -> float:
-    """Family-wise level that a component may spend.
+@dataclass(frozen=True, slots=True)
+class Budget:
+    """How the error budget is shared among the components that are looked for.
 
     Parameters
     ----------
-    component : str
-    drives : int
-        In the table. Where nothing can be asked between them, the mean within has that share too.
-    share : float
-        Of the table's rows. The log p-value of the candidate that acts is in proportion to them, that of the best of
-        many is so before it pays for their number: what is just significant on the table is on average just below this
-        level on a share of it.
+    weights : mapping of str to float
+        Of each component. As shipped: half for the mean, within and between drives in equal parts; a quarter for both
+        measures of spread; about equal parts for the rest, one for each kind of hidden effect. [-]
+    of_columns : frozenset of str
+        Components that look for the best of many candidates.
     """
-    weight = WEIGHTS[component]
-    if drives < MANY_DRIVES and component in ("mean", "between"):
-        weight = WEIGHTS["mean"] + WEIGHTS["between"] if component == "mean" else 0.0
-    candidates = CANDIDATES if component in OF_COLUMNS else 1.0
-    return float(candidates * (BUDGET * weight / sum(WEIGHTS.values()) / candidates) ** share)
+
+    weights: Mapping[str, float]
+    of_columns: frozenset[str]
+
+    def level_of(self, component: str, drives: int, share: float = 1.0) -> float:
+        """Family-wise level that a component may spend.
+
+        Parameters
+        ----------
+        component : str
+        drives : int
+            In the table. Where nothing can be asked between them, the mean within has that share too.
+        share : float
+            Of the table's rows. The log p-value of the candidate that acts is in proportion to them, that of the best
+            of many is so before it pays for their number: what is just significant on the table is on average just
+            below this level on a share of it.
+        """
+        weight = self.weights[component]
+        if drives < MANY_DRIVES and component in ("mean", "between"):
+            weight = self.weights["mean"] + self.weights["between"] if component == "mean" else 0.0
+        candidates = CANDIDATES if component in self.of_columns else 1.0
+        return float(candidates * (BUDGET * weight / sum(self.weights.values()) / candidates) ** share)
 
 
 def upper_tail(score: float, maxima: FloatArray) -> float:

@@ -1,28 +1,30 @@
-"""Which terms of the model are looked for, and in which order."""
+"""Which terms of the model are looked for, in which order, and how surely each has to be found."""
 
 from __future__ import annotations
 
-from xosc_lateral.identification.terms.base import Term
-from xosc_lateral.identification.terms.between import BetweenTerm
-from xosc_lateral.identification.terms.cycle import CycleTerm
-from xosc_lateral.identification.terms.fine_noise import FineNoiseTerm
-from xosc_lateral.identification.terms.mean import MeanTerm
-from xosc_lateral.identification.terms.regimes import RegimesTerm
-from xosc_lateral.identification.terms.restoring import RestoringTerm
-from xosc_lateral.identification.terms.slow_spread import SlowSpreadTerm
-from xosc_lateral.identification.terms.spread import SpreadTerm
-from xosc_lateral.identification.terms.step import StepTerm
-from xosc_lateral.identification.terms.variance_trend import VarianceTrendTerm
+from xosc_lateral.discovery import defined_in
+from xosc_lateral.identification import terms
+from xosc_lateral.identification.significance import Budget
+from xosc_lateral.identification.terms.base import Stage, Term
 
-STAGES: tuple[tuple[type[Term], ...], ...] = (
-    (MeanTerm,),
-    (CycleTerm, StepTerm),
-    (MeanTerm,),
-    (VarianceTrendTerm, SpreadTerm, SlowSpreadTerm),
-    (RegimesTerm,),
-    (FineNoiseTerm, RestoringTerm),
-    (BetweenTerm,),
-)
-"""What is looked for, in this order. The mean comes first: a mean that is not known looks like a spread. Of a stage,
-what has the smallest p-value is added first; regimes come after the spread, because they explain whatever comes in
-clusters, and before what a regime's loud stretches might be taken for."""
+TERMS: tuple[type[Term], ...] = defined_in(terms.__name__, Term)  # type: ignore[type-abstract]
+"""Every term that a file of `terms` defines, by the file's name."""
+
+
+def in_stages(kinds: tuple[type[Term], ...]) -> tuple[tuple[type[Term], ...], ...]:
+    """What is looked for at each stage, in the order in which it is asked."""
+    asked = sorted(kinds, key=lambda kind: kind.place)
+    return tuple(tuple(kind for kind in asked if stage in kind.stages) for stage in Stage)
+
+
+def shared_among(kinds: tuple[type[Term], ...]) -> Budget:
+    """The error budget by the terms' own weights; those of one component compete, and share one part of it."""
+    weights = {kind.component: kind.weight for kind in kinds}
+    return Budget(weights, frozenset(kind.component for kind in kinds if kind.of_columns))
+
+
+STAGES = in_stages(TERMS)
+"""Of a stage, what has the smallest p-value is added first."""
+
+ERROR_BUDGET = shared_among(TERMS)
+"""Of all terms that are looked for."""

@@ -12,7 +12,7 @@ from tests.identification.made_coarse import coarse_of, movement
 from xosc_lateral.driver.effects import VarianceTrend
 from xosc_lateral.identification.regression import Coarse, Fitted, fit_model
 from xosc_lateral.identification.search import Search
-from xosc_lateral.identification.significance import level_of
+from xosc_lateral.identification.stages import ERROR_BUDGET
 from xosc_lateral.identification.terms.base import Removal
 from xosc_lateral.identification.terms.variance_trend import VarianceTrendTerm, _probability
 
@@ -26,8 +26,12 @@ def growing(factor: float, seed: int) -> Coarse:
     return coarse_of(own * factor ** (np.arange(N) / N - 0.5))
 
 
+def search_of(coarse: Coarse) -> Search:
+    return Search.over(coarse, [], np.random.SeedSequence(1), ERROR_BUDGET)
+
+
 def outcome_of(coarse: Coarse) -> tuple[VarianceTrendTerm, float]:
-    outcome = VarianceTrendTerm.test(Search.over(coarse, [], np.random.SeedSequence(1)), fit_model(coarse, ()))
+    outcome = VarianceTrendTerm.test(search_of(coarse), fit_model(coarse, ()))
     assert outcome is not None
     assert isinstance(outcome.term, VarianceTrendTerm)
     return outcome.term, outcome.p_value
@@ -63,8 +67,8 @@ def test_loudness_in_clusters_is_no_trend_more_often_than_it_is_said() -> None:
 
 
 def test_a_steady_growth_is_sure_and_a_steady_drive_is_not() -> None:
-    assert outcome_of(growing(1.8, 76))[1] < level_of("variance_trend", 1)
-    assert outcome_of(growing(1.0, 77))[1] > level_of("variance_trend", 1)
+    assert outcome_of(growing(1.8, 76))[1] < ERROR_BUDGET.level_of("variance_trend", 1)
+    assert outcome_of(growing(1.0, 77))[1] > ERROR_BUDGET.level_of("variance_trend", 1)
 
 
 def test_the_factor_is_sized_within_its_error(fitted: Fitted) -> None:
@@ -102,7 +106,7 @@ def test_it_is_told_by_which_way_it_goes(factor: float, name: str) -> None:
 
 def test_slow_and_quick_growth_are_one_finding_and_looked_for_once(fitted: Fitted) -> None:
     assert VarianceTrendTerm().matches(VarianceTrendTerm(slow=True))
-    assert VarianceTrendTerm.test(Search.over(fitted.coarse, [], np.random.SeedSequence(1)), fitted) is None
+    assert VarianceTrendTerm.test(search_of(fitted.coarse), fitted) is None
 
 
 def test_only_growth_of_the_innovations_can_be_predicted() -> None:
@@ -112,4 +116,4 @@ def test_only_growth_of_the_innovations_can_be_predicted() -> None:
 
 def test_drives_of_minutes_have_no_trend() -> None:
     coarse = coarse_of(movement(np.random.default_rng(79), 400.0))
-    assert VarianceTrendTerm.test(Search.over(coarse, [], np.random.SeedSequence(1)), fit_model(coarse, ())) is None
+    assert VarianceTrendTerm.test(search_of(coarse), fit_model(coarse, ())) is None

@@ -1,4 +1,4 @@
-"""Effects that a profile can hold, one per file, and the tuple of all that are known."""
+"""Effects that a profile can hold, one per file: whatever a file here defines is known, without a list."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from importlib.metadata import entry_points
 from operator import or_
 from typing import Any
 
+from xosc_lateral.discovery import defined_in
 from xosc_lateral.driver.effects.acts import Acts
 from xosc_lateral.driver.effects.angular import Angular
 from xosc_lateral.driver.effects.base import Effect, EffectTerms
@@ -31,26 +32,8 @@ from xosc_lateral.driver.effects.variance_trend import VarianceTrend
 from xosc_lateral.driver.records import read_as
 from xosc_lateral.errors import DriverProfileError
 
-EFFECTS: tuple[type[Effect], ...] = (
-    Linear,
-    Magnitude,
-    Threshold,
-    Saturating,
-    Piecewise,
-    Levels,
-    Nearness,
-    Proximity,
-    Angular,
-    Product,
-    Drift,
-    Step,
-    VarianceTrend,
-    Cycle,
-    Regimes,
-    Population,
-)
+EFFECTS: tuple[type[Effect], ...] = defined_in(__name__, Effect)  # type: ignore[type-abstract]
 """The effects of this package; a profile file names them by their `kind`."""
-
 
 ENTRY_POINTS = "xosc_lateral.effects"
 """Group of entry points under which other packages offer effects: each names a subclass of `Effect`."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar
@@ -68,10 +69,12 @@ class Effect(Record, frozen=True, kw_only=True, tag_field="kind", tag=kind_of):
         cls.kind = kind_of(cls.__name__)
 
     @property
+    @abstractmethod
     def columns(self) -> tuple[str, ...]:
         """Context columns that it reads; empty for a hidden effect."""
         raise NotImplementedError
 
+    @abstractmethod
     def terms(self, time: FloatArray, context: Mapping[str, FloatArray], rng: np.random.Generator) -> EffectTerms:
         """Evaluate on a whole drive.
 

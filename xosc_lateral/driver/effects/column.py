@@ -34,7 +34,7 @@ FloatArray = NDArray[np.float64]
 class ColumnEffect(Effect, frozen=True, kw_only=True):
     """A dependence on context columns: strength = coefficients . (respond(quantity) - reference).
 
-    A new one names its columns, its `shape` and its `quantity`, and is listed in `EFFECTS`.
+    A new one names its columns, its `shape` and its `quantity`.
 
     Parameters
     ----------

@@ -24,7 +24,7 @@ class NoState(msgspec.Struct):
 class HiddenEffect(Effect, frozen=True, kw_only=True):
     """An effect of time or of chance alone; its fields are finite numbers.
 
-    A new one says how its state begins and goes on, and is listed in `EFFECTS`; a plain function of time needs
+    A new one says how its state begins and goes on; a plain function of time needs
     nothing but `advance`.
 
     Raises

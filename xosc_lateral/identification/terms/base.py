@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, field
+from enum import IntEnum
 from typing import TYPE_CHECKING, ClassVar, Self
 
 import numpy as np
@@ -17,6 +18,22 @@ if TYPE_CHECKING:
     from xosc_lateral.identification.search import Search
 
 FloatArray = NDArray[np.float64]
+
+
+class Stage(IntEnum):
+    """When a term is looked for. The mean comes first: a mean that is not known looks like a spread.
+
+    Regimes come after the spread, because they explain whatever comes in clusters, and before what a regime's loud
+    stretches might be taken for.
+    """
+
+    MEAN = 1
+    LOW_FREQUENCY = 2
+    MEAN_AGAIN = 3
+    SPREAD = 4
+    REGIMES = 5
+    MOVEMENT = 6
+    BETWEEN_DRIVES = 7
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,6 +120,14 @@ class Term(ABC):
     """Key of its share of the error budget."""
     kind: ClassVar[str]
     """As in the report's schema."""
+    stages: ClassVar[tuple[Stage, ...]] = ()
+    """At which it is looked for; none: with another term, which it competes with."""
+    place: ClassVar[int] = 0
+    """Among those of a stage: smaller ones are asked first, and first where two are equally sure; then by name. [-]"""
+    weight: ClassVar[float]
+    """Of its component in the error budget; one for each kind of hidden effect. [-]"""
+    of_columns: ClassVar[bool] = False
+    """Whether it is the best of many candidates."""
     seen_held_out: ClassVar[bool] = True
     """Whether the mean or the innovations' scale follow terms of this class on held-out rows: not the latent path of a
     cycle or a drift, nor what changes the slow movement alone."""

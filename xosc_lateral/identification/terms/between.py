@@ -22,7 +22,7 @@ from xosc_lateral.identification.problem import Problem
 from xosc_lateral.identification.regression import Fitted
 from xosc_lateral.identification.seeds import LoopSeed
 from xosc_lateral.identification.significance import MANY_DRIVES
-from xosc_lateral.identification.terms.base import Description, Outcome
+from xosc_lateral.identification.terms.base import Description, Outcome, Stage
 from xosc_lateral.identification.terms.column import ColumnTerm, of_kind
 
 if TYPE_CHECKING:
@@ -46,6 +46,8 @@ class BetweenTerm(ColumnTerm):
 
     component: ClassVar[str] = "between"
     kind: ClassVar[str] = "location"
+    stages: ClassVar[tuple[Stage, ...]] = (Stage.BETWEEN_DRIVES,)
+    weight: ClassVar[float] = 5.5
     seen_held_out: ClassVar[bool] = False
     acts: ClassVar[Acts] = Acts.LOCATION
     what: ClassVar[str] = "place that a drive keeps"

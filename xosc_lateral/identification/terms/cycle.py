@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from xosc_lateral.driver.effects import Cycle, Effect
 from xosc_lateral.identification.regression import MIN_DRIFT_S, Coarse, Fitted
 from xosc_lateral.identification.significance import LEAST
-from xosc_lateral.identification.terms.base import Description, Outcome, Removal, Term, centred
+from xosc_lateral.identification.terms.base import Description, Outcome, Removal, Stage, Term, centred
 
 if TYPE_CHECKING:
     from xosc_lateral.identification.search import Search
@@ -50,6 +50,8 @@ class CycleTerm(Term):
 
     component: ClassVar[str] = "cycle"
     kind: ClassVar[str] = "periodic"
+    stages: ClassVar[tuple[Stage, ...]] = (Stage.LOW_FREQUENCY,)
+    weight: ClassVar[float] = 1.0
     seen_held_out: ClassVar[bool] = False
     frequency: float
     width: int = 1

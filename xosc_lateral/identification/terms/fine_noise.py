@@ -11,6 +11,7 @@ from xosc_lateral.driver.effects import Acts, Effect
 from xosc_lateral.identification.problem import Problem, of_squares
 from xosc_lateral.identification.regression import Fitted
 from xosc_lateral.identification.squares import fine_squares
+from xosc_lateral.identification.terms.base import Stage
 from xosc_lateral.identification.terms.column import ColumnTerm, columns_acting, responses
 from xosc_lateral.identification.terms.mean import MeanTerm
 from xosc_lateral.identification.terms.spread import fine_twin, known_log_scale
@@ -22,6 +23,8 @@ class FineNoiseTerm(ColumnTerm):
 
     component: ClassVar[str] = "fine_noise"
     kind: ClassVar[str] = "scale"
+    stages: ClassVar[tuple[Stage, ...]] = (Stage.MOVEMENT,)
+    weight: ClassVar[float] = 1.0
     seen_held_out: ClassVar[bool] = False
     single: ClassVar[bool] = True
     acts: ClassVar[Acts] = Acts.FINE

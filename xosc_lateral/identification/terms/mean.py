@@ -13,6 +13,7 @@ from xosc_lateral.driver.effects import Acts, Effect
 from xosc_lateral.identification.problem import Problem
 from xosc_lateral.identification.random_slopes import slope_deviation
 from xosc_lateral.identification.regression import Coarse, Fitted
+from xosc_lateral.identification.terms.base import Stage
 from xosc_lateral.identification.terms.column import ColumnTerm
 from xosc_lateral.identification.timeline import coarse_mean
 from xosc_lateral.identification.timing import widening
@@ -26,6 +27,8 @@ class MeanTerm(ColumnTerm):
 
     component: ClassVar[str] = "mean"
     kind: ClassVar[str] = "location"
+    stages: ClassVar[tuple[Stage, ...]] = (Stage.MEAN, Stage.MEAN_AGAIN)
+    weight: ClassVar[float] = 5.5
     acts: ClassVar[Acts] = Acts.LOCATION
     what: ClassVar[str] = "mean offset"
     group: ClassVar[str] = "mean"

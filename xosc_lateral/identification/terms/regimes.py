@@ -27,7 +27,7 @@ from xosc_lateral.identification.regression import Coarse, Fitted
 from xosc_lateral.identification.seeds import LoopSeed
 from xosc_lateral.identification.significance import upper_tail
 from xosc_lateral.identification.squares import SLOW_S, fine_squares, log_sizes, slow_squares
-from xosc_lateral.identification.terms.base import Description, Outcome, Removal, Term
+from xosc_lateral.identification.terms.base import Description, Outcome, Removal, Stage, Term
 from xosc_lateral.identification.terms.column import columns_on_size
 from xosc_lateral.identification.terms.spread import known_log_scale
 
@@ -67,6 +67,8 @@ class RegimesTerm(Term):
 
     component: ClassVar[str] = "regimes"
     kind: ClassVar[str] = "regime"
+    stages: ClassVar[tuple[Stage, ...]] = (Stage.REGIMES,)
+    weight: ClassVar[float] = 0.5
     seen_held_out: ClassVar[bool] = False
     fit: RegimeFit = field(repr=False)
 

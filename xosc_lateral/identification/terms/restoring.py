@@ -13,6 +13,7 @@ from xosc_lateral.driver.effects import Acts, Effect
 from xosc_lateral.identification.problem import Problem, of_products
 from xosc_lateral.identification.ranges import driving_range
 from xosc_lateral.identification.regression import Fitted
+from xosc_lateral.identification.terms.base import Stage
 from xosc_lateral.identification.terms.column import ColumnTerm, columns_acting, responses
 
 FloatArray = NDArray[np.float64]
@@ -30,6 +31,8 @@ class RestoringTerm(ColumnTerm):
 
     component: ClassVar[str] = "restoring"
     kind: ClassVar[str] = "dynamics"
+    stages: ClassVar[tuple[Stage, ...]] = (Stage.MOVEMENT,)
+    weight: ClassVar[float] = 0.5
     seen_held_out: ClassVar[bool] = False
     single: ClassVar[bool] = True
     acts: ClassVar[Acts] = Acts.RATE

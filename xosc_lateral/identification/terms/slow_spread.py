@@ -12,6 +12,7 @@ from xosc_lateral.driver.effects import Acts, Effect
 from xosc_lateral.identification.problem import Problem, of_squares
 from xosc_lateral.identification.regression import Coarse, Fitted
 from xosc_lateral.identification.squares import SLOW_S, log_sizes, slow_squares
+from xosc_lateral.identification.terms.base import Stage
 from xosc_lateral.identification.terms.column import ColumnTerm, columns_on_size, responses
 from xosc_lateral.identification.terms.mean import MeanTerm
 from xosc_lateral.identification.terms.spread import known_log_scale
@@ -25,6 +26,9 @@ class SlowSpreadTerm(ColumnTerm):
 
     component: ClassVar[str] = "slow_spread"
     kind: ClassVar[str] = "scale"
+    stages: ClassVar[tuple[Stage, ...]] = (Stage.SPREAD,)
+    place: ClassVar[int] = 2
+    weight: ClassVar[float] = 3.0
     seen_held_out: ClassVar[bool] = False
     acts: ClassVar[Acts] = Acts.SPREAD
     what: ClassVar[str] = "spread"

@@ -20,7 +20,7 @@ from xosc_lateral.identification.log_scale import squared_innovations
 from xosc_lateral.identification.problem import Problem, of_squares
 from xosc_lateral.identification.regression import Coarse, Fitted
 from xosc_lateral.identification.squares import fine_squares, log_sizes
-from xosc_lateral.identification.terms.base import Term
+from xosc_lateral.identification.terms.base import Stage, Term
 from xosc_lateral.identification.terms.column import ColumnTerm, columns_on_size
 
 FloatArray = NDArray[np.float64]
@@ -35,6 +35,9 @@ class SpreadTerm(ColumnTerm):
 
     component: ClassVar[str] = "spread"
     kind: ClassVar[str] = "scale"
+    stages: ClassVar[tuple[Stage, ...]] = (Stage.SPREAD,)
+    place: ClassVar[int] = 1
+    weight: ClassVar[float] = 3.0
     acts: ClassVar[Acts] = Acts.SPREAD
     what: ClassVar[str] = "spread"
 

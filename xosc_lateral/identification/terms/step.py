@@ -12,7 +12,7 @@ from xosc_lateral.driver.effects import Effect, Step
 from xosc_lateral.identification.low_frequency import find_low_frequency
 from xosc_lateral.identification.regression import Coarse, Fitted
 from xosc_lateral.identification.seeds import LoopSeed
-from xosc_lateral.identification.terms.base import Description, Outcome, Removal, Term, centred
+from xosc_lateral.identification.terms.base import Description, Outcome, Removal, Stage, Term, centred
 from xosc_lateral.identification.terms.cycle import latent_path
 from xosc_lateral.identification.terms.drift import DriftTerm
 
@@ -38,6 +38,8 @@ class StepTerm(Term):
 
     component: ClassVar[str] = "low_frequency"
     kind: ClassVar[str] = "step"
+    stages: ClassVar[tuple[Stage, ...]] = (Stage.LOW_FREQUENCY,)
+    weight: ClassVar[float] = 2.0
     seen_held_out: ClassVar[bool] = False
     at: int
 

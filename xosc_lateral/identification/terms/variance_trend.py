@@ -21,7 +21,7 @@ from xosc_lateral.identification.log_scale import squared_innovations
 from xosc_lateral.identification.regression import Coarse, Fitted, elapsed
 from xosc_lateral.identification.significance import LEAST
 from xosc_lateral.identification.squares import SLOW_S, fine_squares, log_sizes, slow_squares
-from xosc_lateral.identification.terms.base import Description, Outcome, Removal, Term
+from xosc_lateral.identification.terms.base import Description, Outcome, Removal, Stage, Term
 from xosc_lateral.identification.terms.column import columns_on_size
 
 if TYPE_CHECKING:
@@ -46,6 +46,8 @@ class VarianceTrendTerm(Term):
 
     component: ClassVar[str] = "variance_trend"
     kind: ClassVar[str] = "scale"
+    stages: ClassVar[tuple[Stage, ...]] = (Stage.SPREAD,)
+    weight: ClassVar[float] = 1.0
     slow: bool = False
 
     @property
