@@ -27,8 +27,8 @@ from benchmarks.identification_tables import calibration, summary, table
 from xosc_lateral.formats.drives import drives_of_table
 from xosc_lateral.identification.identify import identify
 from xosc_lateral.identification.regression import Coarse
-from xosc_lateral.identification.significance import WEIGHTS
-from xosc_lateral.identification.timeline import join_drives
+from xosc_lateral.identification.stages import ERROR_BUDGET
+from xosc_lateral.identification.timeline import coarse_mean, join_drives
 
 
 def run(case: dict[str, Any], protocol: dict[str, Any], seconds: float) -> dict[str, Any]:
@@ -46,12 +46,12 @@ def run(case: dict[str, Any], protocol: dict[str, Any], seconds: float) -> dict[
         [one.column, round(one.coherence, 3), round(one.predicted_share, 3), one.doubtful] for one in found.feedback
     ]
     outcome["p_mean"] = found.least("mean")
-    outcome["p"] = {name: p for name in WEIGHTS if (p := found.least(name)) is not None}
+    outcome["p"] = {name: p for name in ERROR_BUDGET.weights if (p := found.least(name)) is not None}
     if case["name"].startswith("slow vehicles"):
         outcome |= _oracle_between(case, table)
     elif "size" in case:
         outcome |= oracle(case, bare, coarse, case["seed"])
-        outcome |= _size(case, found, coarse)
+        outcome |= _size(case, found, coarse, bare)
     return outcome
 
 
@@ -67,7 +67,9 @@ def _oracle_between(case: dict[str, Any], table: pd.DataFrame) -> dict[str, floa
     return {"oracle_z": float(sizes[0]) / error, "oracle_size": float(sizes[0]), "oracle_error": error}
 
 
-def _size(case: dict[str, Any], found: Any, coarse: Coarse) -> dict[str, float]:
+def _size(case: dict[str, Any], found: Any, coarse: Coarse, bare: pd.DataFrame) -> dict[str, float]:
+    """Size and error of the right finding; positive where it moves the car as what was planted does."""
+    planted = coarse.offset - Coarse.of(join_drives(drives_of_table(bare, {}))).offset
     for one in found.selection.accepted:
         if (
             sorted(one.term.columns) in [sorted(columns) for columns in case["accepted"]]
@@ -75,7 +77,9 @@ def _size(case: dict[str, Any], found: Any, coarse: Coarse) -> dict[str, float]:
         ):
             effects = one.term.estimate(found.selection.final)
             told = one.term.describe(found.selection.final, effects, "")
-            return {"found_size": told.size, "found_error": told.error}
+            strength = coarse_mean(coarse.strength(effects[0]))[coarse.valid]
+            alike = float(np.sign(np.cov(strength, planted[coarse.valid])[0, 1]))
+            return {"found_size": alike * abs(told.size), "found_error": told.error}
     return {}
 
 

@@ -19,7 +19,8 @@ from xosc_lateral.formats.drives import drives_of_table
 from xosc_lateral.identification import problem
 from xosc_lateral.identification.column_search import best_probability
 from xosc_lateral.identification.identify import usable_columns
-from xosc_lateral.identification.regression import LONGEST, Coarse, fit_model
+from xosc_lateral.identification.innovations import LONGEST
+from xosc_lateral.identification.regression import Coarse, fit_model
 from xosc_lateral.identification.search import Search
 from xosc_lateral.identification.stages import ERROR_BUDGET
 from xosc_lateral.identification.terms.spread import SpreadTerm

@@ -10,10 +10,11 @@ import pytest
 from tests.identification.made_coarse import coarse_of, movement, wander
 from xosc_lateral.driver.effects import Acts, Linear
 from xosc_lateral.driver.effects.response import respond
-from xosc_lateral.identification.column_search import find_column
+from xosc_lateral.identification.column_search import best_columns, find_column
 from xosc_lateral.identification.columns import Column, Role
 from xosc_lateral.identification.regression import Coarse, fit_model
 from xosc_lateral.identification.search import Search
+from xosc_lateral.identification.selection import select
 from xosc_lateral.identification.stages import ERROR_BUDGET
 from xosc_lateral.identification.terms.base import Outcome
 from xosc_lateral.identification.terms.mean import MeanTerm
@@ -62,6 +63,26 @@ def test_idle_columns_are_hardly_ever_sure_to_do_anything() -> None:
     assert len(values) == 3
     assert sum(value < ERROR_BUDGET.level_of("mean", 1) for value in values) <= 1
     assert max(values) > 0.1
+
+
+def test_columns_that_may_act_are_told_by_the_best_p_value() -> None:
+    coarse = drive(36, log_spread=0.5)
+    search = Search.over(coarse, COLUMNS, np.random.SeedSequence(1), ERROR_BUDGET)
+    fitted = fit_model(coarse, ())
+    assert best_columns(search, SpreadTerm, fitted, 0.1) == ("x",)
+    assert best_columns(search, SpreadTerm, fitted, 0.0) == ()
+
+
+def test_a_part_of_a_table_is_given_as_many_terms_as_the_table_has_and_no_others() -> None:
+    """Folds: the best candidate although nothing is significant; and nothing where the table has nothing."""
+    coarse = drive(32)
+    search = Search.over(coarse, COLUMNS, np.random.SeedSequence(1), ERROR_BUDGET)
+    assert select(search).accepted == ()
+    one = select(replace(search, wanted={"mean": 1}))
+    assert [accepted.term.component for accepted in one.accepted] == ["mean"]
+    assert one.accepted[0].p_value > search.level_of("mean")
+    assert {rejected.component for rejected in one.rejected} == {"mean"}
+    assert select(replace(search, wanted={})).accepted == ()
 
 
 def test_a_spread_is_found_as_a_spread_and_not_as_a_shift() -> None:

@@ -89,6 +89,15 @@ def test_a_gain_is_the_mean_over_blocks_with_its_standard_error(coarse: Coarse) 
     assert high - low == pytest.approx(2.0 * 1.96 * found.error)
 
 
+@pytest.mark.parametrize(
+    ("mean", "error", "stands"), [(0.5, 0.1, True), (-0.2, 0.3, True), (-0.4, 0.3, False), (0.0, 0.0, False)]
+)
+def test_only_a_loss_by_a_standard_error_vetoes_a_term_and_being_found_in_no_fold(
+    mean: float, error: float, stands: bool
+) -> None:
+    assert Gain(mean, error, 4).stands is stands
+
+
 def test_a_fold_is_scored_with_its_own_version_of_what_was_kept(coarse: Coarse) -> None:
     fold = chosen(coarse, X, IDLE)
     nested = Nested((fold,), ((coarse.valid, coarse),), np.zeros(len(coarse), dtype=np.intp))

@@ -7,12 +7,12 @@ import pytest
 from msgspec import structs
 
 from tests.identification.made_coarse import coarse_of, movement, wander
-from xosc_lateral.driver.effects import Acts, Linear
+from xosc_lateral.driver.effects import Acts, Factor, Form, Linear, Product
 from xosc_lateral.driver.effects.response import respond
 from xosc_lateral.identification.dictionary import respond_by_second
 from xosc_lateral.identification.regression import fit_model
 from xosc_lateral.identification.terms.mean import MeanTerm
-from xosc_lateral.identification.timing import _beside, _profile, widening
+from xosc_lateral.identification.timing import NEAR_SCALES, _beside, _profile, _shapes, widening
 
 
 @pytest.mark.parametrize("response_s", [0.6, 1.5, 4.0])
@@ -53,6 +53,38 @@ def test_not_knowing_the_timing_widens_the_error_of_a_quick_column_and_hardly_of
     part = fitted.mean_part(term)
     effect = structs.replace(term.effect, coefficients=tuple(fitted.sizes[part]), errors=(0.1,), reference=(0.0,))
     assert least <= widening(fitted, effect, part) < most
+
+
+def test_not_knowing_over_which_distance_a_product_fades_widens_its_error() -> None:
+    rng = np.random.default_rng(8)
+    distance, lane = 60.0 + 40.0 * wander(rng, 4500, 20.0), (wander(rng, 4500, 60.0) > 0.0).astype(float)
+    fading = Product(
+        acts=Acts.LOCATION,
+        factors=(
+            Factor(column="lane", form=Form.EQUALS, at=1.0),
+            Factor(column="distance", form=Form.PROXIMITY, at=40.0),
+        ),
+        response_s=1.5,
+    )
+    context = {"distance": np.abs(distance), "lane": lane}
+    bare = coarse_of(movement(rng, 900.0), context)
+    shift = 0.4 * bare.fine_response(fading)[:, 0]
+    widths = []
+    for effect in (fading, structs.replace(fading, factors=(fading.factors[0], Factor(column="distance")))):
+        fitted = fit_model(coarse_of(bare.timeline.offset + shift, context), (MeanTerm.of(effect),))
+        sized = structs.replace(effect, coefficients=tuple(fitted.sizes), errors=(0.1,), reference=(0.0,))
+        widths.append(widening(fitted, sized, slice(0, 1)))
+    assert widths[0] > 1.3
+    assert len(_shapes(bare, fading)) == len(NEAR_SCALES)
+
+
+def test_beside_a_drive_nothing_of_the_one_before_is_left() -> None:
+    """Of a quantity that is constant within drives, the response is that constant, pads included."""
+    coarse = coarse_of(np.zeros(3000), drives=3)
+    values = np.repeat([1.0, -2.0, 5.0], 1000)
+    for lag_s, response_s in ((0.0, 60.0), (0.0, 2.0)):
+        found = coarse.timeline.respond(values, lag_s, response_s)
+        np.testing.assert_allclose(found, values, atol=1e-12)
 
 
 @pytest.mark.parametrize("response_s", [1.0, 4.0])

@@ -106,7 +106,7 @@ def find_column(search: Search, kind: type[ColumnKind], fitted: Fitted) -> Outco
         if scored is None:
             return Outcome(None, min(refused), 1.0) if refused else None
         p_value = upper_tail(float(scored.scores.scores[scored.scores.best]), scored.scores.maxima)
-        if p_value > search.level_of(kind.component):  # refined, it would not be accepted either
+        if not search.passes(kind.component, p_value, fitted.terms):  # refined, it would not be accepted either
             return Outcome(None, dictionary.candidates[scored.scores.best].columns, p_value)
         term, after = _best(search, kind, fitted, scored, refused)
         if not _grows(fitted, after) and after.log_likelihood >= fitted.log_likelihood - ROUNDING:
@@ -135,6 +135,16 @@ def best_probability(search: Search, kind: type[ColumnKind], fitted: Fitted) -> 
     """p-value of the best candidate of all, before refinement."""
     scored = _score_all(search, kind, fitted)
     return 1.0 if scored is None else upper_tail(float(scored.scores.scores.max()), scored.scores.maxima)
+
+
+def best_columns(search: Search, kind: type[ColumnKind], fitted: Fitted, level: float) -> tuple[str, ...]:
+    """Columns of the best candidate where its p-value is at most `level`; none where it is not."""
+    scored = _score_all(search, kind, fitted)
+    if scored is None:
+        return ()
+    best = scored.scores.best
+    likely = upper_tail(float(scored.scores.scores[best]), scored.scores.maxima) <= level
+    return scored.dictionary.candidates[best].columns if likely else ()
 
 
 def _score_all(search: Search, kind: type[ColumnKind], fitted: Fitted, spared: tuple[str, ...] = ()) -> _Scored | None:
@@ -252,8 +262,8 @@ def _refined(search: Search, kind: type[ColumnKind], scored: _Scored) -> tuple[R
     ]
     outcomes.sort(key=lambda outcome: -outcome.score)
     parts = {(column,) for column in outcomes[0].effect.columns}
-    # a second factor is a finding of its own, and has to be as sure as any
-    chance = float(chi2.isf(search.level_of(kind.component), 1))
+    # a second factor is a finding of its own, and has to be as sure as any; a part of a table is not asked to be sure
+    chance = float(chi2.isf(search.level_of(kind.component), 1)) if search.wanted is None else 0.0
     simpler = [one for one in outcomes if one.effect.columns in parts and one.score > outcomes[0].score - chance]
     best = simpler[0] if simpler else outcomes[0]
     close = [outcome.effect.columns for outcome in outcomes if outcome.score > best.score - ALIKE]

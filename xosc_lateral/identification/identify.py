@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -153,31 +154,32 @@ def _same_throughout(effect: ColumnEffect, timeline: Timeline) -> bool:
 def _judged(
     search: Search, selection: Selection, blocks: NDArray[np.intp], initial: Sequence[Term], progress: Progress
 ) -> tuple[Selection, Nested | None, dict[int, Gain], Gain | None, str]:
-    """What gains nothing on blocks that it was not chosen on goes, and all of it if nothing is gained."""
+    """What loses on blocks that it was not chosen on goes, and all of it if all together loses."""
     if not selection.accepted:
         return selection, None, {}, None, ""
     # what happened once, and when, can't be found without the block in which it happened: folds size it, and know of it
     once = tuple(one.term for one in selection.accepted if one.term.component == StepTerm.component)
-    components = frozenset(one.term.component for one in selection.accepted) - {StepTerm.component}
+    there = Counter(getattr(term, "component", "") for term in selection.final.terms)
+    looked_for = {one.term.component for one in selection.accepted} - {StepTerm.component}
     nested = nest(
         search,
         blocks,
         (*initial, *once),
-        components,
+        {component: there[component] for component in sorted(looked_for)},
         lambda share: progress(0.3 + 0.3 * share, "selecting without a fold"),
     )
-    why = "significant, but chosen and estimated on other blocks it does not predict the held-out ones"
+    why = "significant, but chosen and estimated on other blocks it predicts the held-out ones worse than nothing"
     while True:
         # each beside those that are kept, and nothing else: a fold's misfit would be blamed on what is right
         nested = nested.only([one.term for one in selection.accepted])
         gains = {id(one.term): nested.of(one.term) for one in selection.accepted if one.term.predictable}
         judged = [one.term for one in selection.accepted if id(one.term) in gains]
-        worst = min(judged, key=lambda term: gains[id(term)].mean, default=None)
-        if worst is None or gains[id(worst)].mean > 0.0:
+        fallen = [term for term in judged if not gains[id(term)].stands]
+        if not fallen:
             break
-        selection = selection.without([worst], why)
+        selection = selection.without([min(fallen, key=lambda term: gains[id(term)].mean)], why)
     reason, total = "", nested.together([one.term for one in selection.accepted if one.term.predictable])
-    if any(one.term.predictable for one in selection.accepted) and total.mean <= 0.0:
+    if any(one.term.predictable for one in selection.accepted) and not total.stands:
         low, high = total.interval
         reason = f"the effects found gain {total.mean:.2f} nat a held-out block ({low:.2f} to {high:.2f})"
         selection = selection.without([one.term for one in selection.accepted], reason)

@@ -25,7 +25,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.identification.autocorrelation import Whitener, fit_autoregression
-from xosc_lateral.identification.regression import MIN_DRIFT_S, ORDER, Coarse, Fitted
+from xosc_lateral.identification.innovations import ORDER
+from xosc_lateral.identification.regression import MIN_DRIFT_S, Coarse, Fitted
 from xosc_lateral.identification.significance import as_one_degree, upper_tail
 
 FloatArray = NDArray[np.float64]

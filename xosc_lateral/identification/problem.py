@@ -16,7 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.identification.autocorrelation import MovementProcess, Whitener, fit_autoregression
-from xosc_lateral.identification.regression import ORDER, Coarse
+from xosc_lateral.identification.innovations import ORDER
+from xosc_lateral.identification.regression import Coarse
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]

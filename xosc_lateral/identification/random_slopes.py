@@ -12,7 +12,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.identification.regression import Fitted, ModelTerm, whitener_as_seen
+from xosc_lateral.identification.innovations import whitener_as_seen
+from xosc_lateral.identification.regression import Fitted, ModelTerm
 from xosc_lateral.identification.significance import MANY_DRIVES
 
 FloatArray = NDArray[np.float64]
@@ -30,7 +31,7 @@ def slope_deviation(fitted: Fitted, term: ModelTerm) -> float:
     if part.stop - part.start != 1 or coarse.drives < MANY_DRIVES:
         return 0.0
     # independent rows, which a floor does not leave: what they have in common would look like drivers that differ
-    whitener = whitener_as_seen(coarse, fitted.movement, fitted.scale)
+    whitener = whitener_as_seen(fitted.movement, coarse.valid, coarse.drive, fitted.scale)
     column = whitener.rows(fitted.columns[:, part])[:, 0]
     rows = whitener.rows(fitted.movement * fitted.scale)
     rows = rows / max(float(np.sqrt(np.mean(rows[coarse.valid] ** 2))), 1e-300)

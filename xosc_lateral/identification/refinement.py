@@ -155,7 +155,7 @@ class Refinement:
         """
         timing = {"lag_s": effect.lag_s, "response_s": effect.response_s}
         if isinstance(effect, Product):
-            others = list(_scaled(effect))
+            others = list(other_scales(effect, FINE_SCALES))
             price = self._costs.get(Family.PRODUCT, 0.0) + 2.0 * float(np.log(max(1, len(others))))
             yield from ((structs.replace(other, **timing), price) for other in others)
             return
@@ -184,11 +184,12 @@ def means_by_second(sums: FloatArray, late: int) -> FloatArray:
     return np.asarray((sums[stop] - sums[start]) / np.maximum(stop - start, 1)[:, None])
 
 
-def _scaled(effect: Product) -> Iterator[Product]:
+def other_scales(effect: Product, shares: Sequence[float]) -> Iterator[Product]:
+    """The same product with one of its proximities fading over a share of its distance."""
     for index, factor in enumerate(effect.factors):
         if factor.form is not Form.PROXIMITY:
             continue
-        for share in FINE_SCALES:
+        for share in shares:
             factors = list(effect.factors)
             factors[index] = structs.replace(factor, at=factor.at * share)
             yield structs.replace(effect, factors=(factors[0], factors[1]))

@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 
 from xosc_lateral.driver.effects import Acts, ColumnEffect
 from xosc_lateral.identification.autocorrelation import Whitener, fit_autoregression, start_factors, unbiased
+from xosc_lateral.identification.innovations import LONGEST, ORDER, innovations
 from xosc_lateral.identification.least_squares import clustered_least_squares
 from xosc_lateral.identification.log_scale import (
     bounded,
@@ -35,12 +36,6 @@ from xosc_lateral.identification.timeline import Timeline, coarse_all, coarse_me
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
 IntArray = NDArray[np.intp]
-
-ORDER = 12
-"""Past seconds that have a coefficient each in the movement's autoregression. [s]"""
-
-LONGEST = 96
-"""Past seconds that it sees as means over doubling times: drifts of a minute and a half. [s]"""
 
 FLOOR = 0.03
 """White noise that the model of a drive has beside what it shows: no table knows the lane better (in the motorway
@@ -190,8 +185,6 @@ class Fitted:
         Natural logarithm per unit.
     rows : array, shape (n,)
         Whitened residual, variance 1, 0 where invalid.
-    innovations : array, shape (n,)
-        The same by the movement as it is seen, without a floor: what tells how large it is just now.
     movement : array, shape (n,)
         Offset less level and mean terms, over the scale; 0 where invalid. [m]
     starts : array, shape (order + 1,)
@@ -211,7 +204,6 @@ class Fitted:
     log_sizes: FloatArray
     log_covariance: FloatArray
     rows: FloatArray
-    innovations: FloatArray
     movement: FloatArray
     starts: FloatArray
     log_likelihood: float
@@ -220,6 +212,14 @@ class Fitted:
     def scale(self) -> FloatArray:
         """Factor on the movement, > 0, shape (n,). [-]"""
         return self.whitener.scale
+
+    @cached_property
+    def innovations(self) -> FloatArray:
+        """Whitened by the movement as it is seen, without a floor: how large it is just now. Shape (n,), variance 1."""
+        coarse = self.coarse
+        moved, responses = coarse.offset - self.levels[coarse.drive], self.columns @ self.sizes
+        rows = innovations(moved, responses, coarse.valid, coarse.drive, self.scale)
+        return _standardised(rows, coarse.valid, len(self.sizes))
 
     @property
     def explained(self) -> FloatArray:
@@ -268,33 +268,17 @@ def fit_model(coarse: Coarse, terms: Sequence[ModelTerm]) -> Fitted:
         spread = spread * np.sqrt(own_levels(clipped_squares(rows, valid), valid, drive))
     left = np.where(coarse.valid, coarse.offset - columns @ sizes - levels[coarse.drive], 0.0)
     starts = start_factors(rows, coarse.valid, process.order)
-    seconds = int(valid.sum())
-    freedom = seconds / max(1, seconds - len(sizes))
     return Fitted(
         coarse, tuple(terms), whitener, columns, sizes, covariance, levels, scales, log_sizes,
-        covariance_of_log_sizes(scales, rows, valid, drive), _standardised(rows, valid, freedom),
-        _innovations(coarse, left, scale, freedom), left / scale, starts,
+        covariance_of_log_sizes(scales, rows, valid, drive), _standardised(rows, valid, len(sizes)),
+        left / scale, starts,
         _log_likelihood(rows, whitener, starts),
     )  # fmt: skip
 
 
-def whitener_as_seen(coarse: Coarse, movement: FloatArray, scale: FloatArray) -> Whitener:
-    """What turns the movement as it is seen into independent rows: without a floor."""
-    process = fit_autoregression(movement, coarse.valid, ORDER, longest=LONGEST)
-    return Whitener(process, coarse.valid, coarse.drive, scale)
-
-
-def _innovations(coarse: Coarse, left: FloatArray, scale: FloatArray, freedom: float) -> FloatArray:
-    """What is new in each second of the movement as it is seen, without a floor; young runs by their own size."""
-    whitener = whitener_as_seen(coarse, left / scale, scale)
-    rows = whitener.rows(left)
-    rows = rows / whitener.by_position(start_factors(rows, coarse.valid, whitener.process.order))
-    return _standardised(rows, coarse.valid, freedom)
-
-
-def _standardised(rows: FloatArray, valid: BoolArray, freedom: float) -> FloatArray:
+def _standardised(rows: FloatArray, valid: BoolArray, sizes: int) -> FloatArray:
     """Of variance 1, with as many degrees of freedom as the rows less the sizes have."""
-    variance = freedom * float(rows @ rows) / max(1, int(valid.sum()))
+    variance = float(rows @ rows) / max(1, int(valid.sum()) - sizes)
     return np.asarray(rows / np.sqrt(max(variance, 1e-300)))
 
 

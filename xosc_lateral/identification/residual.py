@@ -24,12 +24,11 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.driver.effects.response import respond
 from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.driver.sampling import OffsetSampler
 from xosc_lateral.driver.seeds import child
 from xosc_lateral.drives.resampling import in_digits
-from xosc_lateral.identification.timeline import LOCAL_S, PAD, Timeline, local_mean, start_anew
+from xosc_lateral.identification.timeline import LOCAL_S, PAD, Timeline, local_mean
 from xosc_lateral.segment import Segment
 
 FloatArray = NDArray[np.float64]
@@ -127,9 +126,7 @@ def statistics_of(
     labels, middles = {}, {}
     for name, values in quantities.items():
         none = np.isnan(values)
-        filled = _filled(values, timeline.valid)
-        response = respond(filled, timeline.step, 0.0, RESPONSE_S)
-        smooth = in_digits(start_anew(response, filled, float(np.exp(-timeline.step / RESPONSE_S)), timeline.drive))
+        smooth = in_digits(timeline.respond(_filled(values, timeline.valid), 0.0, RESPONSE_S))
         label, middle = _binned(smooth, timeline.valid, none)
         if len(middle) > 1:
             labels[name], middles[name] = label, middle

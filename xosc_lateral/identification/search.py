@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -45,8 +45,9 @@ class Search:
         How surely each component has to be found.
     progress : callable
         Told what is being done, in a few words.
-    share : float
-        Of the table's rows that `coarse` is.
+    wanted : mapping of str to int, optional
+        How many terms a component has in the table that this is a part of: so many are added, best first, whatever
+        their p-values, and components that have none are not looked at. None: this is the table.
     """
 
     coarse: Coarse
@@ -55,7 +56,7 @@ class Search:
     seed: np.random.SeedSequence
     budget: Budget
     progress: Callable[[str], None]
-    share: float = 1.0
+    wanted: Mapping[str, int] | None = None
     _built: list[tuple[object, object, Dictionary]] = field(default_factory=list, repr=False)
 
     @classmethod
@@ -98,8 +99,19 @@ class Search:
         return orthonormal(np.concatenate(blocks, axis=1).astype(np.float64), CROSS_BASIS)
 
     def level_of(self, component: str) -> float:
-        """Family-wise level that a component may spend on these rows."""
-        return self.budget.level_of(component, self.coarse.drives, self.share)
+        """Family-wise level that a component may spend."""
+        return self.budget.level_of(component, self.coarse.drives)
+
+    def passes(self, component: str, p_value: float, terms: Sequence[object]) -> bool:
+        """Whether the best that was found of a component is good enough to be added to terms."""
+        if p_value <= self.level_of(component) or self.wanted is None:
+            return p_value <= self.level_of(component)
+        there = sum(1 for term in terms if getattr(term, "component", None) == component)
+        return there < self.wanted.get(component, 0)
+
+    def asks(self, component: str) -> bool:
+        """Whether terms of a component are looked for."""
+        return self.wanted is None or component in self.wanted
 
     def rng(self, *key: int) -> np.random.Generator:
         """Independent stream by purpose."""

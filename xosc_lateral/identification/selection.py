@@ -76,7 +76,7 @@ class Selection:
         )
 
 
-def select(search: Search, initial: Sequence[Term] = (), *, only: frozenset[str] | None = None) -> Selection:
+def select(search: Search, initial: Sequence[Term] = ()) -> Selection:
     """Add terms stage by stage.
 
     Parameters
@@ -84,22 +84,20 @@ def select(search: Search, initial: Sequence[Term] = (), *, only: frozenset[str]
     search : Search
     initial : sequence of Term
         In the model already.
-    only : frozenset of str, optional
-        Components to look at; all without.
     """
     start = fitted = fit_model(search.coarse, initial)
     accepted: list[Accepted] = []
     rejected: dict[str, Rejected] = {}
     seen_at: dict[str, int] = {}
     for stage in STAGES:
-        kinds = [kind for kind in stage if only is None or kind.component in only]
+        kinds = [kind for kind in stage if search.asks(kind.component)]
         while len(accepted) < MAX_TERMS:
             # a kind that found nothing is not asked again before something else was added
             asked = [kind for kind in kinds if seen_at.get(kind.component) != len(accepted)]
             tests = [(kind, test) for kind in asked if (test := _asked(search, kind, fitted)) is not None]
             passed = []
             for kind, test in tests:
-                if test.term is not None and test.p_value <= search.level_of(kind.component):
+                if test.term is not None and search.passes(kind.component, test.p_value, fitted.terms):
                     passed.append(test)
                 else:
                     seen_at[kind.component] = len(accepted)
@@ -134,8 +132,8 @@ def _tested_again(search: Search, selection: Selection, one: Accepted) -> Select
         return selection
     without = selection.without([one.term], "what was found after it explains it")
     search.progress(f"looking at {one.term.component.replace('_', ' ')} again")
-    stands = one.term.probability_beside(search, without.final) <= search.level_of(one.term.component)
-    return selection if stands else without
+    p_value = one.term.probability_beside(search, without.final)
+    return selection if search.passes(one.term.component, p_value, without.final.terms) else without
 
 
 def _changes_scale(term: Term, search: Search) -> bool:

@@ -33,10 +33,6 @@ TAIL_SHARE = 0.25
 MANY_DRIVES = 20
 """From so many drives on a table tells what differs between them, and its null is drawn by whole drives."""
 
-CANDIDATES = 500.0
-"""Independent candidates that a dictionary of 2000 is worth, in orders of magnitude: on three quarters of the rows the
-mean has a level of 0.15 with 250, 0.17 with 500 and 0.21 with 1000. [-]"""
-
 
 @dataclass(frozen=True, slots=True)
 class Budget:
@@ -47,31 +43,23 @@ class Budget:
     weights : mapping of str to float
         Of each component. As shipped: half for the mean, within and between drives in equal parts; a quarter for both
         measures of spread; about equal parts for the rest, one for each kind of hidden effect. [-]
-    of_columns : frozenset of str
-        Components that look for the best of many candidates.
     """
 
     weights: Mapping[str, float]
-    of_columns: frozenset[str]
 
-    def level_of(self, component: str, drives: int, share: float = 1.0) -> float:
+    def level_of(self, component: str, drives: int) -> float:
         """Family-wise level that a component may spend.
 
         Parameters
         ----------
         component : str
         drives : int
-            In the table. Where nothing can be asked between them, the mean within has that share too.
-        share : float
-            Of the table's rows. The log p-value of the candidate that acts is in proportion to them, that of the best
-            of many is so before it pays for their number: what is just significant on the table is on average just
-            below this level on a share of it.
+            In the table. Where nothing can be asked between them, that share is not spent: a table on which something
+            acts is searched again beside it, at the same levels.
         """
-        weight = self.weights[component]
-        if drives < MANY_DRIVES and component in ("mean", "between"):
-            weight = self.weights["mean"] + self.weights["between"] if component == "mean" else 0.0
-        candidates = CANDIDATES if component in self.of_columns else 1.0
-        return float(candidates * (BUDGET * weight / sum(self.weights.values()) / candidates) ** share)
+        if drives < MANY_DRIVES and component == "between":
+            return 0.0
+        return BUDGET * self.weights[component] / sum(self.weights.values())
 
 
 def upper_tail(score: float, maxima: FloatArray) -> float:

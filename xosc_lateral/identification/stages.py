@@ -19,8 +19,7 @@ def in_stages(kinds: tuple[type[Term], ...]) -> tuple[tuple[type[Term], ...], ..
 
 def shared_among(kinds: tuple[type[Term], ...]) -> Budget:
     """The error budget by the terms' own weights; those of one component compete, and share one part of it."""
-    weights = {kind.component: kind.weight for kind in kinds}
-    return Budget(weights, frozenset(kind.component for kind in kinds if kind.of_columns))
+    return Budget({kind.component: kind.weight for kind in kinds})
 
 
 STAGES = in_stages(TERMS)

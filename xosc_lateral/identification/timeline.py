@@ -106,9 +106,12 @@ class Timeline:
         response = respond(values, self.step, lag_s, response_s)
         if response_s <= 0.0:
             return response
-        # amid the pad, what is shifted is the drive's own
-        amid = self.drive[np.maximum(np.arange(len(values)) - PAD // 2, 0)]
-        return start_anew(response, values, float(np.exp(-self.step / response_s)), amid)
+        # amid the pad, what is shifted is the drive's own; before, it is as it is there
+        rows = np.arange(len(values))
+        amid = self.drive[np.maximum(rows - PAD // 2, 0)]
+        anew = start_anew(response, values, float(np.exp(-self.step / response_s)), amid)
+        starts = np.searchsorted(self.drive, np.arange(len(self.names)))
+        return anew[np.maximum(rows, np.minimum(starts + PAD // 2, len(rows) - 1)[self.drive])]
 
 
 def join_drives(drives: Sequence[Drive], rules: CutRules = TRACE_RULES) -> Timeline:

@@ -6,17 +6,21 @@ import numpy as np
 from msgspec import structs
 from numpy.typing import NDArray
 
-from xosc_lateral.driver.effects import ColumnEffect, Product
+from xosc_lateral.driver.effects import ColumnEffect, Product, Proximity
 from xosc_lateral.identification.candidates import shapes_of
 from xosc_lateral.identification.columns import Column, read_column
 from xosc_lateral.identification.ranges import driving_range
-from xosc_lateral.identification.refinement import FINE_RESPONSES, LAG_LIMIT, LAG_STEPS, means_by_second
+from xosc_lateral.identification.refinement import FINE_RESPONSES, LAG_LIMIT, LAG_STEPS, means_by_second, other_scales
 from xosc_lateral.identification.regression import Coarse, Fitted
 
 FloatArray = NDArray[np.float64]
 
 NEAR_S = 2.0
 """Lags that differ from the estimate by up to this are looked at. [s]"""
+
+NEAR_SCALES = tuple(np.geomspace(0.5, 2.0, 21).tolist())
+"""Scales that are looked at, as shares of the estimate, 7 % apart: between two that refinement tries, 40 % apart, the
+change from the usual to the near end differs by a third."""
 
 CHI_SQUARE = 3.84
 """95 % quantile of chi-square with one degree of freedom: the interval gives up half as much log-likelihood. [-]"""
@@ -26,8 +30,9 @@ def widening(fitted: Fitted, effect: ColumnEffect, part: slice) -> float:
     """Factor on the standard errors of an effect on the mean, at least 1.
 
     How far the profile-likelihood interval [1]_ of the change over the driving range reaches from the estimate with
-    lag and time constant free, or the shape of its column, over how far it reaches with all of them told. The
-    likelihood is that of independent rows, scaled to the variance that stretches of a minute show [2]_.
+    lag and time constant free, or the shape of its column, or the distances over which its product fades, over how far
+    it reaches with all of them told. The likelihood is that of independent rows, scaled to the variance that stretches
+    of a minute show [2]_.
 
     Parameters
     ----------
@@ -72,8 +77,11 @@ def widening(fitted: Fitted, effect: ColumnEffect, part: slice) -> float:
 
 
 def _shapes(coarse: Coarse, effect: ColumnEffect) -> list[ColumnEffect]:
-    """Other shapes of the only column, with one coefficient and the same timing."""
-    if isinstance(effect, Product) or len(effect.columns) > 1 or len(effect.coefficients) > 1:
+    """Other shapes of the only column, or scales of a product, with one coefficient and the same timing."""
+    timing = {"lag_s": effect.lag_s, "response_s": effect.response_s}
+    if isinstance(effect, Product):
+        return [structs.replace(other, response_range=()) for other in other_scales(effect, NEAR_SCALES)]
+    if len(effect.columns) > 1 or len(effect.coefficients) > 1:
         return []
     (name,) = effect.columns
     seen = coarse.context[name][coarse.timeline.valid]
@@ -81,10 +89,12 @@ def _shapes(coarse: Coarse, effect: ColumnEffect) -> list[ColumnEffect]:
     if not isinstance(column, Column):
         return []
     shapes = shapes_of(column, seen, curves=False)
-    timing = {"lag_s": effect.lag_s, "response_s": effect.response_s}
+    near = [
+        structs.replace(effect, scale=share * effect.scale) for share in NEAR_SCALES if isinstance(effect, Proximity)
+    ]
     return [
-        structs.replace(shape, **timing)
-        for shape in (*shapes.plain, *shapes.bent)
+        structs.replace(shape, response_range=(), **timing)
+        for shape in (*shapes.plain, *shapes.bent, *near)
         if shape.seen({name: seen[:1]}).shape[1] == 1
     ]
 

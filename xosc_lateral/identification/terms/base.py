@@ -126,8 +126,6 @@ class Term(ABC):
     """Among those of a stage: smaller ones are asked first, and first where two are equally sure; then by name. [-]"""
     weight: ClassVar[float]
     """Of its component in the error budget; one for each kind of hidden effect. [-]"""
-    of_columns: ClassVar[bool] = False
-    """Whether it is the best of many candidates."""
     seen_held_out: ClassVar[bool] = True
     """Whether the mean or the innovations' scale follow terms of this class on held-out rows: not the latent path of a
     cycle or a drift, nor what changes the slow movement alone."""

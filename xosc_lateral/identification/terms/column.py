@@ -43,7 +43,6 @@ class ColumnTerm(Term):
     """What it acts on, in words."""
     group: ClassVar[str] = "spread"
     """Mean or spread: which summary statistics show it."""
-    of_columns: ClassVar[bool] = True
     single: ClassVar[bool] = False
     """Only effects with one coefficient will do."""
     effect: ColumnEffect
