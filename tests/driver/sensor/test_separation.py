@@ -116,6 +116,16 @@ def test_steps_of_a_lattice_are_found_and_their_noise_is_known(truth):
     assert not any("too coarse" in line for line in fit_warnings(replace(profile, sensor=found.sensor)))
 
 
+def test_low_passed_noise_is_found_beside_rounding(truth):
+    """Phones write centimetres: their error is as slow as without."""
+    noise = noises(truth, 3.0, "low-passed")
+    rounded = [np.round((x + e) / 0.01) * 0.01 - x for x, e in zip(truth[1], noise, strict=True)]
+    plain_split, fine_split = split(truth, noise)[0], split(truth, rounded)[0]
+    assert fine_split.sensor.rounding == pytest.approx(0.01)
+    assert fine_split.sensor.order == plain_split.sensor.order > 0
+    assert fine_split.sensor.driver_variance == pytest.approx(plain_split.sensor.driver_variance, rel=0.02)
+
+
 def test_a_known_noise_level_is_kept_to(truth):
     noise = noises(truth, 1.0, "white")
     level = float(np.concatenate(noise).std())

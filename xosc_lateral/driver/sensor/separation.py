@@ -128,7 +128,6 @@ def separate(
     colours = [Colour(), *_colours()]
     if grain and not coarse:
         rounding = _rounding(data, grain, variance)
-        colours = colours[:1]
     base = rounding(data.frequency)
     if kinks is not None:
         base = base + kinks.density(data.frequency)
