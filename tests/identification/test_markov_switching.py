@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from scipy.stats import norm
 
-from xosc_lateral.identification.markov_switching import _forward_backward, fit_regimes
+from xosc_lateral.identification.forward_backward import forward_backward
+from xosc_lateral.identification.markov_switching import fit_regimes
 
 
 def all_paths(rows: np.ndarray, valid: np.ndarray, quiet: float, loud: float, go: float, leave: float):
@@ -35,15 +36,15 @@ def test_probabilities_are_those_of_all_paths(seed: int) -> None:
     rows, valid = rng.normal(size=9) * rng.choice([0.5, 2.0], 9), rng.random(9) > 0.2
     quiet, loud, go, leave = 0.6, 1.9, 0.2, 0.35
     expected = all_paths(rows, valid, quiet, loud, go, leave)
-    on, went, left, likelihood = _forward_backward(rows**2, valid, quiet, loud, go, leave)
+    on, went, left, likelihood = forward_backward(rows**2, valid, quiet, loud, go, leave)
     np.testing.assert_allclose(on, expected[0], rtol=1e-9)
     assert (went, left, likelihood) == pytest.approx(expected[1:], rel=1e-9)
 
 
 def test_rows_that_are_cut_out_say_nothing() -> None:
     rows, valid = np.array([0.1, 50.0, 0.1]), np.array([True, False, True])
-    wild = _forward_backward(rows**2, valid, 0.5, 2.0, 0.1, 0.1)
-    tame = _forward_backward(np.array([0.1, 0.0, 0.1]) ** 2, valid, 0.5, 2.0, 0.1, 0.1)
+    wild = forward_backward(rows**2, valid, 0.5, 2.0, 0.1, 0.1)
+    tame = forward_backward(np.array([0.1, 0.0, 0.1]) ** 2, valid, 0.5, 2.0, 0.1, 0.1)
     np.testing.assert_array_equal(wild[0], tame[0])
     assert wild[3] == tame[3]
 

@@ -1,4 +1,7 @@
-"""A stochastic differential equation whose noise can't grow beyond a bound."""
+"""A stochastic differential equation whose noise can't grow beyond a bound.
+
+After Qi, Ying and Zhang, 2022; see `source`.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Intermittent control: nothing is done until the evidence for an error suffices, then one bell-shaped correction."""
+"""Intermittent control: nothing is done until the evidence for an error suffices, then one bell-shaped correction.
+
+After Markkula, Boer, Romano and Merat, 2018; see `source`.
+"""
 
 from __future__ import annotations
 
@@ -80,9 +83,7 @@ class Intermittent(SimulatedModel):
         """Offsets and the driver's lateral acceleration, shape (n, m) each. [m], [m/s2]"""
         n, m = batch.shape
         step, parts = batch.step, round(ADJUSTMENT / batch.step)
-        # A bell-shaped rate, as shares of the adjustment in each step (raised cosine).
-        edges = np.linspace(0.0, 1.0, parts + 1)
-        shares = np.diff(edges - np.sin(2.0 * np.pi * edges) / (2.0 * np.pi))
+        shares = _bell(parts)
         settle = round(20.0 / step)
         preferred = batch.start
         offset, speed, steer, evidence = preferred.copy(), np.zeros(n), np.zeros(n), np.zeros(n)
@@ -118,3 +119,11 @@ class Intermittent(SimulatedModel):
             "motor_noise": self.motor_noise,
             "unrest_m_s": self.unrest,
         }
+
+
+def _bell(parts: int) -> FloatArray:
+    """Shares of an adjustment in each of its steps, shape (parts,). [-]"""
+    # A bell-shaped rate, as shares of the adjustment in each step (raised cosine).
+    edges = np.linspace(0.0, 1.0, parts + 1)
+    shares = np.diff(edges - np.sin(2.0 * np.pi * edges) / (2.0 * np.pi))
+    return np.asarray(shares)

@@ -1,4 +1,7 @@
-"""The linear driver model with curvature nodes: where in the lane a driver wants to be, from the road ahead."""
+"""The linear driver model with curvature nodes: where in the lane a driver wants to be, from the road ahead.
+
+After Ignéczi and Horváth, 2024; see `source`.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Potentials: a driver rolls down the sum of what the lane's edges and the vehicles beside it raise."""
+"""Potentials: a driver rolls down the sum of what the lane's edges and the vehicles beside it raise.
+
+After Chakroborty, Agrawal and Vasishtha, 2004; see `source`.
+"""
 
 from __future__ import annotations
 
@@ -91,10 +94,8 @@ def move(batch: SegmentBatch, rng: np.random.Generator, force: object, friction:
     assert callable(force)
     n, m = batch.shape
     keep = float(np.exp(-friction * batch.step))
-    kick = noise * float(np.sqrt((1.0 - keep**2) / (2.0 * friction)))
-    # Lateral speed of the stationary motion where the force is weak: a window begins amid a drive.
-    speed = noise / np.sqrt(2.0 * friction) * rng.standard_normal(n)
-    kicks, offset = kick * rng.standard_normal((n, m)), batch.start.copy()
+    speed, kicks = _drawn(batch, rng, friction, noise)
+    offset = batch.start.copy()
     push = (1.0 - keep) / friction
     rows = np.empty((n, m))
     for k in range(m):
@@ -105,3 +106,16 @@ def move(batch: SegmentBatch, rng: np.random.Generator, force: object, friction:
         offset = np.clip(offset + speed * batch.step, -edge, edge)
         speed = np.where(np.abs(offset) >= edge, 0.0, speed)
     return rows
+
+
+def _drawn(
+    batch: SegmentBatch, rng: np.random.Generator, friction: float, noise: float
+) -> tuple[FloatArray, FloatArray]:
+    """Lateral speeds at the start, shape (n,), and what noise adds in each step, shape (n, m). [m/s]"""
+    n, m = batch.shape
+    keep = float(np.exp(-friction * batch.step))
+    kick = noise * float(np.sqrt((1.0 - keep**2) / (2.0 * friction)))
+    # Lateral speed of the stationary motion where the force is weak: a window begins amid a drive.
+    speed = noise / np.sqrt(2.0 * friction) * rng.standard_normal(n)
+    kicks = kick * rng.standard_normal((n, m))
+    return speed, kicks

@@ -1,4 +1,7 @@
-"""Social forces: a spring to the lane's middle, friction, and a push away from whoever drives alongside."""
+"""Social forces: a spring to the lane's middle, friction, and a push away from whoever drives alongside.
+
+After Delpiano, Herrera, Laval and Coeymans, 2020; see `source`.
+"""
 
 from __future__ import annotations
 

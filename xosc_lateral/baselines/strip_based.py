@@ -1,4 +1,7 @@
-"""Strips: the lane divided lengthwise, and decisions to move one strip over (SiMTraM; Vissim moves alike)."""
+"""Strips: the lane divided lengthwise, and decisions to move one strip over (SiMTraM; Vissim moves alike).
+
+After Mathew, Munigety and Bajpai, 2015; see `source`.
+"""
 
 from __future__ import annotations
 

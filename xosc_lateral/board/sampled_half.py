@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -52,6 +52,25 @@ def sample_half(model: LateralModel, half: Half, rng: np.random.Generator) -> Sa
     drawn = [model.sample(segments, None, rng) for _ in range(DRAWS)]
     shortest = min(half.windows)
     ensemble = sample_same_start(model, half.windows[shortest], rng, ENSEMBLE)
+    cut = _cut(model, half, drawn, ensemble, rng)
+    features = {
+        condition: tuple(features_of(rows, half.windows[condition.seconds].lane_width, STEP) for rows in several)
+        for condition, several in cut.items()
+    }
+    first = {condition: several[0] for condition, several in cut.items()}
+    free = half.windows[shortest].cut_from(drawn[0])
+    return SampledHalf(model.settings, drawn[0], ensemble, first, features, variance_parts(free, run_names(half)))
+
+
+def _cut(
+    model: LateralModel,
+    half: Half,
+    drawn: Sequence[Sequence[FloatArray]],
+    ensemble: FloatArray,
+    rng: np.random.Generator,
+) -> dict[SnippetCondition, list[FloatArray]]:
+    """Windows of every condition: out of free runs, or from the real starts."""
+    shortest = min(half.windows)
     cut: dict[SnippetCondition, list[FloatArray]] = {}
     for condition in half.conditions:
         own = half.windows[condition.seconds]
@@ -61,13 +80,7 @@ def sample_half(model: LateralModel, half: Half, rng: np.random.Generator) -> Sa
             cut[condition] = [ensemble[:, member] for member in range(DRAWS)]
         else:
             cut[condition] = [sample_same_start(model, own, rng, 1)[:, 0]]
-    features = {
-        condition: tuple(features_of(rows, half.windows[condition.seconds].lane_width, STEP) for rows in several)
-        for condition, several in cut.items()
-    }
-    first = {condition: several[0] for condition, several in cut.items()}
-    free = half.windows[shortest].cut_from(drawn[0])
-    return SampledHalf(model.settings, drawn[0], ensemble, first, features, variance_parts(free, run_names(half)))
+    return cut
 
 
 def run_names(half: Half) -> NDArray[np.str_]:

@@ -48,10 +48,7 @@ def make_board(
     shown = np.unique(np.linspace(0, len(half.windows[SHORT]) - 1, EXAMPLES).astype(np.int64))
     rows = []
     for rank, key in enumerate(order, start=1):
-        # Distances of a resample are larger than those of the sample itself, the more so the nearer a model is to real
-        # driving: the spread of the resamples is laid about the score instead of about their own, too large mean.
-        spread = np.log(drawn[key])
-        low, high = score[key] * np.exp(np.quantile(spread, QUANTILES) - spread.mean())
+        low, high = _interval(score[key], drawn[key])
         best, worst = np.quantile(places[key], QUANTILES)
         sampled, model = parts[0][1][key], models[key]
         curves = sampled.features[free][0]
@@ -65,8 +62,8 @@ def make_board(
                 numbers=numbers[key],
                 variance=sampled.variance,
                 score=score[key],
-                low=float(low),
-                high=float(high),
+                low=low,
+                high=high,
                 rank=rank,
                 best_rank=int(np.floor(best)),
                 worst_rank=int(np.ceil(worst)),
@@ -101,3 +98,13 @@ def make_board(
         seed=seed,
         seconds=dict(seconds),
     )
+
+
+def _interval(score: float, drawn: FloatArray) -> tuple[float, float]:
+    """Of a score, 95 %, from its resamples, shape (n,). [-]"""
+    # Distances of a resample are larger than those of the sample itself, the more so the nearer a model is to real
+    # driving: the spread of the resamples is laid about the score instead of about their own, too large mean.
+    spread = np.log(drawn)
+    low, high = score * np.exp(np.quantile(spread, QUANTILES) - spread.mean())
+
+    return float(low), float(high)

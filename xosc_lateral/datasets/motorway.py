@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from xosc_lateral.datasets.least_jerk import least_jerk
 from xosc_lateral.drives.filters import first_order
 
 STEP = 0.02
@@ -114,8 +115,7 @@ def _lanes(n: int, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
         start += hold
         target = lane + 1 if lane == 0 else lane - 1 if lane == N_LANES - 1 else lane + int(rng.choice([-1, 1]))
         length = round(rng.uniform(5.0, 8.0) / STEP)
-        done = np.arange(1, length + 1) / length
-        ease = done**3 * (10.0 - 15.0 * done + 6.0 * done**2)  # least jerk from rest to rest
+        ease = least_jerk(length)
         part = way[start : start + length]
         part[:] = lane + (target - lane) * ease[: len(part)]
         start += length

@@ -19,6 +19,7 @@ import pandas as pd
 from scipy.signal import lfilter
 
 from xosc_lateral.datasets.driver_simulator import measure, sample_times
+from xosc_lateral.datasets.least_jerk import least_jerk
 from xosc_lateral.datasets.motorway import N_LANES, STEP, draw_motorway
 from xosc_lateral.drives.filters import first_order
 
@@ -81,8 +82,7 @@ def reflected(n: int, rng: np.random.Generator) -> np.ndarray:
     Shape (n,). [m]
     """
     tolerance, length = 0.35, round(2.0 / MOVEMENT_STEP)
-    done = np.arange(1, length + 1) / length
-    ease = done**3 * (10.0 - 15.0 * done + 6.0 * done**2)
+    ease = least_jerk(length)
     steps = 0.09 * np.sqrt(MOVEMENT_STEP) * rng.normal(size=n)
     out = np.empty(n)
     place, at = 0.0, 0

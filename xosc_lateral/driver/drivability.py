@@ -101,18 +101,24 @@ def strain(offset: FloatArray, step: float, speed: FloatArray) -> Strain:
     if len(offset) < 4:
         return Strain(0.0, 0.0, 0.0, 0.0)
     acceleration = np.abs(np.diff(offset, 2)) / step**2
-    span = max(1, round(JERK_WINDOW / step))
-    signed = np.diff(offset, 2) / step**2
-    jerk = np.abs(signed[span:] - signed[:-span]) / (span * step) if len(signed) > span else np.zeros(1)
+    hardest = _hardest_jerk(offset, step)
     bound = comfort(speed)[1:-1]
     uncomfortable = float(np.quantile(acceleration / bound, 1.0 - SELDOM))
-    largest, hardest = float(acceleration.max()), float(jerk.max())
+    largest = float(acceleration.max())
     return Strain(
         float(np.quantile(acceleration, 1.0 - SELDOM)),
         largest,
         hardest,
         max(uncomfortable, largest / LIMIT, hardest / JERK_LIMIT),
     )
+
+
+def _hardest_jerk(offset: FloatArray, step: float) -> float:
+    """Largest change of the lateral acceleration over the window, per time. [m/s3]"""
+    span = max(1, round(JERK_WINDOW / step))
+    signed = np.diff(offset, 2) / step**2
+    jerk = np.abs(signed[span:] - signed[:-span]) / (span * step) if len(signed) > span else np.zeros(1)
+    return float(jerk.max())
 
 
 def drivable(offset: FloatArray, step: float, speed: FloatArray) -> tuple[FloatArray, Bound | None]:

@@ -95,20 +95,24 @@ def fit_runs(
 ) -> DriverProfile:
     """Fit a profile to runs that are cut already."""
     core = fit_core([run.rel_offset for run in runs], [run.drive for run in runs], model=model)
-    known = provenance or Provenance()
-    seconds = sum(len(run) for run in runs) * core.step
     return DriverProfile(
         name=name,
         model=core,
         lane_width=float(np.median(np.concatenate([run.lane_width for run in runs]))),
-        provenance=replace(
-            known,
-            hours=round(seconds / 3600.0, 4),
-            drives=len({run.drive for run in runs}),
-            runs=len(runs),
-            fit={**known.fit, **_fit_notes(core)},
-            package_version=__version__,
-        ),
+        provenance=_fitted_on(runs, core, provenance or Provenance()),
+    )
+
+
+def _fitted_on(runs: Sequence[Run], core: CoreModel, known: Provenance) -> Provenance:
+    """What is known, with what it was fitted on and how."""
+    seconds = sum(len(run) for run in runs) * core.step
+    return replace(
+        known,
+        hours=round(seconds / 3600.0, 4),
+        drives=len({run.drive for run in runs}),
+        runs=len(runs),
+        fit={**known.fit, **_fit_notes(core)},
+        package_version=__version__,
     )
 
 

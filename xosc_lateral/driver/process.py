@@ -65,9 +65,7 @@ class DriveProcess:
     def __init__(self, profile: DriverProfile, seed: np.random.SeedSequence, *, ahead: int = 0) -> None:
         self._model, self._seed = profile.model, seed
         self._ahead = self._core_ahead = ahead
-        for effect in profile.effects:
-            if not isinstance(effect, HiddenEffect | ColumnEffect):
-                raise TypeError(f"effect {effect!r} is made neither from HiddenEffect nor from ColumnEffect")
+        _refuse_strangers(profile)
         self._hidden = tuple(effect for effect in profile.effects if isinstance(effect, HiddenEffect))
         columned = [effect for effect in profile.effects if isinstance(effect, ColumnEffect)]
         self.columned = tuple(
@@ -207,6 +205,13 @@ class DriveProcess:
             self._core = self._model.resume(read_as(self._model.State, state.core, f"{where}.core"))
             state.core = self._core.state
         self.state = state
+
+
+def _refuse_strangers(profile: DriverProfile) -> None:
+    """Only effects that can go on block by block."""
+    for effect in profile.effects:
+        if not isinstance(effect, HiddenEffect | ColumnEffect):
+            raise TypeError(f"effect {effect!r} is made neither from HiddenEffect nor from ColumnEffect")
 
 
 def combine(terms: Sequence[EffectTerms]) -> EffectTerms:

@@ -100,15 +100,26 @@ def upgraded(state: Mapping[str, Any], profile: DriverProfile) -> dict[str, Any]
     """
     if not isinstance(state, Mapping) or state.get("format") != FORMAT:
         raise DriverProfileError(f'not a state of an offset stream: "format" is not "{FORMAT}"')
+    version = _version_of(state)
+    if version == 1:
+        from xosc_lateral.driver.stream_state_1 import from_version_1
+
+        return from_version_1(state, profile)
+    return _unsealed(state)
+
+
+def _version_of(state: Mapping[str, Any]) -> int:
+    """Of its format, if this package reads it."""
     version = state.get("version", 1)
     if version not in (1, VERSION):
         raise DriverProfileError(
             f"a state written by a newer version of xosc-lateral (format {version!r}; this one reads up to {VERSION})"
         )
-    if version == 1:
-        from xosc_lateral.driver.stream_state_1 import from_version_1
+    return int(version)
 
-        return from_version_1(state, profile)
+
+def _unsealed(state: Mapping[str, Any]) -> dict[str, Any]:
+    """Without format and version, if nobody has changed it."""
     written = {name: value for name, value in state.items() if name != "sha256"}
     if state.get("sha256") != _hash(written):
         raise DriverProfileError("the state of an offset stream is damaged: its sha256 is another")

@@ -33,6 +33,13 @@ def upgraded(values: object) -> dict[str, Any]:
     """
     if not isinstance(values, Mapping) or values.get("format") != FORMAT:
         raise DriverProfileError(f'not a driver profile: "format" is not "{FORMAT}"')
+    version = _version_of(values)
+    rest = {name: value for name, value in values.items() if name not in ("format", "version")}
+    return _from_1(rest) if version == 1 else rest
+
+
+def _version_of(values: Mapping[str, Any]) -> int:
+    """Of the file's format; refused if it is none, or newer than this package."""
     version = values.get("version")
     if not isinstance(version, int) or isinstance(version, bool) or version < 1:
         raise DriverProfileError(f"version {version!r}, expected a whole number from 1")
@@ -41,8 +48,7 @@ def upgraded(values: object) -> dict[str, Any]:
             f"written by a newer version of xosc-lateral (file format {version}; this one reads up to {VERSION}): "
             "update the package"
         )
-    rest = {name: value for name, value in values.items() if name not in ("format", "version")}
-    return _from_1(rest) if version == 1 else rest
+    return version
 
 
 def _from_1(values: dict[str, Any]) -> dict[str, Any]:

@@ -30,6 +30,11 @@ def circular_period(drives: Sequence[FloatArray]) -> float:
     extent = float(values.max() - values.min())
     if extent <= 0.0 or len(np.unique(values)) <= FEW:
         return 0.0
+    return _circle(drives, extent)
+
+
+def _circle(drives: Sequence[FloatArray], extent: float) -> float:
+    """That whole range, rounded, if the drives jump across it as a circle makes them, else 0."""
     jump = np.concatenate([np.abs(np.diff(own)) for own in drives]) / extent
     wraps, between = int((jump > 0.9).sum()), int(((jump > 0.25) & (jump <= 0.9)).sum())
     if wraps < 2 or between > 0.3 * wraps or wraps > 0.05 * len(jump):

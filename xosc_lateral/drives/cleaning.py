@@ -96,7 +96,12 @@ def _in_order(columns: dict[str, FloatArray], name: str, path: Path) -> dict[str
     repeated = np.concatenate([[False], np.diff(time) <= 0])
     _check_repeats(columns, repeated, name, path)
     columns = {key: values[~repeated] for key, values in columns.items()}
-    steps = np.diff(columns["time"])
+    _check_steps(columns["time"], name, path)
+    return columns
+
+
+def _check_steps(time: FloatArray, name: str, path: Path) -> None:
+    steps = np.diff(time)
     if len(steps) and np.median(steps) > MAX_STEP:
         raise FormatError(
             f"drive {name}: rows are {np.median(steps):.4g} s apart (median), 5 Hz needs at most {MAX_STEP} s; "
@@ -104,7 +109,6 @@ def _in_order(columns: dict[str, FloatArray], name: str, path: Path) -> dict[str
             path=path,
             element="column 'time'",
         )
-    return columns
 
 
 def _check_time(time: FloatArray, name: str, path: Path) -> None:
@@ -149,16 +153,23 @@ def _check_units(
             f"{LANE_WIDTHS[1]:g} m; name the unit with --map, as in lane_width=COLUMN:cm",
             path=path,
         )
-    outside = np.abs(offset[known]) > np.maximum(width[known], LANE_WIDTHS[0])
+    _check_offsets(name, offset[known], width[known], path)
+    _check_speed(name, columns.get("speed"), path)
+
+
+def _check_offsets(name: str, offset: FloatArray, width: FloatArray, path: Path) -> None:
+    outside = np.abs(offset) > np.maximum(width, LANE_WIDTHS[0])
     if outside.mean() > MAX_OUTSIDE:
-        worst = float(np.max(np.abs(offset[known])))
+        worst = float(np.max(np.abs(offset)))
         raise FormatError(
-            f"drive {name}: offsets of up to {worst:.4g} m in a lane of {median_width:.3g} m, "
+            f"drive {name}: offsets of up to {worst:.4g} m in a lane of {float(np.median(width)):.3g} m, "
             f"{100 * outside.mean():.0f} % of the rows beyond a whole lane width; name the unit with --map, "
             "as in offset=COLUMN:cm",
             path=path,
         )
-    speed = columns.get("speed")
+
+
+def _check_speed(name: str, speed: FloatArray | None, path: Path) -> None:
     if speed is not None and np.isfinite(speed).any() and float(np.nanmedian(speed)) > MAX_MEDIAN_SPEED:
         raise FormatError(
             f"drive {name}: speed is {float(np.nanmedian(speed)):.4g} m/s (median), more than {MAX_MEDIAN_SPEED:g}; "

@@ -95,19 +95,24 @@ def lane_change_rows(drive: Drive, rules: CutRules = PAPER_RULES) -> BoolArray:
     """
     if drive.run is not None:
         return np.zeros(len(drive), dtype=np.bool_)
-    step = np.abs(np.diff(drive.offset)) > JUMP * np.minimum(drive.lane_width[1:], drive.lane_width[:-1])
-    lane = drive.context.get("lane_index")
-    if lane is not None:
-        known = np.flatnonzero(np.isfinite(lane))
-        moved = known[:-1][np.diff(lane[known]) != 0]
-        step[moved] = True
-    at = np.flatnonzero(step)
+    at = np.flatnonzero(_changes(drive))
     change = np.zeros(len(drive), dtype=np.bool_)
     first = np.searchsorted(drive.time, drive.time[at] - rules.lane_change_margin)
     last = np.searchsorted(drive.time, drive.time[at + 1] + rules.lane_change_margin, side="right")
     for begin, end in zip(first, last, strict=True):
         change[begin:end] = True
     return change
+
+
+def _changes(drive: Drive) -> BoolArray:
+    """Steps from row to row between which the lane is another, shape (n - 1,)."""
+    step = np.abs(np.diff(drive.offset)) > JUMP * np.minimum(drive.lane_width[1:], drive.lane_width[:-1])
+    lane = drive.context.get("lane_index")
+    if lane is not None:
+        known = np.flatnonzero(np.isfinite(lane))
+        moved = known[:-1][np.diff(lane[known]) != 0]
+        step[moved] = True
+    return np.asarray(step)
 
 
 def slow_rows(drive: Drive, rules: CutRules = PAPER_RULES) -> BoolArray:

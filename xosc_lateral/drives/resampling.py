@@ -83,15 +83,23 @@ def average(time: FloatArray, values: FloatArray, grid: FloatArray, *, oversampl
     if len(grid) < 2 or np.median(np.diff(time)) >= PASS_STEP / STEP * (grid[1] - grid[0]):
         result = np.interp(grid, time[~missing], values[~missing])
     else:
-        kernel = np.hanning(2 * oversampling + 1)
-        fine_grid = _fine_grid(grid, oversampling)
-        weight = (nearest(time, missing.astype(np.float64), fine_grid) == 0).astype(np.float64)
-        fine = np.interp(fine_grid, time[~missing], values[~missing]) * weight
-        sums = _decimate(np.pad(fine, len(kernel) // 2), kernel, oversampling, len(grid))
-        weights = _decimate(np.pad(weight, len(kernel) // 2), kernel, oversampling, len(grid))
-        result = sums / np.where(weights > 0, weights, 1.0)
+        result = _hann_average(time, values, missing, grid, oversampling)
     closest = nearest(time, values, grid)
     return np.where(np.isfinite(closest), result, closest)
+
+
+def _hann_average(
+    time: FloatArray, values: FloatArray, missing: NDArray[np.bool_], grid: FloatArray, oversampling: int
+) -> FloatArray:
+    """Over one step to each side, shape of `grid`, of what is there; 0 where nothing is."""
+    kernel = np.hanning(2 * oversampling + 1)
+    fine_grid = _fine_grid(grid, oversampling)
+    weight = (nearest(time, missing.astype(np.float64), fine_grid) == 0).astype(np.float64)
+    fine = np.interp(fine_grid, time[~missing], values[~missing]) * weight
+    sums = _decimate(np.pad(fine, len(kernel) // 2), kernel, oversampling, len(grid))
+    weights = _decimate(np.pad(weight, len(kernel) // 2), kernel, oversampling, len(grid))
+    result = sums / np.where(weights > 0, weights, 1.0)
+    return np.asarray(result)
 
 
 def nearest(time: FloatArray, values: FloatArray, grid: FloatArray) -> FloatArray:

@@ -200,16 +200,7 @@ def _apart(drawn: Sequence[_Drawn], motion: NominalMotion, network: RoadNetwork)
     """Neighbours give way to each other."""
     if sum(bool(one.segments) for one in drawn) == 0 or len(drawn) < 2:
         return list(drawn)
-    sampled = []
-    for one in drawn:
-        rows = len(one.motion.time)
-        deviation, can_move = np.zeros(rows), np.zeros(rows, dtype=np.bool_)
-        if one.segments:
-            deviation = one.deviation(distance_driven(one.motion))
-            for span, _, _ in one.segments:
-                can_move[span.first : span.last + 1] = True
-        heeds = one.profile is not None and any(column in NEIGHBOURS for column in one.profile.columns)
-        sampled.append(SampledVehicle(one.motion, deviation, can_move, heeds))
+    sampled = [_sampled(one) for one in drawn]
     every = max(1, round(SAMPLE_STEP / motion.step))
     moves = give_way(motion, network, sampled, np.arange(0, len(motion.entities[0].time), every))
     return [
@@ -218,6 +209,18 @@ def _apart(drawn: Sequence[_Drawn], motion: NominalMotion, network: RoadNetwork)
         else replace(one, segments=tuple((span, knots, offset + move[knots]) for span, knots, offset in one.segments))
         for one, move in zip(drawn, moves, strict=True)
     ]
+
+
+def _sampled(one: _Drawn) -> SampledVehicle:
+    """What its neighbours see of a vehicle: how it deviates, and where it could do so more."""
+    rows = len(one.motion.time)
+    deviation, can_move = np.zeros(rows), np.zeros(rows, dtype=np.bool_)
+    if one.segments:
+        deviation = one.deviation(distance_driven(one.motion))
+        for span, _, _ in one.segments:
+            can_move[span.first : span.last + 1] = True
+    heeds = one.profile is not None and any(column in NEIGHBOURS for column in one.profile.columns)
+    return SampledVehicle(one.motion, deviation, can_move, heeds)
 
 
 def _result(drawn: _Drawn, network: RoadNetwork) -> EntityResult:

@@ -169,12 +169,7 @@ class Enriched:
             f"{departure.name} leaves its lane at {departure.time:.1f} s by {departure.beyond:.2f} m"
             for departure in self.departures
         ]
-        lines += [
-            f"{entity.name} jumps {length:.1f} m at {time:.1f} s, as in the nominal motion: the lane that it follows "
-            "ends, or its road has a gap; a lane change before it would avoid that"
-            for entity in self.entities
-            for time, length in leaps(entity.motion)
-        ]
+        lines += [line for entity in self.entities for line in _jumps(entity)]
         lines += [
             f"{entity.name}: {', '.join(entity.neutral)} not known in the scenario, taken as neutral"
             for entity in self.entities
@@ -182,3 +177,11 @@ class Enriched:
         ]
         lines += [f"{entity.name}: {entity.bound}" for entity in self.entities if entity.bound is not None]
         return tuple(lines)
+
+
+def _jumps(entity: EntityResult) -> list[str]:
+    return [
+        f"{entity.name} jumps {length:.1f} m at {time:.1f} s, as in the nominal motion: the lane that it follows "
+        "ends, or its road has a gap; a lane change before it would avoid that"
+        for time, length in leaps(entity.motion)
+    ]

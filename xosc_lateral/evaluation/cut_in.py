@@ -1,4 +1,9 @@
-"""When is a neighbour's lateral movement taken for the beginning of a cut-in? Published criteria with their numbers."""
+"""When is a neighbour's lateral movement taken for the beginning of a cut-in? Published criteria with their numbers.
+
+References
+----------
+.. [1] UN Regulation No. 157, paragraph 5.2.5.2 and the guidance on performance models for cut-ins.
+"""
 
 from __future__ import annotations
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from xosc_lateral.evaluation.line_crossing import HALF_WIDTH, time_to_line_crossing
 from xosc_lateral.evaluation.margins import NEAR_MARKING
 
 FloatArray = NDArray[np.float64]
@@ -22,14 +23,8 @@ INDICATORS = (
 
 UNITS = ("m", "s", "s", "-", "-", "m/s2", "m/s3")
 
-HALF_WIDTH = 0.9
-"""Half of a car's width: 1.8 m, as in `NEAR_MARKING`. [m]"""
-
 WANDERING_ZONE = 0.375
 """UN R157, guidance on performance models: a neighbour this far from its lane's centre is no longer wandering. [m]"""
-
-LONGEST_TLC = 20.0
-"""Times to line crossing beyond it count as it: far above the 2 s that warning systems look at. [s]"""
 
 
 def lane_keeping_indicators(
@@ -75,26 +70,3 @@ def lane_keeping_indicators(
             np.sqrt((jerk**2).mean(axis=1)),
         ]
     )
-
-
-def time_to_line_crossing(
-    offset: FloatArray, lane_width: FloatArray, step: float, *, half_width: float = HALF_WIDTH
-) -> FloatArray:
-    """Time until the side that the vehicle moves towards reaches its marking, at constant lateral speed.
-
-    Parameters
-    ----------
-    offset, lane_width : array, shape (..., m)
-        [m]
-
-    Returns
-    -------
-    array, shape (..., m - 1)
-        0 where the side is beyond the marking already, at most `LONGEST_TLC`. [s]
-    """
-    speed = np.diff(offset, axis=-1) / step
-    towards = np.sign(speed) * offset[..., 1:]
-    room = np.maximum(0.5 * lane_width[..., 1:] - half_width - towards, 0.0)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        time = np.where(speed == 0.0, np.inf, room / np.abs(speed))
-    return np.minimum(time, LONGEST_TLC)

@@ -1,4 +1,10 @@
-"""The ten numbers that the paper describes a snippet by, for many snippets at once."""
+"""The ten numbers that the paper describes a snippet by, for many snippets at once.
+
+References
+----------
+.. [1] N. Neis, J. Beyerer, "A two-level stochastic model for the lateral movement of vehicles within their lane", IEEE
+       Intelligent Vehicles Symposium 2023, arXiv:2405.17080: what its evaluation compares.
+"""
 
 from __future__ import annotations
 

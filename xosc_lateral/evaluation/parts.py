@@ -60,12 +60,13 @@ def evaluate_parts(
         ("sampled", "sampled", sampled),
     )
     real = snippet_metrics(snippets.offset)
-    results = []
-    for number, (coarse_from, fine_from, rows) in enumerate(combinations, start=1):
-        artificial = snippet_metrics(rows)
-        distances = metric_distances(real, artificial)
-        results.append(PartEvaluation(number, coarse_from, fine_from, real, artificial, distances))
-    return tuple(results)
+    return tuple(_compared(number, *each, real) for number, each in enumerate(combinations, start=1))
+
+
+def _compared(number: int, coarse_from: str, fine_from: str, rows: FloatArray, real: FloatArray) -> PartEvaluation:
+    """Snippets [m], shape (n, m), put together from parts, beside the measured ones' metrics."""
+    artificial = snippet_metrics(rows)
+    return PartEvaluation(number, coarse_from, fine_from, real, artificial, metric_distances(real, artificial))
 
 
 def _real_parts(snippets: Snippets) -> tuple[FloatArray, FloatArray]:

@@ -85,10 +85,7 @@ def snippets_of(runs: Sequence[Run], seconds: float, step: float, *, by_block: b
     """
     length = round(seconds / step) + 1
     items = tuple(cut_snippets(runs, seconds, step)) if any(len(run) >= length for run in runs) else ()
-    if by_block is None:
-        by_block = len({run.drive for run in runs}) < FEW_DRIVES
-    block = max(BLOCK, 2.0 * seconds)
-    groups = [f"{one.run.drive} {int(one.time[0] // block)}" if by_block else one.run.drive for one in items]
+    groups = _groups(runs, items, seconds, by_block)
     numbers = {id(run): number for number, run in enumerate(runs)}
     return Snippets(
         seconds,
@@ -98,3 +95,12 @@ def snippets_of(runs: Sequence[Run], seconds: float, step: float, *, by_block: b
         np.array(groups, dtype=np.str_),
         tuple((numbers[id(one.run)], one.rows) for one in items),
     )
+
+
+def _groups(runs: Sequence[Run], items: Sequence[Snippet], seconds: float, by_block: bool | None) -> list[str]:
+    """What each snippet is judged with: its drive, or a block of it."""
+    if by_block is None:
+        by_block = len({run.drive for run in runs}) < FEW_DRIVES
+    block = max(BLOCK, 2.0 * seconds)
+    groups = [f"{one.run.drive} {int(one.time[0] // block)}" if by_block else one.run.drive for one in items]
+    return groups

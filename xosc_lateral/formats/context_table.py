@@ -61,6 +61,36 @@ def read_context(path: Path) -> ContextTable:
         (`limits`), or no context column.
     """
     table, sha256 = read_table(path)
+    time = _time_of(table, path)
+    context = {}
+    for name in table.columns:
+        if name == "time":
+            continue
+        values = _values_of(table, name, time, path)
+        known = np.isfinite(values)
+        if known.any():
+            context[str(name)] = (time[known], values[known])
+    if not context:
+        raise FormatError("no column with values besides 'time'", path=path)
+    return ContextTable(context, sha256)
+
+
+def _values_of(table: pd.DataFrame, name: str, time: FloatArray, path: Path) -> FloatArray:
+    """A column's numbers, shape (n,) [own unit]; NaN: not stated."""
+    if table[name].dtype.kind not in "fiub":
+        raise FormatError(_no_number(table[name], time), path=path, element=f"column {str(name)!r}")
+    values = table[name].to_numpy(dtype=np.float64)
+    if (endless := np.flatnonzero(np.isinf(values))).size:
+        what = f"{values[endless[0]]} at {time[endless[0]]:g} s is not finite"
+        raise FormatError(what, path=path, element=f"column {str(name)!r}")
+    if (row := first_implausible(str(name), values)) is not None:
+        what = f"{implausible(str(name), float(values[row]))} at {time[row]:g} s"
+        raise FormatError(what, path=path, element=f"column {str(name)!r}")
+    return values
+
+
+def _time_of(table: pd.DataFrame, path: Path) -> FloatArray:
+    """Its times, shape (n,). [s]"""
     if "time" not in table:
         raise FormatError("no column 'time'", path=path)
     if table["time"].dtype.kind not in "fiu":
@@ -70,25 +100,7 @@ def read_context(path: Path) -> ContextTable:
         raise FormatError(TIME.refusal(float(np.abs(time[[0, -1]]).max())), path=path, element="column 'time'")
     if len(time) == 0 or not np.isfinite(time).all() or (np.diff(time) <= 0).any():
         raise FormatError("times have to increase from row to row", path=path, element="column 'time'")
-    context = {}
-    for name in table.columns:
-        if name == "time":
-            continue
-        if table[name].dtype.kind not in "fiub":
-            raise FormatError(_no_number(table[name], time), path=path, element=f"column {str(name)!r}")
-        values = table[name].to_numpy(dtype=np.float64)
-        if (endless := np.flatnonzero(np.isinf(values))).size:
-            what = f"{values[endless[0]]} at {time[endless[0]]:g} s is not finite"
-            raise FormatError(what, path=path, element=f"column {str(name)!r}")
-        if (row := first_implausible(str(name), values)) is not None:
-            what = f"{implausible(str(name), float(values[row]))} at {time[row]:g} s"
-            raise FormatError(what, path=path, element=f"column {str(name)!r}")
-        known = np.isfinite(values)
-        if known.any():
-            context[str(name)] = (time[known], values[known])
-    if not context:
-        raise FormatError("no column with values besides 'time'", path=path)
-    return ContextTable(context, sha256)
+    return time
 
 
 def _no_number(column: pd.Series, time: FloatArray) -> str:

@@ -50,17 +50,20 @@ def parse_map(words: Iterable[str]) -> dict[str, ColumnSource]:
     mapping: dict[str, ColumnSource] = {}
     for word in words:
         name, equals, rest = word.partition("=")
-        column, colon, unit = rest.rpartition(":")
         if not equals or not name or not rest:
             raise FormatError(f"--map {word!r}: expected NAME=COLUMN or NAME=COLUMN:UNIT")
-        if not colon:
-            mapping[name] = ColumnSource(rest)
-            continue
-        try:
-            mapping[name] = ColumnSource(column, factor(name, unit), unit)
-        except ValueError as error:
-            raise FormatError(f"--map {word!r}: {error}") from error
+        mapping[name] = _source(word, name, rest)
     return mapping
+
+
+def _source(word: str, name: str, rest: str) -> ColumnSource:
+    column, colon, unit = rest.rpartition(":")
+    if not colon:
+        return ColumnSource(rest)
+    try:
+        return ColumnSource(column, factor(name, unit), unit)
+    except ValueError as error:
+        raise FormatError(f"--map {word!r}: {error}") from error
 
 
 def read_drives(
@@ -113,14 +116,15 @@ def drives_of_table(
     columns = _numeric_columns(table, path)
     levels = frozenset(name for name, values in columns.items() if _may_hold_levels(name) and _holds_levels(values))
     _require_columns(columns, path)
-    if "drive" in table.columns:
-        names, first_rows = _drive_names(table, path)
-    else:
-        names, first_rows = [path.name.split(".")[0]], [np.arange(len(table))]
+    names, every = _drive_names(table, path)
     drives = [
         clean_drive(name, {key: values[rows] for key, values in columns.items()}, levels, path)
-        for name, rows in zip(names, first_rows, strict=True)
+        for name, rows in zip(names, every, strict=True)
     ]
+    return _with_rows(drives, path)
+
+
+def _with_rows(drives: Iterable[Drive | None], path: Path) -> list[Drive]:
     found = [drive for drive in drives if drive is not None]
     if not found:
         raise NotEnoughDataError(
@@ -165,17 +169,23 @@ def _numeric_columns(table: pd.DataFrame, path: Path) -> dict[str, FloatArray]:
         if name == "drive":
             continue
         if name in OWN or name == "speed" or types.is_numeric_dtype(table[name]) or types.is_bool_dtype(table[name]):
-            values = _as_numbers(table[name], path, name)
-            values[np.isinf(values) & ~nobody(name, values)] = np.nan
-            if name not in OWN:
-                _leave_out_nonsense(values, name, path)
-            if name in OWN or not np.isnan(values).all():
+            values = _cleaned(table, name, path)
+            if values is not None:
                 columns[name] = values
         elif (numbers := comma_numbers(table[name])) is not None:
             columns[name] = numbers.to_numpy(dtype=np.float64)
         else:
             columns |= indicators(name, table[name], table.get("drive"), MAX_LEVELS)
     return columns
+
+
+def _cleaned(table: pd.DataFrame, name: str, path: Path) -> FloatArray | None:
+    """A column of numbers without what is none; None where nothing is left of a context column."""
+    values = _as_numbers(table[name], path, name)
+    values[np.isinf(values) & ~nobody(name, values)] = np.nan
+    if name not in OWN:
+        _leave_out_nonsense(values, name, path)
+    return values if name in OWN or not np.isnan(values).all() else None
 
 
 def _leave_out_nonsense(values: FloatArray, name: str, path: Path) -> None:
@@ -235,6 +245,8 @@ def _require_columns(columns: Mapping[str, FloatArray], path: Path) -> None:
 
 
 def _drive_names(table: pd.DataFrame, path: Path) -> tuple[list[str], list[NDArray[np.intp]]]:
+    if "drive" not in table.columns:
+        return [path.name.split(".")[0]], [np.arange(len(table))]
     codes, names = table["drive"].factorize()
     if (codes < 0).any():
         raise FormatError("no value", path=path, line=int(np.argmax(codes < 0)) + 2, element="column 'drive'")

@@ -29,18 +29,22 @@ def parse_json(data: bytes, path: Path) -> Any:
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         raise FormatError(f"not JSON: {error}", path=path) from error
-    depth = deepest = 0
-    for bracket in _BRACKETS.finditer(_STRINGS.sub("", text)):
-        depth += 1 if bracket[0] in "[{" else -1
-        deepest = max(deepest, depth)
-    if deepest > JSON_DEPTH.value:
-        raise FormatError(JSON_DEPTH.refusal(deepest), path=path)
+    _check_depth(text, path)
     try:
         return json.loads(text, parse_constant=_refuse_constant)
     except json.JSONDecodeError as error:
         raise FormatError(f"not JSON: {error.msg}", path=path, line=error.lineno) from error
     except ValueError as error:
         raise FormatError(f"not JSON: {error}", path=path) from error
+
+
+def _check_depth(text: str, path: Path) -> None:
+    depth = deepest = 0
+    for bracket in _BRACKETS.finditer(_STRINGS.sub("", text)):
+        depth += 1 if bracket[0] in "[{" else -1
+        deepest = max(deepest, depth)
+    if deepest > JSON_DEPTH.value:
+        raise FormatError(JSON_DEPTH.refusal(deepest), path=path)
 
 
 def canonical_json(value: Any, indent: int = 0) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -53,23 +53,7 @@ def states_frame(motion: NominalMotion, network: RoadNetwork) -> pd.DataFrame:
 def _frame(motion: EntityMotion, network: RoadNetwork, number: int) -> pd.DataFrame:
     import pandas as pd
 
-    ids = np.array([*network.road_ids, ""], dtype=object)
-    frame = pd.DataFrame(
-        {
-            "time": motion.time,
-            "name": motion.name,
-            "x": motion.x,
-            "y": motion.y,
-            "z": motion.z,
-            "h": motion.heading,
-            "speed": motion.speed,
-            "road": ids[motion.road],
-            "lane": motion.lane,
-            "offset_t": _offset_t(motion, network),
-            "s": motion.s,
-            "entity": number,
-        }
-    )
+    frame = pd.DataFrame(_columns(motion, network) | {"entity": number})
     there: pd.DataFrame = frame.loc[(motion.activity & Activity.ACTIVE) != 0]
     return there
 
@@ -79,6 +63,24 @@ def _offset_t(motion: EntityMotion, network: RoadNetwork) -> NDArray[np.float64]
     offset_t = np.zeros(len(motion.time))
     offset_t[on_road] = network.travel_directions(motion.road[on_road], motion.lane[on_road]) * motion.offset[on_road]
     return offset_t
+
+
+def _columns(motion: EntityMotion, network: RoadNetwork) -> dict[str, Any]:
+    """By their names in the table, shape (n,) each."""
+    ids = np.array([*network.road_ids, ""], dtype=object)
+    return {
+        "time": motion.time,
+        "name": motion.name,
+        "x": motion.x,
+        "y": motion.y,
+        "z": motion.z,
+        "h": motion.heading,
+        "speed": motion.speed,
+        "road": ids[motion.road],
+        "lane": motion.lane,
+        "offset_t": _offset_t(motion, network),
+        "s": motion.s,
+    }
 
 
 def _rows(motion: EntityMotion, network: RoadNetwork) -> Iterator[str]:

@@ -1,4 +1,10 @@
-"""All candidates as whitened rows of length one, their scores, and what chance gives."""
+"""All candidates as whitened rows of length one, their scores, and what chance gives.
+
+References
+----------
+.. [1] C. R. Rao, "Large sample tests of statistical hypotheses concerning several parameters with applications to
+       problems of estimation", Proc. Cambridge Philosophical Society 44, 1948: scores, fitted under the null alone.
+"""
 
 from __future__ import annotations
 
@@ -74,13 +80,7 @@ class Quantities:
         """Evaluate all; those that never vary on valid seconds are left out."""
         kept, rows = [], []
         for candidate in candidates:
-            values = candidate.values(context)
-            seen = values[timeline.valid]
-            missing = np.isnan(values)
-            if missing.any():
-                there = seen[np.isfinite(seen)]
-                values = np.where(missing, there.mean() if len(there) else 0.0, values)
-            second = coarse_mean(values)
+            second = coarse_mean(_without_gaps(candidate.values(context), timeline.valid))
             deviation = float(second[valid].std())
             # beside all that it ever is: a product may be zero but for rounding wherever the car follows the road
             if deviation > 1e-9 * max(float(np.abs(second).max()), 1e-300):
@@ -125,6 +125,16 @@ class Dictionary:
         """An entry's effect with its lag and response."""
         effect = self.candidates[index].effect
         return structs.replace(effect, lag_s=float(self.lag[index]), response_s=float(self.response[index]))
+
+
+def _without_gaps(values: FloatArray, valid: BoolArray) -> FloatArray:
+    """What is unknown takes the mean of what is known and valid, shape (n,). [own unit]"""
+    missing = np.isnan(values)
+    if not missing.any():
+        return values
+    seen = values[valid]
+    there = seen[np.isfinite(seen)]
+    return np.where(missing, there.mean() if len(there) else 0.0, values)
 
 
 def build_dictionary(quantities: Quantities, whitener: Whitener) -> Dictionary:

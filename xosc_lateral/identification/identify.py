@@ -168,6 +168,17 @@ def _judged(
         {component: there[component] for component in sorted(looked_for)},
         lambda share: progress(0.3 + 0.3 * share, "selecting without a fold"),
     )
+    selection, nested, gains = _worst_first(selection, nested)
+    reason, total = "", nested.together([one.term for one in selection.accepted if one.term.predictable])
+    if any(one.term.predictable for one in selection.accepted) and not total.stands:
+        low, high = total.interval
+        reason = f"the effects found gain {total.mean:.2f} nat a held-out block ({low:.2f} to {high:.2f})"
+        selection = selection.without([one.term for one in selection.accepted], reason)
+    return selection, nested, gains, total, reason
+
+
+def _worst_first(selection: Selection, nested: Nested) -> tuple[Selection, Nested, dict[int, Gain]]:
+    """Less what loses, one by one, beginning with what loses most."""
     why = "significant, but chosen and estimated on other blocks it predicts the held-out ones worse than nothing"
     while True:
         # each beside those that are kept, and nothing else: a fold's misfit would be blamed on what is right
@@ -176,11 +187,5 @@ def _judged(
         judged = [one.term for one in selection.accepted if id(one.term) in gains]
         fallen = [term for term in judged if not gains[id(term)].stands]
         if not fallen:
-            break
+            return selection, nested, gains
         selection = selection.without([min(fallen, key=lambda term: gains[id(term)].mean)], why)
-    reason, total = "", nested.together([one.term for one in selection.accepted if one.term.predictable])
-    if any(one.term.predictable for one in selection.accepted) and not total.stands:
-        low, high = total.interval
-        reason = f"the effects found gain {total.mean:.2f} nat a held-out block ({low:.2f} to {high:.2f})"
-        selection = selection.without([one.term for one in selection.accepted], reason)
-    return selection, nested, gains, total, reason

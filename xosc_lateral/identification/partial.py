@@ -60,17 +60,23 @@ def curve_of(result: LoopResult, effect: ColumnEffect) -> Curve:
     where, own = _driving(result, effect)
     inside = result.coarse.valid & np.isfinite(where)
     blocks = coarse_middle(hold_out_blocks(result.statistics.timeline))
-    if effect.acts is Acts.LOCATION:
-        values = _alone(result, effect)
-    else:
-        squares = _squares(result, effect.acts)
-        values = squares / max(float(squares[inside].mean()), 1e-30)
+    values = _values(result, effect, inside)
     seen, mean, spread, fitted = _binned(where, values, own, blocks, inside)
     if effect.acts is not Acts.LOCATION:
         mean, spread = 0.5 * np.log(np.maximum(mean, 1e-9)), 0.5 * spread / np.maximum(mean, 1e-9)
     # where the curve is zero is a matter of taste, so the points are shifted onto it as a whole
     shift = float(np.mean(fitted - mean)) if len(mean) else 0.0
     return Curve(over, strength, error, seen, mean + shift, spread)
+
+
+def _values(result: LoopResult, effect: ColumnEffect, inside: BoolArray) -> FloatArray:
+    """What is measured of what the effect acts on, shape (n,): metres, or squares about 1."""
+    if effect.acts is Acts.LOCATION:
+        values = _alone(result, effect)
+    else:
+        squares = _squares(result, effect.acts)
+        values = squares / max(float(squares[inside].mean()), 1e-30)
+    return values
 
 
 def _fitted(result: LoopResult, effect: ColumnEffect) -> tuple[FloatArray, FloatArray, FloatArray]:

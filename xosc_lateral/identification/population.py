@@ -62,18 +62,26 @@ def test_population(fitted: Fitted, known: FloatArray) -> DriverVariance | None:
     """
     whitener = fitted.whitener
     offset = fitted.movement * whitener.scale + (fitted.levels - known)[whitener.drive]
-    means, spreads = [], []
-    for index in range(len(fitted.levels)):
-        own = offset[whitener.valid & (whitener.drive == index)]
-        if len(own) >= 2 * MIN_SECONDS:
-            halves = own[: len(own) // 2], own[len(own) // 2 :]
-            means.append([float(half.mean()) for half in halves])
-            spreads.append([float(np.log(max(half.std(), 1e-6))) for half in halves])
+    means, spreads = _halves(offset, whitener.valid, whitener.drive, len(fitted.levels))
     if len(means) < MIN_DRIVES:
         return None
     shift, p_shift = _scatter(np.asarray(means))
     log_spread, p_spread = _scatter(np.asarray(spreads))
     return DriverVariance(len(means), shift, log_spread, max(min(1.0, 2.0 * min(p_shift, p_spread)), LEAST))
+
+
+def _halves(
+    offset: FloatArray, valid: NDArray[np.bool_], drive: NDArray[np.intp], drives: int
+) -> tuple[list[list[float]], list[list[float]]]:
+    """Means [m] and logarithms of the spread of both halves of every drive that lasts."""
+    means, spreads = [], []
+    for index in range(drives):
+        own = offset[valid & (drive == index)]
+        if len(own) >= 2 * MIN_SECONDS:
+            halves = own[: len(own) // 2], own[len(own) // 2 :]
+            means.append([float(half.mean()) for half in halves])
+            spreads.append([float(np.log(max(half.std(), 1e-6))) for half in halves])
+    return means, spreads
 
 
 def _scatter(halves: FloatArray) -> tuple[float, float]:

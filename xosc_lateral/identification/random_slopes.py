@@ -24,8 +24,6 @@ LEVEL = 0.01
 
 def slope_deviation(fitted: Fitted, term: ModelTerm) -> float:
     """Standard deviation between drives of the only coefficient of a term of the mean; 0: none is seen. [m per unit]"""
-    from scipy.stats import chi2
-
     part = fitted.mean_part(term)
     coarse = fitted.coarse
     if part.stop - part.start != 1 or coarse.drives < MANY_DRIVES:
@@ -35,14 +33,20 @@ def slope_deviation(fitted: Fitted, term: ModelTerm) -> float:
     column = whitener.rows(fitted.columns[:, part])[:, 0]
     rows = whitener.rows(fitted.movement * fitted.scale)
     rows = rows / max(float(np.sqrt(np.mean(rows[coarse.valid] ** 2))), 1e-300)
-    power = np.bincount(coarse.drive, column**2, minlength=coarse.drives)
+    power = np.asarray(np.bincount(coarse.drive, column**2, minlength=coarse.drives), dtype=np.float64)
     told = power > 1e-3 * float(power.mean())
     if told.sum() < MANY_DRIVES:
         return 0.0
-    weight = power[told]
-    off = np.bincount(coarse.drive, column * rows, minlength=coarse.drives)[told] / weight
+    off = np.bincount(coarse.drive, column * rows, minlength=coarse.drives)[told] / power[told]
+    return _beyond_chance(power[told], off)
+
+
+def _beyond_chance(weight: FloatArray, off: FloatArray) -> float:
+    """Standard deviation between drives of slopes, shape (k,), known with precisions `weight`; 0: within chance."""
+    from scipy.stats import chi2
+
     off = off - float(weight @ off) / float(weight.sum())
-    scatter, freedom = float(weight @ off**2), int(told.sum()) - 1
+    scatter, freedom = float(weight @ off**2), len(off) - 1
     if chi2.sf(scatter, freedom) > LEVEL:
         return 0.0
     spread = (scatter - freedom) / (weight.sum() - float(weight @ weight) / weight.sum())

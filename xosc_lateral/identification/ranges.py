@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -30,7 +32,12 @@ def driving_range(coarse: Coarse, effect: ColumnEffect) -> tuple[FloatArray, Flo
     if quantity.shape[1] == 1:
         low, high = _ends(quantity[:, 0])
         return np.array([low]), np.array([high])
-    order = np.argsort(quantity @ np.asarray(effect.coefficients))
+    return _by_strength(quantity, effect.coefficients)
+
+
+def _by_strength(quantity: FloatArray, coefficients: Sequence[float]) -> tuple[FloatArray, FloatArray]:
+    """Rows of the weak and of the strong end, shape (k,) each. [own unit]"""
+    order = np.argsort(quantity @ np.asarray(coefficients))
     return quantity[order[int(0.05 * len(order))]], quantity[order[min(len(order) - 1, int(0.95 * len(order)))]]
 
 

@@ -66,12 +66,18 @@ def fine_squares(fitted: Fitted) -> Squares:
     process = fit_autoregression(moved, valid, FINE_ORDER)
     innovations, responses = moving_sum(process.polynomial, moved), moving_sum(process.polynomial, responses)
     settled = moving_sum(np.ones(process.order + 1), valid.astype(np.float64)) > process.order + 0.5
-    power = float(responses[settled] @ responses[settled])
-    seen = float(np.clip(responses[settled] @ innovations[settled] / power, 0.0, 1.0)) if power > 0.0 else 0.0
-    innovations = innovations - seen * responses
+    innovations = _without_responses(innovations, responses, settled)
     squares = coarse_mean(np.where(settled, np.square(innovations), 0.0))
     whole = coarse_all(settled)
     return Squares(squares / own_levels(squares, whole, coarse.drive)[coarse.drive], whole)
+
+
+def _without_responses(innovations: FloatArray, responses: FloatArray, settled: BoolArray) -> FloatArray:
+    """Innovations less responses, shape (n,) each, as far as these are seen in them. [m]"""
+    power = float(responses[settled] @ responses[settled])
+    seen = float(np.clip(responses[settled] @ innovations[settled] / power, 0.0, 1.0)) if power > 0.0 else 0.0
+    innovations = innovations - seen * responses
+    return innovations
 
 
 def slow_squares(fitted: Fitted) -> Squares:

@@ -19,7 +19,7 @@ from xosc_lateral.road.network import RoadNetwork
 from xosc_lateral.scenario import BoundingBox
 from xosc_lateral.scenario.actions.environment import EnvironmentAction
 from xosc_lateral.scenario.enums import VehicleCategory
-from xosc_lateral.scenario.environment import Environment
+from xosc_lateral.scenario.environment import Environment, Weather
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -152,19 +152,28 @@ def _neighbours(motion: NominalMotion, network: RoadNetwork, index: int, grid: I
             continue
         seen = _see(other, network, grid, groups)
         gap = _free_space(seen, own.entity.bounding_box, other.entity.bounding_box)
-        same_way = ~seen.oncoming
-        where = {
-            "lead": same_way & (seen.lanes_left == 0) & (seen.ahead > 0),
-            "left": same_way & (seen.lanes_left == 1),
-            "right": same_way & (seen.lanes_left == -1),
-            "oncoming": seen.oncoming & (seen.ahead > 0),
-        }
-        for side, there in where.items():
+        for side, there in _sides(seen).items():
             with np.errstate(invalid="ignore"):
                 closer = there & (gap <= REACH) & ~(nearest[side] <= gap)
             nearest[side][closer] = gap[closer]
             if side in truck:
                 truck[side][closer] = float(other.entity.vehicle_category in TRUCKS)
+    return _as_columns(nearest, truck)
+
+
+def _sides(seen: _Others) -> dict[str, NDArray[np.bool_]]:
+    """Rows in which the other one is ahead, beside or comes towards us, shape (n,) each."""
+    same_way = ~seen.oncoming
+    return {
+        "lead": same_way & (seen.lanes_left == 0) & (seen.ahead > 0),
+        "left": same_way & (seen.lanes_left == 1),
+        "right": same_way & (seen.lanes_left == -1),
+        "oncoming": seen.oncoming & (seen.ahead > 0),
+    }
+
+
+def _as_columns(nearest: Mapping[str, FloatArray], truck: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
+    """Distances [m] and kinds of what is nearest on every side, shape (n,) each, by the names of context columns."""
     context = {f"{side}_distance": distance for side, distance in nearest.items()}
     context |= {f"{side}_is_truck": flag for side, flag in truck.items()}
     for side in ("left", "right"):
@@ -224,9 +233,7 @@ def _see(
     seen = _Others(np.full(n, np.nan), np.full(n, np.nan), np.zeros(n, dtype=bool))
     road, lane, s = other.road[grid], other.lane[grid], other.s[grid]
     present = ((other.activity[grid] & Activity.ACTIVE) != 0) & (road >= 0) & (lane != 0)
-    direction = np.zeros(n, dtype=np.int64)
-    direction[present] = network.travel_directions(road[present], lane[present])
-    direction = np.where(np.cos(other.heading_relative[grid]) < 0.0, -direction, direction)
+    direction = _travel(other, network, grid, present)
     for members, own_u, path in groups:
         for part in path:
             on = present[members] & (road[members] == part.road)
@@ -242,6 +249,15 @@ def _see(
             seen.lanes_left[k] = part.sign * (_rank(lane[k]) - _rank(np.int64(part.lane)))
             seen.oncoming[k] = direction[k] != part.sign
     return seen
+
+
+def _travel(other: EntityMotion, network: RoadNetwork, grid: IntArray, present: NDArray[np.bool_]) -> NDArray[np.int64]:
+    """Which way the other one drives along s, +1 or -1, shape (n,); 0 where it is on no lane."""
+    road, lane = other.road[grid], other.lane[grid]
+    direction = np.zeros(len(grid), dtype=np.int64)
+    direction[present] = network.travel_directions(road[present], lane[present])
+    direction = np.where(np.cos(other.heading_relative[grid]) < 0.0, -direction, direction)
+    return np.asarray(direction)
 
 
 def _rank(lane: NDArray[np.integer] | np.integer) -> IntArray:
@@ -282,8 +298,12 @@ def _stated(environment: Environment, time: FloatArray, start: float, heading: F
     if environment.friction_scale_factor is not None:
         values["friction"] = environment.friction_scale_factor * one
     weather = environment.weather
-    if weather is None:
-        return values
+    return values if weather is None else values | _stated_weather(weather, one, heading)
+
+
+def _stated_weather(weather: Weather, one: FloatArray, heading: FloatArray) -> dict[str, FloatArray]:
+    """Light, rain and wind, shape (n,) each."""
+    values: dict[str, FloatArray] = {}
     if weather.illuminance is not None:
         values["illuminance"] = weather.illuminance * one
     if weather.precipitation_type == "dry":

@@ -122,12 +122,20 @@ def row_kinds(motion: EntityMotion, network: RoadNetwork, *, is_trailer: bool = 
 
     Shape (n,). [-]
     """
+    kinds = np.zeros(len(motion.time), dtype=np.int64)
+    for kind, applies in reversed(_reasons(motion, network, is_trailer).items()):
+        kinds[applies] = _KINDS.index(kind)
+    return kinds
+
+
+def _reasons(motion: EntityMotion, network: RoadNetwork, is_trailer: bool) -> dict[SegmentKind, NDArray[np.bool_]]:
+    """Where each kind applies, shape (n,) each, by the enum's order."""
     entity, activity = motion.entity, motion.activity
     n = len(motion.time)
     on_road = (motion.road >= 0) & ((activity & Activity.OFF_ROAD) == 0)
     in_driving_lane = np.zeros(n, dtype=bool)
     in_driving_lane[on_road] = network.lane_index(motion.road[on_road], motion.lane[on_road], motion.s[on_road])[0] >= 0
-    reasons = {
+    return {
         SegmentKind.ABSENT: (activity & Activity.ACTIVE) == 0,
         SegmentKind.NOT_A_VEHICLE: np.full(n, not entity.is_vehicle),
         SegmentKind.TRAILER: np.full(n, is_trailer),
@@ -139,7 +147,3 @@ def row_kinds(motion: EntityMotion, network: RoadNetwork, *, is_trailer: bool = 
         SegmentKind.SLOW: motion.speed < MINIMUM_SPEED * (1.0 - _SPEED_SLACK),
         SegmentKind.ROAD_END: (activity & Activity.ROAD_END) != 0,
     }
-    kinds = np.zeros(n, dtype=np.int64)
-    for kind, applies in reversed(reasons.items()):
-        kinds[applies] = _KINDS.index(kind)
-    return kinds

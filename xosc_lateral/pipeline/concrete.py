@@ -48,21 +48,28 @@ def concrete(request: Request, kind: DocumentKind) -> Iterator[Concrete]:
         yield Concrete(request.scenario, "", request.settings)
         return
     try:
-        logical = read_distribution(request.scenario, allowed=request.settings.allowed)
-        sets = list(islice(logical.parameter_sets(request.settings.seed), int(PARAMETER_SETS.value) + 1))
-        if len(sets) > PARAMETER_SETS.value:
-            raise FormatError(f"{PARAMETER_SETS.refusal(logical.count)}", path=request.scenario)
-        if not sets:
-            raise FormatError("no set of parameters satisfies the scenario's constraints", path=request.scenario)
-        found = [_one(request, logical.scenario_file, index, values) for index, values in enumerate(sets)]
+        scenario_file, sets = _sets(request)
+        found = [_one(request, scenario_file, index, values) for index, values in enumerate(sets)]
     except (XoscLateralError, OSError) as error:
-        yield Concrete(request.scenario, "", request.settings, " ".join(str(error).split()))
-        return
+        found = [_refused(request, str(error))]
     except Exception as error:  # a bug of ours in one file must not cost the others; the row says that it is one
-        what = f"{request.scenario}: internal error: {type(error).__name__}: {error}"
-        yield Concrete(request.scenario, "", request.settings, " ".join(what.split()))
-        return
+        found = [_refused(request, f"{request.scenario}: internal error: {type(error).__name__}: {error}")]
     yield from found
+
+
+def _refused(request: Request, why: str) -> Concrete:
+    return Concrete(request.scenario, "", request.settings, " ".join(why.split()))
+
+
+def _sets(request: Request) -> tuple[Path, list[ParameterSet]]:
+    """The logical scenario's file, and every set of its parameters."""
+    logical = read_distribution(request.scenario, allowed=request.settings.allowed)
+    sets = list(islice(logical.parameter_sets(request.settings.seed), int(PARAMETER_SETS.value) + 1))
+    if len(sets) > PARAMETER_SETS.value:
+        raise FormatError(f"{PARAMETER_SETS.refusal(logical.count)}", path=request.scenario)
+    if not sets:
+        raise FormatError("no set of parameters satisfies the scenario's constraints", path=request.scenario)
+    return logical.scenario_file, sets
 
 
 def _one(request: Request, scenario: Path, index: int, values: ParameterSet) -> Concrete:

@@ -67,10 +67,7 @@ class Job:
 
     def row(self, error: str = "") -> ManifestRow:
         """Its row as far as it is known before the conversion."""
-        try:
-            scenario_sha256 = file_hash(self.source)
-        except (OSError, FormatError):
-            scenario_sha256 = ""
+        scenario_sha256 = self._scenario_hash()
         return ManifestRow(
             output=self.name,
             scenario=self.scenario,
@@ -85,6 +82,14 @@ class Job:
             player=self.settings.target.player.value,
             error=error,
         )
+
+    def _scenario_hash(self) -> str:
+        """Of its file; empty where that can't be read."""
+        try:
+            scenario_sha256 = file_hash(self.source)
+        except (OSError, FormatError):
+            scenario_sha256 = ""
+        return scenario_sha256
 
 
 @dataclass(frozen=True, slots=True)

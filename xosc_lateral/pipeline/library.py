@@ -156,10 +156,7 @@ def _evaluation(half: DriverProfile, others: Sequence[Run]) -> dict[str, Any]:
 # ---- single vehicles -------------------------------------------------------------------------------------------------
 def _single_profiles(seen: Seen, kind: Mapping[str, str], known: Provenance, model: str) -> list[DriverProfile]:
     """Vehicles with long drives whose movement differs most from one another."""
-    by_vehicle: dict[str, list[Run]] = {}
-    for run in seen.driven:
-        by_vehicle.setdefault(run.drive, []).append(run)
-    long = {name: mine for name, mine in by_vehicle.items() if sum(map(len, mine)) * STEP >= LONG_DRIVE}
+    long = _long_drives(seen)
     whole = {name: fit_runs(mine, name=name, model=model) for name, mine in long.items()}
     long = {name: mine for name, mine in long.items() if _describes(whole[name], mine)}
     chosen = most_different({name: snippets_of(mine, SNIPPET, STEP).offset for name, mine in long.items()})
@@ -168,14 +165,7 @@ def _single_profiles(seen: Seen, kind: Mapping[str, str], known: Provenance, mod
     distance = driver_distances(early, [sliding_snippets(parts[name][1]) for name in chosen], SEED)
     profiles = []
     for k, name in enumerate(chosen):
-        others = np.delete(distance[k], k)
-        nearer = int((distance[k, k] < others).sum())
-        evaluation: dict[str, Any] = {
-            "held_out": f"last {100 * (1 - FITTED_SHARE):.0f} % of the drive, not fitted",
-            "own_distance": round(float(distance[k, k]), 4),
-            "distances_to_others": [round(float(value), 4) for value in others],
-            "told_apart": f"nearer to its own held-out part than to those of {nearer} of {len(others)} others",
-        }
+        evaluation = _own_distance(distance[k], k)
         label = f"motorway-vehicle-{k + 1}"
         notes = f"One {kind[name]}, {_place_and_spread(long[name])}."
         provenance = replace(
@@ -184,6 +174,27 @@ def _single_profiles(seen: Seen, kind: Mapping[str, str], known: Provenance, mod
         fitted = fit_runs(long[name], name=label, model=model, provenance=provenance)
         profiles.append(replace(fitted, sensor=seen.sensor))
     return profiles
+
+
+def _long_drives(seen: Seen) -> dict[str, list[Run]]:
+    """Runs of each vehicle that was seen for long."""
+    by_vehicle: dict[str, list[Run]] = {}
+    for run in seen.driven:
+        by_vehicle.setdefault(run.drive, []).append(run)
+    long = {name: mine for name, mine in by_vehicle.items() if sum(map(len, mine)) * STEP >= LONG_DRIVE}
+    return long
+
+
+def _own_distance(distance: NDArray[np.float64], k: int) -> dict[str, Any]:
+    """How near a profile, fitted to the early part, is to its own late part, and to the others'."""
+    others = np.delete(distance, k)
+    nearer = int((distance[k] < others).sum())
+    return {
+        "held_out": f"last {100 * (1 - FITTED_SHARE):.0f} % of the drive, not fitted",
+        "own_distance": round(float(distance[k]), 4),
+        "distances_to_others": [round(float(value), 4) for value in others],
+        "told_apart": f"nearer to its own held-out part than to those of {nearer} of {len(others)} others",
+    }
 
 
 def _describes(profile: DriverProfile, runs: Sequence[Run]) -> bool:

@@ -144,9 +144,8 @@ class ManifestRow:
         row = msgspec.convert(named, cls)
         if any(isinstance(value, int) and abs(value) > _LARGEST for value in named.values()):
             raise ValueError("a number has more than 64 bits")
-        json.dumps(
-            row.to_dict(), ensure_ascii=False, allow_nan=False
-        ).encode()  # no text or number that can't be written
+        # no text or number that can't be written
+        json.dumps(row.to_dict(), ensure_ascii=False, allow_nan=False).encode()
         return row
 
 

@@ -116,16 +116,22 @@ def _table_requests(
     for number, row in enumerate(table.to_dict("records"), start=2):
         cells = {str(name): text for name, value in row.items() if (text := str(value).strip())}
         try:
-            scenario = cells.pop("scenario", "")
-            if not scenario:
-                raise ValueError("no scenario")
-            if "\0" in scenario:
-                raise ValueError(f"scenario {scenario!r}: a path holds no zero byte")
+            scenario = _scenario(cells)
             rows_variants = _whole_number(cells, "variants", variants, smallest=1)
             row_settings = _row_settings(cells, settings, folder)
         except ValueError as error:
             raise FormatError(str(error), path=path, line=number) from error
         yield Request(folder / scenario, row_settings, rows_variants, base)
+
+
+def _scenario(cells: dict[str, str]) -> str:
+    """A row's, taken out of its cells."""
+    scenario = cells.pop("scenario", "")
+    if not scenario:
+        raise ValueError("no scenario")
+    if "\0" in scenario:
+        raise ValueError(f"scenario {scenario!r}: a path holds no zero byte")
+    return scenario
 
 
 def is_single(given: str | Path) -> bool:

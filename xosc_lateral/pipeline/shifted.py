@@ -21,18 +21,22 @@ def shifted_events(before: NominalMotion, after: NominalMotion) -> list[str]:
     now = _starts(after.actions)
     found: dict[str, str] = {}
     for key, start in _starts(before.actions).items():
-        path, actor, _ = key
-        name = path[-2] if len(path) > 1 else path[-1]
-        whose = "" if actor is None else f" of '{actor}'"
+        name, what = _named(key, start)
         if key not in now:
-            found.setdefault(name, f"event '{name}'{whose} at {start:.2f} s no longer happens with the offsets")
+            found.setdefault(name, f"{what} no longer happens with the offsets")
         elif abs(now[key] - start) > MOST:
             moved = now[key] - start
             sense = "later" if moved > 0 else "earlier"
-            found.setdefault(
-                name, f"event '{name}'{whose} at {start:.2f} s happens {abs(moved):.2f} s {sense} with the offsets"
-            )
+            found.setdefault(name, f"{what} happens {abs(moved):.2f} s {sense} with the offsets")
     return list(found.values())
+
+
+def _named(key: Key, start: float) -> tuple[str, str]:
+    """An event's name, and the event in words."""
+    path, actor, _ = key
+    name = path[-2] if len(path) > 1 else path[-1]
+    whose = "" if actor is None else f" of '{actor}'"
+    return name, f"event '{name}'{whose} at {start:.2f} s"
 
 
 def _starts(actions: Sequence[PlayedAction]) -> dict[Key, float]:

@@ -79,16 +79,7 @@ class _Player:
     def play(self, time_limit: float) -> NominalMotion:
         """Run to the end."""
         simulation = self.simulation
-        for state in simulation.entities:
-            state.begin_frame()
-        for element in self.init:
-            element.start()
-        self.root.start()
-        if simulation.derives_motion:
-            for state in simulation.entities:
-                _derive_motion(state, 0.0, height=simulation.derives_height)
-        going = self._frame(0.0)
-        self._write(0.0)
+        going = self._begin()
         last = time_limit - 0.5 * self.step_size
         while going and simulation.time < last:
             for state in simulation.entities:
@@ -100,6 +91,20 @@ class _Player:
         if going:
             simulation.note(f"still runs at the time limit of {time_limit:g} s", simulation.scenario.storyboard.place)
         return self._result(ended_by)
+
+    def _begin(self) -> bool:
+        """The moment in which everything starts; whether there is another."""
+        for state in self.simulation.entities:
+            state.begin_frame()
+        for element in self.init:
+            element.start()
+        self.root.start()
+        if self.simulation.derives_motion:
+            for state in self.simulation.entities:
+                _derive_motion(state, 0.0, height=self.simulation.derives_height)
+        going = self._frame(0.0)
+        self._write(0.0)
+        return going
 
     # ---- one frame ---------------------------------------------------------------------------------------------------
     def _frame(self, step: float) -> bool:
@@ -170,16 +175,20 @@ class _Player:
         for state in self.simulation.entities:
             if state.tow is not None or state.name in placed:
                 continue
-            if state.name not in present:
-                state.active = False
-                self.simulation.note(
-                    f"'{state.name}' has no init actions: it is not there until it is added", state.entity.place
-                )
-            else:
-                self.simulation.note(
-                    f"'{state.name}' has no initial position: it stands at the world's origin", state.entity.place
-                )
-                state.put_in_world(state.pose)
+            self._note_unplaced(state, state.name in present)
+
+    def _note_unplaced(self, state: EntityState, is_present: bool) -> None:
+        """Absent without init actions; at the origin without a position in them."""
+        if not is_present:
+            state.active = False
+            self.simulation.note(
+                f"'{state.name}' has no init actions: it is not there until it is added", state.entity.place
+            )
+        else:
+            self.simulation.note(
+                f"'{state.name}' has no initial position: it stands at the world's origin", state.entity.place
+            )
+            state.put_in_world(state.pose)
 
     def _write(self, time: float) -> None:
         self.times.append(time)

@@ -107,14 +107,9 @@ class Rows:
         offset *= direction
         if len(looked_up):
             _look_up(network, looked_up, free[road[free_rows] == _UNKNOWN], road, lane, s, offset, direction)
-        on_road = road >= 0
-        pose = np.zeros((len(road), 6))
-        if on_road.any():
-            pose[on_road] = np.column_stack(
-                network.lane_to_world(road[on_road], lane[on_road], s[on_road], offset[on_road])
-            )
         to_lane = along - np.where(direction > 0, 0.0, pi)
-        _turn(pose, to_lane, on_road)
+        on_road = road >= 0
+        pose = _poses(network, road, lane, s, offset, to_lane)
         _lay_over(pose, free_rows, free)
         to_lane[looked_up] = pose[looked_up, 3] - _lane_heading(network, road, lane, s, offset, looked_up)
         self._check_jumps(time, pose, activity)
@@ -138,6 +133,21 @@ class Rows:
             heading_relative=(to_lane + pi) % (2.0 * pi) - pi,
             activity=activity,
         )
+
+
+def _poses(
+    network: RoadNetwork, road: IntArray, lane: IntArray, s: FloatArray, offset: FloatArray, to_lane: FloatArray
+) -> FloatArray:
+    """World poses of the rows that are on a road, shape (n, 6), turned by `to_lane` [rad] against their lanes."""
+    on_road = road >= 0
+    pose = np.zeros((len(road), 6))
+    if on_road.any():
+        pose[on_road] = np.column_stack(
+            network.lane_to_world(road[on_road], lane[on_road], s[on_road], offset[on_road])
+        )
+    _turn(pose, to_lane, on_road)
+
+    return pose
 
 
 def _look_up(
@@ -203,14 +213,22 @@ def _beside_road(
     beside = ~on_road
     if not on_road.any():
         return beside
-    suspects = np.flatnonzero(on_road)
-    half = 0.5 * network.lane_width(road[suspects], lane[suspects], s[suspects])
-    suspects = suspects[np.abs(offset[suspects]) > half + _TOUCH]
+    suspects = _suspects(network, road, lane, s, offset, on_road)
     if len(suspects):
         types = {lane.type for r in network.roads for section in r.sections for lane in section.lanes} - {NO_LANE}
         found = network.world_to_lane(pose[suspects, 0], pose[suspects, 1], lane_types=types)
         beside[suspects] = ~(found.distance <= _TOUCH)
     return beside
+
+
+def _suspects(
+    network: RoadNetwork, road: IntArray, lane: IntArray, s: FloatArray, offset: FloatArray, on_road: NDArray[np.bool_]
+) -> NDArray[np.int64]:
+    """Rows that lie beyond their own lane."""
+    suspects = np.flatnonzero(on_road)
+    half = 0.5 * network.lane_width(road[suspects], lane[suspects], s[suspects])
+    suspects = suspects[np.abs(offset[suspects]) > half + _TOUCH]
+    return suspects
 
 
 _TOUCH = 1e-3

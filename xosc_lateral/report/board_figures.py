@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from xosc_lateral.report.figures import INK, MEASURED, MUTED, PALETTE, SAMPLED, figure_style, new_figure, new_panels
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
     from xosc_lateral.board.result import Board
@@ -67,16 +69,22 @@ def windows_figure(board: Board) -> Figure:
         if number >= len(shown):
             axis.set_axis_off()
             continue
-        title, paths = shown[number]
-        axis.plot(time, paths.T, color=MEASURED if number == 0 else SAMPLED, linewidth=1.0)
-        axis.set_title(title, fontsize=8.5)
-        if reach > 0.0:
-            axis.set_ylim(-reach, reach)
+        _draw_window(axis, *shown[number], time, reach, MEASURED if number == 0 else SAMPLED)
     for axis in axes[-1]:
         axis.set_xlabel("time [s]")
     for axis in axes[:, 0]:
         axis.set_ylabel("offset [m]")
     return figure
+
+
+def _draw_window(
+    axis: Axes, title: str, paths: NDArray[np.float64], time: NDArray[np.floating[Any]], reach: float, color: str
+) -> None:
+    """Paths of one model, shape (k, n), as far as `reach` to either side. [m]"""
+    axis.plot(time, paths.T, color=color, linewidth=1.0)
+    axis.set_title(title, fontsize=8.5)
+    if reach > 0.0:
+        axis.set_ylim(-reach, reach)
 
 
 @figure_style()

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from xosc_lateral.version import __version__
 
 if TYPE_CHECKING:
-    from xosc_lateral.board.result import Board, Row
+    from xosc_lateral.board.result import Board, ModelScore, Row
     from xosc_lateral.evaluation.variance import VarianceParts
 from xosc_lateral.report.board import method_text
 
@@ -20,20 +20,24 @@ def board_record(board: Board, inputs: Mapping[str, str]) -> dict[str, Any]:
         "seed": board.seed,
         "inputs": dict(inputs),
         "method": method_text(board),
-        "data": {
-            "drives": board.vehicles,
-            "runs": board.runs,
-            "hours": round(board.hours, 4),
-            "windows": dict(board.windows),
-            "unit": board.unit,
-            "variance_m2": _variance(board.real_variance),
-        },
+        "data": _data_record(board),
         "kendall_tau_between_halves": _short(board.tau),
         "pairs_told_apart": board.pairs_apart,
         "pairs_that_both_halves_agree_on": board.pairs_agreeing,
         "resamples": board.resamples,
         "models": [_row_record(row) for row in board.rows],
         "absent": dict(board.absent),
+    }
+
+
+def _data_record(board: Board) -> dict[str, Any]:
+    return {
+        "drives": board.vehicles,
+        "runs": board.runs,
+        "hours": round(board.hours, 4),
+        "windows": dict(board.windows),
+        "unit": board.unit,
+        "variance_m2": _variance(board.real_variance),
     }
 
 
@@ -51,15 +55,16 @@ def _row_record(row: Row) -> dict[str, Any]:
         "score_interval": [_short(row.low), _short(row.high)],
         "score_by_half": [_short(value) for value in row.scores_by_half],
         "variance_m2": _variance(row.variance),
-        "numbers": {
-            number.name: {
-                "value": _short(number.value),
-                "floor": _short(number.floor),
-                "unit": number.unit,
-                "ranked": number.ranked,
-            }
-            for number in row.numbers
-        },
+        "numbers": {number.name: _number_record(number) for number in row.numbers},
+    }
+
+
+def _number_record(number: ModelScore) -> dict[str, Any]:
+    return {
+        "value": _short(number.value),
+        "floor": _short(number.floor),
+        "unit": number.unit,
+        "ranked": number.ranked,
     }
 
 

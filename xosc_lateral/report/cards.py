@@ -63,17 +63,18 @@ def _entry_record(entry: Entry) -> dict[str, Any]:
         "problem": entry.problem,
         "hidden_by": None if entry.hidden_by is None else str(entry.hidden_by),
     }
-    if entry.profile is None:
-        return place
-    known = entry.profile.provenance
-    metadata = facts_of(entry.profile)
-    return place | {
-        "metadata": {name: metadata[name] for name in FIELDS} | {"tags": list(entry.profile.metadata.tags)},
-        "sha256": profile_hash(entry.profile),
-        "model": entry.profile.model.kind,
+    return place if entry.profile is None else place | _profile_record(entry.profile)
+
+
+def _profile_record(profile: DriverProfile) -> dict[str, Any]:
+    known, metadata = profile.provenance, facts_of(profile)
+    return {
+        "metadata": {name: metadata[name] for name in FIELDS} | {"tags": list(profile.metadata.tags)},
+        "sha256": profile_hash(profile),
+        "model": profile.model.kind,
         "hours": known.hours,
         "drives": known.drives,
-        "effects": len(entry.profile.effects),
+        "effects": len(profile.effects),
         "notes": known.notes,
         "source": known.source,
     }
@@ -155,14 +156,7 @@ def _evaluation_items(evaluation: Mapping[str, Any]) -> list[tuple[str, str]]:
     items = []
     short = evaluation.get("snippets")
     if short:
-        items.append(
-            (
-                "held out",
-                f"{evaluation.get('held_out', '')}: distance {short['mean_distance']:.3f}, floor "
-                f"{short['mean_floor']:.3f}, ratio {short['mean_ratio']:.2f}, worst {short['worst_metric']} "
-                f"{short['worst_ratio']:.2f}",
-            )
-        )
+        items.append(("held out", f"{evaluation.get('held_out', '')}: {_scores(short)}"))
     if evaluation.get("spectrum_error_db") is not None:
         difference = f"{evaluation['spectrum_error_db']:.1f} dB"
         items.append(
@@ -171,6 +165,13 @@ def _evaluation_items(evaluation: Mapping[str, Any]) -> list[tuple[str, str]]:
     if evaluation.get("told_apart"):
         items.append(("own driver", str(evaluation["told_apart"])))
     return items
+
+
+def _scores(short: Mapping[str, Any]) -> str:
+    return (
+        f"distance {short['mean_distance']:.3f}, floor {short['mean_floor']:.3f}, ratio {short['mean_ratio']:.2f}, "
+        f"worst {short['worst_metric']} {short['worst_ratio']:.2f}"
+    )
 
 
 def _summary_lines(profile: DriverProfile, summary: MovementSummary) -> list[str]:

@@ -20,6 +20,7 @@ from xosc_lateral.report.figures import PALETTE, figure_style, new_figure
 from xosc_lateral.report.render import render_page
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 FloatArray = NDArray[np.float64]
@@ -89,15 +90,7 @@ def compare(profiles: Sequence[DriverProfile], seed: int) -> Compared:
         for profile, own in zip(profiles, runs, strict=True)
     ]
     pooled = [np.concatenate(own) for own in snippets]
-    scale = np.concatenate(pooled).std(axis=0)
-    scale = np.where(scale > 0.0, scale, 1.0)
-    count = len(profiles)
-    metrics = np.empty((count, count, len(METRICS)))
-    for one in range(count):
-        halves = np.concatenate(snippets[one][::2]), np.concatenate(snippets[one][1::2])
-        metrics[one, one] = _gaps(*halves) / scale
-        for other in range(one):
-            metrics[one, other] = metrics[other, one] = _gaps(pooled[one], pooled[other]) / scale
+    metrics = _gap_matrix(pooled, snippets)
     return Compared(
         tuple(profiles),
         tuple(summarise(own, profile.model.step) for profile, own in zip(profiles, runs, strict=True)),
@@ -106,6 +99,20 @@ def compare(profiles: Sequence[DriverProfile], seed: int) -> Compared:
         metrics,
         seed,
     )
+
+
+def _gap_matrix(pooled: Sequence[FloatArray], snippets: Sequence[Sequence[FloatArray]]) -> FloatArray:
+    """Gaps of all metrics in standard deviations, shape (k, k, metrics); the diagonal is between halves. [-]"""
+    scale = np.concatenate(pooled).std(axis=0)
+    scale = np.where(scale > 0.0, scale, 1.0)
+    count = len(pooled)
+    metrics = np.empty((count, count, len(METRICS)))
+    for one in range(count):
+        halves = np.concatenate(snippets[one][::2]), np.concatenate(snippets[one][1::2])
+        metrics[one, one] = _gaps(*halves) / scale
+        for other in range(one):
+            metrics[one, other] = metrics[other, one] = _gaps(pooled[one], pooled[other]) / scale
+    return metrics
 
 
 def _gaps(one: FloatArray, other: FloatArray) -> FloatArray:
@@ -156,16 +163,7 @@ def _effect(values: dict[str, Any]) -> str:
 def comparison_record(compared: Compared) -> dict[str, Any]:
     """The same as plain values."""
     return {
-        "profiles": [
-            {
-                "id": profile.name,
-                "sha256": profile_hash(profile),
-                "model": profile.model.kind,
-                "summary": {key: round(value, 4) for key, value in asdict(one).items()},
-                "effects": [_effect(values) for values in profile.to_dict()["effects"]],
-            }
-            for profile, one in zip(compared.profiles, compared.summaries, strict=True)
-        ],
+        "profiles": [_profile_record(*both) for both in zip(compared.profiles, compared.summaries, strict=True)],
         "distance": [[round(float(value), 4) for value in row] for row in compared.distance],
         "metrics": {
             name: [[round(float(value), 4) for value in row] for row in compared.metrics[:, :, k]]
@@ -174,6 +172,16 @@ def comparison_record(compared: Compared) -> dict[str, Any]:
         "floor": round(compared.floor, 4),
         "alike": [list(group) for group in compared.groups],
         "seed": compared.seed,
+    }
+
+
+def _profile_record(profile: DriverProfile, summary: MovementSummary) -> dict[str, Any]:
+    return {
+        "id": profile.name,
+        "sha256": profile_hash(profile),
+        "model": profile.model.kind,
+        "summary": {key: round(value, 4) for key, value in asdict(summary).items()},
+        "effects": [_effect(values) for values in profile.to_dict()["effects"]],
     }
 
 
@@ -194,11 +202,15 @@ def comparison_figure(compared: Compared) -> Figure:
         paths.plot(
             step * np.arange(len(runs[0][rows])), runs[0][rows] + SPACING * (len(shown) - number), dashes, color=color
         )
+    _label(figure, place, power, paths)
+    return figure
+
+
+def _label(figure: Figure, place: Axes, power: Axes, paths: Axes) -> None:
     place.set(xlabel="offset [m], positive to the left", ylabel="density [1/m]", title="Distribution")
     power.set(xlabel="frequency [Hz]", ylabel="power density [m²/Hz]", title="Spectrum")
     paths.set(xlabel="time [s]", title=f"Sample paths, {SPACING:g} m apart", yticks=[])
     figure.legend(*place.get_legend_handles_labels(), loc="outside lower center", ncols=4)
-    return figure
 
 
 @figure_style()

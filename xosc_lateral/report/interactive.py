@@ -49,17 +49,22 @@ def describe_axes(figure: Figure, key: str, color: Callable[[str], str]) -> dict
     return {"axes": [_axes(axes, number, key, color) for number, axes in drawn]}
 
 
+def _box(axes: Axes, width: float, height: float) -> list[float]:
+    """Left, top, right and bottom of a panel, from the figure's upper left. [pt]"""
+    place = axes.get_position()
+    return [
+        round(place.x0 * width, 2),
+        round((1.0 - place.y1) * height, 2),
+        round(place.x1 * width, 2),
+        round((1.0 - place.y0) * height, 2),
+    ]
+
+
 def _axes(axes: Axes, number: int, key: str, color: Callable[[str], str]) -> dict[str, Any]:
     width, height = (POINTS_PER_INCH * part for part in axes.figure.get_size_inches())  # type: ignore[union-attr]
-    place = axes.get_position()
     return {
         "id": f"{key}-a{number}",
-        "box": [
-            round(place.x0 * width, 2),
-            round((1.0 - place.y1) * height, 2),
-            round(place.x1 * width, 2),
-            round((1.0 - place.y0) * height, 2),
-        ],
+        "box": _box(axes, width, height),
         **_axis(axes, "x"),
         **_axis(axes, "y"),
         "lines": [

@@ -13,6 +13,7 @@ from xosc_lateral.identification.close import LoopResult
 from xosc_lateral.identification.findings import Finding
 from xosc_lateral.identification.lack_of_fit import GroupError, LackOfFit, lack_of_fit_of
 from xosc_lateral.identification.scorecard import SNIPPET_ROWS
+from xosc_lateral.identification.selection import Rejected
 from xosc_lateral.report.loop_words import (
     CERTAIN,
     COMPONENT_WORDS,
@@ -76,13 +77,7 @@ def loop_page(result: LoopResult, lack_of_fit: LackOfFit, tables: Sequence[Path]
     return render_page(
         "loop.html",
         title=f"Closed loop: {_title(result.names)}",
-        provenance={
-            "base profile": f"{result.base.name} {profile_hash(result.base)[:12]}",
-            "refined profile": f"{result.refined.name} {profile_hash(result.refined)[:12]}",
-            "held out": result.held_out,
-            "seed": result.seed,
-            **{name: value[:16] for name, value in parsed_hashes(tables).items()},
-        },
+        provenance=_provenance(result, tables),
         result=result,
         outcome=outcome(result),
         certain=CERTAIN,
@@ -100,17 +95,28 @@ def loop_page(result: LoopResult, lack_of_fit: LackOfFit, tables: Sequence[Path]
         n_groups=len(lack_of_fit.groups),
         n_runs=len(result.runs_after),
         feedback_rows=[{"column": item.column, "reason": feedback_words(item)} for item in result.feedback],
-        rejected_rows=[
-            {
-                "component": COMPONENT_WORDS.get(item.component, item.component),
-                "strongest candidate": ", ".join(item.columns) or None,
-                "p-value": item.p_value,
-                "reason": item.why,
-            }
-            for item in result.rejected
-        ],
+        rejected_rows=[_rejected_row(item) for item in result.rejected],
         **_movement(result),
     )
+
+
+def _provenance(result: LoopResult, tables: Sequence[Path]) -> dict[str, Any]:
+    return {
+        "base profile": f"{result.base.name} {profile_hash(result.base)[:12]}",
+        "refined profile": f"{result.refined.name} {profile_hash(result.refined)[:12]}",
+        "held out": result.held_out,
+        "seed": result.seed,
+        **{name: value[:16] for name, value in parsed_hashes(tables).items()},
+    }
+
+
+def _rejected_row(item: Rejected) -> dict[str, Any]:
+    return {
+        "component": COMPONENT_WORDS.get(item.component, item.component),
+        "strongest candidate": ", ".join(item.columns) or None,
+        "p-value": item.p_value,
+        "reason": item.why,
+    }
 
 
 def _title(names: Sequence[str]) -> str:

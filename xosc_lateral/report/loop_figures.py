@@ -15,7 +15,8 @@ from xosc_lateral.identification.blocks import hold_out_blocks
 from xosc_lateral.identification.close import LoopResult
 from xosc_lateral.identification.findings import Finding
 from xosc_lateral.identification.lack_of_fit import LackOfFit
-from xosc_lateral.identification.partial import curve_of
+from xosc_lateral.identification.partial import Curve, curve_of
+from xosc_lateral.identification.scorecard import Scorecard
 from xosc_lateral.mask import true_slices
 from xosc_lateral.report.figures import BLUE, GRID, MUTED, VERMILLION, figure_style, new_figure, new_panels
 from xosc_lateral.report.loop_words import SPREAD, column_label, product_label
@@ -53,15 +54,7 @@ def residual_figure(result: LoopResult, lack_of_fit: LackOfFit, what: str) -> Fi
     rows = -(-len(names) // PANELS)
     figure, axes = new_panels(rows, PANELS, panel_height=0.95, between=0.55, sharey=True)
     for axis, name in zip(axes.ravel(), names, strict=False):
-        group = f"{what} by {name}"
-        place = np.arange(len(result.real[group]))
-        floor = 100.0 * TWO_ERRORS * lack_of_fit.floors[group]
-        axis.fill_between(place, -floor, floor, color=MUTED, alpha=0.2, linewidth=0, label="sampling error")
-        axis.axhline(0.0, color=MUTED, linewidth=0.6)
-        for values, color, label in ((result.before, BEFORE, "before"), (result.after, AFTER, "after")):
-            axis.plot(place, 100.0 * (result.real[group] - values[group]), "o-", color=color, markersize=3, label=label)
-        _name_bins(axis, result.statistics.middles[name], name)
-        axis.set_title(column_label(name, hint=False))
+        _draw_residual(axis, result, lack_of_fit, what, name)
     for axis in axes.ravel()[len(names) :]:
         axis.set_visible(False)
     low, high = axes[0, 0].get_ylim()
@@ -72,6 +65,19 @@ def residual_figure(result: LoopResult, lack_of_fit: LackOfFit, what: str) -> Fi
     return figure
 
 
+def _draw_residual(axis: Axes, result: LoopResult, lack_of_fit: LackOfFit, what: str, name: str) -> None:
+    """One column's fifths, over what chance gives."""
+    group = f"{what} by {name}"
+    place = np.arange(len(result.real[group]))
+    floor = 100.0 * TWO_ERRORS * lack_of_fit.floors[group]
+    axis.fill_between(place, -floor, floor, color=MUTED, alpha=0.2, linewidth=0, label="sampling error")
+    axis.axhline(0.0, color=MUTED, linewidth=0.6)
+    for values, color, label in ((result.before, BEFORE, "before"), (result.after, AFTER, "after")):
+        axis.plot(place, 100.0 * (result.real[group] - values[group]), "o-", color=color, markersize=3, label=label)
+    _name_bins(axis, result.statistics.middles[name], name)
+    axis.set_title(column_label(name, hint=False))
+
+
 @figure_style()
 def effect_figure(result: LoopResult, finding: Finding) -> Figure:
     """An effect's curve with its uncertainty over measured points, beside what held-out blocks show."""
@@ -79,7 +85,12 @@ def effect_figure(result: LoopResult, finding: Finding) -> Figure:
     assert isinstance(effect, ColumnEffect)
     figure, axes = new_figure(1, 2, height=3.3)
     _draw_curve(axes[0, 0], result, effect)
-    axis = axes[0, 1]
+    _draw_held_out(axes[0, 1], result, finding, effect)
+    return figure
+
+
+def _draw_held_out(axis: Axes, result: LoopResult, finding: Finding, effect: ColumnEffect) -> None:
+    """The statistics that show an effect best, on blocks that it was not fitted on."""
     name = finding.statistic.split(" by ", 1)[1]
     bins = _in_unit(effect, result.statistics.middles[name])
     for values, color, label in (
@@ -93,7 +104,6 @@ def effect_figure(result: LoopResult, finding: Finding) -> Figure:
     axis.set_xlabel("shift by the effect [m]" if on_mean else "factor by the effect [-]")
     axis.set_ylabel("mean offset [m]" if on_mean else f"{SPREAD} [m]")
     axis.legend()
-    return figure
 
 
 @figure_style()
@@ -115,11 +125,7 @@ def draw_spectra(axis: Axes, result: LoopResult, segment: int, *, within_blocks:
     together = timeline.valid & np.r_[True, seams[1:] == seams[:-1]]
     segment = min(segment, max(part.stop - part.start for part in true_slices(together)))  # runs may all be shorter
     frequency, density, number = gapped_spectrum(timeline.offset[None], timeline.valid, seams, timeline.step, segment)
-    # the mean of so many independent periodograms, which overlap by half
-    about = TWO_ERRORS / np.sqrt(max(0.75 * number, 1.0))
-    low, high = density * np.exp(-about), density * np.exp(about)
-    axis.fill_between(frequency, low, high, color=DRIVES, alpha=0.2, linewidth=0)
-    axis.plot(frequency, density, color=DRIVES, label="measured (band: two standard errors)")
+    _draw_measured(axis, frequency, density, number)
     for runs, color, label, style in (
         (result.runs_before, BEFORE, "profile before", "-"),
         (result.runs_after, AFTER, "profile after", "--"),
@@ -130,31 +136,45 @@ def draw_spectra(axis: Axes, result: LoopResult, segment: int, *, within_blocks:
     axis.set_ylabel("power density [m²/Hz]")
 
 
+def _draw_measured(axis: Axes, frequency: FloatArray, density: FloatArray, number: float) -> None:
+    """With what so many periodograms leave open."""
+    # the mean of so many independent periodograms, which overlap by half
+    about = TWO_ERRORS / np.sqrt(max(0.75 * number, 1.0))
+    low, high = density * np.exp(-about), density * np.exp(about)
+    axis.fill_between(frequency, low, high, color=DRIVES, alpha=0.2, linewidth=0)
+    axis.plot(frequency, density, color=DRIVES, label="measured (band: two standard errors)")
+
+
 @figure_style()
 def violins_figure(result: LoopResult) -> Figure:
     """The ten metrics: measured to the left, the profile after to the right, the profile before as an outline."""
     scores = result.scores
     figure, axes = new_figure(2, 5, height=5.2)
     for k, (axis, name) in enumerate(zip(axes.ravel(), METRICS, strict=True)):
-        for values, side, color, filled in (
-            (scores.real[:, k], -1.0, DRIVES, True),
-            (scores.sampled_after[:, k], 1.0, AFTER, True),
-            (scores.sampled_before[:, k], 1.0, BEFORE, False),
-        ):
-            grid, density = density_over(values)
-            width = side * 0.95 * density / density.max()
-            if filled:
-                axis.fill_betweenx(grid, 0.0, width, color=color, alpha=0.35, linewidth=0)
-            axis.plot(width, grid, color=color, linewidth=0.9, linestyle="-" if filled else "--")
-            axis.plot([0.0, 0.8 * side], [values.mean()] * 2, color=color, linewidth=1.6 if filled else 1.0)
-        axis.axvline(0.0, color=GRID, linewidth=0.8)
+        _draw_violins(axis, scores, k)
         axis.set_title(LABELS[name])
-        axis.set_xticks([-0.5, 0.5], ["measured", "profile"], fontsize=8.0)
-        axis.set_xlim(-1.15, 1.15)
         axis.grid(False, axis="x")
     for axis in axes[:, 0]:
         axis.set_ylabel("[m]")
     return figure
+
+
+def _draw_violins(axis: Axes, scores: Scorecard, k: int) -> None:
+    """One metric: measured, after and before."""
+    for values, side, color, filled in (
+        (scores.real[:, k], -1.0, DRIVES, True),
+        (scores.sampled_after[:, k], 1.0, AFTER, True),
+        (scores.sampled_before[:, k], 1.0, BEFORE, False),
+    ):
+        grid, density = density_over(values)
+        width = side * 0.95 * density / density.max()
+        if filled:
+            axis.fill_betweenx(grid, 0.0, width, color=color, alpha=0.35, linewidth=0)
+        axis.plot(width, grid, color=color, linewidth=0.9, linestyle="-" if filled else "--")
+        axis.plot([0.0, 0.8 * side], [values.mean()] * 2, color=color, linewidth=1.6 if filled else 1.0)
+    axis.axvline(0.0, color=GRID, linewidth=0.8)
+    axis.set_xticks([-0.5, 0.5], ["measured", "profile"], fontsize=8.0)
+    axis.set_xlim(-1.15, 1.15)
 
 
 def _draw_curve(axis: Axes, result: LoopResult, effect: ColumnEffect) -> None:
@@ -165,18 +185,22 @@ def _draw_curve(axis: Axes, result: LoopResult, effect: ColumnEffect) -> None:
     axis.fill_between(curve.over, low, high, color=AFTER, alpha=0.2, linewidth=0, label="two standard errors")
     axis.plot(curve.over, middle, color=AFTER, label="fitted effect")
     if len(curve.seen):
-        points, bottom, top = (
-            _in_unit(effect, curve.measured + share * curve.measured_error) for share in (0.0, -TWO_ERRORS, TWO_ERRORS)
-        )
-        axis.errorbar(
-            curve.seen, points, np.stack([points - bottom, top - points]),
-            color=DRIVES, fmt="o", markersize=3.5, elinewidth=1.0, label="measured",
-        )  # fmt: skip
+        _draw_points(axis, curve, effect)
     axis.set_title("The effect")
     axis.set_xlabel(_quantity_label(effect))
     axis.set_ylabel("shift of the mean [m], positive to the left" if effect.acts is Acts.LOCATION else "factor [-]")
     axis.locator_params(axis="x", nbins=6)
     axis.legend()
+
+
+def _draw_points(axis: Axes, curve: Curve, effect: ColumnEffect) -> None:
+    points, bottom, top = (
+        _in_unit(effect, curve.measured + share * curve.measured_error) for share in (0.0, -TWO_ERRORS, TWO_ERRORS)
+    )
+    axis.errorbar(
+        curve.seen, points, np.stack([points - bottom, top - points]),
+        color=DRIVES, fmt="o", markersize=3.5, elinewidth=1.0, label="measured",
+    )  # fmt: skip
 
 
 def _in_unit(effect: ColumnEffect, strength: FloatArray) -> FloatArray:

@@ -13,6 +13,7 @@ from xosc_lateral.formats.hashes import parsed_hashes
 from xosc_lateral.formats.json_text import canonical_json
 from xosc_lateral.formats.profiles import profile_hash
 from xosc_lateral.identification.close import LoopResult
+from xosc_lateral.identification.feedback import Feedback
 from xosc_lateral.identification.findings import Finding
 from xosc_lateral.identification.lack_of_fit import LackOfFit
 from xosc_lateral.identification.nested import Gain
@@ -34,23 +35,13 @@ def loop_json(result: LoopResult, lack_of_fit: LackOfFit, tables: Sequence[Path]
 def loop_record(result: LoopResult, lack_of_fit: LackOfFit, tables: Sequence[Path]) -> dict[str, Any]:
     """The same as plain values."""
     error = {"before": result.error_before, "after": result.error_after, "floor": result.floor}
-    scores = result.scores
     return {
         "drives": list(result.names),
         "base_profile": _profile(result.base) | {"given": result.given},
         "refined_profile": _profile(result.refined),
         "held_out": result.held_out,
         "findings": [finding_record(finding) | {"meaning": meaning(finding, result)} for finding in result.findings],
-        "consequences": [
-            {
-                "column": item.column,
-                "why": feedback_words(item),
-                "doubtful": item.doubtful,
-                "coherence": item.coherence,
-                "foretold": item.predicted_share,
-            }
-            for item in result.feedback
-        ],
+        "consequences": [_feedback(item) for item in result.feedback],
         "rejected": [
             {"columns": list(item.columns), "look": item.component, "p_value": item.p_value, "why": item.why}
             for item in result.rejected
@@ -59,28 +50,40 @@ def loop_record(result: LoopResult, lack_of_fit: LackOfFit, tables: Sequence[Pat
         "error": {"measure": MEASURE, **error},
         "held_out_gain": _gain(result.gain),
         "returned_base": result.returned_base or None,
-        "unexplained": {
-            "measure": "root of error after squared minus floor squared, m",
-            "size_m": lack_of_fit.unexplained,
-            "p_value": lack_of_fit.p_value,
-            "clear": lack_of_fit.clear,
-            "where": [group.name for group in lack_of_fit.where] if lack_of_fit.clear else [],
-            "sentence": lack_of_fit_words(result, lack_of_fit),
-        },
+        "unexplained": _unexplained(result, lack_of_fit),
         "residual": [
             {"group": group.name, "before": group.before, "after": group.after, "floor": group.floor}
             for group in lack_of_fit.groups
         ],
-        "metrics": {
-            "before": _metrics(scores.before),
-            "after": _metrics(scores.after),
-            "floor": _metrics(scores.floor),
-        },
-        "provenance": {
-            "package_version": __version__,
-            "seed": result.seed,
-            "inputs": parsed_hashes(tables),
-        },
+        "metrics": {when: _metrics(getattr(result.scores, when)) for when in ("before", "after", "floor")},
+        "provenance": {"package_version": __version__, "seed": result.seed, "inputs": parsed_hashes(tables)},
+    }
+
+
+def _interval(finding: Finding) -> list[float]:
+    """Of its size, 95 %. [m], or a factor"""
+    about = NORMAL_95 * finding.size_error
+    return [finding.size_m - about, finding.size_m + about]
+
+
+def _feedback(item: Feedback) -> dict[str, Any]:
+    return {
+        "column": item.column,
+        "why": feedback_words(item),
+        "doubtful": item.doubtful,
+        "coherence": item.coherence,
+        "foretold": item.predicted_share,
+    }
+
+
+def _unexplained(result: LoopResult, lack_of_fit: LackOfFit) -> dict[str, Any]:
+    return {
+        "measure": "root of error after squared minus floor squared, m",
+        "size_m": lack_of_fit.unexplained,
+        "p_value": lack_of_fit.p_value,
+        "clear": lack_of_fit.clear,
+        "where": [group.name for group in lack_of_fit.where] if lack_of_fit.clear else [],
+        "sentence": lack_of_fit_words(result, lack_of_fit),
     }
 
 
@@ -100,7 +103,7 @@ def finding_record(finding: Finding) -> dict[str, Any]:
         "error_after": finding.error_after,
         "measure": f"{finding.measure}, m",
         "alike": list(finding.alike),
-        "interval": [finding.size_m - NORMAL_95 * finding.size_error, finding.size_m + NORMAL_95 * finding.size_error],
+        "interval": _interval(finding),
         "held_out_gain": _gain(finding.gain),
         "added": [effect.to_dict() for effect in finding.effects],
     }

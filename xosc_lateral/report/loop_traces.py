@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from xosc_lateral.identification.blocks import hold_out_blocks
 from xosc_lateral.identification.close import LoopResult
+from xosc_lateral.identification.timeline import Timeline
 from xosc_lateral.report.figures import GRID, figure_style, new_panels
 from xosc_lateral.report.loop_figures import AFTER, BEFORE, DRIVES
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 SHOWN_DRIVES, SHOWN_S = 3, 120.0
@@ -35,16 +39,23 @@ def traces_figure(result: LoopResult) -> Figure:
     )
     figure, axes = new_panels(len(parts), len(columns), panel_height=0.75, sharex=True, sharey=True)
     for row, rows in zip(axes, parts, strict=True):
-        name = timeline.names[timeline.drive[rows.start]]
-        for axis, (label, offset, color) in zip(row, columns, strict=True):
-            axis.plot(timeline.time[rows] - timeline.time[rows.start], offset[rows], color=color, label=label)
-            axis.axhline(0.0, color=GRID, linewidth=0.8)
-            axis.set_title(f"{name}, {label}")
+        _draw_part(row, timeline, rows, columns)
     axes[0, 0].yaxis.set_major_locator(MultipleLocator(TICK_M))
     axes[len(parts) // 2, 0].set_ylabel("offset [m]")
     for axis in axes[-1]:
         axis.set_xlabel("time [s]")
     return figure
+
+
+def _draw_part(
+    row: Sequence[Axes], timeline: Timeline, rows: slice, columns: Sequence[tuple[str, NDArray[np.float64], str]]
+) -> None:
+    """One stretch: measured, before and after beside each other."""
+    name = timeline.names[timeline.drive[rows.start]]
+    for axis, (label, offset, color) in zip(row, columns, strict=True):
+        axis.plot(timeline.time[rows] - timeline.time[rows.start], offset[rows], color=color, label=label)
+        axis.axhline(0.0, color=GRID, linewidth=0.8)
+        axis.set_title(f"{name}, {label}")
 
 
 def longest_parts(result: LoopResult) -> list[slice]:

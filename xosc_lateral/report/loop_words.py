@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from types import MappingProxyType
 
 import numpy as np
+from numpy.typing import NDArray
 
 from xosc_lateral.driver.effects import Acts, Angular, ColumnEffect, Levels, Magnitude, Product
 from xosc_lateral.identification.close import LoopResult
@@ -177,15 +178,20 @@ def lack_of_fit_words(result: LoopResult, lack_of_fit: LackOfFit) -> str:
             "The remaining residual is not significant: the error after is above the floor, but in "
             f"{100 * lack_of_fit.p_value:.0f}{GAP}% of random splits the two halves of these drives differ as much."
         )
-    where = ", ".join(
-        f"{group_words(group.name, result)} ({_mm(group.after)}, floor {_mm(group.floor)})"
-        for group in most(lack_of_fit)
-    )
-    most_of_it = f" It stands out in: {where}." if where else ""
+    most_of_it = _where(result, lack_of_fit)
     return (
         f"Unexplained residual of {_mm(lack_of_fit.unexplained)}: the error after ({_mm(result.error_after)}) lies "
         f"clearly above the floor ({_mm(result.floor)}), and no effect was found that explains the rest.{most_of_it}"
     )
+
+
+def _where(result: LoopResult, lack_of_fit: LackOfFit) -> str:
+    """Which groups it stands out in, or nothing."""
+    where = ", ".join(
+        f"{group_words(group.name, result)} ({_mm(group.after)}, floor {_mm(group.floor)})"
+        for group in most(lack_of_fit)
+    )
+    return f" It stands out in: {where}." if where else ""
 
 
 def most(lack_of_fit: LackOfFit, number: int = 4) -> tuple[GroupError, ...]:
@@ -235,7 +241,11 @@ def _between(effect: ColumnEffect, result: LoopResult) -> str:
     column = effect.columns[0]
     if isinstance(effect, Angular):
         return f"From the `{column}` of the weakest to that of the strongest effect (the middle 90 % of the time)"
-    seen = coarse.context[column][inside]
+    return _over_values(effect, column, coarse.context[column][inside])
+
+
+def _over_values(effect: ColumnEffect, column: str, seen: NDArray[np.float64]) -> str:
+    """From where to where a column of these values goes."""
     seen = seen[np.isfinite(seen)]
     name = f"`{column}`"
     if isinstance(effect, Magnitude):

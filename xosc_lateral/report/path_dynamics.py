@@ -41,13 +41,19 @@ def lateral_dynamics(motion: EntityMotion, path: WorldTrajectory) -> LateralDyna
     time, x, y = path.time[::every], path.x[::every], path.y[::every]
     if len(time) < 3:
         return LateralDynamics(time, np.full(len(time), np.nan), np.full(len(time), np.nan))
-    velocity = np.gradient(x, time) + 1j * np.gradient(y, time)
-    acceleration = np.gradient(velocity, time)
-    direction = np.exp(1j * path.heading[::every])
-    across = np.imag(acceleration * np.conj(direction))
+    across = _across(time, x, y, path.heading[::every])
     across[_near_breaks(motion, every)] = np.nan
     across[[0, -1]] = np.nan  # differences are one-sided there: half of what they should be
     return LateralDynamics(time, across, np.gradient(across, time))
+
+
+def _across(time: FloatArray, x: FloatArray, y: FloatArray, heading: FloatArray) -> FloatArray:
+    """Acceleration to the left of the heading, shape (n,). [m/s2]"""
+    velocity = np.gradient(x, time) + 1j * np.gradient(y, time)
+    acceleration = np.gradient(velocity, time)
+    direction = np.exp(1j * heading)
+    across = np.imag(acceleration * np.conj(direction))
+    return np.asarray(across)
 
 
 def _near_breaks(motion: EntityMotion, every: int) -> NDArray[np.bool_]:

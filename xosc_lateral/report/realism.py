@@ -101,18 +101,25 @@ def realism_lines(realism: Realism) -> list[str]:
             lines.append(f"    {label!s:44s}" + "".join(f"{cell!s:>18s}" for cell in cells))
     if all(one.alone is None for one in realism.conditions):
         lines.append("    classifier AUC: not computed")
-    shown = next((one for one in realism.conditions if not one.condition.same_start), None)
-    if shown is not None:
-        lines.append(f"lane keeping, {shown.condition.name:24s} measured    sampled   distance  floor [sd]")
-        for row in indicator_rows(shown):
-            label, real, sampled, distance, floor = row.values()
-            lines.append(f"  {label!s:40s}{real:8.4f}  {sampled:9.4f}  {distance:9.3f}  {floor:6.3f}")
+    lines += _indicator_lines(realism)
     real, made = realism.variance_real, realism.variance_sampled
     lines.append(
         f"variance between drivers, within drivers, inside snippets [m²]: "
         f"measured {real.between:.4f}, {real.within:.4f}, {real.inside:.4f}; "
         f"sampled {made.between:.4f}, {made.within:.4f}, {made.inside:.4f}"
     )
+    return lines
+
+
+def _indicator_lines(realism: Realism) -> list[str]:
+    """Lane keeping in free driving, a line each."""
+    lines = []
+    shown = next((one for one in realism.conditions if not one.condition.same_start), None)
+    if shown is not None:
+        lines.append(f"lane keeping, {shown.condition.name:24s} measured    sampled   distance  floor [sd]")
+        for row in indicator_rows(shown):
+            label, real, sampled, distance, floor = row.values()
+            lines.append(f"  {label!s:40s}{real:8.4f}  {sampled:9.4f}  {distance:9.3f}  {floor:6.3f}")
     return lines
 
 

@@ -13,6 +13,7 @@ from xosc_lateral.enrich.result import Enriched, EntityResult
 from xosc_lateral.motion.gaps import REACH, Gap
 from xosc_lateral.motion.nominal import Note
 from xosc_lateral.report import scenario_figures as figures
+from xosc_lateral.report import scenario_time_figures as over_time
 from xosc_lateral.report.path_dynamics import COMFORTABLE
 from xosc_lateral.report.player.scene import enriched_scene
 from xosc_lateral.report.render import KeyFigure, Tone, render_page
@@ -84,8 +85,8 @@ def scenario_page(
         stretched=figures.paths_stretched(enriched),
         above=figures.paths_from_above(enriched),
         others=[{"entity": entity.name, "reason": entity.why} for entity in others],
-        speeds=figures.speeds_over_time(enriched),
-        timeline=figures.timeline(enriched),
+        speeds=over_time.speeds_over_time(enriched),
+        timeline=over_time.timeline(enriched),
         segment_rows=_segment_rows(enriched),
         notes=_note_rows(enriched.motion.notes),
         comfortable=COMFORTABLE,
@@ -100,8 +101,8 @@ def _enriched_entities(enriched: Enriched, done: Sequence[EntityResult]) -> dict
     if not done:
         return {}
     return {
-        "offsets": figures.offsets_over_time(enriched, _largest(done, MOST_PANELS)),
-        "dynamics": figures.dynamics_over_time(_largest(done, MOST_DYNAMICS)),
+        "offsets": over_time.offsets_over_time(enriched, _largest(done, MOST_PANELS)),
+        "dynamics": over_time.dynamics_over_time(_largest(done, MOST_DYNAMICS)),
         "entity_rows": [_entity_row(entity) for entity in done],
         "entity_formats": {"time [s]": ".1f", f"> {COMFORTABLE} m/s² [%]": ".1f"},
         "most_panels": MOST_PANELS,
@@ -116,19 +117,22 @@ def _gaps(enriched: Enriched) -> dict[str, Any]:
     pairs.sort(key=lambda pair: min(gap.distance for gap in pair if gap is not None))
     if not pairs:
         return {"pairs": pairs}
-    touching = {gap.names for gap in enriched.new_contacts}
-    tones: dict[int, Tone] = {
-        number: "bad" for number, pair in enumerate(pairs) if any(gap and gap.names in touching for gap in pair)
-    }
+    tones = _tones(enriched, pairs)
     return {
         "pairs": pairs,
         "shown_pairs": MOST_PAIRS,
-        "gaps": figures.gaps_before_and_after(pairs[:MOST_PAIRS]),
+        "gaps": over_time.gaps_before_and_after(pairs[:MOST_PAIRS]),
         "gap_rows": [_gap_row(*pair) for pair in pairs],
         "gap_formats": dict.fromkeys(("nominal [m]", "enriched [m]", "change [m]"), ".2f")
         | dict.fromkeys(GAP_TIMES, ".1f"),
         "gap_tones": tones,
     }
+
+
+def _tones(enriched: Enriched, pairs: Sequence[tuple[Gap | None, Gap | None]]) -> dict[int, Tone]:
+    """Rows of pairs that touch only since they were enriched."""
+    touching = {gap.names for gap in enriched.new_contacts}
+    return {number: "bad" for number, pair in enumerate(pairs) if any(gap and gap.names in touching for gap in pair)}
 
 
 def _key_figures(enriched: Enriched) -> list[KeyFigure]:

@@ -38,7 +38,7 @@ class HeaderOffset:
     def apply(
         self, x: FloatArray, y: FloatArray, z: FloatArray, heading: FloatArray
     ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-        """Inertial x, y, z [m] and heading in [0, 2 pi) [rad] of places in the coordinates of the file.
+        """Inertial x, y, z [m] and heading from 0 to 2 pi [rad] of places in the coordinates of the file.
 
         Shape (n,) each.
         """

@@ -151,8 +151,12 @@ class Links:
         for _, other, contact in self._direct_connections(here, link, direction):
             yield other, 1 if contact == "start" else -1
         # Files list a connection from the road that drives into it only; on the way back it is found by its own links.
+        yield from self._links_back(here, link.element_id, direction)
+
+    def _links_back(self, here: Road, element: str, direction: int) -> Iterator[End]:
+        """Roads of a junction that lead to this one by their own links."""
         for other, there in enumerate(self.roads):
-            if there.junction != link.element_id:
+            if there.junction != element:
                 continue
             for back, entry in ((there.predecessor, 1), (there.successor, -1)):
                 touches = "end" if direction > 0 else "start"

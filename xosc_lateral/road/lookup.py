@@ -48,6 +48,10 @@ class Lookup:
                 return first
             found = np.searchsorted(self.starts[first + 1 : last + 1], s, side="right")
             return np.asarray(found + first, dtype=np.int32)
+        return self._of_many(owner, s)
+
+    def _of_many(self, owner: IntArray, s: FloatArray) -> IntArray:
+        """The same for an owner per point, shape of both."""
         # s beyond an owner's ends must not reach its neighbours on the axis
         key = np.minimum(np.maximum(s, self._begin[owner]), self._reach[owner]) + self._shift[owner]
         piece = np.searchsorted(self._keys, key, side="right").astype(np.int32) - 1

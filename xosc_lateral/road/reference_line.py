@@ -89,7 +89,11 @@ class ReferenceLines:
         count = int(np.count_nonzero(is_cubic))
         if count in (0, len(s)):
             return (self._cubic_frame if count else self._clothoid_frame)(row, ds, derivatives)
-        frame = Frame(*(np.empty(len(s)) for _ in Frame._fields))
+        return self._mixed(row, ds, is_cubic, derivatives)
+
+    def _mixed(self, row: IntArray, ds: FloatArray, is_cubic: NDArray[np.bool_], derivatives: bool) -> Frame:
+        """Rows of either kind, evaluated apart."""
+        frame = Frame(*(np.empty(len(ds)) for _ in Frame._fields))
         for evaluate, where in (
             (self._cubic_frame, np.flatnonzero(is_cubic)),
             (self._clothoid_frame, np.flatnonzero(~is_cubic)),

@@ -7,13 +7,14 @@ References
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.errors import PlaybackError
+from xosc_lateral.road.lanes import Lane, LaneSection
 from xosc_lateral.road.positions import FloatArray, IntArray
 from xosc_lateral.road.tables import NetworkTables
 
@@ -62,6 +63,10 @@ class Samples:
         self._x0, self._y0 = float(self.x.min()) - CELL, float(self.y.min()) - CELL
         column, line = self._cell(self.x, self.y)
         self._lines = int(line.max()) + 2
+        self._file(column, line)
+
+    def _file(self, column: NDArray[np.int64], line: NDArray[np.int64]) -> None:
+        """Which samples lie in each cell and in those around it."""
         keys, samples = [], []
         for across in (-1, 0, 1):
             for along in (-1, 0, 1):
@@ -156,15 +161,23 @@ def _road_samples(
         lanes = [lane for lane in section.lanes if lane_types is None or lane.type in lane_types]
         if not lanes or section.end <= section.start:
             continue
-        n = int(np.ceil((section.end - section.start) / SPACING)) + 1
-        s = np.linspace(section.start, section.end, n)
-        inside = np.minimum(s, np.nextafter(section.end, -np.inf))
-        left = tables.lane_profile(index, lanes[0].id, inside)
-        right = tables.lane_profile(index, lanes[-1].id, inside)
-        top, bottom = left.centre + 0.5 * left.width, right.centre - 0.5 * right.width
-        m = int(np.ceil(max(float((top - bottom).max()), 0.0) / SPACING)) + 1
-        t = bottom + (top - bottom) * (np.linspace(0.0, 1.0, m)[:, None] if m > 1 else 0.5)
-        t = np.broadcast_to(t, (m, n))
-        poses = tables.road_to_world(index, np.broadcast_to(s, (m, n)), t)
-        parts.append((index, np.tile(s, m), poses.x.ravel(), poses.y.ravel()))
+        s, t = _grid(tables, index, section, lanes)
+        poses = tables.road_to_world(index, s, t)
+        parts.append((index, s.ravel(), poses.x.ravel(), poses.y.ravel()))
     return parts
+
+
+def _grid(
+    tables: NetworkTables, index: int, section: LaneSection, lanes: Sequence[Lane]
+) -> tuple[FloatArray, FloatArray]:
+    """s and t over the lanes of a section, shape (m, n) each. [m]"""
+    n = int(np.ceil((section.end - section.start) / SPACING)) + 1
+    s = np.linspace(section.start, section.end, n)
+    inside = np.minimum(s, np.nextafter(section.end, -np.inf))
+    left = tables.lane_profile(index, lanes[0].id, inside)
+    right = tables.lane_profile(index, lanes[-1].id, inside)
+    top, bottom = left.centre + 0.5 * left.width, right.centre - 0.5 * right.width
+    m = int(np.ceil(max(float((top - bottom).max()), 0.0) / SPACING)) + 1
+    t = bottom + (top - bottom) * (np.linspace(0.0, 1.0, m)[:, None] if m > 1 else 0.5)
+    t = np.broadcast_to(t, (m, n))
+    return np.broadcast_to(s, (m, n)), t

@@ -72,15 +72,7 @@ class NetworkTables(LaneTables):
         if lead is not None:
             x, y = x + lead * frame.cos, y + lead * frame.sin
         if profile is not None:
-            if profile.slope.any():
-                turn = np.arctan(profile.slope)
-                if pitch.any() or roll.any():
-                    turn, pitch, roll = turned_in_surface(turn, pitch, roll)
-                heading = heading + turn
-            backwards = profile.direction < 0
-            if np.any(backwards):
-                heading = heading + np.pi * backwards
-                pitch, roll = pitch * profile.direction, roll * profile.direction
+            heading, pitch, roll = _along_lane(profile, heading, pitch, roll)
             if self._heights.any:
                 z = z + self._heights.at(profile.row, s, t - profile.centre, profile.width, self.ids[profile.row])
         # into [-pi, pi]
@@ -209,6 +201,22 @@ class NetworkTables(LaneTables):
         profile = self.lane_profile(road, mark.lane, inside)
         poses = self.road_to_world(road, s, profile.centre + 0.5 * np.sign(mark.lane) * profile.width)
         return poses.x, poses.y
+
+
+def _along_lane(
+    profile: LaneProfile, heading: FloatArray, pitch: FloatArray, roll: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """As the lane's traffic goes: turned by its slope, and round where it runs against s. [rad]"""
+    if profile.slope.any():
+        turn = np.arctan(profile.slope)
+        if pitch.any() or roll.any():
+            turn, pitch, roll = turned_in_surface(turn, pitch, roll)
+        heading = heading + turn
+    backwards = profile.direction < 0
+    if np.any(backwards):
+        heading = heading + np.pi * backwards
+        pitch, roll = pitch * profile.direction, roll * profile.direction
+    return heading, pitch, roll
 
 
 def turned_in_surface(

@@ -26,17 +26,7 @@ def plot(settings: Settings) -> Plot:
     """Make the scenario."""
     speed, duration = settings.number("speed"), settings.number("duration")
     reach = 200.0 + speed * duration + 150.0
-    bend = Bend(settings.number("radius"), settings.number("arc"), settings.number("clothoid"))
-    straight = Straight(settings.number("straight"))
-    n_bends = math.ceil((reach - 200.0) / (bend.length + straight.length))
-    bends = [Bend((-1.0) ** number * bend.radius, bend.arc, bend.clothoid) for number in range(n_bends)]
-    motorway = Motorway(
-        alignment=(Straight(200.0), *(part for each in bends for part in (each, straight)), Straight(150.0)),
-        lanes=2,
-        lane_width=settings.number("lane_width"),
-        left_hand=is_left_hand(settings),
-        grade=settings.number("grade") / 100.0,
-    )
+    motorway = _motorway(settings, reach)
     return Plot(
         what="Free driving through left and right bends",
         motorway=motorway,
@@ -47,6 +37,21 @@ def plot(settings: Settings) -> Plot:
         steps=(),
         duration=duration,
         declared=("speed",),
+    )
+
+
+def _motorway(settings: Settings, reach: float) -> Motorway:
+    """As many bends to either side as it takes to `reach`. [m]"""
+    bend = Bend(settings.number("radius"), settings.number("arc"), settings.number("clothoid"))
+    straight = Straight(settings.number("straight"))
+    n_bends = math.ceil((reach - 200.0) / (bend.length + straight.length))
+    bends = [Bend((-1.0) ** number * bend.radius, bend.arc, bend.clothoid) for number in range(n_bends)]
+    return Motorway(
+        alignment=(Straight(200.0), *(part for each in bends for part in (each, straight)), Straight(150.0)),
+        lanes=2,
+        lane_width=settings.number("lane_width"),
+        left_hand=is_left_hand(settings),
+        grade=settings.number("grade") / 100.0,
     )
 
 

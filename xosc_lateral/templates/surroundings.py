@@ -34,9 +34,19 @@ def environment_action(settings: Settings) -> Any:
 
     rain, hour = settings.number("rain"), settings.number("time_of_day")
     wet = rain >= 0.1
+    weather = _weather(settings, rain, hour, wet)
+    minutes = round(60.0 * hour)
+    time = xosc.TimeOfDay(False, 2024, 6, 21, minutes // 60, minutes % 60, 0)
+    road = xosc.RoadCondition(_WET_GRIP if wet else 1.0)
+    return xosc.EnvironmentAction(xosc.Environment("Surroundings", time, weather, road))
+
+
+def _weather(settings: Settings, rain: float, hour: float, wet: bool) -> Any:
+    from scenariogeneration import xosc
+
     clouds = xosc.FractionalCloudCover.eightOktas if wet else xosc.FractionalCloudCover.twoOktas
     kind = xosc.PrecipitationType.rain if rain > 0.0 else xosc.PrecipitationType.dry
-    weather = xosc.Weather(
+    return xosc.Weather(
         clouds,
         temperature=288.15,
         sun=_sun(hour, 0.2 if wet else 1.0),
@@ -44,10 +54,6 @@ def environment_action(settings: Settings) -> Any:
         precipitation=xosc.Precipitation(kind, rain),
         wind=_wind(settings),
     )
-    minutes = round(60.0 * hour)
-    time = xosc.TimeOfDay(False, 2024, 6, 21, minutes // 60, minutes % 60, 0)
-    road = xosc.RoadCondition(_WET_GRIP if wet else 1.0)
-    return xosc.EnvironmentAction(xosc.Environment("Surroundings", time, weather, road))
 
 
 def _wind(settings: Settings) -> Any:

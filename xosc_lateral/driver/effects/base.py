@@ -1,4 +1,10 @@
-"""What an effect is: a dependence of the offset on context, time or hidden state that a profile can hold."""
+"""What an effect is: a dependence of the offset on context, time or hidden state that a profile can hold.
+
+References
+----------
+.. [1] N. Neis, J. Beyerer, "A two-level stochastic model for the lateral movement of vehicles within their lane", IEEE
+       Intelligent Vehicles Symposium 2023, arXiv:2405.17080: coarse and fine part, which effects change.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,10 @@
-"""What every core model can do: two independent parts, coarse and fine, sampled apart and in pieces of any length."""
+"""What every core model can do: two independent parts, coarse and fine, sampled apart and in pieces of any length.
+
+References
+----------
+.. [1] N. Neis, J. Beyerer, "A two-level stochastic model for the lateral movement of vehicles within their lane", IEEE
+       Intelligent Vehicles Symposium 2023, arXiv:2405.17080: the split into both parts.
+"""
 
 from __future__ import annotations
 

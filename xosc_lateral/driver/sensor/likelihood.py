@@ -124,6 +124,11 @@ class _Problem:
         loss = float((weight * (np.log(total) + ratio)).sum())
         gradient = slope.T @ (weight * (1.0 - ratio))
         information = (slope.T * weight) @ slope
+        loss = self._add_priors(point, loss, gradient, information)
+        return loss, gradient, information
+
+    def _add_priors(self, point: FloatArray, loss: float, gradient: FloatArray, information: FloatArray) -> float:
+        """Loss with the priors' share; gradient and information are added to in place."""
         for row, value in self._priors(point):
             residual = float(row @ point) - value
             loss += 0.5 * residual**2
@@ -133,7 +138,7 @@ class _Problem:
         loss += 0.5 * float(bend @ bend)
         gradient[:N_KNOTS] += PRIOR_ROWS.T @ bend
         information[:N_KNOTS, :N_KNOTS] += PRIOR_ROWS.T @ PRIOR_ROWS
-        return loss, gradient, information
+        return loss
 
     def _priors(self, point: FloatArray) -> list[tuple[FloatArray, float]]:
         """Weak priors of the sensor's levels, and the level that is known, linearised where it is looked at."""

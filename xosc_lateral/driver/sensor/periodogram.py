@@ -1,4 +1,11 @@
-"""Power density of runs as a Whittle likelihood wants it: mean periodograms in bins, and what they weigh."""
+"""Power density of runs as a Whittle likelihood wants it: mean periodograms in bins, and what they weigh.
+
+References
+----------
+.. [1] P. Whittle, "Estimation and information in stationary time series", Arkiv för Matematik 2, 1953.
+.. [2] P. D. Welch, "The use of fast Fourier transform for the estimation of power spectra", IEEE Trans. Audio and
+       Electroacoustics 15, 1967: means over windows.
+"""
 
 from __future__ import annotations
 

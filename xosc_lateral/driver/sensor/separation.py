@@ -1,4 +1,10 @@
-"""Driver and sensor, told apart in measured runs."""
+"""Driver and sensor, told apart in measured runs.
+
+References
+----------
+.. [1] P. Whittle, "Estimation and information in stationary time series", Arkiv för Matematik 2, 1953: the likelihood.
+.. [2] G. Schwarz, "Estimating the dimension of a model", Annals of Statistics 6, 1978: which colour of noise is taken.
+"""
 
 from __future__ import annotations
 

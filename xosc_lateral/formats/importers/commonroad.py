@@ -21,7 +21,7 @@ from xosc_lateral.errors import FormatError, NotEnoughDataError
 from xosc_lateral.formats.importers.cuts import DEFAULT_CUTS, CutSettings
 from xosc_lateral.formats.importers.lane_graph import LaneGraph
 from xosc_lateral.formats.importers.placed import PlacedTracks, ground_speed, import_placed, travel_heading
-from xosc_lateral.formats.importers.table import Imported, guarded
+from xosc_lateral.formats.importers.table import Imported, ImportRecord, guarded
 from xosc_lateral.formats.xml import read_xml
 
 FloatArray = NDArray[np.float64]
@@ -55,22 +55,7 @@ def import_commonroad(
     parts = [_read(file, settings) for file in files]
     record = parts[0].provenance
     if len(parts) > 1:
-        from dataclasses import replace
-
-        from xosc_lateral.formats.importers.table import hash_files
-
-        rows: dict[str, int] = {}
-        for part in parts:
-            for state, count in part.provenance.rows.items():
-                rows[state] = rows.get(state, 0) + count
-        record = replace(
-            record,
-            source=", ".join(file.name for file in files),
-            sha256=hash_files(files),
-            rows=rows,
-            vehicles=sum(part.provenance.vehicles for part in parts),
-            hours=round(sum(part.provenance.hours for part in parts), 3),
-        )
+        record = _put_together(parts, files)
     table = pd.concat([part.table for part in parts], ignore_index=True)
     if not keep_cut:
         table = table[table["state"] == "kept"].drop(columns="state").reset_index(drop=True)
@@ -81,17 +66,30 @@ def import_commonroad(
     return Imported(table, record)
 
 
+def _put_together(parts: Sequence[Imported], files: Sequence[Path]) -> ImportRecord:
+    """One record of several files."""
+    from dataclasses import replace
+
+    from xosc_lateral.formats.importers.table import hash_files
+
+    rows: dict[str, int] = {}
+    for part in parts:
+        for state, count in part.provenance.rows.items():
+            rows[state] = rows.get(state, 0) + count
+    return replace(
+        parts[0].provenance,
+        source=", ".join(file.name for file in files),
+        sha256=hash_files(files),
+        rows=rows,
+        vehicles=sum(part.provenance.vehicles for part in parts),
+        hours=round(sum(part.provenance.hours for part in parts), 3),
+    )
+
+
 def _read(path: Path, settings: CutSettings) -> Imported:
     scenario = _opened(path)
-    lanelets = {lanelet.lanelet_id: lanelet for lanelet in scenario.lanelet_network.lanelets}
-    numbers = {name: k for k, name in enumerate(lanelets)}
-    shapes = [_Shape(lanelet) for lanelet in lanelets.values()]
-    left = np.array(
-        [numbers.get(one.adj_left, -1) if one.adj_left_same_direction else -1 for one in lanelets.values()], dtype=int
-    )
-    following = [[numbers[name] for name in one.successor if name in numbers] for one in lanelets.values()]
-    graph = LaneGraph(np.array([shape.length for shape in shapes]), left, following)
-    tracks = _placed(scenario, shapes, left, path)
+    graph, shapes = _graph(scenario)
+    tracks = _placed(scenario, shapes, graph.left, path)
     return import_placed(
         tracks,
         graph,
@@ -102,6 +100,19 @@ def _read(path: Path, settings: CutSettings) -> Imported:
         version=str(getattr(scenario, "scenario_id", "unknown")),
         licence=LICENCE,
     )
+
+
+def _graph(scenario: Any) -> tuple[LaneGraph, list[_Shape]]:
+    """How its lanelets hang together, and their shapes."""
+    lanelets = {lanelet.lanelet_id: lanelet for lanelet in scenario.lanelet_network.lanelets}
+    numbers = {name: k for k, name in enumerate(lanelets)}
+    shapes = [_Shape(lanelet) for lanelet in lanelets.values()]
+    left = np.array(
+        [numbers.get(one.adj_left, -1) if one.adj_left_same_direction else -1 for one in lanelets.values()], dtype=int
+    )
+    following = [[numbers[name] for name in one.successor if name in numbers] for one in lanelets.values()]
+    graph = LaneGraph(np.array([shape.length for shape in shapes]), left, following)
+    return graph, shapes
 
 
 def _opened(path: Path) -> Any:
@@ -234,12 +245,22 @@ class _Shape:
         offset = ((np.stack([x, y], axis=1) - middle) * normal).sum(axis=1)
         width = ((left - right) * normal).sum(axis=1)
         way = self.start[k] + u[:, 0] * self.size[k]
+        beyond = self._beyond(x, y, k)
+        curvature = self._curvature(way)
+        return np.where(beyond, np.nan, way), offset, width, direction, curvature
+
+    def _beyond(self, x: FloatArray, y: FloatArray, k: NDArray[np.intp]) -> NDArray[np.bool_]:
+        """Where a point lies before the start or past the end, shape (n,); `k`: the piece nearest to it."""
         at_start = (k == 0) & (((np.stack([x, y], axis=1) - self.centre[0]) @ self.step[0]) < 0)
         at_end = (k == len(self.size) - 1) & (((np.stack([x, y], axis=1) - self.centre[-1]) @ self.step[-1]) > 0)
+        return np.asarray(at_start | at_end)
+
+    def _curvature(self, way: FloatArray) -> FloatArray:
+        """Of the middle, smoothed, shape (n,). [1/m]"""
         middles = 0.5 * (self.start[1:] + self.start[:-1])
         bend = np.interp(way + 0.5 * SMOOTHED, middles, self.direction) - np.interp(
             way - 0.5 * SMOOTHED, middles, self.direction
         )
         span = np.minimum(way + 0.5 * SMOOTHED, middles[-1]) - np.maximum(way - 0.5 * SMOOTHED, middles[0])
         curvature = np.where(span > 1.0, bend / np.maximum(span, 1.0), 0.0)
-        return np.where(at_start | at_end, np.nan, way), offset, width, direction, curvature
+        return np.asarray(curvature)

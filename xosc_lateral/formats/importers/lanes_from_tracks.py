@@ -8,6 +8,13 @@ and the standard error is computed from whole passages (sandwich estimator), whi
 A camera that looks along the road sees tall vehicles displaced (parallax), by an amount that varies with the place: a
 second line, the tilt, per metre of height above the lane's mean. Its own mean along the road is not taken out: it can't
 be told from trucks that really keep to another side than cars.
+
+References
+----------
+.. [1] D. Cochrane, G. H. Orcutt, "Application of least squares regression to relationships containing auto-correlated
+       error terms", J. American Statistical Association 44, 1949.
+.. [2] K.-Y. Liang, S. L. Zeger, "Longitudinal data analysis using generalized linear models", Biometrika 73, 1986: the
+       sandwich over whole passages.
 """
 
 from __future__ import annotations

@@ -244,6 +244,18 @@ def _left_sign(lateral: FloatArray, tracks: pd.DataFrame, vehicle: IntArray, ste
 
     The heading is taken against its own mean over 4 s, which takes the road's course out of it.
     """
+    agreement = _agreement(lateral, tracks, vehicle, step, path)
+    if not abs(agreement) > 0.1:
+        raise FormatError(
+            f"can't tell which side of the lane is positive: correlation of heading and offset rate is {agreement:.2f}",
+            path=path,
+            element="latLaneCenterOffset",
+        )
+    return float(np.sign(agreement))
+
+
+def _agreement(lateral: FloatArray, tracks: pd.DataFrame, vehicle: IntArray, step: float, path: Path) -> float:
+    """Correlation of the way to the left, by the heading, with the rate of the offset. [-]"""
     heading = np.unwrap(np.radians(tracks["heading"].to_numpy()))
     half = max(1, round(2.0 / step))
     inside = np.arange(half, max(half, len(vehicle) - half))
@@ -253,13 +265,7 @@ def _left_sign(lateral: FloatArray, tracks: pd.DataFrame, vehicle: IntArray, ste
     towards_left = tracks["lonVelocity"].to_numpy()[inside] * _about_mean(heading, inside, half)
     rate = _about_mean(np.gradient(lateral), inside, half)
     agreement = float(np.corrcoef(towards_left, rate)[0, 1])
-    if not abs(agreement) > 0.1:
-        raise FormatError(
-            f"can't tell which side of the lane is positive: correlation of heading and offset rate is {agreement:.2f}",
-            path=path,
-            element="latLaneCenterOffset",
-        )
-    return float(np.sign(agreement))
+    return agreement
 
 
 def _about_mean(values: FloatArray, rows: IntArray, half: int) -> FloatArray:

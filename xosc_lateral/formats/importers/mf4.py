@@ -202,12 +202,7 @@ def _said(error: Exception) -> str:
 
 
 def _read_channel(log: Any, name: str, wanted: ColumnSource, source: Path) -> Channel:
-    places = log.channels_db.get(wanted.column)
-    if not places:
-        raise FormatError(f"no channel {wanted.column}{_alike(log, wanted.column)}", path=source, element=name)
-    # The same channel may lie in several groups (one per bus): the one with the most samples counts.
-    signals = [log.get(group=group, index=index) for group, index in places]
-    signal = max(signals, key=lambda one: len(one.samples))
+    signal = _signal(log, name, wanted, source)
     kind = signal.samples.dtype.kind
     if kind in "SU":
         return _words(signal, name, wanted, source)
@@ -219,17 +214,33 @@ def _read_channel(log: Any, name: str, wanted: ColumnSource, source: Path) -> Ch
         )
     unit, by = _unit(signal, name, wanted, source)
     values = np.asarray(signal.samples, dtype=np.float64) * by
+    stamps = _stamps(signal, len(values), name, wanted, source)
+    finite = np.isfinite(values) & np.isfinite(stamps)
+    _require_two(int(finite.sum()), name, wanted, source)
+    stepwise = kind in "iub" and not _is_quantity(name, unit)
+    return Channel(stamps[finite], values[finite], unit, stepwise)
+
+
+def _signal(log: Any, name: str, wanted: ColumnSource, source: Path) -> Any:
+    places = log.channels_db.get(wanted.column)
+    if not places:
+        raise FormatError(f"no channel {wanted.column}{_alike(log, wanted.column)}", path=source, element=name)
+    # The same channel may lie in several groups (one per bus): the one with the most samples counts.
+    signals = [log.get(group=group, index=index) for group, index in places]
+    signal = max(signals, key=lambda one: len(one.samples))
+    return signal
+
+
+def _stamps(signal: Any, count: int, name: str, wanted: ColumnSource, source: Path) -> FloatArray:
+    """Times of a channel's samples, shape (count,). [s]"""
     stamps = np.asarray(signal.timestamps, dtype=np.float64)
-    if len(stamps) != len(values) or np.abs(stamps).max(initial=0.0) > TIME.value or (np.diff(stamps) < 0).any():
+    if len(stamps) != count or np.abs(stamps).max(initial=0.0) > TIME.value or (np.diff(stamps) < 0).any():
         raise FormatError(
             f"channel {wanted.column}: times that do not increase, or are beyond {TIME}",
             path=source,
             element=name,
         )
-    finite = np.isfinite(values) & np.isfinite(stamps)
-    _require_two(int(finite.sum()), name, wanted, source)
-    stepwise = kind in "iub" and not _is_quantity(name, unit)
-    return Channel(stamps[finite], values[finite], unit, stepwise)
+    return stamps
 
 
 def _words(signal: Any, name: str, wanted: ColumnSource, source: Path) -> Channel:

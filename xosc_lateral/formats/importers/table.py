@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar, cast
 
 import numpy as np
+from numpy.typing import NDArray
 
 from xosc_lateral.driver.plausibility import implausible_rows
 from xosc_lateral.drives.cleaning import LANE_WIDTHS, MAX_OUTSIDE
@@ -121,12 +122,28 @@ def _refuse_nonsense(table: pd.DataFrame, path: Path) -> None:
             wrong |= kept & np.isnan(values)
         allowed = 0.0 if name == "time" else MAX_OUTSIDE
         if wrong.sum() > allowed * kept.sum():
-            row = int(np.argmax(wrong))
-            what = f"{values[row]:.6g} is not within [{believed.low:g}, {believed.high:g}] ({believed.reason})"
-            share = f"{100 * wrong.sum() / kept.sum():.0f} % of the rows"
-            raise FormatError(f"{what}, {share}", path=path, element=f"column {name!r}")
+            raise _refusal(name, values, wrong, believed, kept, path)
         if wrong.any():
             table[name] = np.where(wrong, np.nan, values)
+    _check_lane_width(table, kept, path)
+
+
+def _refusal(
+    name: str,
+    values: NDArray[np.float64],
+    wrong: NDArray[np.bool_],
+    believed: Range,
+    kept: NDArray[np.bool_],
+    path: Path,
+) -> FormatError:
+    """Which value, and how many like it."""
+    row = int(np.argmax(wrong))
+    what = f"{values[row]:.6g} is not within [{believed.low:g}, {believed.high:g}] ({believed.reason})"
+    share = f"{100 * wrong.sum() / kept.sum():.0f} % of the rows"
+    return FormatError(f"{what}, {share}", path=path, element=f"column {name!r}")
+
+
+def _check_lane_width(table: pd.DataFrame, kept: NDArray[np.bool_], path: Path) -> None:
     if "lane_width" in table:
         median = float(np.nanmedian(table["lane_width"].to_numpy(dtype=np.float64)[kept]))
         if not LANE_WIDTHS[0] <= median <= LANE_WIDTHS[1]:

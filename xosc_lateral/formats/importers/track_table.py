@@ -148,10 +148,14 @@ def _numbers(column: pd.Series, name: str, path: Path) -> pd.Series:
     numbers = comma_numbers(column)
     if numbers is None:
         numbers = pd.to_numeric(column, errors="coerce")
+    _refuse_words(numbers, column, path)
+    return numbers
+
+
+def _refuse_words(numbers: pd.Series, column: pd.Series, path: Path) -> None:
     strange = numbers.isna() & column.notna()
     if strange.any():
         row = int(np.flatnonzero(strange)[0])
         raise FormatError(
             f"{column.iloc[row]!r} is not a number", path=path, line=row + 2, element=f"column {column.name!r}"
         )
-    return numbers

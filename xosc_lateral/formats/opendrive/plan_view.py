@@ -8,6 +8,7 @@ from math import cos, sin
 
 import numpy as np
 
+from xosc_lateral.errors import FormatError
 from xosc_lateral.formats.opendrive.document import RoadFile, XmlElement
 from xosc_lateral.road.arc_length import end_parameter, parameter_pieces
 from xosc_lateral.road.geometry import MAX_TURN, Arc, Line, ParamCubic, ReferenceElement, Spiral
@@ -69,9 +70,13 @@ def _element(geometry: XmlElement, length: float, source: RoadFile) -> Reference
                 u, v = (_coefficients(shape, axis, source) for axis in "UV")
                 p_end = length if shape.get("pRange") == "arcLength" else 1.0
                 return CubicRecord(x, y, heading, length, u, v, p_end)
+    raise _unknown(geometry, source)
+
+
+def _unknown(geometry: XmlElement, source: RoadFile) -> FormatError:
     known = "line, arc, spiral, poly3, paramPoly3"
     found = ", ".join(str(child.tag) for child in geometry) or "nothing"
-    raise source.error(f"no shape that is known ({known}); found {found}", geometry)
+    return source.error(f"no shape that is known ({known}); found {found}", geometry)
 
 
 def _coefficients(shape: XmlElement, axis: str, source: RoadFile) -> Cubic:

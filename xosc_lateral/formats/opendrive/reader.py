@@ -89,9 +89,7 @@ def _read_road(
     element: XmlElement, plan: Sequence[Record], line: tuple[ReferenceElement, ...], source: RoadFile
 ) -> Road:
     length = _length(element, plan, source)
-    rule = element.get("rule", "RHT").upper()
-    if rule not in ("RHT", "LHT"):
-        raise source.error(f"rule={element.get('rule')!r} is neither RHT nor LHT", element)
+    rule = _rule(element, source)
     _check_places(element, plan, line, source)
     sections, directions = read_sections(element, length, rule, source)
     junction = element.get("junction", "-1")
@@ -110,6 +108,14 @@ def _read_road(
         predecessor=_read_link(element, "predecessor"),
         successor=_read_link(element, "successor"),
     )
+
+
+def _rule(element: XmlElement, source: RoadFile) -> str:
+    """Which side traffic keeps to."""
+    rule = element.get("rule", "RHT").upper()
+    if rule not in ("RHT", "LHT"):
+        raise source.error(f"rule={element.get('rule')!r} is neither RHT nor LHT", element)
+    return rule
 
 
 def _check_places(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from glob import escape
 from pathlib import Path
@@ -90,20 +90,31 @@ class Catalogs:
                 folders.append(folder)
             else:
                 refused = refused or self.boundary.refusal(written, place)
-        for folder in dict.fromkeys(folders):
-            for path in sorted(folder.glob("*.xosc"))[:MAX_FILES_SCANNED]:
-                if self.boundary.holds(path) and _calls_itself(path, catalog):
-                    return path
+        found = self._by_name_inside(folders, catalog)
+        if found is not None:
+            return found
         near = _near_by(self.boundary, f"{catalog}.xosc")
         if near is not None:
             self.remarks.append(Unsupported("CatalogReference", reference.place(), f"catalog taken from {near}"))
             return near
         if refused is not None:
             raise refused
-        searched = ", ".join(str(folder) for folder in dict.fromkeys(folders)) or "no folder is named"
-        place = reference.place()
-        what = f"catalog '{catalog}' not found ({searched})"
-        raise MissingFileError(what, path=place.path, line=place.line, element=place.element)
+        raise _missing(reference, catalog, folders)
+
+    def _by_name_inside(self, folders: Sequence[Path], catalog: str) -> Path | None:
+        """A file whose catalog bears that name, whatever its own is."""
+        for folder in dict.fromkeys(folders):
+            for path in sorted(folder.glob("*.xosc"))[:MAX_FILES_SCANNED]:
+                if self.boundary.holds(path) and _calls_itself(path, catalog):
+                    return path
+        return None
+
+
+def _missing(reference: XmlElement, catalog: str, folders: Sequence[Path]) -> MissingFileError:
+    searched = ", ".join(str(folder) for folder in dict.fromkeys(folders)) or "no folder is named"
+    place = reference.place()
+    what = f"catalog '{catalog}' not found ({searched})"
+    return MissingFileError(what, path=place.path, line=place.line, element=place.element)
 
 
 def _entries(root: etree._Element) -> Iterator[etree._Element]:

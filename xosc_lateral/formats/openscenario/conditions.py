@@ -74,10 +74,20 @@ def read_trigger(element: XmlElement | None, context: Context) -> Trigger | None
 
 def _read_condition(element: XmlElement, context: Context) -> Condition:
     owner = element.required("ByEntityCondition", "ByValueCondition")
-    triggering: TriggeringEntities | None = None
-    content: Content
+    content = _content(owner, context)
+    triggering = None
     if owner.tag == "ByEntityCondition":
         triggering = _triggering_entities(owner.required("TriggeringEntities"), context)
+    delay = element.number("delay", 0.0)
+    if delay < 0:
+        element.fail(f"delay of {delay} s is negative")
+    edge = element.choice("conditionEdge", ConditionEdge, ConditionEdge.NONE)
+    return Condition(element.text("name", ""), delay, edge, content, triggering, element.place())
+
+
+def _content(owner: XmlElement, context: Context) -> Content:
+    """What is waited for; a condition that nobody reads is unsupported."""
+    if owner.tag == "ByEntityCondition":
         kind = owner.required("EntityCondition").child()
         readers: dict[str, Callable[[XmlElement, Context], Content]] = {**ENTITY_CONDITIONS}
     else:
@@ -87,11 +97,7 @@ def _read_condition(element: XmlElement, context: Context) -> Condition:
         owner.fail("contains no condition")
     reader = readers.get(kind.tag)
     content = reader(kind, context) if reader else Unsupported(kind.tag, kind.place())
-    delay = element.number("delay", 0.0)
-    if delay < 0:
-        element.fail(f"delay of {delay} s is negative")
-    edge = element.choice("conditionEdge", ConditionEdge, ConditionEdge.NONE)
-    return Condition(element.text("name", ""), delay, edge, content, triggering, element.place())
+    return content
 
 
 def _triggering_entities(element: XmlElement, context: Context) -> TriggeringEntities:

@@ -133,9 +133,7 @@ def _read_trailer(vehicle: XmlElement, tractor: str, context: Context) -> tuple[
         return None, []
     reference = owner.child("TrailerRef") or owner.child("EntityRef")
     inner = owner.child("Trailer")
-    for other in owner.children():
-        if other.tag not in ("TrailerRef", "EntityRef", "Trailer"):
-            context.remark(other, f"a trailer of '{tractor}' by a {other.tag} is not read")
+    _remark_others(owner, tractor, context)
     if reference is not None:
         return reference.text("entityRef", "") or None, []
     if inner is None:
@@ -144,6 +142,12 @@ def _read_trailer(vehicle: XmlElement, tractor: str, context: Context) -> tuple[
     entities = _read_object(inner, context, f"{tractor}+")
     context.leave()
     return entities[0].name, entities
+
+
+def _remark_others(owner: XmlElement, tractor: str, context: Context) -> None:
+    for other in owner.children():
+        if other.tag not in ("TrailerRef", "EntityRef", "Trailer"):
+            context.remark(other, f"a trailer of '{tractor}' by a {other.tag} is not read")
 
 
 def _coupling(vehicle: XmlElement, tag: str) -> float | None:

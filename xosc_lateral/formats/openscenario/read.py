@@ -197,7 +197,6 @@ def _road_file(logic: XmlElement, boundary: Boundary, remarks: list[Unsupported]
         )
     except FormatError as error:
         missing = error
-    folder = boundary.folder
     name = PureWindowsPath(written.strip()).name
     if is_town(written):
         name += ".xodr"
@@ -207,12 +206,23 @@ def _road_file(logic: XmlElement, boundary: Boundary, remarks: list[Unsupported]
             line=logic.place().line,
             element=logic.label(),
         )
+    found = _road_nearby(logic, name, written, boundary, remarks, roads)
+    if found is not None:
+        return found
+    raise missing
+
+
+def _road_nearby(
+    logic: XmlElement, name: str, written: str, boundary: Boundary, remarks: list[Unsupported], roads: RoadSearch
+) -> Path | None:
+    """A file of that name beside the scenario or in the folders that were named; remarked."""
+    folder = boundary.folder
     beside = [near for near in (folder, folder / "xodr", folder.parent / "xodr") if boundary.holds(near / name)]
     for near in (*beside, *roads.folders):
         if name and (near / name).is_file():
             remarks.append(Unsupported("LogicFile", logic.place(), f"'{written}' is taken from {near / name}"))
             return near / name
-    raise missing
+    return None
 
 
 def is_town(reference: str) -> bool:

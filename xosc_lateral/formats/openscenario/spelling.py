@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections import Counter
 
+from lxml import etree
+
 from xosc_lateral.formats.openscenario.element import XmlElement, means_true
 from xosc_lateral.scenario.place import Place, Unsupported
 
@@ -23,13 +25,7 @@ def remark_spellings(root: XmlElement) -> list[Unsupported]:
     first: dict[tuple[str, str], Place] = {}
     count: Counter[tuple[str, str]] = Counter()
     for item in root.xml.iter("{*}*"):
-        is_truth = item.get("parameterType") == "boolean"
-        for name, value in item.attrib.items():
-            key = str(name), str(value).strip()
-            is_boolean = key[0] in BOOLEANS or (is_truth and key[0] == "value")
-            if is_boolean and means_true(key[1]) and key[1] not in _STANDARD:
-                count[key] += 1
-                first.setdefault(key, XmlElement(item, root.path, root.scope).place())
+        _count(item, root, first, count)
     return [
         Unsupported(
             place.element,
@@ -39,3 +35,16 @@ def remark_spellings(root: XmlElement) -> list[Unsupported]:
         )
         for (name, word), place in first.items()
     ]
+
+
+def _count(
+    item: etree._Element, root: XmlElement, first: dict[tuple[str, str], Place], count: Counter[tuple[str, str]]
+) -> None:
+    """One element's attributes."""
+    is_truth = item.get("parameterType") == "boolean"
+    for name, value in item.attrib.items():
+        key = str(name), str(value).strip()
+        is_boolean = key[0] in BOOLEANS or (is_truth and key[0] == "value")
+        if is_boolean and means_true(key[1]) and key[1] not in _STANDARD:
+            count[key] += 1
+            first.setdefault(key, XmlElement(item, root.path, root.scope).place())

@@ -64,18 +64,24 @@ class BesideOnRoad:
         if self.is_unlimited:
             self._shift(rest)
         else:
-            across = self._speed_across(rest, step)
-            ahead = sqrt(max(state.speed * state.speed - across * across, 0.0))
-            state.take_control(Activity.LATERAL)
-            state.speed_taken = True
-            distance = copysign(ahead * step, state.speed)
-            ds = along_reference(state.network, state.road, state.lane, state.s, state.offset_t, distance)
-            travel(state, 1 if state.is_forward else -1, ds)
-            state.move_to(state.road, state.lane, state.s, state.offset_t + across * step)
-            if abs(rest) <= abs(across) * step + EPSILON and self._most_acceleration == inf:
-                rest = 0.0
+            rest = self._drive_across(rest, step)
         self._turn_along_movement(self._before)
         self._before = state.pose
+        return rest
+
+    def _drive_across(self, rest: float, step: float) -> float:
+        """Along the lane and towards the place at once, as far as its dynamics let it; what is left. [m]"""
+        state = self._state
+        across = self._speed_across(rest, step)
+        ahead = sqrt(max(state.speed * state.speed - across * across, 0.0))
+        state.take_control(Activity.LATERAL)
+        state.speed_taken = True
+        distance = copysign(ahead * step, state.speed)
+        ds = along_reference(state.network, state.road, state.lane, state.s, state.offset_t, distance)
+        travel(state, 1 if state.is_forward else -1, ds)
+        state.move_to(state.road, state.lane, state.s, state.offset_t + across * step)
+        if abs(rest) <= abs(across) * step + EPSILON and self._most_acceleration == inf:
+            rest = 0.0
         return rest
 
     def align(self) -> None:

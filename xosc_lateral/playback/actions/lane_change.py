@@ -47,20 +47,28 @@ class RunningLaneChange(RunningAction):
             return
         lane = self._target_lane()
         if not self.simulation.network.has_lane_at(state.road, lane, state.s):
-            there = ", ".join(str(info.id) for info in self.simulation.network.lanes_at(state.road, state.s))
-            road = self.simulation.network.road_ids[state.road]
-            self.note(
-                f"road '{road}' has no lane {lane} at s = {state.s:.1f} m (lanes: {there}): lane change not played"
-            )
+            self._note_missing(lane)
             return
         state.turn(0.0 if state.is_forward else pi)
+        guide = self._guide = self._guide_on(lane)
+        self._transition = Transition.of(self.content.dynamics)
+        self._transition.begin(guide.offset_t, self.content.target_lane_offset)
+
+    def _note_missing(self, lane: int) -> None:
+        """Name the lanes that there are."""
+        network, state = self.simulation.network, self.state
+        there = ", ".join(str(info.id) for info in network.lanes_at(state.road, state.s))
+        road = network.road_ids[state.road]
+        self.note(f"road '{road}' has no lane {lane} at s = {state.s:.1f} m (lanes: {there}): lane change not played")
+
+    def _guide_on(self, lane: int) -> EntityState:
+        """One that follows the target lane beside the entity, at its own place across the road."""
+        state = self.state
         centre = self.simulation.network.lane_state_at(state.road, lane, state.s).centre_t
         guide = EntityState(state.entity, state.network)
         guide.put(Placement(state.road, lane, state.s, state.t - centre, state.relative_heading))
         guide.route = state.route
-        self._guide = guide
-        self._transition = Transition.of(self.content.dynamics)
-        self._transition.begin(guide.offset_t, self.content.target_lane_offset)
+        return guide
 
     def step(self, time: float, step: float) -> None:
         """Move ahead and sideways."""
@@ -125,7 +133,11 @@ class RunningLaneChange(RunningAction):
         if transition.is_step:
             transition.advance(inf)
             return ahead, transition.target, 0.0
-        # Slower than the change asks for: all movement goes sideways, evenly.
+        return self._aside(way, rate)
+
+    def _aside(self, way: float, rate: float) -> tuple[float, float, float]:
+        """Slower than the change asks for: all movement goes sideways, evenly."""
+        transition = self._transition
         change = max(abs(transition.target - transition.start), EPSILON)
         transition.advance(way * transition.range / change)
         return 0.0, transition.value(DynamicsShape.LINEAR), copysign(0.5 * pi - EPSILON, rate)

@@ -26,16 +26,7 @@ def prepare(content: TimeToCollisionCondition, simulation: Simulation) -> Entity
     freespace = content.freespace
     target = content.target
     if isinstance(target, str):
-        simulation.derives_motion = True
-        other = simulation.entity(target, content.place)
-
-        def to_entity(state: EntityState) -> bool:
-            if not other.active:
-                return False
-            distance = train_distance(simulation.network, state, other, system, kind, freespace=freespace)
-            return _holds(distance, _closing_speed(state, other), content)
-
-        return to_entity
+        return _to_entity(content, simulation, simulation.entity(target, content.place))
     spot = spot_at(target, simulation)
 
     def to_position(state: EntityState) -> bool:
@@ -43,6 +34,19 @@ def prepare(content: TimeToCollisionCondition, simulation: Simulation) -> Entity
         return _holds(distance, state.speed, content)
 
     return to_position
+
+
+def _to_entity(content: TimeToCollisionCondition, simulation: Simulation, other: EntityState) -> EntityCheck:
+    simulation.derives_motion = True
+    system, kind = measure_of(content, simulation)
+
+    def check(state: EntityState) -> bool:
+        if not other.active:
+            return False
+        distance = train_distance(simulation.network, state, other, system, kind, freespace=content.freespace)
+        return _holds(distance, _closing_speed(state, other), content)
+
+    return check
 
 
 def _holds(distance: float | None, closing: float, content: TimeToCollisionCondition) -> bool:

@@ -20,6 +20,7 @@ from xosc_lateral.scenario import Place, Unsupported
 from xosc_lateral.scenario.position import (
     Clothoid,
     ClothoidSpline,
+    ClothoidSplineSegment,
     Nurbs,
     Polyline,
     Position,
@@ -97,23 +98,30 @@ def _clothoid_spline(shape: ClothoidSpline, layout: Layout) -> Path:
         raise _error("the clothoid spline has no segments", layout.place)
     pieces: list[TimedClothoid] = []
     for segment in shape.segments:
-        if segment.position_start is not None:
-            pose = layout.pose_of(segment.position_start, layout.simulation)
-            x, y, heading = pose.x, pose.y, pose.heading
-        elif pieces:
-            x, y, heading = pieces[-1].at(pieces[-1].length)
-        elif layout.follower is not None:
-            pose = layout.follower.plane
-            x, y, heading = pose.x, pose.y, pose.heading
-        else:
-            raise _error("the clothoid spline has no start", layout.place)
+        x, y, heading = _start_of(segment, pieces, layout)
         time = nan if segment.time_start is None else segment.time_start
-        heading += segment.h_offset
         _check_turning(segment.curvature_start, segment.curvature_end, segment.length, layout.place)
         pieces.append(
             TimedClothoid(x, y, heading, segment.curvature_start, segment.curvature_end, segment.length, time)
         )
     return ClothoidPath(pieces, nan if shape.time_end is None else shape.time_end)
+
+
+def _start_of(
+    segment: ClothoidSplineSegment, pieces: Sequence[TimedClothoid], layout: Layout
+) -> tuple[float, float, float]:
+    """Its own position, the end of the piece before, or where the follower is. [m], [m], [rad]"""
+    if segment.position_start is not None:
+        pose = layout.pose_of(segment.position_start, layout.simulation)
+        x, y, heading = pose.x, pose.y, pose.heading
+    elif pieces:
+        x, y, heading = pieces[-1].at(pieces[-1].length)
+    elif layout.follower is not None:
+        pose = layout.follower.plane
+        x, y, heading = pose.x, pose.y, pose.heading
+    else:
+        raise _error("the clothoid spline has no start", layout.place)
+    return x, y, heading + segment.h_offset
 
 
 def _check_turning(start: float, end: float, length: float, place: Place) -> None:

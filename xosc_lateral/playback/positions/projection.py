@@ -47,14 +47,7 @@ def _project(given: dict[str, str], latitude: float, longitude: float) -> tuple[
     if kind == "utm" and "zone" not in given and {"lat_0", "lon_0"} <= given.keys():
         kind = "tmerc"  # field maps name an origin of their own instead of a zone: it is the map's
     if kind == "utm":
-        zone = int(given["zone"])
-        given |= {
-            "lon_0": str(6 * zone - 183),
-            "k": str(_UTM_SCALE),
-            "lat_0": "0",
-            "x_0": str(_UTM_EASTING),
-            "y_0": str(_UTM_SOUTH if "south" in given else 0.0),
-        }
+        given |= _utm(given)
     elif kind not in ("tmerc", "etmerc", "merc"):
         raise ProjectionError(
             f"projection '{kind}' of the road network's geoReference is not known (utm, tmerc, merc are)"
@@ -68,6 +61,18 @@ def _project(given: dict[str, str], latitude: float, longitude: float) -> tuple[
         x, y = _transverse(latitude, longitude - lon_0, k)
         y_0 = _transverse(lat_0, 0.0, k)[1]
     return x + float(given.get("x_0", "0")), y - y_0 + float(given.get("y_0", "0"))
+
+
+def _utm(given: dict[str, str]) -> dict[str, str]:
+    """A zone of UTM as a transverse Mercator projection, by its definition."""
+    zone = int(given["zone"])
+    return {
+        "lon_0": str(6 * zone - 183),
+        "k": str(_UTM_SCALE),
+        "lat_0": "0",
+        "x_0": str(_UTM_EASTING),
+        "y_0": str(_UTM_SOUTH if "south" in given else 0.0),
+    }
 
 
 def _settings(reference: str) -> dict[str, str]:

@@ -11,7 +11,13 @@ from xosc_lateral.playback.placement import NOWHERE, Placement
 from xosc_lateral.playback.positions.on_road import lane_placement, road_placement
 from xosc_lateral.playback.routes import RouteGuide
 from xosc_lateral.playback.simulation import Simulation
-from xosc_lateral.scenario.position import FromCurrentEntity, FromLaneCoordinates, Route, RoutePosition
+from xosc_lateral.scenario.position import (
+    FromCurrentEntity,
+    FromLaneCoordinates,
+    FromRoadCoordinates,
+    Route,
+    RoutePosition,
+)
 
 
 def resolve(
@@ -39,6 +45,19 @@ def resolve(
             "(in esmini only with --align_routepositions)",
             place,
         )
+    return _on_route(position, where, simulation, road, s, direction)
+
+
+def _on_route(
+    position: RoutePosition,
+    where: FromLaneCoordinates | FromRoadCoordinates,
+    simulation: Simulation,
+    road: int,
+    s: float,
+    direction: int,
+) -> Placement:
+    """A lane and an offset, or t, as the route counts them, where it is at `s` [m] of a road."""
+    place = position.place
     if isinstance(where, FromLaneCoordinates):
         lane, offset = _with_route(simulation, road, where.lane_id, where.lane_offset, direction)
         return lane_placement(simulation, road, lane, s, offset, position.orientation, place)

@@ -6,6 +6,7 @@ lanes run straight along it and a lane change crosses them. Beyond both ends of 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from itertools import groupby
 
 import numpy as np
@@ -57,10 +58,15 @@ def _along_roads(network: RoadNetwork, motion: EntityMotion) -> FloatArray | Non
         *zip(motion.road[rows].tolist(), motion.s[rows].tolist(), strict=True),
         *_beyond(network, motion, int(rows[-1]), 1.0),
     ]
-    parts: list[FloatArray] = []
     here = np.array([motion.x[rows[0]], motion.y[rows[0]]])
     begin = int(motion.road[rows[0]])
     t = float(network.path_to_lane(here[:1], here[1:], begin, motion.s[rows[:1]], lane_types=None).t[0])
+    return _beside(network, places, begin, t)
+
+
+def _beside(network: RoadNetwork, places: Sequence[tuple[int, float]], begin: int, t: float) -> FloatArray:
+    """Points at an even t beside one reference line after the other, shape (n, 2). [m]"""
+    parts: list[FloatArray] = []
     for road, group in groupby(places, key=lambda place: place[0]):
         s = np.array([place[1] for place in group])
         if parts and road != begin:

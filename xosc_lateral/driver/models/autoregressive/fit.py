@@ -16,19 +16,16 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from msgspec.structs import replace
 from numpy.typing import NDArray
 
-from xosc_lateral.driver.models.autoregressive.autoregression import Autoregression
 from xosc_lateral.driver.models.autoregressive.filters import split_bands
 from xosc_lateral.driver.models.autoregressive.fit_coarse import fit_coarse
 from xosc_lateral.driver.models.autoregressive.fit_matching import matched, with_volatility
 from xosc_lateral.driver.models.autoregressive.fit_settings import DEFAULT_SETTINGS, FitSettings
 from xosc_lateral.driver.models.autoregressive.fit_spectrum import fit_spectrum
 from xosc_lateral.driver.models.autoregressive.model import AutoregressiveModel
-from xosc_lateral.driver.models.autoregressive.volatility import (
-    Volatility,
-)
+from xosc_lateral.driver.models.autoregressive.rounding import rounded
+from xosc_lateral.driver.models.autoregressive.volatility import Volatility
 from xosc_lateral.errors import NotEnoughDataError
 
 FloatArray = NDArray[np.float64]
@@ -70,31 +67,4 @@ def fit_autoregressive(
         step=settings.step,
     )
     model = with_volatility(model, bands, len(set(drives)) > 1, settings)
-    return _rounded(matched(model, runs, settings))
-
-
-DIGITS = 9
-"""Significant digits kept of a fitted number: what differs beyond is the processor's rounding. [-]"""
-
-
-def _rounded(model: AutoregressiveModel) -> AutoregressiveModel:
-    def tidy(value: float) -> float:
-        return float(f"{value:.{DIGITS}g}")
-
-    def tidy_all(values: FloatArray) -> FloatArray:
-        return np.array([tidy(value) for value in values])
-
-    def tidy_part(part: Volatility) -> Volatility:
-        return Volatility(tidy(part.between), tidy(part.within), tidy(part.correlation_time), tidy(part.slow))
-
-    return AutoregressiveModel(
-        mean=tidy(model.mean),
-        between_drivers=tidy(model.between_drivers),
-        coarse=Autoregression(tidy_all(model.coarse.coefficients), tidy(model.coarse.scale)),
-        fine=replace(model.fine, damping=tidy_all(model.fine.damping)),
-        coarse_volatility=tidy_part(model.coarse_volatility),
-        fine_volatility=tidy_part(model.fine_volatility),
-        correlation=tidy(model.correlation),
-        limits=(tidy(model.limits[0]), tidy(model.limits[1])),
-        step=model.step,
-    )
+    return rounded(matched(model, runs, settings))

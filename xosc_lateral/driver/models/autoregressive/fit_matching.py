@@ -1,4 +1,9 @@
-"""Volatility of the autoregressive model, and rounds of simulating and comparing (indirect inference)."""
+"""Volatility of the autoregressive model, and rounds of simulating and comparing (indirect inference).
+
+References
+----------
+.. [1] C. Gourieroux, A. Monfort, E. Renault, "Indirect inference", J. Applied Econometrics 8, 1993, pp. S85-S118.
+"""
 
 from __future__ import annotations
 

@@ -42,18 +42,29 @@ def fit_spectrum(
     """
     frequency, power = _typical_power(runs, settings)
     knots = np.linspace(0.0, 0.5, settings.n_knots)  # in cycles per sample
-    kernel = building_low_pass()
-    gain = np.abs(np.exp(-2j * np.pi * np.outer(knots, np.arange(len(kernel)))) @ kernel)
-    coarse_power = coarse.power(knots * COARSE_EVERY) * gain**2 / COARSE_EVERY
+    coarse_power = _coarse_power(coarse, knots)
     measured = np.exp(np.interp(knots, frequency, np.log(power)))
     hertz = knots / settings.step
     shared = (hertz >= settings.scale_band[0]) & (hertz <= settings.scale_band[1])
     scale = float(np.exp(np.log(measured[shared] / coarse_power[shared]).mean()))
     lacking = np.maximum(measured - scale * coarse_power, 0.0)
-    low, high = settings.fine_from
-    rise = np.sin(0.5 * np.pi * np.clip((hertz - low) / (high - low), 0.0, 1.0)) ** 2
+    rise = _rise(hertz, settings)
     noise = _shaped(np.sqrt(lacking / NOISE_VARIANCE) * rise, settings)
     return replace(coarse, scale=coarse.scale * np.sqrt(scale)), noise
+
+
+def _coarse_power(coarse: Autoregression, knots: FloatArray) -> FloatArray:
+    """Of the coarse movement at 5 Hz, shape of `knots` [cycles per sample]. [lane widths squared]"""
+    kernel = building_low_pass()
+    gain = np.abs(np.exp(-2j * np.pi * np.outer(knots, np.arange(len(kernel)))) @ kernel)
+    return np.asarray(coarse.power(knots * COARSE_EVERY) * gain**2 / COARSE_EVERY)
+
+
+def _rise(hertz: FloatArray, settings: FitSettings) -> FloatArray:
+    """From 0 to 1 where the fine noise begins, shape of `hertz` [Hz]. [-]"""
+    low, high = settings.fine_from
+    rise = np.sin(0.5 * np.pi * np.clip((hertz - low) / (high - low), 0.0, 1.0)) ** 2
+    return np.asarray(rise)
 
 
 def window_of(runs: Sequence[FloatArray], lengths: Sequence[float], settings: FitSettings) -> int:

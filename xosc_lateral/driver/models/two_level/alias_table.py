@@ -1,4 +1,12 @@
-"""A Markov chain made ready for sampling: one uniform number and two look-ups per step."""
+"""A Markov chain made ready for sampling: one uniform number and two look-ups per step.
+
+References
+----------
+.. [1] A. J. Walker, "An efficient method for generating discrete random variables with general distributions", ACM
+       Trans. Mathematical Software 3, 1977.
+.. [2] M. D. Vose, "A linear algorithm for generating random numbers with a given distribution", IEEE Trans. Software
+       Engineering 17, 1991.
+"""
 
 from __future__ import annotations
 
@@ -7,15 +15,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.driver.jit_kernel import JitKernel
-
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class AliasTable:
-    """A chain made ready for sampling: one uniform number and two look-ups per step (Walker 1977, Vose 1991).
+    """A chain made ready for sampling: one uniform number and two look-ups per step [1]_.
 
     Parameters
     ----------
@@ -41,6 +47,19 @@ class AliasTable:
 def _alias_row(probabilities: FloatArray) -> tuple[FloatArray, IntArray]:
     n = len(probabilities)
     keep, other = (probabilities * n).tolist(), list(range(n))
+    _paired(keep, other)
+    # A bin of probability 0 that rounding left alone must not be drawn.
+    likely = int(np.argmax(probabilities))
+    for k in range(n):
+        if probabilities[k] == 0.0:
+            other[k] = likely if other[k] == k else other[k]
+            keep[k] = 0.0
+    return np.array(keep), np.array(other, dtype=np.int64)
+
+
+def _paired(keep: list[float], other: list[int]) -> None:
+    """Fill what each bin lacks of 1 from one that has more: Vose's algorithm [2]_, in place."""
+    n = len(keep)
     small = [k for k in range(n) if keep[k] < 1.0]
     large = [k for k in range(n) if keep[k] >= 1.0]
     while small and large:
@@ -51,53 +70,3 @@ def _alias_row(probabilities: FloatArray) -> tuple[FloatArray, IntArray]:
             small.append(large.pop())
     for k in small + large:  # what is left differs from 1 by rounding
         keep[k] = 1.0
-    # A bin of probability 0 that rounding left alone must not be drawn.
-    likely = int(np.argmax(probabilities))
-    for k in range(n):
-        if probabilities[k] == 0.0:
-            other[k] = likely if other[k] == k else other[k]
-            keep[k] = 0.0
-    return np.array(keep), np.array(other, dtype=np.int64)
-
-
-def _walk_body(uniform, drivers, n_bins, keep, other, states):  # type: ignore[no-untyped-def]
-    # states: each driver's last state first, then one per driver and step; all arrays flat, step by step
-    if drivers == 1:  # the same, faster: the last state stays in a register
-        state = states[0]
-        for i in range(len(uniform)):
-            scaled = uniform[i] * n_bins
-            column = int(scaled)
-            k = state * n_bins + column
-            state = column if scaled - column < keep[k] else other[k]
-            states[i + 1] = state
-        return
-    for i in range(len(uniform)):
-        scaled = uniform[i] * n_bins
-        column = int(scaled)
-        k = states[i] * n_bins + column
-        states[i + drivers] = column if scaled - column < keep[k] else other[k]
-
-
-_walk = JitKernel(_walk_body)
-
-
-def walk(table: AliasTable, states: IntArray, uniform: FloatArray) -> IntArray:
-    """States after each step of chains that run side by side.
-
-    Parameters
-    ----------
-    table : AliasTable
-    states : array of int, shape (drivers,)
-        Where they are.
-    uniform : array, shape (n, drivers)
-        One number in [0, 1) per step and chain. [-]
-
-    Returns
-    -------
-    array of int, shape (n, drivers)
-    """
-    m = len(states)
-    flat = np.empty(m + uniform.size, dtype=np.int64)
-    flat[:m] = states
-    _walk(uniform.size, (uniform.ravel(), m, table.n_bins, table.keep, table.other), (flat,))
-    return flat[m:].reshape(-1, m)

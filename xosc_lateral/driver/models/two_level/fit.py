@@ -1,4 +1,10 @@
-"""Fitting of the two-level model: count transitions, shape the noise like what is left."""
+"""Fitting of the two-level model: count transitions, shape the noise like what is left.
+
+References
+----------
+.. [1] N. Neis, J. Beyerer, "A two-level stochastic model for the lateral movement of vehicles within their lane", IEEE
+       Intelligent Vehicles Symposium 2023, arXiv:2405.17080, section III.
+"""
 
 from __future__ import annotations
 

@@ -16,10 +16,10 @@ from numpy.typing import NDArray
 from xosc_lateral.driver.convolution import convolve
 from xosc_lateral.driver.models.base import Start
 from xosc_lateral.driver.models.mean_reversion import ClockState, take_at_rate
-from xosc_lateral.driver.models.two_level.alias_table import walk
 from xosc_lateral.driver.models.two_level.markov import bin_of
 from xosc_lateral.driver.models.two_level.parameters import TwoLevelParameters
 from xosc_lateral.driver.models.two_level.settings import TwoLevelSettings
+from xosc_lateral.driver.models.two_level.walk import walk
 from xosc_lateral.driver.seeds import TwoLevelSeed, generator
 
 FloatArray = NDArray[np.float64]

@@ -69,6 +69,16 @@ def time_trigger(owner: etree._Element, tag: str, moment: float, version: Versio
     steps of 1 ms or more.
     """
     trigger = sub(owner, tag)
+    by_value = _by_value(trigger, moment)
+    if version >= (1, 1):
+        sub(by_value, "SimulationTimeCondition", value=decimal(moment, 6), rule="greaterOrEqual")
+    else:
+        sub(by_value, "SimulationTimeCondition", value=decimal(moment - 1e-3, 6), rule="greaterThan")
+    return trigger
+
+
+def _by_value(trigger: etree._Element, moment: float) -> etree._Element:
+    """The only condition of a trigger."""
     condition = sub(
         sub(trigger, "ConditionGroup"),
         "Condition",
@@ -76,12 +86,7 @@ def time_trigger(owner: etree._Element, tag: str, moment: float, version: Versio
         delay="0",
         conditionEdge="none",
     )
-    by_value = sub(condition, "ByValueCondition")
-    if version >= (1, 1):
-        sub(by_value, "SimulationTimeCondition", value=decimal(moment, 6), rule="greaterOrEqual")
-    else:
-        sub(by_value, "SimulationTimeCondition", value=decimal(moment - 1e-3, 6), rule="greaterThan")
-    return trigger
+    return sub(condition, "ByValueCondition")
 
 
 def state_condition(group: etree._Element, kind: str, reference: str, state: str, delay: float) -> None:

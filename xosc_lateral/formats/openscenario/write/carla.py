@@ -98,13 +98,8 @@ def _drives(pieces: Sequence[PathPiece]) -> list[list[PathPiece]]:
 
 def _vertices(item: Moving, pieces: Sequence[PathPiece], begin: float) -> tuple[FloatArray, list[FloatArray]]:
     """Times from the drive's start and x, y, z, h, p, r of its vertices. [s], [m], [rad]"""
-    path, found = item.path, [begin]
-    for piece in pieces:
-        rows = slice(piece.first, piece.last + 1)
-        found += [float(path.time[piece.first]), *vertex_times(path.time[rows], path.x[rows], path.y[rows]).tolist()]
-        found.append(float(path.time[piece.last]) + FRAME)
-    between = (np.floor((np.array(found[1:]) - begin) / FRAME - 0.5) + 0.5) * FRAME
-    moments = begin + np.unique(np.append(0.0, np.maximum(np.round(between, 6), 0.5 * FRAME)))
+    path = item.path
+    moments = _moments(item, pieces, begin)
     last = pieces[-1].last
     over = float(moments[-1] - path.time[last])
     columns = item.poses_at(moments, slice(pieces[0].first if pieces[0].placed else 0, last + 1))
@@ -116,6 +111,18 @@ def _vertices(item: Moving, pieces: Sequence[PathPiece], begin: float) -> tuple[
         values[-2] += onward * direction
         values[-1] = values[-2] + VERTEX_SPACING * direction
     return moments - begin, columns
+
+
+def _moments(item: Moving, pieces: Sequence[PathPiece], begin: float) -> FloatArray:
+    """Times of the vertices, amid frames, from `begin` on. [s]"""
+    path, found = item.path, [begin]
+    for piece in pieces:
+        rows = slice(piece.first, piece.last + 1)
+        found += [float(path.time[piece.first]), *vertex_times(path.time[rows], path.x[rows], path.y[rows]).tolist()]
+        found.append(float(path.time[piece.last]) + FRAME)
+    between = (np.floor((np.array(found[1:]) - begin) / FRAME - 0.5) + 0.5) * FRAME
+    moments = begin + np.unique(np.append(0.0, np.maximum(np.round(between, 6), 0.5 * FRAME)))
+    return np.asarray(moments)
 
 
 def fit_carla(losses: Losses, scenario: Scenario, motion: NominalMotion, converted: Sequence[str]) -> None:

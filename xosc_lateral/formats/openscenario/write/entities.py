@@ -11,6 +11,7 @@ from xosc_lateral.formats.openscenario.element import at_node, local_name
 from xosc_lateral.formats.openscenario.write import build
 from xosc_lateral.formats.openscenario.write.non_motion_actions import CONTROLLER, MOTION, Pose
 from xosc_lateral.scenario import Scenario
+from xosc_lateral.scenario.entity import Entity
 from xosc_lateral.scenario.place import Unsupported
 
 _REPLACED_TAGS = {kind.__name__ for kind in MOTION + CONTROLLER}
@@ -27,15 +28,19 @@ def remove_controllers(root: etree._Element, scenario: Scenario, converted: Coll
             continue  # described in a catalog
         for controller in [child for child in item if local_name(child) == "ObjectController"]:
             item.remove(controller)
-        removed += [
-            Unsupported(
-                "ObjectController",
-                controller.place,
-                f"'{controller.name}' of '{entity.name}', which follows a trajectory",
-            )
-            for controller in entity.controllers
-        ]
+        removed += _removed(entity)
     return removed
+
+
+def _removed(entity: Entity) -> list[Unsupported]:
+    return [
+        Unsupported(
+            "ObjectController",
+            controller.place,
+            f"'{controller.name}' of '{entity.name}', which follows a trajectory",
+        )
+        for controller in entity.controllers
+    ]
 
 
 def rewrite_init(root: etree._Element, scenario: Scenario, starts: Mapping[str, tuple[Pose, float] | None]) -> None:

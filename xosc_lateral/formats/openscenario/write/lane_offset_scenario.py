@@ -95,12 +95,7 @@ def write_lane_offset_scenario(
         if not np.isfinite(chain.offset_t).all():
             raise ValueError(f"offsets of '{chain.entity}' are not finite")
         _add_act(story, f"xosc-lateral offsets {number}", chain, motion, lateral, target.version_for(scenario))
-    storyboard = next(element for element in root if local_name(element) == "Storyboard")
-    _place_aside(storyboard, scenario, chains)
-    if len(story):
-        # Last: a lane change that starts in the same frame has started before ours are looked at.
-        stop = next((element for element in storyboard if local_name(element) == "StopTrigger"), None)
-        build.insert_indented(storyboard, len(storyboard) if stop is None else storyboard.index(stop), story)
+    _put_into(root, story, scenario, chains)
     scope, referred = global_scope(scenario), _referred(story)
     name_literally(root, scenario.path, scope, referred)
     inline_maneuvers(root, scenario, scope, referred)
@@ -113,6 +108,16 @@ def write_lane_offset_scenario(
         write_atomically(output, data)
     names = tuple(dict.fromkeys(chain.entity for chain in chains))
     return WrittenScenario(output, hashlib.sha256(data).hexdigest(), names, (), data, notes)
+
+
+def _put_into(root: etree._Element, story: etree._Element, scenario: Scenario, chains: Sequence[OffsetChain]) -> None:
+    """Our story among the scenario's."""
+    storyboard = next(element for element in root if local_name(element) == "Storyboard")
+    _place_aside(storyboard, scenario, chains)
+    if len(story):
+        # Last: a lane change that starts in the same frame has started before ours are looked at.
+        stop = next((element for element in storyboard if local_name(element) == "StopTrigger"), None)
+        build.insert_indented(storyboard, len(storyboard) if stop is None else storyboard.index(stop), story)
 
 
 def _place_aside(storyboard: etree._Element, scenario: Scenario, chains: Sequence[OffsetChain]) -> None:

@@ -100,12 +100,19 @@ def inline_catalogs(losses: Losses, scenario: Scenario, scope: Scope) -> None:
         for item, within in references:
             if not _inline(item, within, scenario):
                 missing.add(item)
-                names = f"{item.get('catalogName')}/{item.get('entryName')}"
-                losses.note(f"CatalogReference: '{names}' was not found and stays a reference")
-    for locations in losses.root.iter("{*}CatalogLocations"):
-        if not missing:
-            locations[:] = []
-            locations.text = None
+                losses.note(f"CatalogReference: '{_entry_name(item)}' was not found and stays a reference")
+    if not missing:
+        _name_no_catalog(losses.root)
+
+
+def _entry_name(reference: etree._Element) -> str:
+    return f"{reference.get('catalogName')}/{reference.get('entryName')}"
+
+
+def _name_no_catalog(root: etree._Element) -> None:
+    for locations in root.iter("{*}CatalogLocations"):
+        locations[:] = []
+        locations.text = None
 
 
 def inline_maneuvers(root: etree._Element, scenario: Scenario, scope: Scope, wanted: Collection[str]) -> None:
@@ -145,17 +152,22 @@ def _inline(reference: etree._Element, scope: Scope, scenario: Scenario) -> bool
     within = entry_scope(XmlElement(entry, path, Scope({})), asking)
     entry = copy.deepcopy(entry)
     entry.tail = reference.tail
+    _fill_in(entry, within)
+    _seen_from(entry, path, scenario)
+    parent = reference.getparent()
+    assert parent is not None
+    parent.replace(reference, entry)
+    return True
+
+
+def _fill_in(entry: etree._Element, within: Scope) -> None:
+    """Its parameters, which are declared nowhere else."""
     for item in [item for item in entry if isinstance(item.tag, str) and local_name(item) == "ParameterDeclarations"]:
         entry.remove(item)
     for item in entry.iter("{*}*"):
         for name, value in item.attrib.items():
             if str(value).startswith("$") and parameter_name(str(name)) not in NAMES:
                 item.set(name, within.fill(str(value)))
-    _seen_from(entry, path, scenario)
-    parent = reference.getparent()
-    assert parent is not None
-    parent.replace(reference, entry)
-    return True
 
 
 def _entry(catalog: str, name: str, scenario: Scenario) -> tuple[etree._Element, Path] | None:

@@ -132,10 +132,15 @@ def add_trajectories(maneuver: etree._Element, item: Moving, version: build.Vers
         _add_trajectory(build.private_action(event, name), name, item.path, piece, times, version, vertices)
         build.time_trigger(event, "StartTrigger", item.trigger_time(piece), version)
         if piece.stops:
-            name = f"{item.name} stand {number}"
-            stand = build.event(maneuver, name, Priority.OVERRIDE, version)
-            build.speed_step(build.private_action(stand, name), 0.0)
-            build.time_trigger(stand, "StartTrigger", float(item.path.time[piece.last]), version)
+            _add_stand(maneuver, item, piece, number, version)
+
+
+def _add_stand(maneuver: etree._Element, item: Moving, piece: PathPiece, number: int, version: build.Version) -> None:
+    """An event that stops it where a piece ends."""
+    name = f"{item.name} stand {number}"
+    stand = build.event(maneuver, name, Priority.OVERRIDE, version)
+    build.speed_step(build.private_action(stand, name), 0.0)
+    build.time_trigger(stand, "StartTrigger", float(item.path.time[piece.last]), version)
 
 
 def _add_hop(event: etree._Element, name: str, item: Moving, piece: PathPiece, version: build.Version) -> None:

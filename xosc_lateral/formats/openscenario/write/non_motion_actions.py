@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 
 from lxml import etree
@@ -133,18 +133,19 @@ def _copied(action: Action, scenario: Scenario, root: etree._Element, scope: Sco
         return element
     local = Scope({name: final(value) for name, value in action.scope.items()}, scope)
     for item in element.iter("{*}*"):  # no comments
-        for attribute, value in item.attrib.items():
-            text = str(value)
-            if (
-                text.startswith("$")
-                and attribute not in ("parameterRef", "variableRef")
-                and _mentions(text, action.scope)
-            ):
-                try:
-                    item.set(attribute, local.fill(text))
-                except ExpressionError:
-                    continue
+        _fill_attributes(item, action.scope, local)
     return element
+
+
+def _fill_attributes(item: etree._Element, mine: Mapping[str, str], local: Scope) -> None:
+    """Those that mention parameters of the action's own."""
+    for attribute, value in item.attrib.items():
+        text = str(value)
+        if text.startswith("$") and attribute not in ("parameterRef", "variableRef") and _mentions(text, mine):
+            try:
+                item.set(attribute, local.fill(text))
+            except ExpressionError:
+                continue
 
 
 def _mentions(text: str, names: Collection[str]) -> bool:

@@ -159,12 +159,7 @@ def _rename_2(losses: Losses) -> None:
         if oktas is not None and "cloudState" not in weather.attrib:
             weather.set("cloudState", _CLOUDS.get(oktas, "overcast"))
     for position in _found(losses.root, "GeoPosition"):
-        for name in ("latitude", "longitude"):
-            degrees = _number(position, f"{name}Deg")
-            if degrees is not None:
-                position.set(name, build.decimal(radians(degrees), 12))
-                del position.attrib[f"{name}Deg"]
-        _move(position, "altitude", "height")
+        _rename_geo(position)
     for pedal in _found(losses.root, "Brake", "ParkingBrake"):
         percent = _child(pedal, "BrakePercent")
         if percent is not None:
@@ -175,6 +170,16 @@ def _rename_2(losses: Losses) -> None:
         if manual is not None:
             gear.set("number", manual.get("number") or "0")
             remove(manual)
+
+
+def _rename_geo(position: etree._Element) -> None:
+    """In radians, and with a height."""
+    for name in ("latitude", "longitude"):
+        degrees = _number(position, f"{name}Deg")
+        if degrees is not None:
+            position.set(name, build.decimal(radians(degrees), 12))
+            del position.attrib[f"{name}Deg"]
+    _move(position, "altitude", "height")
 
 
 def _complete_2(losses: Losses) -> None:
@@ -194,19 +199,10 @@ def _complete_2(losses: Losses) -> None:
 
 
 def _rename_1(losses: Losses) -> None:
-    for reference in _found(losses.root, "TrajectoryRef"):
-        follow = reference.getparent()
-        if follow is not None and local_name(follow) == "FollowTrajectoryAction":
-            for child in _children(reference):
-                follow.insert(follow.index(reference), child)
-            remove(reference)
+    _unwrap_trajectories(losses)
     for clothoid in _found(losses.root, "Clothoid"):
         _move(clothoid, "curvaturePrime", "curvatureDot")
-    for rain in _found(losses.root, "Precipitation"):
-        amount = _number(rain, "precipitationIntensity")
-        if amount is not None:
-            rain.set("intensity", build.decimal(min(amount / _HEAVY_RAIN, 1.0), 4))
-            del rain.attrib["precipitationIntensity"]
+    _rename_rain(losses)
     for item in _found(losses.root, "Pedestrian"):
         _move(item, "model3d", "model")
         item.set("model", item.get("model") or item.get("name") or "")
@@ -218,6 +214,25 @@ def _rename_1(losses: Losses) -> None:
         losses.refuse(item, "ExternalObjectReference", hint="")
     for action in _found(losses.root, "ControllerAction"):
         _whole_controller_action(action)
+
+
+def _rename_rain(losses: Losses) -> None:
+    """An amount in mm/h was a share of heavy rain."""
+    for rain in _found(losses.root, "Precipitation"):
+        amount = _number(rain, "precipitationIntensity")
+        if amount is not None:
+            rain.set("intensity", build.decimal(min(amount / _HEAVY_RAIN, 1.0), 4))
+            del rain.attrib["precipitationIntensity"]
+
+
+def _unwrap_trajectories(losses: Losses) -> None:
+    """Trajectories lay right in their action before there was a reference around them."""
+    for reference in _found(losses.root, "TrajectoryRef"):
+        follow = reference.getparent()
+        if follow is not None and local_name(follow) == "FollowTrajectoryAction":
+            for child in _children(reference):
+                follow.insert(follow.index(reference), child)
+            remove(reference)
 
 
 def _along_route(losses: Losses, condition: etree._Element) -> None:
@@ -265,6 +280,11 @@ def _complete_1(losses: Losses) -> None:
     for event in _found(losses.root, "Event"):
         if _child(event, "StartTrigger") is None:
             _start_at_once(event, "Action")
+    _complete_environments(losses)
+
+
+def _complete_environments(losses: Losses) -> None:
+    """What version 1.0 wants to be stated of the weather."""
     for environment in _found(losses.root, "Environment"):
         _fill(losses, environment, ("TimeOfDay", "Weather", "RoadCondition"))
     for weather in _found(losses.root, "Weather"):

@@ -148,11 +148,7 @@ def _refined(times: FloatArray, time: FloatArray, way: FloatArray, error: FloatA
     """
     at = np.interp(times, time, way)
     gap = np.searchsorted(times, time, side="right")
-    if replace:
-        room = np.minimum(way, way[-1] - way)
-    else:
-        before = np.clip(gap - 1, 0, len(times) - 2)
-        room = np.minimum(way - at[before], at[before + 1] - way)
+    room = _room(at, way, gap, replace=replace)
     candidates = np.flatnonzero((error > (LARGE_ERROR if replace else TOLERANCE)) & (room >= LEAST_SPACING))
     if len(candidates) == 0:
         return times
@@ -162,6 +158,16 @@ def _refined(times: FloatArray, time: FloatArray, way: FloatArray, error: FloatA
     keep = np.abs(at[:, None] - way[added][None, :]).min(axis=1) >= LEAST_SPACING
     keep[[0, -1]] = True
     return np.sort(np.concatenate((times[keep], time[added])))
+
+
+def _room(at: FloatArray, way: FloatArray, gap: NDArray[np.int64], *, replace: bool) -> FloatArray:
+    """Way from every row to the next vertices, or to the ends, shape (n,). [m]"""
+    if replace:
+        room = np.minimum(way, way[-1] - way)
+    else:
+        before = np.clip(gap - 1, 0, len(at) - 2)
+        room = np.minimum(way - at[before], at[before + 1] - way)
+    return np.asarray(room)
 
 
 def _spaced(rows: NDArray[np.intp], way: FloatArray) -> NDArray[np.intp]:
@@ -177,6 +183,20 @@ def _cut_at_stops(
     time: FloatArray, x: FloatArray, y: FloatArray, first: int, last: int, placed: bool
 ) -> list[PathPiece]:
     """Pieces between the stops and turns backwards inside rows first..last, which hold no jump."""
+    stops = _stops(time, x, y, first, last)
+    pieces = []
+    begin = first
+    for stop_begin, stop_end in stops:
+        if stop_begin > begin or (begin == first and placed):
+            pieces.append(PathPiece(begin, stop_begin, placed and begin == first, stops=stop_end > stop_begin))
+        begin = stop_end
+    if begin < last or (begin == first and placed):
+        pieces.append(PathPiece(begin, last, placed and begin == first, stops=False))
+    return pieces
+
+
+def _stops(time: FloatArray, x: FloatArray, y: FloatArray, first: int, last: int) -> list[tuple[int, int]]:
+    """Rows between which it stands, and those in which it turns round, in order."""
     rows = slice(first, last + 1)
     step = np.diff(time[rows])
     still = np.hypot(np.diff(x[rows]), np.diff(y[rows])) < STANDSTILL_SPEED * step
@@ -189,15 +209,7 @@ def _cut_at_stops(
     ]
     turned = first + _reversals(x[rows], y[rows])
     stops += [(row, row) for row in turned.tolist() if not any(begin <= row <= end for begin, end in stops)]
-    pieces = []
-    begin = first
-    for stop_begin, stop_end in sorted(stops):
-        if stop_begin > begin or (begin == first and placed):
-            pieces.append(PathPiece(begin, stop_begin, placed and begin == first, stops=stop_end > stop_begin))
-        begin = stop_end
-    if begin < last or (begin == first and placed):
-        pieces.append(PathPiece(begin, last, placed and begin == first, stops=False))
-    return pieces
+    return sorted(stops)
 
 
 def _reversals(x: FloatArray, y: FloatArray) -> NDArray[np.intp]:

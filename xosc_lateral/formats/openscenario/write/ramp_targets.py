@@ -3,6 +3,12 @@
 The offset at a time is linear in the targets, and so is the bound on a transition's turn. So the targets with the
 smallest errors are the answer to a linear programme. To lead to the sampled offset itself is not the best: on a drift,
 and where an offset turns back, a transition errs on one side.
+
+References
+----------
+.. [1] ASAM OpenSCENARIO XML 1.3, DynamicsShape: a transition of the shape "sinusoidal" is half a cosine.
+.. [2] Q. Huangfu, J. A. J. Hall, "Parallelizing the dual revised simplex method", Mathematical Programming
+       Computation 10, 2018: what solves the programme.
 """
 
 from __future__ import annotations

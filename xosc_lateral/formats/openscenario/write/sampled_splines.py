@@ -41,13 +41,18 @@ def sample_splines(losses: Losses, scope: Scope) -> None:
             continue
         shape = item.getparent()
         assert shape is not None
-        polyline = etree.Element("Polyline")
-        for pose, time in _vertices(_pieces(spline), spline.optional_number("timeEnd")):
-            _add_vertex(polyline, frame, pose, time)
+        polyline = _polyline(spline, frame)
         build.insert_indented(shape, shape.index(item), polyline)
         polyline.tail = item.tail
         shape.remove(item)
         losses.note(f"ClothoidSpline: written as a Polyline of {len(polyline)} vertices ({losses.target} has none)")
+
+
+def _polyline(spline: XmlElement, frame: Frame) -> etree._Element:
+    polyline = etree.Element("Polyline")
+    for pose, time in _vertices(_pieces(spline), spline.optional_number("timeEnd")):
+        _add_vertex(polyline, frame, pose, time)
+    return polyline
 
 
 def _frame(spline: XmlElement) -> Frame | None:

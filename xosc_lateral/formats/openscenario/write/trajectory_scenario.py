@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -147,6 +147,14 @@ def _replace_stories(
     vertices: Vertices,
 ) -> None:
     storyboard = _child(root, "Storyboard")
+    index = _take_away(storyboard)
+    story = _new_story(scenario, motion, moving, untouched, scope, target, vertices)
+    if len(story):
+        build.insert_indented(storyboard, index, story)
+
+
+def _take_away(storyboard: etree._Element) -> int:
+    """Stories; their comments stay. Where the next one belongs."""
     stories = [element for element in storyboard if local_name(element) == "Story"]
     index = storyboard.index(_child(storyboard, "Init")) + 1
     comments = [comment for old in stories for comment in old.iter(etree.Comment)]
@@ -156,9 +164,7 @@ def _replace_stories(
         kept = etree.Comment(comment.text)
         build.insert_indented(storyboard, index, kept)
         index += 1
-    story = _new_story(scenario, motion, moving, untouched, scope, target, vertices)
-    if len(story):
-        build.insert_indented(storyboard, index, story)
+    return index
 
 
 def _new_story(
@@ -175,14 +181,7 @@ def _new_story(
     kept = [played for played in motion.actions if _is_non_motion(played, scenario, moving)]
     if kept:
         # Before the trajectories: an entity has to be there before it moves.
-        act = build.sub(story, "Act", name=f"{STORY} kept actions")
-        poses = {
-            index: moving[played.action.content.entity_ref].pose_after(played.start)
-            for index, played in enumerate(kept)
-            if is_placing(played.action) and played.action.content.entity_ref in moving
-        }
-        add_non_motion_actions(act, kept, poses, scenario, untouched, scope, version)
-        build.time_trigger(act, "StartTrigger", 0.0, version)
+        _add_kept(story, kept, scenario, moving, untouched, scope, version)
     with_pieces = [item for item in moving.values() if item.pieces]
     # Up to 1.1 there has to be a story, even if nothing happens in it.
     if with_pieces or (not kept and version < (1, 2)):
@@ -197,6 +196,26 @@ def _new_story(
             build.maneuver_group(act, f"{STORY} nothing", None)
         build.time_trigger(act, "StartTrigger", 0.0, version)
     return story
+
+
+def _add_kept(
+    story: etree._Element,
+    kept: Sequence[PlayedAction],
+    scenario: Scenario,
+    moving: Mapping[str, Moving],
+    untouched: etree._Element,
+    scope: Scope,
+    version: tuple[int, int],
+) -> None:
+    """What is not motion, in an act of its own."""
+    act = build.sub(story, "Act", name=f"{STORY} kept actions")
+    poses = {
+        index: moving[played.action.content.entity_ref].pose_after(played.start)
+        for index, played in enumerate(kept)
+        if is_placing(played.action) and played.action.content.entity_ref in moving
+    }
+    add_non_motion_actions(act, kept, poses, scenario, untouched, scope, version)
+    build.time_trigger(act, "StartTrigger", 0.0, version)
 
 
 def _is_non_motion(played: PlayedAction, scenario: Scenario, moving: Mapping[str, Moving]) -> bool:

@@ -100,10 +100,16 @@ def write_variant_set(
         if catalog:
             write_atomically(files.catalog(name), distributions.catalog(name, catalog, version, summary))
     write_atomically(files.logical, build.document(root))
-    seed = facts.get("seed")
     drawn = distributions.Drawn(difference.parameter, names, files.logical.name, version, summary)
+    _write_distributions(files, drawn, weights, facts.get("seed"))
+
+
+def _write_distributions(
+    files: VariantFiles, drawn: distributions.Drawn, weights: Sequence[float] | None, seed: object
+) -> None:
+    """One after another, and at random."""
     write_atomically(files.distribution, drawn.one_after_another())
-    runs = drawn.at_random(weights or [1.0] * len(names), seed if isinstance(seed, int) else 0)
+    runs = drawn.at_random(weights or [1.0] * len(drawn.names), seed if isinstance(seed, int) else 0)
     write_atomically(files.stochastic, runs)
 
 

@@ -133,16 +133,21 @@ def _split_controller_action(item: etree._Element) -> None:
     assert outer is not None
     for part in extra:
         item.remove(part)
-        if local_name(outer) == "Action":
-            another = etree.Element("Action", {"name": f"{outer.get('name')} {local_name(part)}"})
-            private = build.sub(another, "PrivateAction")
-            owner, after = outer.getparent(), outer
-        else:
-            another = private = etree.Element("PrivateAction")
-            owner, after = outer, holder
-        build.sub(private, "ControllerAction").append(part)
-        assert owner is not None
-        build.insert_indented(owner, owner.index(after) + 1, another)
+        _move_out(part, holder, outer)
+
+
+def _move_out(part: etree._Element, holder: etree._Element, outer: etree._Element) -> None:
+    """Into a controller action of its own, right after the one that it was in."""
+    if local_name(outer) == "Action":
+        another = etree.Element("Action", {"name": f"{outer.get('name')} {local_name(part)}"})
+        private = build.sub(another, "PrivateAction")
+        owner, after = outer.getparent(), outer
+    else:
+        another = private = etree.Element("PrivateAction")
+        owner, after = outer, holder
+    build.sub(private, "ControllerAction").append(part)
+    assert owner is not None
+    build.insert_indented(owner, owner.index(after) + 1, another)
 
 
 def _tree(element: etree._Element) -> Iterator[etree._Element]:
