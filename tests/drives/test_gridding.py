@@ -87,13 +87,15 @@ def test_a_lane_change_is_no_road_following_but_its_context_stays() -> None:
 
 
 def test_each_run_is_resampled_from_its_own_rows() -> None:
-    """Where the lane changes the offset jumps by a lane width; nothing of the other lane may ring into the run."""
+    """Where an import has cut the drive, the next row may be in another lane; nothing of it may ring into the run."""
     time = np.arange(0.0, 80.0 + 1e-9, 0.04)
-    offset = np.where(time < 40.0, 1.7, -1.7)
-    made = Drive("made", time, offset, np.full(len(time), 3.6), {"speed": np.full(len(time), 30.0)})
+    run = (time >= 40.0).astype(np.int64)
+    context = {"speed": np.full(len(time), 30.0)}
+    made = Drive("made", time, np.where(run == 0, 1.7, -1.7), np.full(len(time), 3.6), context, run=run)
     (part,), _ = grid_drives([made], RULES, pad=PAD, multiple=MULTIPLE)
-    np.testing.assert_allclose(part.offset[part.valid & (part.time < 40.0)], 1.7, atol=1e-12)
-    np.testing.assert_allclose(part.offset[part.valid & (part.time > 40.0)], -1.7, atol=1e-12)
+    assert part.valid.sum() > 395  # up to the very cut
+    np.testing.assert_allclose(part.offset[part.valid & (part.time < 39.9)], 1.7, atol=1e-12)
+    np.testing.assert_allclose(part.offset[part.valid & (part.time > 40.1)], -1.7, atol=1e-12)
 
 
 def test_a_drive_without_road_following_is_left_out() -> None:

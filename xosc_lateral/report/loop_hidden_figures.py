@@ -31,10 +31,10 @@ if TYPE_CHECKING:
 FloatArray = NDArray[np.float64]
 
 CYCLE_ROWS = 4096
-"""Samples per segment of a weave's spectrum at most: 14 min, or a line would be smeared. [-]"""
+"""Samples per segment of a cycle's spectrum at most: 14 min, or a line would be smeared. [-]"""
 
 SURROUNDINGS_HZ = 0.07
-"""To either side of a weave's line. [Hz]"""
+"""To either side of a cycle's line. [Hz]"""
 
 MEAN_S, SPREAD_S, REGIME_S = 120.0, 240.0, 20.0
 """Averaging times of the paths of the mean, of the spread, and of the spread with regimes. [s]"""
