@@ -132,21 +132,19 @@ def _pieces(runs: Sequence[Run], shapes: Sequence[ColumnEffect]) -> _Pieces:
     for run in runs:
         slow, fast = split_bands(run.offset, STEP)
         quantities = np.stack([_quantity(effect, run) for effect in shapes], axis=1)
-        for first in range(0, len(run) - size + 1, size):
-            piece = slice(first, first + size)
+        for piece in _successive(len(run), size):
             mean.append(run.offset[piece].mean())
             spread.append(np.log(slow[piece].std() + 1e-6))
             fine.append(np.log(fast[piece].std() + 1e-6))
             rows.append(quantities[piece].mean(axis=0))
             drive.append(number[run.drive])
-    shape = (len(rows), len(shapes))
-    return _Pieces(
-        np.array(mean),
-        np.array(spread),
-        np.array(fine),
-        np.array(rows).reshape(shape),
-        np.array(drive, dtype=np.int64),
-    )
+    quantities = np.array(rows).reshape(len(rows), len(shapes))
+    return _Pieces(np.array(mean), np.array(spread), np.array(fine), quantities, np.array(drive, dtype=np.int64))
+
+
+def _successive(n: int, size: int) -> list[slice]:
+    """Whole pieces of so many rows, one after the other."""
+    return [slice(first, first + size) for first in range(0, n - size + 1, size)]
 
 
 def _effects(shapes: Sequence[ColumnEffect], acts: Acts, response: FloatArray, pieces: _Pieces) -> list[ColumnEffect]:

@@ -222,26 +222,27 @@ class OffsetStream:
 
     def to_dict(self) -> dict[str, Any]:
         """The state as plain JSON values; `from_dict` goes on from it with the same profile."""
-        values: dict[str, Any] = plain(
-            StreamState(
-                profile=sampling_hash(self.profile),
-                seed=SeedState(self._seed.entropy, tuple(self._seed.spawn_key)),
-                factor=self._factor,
-                start=self._start,
-                time=self._time,
-                known=self._known,
-                widths=tuple(self._widths),
-                recalled=self._recalled,
-                looked=self._looked,
-                row=self._row,
-                phase=self._phase,
-                samples=tuple(self._samples),
-                curve=self._curve,
-                responses=tuple(response.state() for response in self._responses),
-                process=self._process.state,
-            )
-        )
+        values: dict[str, Any] = plain(self._state())
         return sealed(values)
+
+    def _state(self) -> StreamState:
+        return StreamState(
+            profile=sampling_hash(self.profile),
+            seed=SeedState(self._seed.entropy, tuple(self._seed.spawn_key)),
+            factor=self._factor,
+            start=self._start,
+            time=self._time,
+            known=self._known,
+            widths=tuple(self._widths),
+            recalled=self._recalled,
+            looked=self._looked,
+            row=self._row,
+            phase=self._phase,
+            samples=tuple(self._samples),
+            curve=self._curve,
+            responses=tuple(response.state() for response in self._responses),
+            process=self._process.state,
+        )
 
     @classmethod
     def from_dict(cls, profile: DriverProfile, state: Mapping[str, Any]) -> Self:

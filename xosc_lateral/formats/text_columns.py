@@ -47,15 +47,19 @@ def seconds_of_text(column: pd.Series) -> FloatArray | None:
     known = column.dropna().astype(str).str.strip()
     if known.empty:
         return None
-    if known.str.fullmatch(_CLOCK).all():
-        seconds = _clock_seconds(known)
-    else:
-        stamps = _stamps(known.str.replace(r"(?<=\d),(?=\d)", ".", regex=True))
-        if stamps is None:
-            return None
-        seconds = (stamps - stamps.min()).dt.total_seconds().to_numpy()
+    seconds = _clock_seconds(known) if known.str.fullmatch(_CLOCK).all() else _since_the_earliest(known)
+    if seconds is None:
+        return None
     found = pd.Series(seconds, index=known.index).reindex(column.index)
     return np.array(found, dtype=np.float64)
+
+
+def _since_the_earliest(known: pd.Series) -> FloatArray | None:
+    """Seconds of dates with times; None where one is none."""
+    stamps = _stamps(known.str.replace(r"(?<=\d),(?=\d)", ".", regex=True))
+    if stamps is None:
+        return None
+    return np.asarray((stamps - stamps.min()).dt.total_seconds().to_numpy())
 
 
 def _clock_seconds(clock: pd.Series) -> FloatArray:

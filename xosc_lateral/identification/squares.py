@@ -104,8 +104,14 @@ def log_sizes(squares: Squares, columns: FloatArray) -> tuple[FloatArray, FloatA
     relative = left
     for _ in range(8):
         # clipped about what is expected there: a large effect must not clip itself
-        relative = left / np.exp(np.clip(2.0 * design @ sizes, -6.0, 6.0))
-        relative = np.minimum(relative / max(float(relative.mean()), 1e-300), CLIP)
-        relative = relative / max(float(relative.mean()), 1e-300)
+        relative = _clipped(left, np.exp(np.clip(2.0 * design @ sizes, -6.0, 6.0)))
         sizes = sizes + inverse @ (design.T @ (relative - 1.0))
     return sizes, np.sqrt(np.diag(inverse)) * float(np.std(relative)) / np.sqrt(2.0)
+
+
+def _clipped(left: FloatArray, expected: FloatArray) -> FloatArray:
+    """Squares over what is expected, shape (n,), about 1 and none of them huge. [-]"""
+    relative = left / expected
+    relative = np.minimum(relative / max(float(relative.mean()), 1e-300), CLIP)
+    relative = relative / max(float(relative.mean()), 1e-300)
+    return relative

@@ -224,15 +224,13 @@ def _table(
     def cell(tag: str, column: str, text: str) -> str:
         return f"<{tag}{_class('number' if column in numeric else '')}>{inline(text)}</{tag}>"
 
-    lines = []
-    for number, row in enumerate(rows):
-        cells = "".join(
-            cell("td", column, format_value(row.get(column), formats.get(column, ""))) for column in columns
-        )
-        lines.append(f"<tr{_class(tones.get(number, ''))}>{cells}</tr>")
+    def line(number: int, row: Mapping[str, Any]) -> str:
+        cells = (cell("td", column, format_value(row.get(column), formats.get(column, ""))) for column in columns)
+        return f"<tr{_class(tones.get(number, ''))}>{''.join(cells)}</tr>"
+
     head = "".join(cell("th", column, column) for column in columns)
     title = f"<caption>{inline(caption)}</caption>" if caption else ""
-    body = "\n".join(lines)
+    body = "\n".join(line(number, row) for number, row in enumerate(rows))
     return f'<div class="table"><table>{title}<thead><tr>{head}</tr></thead><tbody>\n{body}\n</tbody></table></div>'
 
 

@@ -30,15 +30,21 @@ def thumbnail(enriched: Enriched) -> str:
         points = np.concatenate([path for _, path in turned])
         low, spread = points.min(axis=0), np.maximum(np.ptp(points, axis=0), 1.0)
         for number, path in turned:
-            share = (path - low) / spread
-            x = BORDER + share[:, 0] * (WIDTH - 2 * BORDER)
-            y = HEIGHT - BORDER - share[:, 1] * (HEIGHT - 2 * BORDER)
             color = PALETTE[number % len(PALETTE)] if enriched.entities[number].is_enriched else MUTED
-            track = " ".join(f"{a:.1f},{b:.1f}" for a, b in zip(x, y, strict=True))
-            lines.append(f'<circle cx="{x[0]:.1f}" cy="{y[0]:.1f}" r="2.5" fill="{color}"/>')
-            lines.append(f'<polyline points="{track}" fill="none" stroke="{color}" stroke-width="1.5"/>')
+            lines += _track((path - low) / spread, color)
     head = f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH} {HEIGHT}" width="{WIDTH}" height="{HEIGHT}">'
     return "\n".join([head, *lines, "</svg>\n"])
+
+
+def _track(share: FloatArray, color: str) -> list[str]:
+    """A path, shape (n, 2), in shares of the picture from its lower left corner, and a dot where it starts. [-]"""
+    x = BORDER + share[:, 0] * (WIDTH - 2 * BORDER)
+    y = HEIGHT - BORDER - share[:, 1] * (HEIGHT - 2 * BORDER)
+    track = " ".join(f"{a:.1f},{b:.1f}" for a, b in zip(x, y, strict=True))
+    return [
+        f'<circle cx="{x[0]:.1f}" cy="{y[0]:.1f}" r="2.5" fill="{color}"/>',
+        f'<polyline points="{track}" fill="none" stroke="{color}" stroke-width="1.5"/>',
+    ]
 
 
 def _paths(enriched: Enriched) -> list[FloatArray]:

@@ -155,19 +155,21 @@ class NetworkTables(LaneTables):
         (t t' dk/ds, under 1e-6 1/m on roads) does not.
         """
 
-        def evaluate(road: IndexLike, s: FloatArray, lane: IndexLike, offset: FloatArray) -> tuple[FloatArray, ...]:
-            s = self._clamped(road, s)
-            row = self.row_of(road, lane, s)
-            profile = self.profile_of(row, s)
-            piece = self._lane_lookup.find(row, s)
-            ds = s - self._lane_lookup.starts[piece]
-            bend = 2.0 * self._lane_table[2][piece] + 6.0 * ds * self._lane_table[3][piece]
-            kappa = self.frame(road, s).curvature
-            forward = 1.0 - kappa * (profile.centre + profile.direction * offset)
-            turn = forward * (bend + kappa * forward) + 2.0 * kappa * profile.slope**2
-            return (profile.direction * turn / (forward**2 + profile.slope**2) ** 1.5,)
+        return self._batch(self._curvature_beside, 1, road, s, lane=lane, offset=offset)[0]
 
-        return self._batch(evaluate, 1, road, s, lane=lane, offset=offset)[0]
+    def _curvature_beside(
+        self, road: IndexLike, s: FloatArray, lane: IndexLike, offset: FloatArray
+    ) -> tuple[FloatArray, ...]:
+        s = self._clamped(road, s)
+        row = self.row_of(road, lane, s)
+        profile = self.profile_of(row, s)
+        piece = self._lane_lookup.find(row, s)
+        ds = s - self._lane_lookup.starts[piece]
+        bend = 2.0 * self._lane_table[2][piece] + 6.0 * ds * self._lane_table[3][piece]
+        kappa = self.frame(road, s).curvature
+        forward = 1.0 - kappa * (profile.centre + profile.direction * offset)
+        turn = forward * (bend + kappa * forward) + 2.0 * kappa * profile.slope**2
+        return (profile.direction * turn / (forward**2 + profile.slope**2) ** 1.5,)
 
     def lean(self, road: ArrayLike, lane: ArrayLike, s: ArrayLike) -> tuple[FloatArray, FloatArray]:
         """Crossfall (positive falling to the right of travel) and grade (positive uphill), both in percent.

@@ -165,16 +165,14 @@ def as_imported(
     if isinstance(made, Imported):
         return made
     table = made if "drive" in made.columns else made.assign(drive=sources[0].name.split(".")[0])
-    step = float(table.groupby("drive", sort=False)["time"].diff().median())
-    licence = str(options.get("licence", "your own recording"))
     record = make_provenance(
         table.assign(state=KEPT),
         format=format,
         sources=[source for source in sources if source.is_file()],
         version="unknown",
-        licence=licence,
+        licence=str(options.get("licence", "your own recording")),
         settings=options,
-        step=step,
+        step=float(table.groupby("drive", sort=False)["time"].diff().median()),
     )
     return Imported(table, record)
 

@@ -62,8 +62,7 @@ class Catalogs:
         # Names of entries are plain text: no scope is needed to find them.
         found = next((XmlElement(xml, path, Scope({})) for xml in _entries(root) if xml.get("name") == name), None)
         if found is None:
-            known = ", ".join(sorted(str(xml.get("name")) for xml in _entries(root))[:8])
-            reference.fail(f"catalog '{catalog}' has no entry '{name}' (it has {known})")
+            reference.fail(f"catalog '{catalog}' has no entry '{name}' (it has {_names(root)})")
         return found.within(entry_scope(found, reference))
 
     def _file(self, catalog: str, reference: XmlElement) -> Path:
@@ -115,6 +114,10 @@ def _missing(reference: XmlElement, catalog: str, folders: Sequence[Path]) -> Mi
     place = reference.place()
     what = f"catalog '{catalog}' not found ({searched})"
     return MissingFileError(what, path=place.path, line=place.line, element=place.element)
+
+
+def _names(root: etree._Element) -> str:
+    return ", ".join(sorted(str(xml.get("name")) for xml in _entries(root))[:8])
 
 
 def _entries(root: etree._Element) -> Iterator[etree._Element]:
