@@ -2,7 +2,7 @@
 
     python -m benchmarks.identification_study --set SET [--only NAME] [-o OUT.jsonl]
 
-SET is design, validation or test, alone or with _2 to _6 for the later rounds.
+SET is design, validation or test, alone or with _2 to _7 for the later rounds.
 
 docs/validation/identification.toml fixes seeds, movements, kinds, sizes and counts; `--share` runs a part of them. One
 line per drive goes to OUT.jsonl as it is finished; `--table OUT.jsonl...` prints the tables of the documents.
@@ -25,9 +25,9 @@ from benchmarks.identification_cases import PROTOCOL, SETS, cases, oracle, plant
 from benchmarks.identification_drives import unit
 from benchmarks.identification_tables import calibration, summary, table
 from xosc_lateral.formats.drives import drives_of_table
-from xosc_lateral.identification.identify import identify
+from xosc_lateral.identification.identify import VETOED, identify
 from xosc_lateral.identification.regression import Coarse
-from xosc_lateral.identification.stages import ERROR_BUDGET
+from xosc_lateral.identification.stages import ERROR_BUDGET, TERMS
 from xosc_lateral.identification.timeline import coarse_mean, join_drives
 
 
@@ -41,6 +41,12 @@ def run(case: dict[str, Any], protocol: dict[str, Any], seconds: float) -> dict[
     outcome["cpu_s"] = round(time.process_time() - started, 1)
     outcome["named"] = [
         [one.term.kind, sorted(one.term.columns), one.p_value, one.term.component] for one in found.selection.accepted
+    ]
+    kinds = {term.component: term.kind for term in TERMS}
+    outcome["vetoed"] = [
+        [kinds[one.component], sorted(one.columns), one.p_value, one.component]
+        for one in found.selection.rejected
+        if one.why == VETOED
     ]
     outcome["feedback"] = [
         [one.column, round(one.coherence, 3), round(one.predicted_share, 3), one.doubtful] for one in found.feedback

@@ -71,7 +71,7 @@ def calibration(outcomes: list[dict[str, Any]]) -> str:
     )
     found = [one for one in told if "found_size" in one and right(one)]
     own = (
-        np.mean([abs(abs(one["found_size"]) - one["size"]) <= 1.96 * one["found_error"] for one in found])
+        np.mean([abs(one["found_size"] - one["size"]) <= 1.96 * one["found_error"] for one in found])
         if found
         else math.nan
     )
@@ -110,8 +110,13 @@ def _wrong(outcomes: Outcomes) -> str:
 
 def _held(outcomes: Outcomes) -> str:
     found = [one for one in outcomes if "found_size" in one and right(one)]
-    held = sum(abs(abs(one["found_size"]) - one["size"]) <= 1.96 * one["found_error"] for one in found)
+    held = sum(abs(one["found_size"] - one["size"]) <= 1.96 * one["found_error"] for one in found)
     return f"{100 * held / len(found):.0f} % of {len(found)}" if found else ""
+
+
+def _vetoed(outcomes: Outcomes) -> str:
+    alone = [one | {"named": [finding]} for one in outcomes for finding in one.get("vetoed", [])]
+    return f"{sum(not false(one) for one in alone)} and {sum(bool(false(one)) for one in alone)}" if alone else ""
 
 
 def _share(outcomes: Outcomes) -> str:
@@ -140,6 +145,7 @@ ROWS: tuple[tuple[str, str, Callable[[Outcomes], str]], ...] = (
         "1 in 40",
         lambda own: _wrong([one for one in own if one["type"].startswith("effect")]),
     ),
+    ("significant, and vetoed by held-out rows: right ones and wrong ones", "", _vetoed),
     ("95 % intervals that hold the size", "95 %", _held),
     ("size found, share of the planted one (median)", "1", _share),
 )

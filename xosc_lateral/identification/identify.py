@@ -29,6 +29,9 @@ from xosc_lateral.identification.terms.step import StepTerm
 from xosc_lateral.identification.terms.variance_trend import VarianceTrendTerm
 from xosc_lateral.identification.timeline import Timeline
 
+VETOED = "significant, but chosen and estimated on other blocks it predicts the held-out ones worse than nothing"
+"""Why a term that loses on held-out rows is rejected."""
+
 Progress = Callable[[float, str], None]
 """Told the share that is done and what is being done."""
 
@@ -179,7 +182,6 @@ def _judged(
 
 def _worst_first(selection: Selection, nested: Nested) -> tuple[Selection, Nested, dict[int, Gain]]:
     """Less what loses, one by one, beginning with what loses most."""
-    why = "significant, but chosen and estimated on other blocks it predicts the held-out ones worse than nothing"
     while True:
         # each beside those that are kept, and nothing else: a fold's misfit would be blamed on what is right
         nested = nested.only([one.term for one in selection.accepted])
@@ -188,4 +190,4 @@ def _worst_first(selection: Selection, nested: Nested) -> tuple[Selection, Neste
         fallen = [term for term in judged if not gains[id(term)].stands]
         if not fallen:
             return selection, nested, gains
-        selection = selection.without([min(fallen, key=lambda term: gains[id(term)].mean)], why)
+        selection = selection.without([min(fallen, key=lambda term: gains[id(term)].mean)], VETOED)

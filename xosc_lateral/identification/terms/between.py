@@ -47,7 +47,7 @@ class BetweenTerm(ColumnTerm):
     component: ClassVar[str] = "between"
     kind: ClassVar[str] = "location"
     stages: ClassVar[tuple[Stage, ...]] = (Stage.BETWEEN_DRIVES,)
-    weight: ClassVar[float] = 5.5
+    weight: ClassVar[float] = 5.0
     seen_held_out: ClassVar[bool] = False
     acts: ClassVar[Acts] = Acts.LOCATION
     what: ClassVar[str] = "place that a drive keeps"

@@ -28,7 +28,7 @@ class MeanTerm(ColumnTerm):
     component: ClassVar[str] = "mean"
     kind: ClassVar[str] = "location"
     stages: ClassVar[tuple[Stage, ...]] = (Stage.MEAN, Stage.MEAN_AGAIN)
-    weight: ClassVar[float] = 5.5
+    weight: ClassVar[float] = 5.0
     acts: ClassVar[Acts] = Acts.LOCATION
     what: ClassVar[str] = "mean offset"
     group: ClassVar[str] = "mean"

@@ -26,7 +26,7 @@ from xosc_lateral.identification.log_scale import squared_innovations
 from xosc_lateral.identification.markov_switching import RegimeFit, fit_regimes
 from xosc_lateral.identification.regression import Coarse, Fitted
 from xosc_lateral.identification.seeds import LoopSeed
-from xosc_lateral.identification.significance import upper_tail
+from xosc_lateral.identification.significance import exponential_tail
 from xosc_lateral.identification.squares import SLOW_S, fine_squares, log_sizes, slow_squares
 from xosc_lateral.identification.terms.base import Description, Outcome, Removal, Stage, Term
 from xosc_lateral.identification.terms.column import columns_on_size
@@ -54,8 +54,11 @@ MAY_ACT = 0.1
 p = 0.01 and 0.05: beside rain p of regimes is 0.2, without it 3e-4 and 1e-10). The best of all columns taken out,
 whatever its p-value, costs true regimes of a minute up to 19 orders of magnitude. [-]"""
 
-DRAWS = 400
-"""Orders of the seconds that are the null."""
+DRAWS = (400, 3600)
+"""Movements without regimes that are the null; the second lot where the first leaves it open."""
+
+UNSURE = 0.05
+"""Larger p-values of the first lot are large enough, whatever the second would say. [-]"""
 
 FULLER = 0.001
 """Share of the variance that keeps the logarithm of a square near 0 from being an outlier [3]_. With the usual 0.02 a
@@ -74,7 +77,7 @@ class RegimesTerm(Term):
     component: ClassVar[str] = "regimes"
     kind: ClassVar[str] = "regime"
     stages: ClassVar[tuple[Stage, ...]] = (Stage.REGIMES,)
-    weight: ClassVar[float] = 0.5
+    weight: ClassVar[float] = 5.0
     seen_held_out: ClassVar[bool] = False
     fit: RegimeFit = field(repr=False)
 
@@ -148,16 +151,22 @@ def probability_of_clusters(rows: FloatArray, valid: BoolArray, known: FloatArra
     variance, time = fit_clusters(rows, valid)
     keep = float(np.exp(-1.0 / time))
     pushes = np.sqrt(variance * (1.0 - keep**2))
-    inside, drawn, null = np.flatnonzero(valid), np.zeros(len(squares)), []
-    ordered = np.sort(squares[inside])
-    for _ in range(DRAWS):
-        loudness = lfilter([pushes], [1.0, -keep], rng.normal(size=len(squares)))[inside]
-        sizes = loudness + np.log(np.abs(rng.normal(size=len(inside))))
-        # the drive's own squares, in the order of the simulated ones: of as heavy tails as they are
-        drawn[inside[np.argsort(sizes)]] = ordered
-        null.append(_scores(drawn, valid).max())
+    inside, drawn = np.flatnonzero(valid), np.zeros(len(squares))
+    ordered, null, p_value = np.sort(squares[inside]), np.zeros(0), 0.0
     observed = float(_scores(squares, valid).max())
-    return upper_tail(observed * abs(observed), np.asarray(null) * np.abs(null))
+    for draws in DRAWS:
+        own = np.zeros(draws)
+        for draw in range(draws):
+            loudness = lfilter([pushes], [1.0, -keep], rng.normal(size=len(squares)))[inside]
+            sizes = loudness + np.log(np.abs(rng.normal(size=len(inside))))
+            # the drive's own squares, in the order of the simulated ones: of as heavy tails as they are
+            drawn[inside[np.argsort(sizes)]] = ordered
+            own[draw] = _scores(drawn, valid).max()
+        null = np.concatenate([null, own])
+        p_value = exponential_tail(observed, null)
+        if p_value > UNSURE:
+            break
+    return p_value
 
 
 def fit_clusters(rows: FloatArray, valid: BoolArray) -> tuple[float, float]:

@@ -28,7 +28,7 @@ class SlowSpreadTerm(ColumnTerm):
     kind: ClassVar[str] = "scale"
     stages: ClassVar[tuple[Stage, ...]] = (Stage.SPREAD,)
     place: ClassVar[int] = 2
-    weight: ClassVar[float] = 3.0
+    weight: ClassVar[float] = 2.0
     seen_held_out: ClassVar[bool] = False
     acts: ClassVar[Acts] = Acts.SPREAD
     what: ClassVar[str] = "spread"
