@@ -140,3 +140,18 @@ def test_the_residual_is_cut_by_every_column_and_by_what_was_found(coarse: Coars
 def test_a_cycle_s_frequency_is_known_where_there_is_one(coarse: Coarse) -> None:
     assert _frequency(fit_model(coarse, (X,))) is None
     assert _frequency(fit_model(coarse, (CycleTerm(1.0 / 12.0),))) == 1.0 / 12.0
+
+
+def test_a_population_s_base_holds_what_its_trucks_do_to_the_rest() -> None:
+    """Trucks move half as much, which no term says of whole drives; the paper's model holds no such thing."""
+    rng = np.random.default_rng(152)
+    drives, seconds = 40, 90.0
+    truck = np.repeat(np.arange(drives) % 2, round(seconds / 0.2)).astype(float)
+    moved = movement(rng, drives * seconds, 3.0) * np.where(truck > 0.0, 0.5, 1.0)
+    fitted = fit_model(coarse_of(moved, {"is_truck": truck}, drives=drives), ())
+    used = np.ones(len(fitted.coarse.timeline), dtype=bool)
+    with_place = fit_without(fitted, {}, used, ModelKind.AUTOREGRESSIVE, "after", None)
+    spread = [effect for effect in with_place.effects if effect.acts is Acts.SPREAD]  # type: ignore[union-attr]
+    assert [effect.columns for effect in spread] == [("is_truck",)]
+    assert np.exp(spread[0].coefficients[0]) == pytest.approx(0.5, rel=0.25)  # type: ignore[union-attr]
+    assert fit_without(fitted, {}, used, ModelKind.TWO_LEVEL, "before", None).effects == ()

@@ -20,6 +20,9 @@ from xosc_lateral.drives.resampling import STEP
 
 FloatArray = NDArray[np.float64]
 
+COLUMNS = ("is_truck", "lane_index", "speed")
+"""What a population's drivers are told apart by: class, lane and speed."""
+
 LEAST_DRIVES = 30
 """Fewer are no population: whose lane it was, and who he is, can't be told apart. [-]"""
 
@@ -101,11 +104,7 @@ def _neutral(run: Run, effects: Sequence[ColumnEffect]) -> Run:
 def _shapes(runs: Sequence[Run]) -> list[ColumnEffect]:
     """Effects without coefficients, of columns that all runs have and that vary."""
     shared = set.intersection(*(set(run.context) for run in runs)) if runs else set()
-    columns = {
-        name: np.concatenate([run.context[name] for run in runs])
-        for name in ("is_truck", "lane_index", "speed")
-        if name in shared
-    }
+    columns = {name: np.concatenate([run.context[name] for run in runs]) for name in COLUMNS if name in shared}
     varying = {name for name, values in columns.items() if np.isfinite(values).all() and np.ptp(values) > 0.0}
     found: list[ColumnEffect] = []
     if "is_truck" in varying:

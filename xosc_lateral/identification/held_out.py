@@ -10,7 +10,7 @@ from msgspec import structs
 from numpy.typing import NDArray
 
 from xosc_lateral.driver.effects import ColumnEffect, Effect
-from xosc_lateral.driver.fitting import fit_runs
+from xosc_lateral.driver.fitting import fit_population, fit_runs
 from xosc_lateral.driver.models.kinds import ModelKind
 from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.driver.provenance import Provenance
@@ -119,13 +119,17 @@ def _held_out_runs(
 def fit_without(
     fitted: Fitted, estimates: Estimates, used: BoolArray, kind: ModelKind, name: str, provenance: Provenance | None
 ) -> DriverProfile:
-    """Base model of what is left without the effects, and the effects."""
+    """Base model of what is left without the effects, and the effects.
+
+    Of a population the base holds what class, lane and speed do to the rest, as `fit` has it; the paper's has not.
+    """
     runs = bare_runs(fitted.coarse.timeline, removal_of(fitted, estimates), used)
     if not runs:
         raise NotEnoughDataError("closing the loop: no run of 10 s is left to fit the base model on")
-    profile = fit_runs(runs, name=name, model=kind, provenance=provenance)
+    fit = fit_runs if kind is ModelKind.TWO_LEVEL else fit_population
+    profile = fit(runs, name=name, model=kind, provenance=provenance)
     effects: tuple[Effect, ...] = tuple(effect for _, own in estimates.values() for effect in own)
-    return structs.replace(profile, effects=effects)
+    return structs.replace(profile, effects=(*profile.effects, *effects))
 
 
 def _quantities(selection: Selection, columns: list[Column]) -> dict[str, FloatArray]:

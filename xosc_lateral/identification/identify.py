@@ -32,6 +32,9 @@ from xosc_lateral.identification.timeline import Timeline
 VETOED = "significant, but chosen and estimated on other blocks it predicts the held-out ones worse than nothing"
 """Why a term that loses on held-out rows is rejected."""
 
+UNSURE = "significant by itself, but within its error of nothing beside what else was found"
+"""Why a term whose size is shrunk to nothing is rejected."""
+
 Progress = Callable[[float, str], None]
 """Told the share that is done and what is being done."""
 
@@ -108,7 +111,7 @@ def identify(
     # products of small matrices gain nothing from threads, and lose a factor of ten to them where all cores are busy
     with threadpool_limits(1, user_api="blas"):
         search = Search.over(coarse, columns, seed, ERROR_BUDGET, lambda what: progress(0.1, what))
-        selection = select(search, initial)
+        selection = _of_some_size(select(search, initial))
         blocks = hold_out_blocks(coarse.timeline)
         kept, nested, gains, total, reason = _judged(search, selection, blocks, initial, progress)
     return Identified(kept, nested, gains, total, reason, columns, feedback, unused)
@@ -152,6 +155,18 @@ def _same_throughout(effect: ColumnEffect, timeline: Timeline) -> bool:
     values = effect.known({name: context[name] for name in effect.columns})
     inside = [values[rows][timeline.valid[rows]] for rows in timeline.spans]
     return all(np.ptp(own, axis=0).max() == 0.0 for own in inside if len(own))
+
+
+def _of_some_size(selection: Selection) -> Selection:
+    """Less what is within one standard error of nothing beside what was found with it, and would be shrunk to nothing.
+
+    Of terms that held-out rows can't judge: the others are told from nothing there.
+    """
+    for one in [one for one in selection.accepted if not one.term.predictable]:
+        effects = [effect for effect in one.term.estimate(selection.final) if isinstance(effect, ColumnEffect)]
+        if effects and not any(any(effect.coefficients) for effect in effects):
+            selection = selection.without([one.term], UNSURE)
+    return selection
 
 
 def _judged(

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.driver.effects import Effect
+from xosc_lateral.driver.place import COLUMNS
 from xosc_lateral.drives.cuts import MIN_RUN
 from xosc_lateral.drives.drive import Run
 from xosc_lateral.drives.resampling import STEP
@@ -45,7 +46,10 @@ def removal_of(fitted: Fitted, estimates: Estimates) -> Removal:
 
 
 def bare_runs(timeline: Timeline, removal: Removal, used: BoolArray) -> list[Run]:
-    """Runs of the movement [m] without effects, from the valid rows in `used`, shape (n,); at least `MIN_RUN` long."""
+    """Runs of the movement [m] without effects, from the valid rows in `used`, shape (n,); at least `MIN_RUN` long.
+
+    They know class, lane and speed, as far as the table does: what these do to a population is fitted with its base.
+    """
     runs: list[Run] = []
     for index, name in enumerate(timeline.names):
         for rows in true_slices(timeline.valid & used & (timeline.drive == index)):
@@ -66,14 +70,17 @@ def bare_movement(timeline: Timeline, removal: Removal, rows: slice, mean: float
 def _run(timeline: Timeline, removal: Removal, rows: slice, name: str, index: int) -> Run:
     movement = bare_movement(timeline, removal, rows)
     width = timeline.lane_width[rows]
+    context = {name: timeline.context[name][rows] for name in COLUMNS if name in timeline.context}
     rate = np.exp(removal.rate[rows])
     if np.any(rate != 1.0):
         # the base's own clock runs at the effect's rate: read the movement at even ticks of that clock
         ticks = np.concatenate([[0.0], np.cumsum(0.5 * (rate[1:] + rate[:-1]))])
         even = np.arange(int(ticks[-1]) + 1, dtype=np.float64)
         movement, width = np.interp(even, ticks, movement), np.interp(even, ticks, width)
+        nearest = np.round(np.interp(even, ticks, np.arange(len(ticks)))).astype(np.intp)
+        context = {name: values[nearest] for name, values in context.items()}
     time = timeline.time[rows.start] + STEP * np.arange(len(movement))
-    return Run(name, index, time, movement, width, {}, frozenset())
+    return Run(name, index, time, movement, width, context, frozenset())
 
 
 def _smooth(values: FloatArray) -> FloatArray:
