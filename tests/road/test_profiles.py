@@ -93,4 +93,4 @@ def test_a_lane_without_records_lies_on_the_road() -> None:
 
 
 def test_before_the_first_record_it_holds_already() -> None:
-    assert height(lane(-1, (30.0, 0.2, 0.2)), 10.0, 0.0) == pytest.approx(0.2)
+    assert height(lane(-1, (30.0, 0.2, 0.2), (40.0, 0.4, 0.4)), 10.0, 0.0) == pytest.approx(0.2)
