@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import xosc_lateral as xl
@@ -134,7 +135,11 @@ def test_comparing_shows_which_are_alike(team, tmp_path, capsys):
     compared = json.loads(out)
     (alike,) = [group for group in compared["alike"] if len(group) > 1]
     assert set(alike) == {"driver-00", "driver-04"}
-    assert compared["floor"] == max(row[k] for k, row in enumerate(compared["distance"]))
+    distance, floor = np.array(compared["distance"]), np.array(compared["floor"])
+    assert np.diag(floor) == pytest.approx(np.diag(distance), abs=1e-4)
+    assert floor[0, 2] == pytest.approx(np.sqrt(0.5 * (floor[0, 0] ** 2 + floor[2, 2] ** 2)), abs=2e-4)
+    different = distance > floor
+    assert different[2:, :2].all() and not different[0, 1], "each profile by its own floor, not by the shakiest one's"
     assert "driver-02" in page.read_text(encoding="utf-8")
 
 

@@ -31,6 +31,9 @@ SHOWN_S = 120.0
 SPACING = 0.8
 """Between the zero lines of two sample paths. [m]"""
 
+HALVINGS, SURE = 40, 0.95
+"""Random halves of a profile's drivers, and how many of them are no further apart than what counts as alike. [-]"""
+
 SHOWN = 12
 """So many profiles are drawn at most; the distances are of all."""
 
@@ -48,7 +51,8 @@ class Compared:
     spectra : tuple of Spectrum
     metrics : array, shape (k, k, 10)
         Wasserstein distance per metric, in standard deviations over all profiles' snippets. On the diagonal: of a
-        profile from itself, one half of its drivers from the other.
+        profile from itself, one half of its drivers from the other, where the mean over the metrics is the 95 %
+        quantile of random halves.
     seed : int
     """
 
@@ -65,19 +69,24 @@ class Compared:
         return np.asarray(self.metrics.mean(axis=2))
 
     @property
-    def floor(self) -> float:
-        """Distance up to which profiles are alike: the largest that one has from itself, between halves of drivers."""
-        return float(np.diag(self.distance).max())
+    def floors(self) -> FloatArray:
+        """Up to which distance two profiles are alike, shape (k, k): root mean square of both from themselves. [-]
+
+        Half of the drivers differ by more than all of them would, which leaves room for the chance of a fit to a
+        hundred drives or more. That of fewer is greater, and not known here.
+        """
+        own = np.diag(self.distance)
+        return np.sqrt(0.5 * (own[:, None] ** 2 + own[None, :] ** 2))
 
     @property
     def groups(self) -> tuple[tuple[str, ...], ...]:
-        """Profiles that are alike: no further apart (average linkage) than the shakiest profile is from itself."""
+        """Profiles that are alike: no further apart (average linkage) than their floor."""
         from scipy.cluster.hierarchy import fcluster, linkage
         from scipy.spatial.distance import squareform
 
-        between = self.distance.copy()
+        between = self.distance / np.maximum(self.floors, 1e-12)
         np.fill_diagonal(between, 0.0)
-        labels = fcluster(linkage(squareform(between, checks=False), "average"), self.floor, "distance")
+        labels = fcluster(linkage(squareform(between, checks=False), "average"), 1.0, "distance")
         names = [profile.name for profile in self.profiles]
         return tuple(tuple(names[k] for k in np.flatnonzero(labels == one)) for one in dict.fromkeys(labels))
 
@@ -90,7 +99,7 @@ def compare(profiles: Sequence[DriverProfile], seed: int) -> Compared:
         for profile, own in zip(profiles, runs, strict=True)
     ]
     pooled = [np.concatenate(own) for own in snippets]
-    metrics = _gap_matrix(pooled, snippets)
+    metrics = _gap_matrix(pooled, snippets, seed)
     return Compared(
         tuple(profiles),
         tuple(summarise(own, profile.model.step) for profile, own in zip(profiles, runs, strict=True)),
@@ -101,18 +110,28 @@ def compare(profiles: Sequence[DriverProfile], seed: int) -> Compared:
     )
 
 
-def _gap_matrix(pooled: Sequence[FloatArray], snippets: Sequence[Sequence[FloatArray]]) -> FloatArray:
+def _gap_matrix(pooled: Sequence[FloatArray], snippets: Sequence[Sequence[FloatArray]], seed: int) -> FloatArray:
     """Gaps of all metrics in standard deviations, shape (k, k, metrics); the diagonal is between halves. [-]"""
     scale = np.concatenate(pooled).std(axis=0)
     scale = np.where(scale > 0.0, scale, 1.0)
     count = len(pooled)
     metrics = np.empty((count, count, len(METRICS)))
     for one in range(count):
-        halves = np.concatenate(snippets[one][::2]), np.concatenate(snippets[one][1::2])
-        metrics[one, one] = _gaps(*halves) / scale
+        metrics[one, one] = _from_itself(snippets[one], scale, np.random.default_rng([seed, one]))
         for other in range(one):
             metrics[one, other] = metrics[other, one] = _gaps(pooled[one], pooled[other]) / scale
     return metrics
+
+
+def _from_itself(drivers: Sequence[FloatArray], scale: FloatArray, rng: np.random.Generator) -> FloatArray:
+    """Distance per metric, shape (10,), between those random halves that are further apart than 95 % of them."""
+    found = []
+    for _ in range(HALVINGS):
+        order = rng.permutation(len(drivers)).tolist()
+        half, rest = order[: len(order) // 2], order[len(order) // 2 :]
+        found.append(_gaps(*(np.concatenate([drivers[k] for k in part]) for part in (half, rest))) / scale)
+    means = [float(gaps.mean()) for gaps in found]
+    return found[int(np.argsort(means)[round(SURE * (HALVINGS - 1))])]
 
 
 def _gaps(one: FloatArray, other: FloatArray) -> FloatArray:
@@ -129,12 +148,12 @@ def comparison_text(compared: Compared) -> str:
     distance = compared.distance
     lines.append(
         f"mean distance of ten metrics of {SNIPPET:g} s snippets, in standard deviations "
-        "(diagonal: two halves of its drivers):"
+        "(diagonal: halves of its drivers, 95 % quantile):"
     )
     width = max(map(len, names))
     for number, name in enumerate(names):
         lines.append(f"  {name:<{width}}  " + " ".join(f"{value:5.2f}" for value in distance[number]))
-    lines.append(f"floor: {compared.floor:.2f}; profiles that are further apart than it differ")
+    lines.append("floor of two profiles: root mean square of their diagonals; further apart, they differ")
     lines += [f"alike: {', '.join(group)}" for group in compared.groups if len(group) > 1]
     return "\n".join(line.rstrip() for line in lines)
 
@@ -169,7 +188,7 @@ def comparison_record(compared: Compared) -> dict[str, Any]:
             name: [[round(float(value), 4) for value in row] for row in compared.metrics[:, :, k]]
             for k, name in enumerate(METRICS)
         },
-        "floor": round(compared.floor, 4),
+        "floor": [[round(float(value), 4) for value in row] for row in compared.floors],
         "alike": [list(group) for group in compared.groups],
         "seed": compared.seed,
     }

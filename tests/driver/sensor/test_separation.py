@@ -114,6 +114,10 @@ def test_steps_of_a_lattice_are_found_and_their_noise_is_known(truth):
     profile = fit_runs([made_run(x[::4]) for x in truth[1][:2]], name="coarse", model="two-level")
     assert any("rounded to 1.5 m, too coarse" in line for line in fit_warnings(replace(profile, sensor=coarse.sensor)))
     assert not any("too coarse" in line for line in fit_warnings(replace(profile, sensor=found.sensor)))
+    assert not any("rounded to" in line for line in fit_warnings(replace(profile, sensor=found.sensor)))
+    spread = np.sqrt(found.sensor.driver_variance)
+    wide = replace(profile, sensor=replace(found.sensor, rounding=float(spread)))
+    assert any("look volatile" in line for line in fit_warnings(wide))
 
 
 def test_low_passed_noise_is_found_beside_rounding(truth):
