@@ -55,12 +55,11 @@ def test_the_density_adds_up_to_the_variance_gaps_or_none() -> None:
 
 def test_with_many_whole_segments_those_with_gaps_do_not_count() -> None:
     values, (valid, seams) = series(5), whole(6000)
-    valid[5900] = False
+    _, _, every = gapped_spectrum(values, valid, seams, STEP, SEGMENT)
+    valid[3000] = False  # two segments, which overlap by half, hold it
     _, density, number = gapped_spectrum(values, valid, seams, STEP, SEGMENT)
-    values[:, 5900] = 1e3
-    _, again, same = gapped_spectrum(values, valid, seams, STEP, SEGMENT)
-    assert number == same >= MANY_SEGMENTS
-    np.testing.assert_array_equal(density, again)
+    assert number == every - 2 >= MANY_SEGMENTS
+    assert (density > 0.0).all()
 
 
 def test_with_few_those_that_are_mostly_there_do() -> None:
