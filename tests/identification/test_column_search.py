@@ -10,7 +10,7 @@ import pytest
 from tests.identification.made_coarse import coarse_of, movement, wander
 from xosc_lateral.driver.effects import Acts, Linear
 from xosc_lateral.driver.effects.response import respond
-from xosc_lateral.identification.column_search import best_columns, find_column
+from xosc_lateral.identification.column_search import find_column, likely_response
 from xosc_lateral.identification.columns import Column, Role
 from xosc_lateral.identification.regression import Coarse, fit_model
 from xosc_lateral.identification.search import Search
@@ -65,12 +65,15 @@ def test_idle_columns_are_hardly_ever_sure_to_do_anything() -> None:
     assert max(values) > 0.1
 
 
-def test_columns_that_may_act_are_told_by_the_best_p_value() -> None:
+def test_what_a_column_may_do_is_told_by_the_best_p_value() -> None:
     coarse = drive(36, log_spread=0.5)
     search = Search.over(coarse, COLUMNS, np.random.SeedSequence(1), ERROR_BUDGET)
     fitted = fit_model(coarse, ())
-    assert best_columns(search, SpreadTerm, fitted, 0.1) == ("x",)
-    assert best_columns(search, SpreadTerm, fitted, 0.0) == ()
+    response = likely_response(search, SpreadTerm, fitted, 0.1)
+    assert response.shape == (len(coarse), 1)
+    x = coarse.response(Linear(acts=Acts.LOCATION, column="x"))
+    assert abs(np.corrcoef(response[coarse.valid, 0], x[coarse.valid, 0])[0, 1]) > 0.7
+    assert likely_response(search, SpreadTerm, fitted, 0.0).shape == (len(coarse), 0)
 
 
 def test_a_part_of_a_table_is_given_as_many_terms_as_the_table_has_and_no_others() -> None:

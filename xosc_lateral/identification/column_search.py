@@ -137,14 +137,15 @@ def best_probability(search: Search, kind: type[ColumnKind], fitted: Fitted) -> 
     return 1.0 if scored is None else upper_tail(float(scored.scores.scores.max()), scored.scores.maxima)
 
 
-def best_columns(search: Search, kind: type[ColumnKind], fitted: Fitted, level: float) -> tuple[str, ...]:
-    """Columns of the best candidate where its p-value is at most `level`; none where it is not."""
+def likely_response(search: Search, kind: type[ColumnKind], fitted: Fitted, level: float) -> FloatArray:
+    """Response of the best candidate, shape (n, 1), where its p-value is at most `level`; else of shape (n, 0)."""
     scored = _score_all(search, kind, fitted)
+    nothing = np.zeros((len(fitted.coarse), 0))
     if scored is None:
-        return ()
+        return nothing
     best = scored.scores.best
     likely = upper_tail(float(scored.scores.scores[best]), scored.scores.maxima) <= level
-    return scored.dictionary.candidates[best].columns if likely else ()
+    return fitted.coarse.response(scored.dictionary.timed(best)) if likely else nothing
 
 
 def _score_all(search: Search, kind: type[ColumnKind], fitted: Fitted, spared: tuple[str, ...] = ()) -> _Scored | None:

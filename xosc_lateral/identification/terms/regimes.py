@@ -21,7 +21,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.driver.effects import Effect, Regimes
-from xosc_lateral.identification.column_search import best_columns
 from xosc_lateral.identification.log_scale import squared_innovations
 from xosc_lateral.identification.markov_switching import RegimeFit, fit_regimes
 from xosc_lateral.identification.regression import Coarse, Fitted
@@ -29,8 +28,7 @@ from xosc_lateral.identification.seeds import LoopSeed
 from xosc_lateral.identification.significance import exponential_tail
 from xosc_lateral.identification.squares import SLOW_S, fine_squares, log_sizes, slow_squares
 from xosc_lateral.identification.terms.base import Description, Outcome, Removal, Stage, Term
-from xosc_lateral.identification.terms.column import columns_on_size
-from xosc_lateral.identification.terms.spread import SpreadTerm, known_log_scale
+from xosc_lateral.identification.terms.spread import known_log_scale, what_columns_may_do
 
 if TYPE_CHECKING:
     from xosc_lateral.identification.search import Search
@@ -48,11 +46,6 @@ and no regime. Sensitivity: docs/design/identification.md. [s]"""
 
 SHORTEST_S = 12
 """Lags are compared from here on: two time constants of what is no regime. [s]"""
-
-MAY_ACT = 0.1
-"""A column that p-values up to this speak for may be what makes stretches loud, rain for one (factors of 1.3 and 2 with
-p = 0.01 and 0.05: beside rain p of regimes is 0.2, without it 3e-4 and 1e-10). The best of all columns taken out,
-whatever its p-value, costs true regimes of a minute up to 19 orders of magnitude. [-]"""
 
 DRAWS = (400, 3600)
 """Movements without regimes that are the null; the second lot where the first leaves it open."""
@@ -92,10 +85,8 @@ class RegimesTerm(Term):
         coarse = fitted.coarse
         if not coarse.lasts or any(isinstance(term, cls) for term in fitted.terms):
             return None
-        # what a column does to the size in another shape than the one that was found is no regime, nor what one may do
-        # that is not quite significant
-        columns = columns_on_size(fitted).union(best_columns(search, SpreadTerm, fitted, MAY_ACT))
-        known = [known_log_scale(fitted), search.cross_basis(columns)]
+        # what a column does to the size in another shape than the one that was found is no regime
+        known = [known_log_scale(fitted), what_columns_may_do(search, fitted)]
         p_value = probability_of_clusters(
             fitted.innovations, coarse.valid, np.concatenate(known, axis=1), search.rng(LoopSeed.REGIMES)
         )

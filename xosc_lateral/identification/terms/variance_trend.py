@@ -22,7 +22,7 @@ from xosc_lateral.identification.regression import Coarse, Fitted, elapsed
 from xosc_lateral.identification.significance import LEAST
 from xosc_lateral.identification.squares import SLOW_S, fine_squares, log_sizes, slow_squares
 from xosc_lateral.identification.terms.base import Description, Outcome, Removal, Stage, Term
-from xosc_lateral.identification.terms.column import columns_on_size
+from xosc_lateral.identification.terms.spread import what_columns_may_do
 
 if TYPE_CHECKING:
     from xosc_lateral.identification.search import Search
@@ -69,7 +69,7 @@ class VarianceTrendTerm(Term):
         if not fitted.coarse.lasts or any(isinstance(term, cls) for term in fitted.terms):
             return None
         # what a column does to the size of any part of the movement is no trend, slow as the column may be
-        known = search.cross_basis(columns_on_size(fitted))
+        known = what_columns_may_do(search, fitted)
         fast, slow = (_probability(fitted, own, known) for own in (False, True))
         term = cls(slow=slow < fast)
         p_value = min(1.0, 2.0 * min(fast, slow))
