@@ -135,7 +135,7 @@ def test_comparing_shows_which_are_alike(team, tmp_path, capsys):
     compared = json.loads(out)
     (alike,) = [group for group in compared["alike"] if len(group) > 1]
     assert set(alike) == {"driver-00", "driver-04"}
-    distance, floor = np.array(compared["distance"]), np.array(compared["floor"])
+    distance, floor = np.array(compared["distance"]), np.array(compared["floors"])
     assert np.diag(floor) == pytest.approx(np.diag(distance), abs=1e-4)
     assert floor[0, 2] == pytest.approx(np.sqrt(0.5 * (floor[0, 0] ** 2 + floor[2, 2] ** 2)), abs=2e-4)
     different = distance > floor

@@ -188,7 +188,8 @@ def comparison_record(compared: Compared) -> dict[str, Any]:
             name: [[round(float(value), 4) for value in row] for row in compared.metrics[:, :, k]]
             for k, name in enumerate(METRICS)
         },
-        "floor": [[round(float(value), 4) for value in row] for row in compared.floors],
+        "floor": round(float(compared.floors.max()), 4),
+        "floors": [[round(float(value), 4) for value in row] for row in compared.floors],
         "alike": [list(group) for group in compared.groups],
         "seed": compared.seed,
     }
