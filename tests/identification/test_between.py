@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 
 from xosc_lateral.driver.effects import Linear
+from xosc_lateral.driver.fitting import fit_profile
+from xosc_lateral.driver.models.kinds import ModelKind
 from xosc_lateral.drives.drive import Drive
 from xosc_lateral.identification.close import close_loop
 from xosc_lateral.identification.identify import usable_columns
@@ -85,7 +87,9 @@ def test_few_drives_say_nothing_between_them() -> None:
 
 
 def test_the_loop_adds_it_and_comes_closer_on_drives_that_it_did_not_fit() -> None:
-    result = close_loop(drives(np.random.default_rng(5), 40, size=0.3, seconds=60.0), seed=1)
+    own = drives(np.random.default_rng(5), 40, size=0.3, seconds=60.0)
+    base = fit_profile(own, name="paper", model=ModelKind.TWO_LEVEL)  # which does not know what speed does
+    result = close_loop(own, base, seed=1)
     finding = next(finding for finding in result.findings if finding.columns == ("speed",))
     assert finding.kind == "location"
     assert finding.error_after < 0.5 * finding.error_before

@@ -162,7 +162,9 @@ def close_loop(
         progress(0.02, "fitting the base profile")
         base = fit_without(fit_model(coarse, ()), {}, everything, kind, f"{name}-base", provenance)
     spectrum = compare_spectrum_shapes(base, timeline, root)
-    found = identify(coarse, root, initial=initial_terms(base, timeline), excluded=excluded, progress=progress)
+    # the loop's own base knows what class, lane and speed do as `fit` has it; what acts is found, not begun with
+    initial = initial_terms(base, timeline) if given else ()
+    found = identify(coarse, root, initial=initial, excluded=excluded, progress=progress)
     population = test_population(found.selection.final, between_shift(found.selection.final))
     differ = population is not None and population.found
     refined_kind = ModelKind.AUTOREGRESSIVE if spectrum.found or differ else kind

@@ -13,7 +13,7 @@ from xosc_lateral.identification.problem import Problem, of_squares
 from xosc_lateral.identification.regression import Coarse, Fitted
 from xosc_lateral.identification.squares import SLOW_S, log_sizes, slow_squares
 from xosc_lateral.identification.terms.base import Stage
-from xosc_lateral.identification.terms.column import ColumnTerm, columns_acting, responses
+from xosc_lateral.identification.terms.column import ColumnTerm, columns_on_size, responses
 from xosc_lateral.identification.terms.mean import MeanTerm
 from xosc_lateral.identification.terms.spread import known_log_scale
 
@@ -46,8 +46,8 @@ class SlowSpreadTerm(ColumnTerm):
 
     @classmethod
     def barred(cls, fitted: Fitted) -> frozenset[str]:
-        """What acts on anything else already: what its shape leaves of itself is slow, and looks like slow movement."""
-        return columns_acting(fitted)
+        """Columns that act on the movement's size already."""
+        return columns_on_size(fitted)
 
     def estimate(self, fitted: Fitted) -> tuple[Effect, ...]:
         """Neighbouring sums overlap, so errors are wider."""
