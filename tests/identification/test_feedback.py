@@ -98,9 +98,36 @@ def test_gaps_and_missing_values_are_no_evidence() -> None:
     assert not find_feedback(timeline(offset, valid, x=column), [Column("x", Role.NUMBER, True)])
 
 
-def test_a_direction_is_never_feedback() -> None:
-    offset, _ = driven(52)
-    assert feedback(offset, offset, Role.ANGLE) is None
+def test_a_direction_that_turns_by_itself_is_no_feedback() -> None:
+    offset, rng = driven(52)
+    assert feedback(offset, 2.0 * low_passed(30.0, rng) % 3.0, Role.ANGLE) is None
+
+
+def test_what_jumps_like_an_angle_may_follow_too() -> None:
+    """A torque that keeps the lane changes its sign at each lane change."""
+    offset, rng = driven(52)
+    found = feedback(offset, -2.0 * offset + 0.05 * rng.normal(size=N), Role.ANGLE)
+    assert found is not None
+    assert not found.doubtful
+
+
+@pytest.mark.parametrize("seed", [54, 55])
+def test_an_activity_over_seconds_follows_from_how_fast_the_car_moves(seed: int) -> None:
+    """As a system reports it that watches a driver, or its own interventions."""
+    offset, rng = driven(seed)
+    keep = np.exp(-STEP / 3.0)
+    activity = lfilter([1.0 - keep], [1.0, -keep], np.abs(np.gradient(offset, STEP)))
+    found = feedback(offset, activity + 0.1 * activity.std() * low_passed(2.0, rng))
+    assert found is not None
+    assert (found.of, found.doubtful) == ("size of the lateral speed", False)
+
+
+@pytest.mark.parametrize("seed", [56, 57])
+def test_what_makes_a_car_restless_does_not_follow_from_it(seed: int) -> None:
+    offset, rng = driven(seed)
+    cause = low_passed(20.0, rng)
+    louder = lfilter([1.0], [1.0, -np.exp(-STEP / 2.0)], 0.05 * np.exp(0.5 * cause) * rng.normal(size=N))
+    assert feedback(offset + louder, cause) is None
 
 
 def test_too_short_a_drive_says_nothing() -> None:
