@@ -7,7 +7,8 @@ import pytest
 from msgspec import structs
 
 from xosc_lateral.datasets.movements import ornstein_uhlenbeck, record_movement
-from xosc_lateral.driver.effects import Acts, Linear, Proximity
+from xosc_lateral.driver.effects import Acts, Linear, Product, Proximity
+from xosc_lateral.driver.effects.product import Factor
 from xosc_lateral.driver.effects.response import respond
 from xosc_lateral.formats.drives import drives_of_table
 from xosc_lateral.identification.candidates import FINE_SCALES, Family, candidates_of, shapes_of
@@ -53,6 +54,24 @@ def test_a_time_constant_is_found_between_the_dictionarys(passed: Coarse) -> Non
     found = refinement.refine(structs.replace(term().effect, lag_s=0.0, response_s=4.0), 0.0, columns).effect
     assert found.lag_s == pytest.approx(LAG, abs=0.4)
     assert found.response_s == pytest.approx(RESPONSE, rel=0.25)
+
+
+def test_a_product_turns_its_sign_where_the_driver_does() -> None:
+    """Curves are cut above 33 m/s and taken wide below; half of the drive is slower than 28 m/s."""
+    table = record_movement(ornstein_uhlenbeck, 1800.0, 4)
+    time = table["time"].to_numpy()
+    speed, bend = 28.0 + 6.0 * np.sin(2 * np.pi * time / 311.0), np.sin(2 * np.pi * time / 53.0)
+    shift = 0.04 * respond((bend * (speed - 33.0))[:, None], float(time[1] - time[0]), LAG, RESPONSE)[:, 0]
+    left, right = table["distance_left"] - shift, table["distance_right"] + shift
+    moved = table.assign(distance_left=left, distance_right=right, speed=speed, bend=bend)
+    coarse = Coarse.of(join_drives(drives_of_table(moved, {})))
+    problem = MeanTerm.problem(fit_model(coarse, ()))
+    refinement = Refinement(coarse, problem, np.zeros((len(problem.observed), 0)), {})
+    factors = (Factor(column="bend"), Factor(column="speed", at=float(np.median(speed))))
+    found = refinement.refine(Product(acts=Acts.LOCATION, factors=factors), 0.0, {}).effect
+    assert isinstance(found, Product)
+    assert found.factors[0].at == 0.0  # a bend's natural zero
+    assert found.factors[1].at == pytest.approx(33.0, abs=1.0)
 
 
 def test_what_a_term_explains_is_on_the_fine_grid_what_the_profile_gives(passed: Coarse) -> None:

@@ -31,6 +31,9 @@ RESPONSES = (0.3, 0.6, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0)
 FINE_RESPONSES = tuple(np.round(np.geomspace(0.3, 8.0, 19), 2).tolist())
 """And in the end, a fifth apart: with a time constant half as long again the size is 15 % off. [s]"""
 
+CENTRES = tuple(np.round(np.arange(0.05, 0.96, 0.1), 2).tolist())
+"""Quantiles at which a number may turn the sign of another column's effect. [-]"""
+
 LAG_STEPS = (1.0, 0.4, 0.2)
 """Lags are searched in steps that get finer. [s]"""
 
@@ -149,13 +152,13 @@ class Refinement:
         return Refined(several[at][0], float(scores[at]), several[at][1]) if scores[at] > best.score else best
 
     def _shapes(self, effect: ColumnEffect, columns: Mapping[str, Column]) -> Iterator[tuple[ColumnEffect, float]]:
-        """Other shapes of the same column, and other scales of a product's proximities, with what each costs.
+        """Other shapes of the same column, and other scales and centres of a product's factors, with what each costs.
 
         A finer choice than the dictionary's makes the family as many times as large.
         """
         timing = {"lag_s": effect.lag_s, "response_s": effect.response_s}
         if isinstance(effect, Product):
-            others = list(other_scales(effect, FINE_SCALES))
+            others = [*other_scales(effect, FINE_SCALES), *other_centres(effect, self._coarse)]
             price = self._costs.get(Family.PRODUCT, 0.0) + 2.0 * float(np.log(max(1, len(others))))
             yield from ((structs.replace(other, **timing), price) for other in others)
             return
@@ -187,9 +190,20 @@ def means_by_second(sums: FloatArray, late: int) -> FloatArray:
 def other_scales(effect: Product, shares: Sequence[float]) -> Iterator[Product]:
     """The same product with one of its proximities fading over a share of its distance."""
     for index, factor in enumerate(effect.factors):
-        if factor.form is not Form.PROXIMITY:
-            continue
-        for share in shares:
-            factors = list(effect.factors)
-            factors[index] = structs.replace(factor, at=factor.at * share)
-            yield structs.replace(effect, factors=(factors[0], factors[1]))
+        if factor.form is Form.PROXIMITY:
+            yield from (_with(effect, index, factor.at * share) for share in shares)
+
+
+def other_centres(effect: Product, coarse: Coarse) -> Iterator[Product]:
+    """The same product, where one of its numbers turns the sign of the other's effect elsewhere than at its median."""
+    for index, factor in enumerate(effect.factors):
+        if factor.form is Form.VALUE and factor.at != 0.0:  # 0: its natural zero
+            seen = coarse.context[factor.column][coarse.timeline.valid]
+            centres = np.unique(np.quantile(seen[np.isfinite(seen)], CENTRES))
+            yield from (_with(effect, index, float(centre)) for centre in centres)
+
+
+def _with(effect: Product, index: int, at: float) -> Product:
+    factors = list(effect.factors)
+    factors[index] = structs.replace(factors[index], at=at)
+    return structs.replace(effect, factors=(factors[0], factors[1]))

@@ -10,7 +10,14 @@ from xosc_lateral.driver.effects import ColumnEffect, Product, Proximity
 from xosc_lateral.identification.candidates import shapes_of
 from xosc_lateral.identification.columns import Column, read_column
 from xosc_lateral.identification.ranges import driving_range
-from xosc_lateral.identification.refinement import FINE_RESPONSES, LAG_LIMIT, LAG_STEPS, means_by_second, other_scales
+from xosc_lateral.identification.refinement import (
+    FINE_RESPONSES,
+    LAG_LIMIT,
+    LAG_STEPS,
+    means_by_second,
+    other_centres,
+    other_scales,
+)
 from xosc_lateral.identification.regression import Coarse, Fitted
 
 FloatArray = NDArray[np.float64]
@@ -77,10 +84,11 @@ def widening(fitted: Fitted, effect: ColumnEffect, part: slice) -> float:
 
 
 def _shapes(coarse: Coarse, effect: ColumnEffect) -> list[ColumnEffect]:
-    """Other shapes of the only column, or scales of a product, with one coefficient and the same timing."""
+    """Other shapes of the only column, or scales and centres of a product, with one coefficient and the same timing."""
     timing = {"lag_s": effect.lag_s, "response_s": effect.response_s}
     if isinstance(effect, Product):
-        return [structs.replace(other, response_range=()) for other in other_scales(effect, NEAR_SCALES)]
+        others = (*other_scales(effect, NEAR_SCALES), *other_centres(effect, coarse))
+        return [structs.replace(other, response_range=()) for other in others]
     if len(effect.columns) > 1 or len(effect.coefficients) > 1:
         return []
     (name,) = effect.columns
