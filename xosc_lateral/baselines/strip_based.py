@@ -15,12 +15,10 @@ from numpy.typing import NDArray
 from xosc_lateral.baselines.batch import SegmentBatch
 from xosc_lateral.baselines.calibration import Bounds, calibrate
 from xosc_lateral.baselines.simulated import SimulatedModel, driver_means_of
+from xosc_lateral.drives.cuts import HALF_WIDTH
 from xosc_lateral.drives.drive import Run
 
 FloatArray = NDArray[np.float64]
-
-HALF_WIDTH = 0.9
-"""Of the vehicle, which has to stay in its lane: a car of 1.8 m. [m]"""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

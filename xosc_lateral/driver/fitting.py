@@ -61,7 +61,20 @@ def fit_profile(
     ):  # to the letter: the paper takes offsets as they were measured
         return fit_runs(runs, name=name, model=model, provenance=provenance)
     cleaned, sensor = driver_runs(runs, drives, sensor_noise=sensor_noise)
-    return fit_population(cleaned, name=name, model=model, provenance=provenance, sensor=sensor)
+    known = provenance or Provenance()
+    known = replace(known, fit={**known.fit, **_marking_notes(drives)})
+    return fit_population(cleaned, name=name, model=model, provenance=known, sensor=sensor)
+
+
+def _marking_notes(drives: Sequence[Drive]) -> Mapping[str, float]:
+    """Shares of all rows that follow one marking, and that were left out, where a camera had misjudged any."""
+    mended = [(len(drive), drive.mended) for drive in drives if drive.mended]
+    rows = sum(map(len, drives))
+    if not mended:
+        return {}
+    one = sum(count * shares.one_marking for count, shares in mended) / rows
+    none = sum(count * shares.no_marking for count, shares in mended) / rows
+    return {"one_marking": round(one, 4), "no_marking": round(none, 4)}
 
 
 def fit_population(

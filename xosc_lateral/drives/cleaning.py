@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.drives.drive import Drive
+from xosc_lateral.drives.markings import mend_markings
 from xosc_lateral.errors import FormatError
 from xosc_lateral.limits import DRIVE_SPAN, TIME
 
@@ -81,7 +83,25 @@ def clean_drive(name: str, columns: dict[str, FloatArray], levels: frozenset[str
     context["lane_width"] = lane_width[good]
     held = frozenset(levels & context.keys())
     run = columns[RUN][good].astype(np.int64) if RUN in columns else None
-    return Drive(name, columns["time"][good], offset[good], lane_width[good], context, held, str(path), run)
+    drive = Drive(name, columns["time"][good], offset[good], lane_width[good], context, held, str(path), run)
+    return drive if run is not None else _seen_through(drive)
+
+
+def _seen_through(drive: Drive) -> Drive:
+    """With the other marking followed where a camera had misjudged one."""
+    mended = mend_markings(drive.time, drive.offset, drive.lane_width)
+    if mended is None:
+        return drive
+    kept = mended.kept
+    context = {key: values[kept] for key, values in drive.context.items()} | {"lane_width": mended.lane_width[kept]}
+    return replace(
+        drive,
+        time=drive.time[kept],
+        offset=mended.offset[kept],
+        lane_width=mended.lane_width[kept],
+        context=context,
+        mended=mended.shares,
+    )
 
 
 def _in_order(columns: dict[str, FloatArray], name: str, path: Path) -> dict[str, FloatArray]:

@@ -12,6 +12,7 @@ from xosc_lateral.drives.drive import Drive, Run
 from xosc_lateral.drives.resampling import STEP, column_on_grid, resample
 from xosc_lateral.errors import NotEnoughDataError
 
+FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
 
 MIN_SPEED = 40.0 / 3.6
@@ -22,6 +23,9 @@ LANE_CHANGE_MARGIN = 4.0
 
 JUMP = 0.5
 """A change of the relative offset between two rows that means another lane. [-]"""
+
+HALF_WIDTH = 0.9
+"""Half of a car's width: a centre nearer than this to a marking has a wheel on it. [m]"""
 
 MAX_GAP = 0.5
 """Missing rows up to this long are bridged; longer ones end a run. [s]"""
@@ -85,9 +89,11 @@ def whole_run(drive: Drive, step: float = STEP) -> Run:
 
 
 def lane_change_rows(drive: Drive, rules: CutRules = PAPER_RULES) -> BoolArray:
-    """Rows within the margin of a lane change: `lane_index` changes, or the offset jumps by about a lane width.
+    """Rows within the margin of a lane change.
 
-    None where an import has cut them already.
+    A lane has changed where `lane_index` does, where the offset jumps by half a lane width and more, and where rows are
+    missing while a wheel is on a marking: a camera that loses the lane there has another when it is back. None where an
+    import has cut them already.
 
     Returns
     -------
@@ -95,7 +101,7 @@ def lane_change_rows(drive: Drive, rules: CutRules = PAPER_RULES) -> BoolArray:
     """
     if drive.run is not None:
         return np.zeros(len(drive), dtype=np.bool_)
-    at = np.flatnonzero(_changes(drive))
+    at = np.flatnonzero(_changes(drive, rules))
     change = np.zeros(len(drive), dtype=np.bool_)
     first = np.searchsorted(drive.time, drive.time[at] - rules.lane_change_margin)
     last = np.searchsorted(drive.time, drive.time[at + 1] + rules.lane_change_margin, side="right")
@@ -104,15 +110,22 @@ def lane_change_rows(drive: Drive, rules: CutRules = PAPER_RULES) -> BoolArray:
     return change
 
 
-def _changes(drive: Drive) -> BoolArray:
+def lane_steps(offset: FloatArray, lane_width: FloatArray) -> BoolArray:
+    """Steps from row to row by which the offset jumps into another lane, shape (n - 1,); both [m] of shape (n,)."""
+    return np.asarray(np.abs(np.diff(offset)) > JUMP * np.minimum(lane_width[1:], lane_width[:-1]))
+
+
+def _changes(drive: Drive, rules: CutRules) -> BoolArray:
     """Steps from row to row between which the lane is another, shape (n - 1,)."""
-    step = np.abs(np.diff(drive.offset)) > JUMP * np.minimum(drive.lane_width[1:], drive.lane_width[:-1])
+    step = lane_steps(drive.offset, drive.lane_width)
+    on_marking = np.abs(drive.offset) > 0.5 * drive.lane_width - HALF_WIDTH
+    step |= (np.diff(drive.time) > rules.max_gap) & (on_marking[1:] | on_marking[:-1])
     lane = drive.context.get("lane_index")
     if lane is not None:
         known = np.flatnonzero(np.isfinite(lane))
         moved = known[:-1][np.diff(lane[known]) != 0]
         step[moved] = True
-    return np.asarray(step)
+    return step
 
 
 def slow_rows(drive: Drive, rules: CutRules = PAPER_RULES) -> BoolArray:

@@ -12,6 +12,21 @@ from numpy.typing import NDArray
 FloatArray = NDArray[np.float64]
 
 
+@dataclass(frozen=True, slots=True)
+class MarkingShares:
+    """Rows in which a camera had misjudged a lane marking.
+
+    Parameters
+    ----------
+    one_marking, no_marking : float
+        Shares of a drive's rows that follow one marking because the other was misjudged (by 5 cm of offset and more),
+        and that were left out because both were. [-]
+    """
+
+    one_marking: float
+    no_marking: float
+
+
 @dataclass(frozen=True, eq=False, slots=True)
 class Drive:
     """One drive as recorded, in clean units: finite, sorted, each time once.
@@ -35,6 +50,8 @@ class Drive:
     run : array of int, shape (n,), optional
         Number of the road-following stretch of each row, where an import has cut the drive already: lane changes and
         their margins are gone, and none are looked for again. None: nothing has been cut.
+    mended : MarkingShares, optional
+        Rows in which a camera had misjudged a marking, see `markings`.
     """
 
     name: str
@@ -45,6 +62,7 @@ class Drive:
     levels: frozenset[str] = frozenset()
     source: str = ""
     run: NDArray[np.int64] | None = None
+    mended: MarkingShares | None = None
 
     def __post_init__(self) -> None:
         """Copy and freeze; refuse unequal lengths and what readers must have taken out."""

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.evaluation.line_crossing import HALF_WIDTH, time_to_line_crossing
+from xosc_lateral.drives.cuts import HALF_WIDTH
+from xosc_lateral.evaluation.line_crossing import time_to_line_crossing
 from xosc_lateral.evaluation.margins import NEAR_MARKING
 
 FloatArray = NDArray[np.float64]

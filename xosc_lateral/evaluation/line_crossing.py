@@ -11,10 +11,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
+from xosc_lateral.drives.cuts import HALF_WIDTH
 
-HALF_WIDTH = 0.9
-"""Half of a car's width: 1.8 m, as in `NEAR_MARKING`. [m]"""
+FloatArray = NDArray[np.float64]
 
 LONGEST_TLC = 20.0
 """Times to line crossing beyond it count as it: far above the 2 s that warning systems look at. [s]"""

@@ -101,10 +101,15 @@ def profile_record(profile: DriverProfile) -> dict[str, Any]:
 
 
 def describe_profile(profile: DriverProfile) -> str:
-    """What was fitted, in a line; another for what of it is the sensor's."""
+    """What was fitted, in a line; others for lane markings that a camera had misjudged, and for the sensor's part."""
     known = profile.provenance
     text = (
         f"{profile.name}: {profile.model.kind} model from {known.hours:.2f} h in {known.runs} runs of {known.drives} "
         f"drives, {len(profile.effects)} effects"
     )
+    if one := known.fit.get("one_marking"):
+        text += (
+            f"\n{100 * one:.1f} % of the rows follow one lane marking, because the other was misjudged; "
+            f"{100 * known.fit['no_marking']:.1f} % are left out, because both were"
+        )
     return text if profile.sensor is None else f"{text}\n{profile.sensor.in_words()}"

@@ -24,6 +24,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from xosc_lateral.drives.markings import MAD_TO_SD
 from xosc_lateral.errors import NotEnoughDataError
 from xosc_lateral.mask import true_slices
 
@@ -36,7 +37,6 @@ TILT_PENALTY = 4.0  # ridge on the tilt's coefficients [-]; chosen likewise, 1 t
 CORRELATION = 0.9  # correlation of a driver's offset after 1 s, as assumed by the weights; 1 would let the level drift
 ROUNDS = 4  # of reweighting; the line moves by under 1 mm after three
 HUBER = 2.0  # residuals beyond this many standard deviations count less: undetected lane changes
-MAD_TO_SD = 1.4826  # of the normal distribution: one over the 75 % quantile [-]
 BEND_PENALTY = 0.1  # [-]
 MIN_PASSAGES = 10  # per 100 m of road, below which the lane ends
 
