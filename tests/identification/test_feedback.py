@@ -132,5 +132,29 @@ def test_what_makes_a_car_restless_does_not_follow_from_it(seed: int) -> None:
 
 def test_too_short_a_drive_says_nothing() -> None:
     offset, _ = driven(53)
-    short = offset[: round(60.0 / STEP)]
+    short = offset[: round(12.0 / STEP)]
     assert not find_feedback(timeline(short, x=-short), [Column("x", Role.NUMBER, False)])
+
+
+@pytest.mark.parametrize("seed", [61, 62, 63, 64])
+def test_runs_of_seconds_tell_too(seed: int) -> None:
+    """A phone's acceleration, half of it the car's, and its speed, over ten minutes in runs of 15 s."""
+    offset, rng = driven(seed)
+    seconds = np.arange(N) * STEP
+    valid = (seconds < 750.0) & (seconds % 18.75 < 15.0)
+    acceleration = np.gradient(np.gradient(offset, STEP), STEP)
+    acceleration += 1.0 * acceleration.std() * rng.normal(size=N)
+    columns = [Column("acceleration", Role.NUMBER, False), Column("speed", Role.NUMBER, False)]
+    found = find_feedback(timeline(offset, valid, acceleration=acceleration, speed=low_passed(30.0, rng)), columns)
+    assert [one.column for one in found] == ["acceleration"]
+
+
+@pytest.mark.parametrize("seed", range(70, 78))
+def test_runs_of_seconds_bar_no_cause(seed: int) -> None:
+    offset, rng = driven(seed)
+    seconds = np.arange(N) * STEP
+    valid = (seconds < 750.0) & (seconds % 18.75 < 15.0)
+    cause = low_passed(20.0, rng)
+    keep = np.exp(-STEP / 2.0)
+    moved = offset + 0.1 * lfilter([1.0 - keep], [1.0, -keep], cause)
+    assert not find_feedback(timeline(moved, valid, x=cause), [Column("x", Role.NUMBER, False)])

@@ -34,8 +34,8 @@ BoolArray = NDArray[np.bool_]
 IntArray = NDArray[np.intp]
 ComplexArray = NDArray[np.complex128]
 
-SEGMENT = 128
-"""Samples per segment of the spectral estimate: 25.6 s."""
+SEGMENTS = (128, 64)
+"""Samples per segment of the spectral estimate: 25.6 s, and 12.8 s where runs are too short for enough of those."""
 
 BAND = (0.2, 0.3, 0.4, 0.6, 0.8)
 """Edges of the parts of the band where a driver no longer responds, and sensors still see the car move. [Hz]"""
@@ -54,8 +54,15 @@ doubtful; below the last, coherence alone is doubtful too. Causes that share mor
 OWN_PAST, MOVED_PAST = 10, 5
 """Past samples of the column, and of the movement, in the test of time's direction: 2 s and 1 s."""
 
+CHANCE = 6.0
+"""Over the number of segments: what unrelated columns' coherence stays below, the largest of 4 parts and 6 movements
+(with 40 half-overlapping segments they reach 0.14). [-]"""
+
+ROWS_EACH = 15
+"""Rows per quantity that a regression needs to tell anything (F. Harrell, Regression Modeling Strategies, 2015). [-]"""
+
 MIN_SEGMENTS = 12
-"""Fewer segments than this say nothing."""
+"""Fewer segments of one length than this say little: the next length is taken."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,26 +91,25 @@ class Feedback:
 
 def find_feedback(timeline: Timeline, columns: Iterable[Column]) -> list[Feedback]:
     """Columns that follow from the movement, doubtful ones included."""
-    starts = _segments(timeline.valid)
-    if len(starts) < MIN_SEGMENTS:
-        return []
+    segments = _segments(timeline.valid)
     moved = _movement(timeline)
-    spectra = {name: _spectra(values, starts) for name, values in moved.items()}
+    spectra = {name: segments.spectra(values) for name, values in moved.items()}
     rows = _rows_with_past(timeline.valid, max(OWN_PAST, MOVED_PAST))
+    floor = CHANCE / max(1, len(segments.starts))
     found = []
     for column in columns:
         values = timeline.context.get(column.name, timeline.lane_width)
         known = np.isfinite(values)
         values = np.where(known, values, np.median(values[timeline.valid & known]))
-        shared = {name: _coherence(_spectra(values, starts), own) for name, own in spectra.items()}
-        size = _spectra(np.abs(values - np.median(values[timeline.valid])), starts)
+        seen = segments.spectra(values)
+        shared = {name: segments.coherence(seen, own) for name, own in spectra.items()}
+        size = segments.spectra(np.abs(values - np.median(values[timeline.valid])))
         for name in ("size of the offset", "excess of the offset"):
-            shared[name] = max(shared[name], _coherence(size, spectra[name]))
+            shared[name] = max(shared[name], segments.coherence(size, spectra[name]))
         of = max(shared, key=lambda name: shared[name])
         # a switch has hardly any changes that could be predicted
         changes = column.role in (Role.NUMBER, Role.ANGLE)
         predicted_share = _predicted_share(values, moved, rows) if changes else 0.0
-        floor = 6.0 / len(starts)
         clear = predicted_share >= PREDICTED or (shared[of] >= max(CLEAR, floor) and predicted_share >= HARDLY)
         if clear or shared[of] >= max(ALONE, floor) or predicted_share >= PERHAPS:
             found.append(Feedback(column.name, shared[of], predicted_share, of, not clear))
@@ -127,6 +133,8 @@ def _movement(timeline: Timeline) -> Mapping[str, FloatArray]:
 
 def _predicted_share(values: FloatArray, moved: Mapping[str, FloatArray], rows: IntArray) -> float:
     """Partial R squared of the recent movement, the present included, given the column's own past."""
+    if len(rows) < ROWS_EACH * (1 + OWN_PAST + len(moved) * len(range(0, MOVED_PAST + 1, 2))):
+        return 0.0
     now = values[rows]
     own = [np.ones(len(rows)), *(values[rows - lag] for lag in range(1, OWN_PAST + 1))]
     other = [series[rows - lag] for series in moved.values() for lag in range(0, MOVED_PAST + 1, 2)]
@@ -149,32 +157,45 @@ def _rows_with_past(valid: BoolArray, past: int) -> IntArray:
     return np.asarray(rows[sums[rows + 1] - sums[rows - past] == past + 1], dtype=np.intp)
 
 
-def _segments(valid: BoolArray) -> IntArray:
-    starts, at, n = [], 0, len(valid)
+@dataclass(frozen=True, eq=False, slots=True)
+class _Segments:
+    """Where the segments of a spectral estimate begin, and how many samples each has."""
+
+    starts: IntArray
+    length: int
+
+    def spectra(self, values: FloatArray) -> ComplexArray:
+        """Transforms of the first difference in the band, shape (segments, frequencies)."""
+        change = np.diff(values, prepend=values[:1])
+        pieces = change[self.starts[:, None] + np.arange(self.length)] * np.hanning(self.length)
+        return np.asarray(np.fft.rfft(pieces, axis=1)[:, self._in_band(self._frequency())])
+
+    def coherence(self, first: ComplexArray, second: ComplexArray) -> float:
+        """Squared, in the part of the band where most is shared: a shaky sensor hides the faster parts."""
+        cross = np.abs(np.sum(first * np.conj(second), axis=0)) ** 2
+        power = np.sum(np.abs(first) ** 2, axis=0) * np.sum(np.abs(second) ** 2, axis=0)
+        coherence = cross / np.maximum(power, 1e-300)
+        frequency = self._frequency()
+        part = np.searchsorted(BAND[1:-1], frequency[self._in_band(frequency)], side="right")
+        return float(max(coherence[part == index].mean() for index in np.unique(part)))
+
+    def _frequency(self) -> FloatArray:
+        return np.asarray(np.fft.rfftfreq(self.length, 0.2), dtype=np.float64)
+
+    @staticmethod
+    def _in_band(frequency: FloatArray) -> BoolArray:
+        return np.asarray((frequency >= BAND[0]) & (frequency <= BAND[-1]))
+
+
+def _segments(valid: BoolArray) -> _Segments:
+    """The longest of which there are enough, half overlapping, in uninterrupted stretches."""
     sums = np.concatenate([[0], np.cumsum(valid)])
-    while at + SEGMENT <= n:
-        if sums[at + SEGMENT] - sums[at] == SEGMENT:
-            starts.append(at)
-            at += SEGMENT // 2
-        else:
-            at += SEGMENT // 16
-    return np.asarray(starts, dtype=np.intp)
-
-
-def _spectra(values: FloatArray, starts: IntArray) -> ComplexArray:
-    """Transforms of the first difference in the band, shape (segments, frequencies)."""
-    change = np.diff(values, prepend=values[:1])
-    pieces = change[starts[:, None] + np.arange(SEGMENT)] * np.hanning(SEGMENT)
-    frequency = np.fft.rfftfreq(SEGMENT, 0.2)
-    return np.asarray(np.fft.rfft(pieces, axis=1)[:, (frequency >= BAND[0]) & (frequency <= BAND[-1])])
-
-
-def _coherence(first: ComplexArray, second: ComplexArray) -> float:
-    """Squared, in the part of the band where most is shared: a shaky sensor hides the faster parts."""
-    cross = np.abs(np.sum(first * np.conj(second), axis=0)) ** 2
-    power = np.sum(np.abs(first) ** 2, axis=0) * np.sum(np.abs(second) ** 2, axis=0)
-    coherence = cross / np.maximum(power, 1e-300)
-    frequency = np.fft.rfftfreq(SEGMENT, 0.2)
-    inside = frequency[(frequency >= BAND[0]) & (frequency <= BAND[-1])]
-    part = np.searchsorted(BAND[1:-1], inside, side="right")
-    return float(max(coherence[part == index].mean() for index in np.unique(part)))
+    for length in SEGMENTS:
+        starts, at = [], 0
+        while at + length <= len(valid):
+            inside = sums[at + length] - sums[at] == length
+            starts.extend([at] if inside else [])
+            at += length // 2 if inside else length // 16
+        if len(starts) >= MIN_SEGMENTS:
+            break
+    return _Segments(np.asarray(starts, dtype=np.intp), length)
