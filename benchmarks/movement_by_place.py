@@ -10,14 +10,14 @@ stands beside the offset: who steers briskly at one place has no need to show an
 from __future__ import annotations
 
 import argparse
-from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from benchmarks.dlr_stretches import Recording
 from benchmarks.markers import write_between_markers
-from xosc_lateral.formats.importers.dlr_ht import STEP, fit_reference_line, import_dlr_ht, read_tracks
+from xosc_lateral.formats.importers.dlr_ht import STEP
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -37,26 +37,20 @@ class Movement:
     def __init__(self, source: Path) -> None:
         from scipy.signal import butter, sosfiltfilt
 
-        tracks = read_tracks(source)
-        north = (tracks.groupby("vehicle")["velocity_northing"].transform("mean") > 0.0).to_numpy()
-        _, place, _ = fit_reference_line(tracks[["center_easting", "center_northing"]].to_numpy(), north)
-        table = import_dlr_ht(source, keep_cut=True).table
-        assert len(table) == len(tracks), "with keep_cut, no row is dropped"
-        kept, vehicle = (table["state"] == "kept").to_numpy(), tracks["vehicle"].to_numpy()
-        columns = [table[name].to_numpy() for name in COLUMNS]
+        recording = Recording.read(source)
+        columns = [recording.table[name].to_numpy() for name in COLUMNS]
         filters = [butter(2, band, "bandpass", fs=1.0 / STEP, output="sos") for band in BANDS]
-        edges = np.flatnonzero(np.diff(kept) | (np.diff(vehicle) != 0)) + 1
         edge, rows, parts = round(EDGE / STEP), [], []
-        for first, last in pairwise([0, *edges.tolist(), len(kept)]):
-            if kept[first] and (last - first) * STEP >= LEAST:
-                rows.append(np.arange(first + edge, last - edge))
-                moved = [sosfiltfilt(one, values[first:last])[edge:-edge] for values in columns for one in filters]
-                parts.append(np.column_stack(moved))
+        for part in recording.stretches(LEAST):
+            rows.append(np.arange(part.start + edge, part.stop - edge))
+            moved = [sosfiltfilt(one, values[part])[edge:-edge] for values in columns for one in filters]
+            parts.append(np.column_stack(moved))
         at = np.concatenate(rows)
         self.values = np.concatenate(parts)
-        self.vehicle = vehicle[at]
+        self.vehicle = recording.vehicle[at]
         self.first_half = self.vehicle % 2 == 0
-        lane = table["lane_index"].to_numpy()[at].astype(np.int64)
+        place, north = recording.place, recording.north
+        lane = recording.table["lane_index"].to_numpy()[at].astype(np.int64)
         self.short = (place[at] // SHORT).astype(np.int64) * 4 + north[at] * 2 + lane
         self.long = (place[at] // LONG).astype(np.int64) * 2 + north[at]
 
@@ -64,7 +58,7 @@ class Movement:
         """Share of the second half's variance that the first half's mean path tells. [-]"""
         values, size = self.values[:, column], self.short.max() + 1
         counts = [np.bincount(self.short[mine], minlength=size) for mine in (self.first_half, ~self.first_half)]
-        told = np.bincount(self.short[self.first_half], values[self.first_half], minlength=size)
+        told: FloatArray = np.bincount(self.short[self.first_half], values[self.first_half], minlength=size)
         told = told / np.maximum(counts[0], 1)
         rows = ~self.first_half & (np.minimum(*counts) >= ROWS)[self.short]
         left = values[rows] - told[self.short[rows]]

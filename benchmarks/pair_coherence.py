@@ -9,14 +9,14 @@ left is another one of that lane, at the same place at another time: what both s
 from __future__ import annotations
 
 import argparse
-from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from benchmarks.dlr_stretches import Recording
 from benchmarks.markers import write_between_markers
-from xosc_lateral.formats.importers.dlr_ht import STEP, fit_reference_line, import_dlr_ht, read_tracks
+from xosc_lateral.formats.importers.dlr_ht import STEP
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -35,25 +35,22 @@ class Rows:
     def __init__(self, source: Path) -> None:
         from scipy.signal import butter, hilbert, sosfiltfilt
 
-        tracks = read_tracks(source)
-        north = (tracks.groupby("vehicle")["velocity_northing"].transform("mean") > 0.0).to_numpy()
-        _, place, _ = fit_reference_line(tracks[["center_easting", "center_northing"]].to_numpy(), north)
-        table = import_dlr_ht(source, keep_cut=True).table
-        kept, vehicle = (table["state"] == "kept").to_numpy(), tracks["vehicle"].to_numpy()
-        offset = table["offset"].to_numpy()
+        recording = Recording.read(source)
+        offset = recording.table["offset"].to_numpy()
         filters = [butter(2, band, "bandpass", fs=1.0 / STEP, output="sos") for band in BANDS]
-        edges = np.flatnonzero(np.diff(kept) | (np.diff(vehicle) != 0)) + 1
         edge, at, signals = round(EDGE / STEP), [], []
-        for first, last in pairwise([0, *edges.tolist(), len(kept)]):
-            if kept[first] and (last - first) * STEP >= LEAST:
-                moved = [hilbert(sosfiltfilt(one, offset[first:last])) for one in filters]
-                signals.append(np.column_stack(moved)[edge:-edge:EVERY])
-                at.append(np.arange(first + edge, last - edge)[::EVERY])
+        for part in recording.stretches(LEAST):
+            moved = [hilbert(sosfiltfilt(one, offset[part])) for one in filters]
+            signals.append(np.column_stack(moved)[edge:-edge:EVERY])
+            at.append(np.arange(part.start + edge, part.stop - edge)[::EVERY])
         rows = np.concatenate(at)
         self.signal = np.concatenate(signals)
-        self.place, self.north, self.vehicle = place[rows], north[rows], vehicle[rows].astype(np.int64)
-        self.lane = table["lane_index"].to_numpy()[rows]
-        self.instant = np.round(table["time"].to_numpy()[rows] / (EVERY * STEP)).astype(np.int64) * 2 + self.north
+        self.place, self.north = recording.place[rows], recording.north[rows]
+        self.vehicle = recording.vehicle[rows].astype(np.int64)
+        self.lane = recording.table["lane_index"].to_numpy()[rows]
+        self.instant = (
+            np.round(recording.table["time"].to_numpy()[rows] / (EVERY * STEP)).astype(np.int64) * 2 + self.north
+        )
 
     def pairs(self) -> tuple[IntArray, IntArray]:
         """Rows of the vehicle on the right and of the one beside it on the left, shape (n,) each."""
