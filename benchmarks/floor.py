@@ -26,6 +26,7 @@ from xosc_lateral.identification.search import Search
 from xosc_lateral.identification.stages import ERROR_BUDGET
 from xosc_lateral.identification.terms.mean import MeanTerm
 from xosc_lateral.identification.timeline import join_drives
+from xosc_lateral.normal import NORMAL_95
 
 FLOORS = (0.0, 0.005, 0.01, 0.02, 0.03, 0.04)
 SMALLER = 0.6
@@ -73,7 +74,7 @@ def measured(case: dict[str, Any], protocol: dict[str, Any]) -> list[dict[str, A
                     "named": p_value <= search.level_of(MeanTerm.component),
                     "share": size / case["size"],
                     "z": size / error,
-                    "held": abs(size - case["size"]) <= 1.96 * error,
+                    "held": abs(size - case["size"]) <= NORMAL_95 * error,
                 }
             )
         regression.FLOOR = usual

@@ -75,18 +75,17 @@ def _oracle_between(case: dict[str, Any], table: pd.DataFrame) -> dict[str, floa
 
 def _size(case: dict[str, Any], found: Any, coarse: Coarse, bare: pd.DataFrame) -> dict[str, float]:
     """Size and error of the right finding; positive where it moves the car as what was planted does."""
+    accepted = [sorted(columns) for columns in case["accepted"]]
+    terms = [one.term for one in found.selection.accepted if one.term.kind == "location"]
+    right = next((term for term in terms if sorted(term.columns) in accepted), None)
+    if right is None:
+        return {}
+    effects = right.estimate(found.selection.final)
+    told = right.describe(found.selection.final, effects, "")
     planted = coarse.offset - Coarse.of(join_drives(drives_of_table(bare, {}))).offset
-    for one in found.selection.accepted:
-        if (
-            sorted(one.term.columns) in [sorted(columns) for columns in case["accepted"]]
-            and one.term.kind == "location"
-        ):
-            effects = one.term.estimate(found.selection.final)
-            told = one.term.describe(found.selection.final, effects, "")
-            strength = coarse_mean(coarse.strength(effects[0]))[coarse.valid]
-            alike = float(np.sign(np.cov(strength, planted[coarse.valid])[0, 1]))
-            return {"found_size": alike * abs(told.size), "found_error": told.error}
-    return {}
+    strength = coarse_mean(coarse.strength(effects[0]))[coarse.valid]
+    alike = float(np.sign(np.cov(strength, planted[coarse.valid])[0, 1]))
+    return {"found_size": alike * abs(told.size), "found_error": told.error}
 
 
 def main() -> None:

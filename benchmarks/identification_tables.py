@@ -8,6 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from xosc_lateral.normal import NORMAL_95
+
 Outcomes = list[dict[str, Any]]
 
 
@@ -65,13 +67,13 @@ def calibration(outcomes: list[dict[str, Any]]) -> str:
     p = np.array([one["p_mean"] for one in outcomes if one["type"].startswith("null") and one["p_mean"] is not None])
     told = [one for one in outcomes if "oracle_size" in one]
     cover = (
-        np.mean([abs(one["oracle_size"] - one["size"]) <= 1.96 * one["oracle_error"] for one in told])
+        np.mean([abs(one["oracle_size"] - one["size"]) <= NORMAL_95 * one["oracle_error"] for one in told])
         if told
         else math.nan
     )
     found = [one for one in told if "found_size" in one and right(one)]
     own = (
-        np.mean([abs(one["found_size"] - one["size"]) <= 1.96 * one["found_error"] for one in found])
+        np.mean([abs(one["found_size"] - one["size"]) <= NORMAL_95 * one["found_error"] for one in found])
         if found
         else math.nan
     )
@@ -110,7 +112,7 @@ def _wrong(outcomes: Outcomes) -> str:
 
 def _held(outcomes: Outcomes) -> str:
     found = [one for one in outcomes if "found_size" in one and right(one)]
-    held = sum(abs(one["found_size"] - one["size"]) <= 1.96 * one["found_error"] for one in found)
+    held = sum(abs(one["found_size"] - one["size"]) <= NORMAL_95 * one["found_error"] for one in found)
     return f"{100 * held / len(found):.0f} % of {len(found)}" if found else ""
 
 

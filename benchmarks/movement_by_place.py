@@ -58,8 +58,8 @@ class Movement:
         """Share of the second half's variance that the first half's mean path tells. [-]"""
         values, size = self.values[:, column], self.short.max() + 1
         counts = [np.bincount(self.short[mine], minlength=size) for mine in (self.first_half, ~self.first_half)]
-        told: FloatArray = np.bincount(self.short[self.first_half], values[self.first_half], minlength=size)
-        told = told / np.maximum(counts[0], 1)
+        sums = np.bincount(self.short[self.first_half], values[self.first_half], minlength=size)
+        told = sums / np.maximum(counts[0], 1)
         rows = ~self.first_half & (np.minimum(*counts) >= ROWS)[self.short]
         left = values[rows] - told[self.short[rows]]
         return float(1.0 - (left**2).mean() / (values[rows] ** 2).mean())

@@ -19,6 +19,7 @@ LAYERS = {
     "limits": 0,
     "jit": 0,
     "mask": 0,
+    "normal": 0,
     "road": 1,
     "scenario": 1,
     "motion": 2,

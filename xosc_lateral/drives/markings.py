@@ -27,6 +27,7 @@ from numpy.typing import NDArray
 from xosc_lateral.drives.cuts import MAX_GAP, lane_steps
 from xosc_lateral.drives.drive import MarkingShares
 from xosc_lateral.drives.resampling import STEP
+from xosc_lateral.normal import MAD_TO_SD
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
@@ -49,9 +50,6 @@ LEAST_NOISE = 0.05
 
 WAVERS_WITHIN = 51
 """Blocks, 10 s, about whose median a camera's noise is seen. [-]"""
-
-MAD_TO_SD = 1.4826
-"""Standard deviation over median absolute deviation of the normal distribution: one over its 75 % quantile. [-]"""
 
 IMPOSSIBLE = 6.0
 """No noise is so many standard deviations off: a drive without it is left as it is. [-]"""

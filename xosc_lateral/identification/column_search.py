@@ -22,7 +22,7 @@ from xosc_lateral.identification.dictionary import (
 from xosc_lateral.identification.problem import Problem
 from xosc_lateral.identification.refinement import Refined, Refinement
 from xosc_lateral.identification.regression import Fitted, ModelTerm, fit_model
-from xosc_lateral.identification.search import Search
+from xosc_lateral.identification.search import Likeliest, Search
 from xosc_lateral.identification.seeds import LoopSeed
 from xosc_lateral.identification.significance import upper_tail
 from xosc_lateral.identification.terms.base import Outcome, Term
@@ -105,9 +105,11 @@ def find_column(search: Search, kind: type[ColumnKind], fitted: Fitted) -> Outco
         scored = _score(search, kind, fitted, problem, dictionary, refused, draws=NULL_DRAWS)
         if scored is None:
             return Outcome(None, min(refused), 1.0) if refused else None
-        p_value = upper_tail(float(scored.scores.scores[scored.scores.best]), scored.scores.maxima)
+        found = scored.likeliest() if refused else search.likeliest(kind, fitted, scored.likeliest)
+        assert found is not None
+        p_value = found.p_value
         if not search.passes(kind.component, p_value, fitted.terms):  # refined, it would not be accepted either
-            return Outcome(None, dictionary.candidates[scored.scores.best].columns, p_value)
+            return Outcome(None, found.effect.columns, p_value)
         term, after = _best(search, kind, fitted, scored, refused)
         if not _grows(fitted, after) and after.log_likelihood >= fitted.log_likelihood - ROUNDING:
             assert isinstance(term, Term)
@@ -133,19 +135,24 @@ def probability_of(search: Search, kind: type[ColumnKind], fitted: Fitted, colum
 
 def best_probability(search: Search, kind: type[ColumnKind], fitted: Fitted) -> float:
     """p-value of the best candidate of all, before refinement."""
-    scored = _score_all(search, kind, fitted)
-    return 1.0 if scored is None else upper_tail(float(scored.scores.scores.max()), scored.scores.maxima)
+    best = _likeliest(search, kind, fitted)
+    return 1.0 if best is None else best.p_value
 
 
 def likely_response(search: Search, kind: type[ColumnKind], fitted: Fitted, level: float) -> FloatArray:
     """Response of the best candidate, shape (n, 1), where its p-value is at most `level`; else of shape (n, 0)."""
-    scored = _score_all(search, kind, fitted)
-    nothing = np.zeros((len(fitted.coarse), 0))
-    if scored is None:
-        return nothing
-    best = scored.scores.best
-    likely = upper_tail(float(scored.scores.scores[best]), scored.scores.maxima) <= level
-    return fitted.coarse.response(scored.dictionary.timed(best)) if likely else nothing
+    best = _likeliest(search, kind, fitted)
+    if best is None or best.p_value > level:
+        return np.zeros((len(fitted.coarse), 0))
+    return fitted.coarse.response(best.effect)
+
+
+def _likeliest(search: Search, kind: type[ColumnKind], fitted: Fitted) -> Likeliest | None:
+    def score() -> Likeliest | None:
+        scored = _score_all(search, kind, fitted)
+        return None if scored is None else scored.likeliest()
+
+    return search.likeliest(kind, fitted, score)
 
 
 def _score_all(search: Search, kind: type[ColumnKind], fitted: Fitted, spared: tuple[str, ...] = ()) -> _Scored | None:
@@ -162,6 +169,11 @@ class _Scored:
     dictionary: Dictionary
     known: FloatArray
     scores: Scores
+
+    def likeliest(self) -> Likeliest:
+        """Best candidate and its p-value."""
+        best = self.scores.best
+        return Likeliest(self.dictionary.timed(best), upper_tail(float(self.scores.scores[best]), self.scores.maxima))
 
 
 def _score(

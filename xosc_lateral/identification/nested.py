@@ -21,9 +21,9 @@ from xosc_lateral.identification.held_out_gain import held_out_gain
 from xosc_lateral.identification.regression import Coarse, fit_model
 from xosc_lateral.identification.search import Search
 from xosc_lateral.identification.selection import Selection, select
-from xosc_lateral.identification.significance import NORMAL_95
 from xosc_lateral.identification.terms.base import Term
 from xosc_lateral.identification.timeline import coarse_middle
+from xosc_lateral.normal import NORMAL_95
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from xosc_lateral.driver.effects import ColumnEffect
 from xosc_lateral.identification.candidates import candidates_of
 from xosc_lateral.identification.columns import Column
 from xosc_lateral.identification.dictionary import (
@@ -28,6 +29,17 @@ BoolArray = NDArray[np.bool_]
 MAX_PRODUCT_COLUMNS = 24
 """Products are tried among all columns up to this number; beyond, of levels and switches with every column: sixty more
 columns must not cost twenty times as much."""
+
+KEPT = 8
+"""Best candidates that are remembered: as many as there are kinds of terms, and some."""
+
+
+@dataclass(frozen=True, eq=False)
+class Likeliest:
+    """Best candidate of one kind of term beside one fit, before refinement, and its p-value."""
+
+    effect: ColumnEffect
+    p_value: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,6 +70,7 @@ class Search:
     progress: Callable[[str], None]
     wanted: Mapping[str, int] | None = None
     _built: list[tuple[object, object, Dictionary]] = field(default_factory=list, repr=False)
+    _likeliest: list[tuple[object, object, Likeliest | None]] = field(default_factory=list, repr=False)
 
     @classmethod
     def over(
@@ -85,6 +98,15 @@ class Search:
         self._built.append((kind, fitted, dictionary))
         return dictionary
 
+    def likeliest(self, kind: object, fitted: object, scored: Callable[[], Likeliest | None]) -> Likeliest | None:
+        """Best candidate of one kind beside one fit, scored once; None: there is no candidate."""
+        for known_kind, known_fit, one in self._likeliest:
+            if known_kind is kind and known_fit is fitted:
+                return one
+        del self._likeliest[:-KEPT]
+        self._likeliest.append((kind, fitted, scored()))
+        return self._likeliest[-1][2]
+
     def cross_basis(self, columns: Collection[str]) -> FloatArray:
         """What columns can do in any shape, at any lag and response, at 1 Hz, orthonormal, shape (n, rank)."""
         known = frozenset(columns)
@@ -104,8 +126,10 @@ class Search:
 
     def passes(self, component: str, p_value: float, terms: Sequence[object]) -> bool:
         """Whether the best that was found of a component is good enough to be added to terms."""
-        if p_value <= self.level_of(component) or self.wanted is None:
-            return p_value <= self.level_of(component)
+        if p_value <= self.level_of(component):
+            return True
+        if self.wanted is None:
+            return False
         there = sum(1 for term in terms if getattr(term, "component", None) == component)
         return there < self.wanted.get(component, 0)
 

@@ -24,9 +24,6 @@ LEAST = 1e-300
 BUDGET = 0.025
 """Probability that anything is named that does not act: on 39 tables of 40 nothing wrong is to be named. [-]"""
 
-NORMAL_95 = 1.96
-"""Standard errors to either side that a 95 % interval of the normal distribution has. [-]"""
-
 TAIL_SHARE = 0.25
 """Share of a null sample that an exponential tail is fitted on. [-]"""
 

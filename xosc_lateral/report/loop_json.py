@@ -17,7 +17,7 @@ from xosc_lateral.identification.feedback import Feedback
 from xosc_lateral.identification.findings import Finding
 from xosc_lateral.identification.lack_of_fit import LackOfFit
 from xosc_lateral.identification.nested import Gain
-from xosc_lateral.identification.significance import NORMAL_95
+from xosc_lateral.normal import NORMAL_95
 from xosc_lateral.report.loop_words import feedback_words, lack_of_fit_words, meaning
 from xosc_lateral.version import __version__
 

@@ -25,6 +25,7 @@ from xosc_lateral.driver.sensor.texture import FAST, LEAST_SHARE, MANY, level_va
 from xosc_lateral.driver.sensor.vehicle_bound import density
 from xosc_lateral.drives.filters import scale_frequencies
 from xosc_lateral.drives.resampling import passed
+from xosc_lateral.normal import NORMAL_95
 
 FloatArray = NDArray[np.float64]
 
@@ -42,9 +43,6 @@ BLOCKS = 8
 """Of windows, of which each is left out in turn for the interval. [-]"""
 
 ROUNDING_ROUNDS = 3
-
-NORMAL_95 = 1.96
-"""Standard errors to either side that a 95 % interval of the normal distribution has. [-]"""
 
 
 @dataclass(frozen=True, eq=False)

@@ -24,9 +24,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.drives.markings import MAD_TO_SD
 from xosc_lateral.errors import NotEnoughDataError
 from xosc_lateral.mask import true_slices
+from xosc_lateral.normal import MAD_TO_SD
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
