@@ -1,6 +1,7 @@
 """Real drives of a phone's camera: what the camera misjudged, what is written, drowsy against normal, the loop.
 
-    python -m benchmarks.phone_drives UAH-DRIVESET-v1 --drivers D4 D5 D6 [--loop] [--write docs/validation/phone.md]
+    python -m benchmarks.phone_drives UAH-DRIVESET-v1 --drivers D4 D5 D6 --loop [--write docs/validation/phone.md]
+    python -m benchmarks.phone_drives UAH-DRIVESET-v1 --drivers D1 D2 D3 --sensitivity [--write docs/design/markings.md]
 
 The UAH-DriveSet [1]_ (not redistributed; for non-commercial use): six drivers and cars on a motorway and a secondary
 road, as they usually drive, as if aggressive and as if drowsy. Its accelerometer is no input of a fit: it is the
@@ -31,6 +32,7 @@ from xosc_lateral.driver.fitting import fit_population, fit_profile
 from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.driver.sampling import sample_offsets
 from xosc_lateral.driver.sensor.runs import driver_runs
+from xosc_lateral.drives import markings
 from xosc_lateral.drives.cuts import cut_runs
 from xosc_lateral.drives.drive import Drive, Run
 from xosc_lateral.drives.resampling import STEP
@@ -243,18 +245,55 @@ def loop_table(all_trips: Sequence[Trip]) -> str:
     return "\n".join(lines)
 
 
+CONSTANTS: tuple[tuple[str, tuple[float, ...]], ...] = (
+    ("LEAST_NOISE", (0.02, 0.1)),
+    ("WIDENING", (1e-4, 1e-3, 3e-3)),
+    ("ACCELERATION", (0.005, 0.05, 0.1)),
+    ("DEGREES", (2.0, 8.0)),
+    ("LEAST_TRUST", (0.05, 0.25)),
+)
+"""Of `markings`, and what is tried instead."""
+
+
+def sensitivity_table(all_trips: Sequence[Trip]) -> str:
+    """What other constants of `markings` make of the agreement with the accelerometer."""
+    lines = [
+        "| constant | mean r | median size / phone's | median 99.9 % in the band, ours [m/s2] |",
+        "|---|---|---|---|",
+    ]
+    lines.append(_sensitivity_line("as recorded", [agreement(trip.recorded, trip.acceleration) for trip in all_trips]))
+    lines.append(_sensitivity_line("**as it is**", [agreement(trip.drive, trip.acceleration) for trip in all_trips]))
+    for name, values in CONSTANTS:
+        usual = getattr(markings, name)
+        for value in values:
+            setattr(markings, name, value)
+            label = f"`{name}` {value:g} (is {usual:g})"
+            lines.append(_sensitivity_line(label, [agreement(trip.drive, trip.acceleration) for trip in all_trips]))
+        setattr(markings, name, usual)
+    return "\n".join(lines)
+
+
+def _sensitivity_line(name: str, found: Sequence[Agreement]) -> str:
+    numbers = [np.mean([one.correlation for one in found])]
+    numbers += [np.median([getattr(one, what) for one in found]) for what in ("ratio", "ours")]
+    return f"| {name} | " + " | ".join(f"{value:.3f}" for value in numbers) + " |"
+
+
 def main() -> None:
     """Print the tables; write them where asked."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folder", type=Path)
     parser.add_argument("--drivers", nargs="+", default=["D4", "D5", "D6"])
     parser.add_argument("--loop", action="store_true", help="the closed loop as well")
+    parser.add_argument("--sensitivity", action="store_true", help="of the constants of `markings`, and nothing else")
     parser.add_argument("--write", type=Path, metavar="PAGE.md")
     args = parser.parse_args()
     every = list(trips(args.folder, args.drivers))
-    tables = {"phone-movement": movement_table(every), "phone-drowsy": drowsiness_table(every)}
-    if args.loop:
-        tables["phone-loop"] = loop_table(every)
+    if args.sensitivity:
+        tables = {"markings-sensitivity": sensitivity_table(every)}
+    else:
+        tables = {"phone-movement": movement_table(every), "phone-drowsy": drowsiness_table(every)}
+        tables |= {"phone-loop": loop_table(every)} if args.loop else {}
     for marker, table in tables.items():
         print(f"{table}\n", flush=True)
         if args.write is not None:
