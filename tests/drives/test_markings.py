@@ -17,6 +17,8 @@ from xosc_lateral.drives.drive import Drive
 from xosc_lateral.drives.markings import mend_markings
 from xosc_lateral.formats.drives import read_drives
 from xosc_lateral.formats.profiles import describe_profile
+from xosc_lateral.identification.identify import usable_columns
+from xosc_lateral.identification.timeline import join_drives
 
 FloatArray = NDArray[np.float64]
 RATE = 25.0
@@ -158,6 +160,9 @@ def test_tables_are_mended_and_profiles_say_so(tmp_path: Path) -> None:
     assert drive.mended is not None
     assert rms(np.interp(seen.time[creep], drive.time, drive.offset) - seen.truth[creep]) < 0.1
     np.testing.assert_array_equal(drive.context["lane_width"], drive.lane_width)
+    columns, _, unused = usable_columns(join_drives([drive]))
+    assert "lane_width" not in [column.name for column in columns]
+    assert "camera" in unused["lane_width"]
     profile = fit_profile([drive], name="phone")
     assert profile.provenance.fit["one_marking"] == pytest.approx(drive.mended.one_marking, abs=1e-4)
     assert " % of the rows follow one lane marking" in describe_profile(profile)

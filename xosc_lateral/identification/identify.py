@@ -122,9 +122,10 @@ def usable_columns(
 ) -> tuple[list[Column], list[Feedback], dict[str, str]]:
     """Columns that may act, those that follow from the movement, and those that tell nothing with the reason."""
     columns, unused = known_columns(timeline)
+    unused |= dict.fromkeys(timeline.of_one_camera, "from the camera that measured the offset: it has the same errors")
     unused |= dict.fromkeys(excluded, "left out on request")
-    feedback = find_feedback(timeline, columns)
-    barred = {one.column for one in feedback} | set(excluded)
+    feedback = [one for one in find_feedback(timeline, columns) if one.column not in unused]
+    barred = {one.column for one in feedback} | set(unused)
     return [column for column in columns if column.name not in barred], feedback, unused
 
 

@@ -68,6 +68,8 @@ class Timeline:
         Columns of whole numbers.
     periods : mapping of str to float
         Full circle of the columns that wrap around.
+    of_one_camera : frozenset of str
+        Columns measured by the camera that measured the offset, and misjudged markings: their errors are the offset's.
     """
 
     names: tuple[str, ...]
@@ -79,6 +81,7 @@ class Timeline:
     context: Mapping[str, FloatArray]
     levels: frozenset[str]
     periods: Mapping[str, float] = field(default_factory=dict)
+    of_one_camera: frozenset[str] = frozenset()
 
     def __len__(self) -> int:
         return len(self.time)
@@ -139,6 +142,7 @@ def join_drives(drives: Sequence[Drive], rules: CutRules = TRACE_RULES) -> Timel
         context=MappingProxyType({name: np.concatenate([_column(part, name) for part in kept]) for name in names}),
         levels=frozenset.intersection(*(part.levels for part in kept)),
         periods=periods,
+        of_one_camera=frozenset({"lane_width"} if any(drive.mended for drive in drives) else ()),
     )
 
 
