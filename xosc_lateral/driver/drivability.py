@@ -21,7 +21,6 @@ from numpy.typing import NDArray
 
 from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.driver.sampling import sample_offsets
-from xosc_lateral.driver.sensor.quantisation import is_too_coarse
 from xosc_lateral.segment import Segment
 
 FloatArray = NDArray[np.float64]
@@ -45,11 +44,6 @@ TRAFFIC = 0.6
 
 ROUGHEST, WIDEST = 0.1, 3.0
 """Standard deviations of the kernel by which paths are smoothed: from, to. [s]"""
-
-WIDE_STEP = 0.75
-"""Steps of values, in the driver's standard deviations, beyond which the fit's volatility is theirs: at 0.6, sampled
-runs of two drives accelerated as much as what they were fitted to; at 0.9 one was twice too wide; at 1.3 to 1.7 they
-were 3 times too wide and accelerated 30 times too much. [-]"""
 
 FREE_RUN = 1200.0
 """Sampled to see what a profile writes. [s]"""
@@ -151,30 +145,16 @@ def drivable(offset: FloatArray, step: float, speed: FloatArray) -> tuple[FloatA
 
 def fit_warnings(profile: DriverProfile) -> list[str]:
     """What to know about a profile's sensor and drivability, in lines."""
-    return [*_coarse_steps(profile), *_wide_steps(profile), *_strained(profile)]
+    return [*_coarse_steps(profile), *_strained(profile)]
 
 
 def _coarse_steps(profile: DriverProfile) -> list[str]:
     sensor = profile.sensor
-    if sensor is None or not is_too_coarse(sensor.rounding, sensor.driver_variance + sensor.sensor_variance):
+    if sensor is None or not sensor.rounding or sensor.driver_share != (0.0, 1.0):
         return []
     return [
-        f"the offsets are rounded to {sensor.rounding:.3g} m, too coarse to separate driver and sensor: "
-        f"{profile.name} contains the rounding as movement of the driver"
-    ]
-
-
-def _wide_steps(profile: DriverProfile) -> list[str]:
-    sensor = profile.sensor
-    if sensor is None or is_too_coarse(sensor.rounding, sensor.driver_variance + sensor.sensor_variance):
-        return []
-    spread = float(np.sqrt(sensor.driver_variance))
-    if sensor.rounding <= WIDE_STEP * spread:
-        return []
-    return [
-        f"the offsets are rounded to {sensor.rounding:.3g} m, while the driver's have a standard deviation of "
-        f"{spread:.3g} m: paths that stand still between steps look volatile, and what {profile.name} samples may move "
-        "several times too much"
+        f"the offsets are rounded to {sensor.rounding:.3g} m, too coarse to tell how far the driver of {profile.name} "
+        "moves between steps"
     ]
 
 

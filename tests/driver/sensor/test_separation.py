@@ -109,15 +109,41 @@ def test_steps_of_a_lattice_are_found_and_their_noise_is_known(truth):
     found, _ = split(truth, noise)
     assert found.sensor.rounding == pytest.approx(grain)
     assert found.sensor.driver_variance == pytest.approx(np.concatenate(truth[1]).var(), rel=0.1)
-    coarse, _ = split(truth, [np.round(x / 1.5) * 1.5 - x for x in truth[1]])
+    coarse, _ = split(truth, [np.round(x / 2.0) * 2.0 - x for x in truth[1]])
     assert coarse.is_too_coarse
     profile = fit_runs([made_run(x[::4]) for x in truth[1][:2]], name="coarse", model="two-level")
-    assert any("rounded to 1.5 m, too coarse" in line for line in fit_warnings(replace(profile, sensor=coarse.sensor)))
+    assert any("rounded to 2 m, too coarse" in line for line in fit_warnings(replace(profile, sensor=coarse.sensor)))
     assert not any("too coarse" in line for line in fit_warnings(replace(profile, sensor=found.sensor)))
     assert not any("rounded to" in line for line in fit_warnings(replace(profile, sensor=found.sensor)))
-    spread = np.sqrt(found.sensor.driver_variance)
-    wide = replace(profile, sensor=replace(found.sensor, rounding=float(spread)))
-    assert any("look volatile" in line for line in fit_warnings(wide))
+
+
+def test_a_path_in_wide_steps_moves_between_them_as_the_driver_did(truth):
+    """Steps of two standard deviations: the rounded path stands still, and jumps; what it may hide does neither."""
+    grain = 2.0 * float(np.concatenate(truth[1]).std())
+    found, runs = split(truth, [np.round(x / grain) * grain - x for x in truth[1]])
+    variance = np.concatenate(truth[1]).var()
+    assert found.sensor.driver_variance == pytest.approx(variance, rel=0.16), "two standard errors of 18 minutes"
+    low, high = found.sensor.driver_share
+    assert low < variance / (variance + grain**2 / 12.0) < high
+    true = [resample(t, x, np.arange(t[0], t[-1], STEP)) for t, x in zip(*truth, strict=True)]
+    parts = [found.driver_part(run, STEP) for run in runs]
+    assert found.driver_part(runs[0], STEP) == pytest.approx(parts[0], abs=0.0), "the same run, the same path"
+    still, moving, right = (np.mean(np.abs(np.diff(np.concatenate(x))) < 1e-3) for x in (runs, parts, true))
+    assert still > 2.0 * right
+    assert moving == pytest.approx(right, abs=0.03)
+    error = [np.std(np.concatenate(x) - np.concatenate(true)) for x in (parts, runs)]
+    assert error[0] < 0.9 * error[1], "and it is nearer to the true one"
+    assert found.sensor.sensor_variance == pytest.approx(error[1] ** 2, rel=0.15)
+
+
+def test_noise_that_dithers_a_lattice_is_seen_as_noise(truth):
+    noise = noises(truth, 3.0, "white")
+    grain = 0.9 * float(np.concatenate(truth[1]).std())
+    rounded = [np.round((x + e) / grain) * grain - x for x, e in zip(truth[1], noise, strict=True)]
+    found, _ = split(truth, rounded)
+    assert found.sensor.rounding == pytest.approx(grain)
+    assert found.hidden is None
+    assert found.sensor.driver_variance == pytest.approx(np.concatenate(truth[1]).var(), rel=0.1)
 
 
 def test_low_passed_noise_is_found_beside_rounding(truth):
@@ -171,6 +197,12 @@ def test_sampled_sensor_noise_has_the_model_s_density():
     band = (frequency > 0.05) & (frequency < 1.4)
     assert density[band] == pytest.approx(sensor.density(frequency[band]), rel=0.25)
     assert density[frequency > 1.6].max() < 1e-5
+
+
+def test_offsets_that_never_move_are_all_the_driver_s():
+    found = separate([np.full(600, 0.2)] * 3, STEP)
+    assert found.sensor.share == 1.0
+    assert found.driver_part(np.full(600, 0.2), STEP) == pytest.approx(np.full(600, 0.2))
 
 
 def test_what_is_no_sensor_is_refused():

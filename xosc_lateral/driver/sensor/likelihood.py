@@ -7,6 +7,7 @@ References
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -23,6 +24,9 @@ ABOVE = 1.0
 FLOOR_SD = 3.0
 COLOUR_SD = 4.0
 """Of weak priors that keep parts that are not there from running off: of log density. [-]"""
+
+NO_WHITE = np.log(1e-14)
+"""Log density of white noise that is not there: a hundredth of what is added to every periodogram. [-]"""
 
 KNOWN_SD = 0.05
 """How closely a noise level that is known is kept to: of its logarithm. [-]"""
@@ -41,10 +45,13 @@ class Colour:
     order : int
     corner : float
         [Hz]
+    alone : bool
+        Whether there is no white noise beside it.
     """
 
     order: int = 0
     corner: float = 1.0
+    alone: bool = False
 
     def shape(self, frequency: FloatArray) -> FloatArray:
         """Density over that at frequency 0. Shape as `frequency` [Hz]. [-]"""
@@ -96,7 +103,7 @@ class _Problem:
         self.size = N_KNOTS + 1 + bool(colour.order)
         high = data.frequency > ABOVE
         self.top = float(np.log(np.average(data.density[high], weights=data.weight[high])))
-        self.corner = colour.corner
+        self.corner, self.alone = colour.corner, colour.alone
 
     def start(self) -> FloatArray:
         """The measured density up to 0.3 Hz, going on as f^-6 from there; the sensor's as flat as above 1 Hz."""
@@ -105,7 +112,8 @@ class _Problem:
         last = int(np.searchsorted(KNOTS, 0.3)) - 1
         measured[last + 1 :] = measured[last] - 6.0 * (log[last + 1 :] - log[last])
         at = int(np.argmin(np.abs(self.data.frequency - 0.7 * self.corner)))
-        rest = [self.top - 0.3, float(np.log(self.data.density[at])) - 0.7]
+        white = NO_WHITE if self.alone else self.top - 0.3
+        rest = [white, float(np.log(self.data.density[at])) - 0.7]
         return np.concatenate([measured, rest[: self.size - N_KNOTS]])
 
     def at(self, point: FloatArray) -> tuple[float, FloatArray, FloatArray]:
@@ -144,8 +152,8 @@ class _Problem:
         """Weak priors of the sensor's levels, and the level that is known, linearised where it is looked at."""
         white = np.zeros(self.size)
         white[N_KNOTS] = 1.0 / FLOOR_SD
-        rows = [(white, (self.top - 1.0) / FLOOR_SD)]
-        if self.shape is not None:
+        rows = [(white, (NO_WHITE if self.alone else self.top - 1.0) / FLOOR_SD)]
+        if self.shape is not None and not self.alone:
             both = np.zeros(self.size)
             both[N_KNOTS], both[N_KNOTS + 1] = -1.0 / COLOUR_SD, 1.0 / COLOUR_SD
             rows.append((both, 0.0))
@@ -182,15 +190,24 @@ def solve(
     """
     problem = _Problem(data, colour, base, known)
     point = problem.start() if start is None else np.array([*start.knots, start.white, start.colour])[: problem.size]
-    loss, gradient, information = problem.at(point)
+    point, loss = climb(problem.at, point)
+    coloured = float(point[N_KNOTS + 1]) if colour.order else -np.inf
+    return Solution(point[:N_KNOTS], float(point[N_KNOTS]), coloured, loss)
+
+
+def climb(
+    at: Callable[[FloatArray], tuple[float, FloatArray, FloatArray]], point: FloatArray
+) -> tuple[FloatArray, float]:
+    """The least loss and where it is, by Fisher scoring from a point; `at` gives loss, gradient and information."""
+    loss, gradient, information = at(point)
     for _ in range(ROUNDS):
         step = np.linalg.solve(information + 1e-6 * np.eye(len(point)), -gradient)
         step = np.clip(step, -LONGEST_STEP, LONGEST_STEP)
         length = 1.0
-        tried = problem.at(point + step)
+        tried = at(point + step)
         while tried[0] >= loss and length > 1e-3:
             length *= 0.4
-            tried = problem.at(point + length * step)
+            tried = at(point + length * step)
         if tried[0] >= loss:
             break
         gained = loss - tried[0]
@@ -198,5 +215,4 @@ def solve(
         loss, gradient, information = tried
         if gained < ENOUGH:
             break
-    coloured = float(point[N_KNOTS + 1]) if colour.order else -np.inf
-    return Solution(point[:N_KNOTS], float(point[N_KNOTS]), coloured, loss)
+    return point, loss

@@ -47,7 +47,8 @@ class SensorModel(Record, frozen=True):
     rounding : float
         Step that values come in; 0 where none was found. [m]
     driver_variance, sensor_variance : float
-        Of the measured rows, whose sum is the measured variance. [m2]
+        Of the measured rows, whose sum is the measured variance; where values come in wide steps, which hang on the
+        driver, the latter is the rows' mean square error. [m2]
     driver_share : tuple of float
         Share of the driver: 95 % interval. [-]
 

@@ -12,15 +12,6 @@ FloatArray = NDArray[np.float64]
 LEAST_STEP = 0.004
 """Finer steps add less than 2e-6 m2, below any sensor's own noise. [m]"""
 
-COARSEST = 2.5
-"""Steps of more standard deviations of what is measured are too coarse to be told apart from it: the error's
-correlation with the signal, left out here, grows beyond a tenth (Widrow, Kollar 2008, chapter 5). [-]"""
-
-
-def is_too_coarse(step: float, variance: float) -> bool:
-    """Whether values in steps [m] with this variance [m2] can't be split into what was measured and its rounding."""
-    return bool(step > COARSEST * np.sqrt(max(variance - step**2 / 12.0, 1e-12)))
-
 
 def quantisation_step(values: FloatArray) -> float:
     """Step of the lattice that all values lie on, 0 if there is none of at least `LEAST_STEP`. [m]
@@ -28,7 +19,7 @@ def quantisation_step(values: FloatArray) -> float:
     `values` of shape (n,).
     """
     levels = np.unique(np.round(values, 7))
-    if len(levels) < 3 or len(levels) > 0.2 * len(values):
+    if len(levels) < 2 or len(levels) > 0.2 * len(values):
         return 0.0
     step = float(np.diff(levels).min())
     if step < LEAST_STEP:

@@ -3,7 +3,6 @@
 References
 ----------
 .. [1] P. Whittle, "Estimation and information in stationary time series", Arkiv för Matematik 2, 1953: the likelihood.
-.. [2] G. Schwarz, "Estimating the dimension of a model", Annals of Statistics 6, 1978: which colour of noise is taken.
 """
 
 from __future__ import annotations
@@ -16,25 +15,21 @@ import numpy as np
 from msgspec.structs import replace
 from numpy.typing import NDArray
 
+from xosc_lateral.driver.sensor.explanations import explanations
+from xosc_lateral.driver.sensor.hidden_path import HiddenPath
 from xosc_lateral.driver.sensor.kinks_fit import find_kinks
 from xosc_lateral.driver.sensor.likelihood import Colour, Known, Solution, solve
 from xosc_lateral.driver.sensor.model import SensorModel
 from xosc_lateral.driver.sensor.periodogram import Periodogram, periodogram, windows_of
-from xosc_lateral.driver.sensor.quantisation import is_too_coarse, quantisation_step, rounding_density
+from xosc_lateral.driver.sensor.quantisation import quantisation_step, rounding_density
 from xosc_lateral.driver.sensor.texture import FAST, LEAST_SHARE, MANY, level_variation, measured_density
 from xosc_lateral.driver.sensor.vehicle_bound import density
+from xosc_lateral.driver.sensor.wide_steps import WideSteps, split_wide_steps
 from xosc_lateral.drives.filters import scale_frequencies
 from xosc_lateral.drives.resampling import passed
 from xosc_lateral.normal import NORMAL_95
 
 FloatArray = NDArray[np.float64]
-
-ORDERS = (1, 2, 4)
-CORNERS = (0.12, 0.17, 0.22, 0.29, 0.38, 0.5, 0.65, 0.85, 1.1, 1.4)
-"""Of the sensor's low-passed part, that are tried: a step of 30 %. [Hz]"""
-
-LEAST_CORNER = {1: 0.0, 2: 0.38, 4: 0.38}
-"""By order. A steep fall from a lower corner can't be told from a driver's own. [Hz]"""
 
 PLAUSIBLE = 6.0
 """Explanations whose information criterion is within this of the best count for the interval: e^-3 as likely. [-]"""
@@ -43,6 +38,9 @@ BLOCKS = 8
 """Of windows, of which each is left out in turn for the interval. [-]"""
 
 ROUNDING_ROUNDS = 3
+
+LEAST_LEVELS = 3
+"""How often two levels are left is one number, and what lies behind them has two, mean and spread. [-]"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,19 +56,24 @@ class Separation:
         Density of what rounding adds. [m2/Hz]
     is_too_coarse : bool
         Whether values come in steps too coarse for the split to mean anything.
+    hidden : HiddenPath, optional
+        Where values come in wide steps: what could lie behind them.
     """
 
     knots: FloatArray
     sensor: SensorModel
     rounding: Callable[[FloatArray], FloatArray]
     is_too_coarse: bool = False
+    hidden: HiddenPath | None = None
 
     def driver_part(self, offset: FloatArray, step: float) -> FloatArray:
         """The offset with every frequency scaled down to the driver's share of the power, about its own mean.
 
         Keeps the driver's spectrum (Wiener's filter would not: it leaves less than the driver's power), and the path
-        itself wherever the sensor is good.
+        itself wherever the sensor is good. Of values in wide steps: a path that they may hide.
         """
+        if self.hidden is not None:
+            return self.hidden.draw(offset, step)
         n = len(offset)
         if n < 2:
             return offset
@@ -123,29 +126,43 @@ def separate(
     data = periodogram(frequency, windows)
     known = None if sensor_noise is None else Known(sensor_noise, rate or 1.0 / step)
     grain = quantisation_step(np.concatenate(measured))
-    coarse = is_too_coarse(grain, variance)
+    two_levels = len(np.unique(np.concatenate(measured))) < LEAST_LEVELS
+    if grain and not two_levels:
+        per_second = rate or sum(map(len, measured)) / (step * sum(map(len, runs)))
+        wide = split_wide_steps(data, windows, measured, grain, per_second, sensor_noise)
+        if wide is not None:
+            return _textured(_seen_through(wide, per_second), runs, frequency, windows, step)
     pieces = None if rows is None or rate is None else find_kinks(rows, rate, frequency, windows.mean(axis=0))
     kinks, noise = pieces or (None, 0.0)
     if kinks is not None and known is None:
         known = Known(noise, rate or 1.0 / step)
     rounding: Callable[[FloatArray], FloatArray] = _no_density
-    colours = [Colour(), *_colours()]
-    if grain and not coarse:
+    if grain and not two_levels:
         rounding = _rounding(data, grain, variance)
     base = rounding(data.frequency)
     if kinks is not None:
         base = base + kinks.density(data.frequency)
-    found = [(solve(data, colour, base, known), colour) for colour in colours]
-    criteria = np.array([2.0 * one.loss + 2.0 * np.log(data.count) * bool(colour.order) for one, colour in found])
-    best, colour = found[int(np.argmin(criteria))]
-    result = Separation(best.knots, replace(_sensor(best, colour, grain), kinks=kinks), rounding, bool(coarse))
+    found = explanations(data, base, known)
+    least = min(found, key=lambda one: one.criterion)
+    best, colour = least.solution, least.colour
+    result = Separation(best.knots, replace(_sensor(best, colour, grain), kinks=kinks), rounding)
     driver = float(np.concatenate([result.driver_part(run, step) for run in runs]).var())
-    share = min(driver / variance, 1.0)
-    plausible = [one for one, good in zip(found, criteria < criteria.min() + PLAUSIBLE, strict=True) if good]
-    interval = _interval(frequency, windows, best, colour, base, known, plausible, share, data)
+    share = min(driver / variance, 1.0) if variance > 0.0 else 1.0
+    plausible = [(one.solution, one.colour) for one in found if one.criterion < least.criterion + PLAUSIBLE]
+    interval = (
+        (0.0, 1.0) if two_levels else _interval(frequency, windows, best, colour, base, known, plausible, share, data)
+    )
     sensor = _sensor(best, colour, grain, share * variance, (1.0 - share) * variance, interval)
     sensor = replace(sensor, kinks=kinks)
-    return _textured(Separation(best.knots, sensor, rounding, bool(coarse)), runs, frequency, windows, step)
+    return _textured(Separation(best.knots, sensor, rounding, two_levels), runs, frequency, windows, step)
+
+
+def _seen_through(wide: WideSteps, rate: float) -> Separation:
+    """What was told through steps, as a split."""
+    numbers = (2.0 * wide.noise / rate, wide.path.grain, *wide.variances(), *wide.interval())
+    white, grain, driver, rest, low, high = rounded(numbers)
+    sensor = SensorModel(white, rounding=grain, driver_variance=driver, sensor_variance=rest, driver_share=(low, high))
+    return Separation(wide.knots, sensor, wide.rounding, (low, high) == (0.0, 1.0), wide.path)
 
 
 def _textured(
@@ -164,11 +181,7 @@ def _textured(
     if (windows.mean(axis=0) * share)[fast].sum() > LEAST_SHARE * windows.mean(axis=0)[fast].sum():
         variance, duration = level_variation(runs, sensor.sample(MANY, step, np.random.default_rng(0)), step)
         sensor = replace(sensor, level_variance=rounded((variance,))[0], level_duration=rounded((duration,))[0])
-    return Separation(split.knots, sensor, split.rounding, split.is_too_coarse)
-
-
-def _colours() -> list[Colour]:
-    return [Colour(order, corner) for order in ORDERS for corner in CORNERS if corner >= LEAST_CORNER[order]]
+    return replaced(split, sensor=sensor)
 
 
 def _sensor(
@@ -180,8 +193,8 @@ def _sensor(
     interval: tuple[float, float] = (0.0, 1.0),
 ) -> SensorModel:
     levels = (np.exp(found.white), np.exp(found.colour), driver, rest)
-    white, coloured, driver, rest, low, high = rounded((*levels, *interval))
-    return SensorModel(white, coloured, colour.corner, colour.order, grain, driver, rest, (low, high))
+    white, coloured, corner, driver, rest, low, high = rounded((*levels[:2], colour.corner, *levels[2:], *interval))
+    return SensorModel(white, coloured, corner, colour.order, grain, driver, rest, (low, high))
 
 
 DIGITS = 7
