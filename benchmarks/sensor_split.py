@@ -37,8 +37,8 @@ STEP = 0.2
 SAMPLED = range(3)
 """Seeds."""
 
-GUSTS = "gusts"
-"""What names of simulated drives with gusts begin with."""
+CALM, GUSTS = "calm", "gusts"
+"""What names of simulated drives begin with, without gusts and with."""
 
 CLOSE, AS_BRISK = 0.1, 0.15
 """What is asked of the driver's variance and of the acceleration. [-]"""
@@ -52,7 +52,7 @@ def simulated(seed: int, *, gusts: bool = True) -> Drive:
         made = simulate_drive(3000.0, seed=seed, driver=calm, sensor_rate=20.0)
     context = {"lane_index": made.table["lane_index"].to_numpy(dtype=float)}
     return Drive(
-        f"{GUSTS if gusts else 'simulated'} {seed}",
+        f"{GUSTS if gusts else CALM} {seed}",
         made.truth.time,
         made.truth.offset,
         np.full(len(made.truth.time), 3.75),
@@ -142,27 +142,32 @@ def split_drive(drive: Drive) -> Iterator[tuple[tuple[str, float], Found]]:
             )
 
 
-def _range(values: Sequence[float], within: float | None = None) -> str:
-    words = f"{min(values):.2f} to {max(values):.2f}"
-    if within is None:
-        return words
-    return f"{words} ({sum(abs(value - 1.0) <= within for value in values)} of {len(values)})"
+def _range(values: Sequence[float], within: float) -> str:
+    if not values:
+        return "-"
+    close = sum(abs(value - 1.0) <= within for value in values)
+    return f"{min(values):.2f} to {max(values):.2f} ({close} of {len(values)})"
 
 
 def table(found: dict[tuple[str, float], list[Found]]) -> str:
     """One line per kind and ratio; in brackets, how many drives are within what is asked."""
     lines = [
-        "| noise | SNR | driver's variance / true | error of its share | acceleration / true | of sampled runs "
-        "| of sampled runs, gusts | in interval |",
-        "|---|---|---|---|---|---|---|---|",
+        "| noise | SNR | driver's variance / true | error of its share | acceleration / true, tables "
+        "| of sampled runs, tables | simulated, no gusts | simulated, gusts | in interval |",
+        "|---|---|---|---|---|---|---|---|---|",
     ]
     for (kind, ratio), drives in found.items():
-        calm = [one for one in drives if not one.drive.startswith(GUSTS)]
-        gusty = [one.sampled for one in drives if one.drive.startswith(GUSTS)]
+        simulated_ones = [one for one in drives if one.drive.startswith((CALM, GUSTS))]
+        tables = [one for one in drives if one not in simulated_ones]
+        parts = [
+            [one.acceleration for one in tables],
+            [one.sampled for one in tables],
+            [one.sampled for one in simulated_ones if one.drive.startswith(CALM)],
+            [one.sampled for one in simulated_ones if one.drive.startswith(GUSTS)],
+        ]
         lines.append(
             f"| {kind} | {ratio:g} | {_range([one.variance for one in drives], CLOSE)} "
-            f"| {max(one.share for one in drives):.3f} | {_range([one.acceleration for one in calm], AS_BRISK)} "
-            f"| {_range([one.sampled for one in calm], AS_BRISK)} | {_range(gusty)} "
+            f"| {max(one.share for one in drives):.3f} | {' | '.join(_range(part, AS_BRISK) for part in parts)} "
             f"| {sum(one.inside for one in drives)} of {len(drives)} |"
         )
     return "\n".join(lines)
