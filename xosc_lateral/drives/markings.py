@@ -39,7 +39,7 @@ ACCELERATION = 0.02
 """Density of a driver's lateral acceleration: 0.14 m/s2 rms below 0.5 Hz, as on motorways. [m2/s3]"""
 
 WIDENING = 3e-4
-"""Of the lane: 0.02 m within a second, 0.1 m within 40 s (`docs/design/sensor.md` shows how little either matters).
+"""Of the lane: 0.02 m within a second, 0.1 m within 40 s (`docs/design/markings.md` shows how little either matters).
 [m2/s]"""
 
 MEASURED = 0.01
@@ -55,7 +55,7 @@ IMPOSSIBLE = 6.0
 """No noise is so many standard deviations off: a drive without it is left as it is. [-]"""
 
 LEAST_TRUST = 0.15
-"""Rows with less in the mean of their two views are left out: both are 5 and more standard deviations off. [-]"""
+"""Rows with less in the mean of their two views are left out: both are 5 standard deviations off, and more. [-]"""
 
 MOVED = 0.05
 """Rows whose offset changes by more are counted as mended. [m]"""
@@ -119,7 +119,7 @@ def mend_markings(time: FloatArray, offset: FloatArray, lane_width: FloatArray) 
 def _trust(offset: FloatArray, width: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Weights of the rows' views of the left and the right marking, from their errors in offset and lane width. [m]"""
     errors = (0.5 * width - offset, 0.5 * width + offset)
-    noise = MAD_TO_SD * float(np.median(np.abs(np.concatenate(errors))))
+    noise = max(MAD_TO_SD * float(np.median(np.abs(np.concatenate(errors)))), MEASURED)
     return _weights(errors[0] / noise), _weights(errors[1] / noise)
 
 
