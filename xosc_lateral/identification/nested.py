@@ -135,7 +135,7 @@ def nest(
 
     def selected(fold: int) -> Selection:
         part = coarse.only(seconds % folds != fold) if folds > 1 else coarse
-        return select(replace(quiet, coarse=part, _built=[]), initial)
+        return select(replace(quiet, coarse=part), initial)
 
     selections = []
     # threads: the work is in compiled code that lets others run, and all folds read the same candidates

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Generic, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,8 +31,10 @@ MAX_PRODUCT_COLUMNS = 24
 """Products are tried among all columns up to this number; beyond, of levels and switches with every column: sixty more
 columns must not cost twenty times as much."""
 
-KEPT = 8
-"""Best candidates that are remembered: as many as there are kinds of terms, and some."""
+BUILT, SCORED = 2, 8
+"""Dictionaries that are kept (each of tens of megabytes), and best candidates: as many as kinds of terms, and some."""
+
+T = TypeVar("T")
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,6 +43,27 @@ class Likeliest:
 
     effect: ColumnEffect
     p_value: float
+
+
+@dataclass(frozen=True, eq=False)
+class Recent(Generic[T]):
+    """What was last worked out for one kind of term beside one fit; `most` of them are kept.
+
+    For one thread: a search that is replaced, by that of a fold, say, begins with a memory of its own.
+    """
+
+    most: int
+    _kept: list[tuple[object, object, T]] = field(default_factory=list, repr=False)
+
+    def of(self, kind: object, fitted: object, make: Callable[[], T]) -> T:
+        """As it was worked out before, or else now."""
+        for known_kind, known_fit, one in self._kept:
+            if known_kind is kind and known_fit is fitted:
+                return one
+        made = make()
+        self._kept.append((kind, fitted, made))
+        del self._kept[: -self.most]
+        return made
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,8 +93,8 @@ class Search:
     budget: Budget
     progress: Callable[[str], None]
     wanted: Mapping[str, int] | None = None
-    _built: list[tuple[object, object, Dictionary]] = field(default_factory=list, repr=False)
-    _likeliest: list[tuple[object, object, Likeliest | None]] = field(default_factory=list, repr=False)
+    _built: Recent[Dictionary] = field(default_factory=lambda: Recent(BUILT), init=False, repr=False)
+    _likeliest: Recent[Likeliest | None] = field(default_factory=lambda: Recent(SCORED), init=False, repr=False)
 
     @classmethod
     def over(
@@ -89,23 +113,12 @@ class Search:
         return cls(coarse, {column.name: column for column in columns}, quantities, seed, budget, progress)
 
     def dictionary(self, kind: object, fitted: object, problem: Problem) -> Dictionary:
-        """Whitened candidates of one kind of term beside one fit; the last two are kept."""
-        for known_kind, known_fit, dictionary in self._built:
-            if known_kind is kind and known_fit is fitted:
-                return dictionary
-        dictionary = build_dictionary(self.quantities, problem.whitener)
-        del self._built[:-1]
-        self._built.append((kind, fitted, dictionary))
-        return dictionary
+        """Whitened candidates of one kind of term beside one fit."""
+        return self._built.of(kind, fitted, lambda: build_dictionary(self.quantities, problem.whitener))
 
     def likeliest(self, kind: object, fitted: object, scored: Callable[[], Likeliest | None]) -> Likeliest | None:
         """Best candidate of one kind beside one fit, scored once; None: there is no candidate."""
-        for known_kind, known_fit, one in self._likeliest:
-            if known_kind is kind and known_fit is fitted:
-                return one
-        del self._likeliest[:-KEPT]
-        self._likeliest.append((kind, fitted, scored()))
-        return self._likeliest[-1][2]
+        return self._likeliest.of(kind, fitted, scored)
 
     def cross_basis(self, columns: Collection[str]) -> FloatArray:
         """What columns can do in any shape, at any lag and response, at 1 Hz, orthonormal, shape (n, rank)."""
