@@ -124,9 +124,10 @@ def usable_columns(
     columns, unused = known_columns(timeline)
     unused |= dict.fromkeys(timeline.of_one_camera, "from the camera that measured the offset: it has the same errors")
     unused |= dict.fromkeys(excluded, "left out on request")
-    feedback = [one for one in find_feedback(timeline, columns) if one.column not in unused]
-    barred = {one.column for one in feedback} | set(unused)
-    return [column for column in columns if column.name not in barred], feedback, unused
+    columns = [column for column in columns if column.name not in unused]
+    feedback = find_feedback(timeline, columns)
+    follow = {one.column for one in feedback}
+    return [column for column in columns if column.name not in follow], feedback, unused
 
 
 def initial_terms(base: DriverProfile, timeline: Timeline) -> tuple[Term, ...]:
