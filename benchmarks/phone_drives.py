@@ -159,12 +159,10 @@ def _in_band(run: Run, acceleration: tuple[FloatArray, FloatArray]) -> tuple[Flo
 
 def written(profile: DriverProfile, speed: float) -> float:
     """Lateral acceleration that what `convert` writes exceeds in 0.1 % of the time, mean over seeds. [m/s2]"""
-    count = round(SAMPLED / profile.model.step) + 1
-    time = profile.model.step * np.arange(count, dtype=np.float64)
-    speeds = np.full(count, speed)
-    segment = Segment(time=time, lane_width=np.full(count, profile.lane_width), speed=speeds)
-    paths = [drivable(sample_offsets(profile, segment, seed), profile.model.step, speeds)[0] for seed in SEEDS]
-    return float(np.mean([strain(path, profile.model.step, speeds).seldom for path in paths]))
+    step = profile.model.step
+    segment = Segment.even(SAMPLED, step, profile.lane_width, speed)
+    paths = [drivable(sample_offsets(profile, segment, seed), step, segment.speed)[0] for seed in SEEDS]
+    return float(np.mean([strain(path, step, segment.speed).seldom for path in paths]))
 
 
 def movement_table(all_trips: Sequence[Trip]) -> str:

@@ -78,6 +78,12 @@ class Segment:
         if self.before < 0 or self.after < 0 or self.before + self.after > n:
             raise ValueError(f"{self.before} rows before and {self.after} after a segment in {n} rows")
 
+    @classmethod
+    def even(cls, duration: float, step: float, lane_width: float, speed: float) -> Segment:
+        """Free driving at one speed [m/s] in a lane of one width [m], for so long, at this step. [s]"""
+        n = round(duration / step) + 1
+        return cls(step * np.arange(n, dtype=np.float64), np.full(n, lane_width), np.full(n, speed))
+
     def __len__(self) -> int:
         return len(self.time)
 

@@ -159,10 +159,8 @@ def _coarse_steps(profile: DriverProfile) -> list[str]:
 
 
 def _strained(profile: DriverProfile) -> list[str]:
-    n = round(FREE_RUN / profile.model.step) + 1
-    time: FloatArray = profile.model.step * np.arange(n, dtype=np.float64)
-    speed = np.full(n, 30.0)
-    segment = Segment(time=time, lane_width=np.full(n, profile.lane_width), speed=speed)
+    segment = Segment.even(FREE_RUN, profile.model.step, profile.lane_width, 30.0)
+    speed = segment.speed
     found = strain(sample_offsets(profile, segment, 1), profile.model.step, speed)
     if found.excess > 1.0:
         return [

@@ -49,10 +49,7 @@ class MovementSummary:
 
 def free_runs(profile: DriverProfile, seed: int, *, drivers: int = DRIVERS, duration: float = DURATION) -> FloatArray:
     """Offsets of several drivers in even traffic, shape (drivers, n). [m]"""
-    step = profile.model.step
-    n = round(duration / step) + 1
-    time: FloatArray = step * np.arange(n, dtype=np.float64)
-    segment = Segment(time, np.full(n, profile.lane_width), np.full(n, SPEED))
+    segment = Segment.even(duration, profile.model.step, profile.lane_width, SPEED)
     root = np.random.SeedSequence(seed)
     return np.array([sample_offsets(profile, segment, child(root, k)) for k in range(drivers)])
 
