@@ -10,14 +10,14 @@ motorway, and cameras do see worse at some.
 from __future__ import annotations
 
 import argparse
-from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from benchmarks.dlr_stretches import Recording
 from benchmarks.markers import write_between_markers
-from xosc_lateral.formats.importers.dlr_ht import STEP, fit_reference_line, import_dlr_ht, read_tracks
+from xosc_lateral.formats.importers.dlr_ht import STEP
 
 FloatArray = NDArray[np.float64]
 
@@ -33,21 +33,14 @@ def fast_movement(source: Path) -> tuple[FloatArray, NDArray[np.bool_], NDArray[
     """Place along the road [m], direction (True: north), vehicle, and filtered offset [m] of every usable row."""
     from scipy.signal import butter, sosfiltfilt
 
-    tracks = read_tracks(source)
-    forward = (tracks.groupby("vehicle")["velocity_northing"].transform("mean") > 0.0).to_numpy()
-    _, place, _ = fit_reference_line(tracks[["center_easting", "center_northing"]].to_numpy(), forward)
-    table = import_dlr_ht(source, keep_cut=True).table
-    assert len(table) == len(tracks), "with keep_cut, no row is dropped"
-    kept, vehicle = (table["state"] == "kept").to_numpy(), tracks["vehicle"].to_numpy()
-    offset = table["offset"].to_numpy()
+    recording = Recording.read(source)
+    offset = recording.table["offset"].to_numpy()
     band = butter(2, BAND, "bandpass", fs=1.0 / STEP, output="sos")
-    edges = np.flatnonzero(np.diff(kept) | (np.diff(vehicle) != 0)) + 1
     edge, parts = round(LONGEST_EDGE / STEP), []
-    for first, last in pairwise([0, *edges, len(kept)]):
-        if kept[first] and (last - first) * STEP >= LEAST:
-            inside = slice(first + edge, last - edge)
-            fast = sosfiltfilt(band, offset[first:last])[edge:-edge]
-            parts.append((place[inside], forward[inside], vehicle[inside], fast))
+    for part in recording.stretches(LEAST):
+        inside = slice(part.start + edge, part.stop - edge)
+        fast = sosfiltfilt(band, offset[part])[edge:-edge]
+        parts.append((recording.place[inside], recording.north[inside], recording.vehicle[inside], fast))
     columns = zip(*parts, strict=True)
     return tuple(np.concatenate(column) for column in columns)  # type: ignore[return-value]
 

@@ -11,7 +11,14 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from xosc_lateral.formats.importers.dlr_ht import STEP, fit_reference_line, import_dlr_ht, read_tracks
+from xosc_lateral.formats.importers.dlr_ht import STEP, fit_reference_line, import_dlr_ht, read_tracks, travels_north
+
+
+def along_road(tracks: pd.DataFrame) -> tuple[NDArray[np.bool_], NDArray[np.float64], NDArray[np.float64]]:
+    """Carriageway of each row, and its place along the reference line and aside from it [m], shape (n,) each."""
+    north = travels_north(tracks)
+    _, place, aside = fit_reference_line(tracks[["center_easting", "center_northing"]].to_numpy(), north)
+    return north, place, aside
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,8 +45,7 @@ class Recording:
     def read(cls, source: Path) -> Recording:
         """From the data set's wheel, zip or table."""
         tracks = read_tracks(source)
-        north = (tracks.groupby("vehicle")["velocity_northing"].transform("mean") > 0.0).to_numpy()
-        _, place, _ = fit_reference_line(tracks[["center_easting", "center_northing"]].to_numpy(), north)
+        north, place, _ = along_road(tracks)
         table = import_dlr_ht(source, keep_cut=True).table
         assert len(table) == len(tracks), "with keep_cut, no row is dropped"
         return cls(table, tracks["vehicle"].to_numpy(), north, place)

@@ -23,7 +23,7 @@ def side_by_side(source: Path) -> tuple[pd.DataFrame, pd.DataFrame]:
     table = dlr_ht.import_dlr_ht(source, keep_cut=True).table
     dlr_ht.COLUMNS = (*dlr_ht.COLUMNS, "dimension_width")
     tracks = dlr_ht.read_tracks(source)
-    north = tracks.groupby("vehicle")["velocity_northing"].transform("mean").to_numpy() > 0.0
+    north = dlr_ht.travels_north(tracks)
     _, s, _ = fit_reference_line(tracks[["center_easting", "center_northing"]].to_numpy(), north)
     rows = pd.DataFrame(
         {

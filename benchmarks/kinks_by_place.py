@@ -15,9 +15,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from benchmarks.dlr_stretches import along_road
 from benchmarks.markers import write_between_markers
 from xosc_lateral.driver.sensor.kinks_fit import jumps_of
-from xosc_lateral.formats.importers.dlr_ht import STEP, fit_reference_line, read_tracks
+from xosc_lateral.formats.importers.dlr_ht import STEP, read_tracks
 
 FloatArray = NDArray[np.float64]
 EVERY = 1.0
@@ -36,8 +37,7 @@ def jumps_and_places(source: Path) -> tuple[FloatArray, FloatArray, NDArray[np.b
     """Log squared jump [-], place [m], direction (True: north) and vehicle of every kink."""
     tracks = read_tracks(source)
     vehicle = tracks["vehicle"].to_numpy()
-    forward = (tracks.groupby("vehicle")["velocity_northing"].transform("mean") > 0.0).to_numpy()
-    _, place, aside = fit_reference_line(tracks[["center_easting", "center_northing"]].to_numpy(), forward)
+    forward, place, aside = along_road(tracks)
     size, parts = round(EVERY / STEP), []
     for name in np.unique(vehicle):
         rows = np.flatnonzero(vehicle == name)

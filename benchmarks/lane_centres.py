@@ -53,7 +53,7 @@ def lanes_of(source: Path) -> tuple[list[Lane], list[FloatArray]]:
     """Every lane's rows, and the offsets of all kept stretches."""
     tracks = dlr_ht.read_tracks(source)
     table = dlr_ht.import_dlr_ht(source, keep_cut=True).table
-    forward = dlr_ht._travels_north(tracks)
+    forward = dlr_ht.travels_north(tracks)
     line, s, d = fit_reference_line(tracks[["center_easting", "center_northing"]].to_numpy(), forward)
     s, d = np.where(forward, s, line.length - s), np.where(forward, d, -d)
     kept = (table["state"] == KEPT).to_numpy()

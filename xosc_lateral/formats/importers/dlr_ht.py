@@ -75,7 +75,7 @@ def import_dlr_ht(source: Path, settings: CutSettings = DEFAULT_CUTS, *, keep_cu
     tracks = read_tracks(source)
     xy = tracks[["center_easting", "center_northing"]].to_numpy()
     vehicle = tracks["vehicle"].to_numpy()
-    forward = _travels_north(tracks)
+    forward = travels_north(tracks)
     reference, s_road, d_road = fit_reference_line(xy, forward)
     # From here on every carriageway has its own s and d: s grows with travel, d is positive to the left of it.
     s = np.where(forward, s_road, reference.length - s_road)
@@ -183,7 +183,8 @@ def _check_numbers(column: pd.Series, source: Path) -> None:
         raise FormatError(f"no number: {column.iloc[row]}", path=source, line=row + 2, element=str(column.name))
 
 
-def _travels_north(tracks: pd.DataFrame) -> NDArray[np.bool_]:
+def travels_north(tracks: pd.DataFrame) -> NDArray[np.bool_]:
+    """Carriageway of each row, by its vehicle's mean velocity, shape (n,)."""
     mean = tracks.groupby("vehicle")["velocity_northing"].transform("mean")
     return np.asarray(mean.to_numpy() > 0.0)
 
