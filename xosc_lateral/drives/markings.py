@@ -101,6 +101,8 @@ def mend_markings(time: FloatArray, offset: FloatArray, lane_width: FloatArray) 
     Mended or None
         None where the lane width wasn't measured, or nothing in it is impossible.
     """
+    if np.ptp(lane_width) == 0.0:  # before anything is imported or computed: from a map, as most tables have it
+        return None
     breaks = (np.diff(time) > MAX_GAP) | lane_steps(offset, lane_width)
     block, moment = _blocks(time, breaks)
     views = _Views.of(block, offset, lane_width, np.flatnonzero(breaks))
