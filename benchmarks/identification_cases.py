@@ -23,7 +23,7 @@ from benchmarks.identification_drives import (
 from xosc_lateral.identification.regression import Coarse, fit_model
 from xosc_lateral.identification.timeline import coarse_mean
 
-ROUNDS = ("", "_2", "_3", "_4", "_5", "_6", "_7", "_8")
+ROUNDS = ("", "_2", "_3", "_4", "_5", "_6", "_7", "_8", "_9")
 SETS = tuple(name + suffix for suffix in ROUNDS for name in ("design", "validation", "test"))
 PROTOCOL = Path(__file__).parents[1] / "docs" / "validation" / "identification.toml"
 

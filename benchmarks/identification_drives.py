@@ -25,6 +25,7 @@ from xosc_lateral.datasets.movements import (
     ornstein_uhlenbeck,
     oscillating,
     pursuit,
+    rate_limited,
     record_movement,
     reflected,
     sawtooth,
@@ -46,6 +47,7 @@ MOVEMENTS = {
     "long_memory": long_memory,
     "free_play": free_play,
     "zigzag": zigzag,
+    "rate_limited": rate_limited,
 }
 FOLLOWING = ["steering_wheel_angle", "yaw_rate"]
 

@@ -2,7 +2,7 @@
 
     python -m benchmarks.identification_study --set SET [--only NAME] [-o OUT.jsonl]
 
-SET is design, validation or test, alone or with _2 to _8 for the later rounds.
+SET is design, validation or test, alone or with _2 to _9 for the later rounds.
 
 docs/validation/identification.toml fixes seeds, movements, kinds, sizes and counts; `--share` runs a part of them. One
 line per drive goes to OUT.jsonl as it is finished; `--table OUT.jsonl...` prints the tables of the documents.

@@ -28,6 +28,7 @@ PLAIN: dict[str, Movement] = {
         "long_memory",
         "free_play",
         "zigzag",
+        "rate_limited",
         "in_regimes",
     )
 }
@@ -185,3 +186,11 @@ def test_a_movement_is_told_of_a_column_where_that_is_asked_for() -> None:
 
 def test_the_grid_of_movements_is_coarser_than_that_of_the_road() -> None:
     assert pytest.approx(5.0) == MOVEMENT_STEP / STEP
+
+
+def test_who_is_rate_limited_gets_aside_at_a_rate_of_his_own_and_no_faster() -> None:
+    away = round(5.0 / MOVEMENT_STEP)
+    path = moved("rate_limited")
+    speed = np.abs(path[away:] - path[:-away]) / 5.0
+    assert np.quantile(speed, 0.95) < 1.4 * np.quantile(speed, 0.7)
+    assert 0.02 < np.quantile(speed, 0.7) < 0.08

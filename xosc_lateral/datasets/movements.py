@@ -205,6 +205,17 @@ def zigzag(n: int, rng: np.random.Generator) -> np.ndarray:
     return np.cumsum(_smooth(velocity)) * MOVEMENT_STEP + 0.02 * _smooth(_first_order_noise(n, rng, 1.0))
 
 
+def rate_limited(n: int, rng: np.random.Generator) -> np.ndarray:
+    """Follows a goal that wanders within half a minute, at no more than 4 cm/s or so. Shape (n,). [m]"""
+    goal = 0.25 * _first_order_noise(n, rng, rng.uniform(15.0, 30.0))
+    limit = 0.04 * np.exp(0.3 * rng.normal())
+    place = np.zeros(n)
+    for t in range(1, n):
+        speed = 0.5 * (goal[t] - place[t - 1])
+        place[t] = place[t - 1] + MOVEMENT_STEP * np.clip(speed, -limit, limit)
+    return _smooth(place) + 0.02 * _smooth(_first_order_noise(n, rng, 1.0))
+
+
 def in_regimes(n: int, rng: np.random.Generator) -> np.ndarray:
     """For a minute at a time, pushed 2.5 times as hard; and then quiet for two. Shape (n,). [m]"""
     loud = np.ones(n)
