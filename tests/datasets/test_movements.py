@@ -188,9 +188,7 @@ def test_the_grid_of_movements_is_coarser_than_that_of_the_road() -> None:
     assert pytest.approx(5.0) == MOVEMENT_STEP / STEP
 
 
-def test_who_is_rate_limited_gets_aside_at_a_rate_of_his_own_and_no_faster() -> None:
-    away = round(5.0 / MOVEMENT_STEP)
-    path = moved("rate_limited")
-    speed = np.abs(path[away:] - path[:-away]) / 5.0
-    assert np.quantile(speed, 0.95) < 1.4 * np.quantile(speed, 0.7)
-    assert 0.02 < np.quantile(speed, 0.7) < 0.08
+def test_who_is_rate_limited_goes_as_fast_as_he_does_or_hardly_at_all() -> None:
+    """Speeds that are bounded have thinner tails than normal ones: excess kurtosis -1.2 where all are as frequent."""
+    path, away = moved("rate_limited"), round(3.0 / MOVEMENT_STEP)
+    assert stats.kurtosis((path[away:] - path[:-away]) / 3.0) < -0.7

@@ -206,8 +206,8 @@ def zigzag(n: int, rng: np.random.Generator) -> np.ndarray:
 
 
 def rate_limited(n: int, rng: np.random.Generator) -> np.ndarray:
-    """Follows a goal that wanders within half a minute, at no more than 4 cm/s or so. Shape (n,). [m]"""
-    goal = 0.25 * _first_order_noise(n, rng, rng.uniform(15.0, 30.0))
+    """Follows a goal that wanders within ten seconds, at no more than 4 cm/s or so. Shape (n,). [m]"""
+    goal = 0.25 * _first_order_noise(n, rng, rng.uniform(8.0, 15.0))
     limit = 0.04 * np.exp(0.3 * rng.normal())
     place = np.zeros(n)
     for t in range(1, n):
