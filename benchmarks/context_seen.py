@@ -1,17 +1,20 @@
-"""What a classifier gains from the context: by which columns, and in which movement.
+"""What a classifier gains from the context: by which columns, with and without neighbours' effects.
 
     xosc-lateral import dlr-ht tasi-0.15.4-py3-none-any.whl -o dlr.parquet
-    python -m benchmarks.context_seen dlr.parquet [--seed 0] [--write docs/validation/realism.md]
+    python -m benchmarks.context_seen dlr.parquet [--seeds 10 11 12 13] [--write docs/validation/realism.md]
 
-Free runs of the driver alone beside recorded ones, snippets of 10 s, as in `fair_measure`, below 0.5 Hz and below
-0.25 Hz. Columns that say where a vehicle is (the road's curvature, its lanes' width, and speed and acceleration, which
-traffic has in common at a place) and all others are shown apart.
+Free runs of the driver alone beside recorded ones, as in `fair_measure`; mean over several random halvings of the
+vehicles, each half in its turn held out, with the standard error over halvings. Some columns say where a vehicle is:
+the map's (the road's curvature, and its lanes' width, which tells the carriageway), and speed and acceleration, which
+the same cameras saw there. The context is shown with them and without.
 """
 
 from __future__ import annotations
 
 import argparse
+import sys
 from collections.abc import Sequence
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -23,70 +26,72 @@ from xosc_lateral.driver.fitting import fit_profile
 from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.drives.cuts import all_runs
 from xosc_lateral.drives.drive import Run
-from xosc_lateral.drives.filters import kaiser_design, low_pass
 from xosc_lateral.evaluation.classifier import classifier_two_sample_test, context_features
-from xosc_lateral.evaluation.filters import ATTENUATION, CUTOFF, THINNED, TRANSITION
+from xosc_lateral.evaluation.filters import below_half_hertz, thinned
 from xosc_lateral.evaluation.sampled_snippets import sample_runs
 from xosc_lateral.evaluation.snippets import snippets_of
 from xosc_lateral.formats.drives import read_drives
 
 FloatArray = NDArray[np.float64]
-SECONDS = 10.0
-FACTORS = (1.0, 0.5)
-"""Of the frequency below which movement is shown; all else goes with it. [-]"""
-OF_PLACE = ("curvature", "lane_width", "speed", "acceleration")
+LENGTHS = (10.0, 30.0)
+"""Of snippets. [s]"""
+OF_MAP = frozenset({"curvature", "lane_width"})
+OF_PLACE = OF_MAP | {"speed", "acceleration"}
 EACH = 3
 """Features of a context column. [-]"""
 
 
-def slow(path: FloatArray, step: float, factor: float) -> FloatArray:
-    """As `below_half_hertz`, with another border. [m]"""
-    nyquist = 0.5 / step
-    half, beta = kaiser_design(ATTENUATION, factor * TRANSITION / nyquist)
-    kernel = low_pass(half, factor * CUTOFF / nyquist, beta)
-    half = min(half, len(path) - 1)
-    middle = len(kernel) // 2
-    kernel = kernel[middle - half : middle + half + 1] / kernel[middle - half : middle + half + 1].sum()
-    return np.convolve(np.pad(path, half, mode="reflect", reflect_type="odd"), kernel, mode="valid")
-
-
-def areas(profile: DriverProfile, runs: Sequence[Run], seed: int, factor: float) -> list[float]:
-    """Without context, with all of it, with columns of the place, with the others."""
+def areas(profile: DriverProfile, runs: Sequence[Run], seed: int, seconds: float) -> list[float]:
+    """Without context, with all of it, without the map's columns, without the place's."""
     step = profile.model.step
-    cut = snippets_of(runs, SECONDS, step)
-    every = round(THINNED / factor / step)
-    real = cut.cut_from([slow(run.offset, step, factor) for run in runs])
-    made = cut.cut_from([slow(path, step, factor) for path in sample_runs(profile, runs, seed, same_start=False)])
+    cut, paths = snippets_of(runs, seconds, step), sample_runs(profile, runs, seed, same_start=False)
+    real = cut.cut_from([below_half_hertz(run.offset, step) for run in runs])
+    made = cut.cut_from([below_half_hertz(path, step) for path in paths])
     context = context_features(cut, real), context_features(cut, made)
     names = sorted({name for one in cut.items for name in one.run.context})
-    of_place = np.repeat([name in OF_PLACE for name in names], EACH)
-    found = []
-    for chosen in (None, np.ones(len(of_place), dtype=bool), of_place, ~of_place):
-        seen = None if chosen is None else [part[:, chosen] for part in context]
-        shown = real[:, ::every], made[:, ::every]
+    shown, found = (thinned(real, step), thinned(made, step)), []
+    for left_out in (None, frozenset[str](), OF_MAP, OF_PLACE):
+        seen = None
+        if left_out is not None:
+            kept = np.repeat([name not in left_out for name in names], EACH)
+            seen = [part[:, kept] for part in context]
         result = classifier_two_sample_test(*shown, cut.group, cut.group, context=seen, seed=seed)
         assert result is not None
         found.append(result.auc)
     return found
 
 
+def table(found: dict[bool, FloatArray]) -> list[str]:
+    """Of areas, shape (halvings, 2, lengths, 4) each, by whether neighbours were fitted."""
+    lines = [
+        "| snippets | neighbours fitted | alone | all context | without the map's | without the place's |",
+        "|---|---|---|---|---|---|",
+    ]
+    for number, seconds in enumerate(LENGTHS):
+        for neighbours, several in found.items():
+            means = several[:, :, number].mean(axis=1)
+            errors = means.std(axis=0, ddof=1) / np.sqrt(len(means))
+            cells = " | ".join(f"{a:.3f} ± {b:.3f}" for a, b in zip(means.mean(axis=0), errors, strict=True))
+            lines.append(f"| {seconds:g} s | {'yes' if neighbours else 'no'} | {cells} |")
+    return lines
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("table", type=Path, nargs="+")
-    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--seeds", type=int, nargs="+", default=[10, 11, 12, 13], help="one halving each")
     parser.add_argument("--write", type=Path, help="page with the markers")
     args = parser.parse_args()
-    one, other = halves(read_drives(args.table), args.seed)
-    pairs = [(fit_profile(a, name="half"), all_runs(b)) for a, b in ((one, other), (other, one))]
-    lines = [
-        "| movement below | alone | with all context | with the place's | with the rest |",
-        "|---|---|---|---|---|",
-    ]
-    for factor in FACTORS:
-        found = np.array([areas(profile, runs, args.seed, factor) for profile, runs in pairs])
-        cells = " | ".join(f"{a:.3f} / {b:.3f}" for a, b in found.T)
-        lines.append(f"| {factor * CUTOFF:g} Hz | {cells} |")
-    text = "\n".join(lines)
+    drives = read_drives(args.table)
+    found: dict[bool, list[list[list[float]]]] = {False: [], True: []}
+    for neighbours, seed in product((True, False), args.seeds):
+        one, other = halves(drives, seed)
+        for fitted, held_out in ((one, other), (other, one)):
+            profile, runs = fit_profile(fitted, name="half", neighbours=neighbours), all_runs(held_out)
+            found[neighbours].append([areas(profile, runs, 0, seconds) for seconds in LENGTHS])
+            print(seed, neighbours, np.round(found[neighbours][-1], 3).tolist(), file=sys.stderr, flush=True)
+    shape = (len(args.seeds), 2, len(LENGTHS), -1)
+    text = "\n".join(table({neighbours: np.array(several).reshape(shape) for neighbours, several in found.items()}))
     print(text)
     if args.write is not None:
         write_between_markers(args.write, text, "context-seen")

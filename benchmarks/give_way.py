@@ -1,6 +1,6 @@
 """Lateral gaps of vehicles side by side, beside those of any two vehicles of the two lanes: `enrich.give_way.GAPS`.
 
-python benchmarks/give_way.py WHEEL
+python -m benchmarks.give_way WHEEL
 """
 
 from __future__ import annotations

@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -33,6 +33,7 @@ from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.driver.sampling import sample_offsets
 from xosc_lateral.driver.sensor.runs import driver_runs
 from xosc_lateral.drives import markings
+from xosc_lateral.drives.cleaning import RUN
 from xosc_lateral.drives.cuts import cut_runs
 from xosc_lateral.drives.drive import Drive, Run
 from xosc_lateral.drives.resampling import STEP
@@ -75,11 +76,9 @@ class Trip:
 
     @property
     def recorded(self) -> Drive:
-        """As the camera saw it, no marking mended."""
-        time, offset, width, speed = (self.table[name].to_numpy() for name in ("time", "offset", "lane_width", "speed"))
-        good = np.concatenate([[True], np.diff(time) > 0]) & (width > 1.0) & (np.abs(offset) < width)
-        context = {"speed": speed[good], "lane_width": width[good]}
-        return Drive(self.name, time[good], offset[good], width[good], context)
+        """As the camera saw it: no marking is mended where an import has cut, but lane changes are looked for."""
+        (drive,) = drives_of_table(self.table.assign(**{RUN: 0}), {}, self.name)
+        return replace(drive, run=None)
 
 
 def trips(folder: Path, drivers: Sequence[str]) -> Iterator[Trip]:

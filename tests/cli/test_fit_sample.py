@@ -83,3 +83,12 @@ def test_input_at_fault_is_one_line_and_nothing_is_written(tmp_path: Path, capsy
     assert said.startswith(f"xosc-lateral: {bad}: drive bad: offsets of up to 20 m")
     assert "\n" not in said
     assert not out.exists()
+
+
+def test_neighbours_of_few_drives_are_refused_in_one_line(
+    measured: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["fit", str(measured), "-o", str(tmp_path / "p.json"), "--neighbours"]) == 1
+    said = capsys.readouterr().err.strip()
+    assert "what neighbours do takes 30 drives at least, these are " in said
+    assert "\n" not in said

@@ -9,12 +9,15 @@ import pytest
 
 from tests.baselines.made_runs import made_run, smooth_runs
 from xosc_lateral.driver.effects import Acts, Linear
-from xosc_lateral.driver.fitting import fit_population
+from xosc_lateral.driver.fitting import fit_population, fit_profile
 from xosc_lateral.driver.models.autoregressive.filters import split_bands
+from xosc_lateral.driver.neighbours import SCALE
 from xosc_lateral.driver.place import LEAST_DRIVES, _shrunk, fit_place, without_place
 from xosc_lateral.driver.sampling import sample_offsets
 from xosc_lateral.driver.snippets import segment_of
-from xosc_lateral.drives.drive import Run
+from xosc_lateral.drives.cuts import CutRules
+from xosc_lateral.drives.drive import Drive, Run
+from xosc_lateral.errors import DriverProfileError, NotEnoughDataError
 
 
 def population(
@@ -107,3 +110,40 @@ def test_one_profile_gives_trucks_and_cars_their_own_level(is_truck: float):
     measured = [run.offset.mean() for run in runs if run.context["is_truck"][0] == is_truck]
     error = np.hypot(np.std(sampled) / np.sqrt(len(sampled)), np.std(measured) / np.sqrt(len(measured)))
     assert abs(np.mean(sampled) - np.mean(measured)) < 3.5 * error
+
+
+def beside_others(seed: int, left: float, right: float) -> list[Run]:
+    """Drivers of 60 s whom others overtake on the left, or whom they overtake on the right, once each. [m]"""
+    rng, runs = np.random.default_rng([seed, 2]), []
+    for k, run in enumerate(smooth_runs(60, 60.0, seed=seed)):
+        side, strength = ("left_distance", left) if k % 2 else ("right_distance", right)
+        distance = np.maximum(np.abs(rng.uniform(3.0, 8.0) * (run.time - run.time[0] - rng.uniform(10.0, 50.0))) - 5, 0)
+        distance[distance > 150.0] = np.inf if k % 3 else np.nan
+        moved = run.offset + strength * np.exp(-np.nan_to_num(distance, nan=np.inf) / SCALE)
+        runs.append(made_run(moved, drive=run.drive, speed=30.0, **{side: distance}))
+    return runs
+
+
+def test_what_neighbours_do_is_found_with_its_size_and_is_nothing_where_there_are_none():
+    runs = beside_others(5, left=-0.3, right=0.5)
+    found = {effect.columns[0]: effect for effect in fit_place(runs, neighbours=True)}
+    for column, size in (("left_distance", -0.3), ("right_distance", 0.5)):
+        assert found[column].acts is Acts.LOCATION
+        assert found[column].coefficients[0] == pytest.approx(size, abs=4.0 * found[column].errors[0])
+        assert found[column].errors[0] < 0.3 * abs(size)
+        assert not found[column].strength(0.2, {column: np.full(9, np.inf)}).any()
+        assert not found[column].strength(0.2, {column: np.full(9, np.nan)}).any()
+    assert fit_place(runs) == ()  # nobody asked
+
+
+def test_neighbours_that_cannot_be_fitted_are_refused():
+    with pytest.raises(NotEnoughDataError, match="no drive has a neighbour"):
+        fit_place(population(1), neighbours=True)
+    with pytest.raises(NotEnoughDataError, match="takes 30 drives at least, these are 29"):
+        fit_place(beside_others(5, -0.3, 0.5)[: LEAST_DRIVES - 1], neighbours=True)
+
+
+def test_the_paper_s_model_has_no_neighbours():
+    drive = Drive("a", *(np.arange(100.0), np.zeros(100), np.full(100, 3.5)), {"speed": np.full(100, 30.0)})
+    with pytest.raises(DriverProfileError, match="without what neighbours do"):
+        fit_profile([drive], name="paper", model="two-level", rules=CutRules(max_gap=2.0), neighbours=True)

@@ -43,6 +43,7 @@ def fit(
     licence: str = "",
     sensor_noise: float | None = None,
     left_hand: bool = False,
+    neighbours: bool = False,
 ) -> DriverProfile:
     """Fit a driver profile.
 
@@ -60,10 +61,13 @@ def fit(
         Standard deviation of the sensor's error on the offset, where it is known; else found from the drives. [m]
     left_hand : bool
         The drives are of left-hand traffic: roads with right-hand traffic get their mirror image.
+    neighbours : bool
+        The profile also holds how drivers keep away from vehicles beside them, from `left_distance` and
+        `right_distance`. Takes 30 drives or more, and not the two-level model.
 
     Raises
     ------
-    FormatError, NotEnoughDataError
+    FormatError, NotEnoughDataError, DriverProfileError
     """
     from msgspec.structs import replace
 
@@ -73,5 +77,12 @@ def fit(
     given = given_drives(drives, columns)
     known = Provenance(source=source or ", ".join(given.inputs), licence=licence, inputs=dict(given.inputs))
     with naming(given):
-        profile = fit_profile(given.drives, name=name, model=model, provenance=known, sensor_noise=sensor_noise)
+        profile = fit_profile(
+            given.drives,
+            name=name,
+            model=model,
+            provenance=known,
+            sensor_noise=sensor_noise,
+            neighbours=neighbours,
+        )
     return replace(profile, left_hand=left_hand)

@@ -50,6 +50,9 @@ def fit(
         typer.Option(help="Standard deviation of the sensor's error [m]; default: estimated.", min=1e-4, max=2),
     ] = None,
     left_hand: Annotated[bool, typer.Option("--left-hand", help="Drives of left-hand traffic.")] = False,
+    neighbours: Annotated[
+        bool, typer.Option("--neighbours", help="Also fit how drivers keep away from vehicles beside them.")
+    ] = False,
     force: Force = False,
     quiet: Quiet = False,
     as_json: AsJson = False,
@@ -75,6 +78,7 @@ def fit(
         licence=licence,
         sensor_noise=sensor_noise,
         left_hand=left_hand,
+        neighbours=neighbours,
     )
     if written is None:
         write_stdout(profile_bytes(profile))

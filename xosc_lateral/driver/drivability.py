@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.driver.sampling import sample_offsets
+from xosc_lateral.driver.sensor.model import WIDE
 from xosc_lateral.segment import Segment
 
 FloatArray = NDArray[np.float64]
@@ -150,7 +151,9 @@ def fit_warnings(profile: DriverProfile) -> list[str]:
 
 def _coarse_steps(profile: DriverProfile) -> list[str]:
     sensor = profile.sensor
-    if sensor is None or not sensor.rounding or sensor.driver_share != (0.0, 1.0):
+    if sensor is None or sensor.driver_share != (0.0, 1.0):
+        return []
+    if sensor.rounding <= WIDE * np.sqrt(sensor.driver_variance):  # little data, not its steps
         return []
     return [
         f"the offsets are rounded to {sensor.rounding:.3g} m, too coarse to tell how far the driver of {profile.name} "

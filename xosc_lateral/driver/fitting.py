@@ -19,6 +19,7 @@ from xosc_lateral.driver.sensor.model import SensorModel
 from xosc_lateral.driver.sensor.runs import driver_runs
 from xosc_lateral.drives.cuts import PAPER_RULES, CutRules, all_runs
 from xosc_lateral.drives.drive import Drive, Run
+from xosc_lateral.errors import DriverProfileError
 from xosc_lateral.version import __version__
 
 FloatArray = NDArray[np.float64]
@@ -32,6 +33,7 @@ def fit_profile(
     rules: CutRules = PAPER_RULES,
     provenance: Provenance | None = None,
     sensor_noise: float | None = None,
+    neighbours: bool = False,
 ) -> DriverProfile:
     """Cut drives into runs, tell driver and sensor apart, and fit a profile.
 
@@ -49,21 +51,27 @@ def fit_profile(
         What is known about the drives; hours, counts and fit settings are filled in.
     sensor_noise : float, optional
         Standard deviation of the sensor's error on the rows, where it is known. [m]
+    neighbours : bool
+        A population's profile also holds how its drivers keep away from vehicles beside them.
 
     Raises
     ------
     NotEnoughDataError
-        When too little is left after cutting.
+        When too little is left after cutting, or neighbours are asked for and not known.
+    DriverProfileError
+        When neighbours are asked of the two-level model, which is the paper's to the letter.
     """
     runs = all_runs(drives, rules)
     if (
         model_named(model).model.kind == ModelKind.TWO_LEVEL
     ):  # to the letter: the paper takes offsets as they were measured
+        if neighbours:
+            raise DriverProfileError(f"a {ModelKind.TWO_LEVEL} profile is fitted without what neighbours do")
         return fit_runs(runs, name=name, model=model, provenance=provenance)
     cleaned, sensor = driver_runs(runs, drives, sensor_noise=sensor_noise)
     known = provenance or Provenance()
     known = replace(known, fit={**known.fit, **_marking_notes(drives)})
-    return fit_population(cleaned, name=name, model=model, provenance=known, sensor=sensor)
+    return fit_population(cleaned, name=name, model=model, provenance=known, sensor=sensor, neighbours=neighbours)
 
 
 def _marking_notes(drives: Sequence[Drive]) -> Mapping[str, float]:
@@ -84,6 +92,7 @@ def fit_population(
     model: ModelKind | str = ModelKind.AUTOREGRESSIVE,
     provenance: Provenance | None = None,
     sensor: SensorModel | None = None,
+    neighbours: bool = False,
 ) -> DriverProfile:
     """Fit a profile to the driver's part of runs: what class, lane and speed do first (`place`), then the drivers.
 
@@ -93,8 +102,10 @@ def fit_population(
         Without the sensor's part, see `driver_runs`.
     sensor : SensorModel, optional
         What was taken out; the profile keeps it.
+    neighbours : bool
+        Also what vehicles beside them do (`fit_place`).
     """
-    place = fit_place(runs)
+    place = fit_place(runs, neighbours=neighbours)
     profile = fit_runs(without_place(runs, place), name=name, model=model, provenance=provenance)
     return replace(profile, sensor=sensor, effects=place)
 

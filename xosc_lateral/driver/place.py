@@ -1,7 +1,8 @@
 """What class, lane and speed do to a population's level, spread and fine movement, fitted before the rest.
 
 Trucks, cars and lanes of one recording differ. What of it is beyond chance becomes effects of the profile, so that one
-profile gives each its own, wherever class, lane and speed are known.
+profile gives each its own, wherever class, lane and speed are known. Where asked for, what neighbours do to the level
+is fitted along with them (`neighbours`).
 """
 
 from __future__ import annotations
@@ -12,11 +13,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.driver.effects import Acts, ColumnEffect, Levels, Linear, Piecewise
+from xosc_lateral.driver.effects import Acts, ColumnEffect, Levels, Linear, Piecewise, Proximity
 from xosc_lateral.driver.effects.rounding import rounded_number
 from xosc_lateral.driver.models.autoregressive.filters import split_bands
+from xosc_lateral.driver.neighbours import neighbour_shapes
 from xosc_lateral.drives.drive import Run
 from xosc_lateral.drives.resampling import STEP
+from xosc_lateral.errors import NotEnoughDataError
 
 FloatArray = NDArray[np.float64]
 
@@ -58,12 +61,23 @@ class _Pieces:
     drive: NDArray[np.int64]
 
 
-def fit_place(runs: Sequence[Run]) -> tuple[ColumnEffect, ...]:
+def fit_place(runs: Sequence[Run], *, neighbours: bool = False) -> tuple[ColumnEffect, ...]:
     """Effects of class, lane and speed; none where there are too few drives or columns.
 
     Drivers' own levels are a random effect, and errors are robust against whatever else the snippets of one drive
     share [1]_. The slopes of all columns are shrunk together, by the share of their size that chance would not make
     (`_shrunk`): dropping the uncertain ones predicts other vehicles worse. Nothing is left where chance makes all.
+
+    Parameters
+    ----------
+    runs : sequence of Run
+    neighbours : bool
+        Also of the distances to vehicles in the neighbouring lanes, on the level (`neighbours`).
+
+    Raises
+    ------
+    NotEnoughDataError
+        Neighbours are asked for, and there are too few drives or no column of them.
 
     References
     ----------
@@ -72,12 +86,15 @@ def fit_place(runs: Sequence[Run]) -> tuple[ColumnEffect, ...]:
     .. [2] B. Efron, C. Morris, "Stein's estimation rule and its competitors - an empirical Bayes approach", J. American
        Statistical Association 68 (1973).
     """
-    shapes = _shapes(runs)
-    if not shapes or len({run.drive for run in runs}) < LEAST_DRIVES:
+    shapes, drives = _shapes(runs), len({run.drive for run in runs})
+    if neighbours and drives < LEAST_DRIVES:
+        raise NotEnoughDataError(f"what neighbours do takes {LEAST_DRIVES} drives at least, these are {drives}")
+    if drives < LEAST_DRIVES or not (shapes or neighbours):
         return ()
-    pieces = _pieces(runs, shapes)
-    found: list[ColumnEffect] = []
-    for acts, response in ((Acts.LOCATION, pieces.mean), (Acts.SPREAD, pieces.spread), (Acts.FINE, pieces.fine)):
+    beside = neighbour_shapes(runs) if neighbours else []
+    pieces, found = _pieces(runs, [*shapes, *beside]), list[ColumnEffect]()
+    found += _effects([*shapes, *beside], Acts.LOCATION, pieces.mean, pieces)
+    for acts, response in ((Acts.SPREAD, pieces.spread), (Acts.FINE, pieces.fine)):
         found += _effects(shapes, acts, response, pieces)
     return tuple(found)
 
@@ -120,6 +137,8 @@ def _shapes(runs: Sequence[Run]) -> list[ColumnEffect]:
 
 def _quantity(effect: ColumnEffect, run: Run) -> FloatArray:
     """The one number that an effect goes by, shape (n,): of a speed, its place between the knots."""
+    if isinstance(effect, Proximity):  # a run that has no such column had nobody there
+        return effect.response(STEP, run.context)[:, 0] if effect.column in run.context else np.zeros(len(run))
     values = effect.quantity(run.context)
     return values[:, 1] - values[:, 2] if isinstance(effect, Piecewise) else values[:, 0]
 
@@ -147,9 +166,12 @@ def _successive(n: int, size: int) -> list[slice]:
 
 
 def _effects(shapes: Sequence[ColumnEffect], acts: Acts, response: FloatArray, pieces: _Pieces) -> list[ColumnEffect]:
-    """One of each column, or none."""
-    slopes, covariance = _regressed(response, pieces.quantities, pieces.drive)
-    errors, reference = np.sqrt(np.maximum(np.diag(covariance), 1e-30)), pieces.quantities.mean(axis=0)
+    """One of each column, which are the first of the pieces', or none."""
+    if not shapes:
+        return []
+    quantities = pieces.quantities[:, : len(shapes)]
+    slopes, covariance = _regressed(response, quantities, pieces.drive)
+    errors, reference = np.sqrt(np.maximum(np.diag(covariance), 1e-30)), quantities.mean(axis=0)
     shrunk = _shrunk(slopes, covariance)
     if not shrunk.any():
         return []
@@ -191,6 +213,8 @@ def _effect(shape: ColumnEffect, acts: Acts, slope: float, error: float, referen
     from msgspec.structs import replace as with_fields
 
     slope, error, reference = (rounded_number(value) for value in (slope, error, reference))
+    if isinstance(shape, Proximity):
+        reference = 0.0  # nobody there
     if not isinstance(shape, Piecewise):
         return with_fields(shape, acts=acts, coefficients=(slope,), errors=(error,), reference=(reference,))
     # Flat, then a straight line between the knots, then flat; the reference is one place on it.

@@ -115,6 +115,8 @@ def test_steps_of_a_lattice_are_found_and_their_noise_is_known(truth):
     assert any("rounded to 2 m, too coarse" in line for line in fit_warnings(replace(profile, sensor=coarse.sensor)))
     assert not any("too coarse" in line for line in fit_warnings(replace(profile, sensor=found.sensor)))
     assert not any("rounded to" in line for line in fit_warnings(replace(profile, sensor=found.sensor)))
+    unsure = replace(found.sensor, rounding=0.02, driver_share=(0.0, 1.0))  # fine steps, little data
+    assert not any("rounded to" in line for line in fit_warnings(replace(profile, sensor=unsure)))
 
 
 def test_a_path_in_wide_steps_moves_between_them_as_the_driver_did(truth):

@@ -27,6 +27,10 @@ FloatArray = NDArray[np.float64]
 FAINTEST = 1e-16
 """Added to measured densities, so that none at all has a logarithm. [m2/Hz]"""
 
+WIDE = 0.6
+"""Steps of more standard deviations of the movement are wide; narrower ones do no harm as noise
+(docs/design/sensor.md). [-]"""
+
 HIGHEST = 1.5
 """Runs are low-passed here on being resampled to 5 Hz, and so is what is sampled. [Hz]"""
 

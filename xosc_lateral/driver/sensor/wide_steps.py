@@ -17,16 +17,13 @@ from numpy.typing import NDArray
 
 from xosc_lateral.driver.sensor.hidden_path import HiddenPath
 from xosc_lateral.driver.sensor.likelihood import Colour, climb, solve
+from xosc_lateral.driver.sensor.model import WIDE
 from xosc_lateral.driver.sensor.periodogram import PASSED, Periodogram
 from xosc_lateral.driver.sensor.rounded_gaussian import RoundedGaussian, gaussian_behind
 from xosc_lateral.driver.sensor.vehicle_bound import N_KNOTS, PRIOR_ROWS, PRIOR_VALUES, density
 from xosc_lateral.normal import NORMAL_95
 
 FloatArray = NDArray[np.float64]
-
-WIDE = 0.6
-"""Steps of more standard deviations of the movement are wide; narrower ones do no harm as noise
-(docs/design/sensor.md). [-]"""
 
 DITHER = 0.25
 """Noise of more steps makes rounding linear: what is left of its dependence on the signal is exp(-2 pi^2 DITHER^2), a

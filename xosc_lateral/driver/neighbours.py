@@ -1,0 +1,39 @@
+"""What vehicles in the neighbouring lanes do to a population's level: drivers keep away from whom they are beside.
+
+The effect fades exponentially with the free space lengthwise, and is none where there is nobody. How strong it is on
+either side is found in the fit (`place`); its form was found in DLR Highway Traffic v1.1.0
+(benchmarks/neighbour_response.py): of those within 0.5 % of the variance of the best, one that is not too quick.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from xosc_lateral.driver.effects import Acts, Proximity
+from xosc_lateral.drives.drive import Run
+from xosc_lateral.errors import NotEnoughDataError
+
+NEIGHBOURS = ("left_distance", "right_distance")
+"""Free space lengthwise to the nearest vehicle in the lane to the left and to the right [m]; NaN or infinite: none."""
+
+SCALE = 40.0
+"""Free space over which the effect fades to 37 %. [m]"""
+
+LAG, RESPONSE = -1.0, 2.0
+"""Delay and first-order lag: drivers see neighbours coming, and nobody moves at once. [s]"""
+
+
+def neighbour_shapes(runs: Sequence[Run]) -> list[Proximity]:
+    """Effects without coefficients of the distances that any run has.
+
+    Raises
+    ------
+    NotEnoughDataError
+        If none has one.
+    """
+    seen = [name for name in NEIGHBOURS if any(np.isfinite(run.context.get(name, np.nan)).any() for run in runs)]
+    if not seen:
+        raise NotEnoughDataError(f"no drive has a neighbour: columns {' and '.join(NEIGHBOURS)} are missing or empty")
+    return [Proximity(acts=Acts.LOCATION, column=name, scale=SCALE, lag_s=LAG, response_s=RESPONSE) for name in seen]
