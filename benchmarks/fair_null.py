@@ -1,11 +1,13 @@
 """What would the fair measure say of a model that is the truth? The recording replaced by sampled drives.
 
     xosc-lateral import dlr-ht tasi-0.15.4-py3-none-any.whl -o dlr.parquet
-    python -m benchmarks.fair_null dlr.parquet [--repeats 12] [--write docs/validation/realism.md]
+    python -m benchmarks.fair_null dlr.parquet [--repeats 12] [--neighbours] [--cameras tasi-0.15.4-py3-none-any.whl]
+        [--write docs/validation/realism.md]
 
 A profile is fitted to all vehicles, and stands for the truth: each recorded run is replaced by one that it sampled
 under the same context. These drives are halved, fitted and judged as the recording is (free runs below 0.5 Hz, both
-halves). What is left above 0.5 is chance: of the vehicles that a half holds, of the fit, and of the classifier.
+halves). What is left above 0.5 is chance: of the vehicles that a half holds, of the fit, and of the classifier. With
+`--cameras` these drives are as loud at each place as the recording is, which no driver's profile can know.
 """
 
 from __future__ import annotations
@@ -18,6 +20,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from benchmarks.camera_levels import CameraLevels
 from benchmarks.markers import write_between_markers
 from xosc_lateral.driver.fitting import fit_population, fit_profile
 from xosc_lateral.driver.profile import DriverProfile
@@ -64,15 +67,25 @@ def areas(
     return np.array(found)
 
 
-def under_the_truth(truth: DriverProfile, runs: Sequence[Run], seed: int) -> FloatArray:
+def under_the_truth(
+    truth: DriverProfile,
+    runs: Sequence[Run],
+    seed: int,
+    *,
+    neighbours: bool = False,
+    cameras: CameraLevels | None = None,
+) -> FloatArray:
     """Areas for both halves of drives that a known profile sampled, shape (2, measures). [-]"""
     sampled = sample_runs(truth, runs, seed, same_start=False)
+    if cameras is not None:
+        sampled = [cameras.on(run, path) for run, path in zip(runs, sampled, strict=True)]
     drives = [replace(run, offset=path) for run, path in zip(runs, sampled, strict=True)]
     names = sorted({run.drive for run in drives})
     chosen = set(np.random.default_rng(seed).permutation(names)[: len(names) // 2].tolist())
     one = [run for run in drives if run.drive in chosen]
     other = [run for run in drives if run.drive not in chosen]
-    return np.array([areas(fit_population(a, name="half"), b, 0) for a, b in ((one, other), (other, one))])
+    pairs = ((one, other), (other, one))
+    return np.array([areas(fit_population(a, name="half", neighbours=neighbours), b, 0) for a, b in pairs])
 
 
 def table(found: FloatArray) -> list[str]:
@@ -93,15 +106,23 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("table", type=Path, nargs="+")
     parser.add_argument("--repeats", type=int, default=12)
+    parser.add_argument("--neighbours", action="store_true", help="all profiles hold what neighbours do")
+    parser.add_argument("--cameras", type=Path, metavar="WHEEL", help="as loud at each place as this recording")
     parser.add_argument("--write", type=Path, help="page with the markers")
     args = parser.parse_args()
     drives = read_drives(args.table)
-    truth, runs = fit_profile(drives, name="all"), all_runs(drives)
-    found = np.array([under_the_truth(truth, runs, FIRST_SEED + k) for k in range(args.repeats)])
+    truth, runs = fit_profile(drives, name="all", neighbours=args.neighbours), all_runs(drives)
+    cameras = None
+    if args.cameras is not None:
+        cameras = CameraLevels.found(args.cameras, runs, sample_runs(truth, runs, FIRST_SEED - 1, same_start=False))
+    seeds = range(FIRST_SEED, FIRST_SEED + args.repeats)
+    found = np.array(
+        [under_the_truth(truth, runs, seed, neighbours=args.neighbours, cameras=cameras) for seed in seeds]
+    )
     text = "\n".join(table(found))
     print(text)
     if args.write is not None:
-        write_between_markers(args.write, text, "fair-null")
+        write_between_markers(args.write, text, "fair-null" if cameras is None else "fair-null-cameras")
 
 
 if __name__ == "__main__":
