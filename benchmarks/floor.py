@@ -15,8 +15,9 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from benchmarks.identification_cases import PROTOCOL, SETS, bare_drive, cases, oracle
+from benchmarks.identification_cases import PROTOCOL, SETS, bare_drive, cases
 from benchmarks.identification_drives import smoothed_tracks, with_mean
+from benchmarks.identification_oracle import told_regression
 from xosc_lateral.formats.drives import drives_of_table
 from xosc_lateral.identification import regression
 from xosc_lateral.identification.column_search import best_probability
@@ -64,8 +65,8 @@ def measured(case: dict[str, Any], protocol: dict[str, Any]) -> list[dict[str, A
         for floor in FLOORS:
             regression.FLOOR = floor
             p_value = best_probability(search, MeanTerm, fit_model(coarse, ()))
-            told = oracle(case, bare, coarse, seed)
-            size, error = told["oracle_size"], told["oracle_error"]
+            told = told_regression(case, bare, coarse, seed)
+            size, error = told["size"], told["error"]
             rows.append(
                 {
                     "kind": "many short drives" if short else "one long drive",

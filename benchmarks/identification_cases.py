@@ -1,4 +1,4 @@
-"""Drives of the protocol (docs/validation/identification.toml), and what an oracle sees in one with an effect."""
+"""Drives of the protocol (docs/validation/identification.toml)."""
 
 from __future__ import annotations
 
@@ -6,22 +6,17 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pandas as pd
 
 from benchmarks.identification_drives import (
     baited,
     long_drive,
-    quantity,
-    responded,
     short_drives,
     smoothed_tracks,
     unit,
     with_mean,
     with_spread,
 )
-from xosc_lateral.identification.regression import Coarse, fit_model
-from xosc_lateral.identification.timeline import coarse_mean
 
 ROUNDS = ("", "_2", "_3", "_4", "_5", "_6", "_7", "_8", "_9")
 SETS = tuple(name + suffix for suffix in ROUNDS for name in ("design", "validation", "test"))
@@ -69,34 +64,9 @@ def planted_drive(case: dict[str, Any], protocol: dict[str, Any], seconds: float
         table = with_mean(table, case["name"], case["size"], seed)
     elif "factor" in case:
         table = with_spread(table, case["name"], case["factor"], seed)
-    return bare, smoothed_tracks(table) if "smoothed" in case else table
+    return bare, as_provided(case, table)
 
 
-def oracle(case: dict[str, Any], table: pd.DataFrame, coarse: Coarse, seed: int) -> dict[str, float]:
-    """z of the planted response itself in the same regression, its timing told."""
-    from dataclasses import dataclass
-
-    from xosc_lateral.identification.terms.mean import MeanTerm
-
-    time_, values = table["time"].to_numpy(), unit(quantity(case["name"], table))
-    if "drive" in table:
-        names, drives = table["drive"].to_numpy(), coarse.timeline.names
-        rows = [np.flatnonzero(names == name) for name in drives]
-    else:
-        rows = [np.arange(len(table))]
-    fine = np.zeros(len(coarse.timeline))
-    for span, own in zip(coarse.timeline.spans, rows, strict=True):
-        response = responded(values[own], time_[own], np.random.default_rng([7, seed]))
-        grid = time_[own][0] + coarse.timeline.step * (np.arange(span.stop - span.start) - 75)
-        fine[span] = np.interp(grid, time_[own], response)
-    told = coarse_mean(fine)
-    told = told - told[coarse.valid].mean()
-
-    @dataclass(frozen=True, eq=False)
-    class Told(MeanTerm):
-        def mean_columns(self, coarse: Coarse) -> np.ndarray:
-            return told[:, None]
-
-    fitted = fit_model(coarse, (Told(None),))  # type: ignore[arg-type]
-    error = float(np.sqrt(fitted.covariance[0, 0]))
-    return {"oracle_z": float(fitted.sizes[0]) / error, "oracle_size": float(fitted.sizes[0]), "oracle_error": error}
+def as_provided(case: dict[str, Any], table: pd.DataFrame) -> pd.DataFrame:
+    """Smoothed where the case says so."""
+    return smoothed_tracks(table) if "smoothed" in case else table

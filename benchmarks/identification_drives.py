@@ -123,10 +123,15 @@ def quantity(name: str, table: pd.DataFrame) -> Values:
 
 def unit(values: Values) -> Values:
     """Changes by 1 between its 5 % and 95 % quantile, about its median."""
-    low, middle, high = np.quantile(values, [0.05, 0.5, 0.95])
+    return np.asarray((values - np.quantile(values, 0.5)) / range_of(values))
+
+
+def range_of(values: Values) -> float:
+    """Between the 5 % and 95 % quantile; of what is nearly always the same, from end to end."""
+    low, high = np.quantile(values, [0.05, 0.95])
     if high <= low:
         low, high = values.min(), values.max()
-    return (values - middle) / max(high - low, 1e-12)
+    return max(float(high - low), 1e-12)
 
 
 def responded(values: Values, time: Values, rng: np.random.Generator) -> Values:
@@ -140,10 +145,19 @@ def responded(values: Values, time: Values, rng: np.random.Generator) -> Values:
     return np.interp(time, grid, series)
 
 
-def with_mean(table: pd.DataFrame, kind: str, size: float, seed: int) -> pd.DataFrame:
-    """Plant an effect on the mean, drive by drive with one driver's response."""
+def parts_of(name: str, table: pd.DataFrame) -> tuple[Values, ...]:
+    """What a kind's driving quantity is the sum of: columns of its own act in each part."""
+    if name != "both neighbours":
+        return (quantity(name, table),)
+    right = quantity("neighbour on the right, left lane", table)
+    return right, quantity(name, table) - right
+
+
+def with_mean(table: pd.DataFrame, kind: str, size: float, seed: int, part: Values | None = None) -> pd.DataFrame:
+    """Plant an effect on the mean, drive by drive with one driver's response; or a part of it alone."""
     shift = np.zeros(len(table))
-    values = unit(quantity(kind, table))
+    whole = quantity(kind, table)
+    values = unit(whole) if part is None else part / range_of(whole)
     drives = table["drive"].to_numpy() if "drive" in table else np.zeros(len(table), dtype=int)
     for name in pd.unique(drives):
         rows = drives == name

@@ -21,26 +21,26 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from benchmarks.identification_cases import PROTOCOL, SETS, cases, oracle, planted_drive
-from benchmarks.identification_drives import unit
+from benchmarks.identification_cases import PROTOCOL, SETS, cases, planted_drive
+from benchmarks.identification_oracle import coarse_of, oracle, oracle_between
 from benchmarks.identification_tables import calibration, summary, table
-from xosc_lateral.formats.drives import drives_of_table
 from xosc_lateral.identification.identify import VETOED, identify
 from xosc_lateral.identification.regression import Coarse
 from xosc_lateral.identification.stages import ERROR_BUDGET, TERMS
-from xosc_lateral.identification.timeline import coarse_mean, join_drives
+from xosc_lateral.identification.timeline import coarse_mean
 
 
 def run(case: dict[str, Any], protocol: dict[str, Any], seconds: float) -> dict[str, Any]:
     """Make one drive, identify, and compare with the truth."""
     bare, table = planted_drive(case, protocol, seconds)
     started = time.process_time()
-    coarse = Coarse.of(join_drives(drives_of_table(table, {})))
+    coarse = coarse_of(table)
     found = identify(coarse, np.random.SeedSequence(1))
     outcome = dict(case)
     outcome["cpu_s"] = round(time.process_time() - started, 1)
     outcome["named"] = [
-        [one.term.kind, sorted(one.term.columns), one.p_value, one.term.component] for one in found.selection.accepted
+        [one.term.kind, sorted(one.term.columns), one.p_value, one.term.component, [sorted(x) for x in one.alike]]
+        for one in found.selection.accepted
     ]
     kinds = {term.component: term.kind for term in TERMS}
     outcome["vetoed"] = [
@@ -54,23 +54,11 @@ def run(case: dict[str, Any], protocol: dict[str, Any], seconds: float) -> dict[
     outcome["p_mean"] = found.least("mean")
     outcome["p"] = {name: p for name in ERROR_BUDGET.weights if (p := found.least(name)) is not None}
     if case["name"].startswith("slow vehicles"):
-        outcome |= _oracle_between(case, table)
+        outcome |= oracle_between(case, table)
     elif "size" in case:
-        outcome |= oracle(case, bare, coarse, case["seed"])
+        outcome |= oracle(case, bare, coarse)
         outcome |= _size(case, found, coarse, bare)
     return outcome
-
-
-def _oracle_between(case: dict[str, Any], table: pd.DataFrame) -> dict[str, float]:
-    """The same between drives: their mean offsets on what was planted, lane told."""
-    means = table.groupby("drive")[["offset", "speed", "lane_index"]].mean()
-    usual = unit(table.groupby("drive")["speed"].transform("mean").to_numpy())
-    own = pd.Series(usual, index=table["drive"]).groupby(level=0).first().loc[means.index]
-    design = np.stack([own, means["lane_index"], np.ones(len(means))], axis=1)
-    sizes = np.linalg.lstsq(design, means["offset"], rcond=None)[0]
-    left = means["offset"] - design @ sizes
-    error = float(np.sqrt(left @ left / (len(means) - 3) * np.linalg.inv(design.T @ design)[0, 0]))
-    return {"oracle_z": float(sizes[0]) / error, "oracle_size": float(sizes[0]), "oracle_error": error}
 
 
 def _size(case: dict[str, Any], found: Any, coarse: Coarse, bare: pd.DataFrame) -> dict[str, float]:
@@ -82,7 +70,7 @@ def _size(case: dict[str, Any], found: Any, coarse: Coarse, bare: pd.DataFrame) 
         return {}
     effects = right.estimate(found.selection.final)
     told = right.describe(found.selection.final, effects, "")
-    planted = coarse.offset - Coarse.of(join_drives(drives_of_table(bare, {}))).offset
+    planted = coarse.offset - coarse_of(bare).offset
     strength = coarse_mean(coarse.strength(effects[0]))[coarse.valid]
     alike = float(np.sign(np.cov(strength, planted[coarse.valid])[0, 1]))
     return {"found_size": alike * abs(told.size), "found_error": told.error}
@@ -112,10 +100,8 @@ def main() -> None:
             continue
         outcome = run(case, protocol, args.seconds or protocol["drives"]["long_s"])
         outcomes.append(outcome)
-        words = (
-            "; ".join(f"{part} {'*'.join(columns) or '-'} {p:.1e}" for _, columns, p, part in outcome["named"])
-            or "nothing"
-        )
+        named = (f"{part} {'*'.join(columns) or '-'} {p:.1e}" for _, columns, p, part, _ in outcome["named"])
+        words = "; ".join(named) or "nothing"
         print(
             case["name"],
             case.get("size", case.get("factor", "")),

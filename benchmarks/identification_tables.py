@@ -31,6 +31,18 @@ def false(outcome: dict[str, Any]) -> list[Any]:
     return [one for one in outcome["named"] if not (one[0] == kind and one[1] in accepted) and not _lane(outcome, one)]
 
 
+def undecided(outcome: dict[str, Any], named: list[Any]) -> bool:
+    """Whether what was planted is among what a finding says would explain about as much."""
+    kind = "scale" if "factor" in outcome else "location"
+    accepted = [sorted(columns) for columns in outcome.get("accepted", [])]
+    return named[0] == kind and any(columns in accepted for columns in (named[4] if len(named) > 4 else ()))
+
+
+def wrong(outcome: dict[str, Any]) -> list[Any]:
+    """What is named, was not planted, and is not said to be undecided between the two."""
+    return [one for one in false(outcome) if not undecided(outcome, one)]
+
+
 def _lane(outcome: dict[str, Any], named: list[Any]) -> bool:
     """Whether a finding is what all short drives hold: the left lane's vehicles keep 0.08 m further right.
 
@@ -54,10 +66,10 @@ def table(outcomes: list[dict[str, Any]]) -> str:
         seen = [one for one in own if abs(one.get("oracle_z", 0.0)) >= 5.0]
         named = sum(right(one) for one in seen) if seen else ""
         hits = sum(right(one) for one in own) if "accepted" in own[0] else ""
-        wrong = sum(bool(false(one)) for one in own)
+        something = sum(bool(wrong(one)) for one in own)
         median = f"{np.median(z):.1f}" if z else ""
         lines.append(
-            f"| {name} | {size} | {len(own)} | {median} | {len(seen) if z else ''} | {named} | {hits} | {wrong} |"
+            f"| {name} | {size} | {len(own)} | {median} | {len(seen) if z else ''} | {named} | {hits} | {something} |"
         )
     return "\n".join(lines)
 
@@ -107,7 +119,11 @@ def _named(outcomes: Outcomes) -> str:
 
 
 def _wrong(outcomes: Outcomes) -> str:
-    return f"{sum(bool(false(one)) for one in outcomes)} of {len(outcomes)}"
+    return f"{sum(bool(wrong(one)) for one in outcomes)} of {len(outcomes)}"
+
+
+def _undecided(outcomes: Outcomes) -> str:
+    return str(sum(bool(false(one)) and not wrong(one) for one in outcomes) or "")
 
 
 def _held(outcomes: Outcomes) -> str:
@@ -146,6 +162,11 @@ ROWS: tuple[tuple[str, str, Callable[[Outcomes], str]], ...] = (
         "something wrong beside what acts",
         "1 in 40",
         lambda own: _wrong([one for one in own if one["type"].startswith("effect")]),
+    ),
+    (
+        "what acts is told only as what would explain about as much as something else",
+        "",
+        lambda own: _undecided([one for one in own if one["type"].startswith("effect")]),
     ),
     ("significant, and vetoed by held-out rows: right ones and wrong ones", "", _vetoed),
     ("95 % intervals that hold the size", "95 %", _held),

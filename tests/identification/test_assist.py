@@ -18,13 +18,13 @@ from xosc_lateral.formats.drives import parse_map, read_drives
 from xosc_lateral.formats.profiles import read_profile
 
 WORDS = [word for one in OPENLKA_MAP for word in ("--map", one)]
-PLACE, TIGHTNESS, SECONDS = 0.2, 0.4, 1800.0
+PLACE, TIGHTNESS, SECONDS = 0.2, 0.3, 3000.0
 
 
 @pytest.fixture(scope="module")
 def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("assist") / "route.csv"
-    drive = simulate_drive(SECONDS, 1, effects=[LaneKeepingAssist(place=PLACE, tightness=TIGHTNESS)])
+    drive = simulate_drive(SECONDS, 3, effects=[LaneKeepingAssist(place=PLACE, tightness=TIGHTNESS)])
     openlka_layout(drive.table).to_csv(path, index=False)
     return path
 

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from xosc_lateral.identification.terms.regimes import CLUSTER_S, fit_clusters, probability_of_clusters
+from xosc_lateral.identification.log_scale import squared_innovations
+from xosc_lateral.identification.terms.regimes import probability_of_persistence
 
 N = 3000
 
@@ -28,38 +29,31 @@ def regimes(factor: float, on_s: float, off_s: float, seed: int) -> np.ndarray:
     return out * rng.normal(size=N)
 
 
-def test_variance_and_memory_of_loudness_are_found() -> None:
-    fits = [fit_clusters(clusters(0.3, 3.0, seed), np.ones(N, dtype=np.bool_)) for seed in range(20)]
-    variance, memory = np.mean(fits, axis=0)
-    assert variance == pytest.approx(0.3, rel=0.15)
-    assert memory == pytest.approx(3.0, rel=0.25)
-
-
-def test_loudness_that_stays_the_same_has_no_variance() -> None:
-    variances = [
-        fit_clusters(np.random.default_rng(seed).normal(size=N), np.ones(N, dtype=np.bool_))[0] for seed in range(10)
-    ]
-    assert max(variances) < 0.1
+def probability(rows: np.ndarray, valid: np.ndarray, seed: int) -> float:
+    squares = squared_innovations(rows, valid)
+    return probability_of_persistence(squares, valid, np.zeros((len(rows), 0)), np.random.default_rng(seed))
 
 
 def test_seconds_that_are_cut_out_do_not_count() -> None:
     rows = clusters(0.3, 3.0, 5, 2 * N)
     valid = np.arange(2 * N) % 400 < 250
     spoilt = np.where(valid, rows, 1e6)
-    assert fit_clusters(spoilt, valid) == pytest.approx(fit_clusters(np.where(valid, rows, 0.0), valid))
+    assert probability(spoilt, valid, 1) == probability(np.where(valid, rows, 0.0), valid, 1)
 
 
-def test_memory_is_bounded_where_loudness_lasts_for_a_minute() -> None:
-    assert fit_clusters(regimes(2.5, 60.0, 120.0, 1), np.ones(N, dtype=np.bool_))[1] == pytest.approx(CLUSTER_S)
+def test_regimes_that_are_known_are_not_found_again() -> None:
+    rows, valid = regimes(2.5, 60.0, 120.0, 3), np.ones(N, dtype=np.bool_)
+    loud = (np.convolve(rows**2, np.ones(15) / 15, "same") > 2.5).astype(float)[:, None]
+    squares = squared_innovations(rows, valid)
+    alone = probability_of_persistence(squares, valid, np.zeros((N, 0)), np.random.default_rng(1))
+    beside = probability_of_persistence(squares, valid, loud, np.random.default_rng(1))
+    assert alone < 1e-3 < 0.01 < beside
 
 
 @pytest.mark.parametrize("memory", [1.0, 3.0, 6.0])
 def test_clusters_of_seconds_are_no_regimes(memory: float) -> None:
     valid = np.ones(N, dtype=np.bool_)
-    p_values = [
-        probability_of_clusters(clusters(0.25, memory, seed), valid, np.zeros((N, 0)), np.random.default_rng(seed))
-        for seed in range(12)
-    ]
+    p_values = [probability(clusters(0.25, memory, seed), valid, seed) for seed in range(12)]
     assert np.mean(np.less(p_values, 0.05)) <= 0.25
     assert np.median(p_values) > 0.1
 
@@ -68,5 +62,4 @@ def test_regimes_of_a_minute_are_no_clusters() -> None:
     valid = np.ones(N, dtype=np.bool_)
     for seed in range(4):
         rows = regimes(2.5, 60.0, 120.0, seed)
-        p_value = probability_of_clusters(rows, valid, np.zeros((N, 0)), np.random.default_rng(seed))
-        assert p_value < 0.002
+        assert probability(rows, valid, seed) < 0.002

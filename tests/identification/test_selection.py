@@ -38,7 +38,6 @@ def effect_of(selection: Selection, columns: tuple[str, ...]) -> ColumnEffect:
         (plants.curve_cutting(0.4), ("location", ("curvature",))),
         (plants.truck_avoidance(0.3), ("location", ("truck_right",))),
         (plants.SideWind(0.4), ("location", ("wind_direction", "wind_speed"))),
-        (plants.SpreadBy("rain", 4.0), ("scale", ("rain",))),
         (plants.Fatigue(2.5), ("scale", ())),
         (plants.CyclicTarget(0.15, 12.0), ("periodic", ())),
         (plants.CameraStep(0.6), ("step", ())),
@@ -47,6 +46,10 @@ def effect_of(selection: Selection, columns: tuple[str, ...]) -> ColumnEffect:
 )
 def test_a_planted_effect_is_named(driven: Driven, plant: plants.Plant, expected: tuple[str, tuple[str, ...]]) -> None:
     assert expected in named(selected(driven(101, [plant])))
+
+
+def test_a_planted_spread_is_named(driven: Driven) -> None:
+    assert ("scale", ("rain",)) in named(selected(driven(103, [plants.SpreadBy("rain", 4.0)])))
 
 
 @pytest.mark.parametrize(

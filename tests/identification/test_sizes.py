@@ -7,7 +7,7 @@ import pytest
 from msgspec import structs
 
 from xosc_lateral.datasets.movements import ornstein_uhlenbeck, record_movement
-from xosc_lateral.driver.effects import Acts, Linear, Product, Proximity
+from xosc_lateral.driver.effects import Acts, Linear, Product, Proximity, Saturating, Threshold
 from xosc_lateral.driver.effects.product import Factor
 from xosc_lateral.driver.effects.response import respond
 from xosc_lateral.formats.drives import drives_of_table
@@ -109,3 +109,15 @@ def test_a_finer_choice_pays_for_its_number() -> None:
     assert {round(share * median, 9) for share in FINE_SCALES} <= {round(scale, 9) for scale in scales}
     coarse = sum(one.family is Family.BENT and one.columns == ("gap",) for one in candidates)
     assert shapes.finer == len(shapes.bent) / coarse
+
+
+def test_a_column_that_mostly_has_one_of_two_values_has_limits_in_between() -> None:
+    """A crossfall: -2.5 or 2.5 % nearly always, and on its way from one to the other for a tenth of the time."""
+    way = np.linspace(-2.5, 2.5, 100)
+    crossfall = np.concatenate([np.full(600, -2.5), way, np.full(200, 2.5), way[::-1]])
+    shapes = shapes_of(Column("crossfall", Role.NUMBER, False), crossfall, curves=True)
+    limits = {shape.at for shape in shapes.bent if isinstance(shape, Threshold)}
+    assert len(limits) > 10
+    assert min(np.abs(list(limits))) < 0.2
+    middles = {shape.middle for shape in shapes.bent if isinstance(shape, Saturating)}
+    assert max(np.abs(list(middles))) < 0.2

@@ -40,11 +40,11 @@ from xosc_lateral.identification.findings import Finding
 from xosc_lateral.identification.lack_of_fit import LackOfFit, lack_of_fit_of
 from xosc_lateral.identification.moving_statistics import by_drive, moving_spread
 from xosc_lateral.identification.partial import curve_of
-from xosc_lateral.report.loop import loop_page, loop_text
+from xosc_lateral.report.loop import finding_sentence, loop_page, loop_text
 from xosc_lateral.report.loop_figures import DRIVES, draw_spectra, effect_figure, residual_figure
 from xosc_lateral.report.loop_hidden_figures import DRAWINGS
-from xosc_lateral.report.loop_json import loop_json
-from xosc_lateral.report.loop_words import lack_of_fit_words, meaning, p_value_words, size_words
+from xosc_lateral.report.loop_json import finding_record, loop_json
+from xosc_lateral.report.loop_words import lack_of_fit_words, meaning, others_words, p_value_words, size_words
 
 SHIFT = 0.4  # [m]
 
@@ -110,6 +110,15 @@ def test_the_page_says_in_words_what_was_found_how_sure_and_when(page: str, resu
     assert "further left" in page
     assert "is found practically never (p = " in page
     assert re.search(r"The driver responds (at once|[\d.]+ s (in advance|later))", page)
+
+
+def test_what_would_explain_as_much_is_said_by_its_columns(result: LoopResult) -> None:
+    found = replace(result.findings[0], columns=("grade", "speed"), alike=(("grade",), ("crossfall", "speed")))
+    assert others_words(found, "`") == "`grade` alone, or `crossfall` with `speed`"
+    assert "grade alone, or crossfall with speed would explain it about as well" in finding_sentence(found)
+    record = finding_record(found)
+    assert record["alike"] == ["crossfall"]
+    assert record["instead"] == [["grade"], ["crossfall", "speed"]]
 
 
 def test_the_page_has_every_part_that_a_reader_needs(page: str) -> None:

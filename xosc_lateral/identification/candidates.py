@@ -159,7 +159,7 @@ def _curves(column: Column, values: FloatArray) -> list[ColumnEffect]:
     """Curves with one or two bends; a neighbour that is not there is far away, which a curve does not say."""
     if column.role is not Role.NUMBER or column.gaps:
         return []
-    knots = np.unique(np.quantile(values[np.isfinite(values)], KNOTS)).tolist()
+    knots = np.unique(_quantiles(values[np.isfinite(values)], KNOTS)).tolist()
     return [
         Piecewise(acts=Acts.LOCATION, column=column.name, knots=some)
         for number in (1, 2)
@@ -192,11 +192,11 @@ def _bent(
             yield Levels(acts=Acts.LOCATION, column=name, levels=(level,)), (1.0,)
     if column.role is not Role.NUMBER or not _varies(values):
         return
-    for at in np.unique(np.quantile(seen, limits)):
+    for at in np.unique(_quantiles(seen, limits)):
         if seen.min() < at < seen.max():
             yield Threshold(acts=Acts.LOCATION, column=name, at=float(at)), (1.0,)
             yield Threshold(acts=Acts.LOCATION, column=name, at=float(at), jump=False), (1.0,)
-    low, middle, high = np.quantile(seen, [0.1, 0.5, 0.9])
+    low, middle, high = _quantiles(seen, (0.1, 0.5, 0.9))
     if high > low:
         for width in (0.2, 0.5):
             yield (
@@ -245,6 +245,21 @@ def _pairs(first: Column, second: Column, factors: Mapping[str, list[Factor]]) -
                 yield one_, other_
             else:
                 yield one, other
+
+
+def _quantiles(seen: FloatArray, shares: Sequence[float]) -> FloatArray:
+    """Quantiles, shape (n,) like `shares`, of what a column is while it is not one of the values that it mostly has.
+
+    A crossfall is -2.5 % or 2.5 % for nine tenths of the time: nearly all of its quantiles are one of the two, and what
+    a driver does in between, or on either side of level, would have no candidate. [the column's unit]
+    """
+    while True:
+        values = np.quantile(seen, shares)
+        known, times = np.unique(values, return_counts=True)
+        rest = seen[~np.isin(seen, known[times > 1])]
+        if len(rest) in (0, len(seen)):
+            return values
+        seen = rest
 
 
 def _scale(values: FloatArray, share: float) -> float:

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.driver.effects import ColumnEffect
+from xosc_lateral.identification.alternatives import Alternatives
 from xosc_lateral.identification.dictionary import (
     CROSS_BASIS,
     NULL_DRAWS,
@@ -35,9 +36,6 @@ CONTENDERS = 4
 
 WITHIN = 12.0
 """Sets of columns that score lower than the best by more than this are not. [squared score]"""
-
-ALIKE = 1.0
-"""A set of columns whose refined score differs by less can't be told from the best. [squared score]"""
 
 CLUSTER_S = 120
 """Windows that count as independent where movement with and without a term is compared: longer than the memory of a
@@ -67,7 +65,7 @@ class ColumnKind(ModelTerm, Protocol):
         ...
 
     @classmethod
-    def of(cls, effect: ColumnEffect, alike: tuple[str, ...] = ()) -> Self:
+    def of(cls, effect: ColumnEffect, alike: Alternatives = ()) -> Self:
         """A term of an effect."""
         ...
 
@@ -279,9 +277,9 @@ def _refined(search: Search, kind: type[ColumnKind], scored: _Scored) -> tuple[R
     chance = float(chi2.isf(search.level_of(kind.component), 1)) if search.wanted is None else 0.0
     simpler = [one for one in outcomes if one.effect.columns in parts and one.score > outcomes[0].score - chance]
     best = simpler[0] if simpler else outcomes[0]
-    close = [outcome.effect.columns for outcome in outcomes if outcome.score > best.score - ALIKE]
-    alike = {name for columns in close for name in columns} - set(best.effect.columns)
-    return best, kind.of(best.effect, tuple(sorted(alike)))
+    others = [one.effect for one in outcomes if one.effect.columns != best.effect.columns and np.isfinite(one.score)]
+    alike = dict.fromkeys(one.columns for one in others if refinement.as_good(best.effect, one))
+    return best, kind.of(best.effect, tuple(alike))
 
 
 def _contenders(dictionary: Dictionary, scores: Scores) -> list[int]:

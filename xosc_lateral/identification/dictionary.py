@@ -41,6 +41,10 @@ NULL_DRAWS = 400
 LEAST_SHIFT_S = 60
 """No rotation is shorter: a driver's response must be out of reach. [s]"""
 
+BLOCK_S = 300
+"""Length of the blocks that are dealt in random order: three times the memory that whitening sees. Sensitivity:
+docs/design/identification.md. [s]"""
+
 MIN_SUPPORT_S = 45.0
 """A quantity that rests on fewer seconds than this is not looked at: anything may have happened just then. [s]"""
 
@@ -265,10 +269,11 @@ def score_entries(
 def draw_null(residual: FloatArray, drive: IntArray, rng: np.random.Generator, draws: int = NULL_DRAWS) -> FloatArray:
     """Residuals whose tie to the columns is broken, shape (seconds, draws).
 
-    Few long drives: rotated by at least `LEAST_SHIFT_S`. Many short ones: the sign of each whole drive drawn anew
-    (a wild cluster bootstrap [1]_). Drives are independent, and what an autoregression fitted to runs of a minute
-    leaves in a drive's slow movement and first rows stays beside the columns of that very drive; rotation would spread
-    it evenly.
+    Few long drives: rotated by at least `LEAST_SHIFT_S`, cut into blocks, and these dealt in random order. Rotations
+    alone are few: a column that changes within a minute sees no more than fifty of them in a drive of fifty minutes.
+    Many short drives: the sign of each whole drive drawn anew (a wild cluster bootstrap [1]_). Drives are independent,
+    and what an autoregression fitted to runs of a minute leaves in a drive's slow movement and first rows stays beside
+    the columns of that very drive; rotation would spread it evenly.
 
     References
     ----------
@@ -280,10 +285,18 @@ def draw_null(residual: FloatArray, drive: IntArray, rng: np.random.Generator, d
     if len(names) >= MANY_DRIVES:
         return np.asarray(residual[:, None] * rng.choice([-1.0, 1.0], size=(len(names), draws))[own])
     low = min(LEAST_SHIFT_S, seconds // 4)
-    shifts = rng.integers(low, max(low + 1, seconds - low), size=draws)
-    doubled = np.concatenate([residual, residual])
-    rotated = [doubled[shift : shift + seconds] for shift in shifts]
-    return np.stack(rotated, axis=1) if rotated else np.zeros((seconds, 0))
+    # in order: where there is but one block, neighbours are alike, and how much so tells how many there are in truth
+    shifts = np.sort(rng.integers(low, max(low + 1, seconds - low), size=draws))
+    drawn = np.empty((seconds, draws))
+    for draw, shift in enumerate(shifts):
+        drawn[:, draw] = in_another_order(np.roll(residual, -shift), BLOCK_S, rng)
+    return drawn
+
+
+def in_another_order(values: FloatArray, length: int, rng: np.random.Generator) -> FloatArray:
+    """Blocks of about a length, dealt in random order, shape (n,) like `values`."""
+    blocks = np.array_split(values, max(1, round(len(values) / length)))
+    return np.concatenate([blocks[index] for index in rng.permutation(len(blocks))])
 
 
 def orthonormal(columns: FloatArray, share: float = 1e-6) -> FloatArray:

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.driver.effects import Effect
+from xosc_lateral.identification.alternatives import Alternatives
 from xosc_lateral.identification.nested import Gain
 from xosc_lateral.identification.population import DriverVariance
 from xosc_lateral.identification.regression import Fitted
@@ -32,8 +33,8 @@ class Finding:
         As in the report's schema.
     columns : tuple of str
         That cause it; two when it is a product.
-    alike : tuple of str
-        Columns that the data can't tell from them.
+    alike : tuple of tuple of str
+        Columns of each other effect that the data can't tell from it.
     lag_s, response_s : float or None
     shape : str
     size_m : float
@@ -57,7 +58,7 @@ class Finding:
     effect: str
     kind: str
     columns: tuple[str, ...]
-    alike: tuple[str, ...]
+    alike: Alternatives
     lag_s: float | None
     response_s: float | None
     shape: str

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from xosc_lateral.driver.effects import ColumnEffect, Product
 from xosc_lateral.driver.effects.product import Form
+from xosc_lateral.identification.alternatives import explains_as_much
 from xosc_lateral.identification.candidates import FINE_SCALES, Family, shapes_of
 from xosc_lateral.identification.columns import Column
 from xosc_lateral.identification.dictionary import orthonormal
@@ -106,15 +107,24 @@ class Refinement:
         """Squared score of each effect, all its coefficients free, less log n for each beyond the first."""
         responses = [self._response(effect) for effect in effects]
         widths = [response.shape[1] for response in responses]
-        # single precision tells responses apart as well, in half the time
-        rows = self._problem.rows(np.concatenate(responses, axis=1).astype(np.float32))
-        rows -= self._basis @ (self._basis.T @ rows)
+        rows = self._rows(np.concatenate(responses, axis=1))
         found, at = [], 0
         for width in widths:
             own = rows[:, at : at + width].astype(np.float64)
             at += width
             found.append(self._score(own))
         return found
+
+    def as_good(self, chosen: ColumnEffect, other: ColumnEffect) -> bool:
+        """Whether another effect would explain as much, as far as the rows can tell."""
+        one, two = (self._rows(self._response(effect)).astype(np.float64) for effect in (chosen, other))
+        return explains_as_much(one, two, self._left, self._coarse.cluster[self._problem.valid])
+
+    def _rows(self, responses: FloatArray) -> FloatArray:
+        """White, beside what is known; in single precision, which tells responses apart as well in half the time."""
+        rows = self._problem.rows(responses.astype(np.float32))
+        rows -= self._basis @ (self._basis.T @ rows)
+        return rows
 
     def _score(self, rows: FloatArray) -> float:
         sizes = np.linalg.norm(rows, axis=0)

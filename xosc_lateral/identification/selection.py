@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+from xosc_lateral.identification.alternatives import Alternatives
 from xosc_lateral.identification.regression import Fitted, fit_model
 from xosc_lateral.identification.search import Search
 from xosc_lateral.identification.stages import STAGES
@@ -22,9 +23,9 @@ class Accepted:
     p_value: float
 
     @property
-    def alike(self) -> tuple[str, ...]:
-        """Columns that explain as much."""
-        alike: tuple[str, ...] = getattr(self.term, "alike", ())
+    def alike(self) -> Alternatives:
+        """Columns of each other effect that explains as much."""
+        alike: Alternatives = getattr(self.term, "alike", ())
         return alike
 
 

@@ -22,6 +22,7 @@ from xosc_lateral.report.loop_words import (
     group_words,
     lack_of_fit_words,
     meaning,
+    others_words,
     outcome,
     size_words,
 )
@@ -62,7 +63,7 @@ def finding_sentence(finding: Finding) -> str:
     if finding.lag_s is not None:
         early = f"{-finding.lag_s:.1f} s ahead" if finding.lag_s < 0 else f"lag {finding.lag_s:.1f} s"
         when = f", {early}, response time {finding.response_s:.1f} s"
-    alike = f"; {', '.join(finding.alike)} would explain it as well" if finding.alike else ""
+    alike = f"; {others_words(finding)} would explain it about as well" if finding.alike else ""
     size = "" if finding.kind == "memory" else f", {size_words(finding)}"
     return f"{finding.effect}: {finding.shape}{size}{when}{alike}"
 

@@ -139,12 +139,22 @@ def meaning(finding: Finding, result: LoopResult) -> str:
         f"Without this effect, one as strong is found {p_value_words(finding.p_value)} (p = {finding.p_value:.1e}).",
     ]
     if finding.alike:
-        names = ", ".join(f"`{name}`" for name in finding.alike)
-        words.append(f"{names} would explain it equally well; these drives cannot tell which of them it is.")
+        words.append(
+            f"{others_words(finding, '`')} would explain it about as well; these drives cannot tell which it is."
+        )
     measure = _PLAIN_GROUPS.get(finding.statistic, finding.measure)
     change = f"{_cm(finding.error_before)} before, {_cm(finding.error_after)} now"
     words.append(f"Error of the {measure} on held-out blocks: {change}.")
     return " ".join(word for word in words if word)
+
+
+def others_words(finding: Finding, mark: str = "") -> str:
+    """Columns of each other effect that explains as much, each name between marks; empty: there is none."""
+    return ", or ".join(
+        " with ".join(f"{mark}{name}{mark}" for name in columns)
+        + (" alone" if set(columns) < set(finding.columns) else "")
+        for columns in finding.alike
+    )
 
 
 def feedback_words(item: Feedback) -> str:

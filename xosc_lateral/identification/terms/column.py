@@ -11,6 +11,7 @@ from msgspec import structs
 from numpy.typing import NDArray
 
 from xosc_lateral.driver.effects import Acts, ColumnEffect, Effect
+from xosc_lateral.identification.alternatives import Alternatives
 from xosc_lateral.identification.column_search import find_column, probability_of
 from xosc_lateral.identification.problem import Problem
 from xosc_lateral.identification.ranges import span
@@ -34,8 +35,8 @@ class ColumnTerm(Term):
     ----------
     effect : ColumnEffect
         Without coefficients.
-    alike : tuple of str
-        Columns that explain as much.
+    alike : tuple of tuple of str
+        Columns of each other effect that explains as much.
     """
 
     acts: ClassVar[Acts]
@@ -46,7 +47,7 @@ class ColumnTerm(Term):
     single: ClassVar[bool] = False
     """Only effects with one coefficient will do."""
     effect: ColumnEffect
-    alike: tuple[str, ...] = ()
+    alike: Alternatives = ()
 
     @property
     def columns(self) -> tuple[str, ...]:
@@ -54,7 +55,7 @@ class ColumnTerm(Term):
         return self.effect.columns
 
     @classmethod
-    def of(cls, effect: ColumnEffect, alike: tuple[str, ...] = ()) -> Self:
+    def of(cls, effect: ColumnEffect, alike: Alternatives = ()) -> Self:
         """A term of an effect that may act on something else."""
         return cls(structs.replace(effect, acts=cls.acts), alike)
 

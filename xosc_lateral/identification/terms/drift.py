@@ -38,7 +38,7 @@ class DriftTerm(Term):
 
     component: ClassVar[str] = "low_frequency"
     kind: ClassVar[str] = "drift"
-    weight: ClassVar[float] = 2.5
+    weight: ClassVar[float] = 3.0
     seen_held_out: ClassVar[bool] = False
 
     def mean_columns(self, coarse: Coarse) -> FloatArray:

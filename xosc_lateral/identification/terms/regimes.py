@@ -1,15 +1,15 @@
 """Loud and quiet stretches that no column tells apart: distraction, say.
 
-A two-state Markov chain [1]_. The null is a movement whose loudness varies within seconds, a log-normal stochastic
-volatility [2]_: fitted to the logarithms of the squares [3]_ by their autocovariance, with a memory of at most
-`CLUSTER_S`.
+A two-state Markov chain [1]_. The null is a movement that is loud or quiet for no longer than `CLUSTER_S`: its own
+squares, in blocks of that length, in random order [2]_.
 
 References
 ----------
 .. [1] J. D. Hamilton, "A new approach to the economic analysis of nonstationary time series and the business cycle",
        Econometrica 57, 1989.
-.. [2] A. Harvey, E. Ruiz, N. Shephard, "Multivariate stochastic variance models", Review of Economic Studies 61, 1994.
-.. [3] W. Fuller, "Introduction to Statistical Time Series", 2nd ed., 1996, section 9.2.
+.. [2] E. Carlstein, "The use of subseries values for estimating the variance of a general statistic from a stationary
+       sequence", Annals of Statistics 14, 1986: blocks that do not overlap. Dealt without replacement: a permutation
+       test, of blocks that are taken for exchangeable.
 """
 
 from __future__ import annotations
@@ -21,11 +21,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.driver.effects import Effect, Regimes
+from xosc_lateral.identification.dictionary import in_another_order
 from xosc_lateral.identification.log_scale import squared_innovations
 from xosc_lateral.identification.markov_switching import RegimeFit, fit_regimes
 from xosc_lateral.identification.regression import Coarse, Fitted
 from xosc_lateral.identification.seeds import LoopSeed
-from xosc_lateral.identification.significance import exponential_tail
+from xosc_lateral.identification.significance import HEAVY_TAIL_SHARE, upper_tail
 from xosc_lateral.identification.squares import SLOW_S, fine_squares, log_sizes, slow_squares
 from xosc_lateral.identification.terms.base import Description, Outcome, Removal, Stage, Term
 from xosc_lateral.identification.terms.spread import known_log_scale, what_columns_may_do
@@ -40,22 +41,18 @@ BoolArray = NDArray[np.bool_]
 MEMORIES_S = (6.0, 15.0, 40.0)
 """Lengths of regimes that are looked for. [s]"""
 
-CLUSTER_S = 6.0
+CLUSTER_S = 15
 """Loudness that persists for up to this is how people steer, by a correction now and then and what it takes to settle,
 and no regime. Sensitivity: docs/design/identification.md. [s]"""
 
 SHORTEST_S = 12
-"""Lags are compared from here on: two time constants of what is no regime. [s]"""
+"""Lags are compared from here on. [s]"""
 
 DRAWS = (400, 3600)
-"""Movements without regimes that are the null; the second lot where the first leaves it open."""
+"""Orders of the blocks that are the null; the second lot where the first leaves it open."""
 
 UNSURE = 0.05
 """Larger p-values of the first lot are large enough, whatever the second would say. [-]"""
-
-FULLER = 0.001
-"""Share of the variance that keeps the logarithm of a square near 0 from being an outlier [3]_. With the usual 0.02 a
-variance of 0.3 comes out as 0.23, with this as 0.30: squares of clustered loudness have heavy tails. [-]"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,7 +67,7 @@ class RegimesTerm(Term):
     component: ClassVar[str] = "regimes"
     kind: ClassVar[str] = "regime"
     stages: ClassVar[tuple[Stage, ...]] = (Stage.REGIMES,)
-    weight: ClassVar[float] = 5.0
+    weight: ClassVar[float] = 2.5
     seen_held_out: ClassVar[bool] = False
     fit: RegimeFit = field(repr=False)
 
@@ -81,14 +78,17 @@ class RegimesTerm(Term):
 
     @classmethod
     def test(cls, search: Search, fitted: Fitted) -> Outcome | None:
-        """Weighted autocovariance of the squared innovations; null: the same seconds, clustered at most for seconds."""
+        """Weighted autocovariance of the squared innovations; null: blocks of the same squares in another order."""
         coarse = fitted.coarse
         if not coarse.lasts or any(isinstance(term, cls) for term in fitted.terms):
             return None
         # what a column does to the size in another shape than the one that was found is no regime
         known = [known_log_scale(fitted), what_columns_may_do(search, fitted)]
-        p_value = probability_of_clusters(
-            fitted.innovations, coarse.valid, np.concatenate(known, axis=1), search.rng(LoopSeed.REGIMES)
+        p_value = probability_of_persistence(
+            squared_innovations(fitted.innovations, coarse.valid),
+            coarse.valid,
+            np.concatenate(known, axis=1),
+            search.rng(LoopSeed.REGIMES),
         )
         return Outcome(cls(fit_regimes(fitted.innovations, coarse.valid)), (), p_value)
 
@@ -121,74 +121,35 @@ class RegimesTerm(Term):
         return Description("on/off regimes", shape, effect.factor, effect.factor_error, statistic, statistic)
 
 
-def probability_of_clusters(rows: FloatArray, valid: BoolArray, known: FloatArray, rng: np.random.Generator) -> float:
-    """Probability that loudness with a memory of seconds gives as much persistence.
+def probability_of_persistence(
+    squares: FloatArray, valid: BoolArray, known: FloatArray, rng: np.random.Generator
+) -> float:
+    """Probability that loudness which lasts for no longer than `CLUSTER_S` shows as much persistence.
 
     Parameters
     ----------
-    rows : array, shape (n,)
-        Whitened, one per second.
+    squares : array, shape (n,)
+        Of white rows, one per second, mean 0; 0 where invalid.
     valid : bool array, shape (n,)
     known : array, shape (n, k)
         What is known to go with the size; taken out of the squares.
     rng : Generator
     """
-    from scipy.signal import lfilter
-
-    squares = squared_innovations(rows, valid)
     if known.shape[1]:
         basis = np.linalg.qr((known - known[valid].mean(axis=0)) * valid[:, None])[0]
         squares = squares - basis @ (basis.T @ squares)
-    variance, time = fit_clusters(rows, valid)
-    keep = float(np.exp(-1.0 / time))
-    pushes = np.sqrt(variance * (1.0 - keep**2))
     inside, drawn = np.flatnonzero(valid), np.zeros(len(squares))
-    ordered, null, p_value = np.sort(squares[inside]), np.zeros(0), 0.0
-    observed = float(_scores(squares, valid).max())
+    observed, null, p_value = float(_scores(squares, valid).max()), np.zeros(0), 1.0
     for draws in DRAWS:
         own = np.zeros(draws)
         for draw in range(draws):
-            loudness = lfilter([pushes], [1.0, -keep], rng.normal(size=len(squares)))[inside]
-            sizes = loudness + np.log(np.abs(rng.normal(size=len(inside))))
-            # the drive's own squares, in the order of the simulated ones: of as heavy tails as they are
-            drawn[inside[np.argsort(sizes)]] = ordered
+            drawn[inside] = in_another_order(np.roll(squares[inside], rng.integers(CLUSTER_S)), CLUSTER_S, rng)
             own[draw] = _scores(drawn, valid).max()
         null = np.concatenate([null, own])
-        p_value = exponential_tail(observed, null)
+        p_value = upper_tail(observed, null, tail_share=HEAVY_TAIL_SHARE, least_excess=0.0)
         if p_value > UNSURE:
             break
     return p_value
-
-
-def fit_clusters(rows: FloatArray, valid: BoolArray) -> tuple[float, float]:
-    """Loudness as a first-order autoregression of the log scale.
-
-    Parameters
-    ----------
-    rows : array, shape (n,)
-        Whitened, one per second.
-    valid : bool array, shape (n,)
-
-    Returns
-    -------
-    variance : float
-        Of the log scale. [-]
-    time : float
-        Time constant, 1 to `CLUSTER_S`. [s]
-    """
-    squares = np.square(rows[valid])
-    least = FULLER * float(squares.mean())
-    logs = np.zeros(len(rows))
-    logs[valid] = np.log(squares + least) - least / (squares + least)
-    logs[valid] -= logs[valid].mean()
-    lags = np.arange(1, 2 * SHORTEST_S)
-    pairs = np.maximum(_products(valid.astype(np.float64), lags), 1.0)
-    covariance = _products(logs, lags) / pairs
-    memories = np.geomspace(1.0, CLUSTER_S, 12)
-    shapes = np.exp(-lags / memories[:, None])
-    variances = np.maximum(shapes @ covariance / np.square(shapes).sum(axis=1), 0.0)
-    best = int(np.argmin(np.square(covariance - variances[:, None] * shapes).sum(axis=1)))
-    return 0.25 * float(variances[best]), float(memories[best])
 
 
 def _products(series: FloatArray, lags: NDArray[np.intp]) -> FloatArray:

@@ -39,7 +39,7 @@ class StepTerm(Term):
     component: ClassVar[str] = "low_frequency"
     kind: ClassVar[str] = "step"
     stages: ClassVar[tuple[Stage, ...]] = (Stage.LOW_FREQUENCY,)
-    weight: ClassVar[float] = 2.5
+    weight: ClassVar[float] = 3.0
     seen_held_out: ClassVar[bool] = False
     at: int
 
