@@ -24,7 +24,7 @@ PLACE, TIGHTNESS, SECONDS = 0.2, 0.3, 3000.0
 @pytest.fixture(scope="module")
 def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("assist") / "route.csv"
-    drive = simulate_drive(SECONDS, 3, effects=[LaneKeepingAssist(place=PLACE, tightness=TIGHTNESS)])
+    drive = simulate_drive(SECONDS, 1, effects=[LaneKeepingAssist(place=PLACE, tightness=TIGHTNESS)])
     openlka_layout(drive.table).to_csv(path, index=False)
     return path
 
