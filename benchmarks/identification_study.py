@@ -11,7 +11,6 @@ line per drive goes to OUT.jsonl as it is finished; `--table OUT.jsonl...` print
 from __future__ import annotations
 
 import argparse
-import json
 import math
 import time
 import tomllib
@@ -24,6 +23,7 @@ import pandas as pd
 from benchmarks.identification_cases import PROTOCOL, SETS, cases, planted_drive
 from benchmarks.identification_oracle import coarse_of, oracle, oracle_between
 from benchmarks.identification_tables import calibration, summary, table
+from benchmarks.outcome_lines import append_outcome, read_outcomes
 from xosc_lateral.identification.identify import VETOED, identify
 from xosc_lateral.identification.regression import Coarse
 from xosc_lateral.identification.stages import ERROR_BUDGET, TERMS
@@ -88,8 +88,7 @@ def main() -> None:
     parser.add_argument("--table", type=Path, nargs="+")
     args = parser.parse_args()
     if args.table is not None:
-        lines = [line for path in args.table for line in path.read_text(encoding="utf-8").splitlines()]
-        outcomes = sorted(map(json.loads, lines), key=lambda outcome: outcome["seed"])
+        outcomes = read_outcomes(args.table)
         print(summary(outcomes), calibration(outcomes), table(outcomes), sep="\n\n")
         return
     protocol = tomllib.loads(PROTOCOL.read_text(encoding="utf-8"))
@@ -112,9 +111,7 @@ def main() -> None:
             f"({outcome['cpu_s']} s)",
             flush=True,
         )
-        if args.output is not None:
-            with args.output.open("a", encoding="utf-8") as file:
-                file.write(json.dumps(outcome) + "\n")
+        append_outcome(args.output, outcome)
     print(summary(outcomes), calibration(outcomes), table(outcomes), sep="\n\n")
 
 

@@ -10,7 +10,6 @@ to OUT.jsonl as it is finished. A drive takes 2 s. What a table is asked first i
 from __future__ import annotations
 
 import argparse
-import json
 import tomllib
 from pathlib import Path
 from typing import Any
@@ -20,6 +19,7 @@ import numpy as np
 from benchmarks.identification_cases import PROTOCOL
 from benchmarks.identification_drives import long_drive, smoothed_tracks
 from benchmarks.identification_oracle import coarse_of
+from benchmarks.outcome_lines import append_outcome, read_outcomes
 from xosc_lateral.identification import dictionary
 from xosc_lateral.identification.identify import usable_columns
 from xosc_lateral.identification.regression import fit_model
@@ -61,8 +61,7 @@ def main() -> None:
     parser.add_argument("--table", type=Path, nargs="+")
     args = parser.parse_args()
     if args.table is not None:
-        lines = [line for path in args.table for line in path.read_text(encoding="utf-8").splitlines()]
-        print(table([json.loads(line) for line in lines]))
+        print(table(read_outcomes(args.table)))
         return
     dictionary.BLOCK_S = args.block
     protocol = tomllib.loads(PROTOCOL.read_text(encoding="utf-8"))
@@ -73,9 +72,7 @@ def main() -> None:
         movement, smoothed = movements[place % len(movements)], bool(place // len(movements) % 2)
         found = probabilities(movement, FIRST_SEED + place, protocol["drives"]["long_s"], smoothed)
         outcomes.append({"seed": FIRST_SEED + place, "movement": movement, "smoothed": smoothed, "p": found})
-        if args.output is not None:
-            with args.output.open("a", encoding="utf-8") as file:
-                file.write(json.dumps(outcomes[-1]) + "\n")
+        append_outcome(args.output, outcomes[-1])
     print(table(outcomes))
 
 
