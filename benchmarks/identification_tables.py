@@ -15,8 +15,7 @@ Outcomes = list[dict[str, Any]]
 
 def right(outcome: dict[str, Any]) -> bool:
     """Whether the planted thing is named."""
-    kind = "scale" if "factor" in outcome else "location"
-    accepted = [sorted(columns) for columns in outcome["accepted"]]
+    kind, accepted = _planted(outcome)
     if outcome["name"] == "both neighbours":
         return all(any(columns == [one] for _, columns, *_ in outcome["named"]) for one in outcome["accepted"][0])
     return any(k == kind and columns in accepted for k, columns, *_ in outcome["named"])
@@ -24,23 +23,27 @@ def right(outcome: dict[str, Any]) -> bool:
 
 def false(outcome: dict[str, Any]) -> list[Any]:
     """What is named and was not planted."""
-    accepted = [sorted(columns) for columns in outcome.get("accepted", [])]
+    kind, accepted = _planted(outcome)
     if outcome["name"] == "both neighbours":
         accepted += [[one] for one in outcome["accepted"][0]]
-    kind = "scale" if "factor" in outcome else "location"
     return [one for one in outcome["named"] if not (one[0] == kind and one[1] in accepted) and not _lane(outcome, one)]
 
 
 def undecided(outcome: dict[str, Any], named: list[Any]) -> bool:
     """Whether what was planted is among what a finding says would explain about as much."""
-    kind = "scale" if "factor" in outcome else "location"
-    accepted = [sorted(columns) for columns in outcome.get("accepted", [])]
+    kind, accepted = _planted(outcome)
     return named[0] == kind and any(columns in accepted for columns in (named[4] if len(named) > 4 else ()))
 
 
 def wrong(outcome: dict[str, Any]) -> list[Any]:
     """What is named, was not planted, and is not said to be undecided between the two."""
     return [one for one in false(outcome) if not undecided(outcome, one)]
+
+
+def _planted(outcome: dict[str, Any]) -> tuple[str, list[list[str]]]:
+    """Kind of what was planted, and the sets of columns that name it; none where nothing was."""
+    kind = "scale" if "factor" in outcome else "location"
+    return kind, [sorted(columns) for columns in outcome.get("accepted", [])]
 
 
 def _lane(outcome: dict[str, Any], named: list[Any]) -> bool:
