@@ -1,7 +1,7 @@
 """What would the fair measure say of a model that is the truth? The recording replaced by sampled drives.
 
     xosc-lateral import dlr-ht tasi-0.15.4-py3-none-any.whl -o dlr.parquet
-    python -m benchmarks.fair_null dlr.parquet [--repeats 12] [--neighbours] [--cameras tasi-0.15.4-py3-none-any.whl]
+    python -m benchmarks.fair_null dlr.parquet [--repeats 12] [--no-neighbours] [--cameras tasi-0.15.4-py3-none-any.whl]
         [--write docs/validation/realism.md]
 
 A profile is fitted to all vehicles, and stands for the truth: each recorded run is replaced by one that it sampled
@@ -72,7 +72,7 @@ def under_the_truth(
     runs: Sequence[Run],
     seed: int,
     *,
-    neighbours: bool = False,
+    neighbours: bool | None = None,
     cameras: CameraLevels | None = None,
 ) -> FloatArray:
     """Areas for both halves of drives that a known profile sampled, shape (2, measures). [-]"""
@@ -106,7 +106,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("table", type=Path, nargs="+")
     parser.add_argument("--repeats", type=int, default=12)
-    parser.add_argument("--neighbours", action="store_true", help="all profiles hold what neighbours do")
+    parser.add_argument("--no-neighbours", dest="neighbours", action="store_false", default=None)
     parser.add_argument("--cameras", type=Path, metavar="WHEEL", help="as loud at each place as this recording")
     parser.add_argument("--write", type=Path, help="page with the markers")
     args = parser.parse_args()

@@ -162,3 +162,26 @@ def test_sampling_says_which_columns_it_takes_as_neutral():
     assert made.warnings == ()  # a free run has a speed
     made = xl.sample(xl.read_profile("motorway-vehicle-1").with_effects(windy), duration=10.0)
     assert made.warnings == ("a free run: wind_speed not known, taken as neutral",)
+
+
+def test_a_column_that_tables_lack_is_said_once_and_one_that_a_drive_never_met_is_known(tmp_path):
+    from xosc_lateral.driver.effects import Acts, Linear, Proximity
+
+    shape = {"acts": Acts.LOCATION, "coefficients": (-0.3,), "errors": (0.0,), "reference": (0.2,)}
+    effects = Linear(column="wind_speed", **shape), Proximity(column="left_distance", scale=20.0, **shape)
+    bare = xl.read_profile("motorway-vehicle-1")
+    time = 0.2 * np.arange(100.0)
+    drives = [
+        pd.DataFrame({"drive": k, "time": time, "offset": 0.1 * np.sin(time), "lane_width": 3.5, "left_distance": d})
+        for k, d in enumerate((np.nan, np.inf, 12.0))
+    ]
+    table = pd.concat(drives)
+    made, alike = (xl.sample(one, context=table, seed=1) for one in (bare.with_effects(*effects), bare))
+    assert made.warnings == ("3 of 3 drives: wind_speed not known, taken as neutral",)
+    shift = (made.to_frame()["offset"] - alike.to_frame()["offset"]).groupby(table["drive"].to_numpy()).mean()
+    np.testing.assert_allclose(shift, -0.3 * (np.array([0.0, 0.0, np.exp(-12.0 / 20.0)]) - 0.2), atol=1e-9)
+    both = xl.sample(bare.with_effects(*effects), context=[drives[2].drop(columns="left_distance"), table], seed=1)
+    assert both.warnings == (
+        "drive DataFrame 1:2: left_distance not known, taken as neutral",
+        "4 of 4 drives: wind_speed not known, taken as neutral",
+    )

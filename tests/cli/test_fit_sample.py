@@ -85,9 +85,14 @@ def test_input_at_fault_is_one_line_and_nothing_is_written(tmp_path: Path, capsy
     assert not out.exists()
 
 
-def test_neighbours_of_few_drives_are_refused_in_one_line(
-    measured: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+def test_neighbours_of_few_drives_are_refused_in_one_line_where_asked_for_and_else_left_out(
+    measured: Path, profile: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
+    without = tmp_path / "without.json"
+    kind = ["--model", profile.stem, "--name", profile.stem]
+    assert main(["fit", str(measured), "-o", str(without), "--no-neighbours", *kind]) == 0
+    assert without.read_bytes() == profile.read_bytes()
+    capsys.readouterr()
     assert main(["fit", str(measured), "-o", str(tmp_path / "p.json"), "--neighbours"]) == 1
     said = capsys.readouterr().err.strip()
     assert "what neighbours do takes 30 drives at least, these are " in said

@@ -126,24 +126,44 @@ def beside_others(seed: int, left: float, right: float) -> list[Run]:
 
 def test_what_neighbours_do_is_found_with_its_size_and_is_nothing_where_there_are_none():
     runs = beside_others(5, left=-0.3, right=0.5)
-    found = {effect.columns[0]: effect for effect in fit_place(runs, neighbours=True)}
+    found = {effect.columns[0]: effect for effect in fit_place(runs)}
     for column, size in (("left_distance", -0.3), ("right_distance", 0.5)):
         assert found[column].acts is Acts.LOCATION
         assert found[column].coefficients[0] == pytest.approx(size, abs=4.0 * found[column].errors[0])
         assert found[column].errors[0] < 0.3 * abs(size)
         assert not found[column].strength(0.2, {column: np.full(9, np.inf)}).any()
         assert not found[column].strength(0.2, {column: np.full(9, np.nan)}).any()
-    assert fit_place(runs) == ()  # nobody asked
+    assert tuple(found.values()) == fit_place(runs, neighbours=True)
+    assert fit_place(runs, neighbours=False) == ()
 
 
-def test_neighbours_that_cannot_be_fitted_are_refused():
-    with pytest.raises(NotEnoughDataError, match="no drive has a neighbour"):
-        fit_place(population(1), neighbours=True)
-    with pytest.raises(NotEnoughDataError, match="takes 30 drives at least, these are 29"):
-        fit_place(beside_others(5, -0.3, 0.5)[: LEAST_DRIVES - 1], neighbours=True)
+def test_a_side_on_which_few_drives_had_anybody_is_left_alone():
+    lonely = {run.drive for run in beside_others(5, -0.3, 0.5)[1:4:2]}  # two of those with somebody on the left
+    runs = [
+        run if run.drive not in lonely else replace(run, context={"speed": run.context["speed"]})
+        for run in beside_others(5, -0.3, 0.5)
+    ]
+    assert [effect.columns for effect in fit_place(runs)] == [("right_distance",)]
+    far = [replace(run, context={**run.context, "left_distance": np.full(len(run), SCALE + 1.0)}) for run in runs]
+    assert [effect.columns for effect in fit_place(far)] == [("right_distance",)]
+
+
+def test_neighbours_that_cannot_be_fitted_are_refused_where_asked_for_and_passed_over_where_not():
+    few = beside_others(5, -0.3, 0.5)[: LEAST_DRIVES - 1]
+    rare = [run if k < 9 else replace(run, context={}) for k, run in enumerate(beside_others(5, -0.3, 0.5))]
+    for runs, why in (
+        (population(1), "no drive has a neighbour"),
+        (few, "takes 30 drives at least, these are 29"),
+        (rare, "takes 30 drives that have one within 40 m on the same side, these are 5"),
+    ):
+        with pytest.raises(NotEnoughDataError, match=why):
+            fit_place(runs, neighbours=True)
+        assert fit_place(runs) == fit_place(runs, neighbours=False)
 
 
 def test_the_paper_s_model_has_no_neighbours():
     drive = Drive("a", *(np.arange(100.0), np.zeros(100), np.full(100, 3.5)), {"speed": np.full(100, 30.0)})
+    rules = CutRules(max_gap=2.0)
     with pytest.raises(DriverProfileError, match="without what neighbours do"):
-        fit_profile([drive], name="paper", model="two-level", rules=CutRules(max_gap=2.0), neighbours=True)
+        fit_profile([drive], name="paper", model="two-level", rules=rules, neighbours=True)
+    assert not fit_profile([drive], name="paper", model="two-level", rules=rules).effects

@@ -63,6 +63,29 @@ def test_whoever_can_not_move_leaves_it_to_the_other(tmp_path: Path) -> None:
     assert moves[250] == pytest.approx(float(np.interp(undisturbed, *GAPS)) - undisturbed, rel=0.02)
 
 
+@pytest.mark.parametrize("side", ["left", "right"])
+def test_whom_a_profile_heeds_by_itself_the_law_leaves_alone_unless_the_gap_is_rare(tmp_path: Path, side: str) -> None:
+    network = two_roads(tmp_path)
+    lanes = {name: drive(network, entity(name), lane=lane, start=100.0) for name, lane in (("right", -2), ("left", -1))}
+
+    def moves(apart: float, *, heeded: bool) -> list[bool]:
+        sampled = [
+            SampledVehicle(
+                one,
+                np.full(len(one.time), -apart if name == "right" else apart),
+                np.ones(len(one.time), dtype=bool),
+                frozenset({side} if heeded else ()),
+            )
+            for name, one in lanes.items()
+        ]
+        found = give_way(together(*lanes.values()), network, sampled, ROWS)
+        return [move is not None and abs(move[250]) > 0.01 for move in found]
+
+    usual, rare = (0.5 * (gap - (LANE_WIDTH - 2.0)) for gap in (1.5, 0.1))
+    assert moves(usual, heeded=False) == moves(rare, heeded=True) == [True, True]
+    assert moves(usual, heeded=True) == [side == "right", side == "left"]  # who heeds the other side gives way here
+
+
 def test_a_scenario_s_neighbours_keep_apart_whatever_their_order(tmp_path: Path) -> None:
     network = two_roads(tmp_path)
     names = {"a": -2, "b": -1, "c": -3}

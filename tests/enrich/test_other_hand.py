@@ -34,9 +34,12 @@ def deviations(
     return {one.name: one.deviation for one in found.entities}
 
 
+@pytest.mark.parametrize("profile", ["motorway", "motorway-refined"])
 @pytest.mark.parametrize(("rule", "side"), ROADS)
-def test_left_hand_traffic_is_right_hand_traffic_in_a_mirror(tmp_path: Path, rule: str, side: int) -> None:
-    home = read_profile("motorway-refined")
+def test_left_hand_traffic_is_right_hand_traffic_in_a_mirror(
+    tmp_path: Path, rule: str, side: int, profile: str
+) -> None:
+    home = read_profile(profile)
     here, there = (deviations(tmp_path, *road, 5, home, 2, 1) for road in (ROADS[0], (rule, side)))
     sign = -1.0 if rule == "LHT" else 1.0
     for name, deviation in here.items():

@@ -45,6 +45,21 @@ def test_all_formats_give_the_same_drive(tmp_path: Path, suffix: str) -> None:
 
 
 @pytest.mark.parametrize("suffix", [".csv", ".parquet"])
+def test_a_column_that_is_empty_all_through_a_drive_is_told_from_one_that_the_table_lacks(
+    tmp_path: Path, suffix: str
+) -> None:
+    path = tmp_path / f"mine{suffix}"
+    made = pd.concat([table().assign(drive=name) for name in ("alone", "followed")])
+    made.loc[made["drive"] == "alone", "lead_distance"] = np.nan
+    made = made.assign(rain=np.nan, left_distance=None)
+    made.to_parquet(path) if suffix == ".parquet" else made.to_csv(path, index=False)
+    alone, followed = read_drives(path)
+    assert alone.empty == {"lead_distance", "rain", "left_distance"} and followed.empty == {"rain", "left_distance"}
+    assert not alone.empty & alone.context.keys()
+    assert [run.empty for run in all_runs([alone, followed])] == [alone.empty, followed.empty]
+
+
+@pytest.mark.parametrize("suffix", [".csv", ".parquet"])
 def test_an_infinite_distance_is_nobody_within_reach_and_no_other_column_may_be_infinite(
     tmp_path: Path, suffix: str
 ) -> None:

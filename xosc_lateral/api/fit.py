@@ -43,7 +43,7 @@ def fit(
     licence: str = "",
     sensor_noise: float | None = None,
     left_hand: bool = False,
-    neighbours: bool = False,
+    neighbours: bool | None = None,
 ) -> DriverProfile:
     """Fit a driver profile.
 
@@ -61,9 +61,10 @@ def fit(
         Standard deviation of the sensor's error on the offset, where it is known; else found from the drives. [m]
     left_hand : bool
         The drives are of left-hand traffic: roads with right-hand traffic get their mirror image.
-    neighbours : bool
-        The profile also holds how drivers keep away from vehicles beside them, from `left_distance` and
-        `right_distance`. Takes 30 drives or more, and not the two-level model.
+    neighbours : bool, optional
+        Whether the profile holds how drivers keep away from vehicles beside them, from `left_distance` and
+        `right_distance`. That takes 30 drives that had somebody there, and not the two-level model. None: where it can
+        be fitted; True: or an error says why not; False: in no case.
 
     Raises
     ------

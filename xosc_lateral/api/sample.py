@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 
     from xosc_lateral.driver.profile import DriverProfile
     from xosc_lateral.driver.sampled_offsets import SampledOffsets
+    from xosc_lateral.drives.drive import Drive
 
 
 def sample(
@@ -69,13 +70,10 @@ def sample(
     if duration is not None:
         made = list(sample_free(driver, duration, seed, speed=speed, lane_width=lane_width, with_sensor=with_sensor))
         settings: dict[str, Any] = {"duration_s": duration, "speed": speed}
-        return Offsets(driver, made, seed, None, settings, _neutral(driver, {"speed", "lane_width"}, "a free run"))
+        unknown = [column for column in driver.columns if column not in {"speed", "lane_width"}]
+        return Offsets(driver, made, seed, None, settings, [_neutral("a free run", unknown)] if unknown else [])
     given = given_drives(like if like is not None else context, columns)  # type: ignore[arg-type]
-    warnings = [
-        line
-        for drive in given.drives
-        for line in _neutral(driver, {"lane_width", *drive.context}, f"drive {drive.name}")
-    ]
+    warnings = _unknown_columns(driver, given.drives)
     if like is not None:
         with naming(given):
             made = list(sample_like(driver, given.drives, snippet, seed, with_sensor=with_sensor))
@@ -85,10 +83,24 @@ def sample(
     )
 
 
-def _neutral(profile: DriverProfile, known: Collection[str], where: str) -> list[str]:
-    """Columns that the profile's effects read and that are not there: those effects stay neutral, which is said."""
-    missing = [column for column in profile.columns if column not in known]
-    return [f"{where}: {', '.join(missing)} not known, taken as neutral"] if missing else []
+def _unknown_columns(profile: DriverProfile, drives: Sequence[Drive]) -> list[str]:
+    """Columns that the profile's effects read and tables lack, in one line for those that the same drives lack.
+
+    A column that a table has and that is empty all through a drive is known: there is none (no lane to that side).
+    """
+    lacking: dict[tuple[str, ...], list[str]] = {}
+    for column in profile.columns:
+        names = tuple(d.name for d in drives if column not in {"lane_width", *d.context, *d.empty})
+        lacking.setdefault(names, []).append(column)
+    return [
+        _neutral(f"drive {names[0]}" if len(names) == 1 else f"{len(names)} of {len(drives)} drives", columns)
+        for names, columns in lacking.items()
+        if names
+    ]
+
+
+def _neutral(where: str, columns: Sequence[str]) -> str:
+    return f"{where}: {', '.join(columns)} not known, taken as neutral"
 
 
 class Offsets(Result):

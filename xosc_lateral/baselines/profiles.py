@@ -90,7 +90,7 @@ class Autoregressive(ProfileModel):
 
     @classmethod
     def fit(cls, runs: Sequence[Run]) -> Self:
-        """What `fit` does: the sensor's part is taken out, then what class, lane and speed do, then the drivers."""
+        """What `fit` does: the sensor's part is taken out, then what is known to act on drivers, then the drivers."""
         cleaned, sensor = driver_runs(runs)
         return cls(fit_population(cleaned, name="autoregressive", model=ModelKind.AUTOREGRESSIVE, sensor=sensor))
 
@@ -110,6 +110,7 @@ def drives_of(runs: Sequence[Run]) -> list[Drive]:
                 context=context,
                 levels=own[0].levels,
                 run=np.concatenate([np.full(len(run), number, dtype=np.int64) for number, run in enumerate(own)]),
+                empty=own[0].empty,
             )
         )
     return drives

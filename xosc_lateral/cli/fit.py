@@ -51,8 +51,12 @@ def fit(
     ] = None,
     left_hand: Annotated[bool, typer.Option("--left-hand", help="Drives of left-hand traffic.")] = False,
     neighbours: Annotated[
-        bool, typer.Option("--neighbours", help="Also fit how drivers keep away from vehicles beside them.")
-    ] = False,
+        bool | None,
+        typer.Option(
+            "--neighbours/--no-neighbours",
+            help="Whether to fit how drivers keep away from vehicles beside them; default: where they are known.",
+        ),
+    ] = None,
     force: Force = False,
     quiet: Quiet = False,
     as_json: AsJson = False,

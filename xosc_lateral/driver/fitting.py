@@ -33,11 +33,12 @@ def fit_profile(
     rules: CutRules = PAPER_RULES,
     provenance: Provenance | None = None,
     sensor_noise: float | None = None,
-    neighbours: bool = False,
+    neighbours: bool | None = None,
 ) -> DriverProfile:
     """Cut drives into runs, tell driver and sensor apart, and fit a profile.
 
-    Of a population it holds what class, lane and speed do to level, spread and fine movement (`place`), else none.
+    Of a population it holds what class, lane and speed do to level, spread and fine movement, and neighbours to the
+    level, as far as they are known (`place`); of few drives, and of the two-level model, nothing of that.
 
     Parameters
     ----------
@@ -51,15 +52,16 @@ def fit_profile(
         What is known about the drives; hours, counts and fit settings are filled in.
     sensor_noise : float, optional
         Standard deviation of the sensor's error on the rows, where it is known. [m]
-    neighbours : bool
-        A population's profile also holds how its drivers keep away from vehicles beside them.
+    neighbours : bool, optional
+        Whether a population's profile holds how its drivers keep away from vehicles beside them. None: where they are
+        known.
 
     Raises
     ------
     NotEnoughDataError
-        When too little is left after cutting, or neighbours are asked for and not known.
+        When too little is left after cutting, or neighbours are asked for (True) and not known.
     DriverProfileError
-        When neighbours are asked of the two-level model, which is the paper's to the letter.
+        When neighbours are asked for (True) of the two-level model, which is the paper's to the letter.
     """
     runs = all_runs(drives, rules)
     if (
@@ -92,9 +94,9 @@ def fit_population(
     model: ModelKind | str = ModelKind.AUTOREGRESSIVE,
     provenance: Provenance | None = None,
     sensor: SensorModel | None = None,
-    neighbours: bool = False,
+    neighbours: bool | None = None,
 ) -> DriverProfile:
-    """Fit a profile to the driver's part of runs: what class, lane and speed do first (`place`), then the drivers.
+    """Fit a profile to the driver's part of runs: what class, lane, speed and neighbours do first, then the drivers.
 
     Parameters
     ----------
@@ -102,8 +104,8 @@ def fit_population(
         Without the sensor's part, see `driver_runs`.
     sensor : SensorModel, optional
         What was taken out; the profile keeps it.
-    neighbours : bool
-        Also what vehicles beside them do (`fit_place`).
+    neighbours : bool, optional
+        Whether also what vehicles beside them do; None: where they are known (`fit_place`).
     """
     place = fit_place(runs, neighbours=neighbours)
     profile = fit_runs(without_place(runs, place), name=name, model=model, provenance=provenance)

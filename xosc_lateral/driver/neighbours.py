@@ -13,7 +13,6 @@ import numpy as np
 
 from xosc_lateral.driver.effects import Acts, Proximity
 from xosc_lateral.drives.drive import Run
-from xosc_lateral.errors import NotEnoughDataError
 
 NEIGHBOURS = ("left_distance", "right_distance")
 """Free space lengthwise to the nearest vehicle in the lane to the left and to the right [m]; NaN or infinite: none."""
@@ -25,15 +24,19 @@ LAG, RESPONSE = -1.0, 2.0
 """Delay and first-order lag: drivers see neighbours coming, and nobody moves at once. [s]"""
 
 
-def neighbour_shapes(runs: Sequence[Run]) -> list[Proximity]:
-    """Effects without coefficients of the distances that any run has.
+def neighbour_shapes(runs: Sequence[Run], least: int) -> list[Proximity]:
+    """Effects without coefficients, of each side on which so many drives have somebody within `SCALE`."""
+    return [
+        Proximity(acts=Acts.LOCATION, column=name, scale=SCALE, lag_s=LAG, response_s=RESPONSE)
+        for name in NEIGHBOURS
+        if len(_drives_beside(runs, name)) >= least
+    ]
 
-    Raises
-    ------
-    NotEnoughDataError
-        If none has one.
-    """
-    seen = [name for name in NEIGHBOURS if any(np.isfinite(run.context.get(name, np.nan)).any() for run in runs)]
-    if not seen:
-        raise NotEnoughDataError(f"no drive has a neighbour: columns {' and '.join(NEIGHBOURS)} are missing or empty")
-    return [Proximity(acts=Acts.LOCATION, column=name, scale=SCALE, lag_s=LAG, response_s=RESPONSE) for name in seen]
+
+def most_beside(runs: Sequence[Run]) -> int:
+    """How many drives have somebody within `SCALE`, on the side on which more do."""
+    return max(len(_drives_beside(runs, name)) for name in NEIGHBOURS)
+
+
+def _drives_beside(runs: Sequence[Run], column: str) -> set[str]:
+    return {run.drive for run in runs if column in run.context and (np.abs(run.context[column]) <= SCALE).any()}

@@ -68,7 +68,10 @@ def cut_snippets(runs: Sequence[Run], seconds: float, step: float = STEP) -> lis
 
 
 def segment_of(run: Run, rows: slice | None = None) -> Segment:
-    """A run, or rows of it with the context around them, as the segment that is sampled on."""
+    """A run, or rows of it with the context around them, as the segment that is sampled on.
+
+    Columns that are empty all along stay in the context: there is none, which is not the same as not being known.
+    """
     first, last = (0, len(run)) if rows is None else (rows.start, rows.stop)
     begin = max(0, first - round(PAST / STEP))
     end = min(len(run), last + round(FUTURE / STEP))
@@ -78,7 +81,8 @@ def segment_of(run: Run, rows: slice | None = None) -> Segment:
         time=run.time[cut],
         lane_width=run.lane_width[cut],
         speed=speed,
-        context={name: values[cut] for name, values in run.context.items()},
+        context={name: np.full(end - begin, np.nan) for name in run.empty}
+        | {name: values[cut] for name, values in run.context.items()},
         before=first - begin,
         after=end - last,
     )

@@ -79,11 +79,14 @@ def clean_drive(name: str, columns: dict[str, FloatArray], levels: frozenset[str
     if good.sum() < 2:
         return None
     context = {key: values[good] for key, values in columns.items() if key not in OWN}
-    context = {key: values for key, values in context.items() if not np.isnan(values).all()}
+    empty = frozenset(key for key, values in context.items() if np.isnan(values).all())
+    context = {key: values for key, values in context.items() if key not in empty}
     context["lane_width"] = lane_width[good]
     held = frozenset(levels & context.keys())
     run = columns[RUN][good].astype(np.int64) if RUN in columns else None
-    drive = Drive(name, columns["time"][good], offset[good], lane_width[good], context, held, str(path), run)
+    drive = Drive(
+        name, columns["time"][good], offset[good], lane_width[good], context, held, str(path), run, empty=empty
+    )
     return drive if run is not None else _seen_through(drive)
 
 

@@ -144,7 +144,7 @@ def _run(drive: Drive, index: int, rows: slice, step: float) -> Run:
     }
     lane_width = column_on_grid(time, drive.lane_width[rows], grid, held=False)
     offset = resample(time, drive.offset[rows], grid)
-    return Run(drive.name, index, grid, offset, lane_width, context, drive.levels)
+    return Run(drive.name, index, grid, offset, lane_width, context, drive.levels, drive.empty)
 
 
 def _uninterrupted(drive: Drive, keep: BoolArray, max_gap: float) -> list[slice]:

@@ -52,6 +52,9 @@ class Drive:
         their margins are gone, and none are looked for again. None: nothing has been cut.
     mended : MarkingShares, optional
         Rows in which a camera had misjudged a marking, see `markings`.
+    empty : frozenset of str
+        Columns of its table that hold nothing in this drive, and are not in `context`: there is none, all along (no
+        lane to that side). Of a column that the table lacks, nothing is known.
     """
 
     name: str
@@ -63,6 +66,7 @@ class Drive:
     source: str = ""
     run: NDArray[np.int64] | None = None
     mended: MarkingShares | None = None
+    empty: frozenset[str] = frozenset()
 
     def __post_init__(self) -> None:
         """Copy and freeze; refuse unequal lengths and what readers must have taken out."""
@@ -98,7 +102,7 @@ class Run:
         [m]
     context : mapping of str to array, shape (n,)
         As in `Drive`.
-    levels : frozenset of str
+    levels, empty : frozenset of str
         As in `Drive`.
     """
 
@@ -109,6 +113,7 @@ class Run:
     lane_width: FloatArray
     context: Mapping[str, FloatArray] = field(default_factory=dict)
     levels: frozenset[str] = frozenset()
+    empty: frozenset[str] = frozenset()
 
     def __post_init__(self) -> None:
         """Copy and freeze; refuse unequal lengths and missing values."""

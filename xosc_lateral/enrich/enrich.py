@@ -16,7 +16,7 @@ from xosc_lateral.driver.sampling import OffsetSampler
 from xosc_lateral.driver.sensor.error import known_sensor, sensor_error
 from xosc_lateral.enrich.consequences import gaps_of, lane_departures
 from xosc_lateral.enrich.give_way import SampledVehicle, give_way
-from xosc_lateral.enrich.other_hand import mirrored
+from xosc_lateral.enrich.other_hand import mirrored, other_side
 from xosc_lateral.enrich.result import Enriched, EntityResult, SampledSegment
 from xosc_lateral.motion.context import entity_context
 from xosc_lateral.motion.deviation import SETTLING_TIME, SampledDeviation, deviation_through
@@ -140,6 +140,8 @@ class _Drawn:
         It was not sampled.
     errors : tuple of array
         What a sensor adds to each segment's offsets; zeros unless asked for. [m]
+    heeds : frozenset of str
+        Sides on which the profile responds to neighbours by itself.
     """
 
     motion: EntityMotion
@@ -149,6 +151,7 @@ class _Drawn:
     segments: tuple[tuple[SegmentSpan, IntArray, FloatArray], ...] = ()
     neutral: tuple[str, ...] = ()
     errors: tuple[FloatArray, ...] = ()
+    heeds: frozenset[str] = frozenset()
 
     def deviation(self, distance: FloatArray) -> FloatArray:
         """On every row, positive left. [m]"""
@@ -177,7 +180,7 @@ def _draw(
     every = max(1, round(SAMPLE_STEP / motion.step))
     segments: list[tuple[SegmentSpan, IntArray, FloatArray]] = []
     errors: list[FloatArray] = []
-    neutral: set[str] = set()
+    neutral, heeds = set[str](), set[str]()
     for span in spans:
         knots = np.arange(span.first, span.last + 1, every)
         if not span.is_road_following or len(knots) < 2:
@@ -185,6 +188,7 @@ def _draw(
         segment = _segment(motion, network, index, knots, every, foreign_context)
         neutral |= _unknown(driver, segment)
         other_hand = _is_left_hand(entity, network, knots) != driver.left_hand
+        heeds |= _heeded(driver, other_hand=other_hand)
         wanted = -sampler.sample(mirrored(segment)) if other_hand else sampler.sample(segment)
         inside = segment.inside
         who = f"profile {driver.name} for {entity.name!r}"
@@ -193,7 +197,16 @@ def _draw(
         segments.append((span, knots, wanted))
     if not segments:
         return _Drawn(entity, spans, None, "no road-following segment")
-    return _Drawn(entity, spans, driver, "", tuple(segments), tuple(sorted(neutral)), tuple(errors))
+    unknown = tuple(sorted(neutral))
+    return _Drawn(entity, spans, driver, "", tuple(segments), unknown, tuple(errors), frozenset(heeds))
+
+
+def _heeded(driver: DriverProfile, *, other_hand: bool) -> set[str]:
+    """Sides, "left" and "right", on which a profile responds to neighbours by itself."""
+    columns = NEIGHBOURS & set(driver.columns)
+    return {"left", "right"} & {
+        word for column in columns for word in (other_side(column) if other_hand else column).split("_")
+    }
 
 
 def _apart(drawn: Sequence[_Drawn], motion: NominalMotion, network: RoadNetwork) -> list[_Drawn]:
@@ -219,8 +232,7 @@ def _sampled(one: _Drawn) -> SampledVehicle:
         deviation = one.deviation(distance_driven(one.motion))
         for span, _, _ in one.segments:
             can_move[span.first : span.last + 1] = True
-    heeds = one.profile is not None and any(column in NEIGHBOURS for column in one.profile.columns)
-    return SampledVehicle(one.motion, deviation, can_move, heeds)
+    return SampledVehicle(one.motion, deviation, can_move, one.heeds)
 
 
 def _result(drawn: _Drawn, network: RoadNetwork) -> EntityResult:

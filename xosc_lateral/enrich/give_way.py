@@ -58,14 +58,15 @@ class SampledVehicle:
         From it, positive left. [m]
     can_move : array of bool, shape (rows,)
         Where its path is sampled and may be moved.
-    heeds : bool
-        Whether its profile responds to neighbours by itself: then only gaps that hardly ever occur are widened.
+    heeds : frozenset of str
+        Sides, "left" and "right", on which its profile responds to neighbours by itself: there, only gaps that hardly
+        ever occur are widened.
     """
 
     motion: EntityMotion
     deviation: FloatArray
     can_move: NDArray[np.bool_]
-    heeds: bool = False
+    heeds: frozenset[str] = frozenset()
 
 
 def give_way(
@@ -140,7 +141,7 @@ class _Frame:
         )
 
 
-def _widening(own: _Frame, other: _Frame, heeds: bool) -> tuple[FloatArray, NDArray[np.bool_]] | None:
+def _widening(own: _Frame, other: _Frame, heeds: frozenset[str]) -> tuple[FloatArray, NDArray[np.bool_]] | None:
     """By how much the gap to the other is widened, and whether the other is to the left; None if it never is near."""
     ahead_x, ahead_y = other.x - own.x, other.y - own.y
     reach = FADES + 0.5 * (own.length + other.length)
@@ -156,13 +157,14 @@ def _widening(own: _Frame, other: _Frame, heeds: bool) -> tuple[FloatArray, NDAr
     gap = nominal + np.where(is_left, 1.0, -1.0) * (other.deviation - own.deviation)
     free = np.maximum(np.abs(along) - 0.5 * (own.length + other.length), 0.0)
     weight = _fading(free / FADES) * (1.0 - _fading(nominal / ENTERING)) * (near & same_way)
-    return weight * _wider(gap, heeds), is_left
+    wider = np.where(is_left, _wider(gap, "left" in heeds), _wider(gap, "right" in heeds))
+    return weight * wider, is_left
 
 
-def _wider(gap: FloatArray, heeds: bool) -> FloatArray:
-    """What a gap is widened by. [m]"""
+def _wider(gap: FloatArray, heeded: bool) -> FloatArray:
+    """What a gap to somebody is widened by, whom the profile heeds by itself or not. [m]"""
     free, side_by_side = GAPS
-    if heeds:
+    if heeded:
         side_by_side = np.maximum(free, np.minimum(side_by_side, side_by_side[2]))
     wanted = np.interp(gap, free, side_by_side)
     wanted = np.where(gap < free[0], side_by_side[0], wanted)

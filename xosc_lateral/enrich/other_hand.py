@@ -33,7 +33,7 @@ def mirrored(segment: Segment) -> Segment:
 
 
 def _mirrored(context: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
-    found = {_other_side(name): values for name, values in context.items()}
+    found = {other_side(name): values for name, values in context.items()}
     for name in OTHER_SIGN:
         if name in found:
             found[name] = -found[name]
@@ -44,5 +44,6 @@ def _mirrored(context: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
     return found
 
 
-def _other_side(name: str) -> str:
+def other_side(name: str) -> str:
+    """The name with the words `left` and `right` exchanged."""
     return "_".join(_SIDES.get(word, word) for word in name.split("_"))

@@ -169,9 +169,9 @@ def _numeric_columns(table: pd.DataFrame, path: Path) -> dict[str, FloatArray]:
         if name == "drive":
             continue
         if name in OWN or name == "speed" or types.is_numeric_dtype(table[name]) or types.is_bool_dtype(table[name]):
-            values = _cleaned(table, name, path)
-            if values is not None:
-                columns[name] = values
+            columns[name] = _cleaned(table, name, path)
+        elif table[name].isna().all():
+            columns[name] = np.full(len(table), np.nan)
         elif (numbers := comma_numbers(table[name])) is not None:
             columns[name] = numbers.to_numpy(dtype=np.float64)
         else:
@@ -179,13 +179,13 @@ def _numeric_columns(table: pd.DataFrame, path: Path) -> dict[str, FloatArray]:
     return columns
 
 
-def _cleaned(table: pd.DataFrame, name: str, path: Path) -> FloatArray | None:
-    """A column of numbers without what is none; None where nothing is left of a context column."""
+def _cleaned(table: pd.DataFrame, name: str, path: Path) -> FloatArray:
+    """A column of numbers without what is none."""
     values = _as_numbers(table[name], path, name)
     values[np.isinf(values) & ~nobody(name, values)] = np.nan
     if name not in OWN:
         _leave_out_nonsense(values, name, path)
-    return values if name in OWN or not np.isnan(values).all() else None
+    return values
 
 
 def _leave_out_nonsense(values: FloatArray, name: str, path: Path) -> None:

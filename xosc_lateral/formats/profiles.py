@@ -97,6 +97,7 @@ def profile_record(profile: DriverProfile) -> dict[str, Any]:
     facts: dict[str, Any] = {"id": profile.name, "model": profile.model.kind, "sha256": profile_hash(profile)}
     if profile.sensor is not None:
         facts["sensor"] = plain(profile.sensor) | {"share": profile.sensor.share}
+    facts |= {"effects": len(profile.effects), "columns": list(profile.columns)}
     return facts | {"hours": known.hours, "drives": known.drives, "runs": known.runs, "lane_width": profile.lane_width}
 
 
@@ -107,6 +108,8 @@ def describe_profile(profile: DriverProfile) -> str:
         f"{profile.name}: {profile.model.kind} model from {known.hours:.2f} h in {known.runs} runs of {known.drives} "
         f"drives, {len(profile.effects)} effects"
     )
+    if profile.columns:
+        text += f" of {', '.join(profile.columns)}"
     if one := known.fit.get("one_marking"):
         text += (
             f"\n{100 * one:.1f} % of the rows follow one lane marking, because the other was misjudged; "

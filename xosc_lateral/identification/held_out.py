@@ -122,12 +122,15 @@ def fit_without(
     """Base model of what is left without the effects, and the effects.
 
     Of a population the base holds what class, lane and speed do to the rest, as `fit` has it; the paper's has not.
+    What neighbours do is for the loop to find.
     """
     runs = bare_runs(fitted.coarse.timeline, removal_of(fitted, estimates), used)
     if not runs:
         raise NotEnoughDataError("closing the loop: no run of 10 s is left to fit the base model on")
-    fit = fit_runs if kind is ModelKind.TWO_LEVEL else fit_population
-    profile = fit(runs, name=name, model=kind, provenance=provenance)
+    if kind is ModelKind.TWO_LEVEL:
+        profile = fit_runs(runs, name=name, model=kind, provenance=provenance)
+    else:
+        profile = fit_population(runs, name=name, model=kind, provenance=provenance, neighbours=False)
     effects: tuple[Effect, ...] = tuple(effect for _, own in estimates.values() for effect in own)
     return structs.replace(profile, effects=(*profile.effects, *effects))
 

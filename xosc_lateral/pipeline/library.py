@@ -13,6 +13,7 @@ from __future__ import annotations
 import tempfile
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from dataclasses import replace as replace_fields
 from pathlib import Path
 from typing import Any
 
@@ -251,7 +252,9 @@ def split_in_time(runs: Sequence[Run]) -> tuple[list[Run], list[Run]]:
 
 def _part(run: Run, rows: slice) -> Run:
     context = {name: values[rows] for name, values in run.context.items()}
-    return Run(run.drive, run.index, run.time[rows], run.offset[rows], run.lane_width[rows], context, run.levels)
+    return replace_fields(
+        run, time=run.time[rows], offset=run.offset[rows], lane_width=run.lane_width[rows], context=context
+    )
 
 
 def sliding_snippets(runs: Sequence[Run]) -> FloatArray:
