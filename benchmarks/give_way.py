@@ -1,6 +1,9 @@
 """Lateral gaps of vehicles side by side, beside those of any two vehicles of the two lanes: `enrich.give_way.GAPS`.
 
-python -m benchmarks.give_way WHEEL
+    python -m benchmarks.give_way WHEEL [--profile motorway motorway-refined] [--seeds 12] [--write PAGE.md]
+
+Then those that profiles leave which are sampled under the context of the same vehicles, nobody giving way (`HEEDED`, of
+`motorway`), and with the law by which `convert` makes them.
 """
 
 from __future__ import annotations
@@ -10,9 +13,19 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
+from benchmarks.markers import write_between_markers
+from xosc_lateral.driver.profile import DriverProfile
+from xosc_lateral.driver.sampled_offsets import sample_context
+from xosc_lateral.enrich.enrich import NEIGHBOURS
+from xosc_lateral.enrich.give_way import wider
+from xosc_lateral.formats.drives import drives_of_table
 from xosc_lateral.formats.importers import dlr_ht
 from xosc_lateral.formats.importers.road_from_tracks import fit_reference_line
+from xosc_lateral.formats.profiles import read_profile
+
+FloatArray = NDArray[np.float64]
 
 QUANTILES = (0.0, 0.001, 0.01, 0.05, 0.1, 0.25, 0.5, 0.75, 0.9, 0.99)
 EVERY = 20  # rows: 1 s
@@ -44,23 +57,62 @@ def side_by_side(source: Path) -> tuple[pd.DataFrame, pd.DataFrame]:
     return pairs[beside], rows
 
 
+def sampled_gaps(profile: DriverProfile, source: Path, pairs: pd.DataFrame, seeds: int) -> FloatArray:
+    """The same gaps with both vehicles sampled from a profile, each under its own context, shape (seeds, n). [m]"""
+    imported = dlr_ht.import_dlr_ht(source, keep_cut=True).table
+    tracks = dlr_ht.read_tracks(source)
+    by_vehicle = imported.assign(late=tracks["time"] - imported["time"]).groupby(tracks["vehicle"])[["drive", "late"]]
+    known = by_vehicle.first()
+    drives = drives_of_table(imported.drop(columns=["state", "following_run", "vehicle_class"]), {})
+    time = pairs["frame"].to_numpy() // 2 * 0.05
+
+    def at(vehicle: pd.Series, made: dict[str, tuple[FloatArray, FloatArray]]) -> FloatArray:
+        rows = zip(known.loc[vehicle, "drive"], time - known.loc[vehicle, "late"].to_numpy(), strict=True)
+        return np.array([np.interp(moment, *made[name]) for name, moment in rows])
+
+    found = []
+    for seed in range(seeds):
+        made = {one.drive: (one.time, one.offset) for one in sample_context(profile, drives, seed)}
+        found.append(free_gap(pairs) + at(pairs["vehicle_left"], made) - at(pairs["vehicle"], made))
+    return np.array(found)
+
+
+def free_gap(pairs: pd.DataFrame) -> FloatArray:
+    """With both in their lane's middle, shape (n,). [m]"""
+    return np.asarray(pairs["apart"] - 0.5 * (pairs["width"] + pairs["width_left"]))
+
+
 def main() -> None:
-    """Print both distributions."""
+    """Print all distributions."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("wheel", type=Path, metavar="WHEEL")
-    pairs, rows = side_by_side(parser.parse_args().wheel)
-    free = pairs["apart"] - 0.5 * (pairs["width"] + pairs["width_left"])
+    parser.add_argument("--profile", nargs="*", default=["motorway", "motorway-refined"])
+    parser.add_argument("--seeds", type=int, default=12)
+    parser.add_argument("--write", type=Path, help="page with the markers")
+    args = parser.parse_args()
+    pairs, rows = side_by_side(args.wheel)
+    free = free_gap(pairs)
     real = free + pairs["offset_left"] - pairs["offset"]
     n = 20 * len(pairs)
     left, right = (
         rows.loc[rows["lane"] == lane, "offset"].sample(n, replace=True, random_state=lane) for lane in (1, 0)
     )
-    drawn = np.tile(free, 20) + left.to_numpy() - right.to_numpy()
+    columns = {"side by side": real.to_numpy(), "any two": np.tile(free, 20) + left.to_numpy() - right.to_numpy()}
+    for name in args.profile:
+        profile = read_profile(name)
+        gaps = sampled_gaps(profile, args.wheel, pairs, args.seeds).ravel()
+        heeded = bool(NEIGHBOURS & set(profile.columns))
+        columns |= {f"`{profile.name}`": gaps, f"`{profile.name}`, giving way": gaps + wider(gaps, heeded=heeded)}
     encounters = real.groupby([pairs["vehicle"], pairs["vehicle_left"]]).min()
-    print(f"{len(pairs)} s side by side, {len(encounters)} encounters; gap [m] at quantiles")
-    print("| quantile | side by side | any two |\n|---|---|---|")
+    lines = [f"| quantile | {' | '.join(columns)} |", "|---" * (1 + len(columns)) + "|"]
     for quantile in QUANTILES:
-        print(f"| {quantile:g} | {real.quantile(quantile):.2f} | {np.quantile(drawn, quantile):.2f} |")
+        values = " | ".join(f"{np.quantile(gaps, quantile):.2f}" for gaps in columns.values())
+        lines.append(f"| {100 * quantile:g} % | {values} |")
+    lines.append(f"| mean | {' | '.join(f'{gaps.mean():.2f}' for gaps in columns.values())} |")
+    text = "\n".join([*lines, "", f"{len(pairs)} s side by side, {len(encounters)} encounters; {args.seeds} seeds."])
+    print(text)
+    if args.write is not None:
+        write_between_markers(args.write, text, "gaps")
 
 
 if __name__ == "__main__":

@@ -27,7 +27,11 @@ from xosc_lateral.formats.drives import read_drives
 FloatArray = NDArray[np.float64]
 
 SCALES = (10.0, 20.0, 40.0, 80.0)  # [m]
-FORMS = ((0.0, 0.0), (0.0, 1.0), (-1.0, 1.0), (0.0, 2.0), (-1.0, 2.0), (-2.0, 2.0), (-2.0, 4.0))  # delay and lag [s]
+FORMS = (
+    *((lag, response, 1) for lag in (0.0, -1.0, -2.0) for response in (0.0, 1.0, 2.0, 4.0) if response >= -lag),
+    *((lag, response, 2) for lag in (0.0, -1.0, -2.0) for response in (0.5, 1.0, 2.0) if 2.0 * response >= -lag),
+)
+"""Delay and lag [s], and how many lags in a row [-]."""
 EVERY = 5  # rows: 1 s
 
 
@@ -60,19 +64,26 @@ def main() -> None:
     args = parser.parse_args()
     runs = all_runs(read_drives(args.table))
     lines = [
-        f"| delay, lag [s] | {' | '.join(f'{scale:g} m' for scale in SCALES)} |",
+        f"| delay, lags [s] | {' | '.join(f'{scale:g} m' for scale in SCALES)} |",
         "|---" * (len(SCALES) + 1) + "|",
     ]
-    for lag, response in FORMS:
+    for lag, response, order in FORMS:
         several = [
             [
-                Proximity(acts=Acts.LOCATION, column=name, scale=scale, lag_s=lag, response_s=response)
+                Proximity(
+                    acts=Acts.LOCATION,
+                    column=name,
+                    scale=scale,
+                    lag_s=lag,
+                    response_s=response,
+                    response_order=order,
+                )
                 for name in NEIGHBOURS
             ]
             for scale in SCALES
         ]
         cells = " | ".join(f"{100 * left(runs, effects):.1f} %" for effects in several)
-        lines.append(f"| {lag:g}, {response:g} | {cells} |")
+        lines.append(f"| {lag:g}, {' and '.join([f'{response:g}'] * order)} | {cells} |")
     text = "\n".join(lines)
     print(text)
     if args.write is not None:

@@ -10,7 +10,7 @@ import pytest
 from tests.motion.made_motion import LANE_WIDTH, drive, entity, together, two_roads
 from tests.profiles import simulated_profile
 from xosc_lateral.enrich.enrich import enrich
-from xosc_lateral.enrich.give_way import GAPS, OVERTAKING_SHARE, SampledVehicle, give_way
+from xosc_lateral.enrich.give_way import GAPS, HEEDED, OVERTAKING_SHARE, SampledVehicle, give_way
 
 ROWS = np.arange(0, 501, 10)
 
@@ -64,26 +64,24 @@ def test_whoever_can_not_move_leaves_it_to_the_other(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("side", ["left", "right"])
-def test_whom_a_profile_heeds_by_itself_the_law_leaves_alone_unless_the_gap_is_rare(tmp_path: Path, side: str) -> None:
+@pytest.mark.parametrize("gap", [0.3, 1.5])
+def test_where_a_profile_heeds_somebody_by_itself_the_law_adds_what_that_leaves(
+    tmp_path: Path, side: str, gap: float
+) -> None:
     network = two_roads(tmp_path)
-    lanes = {name: drive(network, entity(name), lane=lane, start=100.0) for name, lane in (("right", -2), ("left", -1))}
-
-    def moves(apart: float, *, heeded: bool) -> list[bool]:
-        sampled = [
-            SampledVehicle(
-                one,
-                np.full(len(one.time), -apart if name == "right" else apart),
-                np.ones(len(one.time), dtype=bool),
-                frozenset({side} if heeded else ()),
-            )
-            for name, one in lanes.items()
-        ]
-        found = give_way(together(*lanes.values()), network, sampled, ROWS)
-        return [move is not None and abs(move[250]) > 0.01 for move in found]
-
-    usual, rare = (0.5 * (gap - (LANE_WIDTH - 2.0)) for gap in (1.5, 0.1))
-    assert moves(usual, heeded=False) == moves(rare, heeded=True) == [True, True]
-    assert moves(usual, heeded=True) == [side == "right", side == "left"]  # who heeds the other side gives way here
+    apart = 0.5 * (gap - (LANE_WIDTH - 2.0))
+    sampled = [
+        SampledVehicle(one, np.full(len(one.time), deviation), np.ones(len(one.time), dtype=bool), frozenset({side}))
+        for one, deviation in (
+            (drive(network, entity("right"), lane=-2, start=100.0), -apart),
+            (drive(network, entity("left"), lane=-1, start=100.0), apart),
+        )
+    ]
+    right, left = give_way(together(*(one.motion for one in sampled)), network, sampled, ROWS)
+    by_law, after = (float(np.interp(gap, known, GAPS[1])) - gap for known in (GAPS[0], HEEDED))
+    assert 0.0 < after < by_law
+    assert right[250] == pytest.approx(-(1 - OVERTAKING_SHARE) * (after if side == "left" else by_law), rel=0.02)
+    assert left[250] == pytest.approx(OVERTAKING_SHARE * (by_law if side == "left" else after), rel=0.02)
 
 
 def test_a_scenario_s_neighbours_keep_apart_whatever_their_order(tmp_path: Path) -> None:

@@ -65,6 +65,11 @@ def test_a_base_s_effects_are_fitted_anew_from_nothing(timeline: Timeline) -> No
     assert (term.effect.coefficients, term.effect.reference, term.effect.response_range) == ((), (), ())
 
 
+def test_lags_in_a_row_become_one_as_late(timeline: Timeline) -> None:
+    (term,) = initial(timeline, made(Linear, 0.3, column="grade", response_s=1.5, response_order=2))
+    assert (term.effect.response_s, term.effect.response_order) == (3.0, 1)
+
+
 def test_each_part_of_the_movement_has_its_term(timeline: Timeline) -> None:
     effects = (
         made(Linear, 0.2, column="grade", acts=Acts.SPREAD),

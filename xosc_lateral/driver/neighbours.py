@@ -2,7 +2,8 @@
 
 The effect fades exponentially with the free space lengthwise, and is none where there is nobody. How strong it is on
 either side is found in the fit (`place`); its form was found in DLR Highway Traffic v1.1.0
-(benchmarks/neighbour_response.py): of those within 0.5 % of the variance of the best, one that is not too quick.
+(benchmarks/neighbour_response.py): of those within 0.5 % of the variance of the best, one that is not too quick, and
+without kinks.
 """
 
 from __future__ import annotations
@@ -20,14 +21,15 @@ NEIGHBOURS = ("left_distance", "right_distance")
 SCALE = 40.0
 """Free space over which the effect fades to 37 %. [m]"""
 
-LAG, RESPONSE = -1.0, 2.0
-"""Delay and first-order lag: drivers see neighbours coming, and nobody moves at once. [s]"""
+LAG, RESPONSE, ORDER = -1.0, 1.0, 2
+"""Delay, and two first-order lags: drivers see neighbours coming, and nobody moves at once. After a single lag of 2 s
+somebody who comes into the lane would be a kink in the path, which no car can drive. [s], [s], [-]"""
 
 
 def neighbour_shapes(runs: Sequence[Run], least: int) -> list[Proximity]:
     """Effects without coefficients, of each side on which so many drives have somebody within `SCALE`."""
     return [
-        Proximity(acts=Acts.LOCATION, column=name, scale=SCALE, lag_s=LAG, response_s=RESPONSE)
+        Proximity(acts=Acts.LOCATION, column=name, scale=SCALE, lag_s=LAG, response_s=RESPONSE, response_order=ORDER)
         for name in NEIGHBOURS
         if len(_drives_beside(runs, name)) >= least
     ]

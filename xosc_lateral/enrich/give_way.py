@@ -2,9 +2,10 @@
 
 Every vehicle's path is sampled by itself first. Where two drive side by side, the lateral gap that this leaves between
 them is mapped to the gap that real neighbours leave at the same quantile: gaps between vehicles side by side beside
-those between any two vehicles of the two lanes (`GAPS`). The narrower the gap would be, the more it is widened; both
-vehicles take their part, the one in the overtaking lane the larger one, as measured. The mapping fades with the free
-space lengthwise. All displacements follow from the paths as first sampled, so nobody's depends on the order of
+those between any two vehicles of the two lanes (`GAPS`), or beside those that profiles leave which keep away from
+neighbours by themselves, in the mean (`HEEDED`). The narrower the gap would be, the more it is widened; both vehicles
+take their part, the one in the overtaking lane the larger one, as measured. The mapping fades with the free space
+lengthwise. All displacements follow from the paths as first sampled, so nobody's depends on the order of
 entities, and a vehicle far away changes nobody's.
 
 Our own rule: quantile mapping to gaps that were measured in DLR Highway Traffic v1.1.0 (benchmarks/give_way.py).
@@ -33,6 +34,11 @@ least, 0.1, 1, 5, 25 and 50 %): DLR Highway Traffic, 749 encounters of an early 
 744, the rarest two up to 0.11 m wider between any two, all others within 0.02 m). From 3 m on nobody gives way, which
 is assumed. [m]"""
 
+HEEDED = np.array([-0.03, 0.26, 0.55, 0.95, 1.43, 1.75, 3.0])
+"""Lateral gap that vehicles leave by themselves whose profiles know what neighbours do, at the quantiles of `GAPS`:
+those side by side in the same recording, sampled from `motorway` under its context, 12 seeds
+(`benchmarks/give_way.py`; `motorway-refined` leaves 0.05 m more of the narrow ones). [m]"""
+
 OVERTAKING_SHARE = 0.75
 """Part of the one in the overtaking lane: it moves 0.24 m, the other 0.08 m (same recording, full proximity). [-]"""
 
@@ -59,8 +65,8 @@ class SampledVehicle:
     can_move : array of bool, shape (rows,)
         Where its path is sampled and may be moved.
     heeds : frozenset of str
-        Sides, "left" and "right", on which its profile responds to neighbours by itself: there, only gaps that hardly
-        ever occur are widened.
+        Sides, "left" and "right", on which its profile responds to neighbours by itself: there, gaps are widened by
+        what that leaves to be widened.
     """
 
     motion: EntityMotion
@@ -92,10 +98,10 @@ def give_way(
             if not (sampled[i].can_move.any() or sampled[j].can_move.any()):
                 continue
             for own, other in ((i, j), (j, i)):
-                wider = _widening(frames[own], frames[other], sampled[own].heeds)
-                if wider is None:
+                widening = _widening(frames[own], frames[other], sampled[own].heeds)
+                if widening is None:
                     continue
-                aside, is_left = wider  # of `own`, by where `other` is
+                aside, is_left = widening  # of `own`, by where `other` is
                 share = np.where(is_left == left_hand[own], OVERTAKING_SHARE, 1.0 - OVERTAKING_SHARE)
                 share = np.where(frames[other].can_move, share, 1.0) * frames[own].can_move
                 right[own] = np.maximum(right[own], np.where(is_left, share * aside, 0.0))
@@ -157,15 +163,14 @@ def _widening(own: _Frame, other: _Frame, heeds: frozenset[str]) -> tuple[FloatA
     gap = nominal + np.where(is_left, 1.0, -1.0) * (other.deviation - own.deviation)
     free = np.maximum(np.abs(along) - 0.5 * (own.length + other.length), 0.0)
     weight = _fading(free / FADES) * (1.0 - _fading(nominal / ENTERING)) * (near & same_way)
-    wider = np.where(is_left, _wider(gap, "left" in heeds), _wider(gap, "right" in heeds))
-    return weight * wider, is_left
+    wide = np.where(is_left, wider(gap, heeded="left" in heeds), wider(gap, heeded="right" in heeds))
+    return weight * wide, is_left
 
 
-def _wider(gap: FloatArray, heeded: bool) -> FloatArray:
-    """What a gap to somebody is widened by, whom the profile heeds by itself or not. [m]"""
+def wider(gap: FloatArray, *, heeded: bool) -> FloatArray:
+    """What gaps to somebody are widened by, whom the profile heeds by itself or not, shape (n,). [m]"""
     free, side_by_side = GAPS
-    if heeded:
-        side_by_side = np.maximum(free, np.minimum(side_by_side, side_by_side[2]))
+    free = HEEDED if heeded else free
     wanted = np.interp(gap, free, side_by_side)
     wanted = np.where(gap < free[0], side_by_side[0], wanted)
     return np.asarray(np.maximum(wanted - gap, 0.0) * (gap < free[-1]))

@@ -131,13 +131,23 @@ def usable_columns(
 
 
 def initial_terms(base: DriverProfile, timeline: Timeline) -> tuple[Term, ...]:
-    """The base's own effects as far as the table has their columns: they are refitted, not found anew."""
+    """The base's own effects as far as the table has their columns: they are refitted, not found anew.
+
+    The loop knows responses by one first-order lag, so that several in a row become one that is as late.
+    """
     there = {"lane_width", *timeline.context}
     terms: list[Term] = []
     for effect in base.effects:
         if isinstance(effect, ColumnEffect) and set(effect.columns) <= there:
             bare = structs.replace(
-                effect, coefficients=(), errors=(), reference=(), between_drivers=(), response_range=()
+                effect,
+                coefficients=(),
+                errors=(),
+                reference=(),
+                between_drivers=(),
+                response_range=(),
+                response_s=effect.response_s * effect.response_order,
+                response_order=1,
             )
             if effect.acts is Acts.LOCATION:
                 between = is_between(effect) or _same_throughout(effect, timeline)

@@ -45,7 +45,7 @@ EXAMPLES: tuple[Effect, ...] = (
     ),
     Levels(acts=Acts.LOCATION, column="x", levels=(1.0,), **ONE),
     Nearness(acts=Acts.FINE, column="x", scale=10.0, **ONE),
-    Proximity(acts=Acts.LOCATION, column="x", scale=10.0, **ONE),
+    Proximity(acts=Acts.LOCATION, column="x", scale=10.0, lag_s=-0.4, response_s=1.0, response_order=2, **ONE),
     Angular(
         acts=Acts.LOCATION, column="x", period=360.0, coefficients=(0.3, 0.1), errors=(0.1, 0.1), reference=(0.0, 0.0)
     ),

@@ -14,6 +14,8 @@ WRONG: dict[str, tuple[dict, str]] = {
     "endless error": ({"errors": (np.inf,)}, "not finite"),
     "endless lag": ({"lag_s": np.inf}, "not finite"),
     "responds before it is asked": ({"response_s": -0.1}, "below 0 s"),
+    "no lag at all": ({"response_order": 0}, "response_order 0, expected 1 to 9"),
+    "a delay of lags": ({"response_order": 10}, "response_order 10, expected 1 to 9"),
     "errors of something else": ({"errors": (0.1, 0.1)}, "as many coefficients"),
     "a reference too few": ({"reference": ()}, "as many coefficients"),
     "deviations of something else": ({"between_drivers": (0.1, 0.1)}, "between_drivers"),

@@ -8,7 +8,7 @@ import pytest
 from scipy.signal import lfilter
 
 from xosc_lateral.driver.effects import Drift
-from xosc_lateral.driver.effects.response import respond, split_shift
+from xosc_lateral.driver.effects.response import Response, respond, split_shift
 from xosc_lateral.driver.jit_kernel import WORTH_IMPORTING
 
 STEP = 0.2
@@ -33,6 +33,23 @@ def test_a_lag_is_scipys_filter_started_settled(response_s: float, n: int) -> No
     values, keep = quantity(n), np.exp(-STEP / response_s)
     expected, _ = lfilter([1.0 - keep], [1.0, -keep], values, zi=[keep * values[0]])
     np.testing.assert_allclose(respond(values, STEP, 0.0, response_s), expected, rtol=0, atol=1e-12)
+
+
+def test_lags_in_a_row_are_one_after_the_other_also_block_by_block() -> None:
+    values = quantity(300, 2)
+    whole = respond(values, STEP, -0.53, 1.0, order=3)
+    once = respond(values, STEP, -0.53, 1.0)
+    np.testing.assert_allclose(whole, respond(respond(once, STEP, 0.0, 1.0), STEP, 0.0, 1.0), rtol=0, atol=1e-12)
+    blocks = Response(STEP, -0.53, 1.0, order=3)
+    parts = [blocks.take(values[:1]), *(blocks.take(values[k : k + 1]) for k in range(1, 90)), blocks.take(values[90:])]
+    np.testing.assert_array_equal(np.concatenate([*parts, blocks.finish(values[:0])]), whole)
+
+
+def test_after_two_lags_a_jump_is_a_bend_and_after_one_a_kink() -> None:
+    jump = (np.arange(100) >= 50).astype(float)
+    once, twice = (np.diff(respond(jump, STEP, 0.0, 1.0, order=order)) for order in (1, 2))
+    assert np.abs(np.diff(once)).max() > 0.9 * once.max()
+    assert np.abs(np.diff(twice)).max() < 0.6 * twice.max()
 
 
 def test_every_component_is_responseed_by_itself() -> None:

@@ -31,6 +31,10 @@ from xosc_lateral.errors import DriverProfileError
 FloatArray = NDArray[np.float64]
 
 
+MAX_ORDER = 9
+"""More lags in a row are a delay. [-]"""
+
+
 class ColumnEffect(Effect, frozen=True, kw_only=True):
     """A dependence on context columns: strength = coefficients . (respond(quantity) - reference).
 
@@ -46,6 +50,9 @@ class ColumnEffect(Effect, frozen=True, kw_only=True):
         Standard errors of the coefficients.
     lag_s, response_s : float
         Delay (negative: looks ahead) and first-order lag of the response. [s]
+    response_order : int
+        Count of such lags one after the other: after one, a jump of the quantity is a kink of the path, after two a
+        bend.
     reference : tuple of float
         Value of the quantity at which nothing changes: its mean over the drives it was fitted on.
     between_drivers : tuple of float
@@ -57,7 +64,8 @@ class ColumnEffect(Effect, frozen=True, kw_only=True):
     Raises
     ------
     DriverProfileError
-        If the lengths disagree, a number is not finite, or the response time or a deviation is negative.
+        If the lengths disagree, a number is not finite, the response time or a deviation is negative, or the order is
+        not 1 to 9.
 
     Notes
     -----
@@ -72,6 +80,7 @@ class ColumnEffect(Effect, frozen=True, kw_only=True):
     reference: tuple[float, ...] = ()
     between_drivers: tuple[float, ...] = ()
     response_range: tuple[tuple[float, float], ...] = msgspec.field(name="answer_range", default=())
+    response_order: int = 1
 
     def __post_init__(self) -> None:
         """Coerce and validate once."""
@@ -81,6 +90,10 @@ class ColumnEffect(Effect, frozen=True, kw_only=True):
         if not np.isfinite(numbers).all() or self.response_s < 0:
             raise DriverProfileError(
                 f"effect {self.kind}: {numbers} has a number that is not finite, or a response below 0 s"
+            )
+        if not 1 <= self.response_order <= MAX_ORDER:
+            raise DriverProfileError(
+                f"effect {self.kind}: response_order {self.response_order}, expected 1 to {MAX_ORDER}"
             )
         if len({len(self.coefficients), len(self.errors), len(self.reference)}) != 1:
             raise DriverProfileError(f"effect {self.kind}: as many coefficients as errors and references are needed")
@@ -152,11 +165,11 @@ class ColumnEffect(Effect, frozen=True, kw_only=True):
 
     def response(self, step: float, context: Mapping[str, FloatArray]) -> FloatArray:
         """Driving quantity as the driver responds to it, shape (n, k), on a grid of the given step [s]."""
-        return respond(self.known(context), step, self.lag_s, self.response_s)
+        return respond(self.known(context), step, self.lag_s, self.response_s, order=self.response_order)
 
     def response_in_blocks(self, step: float, state: ResponseState | None = None) -> Response:
         """The response block by block, shape (n, k) each, from the start of a drive or from a state; `step` in [s]."""
-        return Response(step, self.lag_s, self.response_s, state)
+        return Response(step, self.lag_s, self.response_s, state, order=self.response_order)
 
     def strength(self, step: float, context: Mapping[str, FloatArray]) -> FloatArray | None:
         """[m] or natural logarithm of a factor, shape (n,); None when a column is missing."""
@@ -200,6 +213,8 @@ class ColumnEffect(Effect, frozen=True, kw_only=True):
             del values["between_drivers"]
         if not self.response_range:
             del values["answer_range"]
+        if self.response_order == 1:
+            del values["response_order"]
         return values
 
 

@@ -27,8 +27,8 @@ class ResponseState(msgspec.Struct):
         Last rows of the quantity, as far back as they are still needed.
     taken, given : int
         Rows of the quantity seen, and of the response given.
-    settled : array, shape (k,), optional
-        Last response of the first-order lag.
+    settled : array, shape (order * k,), optional
+        Last response of each first-order lag.
     """
 
     held: FloatArray | None = None
@@ -38,7 +38,7 @@ class ResponseState(msgspec.Struct):
 
 
 class Response:
-    """A shift in time, then a first-order lag of gain 1, of a quantity given block by block.
+    """A shift in time, then equal first-order lags of gain 1 one after the other, of a quantity given block by block.
 
     Row i of the response is due once all rows that it looks ahead to were given; before the first row and, at the end,
     beyond the last one, the outermost row holds. The lag starts settled.
@@ -50,13 +50,18 @@ class Response:
     lag_s : float
         Delay; negative: the driver looks ahead. [s]
     response_s : float
-        Time constant of the first-order lag; 0 for none. [s]
+        Time constant of each first-order lag; 0 for none. [s]
     state : ResponseState, optional
         To go on from.
+    order : int
+        Count of first-order lags: after two, a jump is a bend without a kink.
     """
 
-    def __init__(self, step: float, lag_s: float, response_s: float, state: ResponseState | None = None) -> None:
+    def __init__(
+        self, step: float, lag_s: float, response_s: float, state: ResponseState | None = None, *, order: int = 1
+    ) -> None:
         self.state = ResponseState() if state is None else state
+        self._order = order
         self._whole, self._share = split_shift(lag_s / step)
         self._keep = float(np.exp(-step / response_s)) if response_s > 0 else None
         self.ahead = max(0, self._whole + (1 if self._share else 0))
@@ -102,8 +107,10 @@ class Response:
             at -= self.state.taken - len(held)
             value = held[at] if not self._share else held[at] * (1.0 - self._share) + self._share * held[at + 1]
         if self._keep is not None:
-            settled = value if self.state.settled is None else self.state.settled
-            self.state.settled = value = (1.0 - self._keep) * value + self._keep * settled
+            settled = self._settled(value)
+            for own in settled.reshape(self._order, -1):
+                own[:] = value = (1.0 - self._keep) * value + self._keep * own
+            self.state.settled = settled
         return np.asarray(value[None, :])
 
     def _shifted(self, held: FloatArray, first: int, until: int) -> FloatArray:
@@ -124,18 +131,23 @@ class Response:
         return result
 
     def _lagged(self, values: FloatArray) -> FloatArray:
-        """First-order lag, in place."""
+        """First-order lags, in place."""
         if self._keep is None or not len(values):
             return values
-        settled = values[0].copy() if self.state.settled is None else self.state.settled
-        keep = np.array([self._keep])
-        for k in range(values.shape[1]):
-            values[:, k] = recur(settled[k : k + 1], (1.0 - self._keep) * values[:, k], keep)[1:]
-        self.state.settled = values[-1].copy()
+        settled, keep = self._settled(values[0]), np.array([self._keep])
+        for own in settled.reshape(self._order, -1):
+            for k in range(values.shape[1]):
+                values[:, k] = recur(own[k : k + 1], (1.0 - self._keep) * values[:, k], keep)[1:]
+            own[:] = values[-1]
+        self.state.settled = settled
         return values
 
+    def _settled(self, value: FloatArray) -> FloatArray:
+        """Where each lag is, as an array of its own; at the start, at the value."""
+        return np.tile(value, self._order) if self.state.settled is None else np.array(self.state.settled)
 
-def respond(values: FloatArray, step: float, lag_s: float, response_s: float) -> FloatArray:
+
+def respond(values: FloatArray, step: float, lag_s: float, response_s: float, *, order: int = 1) -> FloatArray:
     """Response to a whole drive; see `Response`.
 
     Parameters
@@ -144,6 +156,7 @@ def respond(values: FloatArray, step: float, lag_s: float, response_s: float) ->
         Finite, on an even time grid. [any unit]
     step, lag_s, response_s : float
         [s]
+    order : int
 
     Returns
     -------
@@ -153,7 +166,8 @@ def respond(values: FloatArray, step: float, lag_s: float, response_s: float) ->
     values = np.asarray(values, dtype=np.float64)
     if not len(values):
         return values.copy()
-    return Response(step, lag_s, response_s).finish(values.reshape(len(values), -1)).reshape(values.shape)
+    response = Response(step, lag_s, response_s, order=order)
+    return response.finish(values.reshape(len(values), -1)).reshape(values.shape)
 
 
 def split_shift(steps: float) -> tuple[int, float]:
