@@ -14,7 +14,7 @@ from scipy.ndimage import gaussian_filter1d
 from xosc_lateral.driver.fitting import fit_profile
 from xosc_lateral.drives.cuts import PAPER_RULES, cut_runs, lane_change_rows
 from xosc_lateral.drives.drive import Drive
-from xosc_lateral.drives.markings import mend_markings
+from xosc_lateral.drives.markings import Mended, both_markings
 from xosc_lateral.formats.drives import read_drives
 from xosc_lateral.formats.profiles import describe_profile
 from xosc_lateral.identification.identify import usable_columns
@@ -69,6 +69,11 @@ def misjudged(seed: int = 0) -> tuple[Camera, slice]:
     creep = seen.rows(150.0, 153.0)
     seen.left[creep] += np.linspace(0.0, 1.2, creep.stop - creep.start)
     return seen, creep
+
+
+def mend_markings(time: FloatArray, offset: FloatArray, lane_width: FloatArray) -> Mended | None:
+    seen = both_markings(time, offset, lane_width)
+    return None if seen is None else seen.mended()
 
 
 def rms(values: FloatArray) -> float:
@@ -160,6 +165,9 @@ def test_tables_are_mended_and_profiles_say_so(tmp_path: Path) -> None:
     assert drive.mended is not None
     assert rms(np.interp(seen.time[creep], drive.time, drive.offset) - seen.truth[creep]) < 0.1
     np.testing.assert_array_equal(drive.context["lane_width"], drive.lane_width)
+    assert drive.half_width is not None
+    kept = np.isin(seen.time, drive.time)
+    np.testing.assert_allclose(drive.half_width, 0.5 * seen.lane_width[kept])
     columns, _, unused = usable_columns(join_drives([drive]))
     assert "lane_width" not in [column.name for column in columns]
     assert "camera" in unused["lane_width"]

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.drives.drive import Drive
-from xosc_lateral.drives.markings import mend_markings
+from xosc_lateral.drives.markings import both_markings
 from xosc_lateral.errors import FormatError
 from xosc_lateral.limits import DRIVE_SPAN, TIME
 
@@ -91,8 +91,12 @@ def clean_drive(name: str, columns: dict[str, FloatArray], levels: frozenset[str
 
 
 def _seen_through(drive: Drive) -> Drive:
-    """With the other marking followed where a camera had misjudged one."""
-    mended = mend_markings(drive.time, drive.offset, drive.lane_width)
+    """With the other marking followed where a camera had misjudged one, and with what it saw of both."""
+    seen = both_markings(drive.time, drive.offset, drive.lane_width)
+    if seen is None:
+        return drive
+    drive = replace(drive, half_width=0.5 * drive.lane_width)
+    mended = seen.mended()
     if mended is None:
         return drive
     kept = mended.kept
@@ -104,6 +108,7 @@ def _seen_through(drive: Drive) -> Drive:
         lane_width=mended.lane_width[kept],
         context=context,
         mended=mended.shares,
+        half_width=0.5 * drive.lane_width[kept],
     )
 
 

@@ -55,6 +55,9 @@ class Drive:
     empty : frozenset of str
         Columns of its table that hold nothing in this drive, and are not in `context`: there is none, all along (no
         lane to that side). Of a column that the table lacks, nothing is known.
+    half_width : array, shape (n,), optional
+        Half the lane width as a camera recorded it, with errors of both markings, as the offset has them. None: the
+        lane width comes from a map, or from elsewhere than the offset. [m]
     """
 
     name: str
@@ -67,6 +70,7 @@ class Drive:
     run: NDArray[np.int64] | None = None
     mended: MarkingShares | None = None
     empty: frozenset[str] = frozenset()
+    half_width: FloatArray | None = None
 
     def __post_init__(self) -> None:
         """Copy and freeze; refuse unequal lengths and what readers must have taken out."""
@@ -139,7 +143,8 @@ def _freeze(series: Drive | Run) -> None:
         object.__setattr__(series, "run", _frozen_numbers(series.run, len(series.time), f"drive {series.name}: run"))
     name = series.name if isinstance(series, Drive) else series.drive
     n = len(series.time)
-    for label in ("time", "offset", "lane_width"):
+    half_width = ("half_width",) if isinstance(series, Drive) and series.half_width is not None else ()
+    for label in ("time", "offset", "lane_width", *half_width):
         values = _frozen(getattr(series, label), n, f"drive {name}: {label}")
         if not np.isfinite(values).all():
             raise ValueError(f"drive {name}: {label} is not finite")

@@ -74,7 +74,7 @@ class Mended:
     Parameters
     ----------
     offset, lane_width : array, shape (n,)
-        [m]
+        The lane width smoothed. [m]
     kept : bool array, shape (n,)
         Rows with a view to trust.
     shares : MarkingShares
@@ -86,8 +86,8 @@ class Mended:
     shares: MarkingShares
 
 
-def mend_markings(time: FloatArray, offset: FloatArray, lane_width: FloatArray) -> Mended | None:
-    """Follow the other marking where a camera has misjudged one.
+def both_markings(time: FloatArray, offset: FloatArray, lane_width: FloatArray) -> BothMarkings | None:
+    """What a camera saw of both lane markings.
 
     Parameters
     ----------
@@ -98,24 +98,51 @@ def mend_markings(time: FloatArray, offset: FloatArray, lane_width: FloatArray) 
 
     Returns
     -------
-    Mended or None
-        None where the lane width wasn't measured, or nothing in it is impossible.
+    BothMarkings or None
+        None where the lane width wasn't measured, or not by what measured the offset.
     """
     if np.ptp(lane_width) == 0.0:  # before anything is imported or computed: from a map, as most tables have it
         return None
     breaks = (np.diff(time) > MAX_GAP) | lane_steps(offset, lane_width)
     block, moment = _blocks(time, breaks)
     views = _Views.of(block, offset, lane_width, np.flatnonzero(breaks))
-    smoothed = None if views is None else views.smoothed(np.diff(time)[breaks])
-    if smoothed is None:
-        return None
-    centres = STEP * (np.arange(len(smoothed[0])) + 0.5)
-    place, lane = (np.interp(moment, centres, values) for values in smoothed)
-    left, right = _trust(offset - place, lane_width - lane)
-    change = 0.5 * (lane_width - lane) * (right - left) / (left + right)
-    kept = 0.5 * (left + right) >= LEAST_TRUST
-    shares = MarkingShares(float(np.mean(kept & (np.abs(change) > MOVED))), float(np.mean(~kept)))
-    return Mended(offset + change, lane, kept, shares)
+    return None if views is None else BothMarkings(offset, lane_width, moment, np.diff(time)[breaks], views)
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class BothMarkings:
+    """What a camera saw of both lane markings.
+
+    Parameters
+    ----------
+    offset, lane_width : array, shape (n,)
+        As recorded. [m]
+    moment : array, shape (n,)
+        Of the rows, see `_blocks`. [s]
+    gaps : array
+        Times between the rows on both sides of the breaks. [s]
+    views : _Views
+    """
+
+    offset: FloatArray
+    lane_width: FloatArray
+    moment: FloatArray
+    gaps: FloatArray
+    views: _Views
+
+    def mended(self) -> Mended | None:
+        """With the other marking followed where one was misjudged; None where nothing is impossible."""
+        smoothed = self.views.smoothed(self.gaps)
+        if smoothed is None:
+            return None
+        centres = STEP * (np.arange(len(smoothed[0])) + 0.5)
+        place, lane = (np.interp(self.moment, centres, values) for values in smoothed)
+        wider = self.lane_width - lane
+        left, right = _trust(self.offset - place, wider)
+        change = 0.5 * wider * (right - left) / (left + right)
+        kept = 0.5 * (left + right) >= LEAST_TRUST
+        shares = MarkingShares(float(np.mean(kept & (np.abs(change) > MOVED))), float(np.mean(~kept)))
+        return Mended(self.offset + change, lane, kept, shares)
 
 
 def _trust(offset: FloatArray, width: FloatArray) -> tuple[FloatArray, FloatArray]:

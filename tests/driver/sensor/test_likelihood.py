@@ -31,10 +31,10 @@ def measured(colour: Colour | None = None, weight: float = 200.0) -> Periodogram
 
 @pytest.mark.parametrize("order", [1, 2, 4])
 @pytest.mark.parametrize("corner", [0.3, 2.0])
-def test_the_bandwidth_is_the_integral_of_the_shape(order: int, corner: float) -> None:
+def test_the_integral_is_that_of_the_shape(order: int, corner: float) -> None:
     colour = Colour(order, corner)
     expected = quad(lambda f: float(colour.shape(np.array(f))), 0.0, np.inf)[0]
-    assert colour.bandwidth == pytest.approx(expected, rel=1e-6)
+    assert colour.integral(np.inf) == pytest.approx(expected, rel=1e-6)
     assert colour.shape(np.array([0.0, corner])) == pytest.approx([1.0, 0.5])
 
 

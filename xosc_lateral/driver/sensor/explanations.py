@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from xosc_lateral.driver.sensor.likelihood import Colour, Known, Solution, solve
 from xosc_lateral.driver.sensor.periodogram import Periodogram
+from xosc_lateral.driver.sensor.second_view import SecondView
 
 FloatArray = NDArray[np.float64]
 
@@ -51,9 +52,18 @@ class Explanation:
     criterion: float
 
 
-def explanations(data: Periodogram, base: FloatArray, known: Known | None) -> list[Explanation]:
-    """All that were tried, white noise alone first; arguments as for `solve`."""
-    found = [_explanation(data, Colour(), base, known)]
+def explanations(
+    data: Periodogram, base: FloatArray, known: Known | None, view: SecondView | None = None, *, only_view: bool = False
+) -> list[Explanation]:
+    """All that were tried; of a second view, also or only what it shows.
+
+    Other arguments as for `solve`.
+    """
+    seen = [] if view is None else [Colour(alone=alone, view=view) for alone in (False, True)]
+    found = [_explanation(data, colour, base, known) for colour in seen]
+    if found and only_view:
+        return found
+    found.append(_explanation(data, Colour(), base, known))
     for order in ORDERS:
         for alone in (False, True):
             found += _of_family(data, order, alone, base, known)
@@ -91,7 +101,12 @@ def _in_digits(corner: float) -> float:
 def _explanation(
     data: Periodogram, colour: Colour, base: FloatArray, known: Known | None, start: Solution | None = None
 ) -> Explanation:
-    """White noise has a level, a low-passed part a level and a corner: so many numbers are paid for."""
+    """White noise has a level, a low-passed part a level and a corner: so many numbers are paid for.
+
+    A second view has a level, too, and a shape that is known from as many windows as the data: its own chance costs a
+    likelihood as much as fitting its knots would gain, half for each, which is given back.
+    """
     found = solve(data, colour, base, known, start)
-    numbers = 2 * bool(colour.order) + (not colour.alone)
-    return Explanation(found, colour, 2.0 * found.loss + numbers * float(np.log(data.count)))
+    numbers = 2 * bool(colour.order) + (colour.view is not None) + (not colour.alone)
+    own_chance = 0 if colour.view is None else len(colour.view.knots)
+    return Explanation(found, colour, 2.0 * found.loss + numbers * float(np.log(data.count)) - own_chance)

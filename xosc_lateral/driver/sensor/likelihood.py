@@ -1,4 +1,4 @@
-"""Whittle's likelihood of driver plus sensor, climbed by Fisher scoring.
+"""Whittle's likelihood of driver plus sensor.
 
 References
 ----------
@@ -7,13 +7,14 @@ References
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from xosc_lateral.driver.sensor.ascent import climb
 from xosc_lateral.driver.sensor.periodogram import Periodogram
+from xosc_lateral.driver.sensor.second_view import LEVEL_SD, SecondView
 from xosc_lateral.driver.sensor.vehicle_bound import KNOTS, N_KNOTS, PRIOR_ROWS, PRIOR_VALUES, interpolation
 
 FloatArray = NDArray[np.float64]
@@ -31,35 +32,43 @@ NO_WHITE = np.log(1e-14)
 KNOWN_SD = 0.05
 """How closely a noise level that is known is kept to: of its logarithm. [-]"""
 
-ROUNDS = 60
-ENOUGH = 1e-3
-LONGEST_STEP = 1.5
-
 
 @dataclass(frozen=True, slots=True)
 class Colour:
-    """Low-passed part of the sensor: a Butterworth shape; order 0: there is none.
+    """Coloured part of the sensor: a Butterworth shape of some order, or what a second view shows; else there is none.
 
     Parameters
     ----------
     order : int
+        0: no Butterworth shape.
     corner : float
         [Hz]
     alone : bool
         Whether there is no white noise beside it.
+    view : SecondView, optional
+        The level is then over its density.
     """
 
     order: int = 0
     corner: float = 1.0
     alone: bool = False
-
-    def shape(self, frequency: FloatArray) -> FloatArray:
-        """Density over that at frequency 0. Shape as `frequency` [Hz]. [-]"""
-        return np.asarray(1.0 / (1.0 + (frequency / self.corner) ** (2 * self.order)))
+    view: SecondView | None = None
 
     @property
-    def bandwidth(self) -> float:
-        """Integral of the shape over all frequencies. [Hz]"""
+    def is_there(self) -> bool:
+        """Whether there is a coloured part."""
+        return self.order > 0 or self.view is not None
+
+    def shape(self, frequency: FloatArray) -> FloatArray:
+        """Density over that at frequency 0 [-], or of the second view [m2/Hz]. Shape as `frequency` [Hz]."""
+        if self.view is not None:
+            return self.view.density(frequency)
+        return np.asarray(1.0 / (1.0 + (frequency / self.corner) ** (2 * self.order)))
+
+    def integral(self, highest: float) -> float:
+        """Of the shape over all frequencies; of a second view, up to `highest`, that of the rows [Hz]."""
+        if self.view is not None:
+            return self.view.variance(highest)
         part = np.pi / (2 * self.order)
         return float(self.corner * part / np.sin(part))
 
@@ -81,7 +90,7 @@ class Solution:
     knots : array, shape (N_KNOTS,)
         Log density of the driver.
     white, colour : float
-        Log densities of the sensor's two parts; `colour` is -inf where there is none.
+        Log densities of the sensor's two parts, of `colour` over its shape; -inf where there is none.
     loss : float
         Minus log posterior.
     """
@@ -98,9 +107,10 @@ class _Problem:
     def __init__(self, data: Periodogram, colour: Colour, base: FloatArray, known: Known | None) -> None:
         self.data, self.base, self.known = data, base, known
         self.matrix = interpolation(data.frequency)
-        self.shape = colour.shape(data.frequency) if colour.order else None
-        self.bandwidth = colour.bandwidth if colour.order else 0.0
-        self.size = N_KNOTS + 1 + bool(colour.order)
+        self.shape = colour.shape(data.frequency) if colour.is_there else None
+        self.integral = colour.integral(0.5 * known.rate) if colour.is_there and known else 0.0
+        self.size = N_KNOTS + 1 + colour.is_there
+        self.is_seen = colour.view is not None
         high = data.frequency > ABOVE
         self.top = float(np.log(np.average(data.density[high], weights=data.weight[high])))
         self.corner, self.alone = colour.corner, colour.alone
@@ -113,7 +123,7 @@ class _Problem:
         measured[last + 1 :] = measured[last] - 6.0 * (log[last + 1 :] - log[last])
         at = int(np.argmin(np.abs(self.data.frequency - 0.7 * self.corner)))
         white = NO_WHITE if self.alone else self.top - 0.3
-        rest = [white, float(np.log(self.data.density[at])) - 0.7]
+        rest = [white, 0.0 if self.is_seen else float(np.log(self.data.density[at])) - 0.7]
         return np.concatenate([measured, rest[: self.size - N_KNOTS]])
 
     def at(self, point: FloatArray) -> tuple[float, FloatArray, FloatArray]:
@@ -153,7 +163,11 @@ class _Problem:
         white = np.zeros(self.size)
         white[N_KNOTS] = 1.0 / FLOOR_SD
         rows = [(white, (NO_WHITE if self.alone else self.top - 1.0) / FLOOR_SD)]
-        if self.shape is not None and not self.alone:
+        if self.is_seen:
+            level = np.zeros(self.size)
+            level[N_KNOTS + 1] = 1.0 / LEVEL_SD
+            rows.append((level, 0.0))
+        elif self.shape is not None and not self.alone:
             both = np.zeros(self.size)
             both[N_KNOTS], both[N_KNOTS + 1] = -1.0 / COLOUR_SD, 1.0 / COLOUR_SD
             rows.append((both, 0.0))
@@ -161,7 +175,7 @@ class _Problem:
             parts = np.zeros(self.size)
             parts[N_KNOTS] = np.exp(point[N_KNOTS]) * 0.5 * self.known.rate
             if self.shape is not None:
-                parts[N_KNOTS + 1] = np.exp(point[N_KNOTS + 1]) * self.bandwidth
+                parts[N_KNOTS + 1] = np.exp(point[N_KNOTS + 1]) * self.integral
             variance = float(parts.sum())
             row = parts / variance / KNOWN_SD
             lacking = (2.0 * np.log(self.known.deviation) - np.log(variance)) / KNOWN_SD
@@ -191,28 +205,5 @@ def solve(
     problem = _Problem(data, colour, base, known)
     point = problem.start() if start is None else np.array([*start.knots, start.white, start.colour])[: problem.size]
     point, loss = climb(problem.at, point)
-    coloured = float(point[N_KNOTS + 1]) if colour.order else -np.inf
+    coloured = float(point[N_KNOTS + 1]) if colour.is_there else -np.inf
     return Solution(point[:N_KNOTS], float(point[N_KNOTS]), coloured, loss)
-
-
-def climb(
-    at: Callable[[FloatArray], tuple[float, FloatArray, FloatArray]], point: FloatArray
-) -> tuple[FloatArray, float]:
-    """The least loss and where it is, by Fisher scoring from a point; `at` gives loss, gradient and information."""
-    loss, gradient, information = at(point)
-    for _ in range(ROUNDS):
-        step = np.linalg.solve(information + 1e-6 * np.eye(len(point)), -gradient)
-        step = np.clip(step, -LONGEST_STEP, LONGEST_STEP)
-        length = 1.0
-        tried = at(point + step)
-        while tried[0] >= loss and length > 1e-3:
-            length *= 0.4
-            tried = at(point + length * step)
-        if tried[0] >= loss:
-            break
-        gained = loss - tried[0]
-        point = point + length * step
-        loss, gradient, information = tried
-        if gained < ENOUGH:
-            break
-    return point, loss

@@ -63,6 +63,9 @@ class SensorModel(Record, frozen=True):
         Variance of the log of the density over time [-], and how long a level lasts [s]; in files `wanders`, `lasts`.
     kinks : Kinks or None
         Of tracks that were smoothed piece by piece.
+    second_view : float
+        Power of the error over that of half the lane width, beside the white part, where that is how it was told
+        (`second_view`); else 0. [-]
 
     Raises
     ------
@@ -83,10 +86,12 @@ class SensorModel(Record, frozen=True):
     level_variance: float = msgspec.field(default=0.0, name="wanders")
     level_duration: float = msgspec.field(default=60.0, name="lasts")
     kinks: Kinks | None = None
+    second_view: float = 0.0
 
     def __post_init__(self) -> None:
         """Check."""
-        parts = (self.white, self.coloured, self.rounding, self.driver_variance, self.sensor_variance)
+        levels = (self.white, self.coloured, self.rounding, self.second_view)
+        parts = (*levels, self.driver_variance, self.sensor_variance)
         numbers = (*parts, self.level_variance, *self.frequencies, *self.densities)
         if not all(map(isfinite, numbers)) or min(numbers) < 0 or self.order < 0 or not self.corner > 0:
             raise DriverProfileError(f"sensor: {self}")
@@ -107,6 +112,8 @@ class SensorModel(Record, frozen=True):
             f"{100 * self.share:.1f} % of the measured variance is the driver's (95 % interval: {100 * low:.1f} to "
             f"{100 * high:.1f} %), the rest is sensor error ({np.sqrt(self.sensor_variance):.3f} m rms)"
         )
+        if self.second_view:
+            words = f"{words}, told by the lane width, which the same camera measured"
         if self.kinks is None:
             return words
         fastest = CROSSING[1] * self.kinks.highest

@@ -12,7 +12,7 @@ from xosc_lateral.driver.sensor.model import SensorModel
 from xosc_lateral.driver.sensor.periodogram import WINDOWS
 from xosc_lateral.driver.sensor.separation import separate
 from xosc_lateral.drives.drive import Drive, Run
-from xosc_lateral.drives.resampling import STEP
+from xosc_lateral.drives.resampling import STEP, resample
 
 FloatArray = NDArray[np.float64]
 
@@ -39,7 +39,15 @@ def driver_runs(
     if max(map(len, runs), default=0) * STEP < WINDOWS[-1]:
         return list(runs), None
     rows, rate = rows_of(runs, drives)
-    found = separate([run.offset for run in runs], STEP, rows=rows, rate=rate, sensor_noise=sensor_noise)
+    found = separate(
+        [run.offset for run in runs],
+        STEP,
+        rows=rows,
+        rate=rate,
+        sensor_noise=sensor_noise,
+        half_widths=half_widths_of(runs, drives),
+        one_camera=all(drive.mended is not None for drive in drives),
+    )
     return [replace(run, offset=found.driver_part(run.offset, STEP)) for run in runs], found.sensor
 
 
@@ -48,10 +56,25 @@ def rows_of(runs: Sequence[Run], drives: Sequence[Drive]) -> tuple[list[FloatArr
     known = {drive.name: drive for drive in drives}
     if not all(run.drive in known for run in runs):
         return None, None
-    rows, steps = [], []
+    cut = [(known[run.drive], _rows(known[run.drive], run)) for run in runs]
+    steps = np.concatenate([np.diff(drive.time[rows]) for drive, rows in cut])
+    return [drive.offset[rows] for drive, rows in cut], 1.0 / float(np.median(steps))
+
+
+def half_widths_of(runs: Sequence[Run], drives: Sequence[Drive]) -> list[FloatArray] | None:
+    """Half the lane width in each run [m]; None where not all drives are there, or a camera measured not all."""
+    seen = {drive.name: (drive, drive.half_width) for drive in drives if drive.half_width is not None}
+    if not all(run.drive in seen for run in runs):
+        return None
+    found = []
     for run in runs:
-        drive = known[run.drive]
-        first, last = np.searchsorted(drive.time, (run.time[0] - 1e-6, run.time[-1] + 1e-6))
-        rows.append(drive.offset[first:last])
-        steps.append(np.diff(drive.time[first:last]))
-    return rows, 1.0 / float(np.median(np.concatenate(steps)))
+        drive, half_width = seen[run.drive]
+        rows = _rows(drive, run)
+        found.append(resample(drive.time[rows], half_width[rows], run.time))
+    return found
+
+
+def _rows(drive: Drive, run: Run) -> slice:
+    """Of a drive, that lie in one of its runs."""
+    first, last = np.searchsorted(drive.time, (run.time[0] - 1e-6, run.time[-1] + 1e-6))
+    return slice(int(first), int(last))

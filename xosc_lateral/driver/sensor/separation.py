@@ -15,13 +15,14 @@ import numpy as np
 from msgspec.structs import replace
 from numpy.typing import NDArray
 
-from xosc_lateral.driver.sensor.explanations import explanations
+from xosc_lateral.driver.sensor.explanations import Explanation, explanations
 from xosc_lateral.driver.sensor.hidden_path import HiddenPath
 from xosc_lateral.driver.sensor.kinks_fit import find_kinks
 from xosc_lateral.driver.sensor.likelihood import Colour, Known, Solution, solve
 from xosc_lateral.driver.sensor.model import SensorModel
 from xosc_lateral.driver.sensor.periodogram import Periodogram, periodogram, windows_of
 from xosc_lateral.driver.sensor.quantisation import quantisation_step, rounding_density
+from xosc_lateral.driver.sensor.second_view import LEVEL_SD, SecondView, second_view
 from xosc_lateral.driver.sensor.texture import FAST, LEAST_SHARE, MANY, level_variation, measured_density
 from xosc_lateral.driver.sensor.vehicle_bound import density
 from xosc_lateral.driver.sensor.wide_steps import WideSteps, split_wide_steps
@@ -52,8 +53,8 @@ class Separation:
     knots : array
         Of the driver's density, see `vehicle_bound`.
     sensor : SensorModel
-    rounding : callable
-        Density of what rounding adds. [m2/Hz]
+    beside : callable
+        Density of what the sensor's numbers don't hold: of rounding, and of errors seen in a second view. [m2/Hz]
     is_too_coarse : bool
         Whether values come in steps too coarse for the split to mean anything.
     hidden : HiddenPath, optional
@@ -62,7 +63,7 @@ class Separation:
 
     knots: FloatArray
     sensor: SensorModel
-    rounding: Callable[[FloatArray], FloatArray]
+    beside: Callable[[FloatArray], FloatArray]
     is_too_coarse: bool = False
     hidden: HiddenPath | None = None
 
@@ -87,7 +88,7 @@ class Separation:
     def driver_share_of(self, frequency: FloatArray) -> FloatArray:
         """Driver's share of the power at each frequency from 0 on, shape (m,). [-]"""
         driver = density(self.knots, frequency)
-        share = driver / (driver + self.sensor.density(frequency) + self.rounding(frequency))
+        share = driver / (driver + self.sensor.density(frequency) + self.beside(frequency))
         share[0] = 1.0
         return share
 
@@ -99,6 +100,8 @@ def separate(
     rows: Sequence[FloatArray] | None = None,
     rate: float | None = None,
     sensor_noise: float | None = None,
+    half_widths: Sequence[FloatArray] | None = None,
+    one_camera: bool = False,
 ) -> Separation:
     """Tell driver and sensor apart.
 
@@ -114,6 +117,11 @@ def separate(
         Rows per second; needed with `sensor_noise`. [Hz]
     sensor_noise : float, optional
         Standard deviation of the sensor's error on the rows, where it is known. [m]
+    half_widths : sequence of array, optional
+        Half the lane width in the same runs, where a camera measured it: a second view of its errors. [m]
+    one_camera : bool
+        Whether that is known to be the camera that measured the offset; else what the width shows is taken where it is
+        plausible.
 
     Raises
     ------
@@ -142,19 +150,47 @@ def separate(
     base = rounding(data.frequency)
     if kinks is not None:
         base = base + kinks.density(data.frequency)
-    found = explanations(data, base, known)
-    least = min(found, key=lambda one: one.criterion)
+    view = second_view(half_widths, step) if half_widths else None
+    found = explanations(data, base, known, view, only_view=one_camera)
+    least = _taken(found)
     best, colour = least.solution, least.colour
-    result = Separation(best.knots, replace(_sensor(best, colour, grain), kinks=kinks), rounding)
+    beside = _with_view(rounding, best, colour)
+    result = Separation(best.knots, replace(_sensor(best, colour, grain), kinks=kinks), beside)
     driver = float(np.concatenate([result.driver_part(run, step) for run in runs]).var())
     share = min(driver / variance, 1.0) if variance > 0.0 else 1.0
     plausible = [(one.solution, one.colour) for one in found if one.criterion < least.criterion + PLAUSIBLE]
+    if colour.view is not None:
+        plausible += [(solve(data, one, base, known, best), one) for one in _other_views(colour, colour.view)]
     interval = (
         (0.0, 1.0) if two_levels else _interval(frequency, windows, best, colour, base, known, plausible, share, data)
     )
     sensor = _sensor(best, colour, grain, share * variance, (1.0 - share) * variance, interval)
     sensor = replace(sensor, kinks=kinks)
-    return _textured(Separation(best.knots, sensor, rounding, two_levels), runs, frequency, windows, step)
+    return _textured(Separation(best.knots, sensor, beside, two_levels), runs, frequency, windows, step)
+
+
+def _taken(found: Sequence[Explanation]) -> Explanation:
+    """The best by its criterion, or that of the plausible ones which another measurement tells."""
+    least = min(found, key=lambda one: one.criterion)
+    seen = [one for one in found if one.colour.view is not None and one.criterion < least.criterion + PLAUSIBLE]
+    return min(seen, key=lambda one: one.criterion, default=least)
+
+
+def _with_view(
+    rounding: Callable[[FloatArray], FloatArray], found: Solution, colour: Colour
+) -> Callable[[FloatArray], FloatArray]:
+    """Density of rounding, and of errors that a second view shows, where one does."""
+    if colour.view is None:
+        return rounding
+    view, level = colour.view, float(np.exp(found.colour))
+    return lambda frequency: rounding(frequency) + level * view.density(frequency)
+
+
+def _other_views(colour: Colour, view: SecondView) -> list[Colour]:
+    """The same, if no lane ever widened, and as far as 95 % of what pitch or errors of both markings alike make go."""
+    shift = NORMAL_95 * LEVEL_SD
+    others = [replaced(view, slowest=0.0), view.scaled(np.exp(-shift)), view.scaled(np.exp(shift))]
+    return [replaced(colour, view=other) for other in others]
 
 
 def _seen_through(wide: WideSteps, rate: float) -> Separation:
@@ -192,9 +228,11 @@ def _sensor(
     rest: float = 0.0,
     interval: tuple[float, float] = (0.0, 1.0),
 ) -> SensorModel:
-    levels = (np.exp(found.white), np.exp(found.colour), driver, rest)
-    white, coloured, corner, driver, rest, low, high = rounded((*levels[:2], colour.corner, *levels[2:], *interval))
-    return SensorModel(white, coloured, corner, colour.order, grain, driver, rest, (low, high))
+    level = float(np.exp(found.colour))
+    coloured, seen = (level, 0.0) if colour.view is None else (0.0, level)
+    numbers = (np.exp(found.white), coloured, colour.corner, driver, rest, *interval, seen)
+    white, coloured, corner, driver, rest, low, high, seen = rounded(numbers)
+    return SensorModel(white, coloured, corner, colour.order, grain, driver, rest, (low, high), second_view=seen)
 
 
 DIGITS = 7
@@ -220,13 +258,22 @@ def _rounding(data: Periodogram, grain: float, variance: float) -> Callable[[Flo
     return shape
 
 
+def _chance(found: Solution, colour: Colour, data: Periodogram) -> float:
+    """Standard error of what a second view says of a sensor's power: its errors are not the offset's own. [m2]
+
+    Both are one draw each of the same density, of which a bin of weight w shows its mean to a share of 1 / sqrt(w).
+    """
+    power = np.exp(found.colour) * colour.shape(data.frequency) * np.gradient(data.frequency)
+    return float(np.sqrt((2.0 * power**2 / data.weight).sum()))
+
+
 def _in_band(found: Solution, colour: Colour, data: Periodogram) -> float:
     """Sensor's power among what was seen. [m2]"""
     from scipy.integrate import trapezoid
 
     frequency = np.linspace(0.0, float(data.frequency[-1]), 400)
     total = np.full(len(frequency), np.exp(found.white))
-    if colour.order:
+    if colour.is_there:
         total += np.exp(found.colour) * colour.shape(frequency)
     return float(trapezoid(total, frequency))
 
@@ -253,6 +300,8 @@ def _interval(
             part = periodogram(frequency, windows[others])
             left_out.append(_in_band(solve(part, colour, base, known, best), colour, part))
     error = np.sqrt((len(blocks) - 1) * np.var(left_out)) if len(left_out) > 1 else seen
+    if colour.view is not None:
+        error = np.hypot(error, _chance(best, colour, data))
     span = share / max(seen, 1e-30)
     low = share - span * (float(levels.max()) + NORMAL_95 * float(error))
     high = share - span * (float(levels.min()) - NORMAL_95 * float(error))

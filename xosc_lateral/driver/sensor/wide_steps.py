@@ -15,8 +15,9 @@ from dataclasses import replace as replaced
 import numpy as np
 from numpy.typing import NDArray
 
+from xosc_lateral.driver.sensor.ascent import climb
 from xosc_lateral.driver.sensor.hidden_path import HiddenPath
-from xosc_lateral.driver.sensor.likelihood import Colour, climb, solve
+from xosc_lateral.driver.sensor.likelihood import Colour, solve
 from xosc_lateral.driver.sensor.model import WIDE
 from xosc_lateral.driver.sensor.periodogram import PASSED, Periodogram
 from xosc_lateral.driver.sensor.rounded_gaussian import RoundedGaussian, gaussian_behind
