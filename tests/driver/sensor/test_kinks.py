@@ -12,7 +12,7 @@ from xosc_lateral.driver.sensor.model import SensorModel
 from xosc_lateral.driver.sensor.separation import separate
 from xosc_lateral.drives.filters import scale_frequencies
 from xosc_lateral.drives.periodogram import periodograms
-from xosc_lateral.drives.resampling import STEP, passed, resample
+from xosc_lateral.drives.resampling import STEP, resample
 from xosc_lateral.errors import DriverProfileError
 
 RATE, EVERY, JUMP = 20.0, 1.0, 0.02
@@ -93,21 +93,46 @@ def test_sampled_kinks_have_their_density_with_zeros_once_a_period():
     between = (frequency > 0.65) & (frequency < 0.95) | (frequency > 1.05) & (frequency < 1.45)
     ratio = density[between] / kinks.density(frequency[between])
     np.testing.assert_allclose(np.log(ratio).mean(), 0.0, atol=0.1)
-    slow = (frequency > 0.1) & (frequency < 0.4)
-    assert density[slow].max() < 0.05 * WHITE / (2.0 * np.pi * 0.4) ** 4
+    slow = (frequency > 0.25) & (frequency < 0.4)
+    expected = WHITE / EVERY**2 / (2.0 * np.pi * frequency[slow]) ** 4
+    np.testing.assert_allclose(np.log(density[slow] / expected).mean(), 0.0, atol=0.1)
+    assert density[frequency < 0.05].max() < density[slow].max()
 
 
-def test_images_of_slow_movement_follow_from_it():
-    """All of a wave is the kinks': what they add is its image, smaller by the square of the frequencies' ratio."""
-    kinks = Kinks(EVERY, (0.0,) * 5, (1.0,) * 5, 0.0, 5.0)
+def test_a_path_gives_up_what_the_kinks_have_in_it():
+    """All of a wave of 0.3 Hz is theirs: it makes room. Slower than 0.1 Hz, and of another's, nothing is touched."""
+    theirs = Kinks(EVERY, (0.0,) * 5, (1.0,) * 5, 0.0, 5.0)
+    others = Kinks(EVERY, (0.0,) * 5, (0.0,) * 5, 0.0, 5.0)
     time = STEP * np.arange(3000)
-    path = np.cos(2.0 * np.pi * 0.3 * time)
-    added = kinks.sample(path, STEP, np.random.default_rng(0))[500:2500]
-    for image in (0.7, 1.3):
-        wave = np.exp(-2j * np.pi * image * time[500:2500])
-        amplitude = 2.0 * abs(np.mean(added * wave)) / passed(np.array([image]))[0]
-        assert amplitude == pytest.approx((0.3 / image) ** 2, rel=0.05)
-    assert abs(np.mean(added * np.exp(-2j * np.pi * 0.3 * time[500:2500]))) < 1e-3
+    slow, wave = np.cos(2.0 * np.pi * 0.05 * time), np.cos(2.0 * np.pi * 0.3 * time)
+    middle = slice(500, 2500)
+    rng = np.random.default_rng(0)
+    path = slow + wave
+    np.testing.assert_allclose((path + theirs.sample(path, STEP, rng))[middle], slow[middle], atol=0.02)
+    np.testing.assert_allclose((path + others.sample(path, STEP, rng))[middle], path[middle], atol=0.02)
+    assert np.abs(theirs.sample(path, STEP, rng)[[0, -1]]).max() < 1e-9  # and its ends stay where they are
+
+
+def test_power_below_half_a_kink_a_period_is_the_paths_and_as_loud_as_the_images():
+    """What is drawn stands for what was given up, and loud kinks are loud at all frequencies."""
+    rng = np.random.default_rng(3)
+    density = 2.0 * WHITE / EVERY**2 / (2.0 * np.pi * 0.3) ** 4
+    kinks = Kinks(EVERY, (WHITE,) * 5, (0.5,) * 5, 1.5, 10.0)
+    frequency = np.fft.rfftfreq(6000, STEP)
+    band = (frequency > 0.28) & (frequency < 0.32)
+    whole, near, far = [], [], []
+    for _ in range(16):
+        gain = np.where(band, np.sqrt(density / (2.0 * STEP)), 0.0)
+        path = scale_frequencies(rng.normal(size=6000), gain)
+        pieces = (path + kinks.sample(path, STEP, rng))[500:5500].reshape(-1, 100)
+        powers = np.abs(np.fft.rfft(pieces * np.hanning(100), axis=1)) ** 2
+        at = np.fft.rfftfreq(100, STEP)
+        near.append(np.log(powers[:, (at > 0.33) & (at < 0.45)].sum(axis=1)))
+        far.append(np.log(powers[:, (at > 1.05) & (at < 1.45)].sum(axis=1)))
+        one = np.abs(np.fft.rfft(path + kinks.sample(path, STEP, rng))) ** 2
+        whole.append(one[band].sum() / (np.abs(np.fft.rfft(path)) ** 2)[band].sum())
+    assert np.mean(whole) == pytest.approx(1.0, abs=0.1)
+    assert np.corrcoef(np.concatenate(near), np.concatenate(far))[0, 1] > 0.3
 
 
 def test_kinks_are_kept_in_files_and_checked():

@@ -5,8 +5,9 @@ meet. Between the kinks such an error is a straight line, and its second derivat
 `every` seconds. Therefore its power density at any frequency is that of the jumps over the fourth power of the
 frequency (derived here): with zeros at all multiples of 1 / `every`, and images of what is slow between them. No
 vehicle moves like that. Below half a kink a period, an error is as smooth as driving, and is left to the driver; above,
-all is the sensor's. What is above depends on what is below, so that part of the jumps is told by the path that was
-sampled, as much as the error has in the power there, and the rest is drawn.
+all is the sensor's. Where tracks are to be as they were recorded, both must be of the same kinks, which are louder at
+one place than at another: a sampled path then gives up as much of its power as the error has in it, and gets the error
+of the kinks drawn.
 """
 
 from __future__ import annotations
@@ -32,8 +33,9 @@ below, as far as the filter by which movement below 0.5 Hz is judged can see, is
 MARGIN = 30
 """Kinks drawn before the first row and after the last: slow errors must not come round to their own beginning. [-]"""
 
-TAPER = 10.0
-"""Of what a path is continued by at its ends. [s]"""
+SLOWEST = (0.1, 0.2)
+"""Up to the first the error is too small a part of the movement to ask for (less than a tenth in the recording that
+kinks were found in), from the second on it is drawn. [Hz]"""
 
 FINER = 4
 """Points per row of the grid that kinks are put on, between two of them in proportion. [-]"""
@@ -49,7 +51,7 @@ class Kinks(Record, frozen=True):
     densities : tuple of float
         One-sided power density of the jumps, at even frequencies from 0 to half a kink a period. [m2/s2/Hz]
     shares : tuple of float
-        What the kinks' error has in all that is seen at those frequencies, driver included. [-]
+        What the kinks' error has in the power of all that is seen at those frequencies, driver included. [-]
     level_variance, level_duration : float
         Variance of the logarithm of their squares' level [-], and how long a level lasts [s].
 
@@ -82,15 +84,21 @@ class Kinks(Record, frozen=True):
         """One-sided power density of what the kinks add in runs at 5 Hz. [m2/Hz] Shape as `frequency` [Hz]."""
         folded = np.abs((frequency + self.highest) % (2.0 * self.highest) - self.highest)
         jumps = np.interp(folded, self._frequencies, self.densities) / self.every**2
-        return np.asarray(jumps * self._gain(frequency) ** 2)
+        return np.asarray(jumps * _gain(frequency, self._crossing) ** 2)
 
     def sample(self, path: FloatArray, step: float, rng: np.random.Generator) -> FloatArray:
-        """What the kinks add to a sampled path, shape (n,), at this step. [m]"""
-        count = round(len(path) * step / self.every) + 2 * MARGIN + 2
+        """What to add to a sampled path so that it is one of pieces, shape (n,), at this step. [m]
+
+        The error of the kinks drawn, at all frequencies that it shows at, less what the path has of it already.
+        """
+        return np.asarray(self._error(len(path), step, rng) + _scaled(path, step, self._left) - path)
+
+    def _error(self, n: int, step: float, rng: np.random.Generator) -> FloatArray:
+        """Of kinks at even times, from `SLOWEST` on, shape (n,). [m]"""
+        count = round(n * step / self.every) + 2 * MARGIN + 2
         first = rng.random()
         times: FloatArray = self.every * (np.arange(count, dtype=np.float64) - MARGIN - first)
-        told = self.every * _bend(path, step, times, self._share)
-        jumps = told + self._drawn(count, rng) * self._level(count, rng)
+        jumps = self._drawn(count, rng) * self._level(count, rng)
         fine = step / FINER
         place = (times - times[0]) / fine
         before = place.astype(np.int64)
@@ -98,28 +106,27 @@ class Kinks(Record, frozen=True):
         np.add.at(impulses, before, jumps * (1.0 - place + before) / fine)
         np.add.at(impulses, before + 1, jumps * (place - before) / fine)
         frequency: FloatArray = np.asarray(np.fft.rfftfreq(len(impulses), fine), dtype=np.float64)
-        error = scale_frequencies(impulses, -self._gain(frequency))
-        return np.asarray(np.interp(np.arange(len(path)) * step, times[0] + fine * np.arange(len(error)), error))
+        error = scale_frequencies(impulses, -_gain(frequency, SLOWEST))
+        return np.asarray(np.interp(np.arange(n) * step, times[0] + fine * np.arange(len(error)), error))
 
     @property
     def _frequencies(self) -> FloatArray:
         return np.linspace(0.0, self.highest, len(self.densities))
 
-    def _share(self, frequency: FloatArray) -> FloatArray:
-        known = np.interp(frequency, self._frequencies, self.shares)
-        return np.asarray(np.where(frequency < self.highest, known, 0.0))
+    def _left(self, frequency: FloatArray) -> FloatArray:
+        """Factor on a path's amplitude, so that there is room for the kinks. Shape as `frequency` [Hz]. [-]"""
+        share = np.interp(frequency, self._frequencies, self.shares) * _rising(frequency, SLOWEST) ** 2
+        of_path = 1.0 - _rising(frequency, self._crossing) ** 2
+        return np.asarray(np.sqrt(1.0 - share * of_path) * passed(frequency))
 
-    def _gain(self, frequency: FloatArray) -> FloatArray:
-        """From impulses of acceleration to the sensor's part of the offset, in runs at 5 Hz. [s2]"""
-        low, high = (self.highest * share for share in CROSSING)
-        rise = np.sin(0.5 * np.pi * np.clip((frequency - low) / (high - low), 0.0, 1.0))
-        return np.asarray(rise * passed(frequency) / np.maximum(2.0 * np.pi * frequency, 2.0 * np.pi * low) ** 2)
+    @property
+    def _crossing(self) -> tuple[float, float]:
+        return CROSSING[0] * self.highest, CROSSING[1] * self.highest
 
     def _drawn(self, count: int, rng: np.random.Generator) -> FloatArray:
-        """The jumps' part that no path tells, shape (count,). [m/s]"""
-        left = np.array(self.densities) * (1.0 - np.array(self.shares))
+        """Jumps of one level, shape (count,). [m/s]"""
         frequency = np.fft.rfftfreq(count, self.every)
-        gain = np.sqrt(np.interp(frequency, self._frequencies, left) / (2.0 * self.every))
+        gain = np.sqrt(np.interp(frequency, self._frequencies, self.densities) / (2.0 * self.every))
         return scale_frequencies(rng.normal(size=count), gain)
 
     def _level(self, count: int, rng: np.random.Generator) -> FloatArray:
@@ -131,16 +138,24 @@ class Kinks(Record, frozen=True):
         return np.asarray(np.exp(0.5 * (level - 0.5 * self.level_variance)))
 
 
-def _bend(path: FloatArray, step: float, times: FloatArray, share: Callable[[FloatArray], FloatArray]) -> FloatArray:
-    """Second derivative of a part of the path at these times [s], 0 far outside of it. [m/s2]"""
-    about = path - path.mean()
-    reach = min(len(path) - 1, round(MARGIN / step))
-    if reach < 2:
-        return np.zeros(len(times))
-    longer = np.concatenate([2.0 * about[0] - about[reach:0:-1], about, 2.0 * about[-1] - about[-2 : -reach - 2 : -1]])
-    edge = np.sin(0.5 * np.pi * np.linspace(0.0, 1.0, min(reach, round(TAPER / step)))) ** 2
-    longer[: len(edge)] *= edge
-    longer[-len(edge) :] *= edge[::-1]
-    frequency: FloatArray = np.asarray(np.fft.rfftfreq(len(longer), step), dtype=np.float64)
-    bend = scale_frequencies(longer, -share(frequency) * (2.0 * np.pi * frequency) ** 2)
-    return np.asarray(np.interp(times, step * (np.arange(len(longer)) - reach), bend, left=0.0, right=0.0))
+def _gain(frequency: FloatArray, edge: tuple[float, float]) -> FloatArray:
+    """From impulses of acceleration to what they add to the offset above an edge [Hz], in runs at 5 Hz. [s2]"""
+    bend = np.maximum(2.0 * np.pi * frequency, 2.0 * np.pi * edge[0]) ** 2
+    return np.asarray(_rising(frequency, edge) * passed(frequency) / bend)
+
+
+def _rising(frequency: FloatArray, edge: tuple[float, float]) -> FloatArray:
+    """From 0 at an edge's lower end to 1 at its upper one [Hz], in amplitude; shape as `frequency`. [-]"""
+    low, high = edge
+    return np.asarray(np.sin(0.5 * np.pi * np.clip((frequency - low) / (high - low), 0.0, 1.0)))
+
+
+def _scaled(path: FloatArray, step: float, gain: Callable[[FloatArray], FloatArray]) -> FloatArray:
+    """With every frequency [Hz] scaled about the straight line between the ends, which stay where they are."""
+    if len(path) < 3:
+        return path
+    line = np.linspace(path[0], path[-1], len(path))
+    about = path - line
+    odd = np.concatenate([about, -about[-2:0:-1]])
+    frequency: FloatArray = np.asarray(np.fft.rfftfreq(len(odd), step), dtype=np.float64)
+    return np.asarray(line + scale_frequencies(odd, gain(frequency))[: len(path)])
