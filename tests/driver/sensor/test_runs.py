@@ -11,7 +11,8 @@ from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.driver.sensor.error import known_sensor, sensor_error
 from xosc_lateral.driver.sensor.model import SensorModel
 from xosc_lateral.driver.sensor.periodogram import WINDOWS
-from xosc_lateral.driver.sensor.runs import driver_runs, rows_of
+from xosc_lateral.driver.sensor.runs import driver_runs, durations_of, rows_of
+from xosc_lateral.drives.cuts import cut_runs
 from xosc_lateral.drives.drive import Drive
 from xosc_lateral.errors import DriverProfileError
 
@@ -32,6 +33,22 @@ def test_runs_shorter_than_a_spectrum_are_left_alone() -> None:
     assert kept == [run]
     assert sensor is None
     assert driver_runs([]) == ([], None)
+
+
+def test_a_sensors_share_is_over_time_not_over_rows() -> None:
+    """A tracker that gives three times as many rows on one side of the lane doesn't make the driver more of it."""
+    rng = np.random.default_rng(3)
+    slow = np.cumsum(rng.normal(size=400)) * 0.02
+    offset = np.interp(np.arange(0.0, 400.0, 0.05), np.arange(400.0), slow - slow.mean())
+    time = np.arange(len(offset)) / 20.0
+    seen = (np.arange(len(offset)) % 3 == 0) | (offset > 0.0)
+    noise = 0.03 * rng.normal(size=len(offset))
+    uneven = Drive("d", time[seen], (offset + noise)[seen], np.full(seen.sum(), 3.5))
+    (run,) = cut_runs(uneven)
+    assert np.concatenate(durations_of([run], [uneven])).sum() == pytest.approx(run.time[-1] - run.time[0], abs=0.3)
+    _, sensor = driver_runs([run], [uneven])
+    assert sensor is not None
+    assert np.sqrt(sensor.sensor_variance) == pytest.approx(0.03, rel=0.3)
 
 
 def test_rows_as_recorded_are_those_within_each_run() -> None:

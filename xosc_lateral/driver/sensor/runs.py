@@ -43,6 +43,7 @@ def driver_runs(
         [run.offset for run in runs],
         STEP,
         rows=rows,
+        durations=durations_of(runs, drives) if rows else None,
         rate=rate,
         sensor_noise=sensor_noise,
         half_widths=half_widths_of(runs, drives),
@@ -59,6 +60,12 @@ def rows_of(runs: Sequence[Run], drives: Sequence[Drive]) -> tuple[list[FloatArr
     cut = [(known[run.drive], _rows(known[run.drive], run)) for run in runs]
     steps = np.concatenate([np.diff(drive.time[rows]) for drive, rows in cut])
     return [drive.offset[rows] for drive, rows in cut], 1.0 / float(np.median(steps))
+
+
+def durations_of(runs: Sequence[Run], drives: Sequence[Drive]) -> list[FloatArray]:
+    """How long each row of the runs stands for, up to the middles between it and its neighbours. [s]"""
+    known = {drive.name: drive for drive in drives}
+    return [np.gradient(known[run.drive].time[_rows(known[run.drive], run)]) for run in runs]
 
 
 def half_widths_of(runs: Sequence[Run], drives: Sequence[Drive]) -> list[FloatArray] | None:

@@ -98,6 +98,7 @@ def separate(
     step: float,
     *,
     rows: Sequence[FloatArray] | None = None,
+    durations: Sequence[FloatArray] | None = None,
     rate: float | None = None,
     sensor_noise: float | None = None,
     half_widths: Sequence[FloatArray] | None = None,
@@ -113,6 +114,8 @@ def separate(
         [s]
     rows : sequence of array, optional
         The offsets of the same runs as recorded; variances are counted, and rounding is looked for, in these. [m]
+    durations : sequence of array, optional
+        How long each row stands for, where rows are not even in time. [s]
     rate : float, optional
         Rows per second; needed with `sensor_noise`. [Hz]
     sensor_noise : float, optional
@@ -129,7 +132,7 @@ def separate(
         If no run lasts 12.8 s.
     """
     measured = list(rows) if rows is not None else list(runs)
-    variance = float(np.concatenate(measured).var())
+    variance = _variance(measured, durations)
     frequency, windows = windows_of(runs, step)
     data = periodogram(frequency, windows)
     known = None if sensor_noise is None else Known(sensor_noise, rate or 1.0 / step)
@@ -174,6 +177,15 @@ def _taken(found: Sequence[Explanation]) -> Explanation:
     least = min(found, key=lambda one: one.criterion)
     seen = [one for one in found if one.colour.view is not None and one.criterion < least.criterion + PLAUSIBLE]
     return min(seen, key=lambda one: one.criterion, default=least)
+
+
+def _variance(rows: Sequence[FloatArray], durations: Sequence[FloatArray] | None) -> float:
+    """Over time, as runs at an even step have it. [m2]"""
+    values = np.concatenate(rows)
+    if durations is None:
+        return float(values.var())
+    weights = np.concatenate(durations)
+    return float(np.average((values - np.average(values, weights=weights)) ** 2, weights=weights))
 
 
 def _with_view(
