@@ -99,6 +99,18 @@ def test_the_state_goes_on_through_a_lane_change(profile: DriverProfile) -> None
     assert np.array_equal(np.concatenate([first, second]), OffsetSampler(profile, 3).sample(segment(200)))
 
 
+def test_what_is_skipped_was_driven(profile: DriverProfile) -> None:
+    """With hidden effects, too, which go by the time: nothing is lost but the rows between."""
+    rich = replace(profile, effects=(Drift(size=0.1), Cycle(amplitude=0.1, period_s=20.0)))
+    whole, sampler = OffsetSampler(rich, 3).sample(segment(400)), OffsetSampler(rich, 3)
+    sampler.skip(100.0)  # nobody drives on who has not begun
+    first = sampler.sample(segment(100))
+    sampler.skip(-5.0)
+    sampler.skip(30.0)
+    later = sampler.sample(segment(150, first=250))
+    assert np.array_equal(first, whole[:100]) and np.array_equal(later, whole[250:])
+
+
 def test_a_copy_goes_on_by_itself(profile: DriverProfile) -> None:
     sampler = OffsetSampler(profile, 3)
     sampler.sample(segment(50))

@@ -43,6 +43,23 @@ def realism(profile: DriverProfile, own: list[Run]) -> Realism:
     return score_realism(profile, own, seed=1, classify=False)
 
 
+def test_free_runs_of_one_drive_are_of_one_driver(profile: DriverProfile) -> None:
+    """Given in any order, they are pieces of one drive; with the starts of real ones each is of a new driver."""
+    (run,) = smooth_runs(1, 120.0, seed=6)
+    whole = [Run(drive, 0, run.time, run.offset, run.lane_width) for drive in ("first", "second")]
+    parts = [slice(300, 601), slice(0, 200)]
+    pieces = [
+        Run(one.drive, k, one.time[rows], one.offset[rows], one.lane_width[rows])
+        for one in whole
+        for k, rows in enumerate(parts)
+    ]
+    uncut = sample_runs(profile, whole, 5, same_start=False)
+    for k, path in enumerate(sample_runs(profile, pieces, 5, same_start=False)):
+        np.testing.assert_array_equal(path, uncut[k // 2][parts[k % 2]])
+    started = sample_runs(profile, pieces, 5)
+    assert [path[0] for path in started] == pytest.approx([piece.offset[0] for piece in pieces])
+
+
 def test_slow_movement_passes_and_fast_movement_does_not():
     time = STEP * np.arange(200)
     for frequency, gain in ((0.1, 1.0), (0.35, 1.0), (0.7, 0.0), (2.0, 0.0)):

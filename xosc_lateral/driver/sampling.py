@@ -76,6 +76,12 @@ class OffsetSampler:
             offset[rows] = self._process.take(terms.rows(rows), width[rows], start if first == 0 else None)
         return offset
 
+    def skip(self, seconds: float) -> None:
+        """Drive on for so long, unseen [s]; not before the start, and not backwards."""
+        rows = round(seconds / self.profile.model.step) if self._process.has_begun else 0
+        for first in range(0, rows, BLOCK):
+            self._process.take(EffectTerms(), np.ones(min(BLOCK, rows - first)))
+
     def copy(self) -> Self:
         """A sampler in the same state that goes on by itself."""
         return deepcopy(self)

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from xosc_lateral.driver.models.base import Start
 from xosc_lateral.driver.profile import DriverProfile
-from xosc_lateral.driver.sampling import sample_offsets
+from xosc_lateral.driver.sampling import OffsetSampler, sample_offsets
 from xosc_lateral.driver.seeds import child
 from xosc_lateral.driver.sensor.error import recorded, sensor_error
 from xosc_lateral.driver.snippets import segment_of
@@ -66,15 +66,27 @@ def sample_parts(profile: DriverProfile, snippets: Snippets, seed: int) -> tuple
 
 
 def sample_runs(profile: DriverProfile, runs: Sequence[Run], seed: int, *, same_start: bool = True) -> list[FloatArray]:
-    """For each run one of a new driver, of the same length and context, and the same start or any. [m]
+    """For each run one of the same length and context, shape (n_i,) each. [m]
 
-    Shape (n_i,) each.
+    With the same start each is of a new driver. Free runs of one drive are of one driver, who drives on between them,
+    unseen: drivers are then as constant as the profile has them.
     """
     root = np.random.SeedSequence(seed)
-    return [
-        sample_offsets(profile, segment_of(run), child(root, k), start=float(run.offset[0]) if same_start else None)
-        for k, run in enumerate(runs)
-    ]
+    if same_start:
+        return [
+            sample_offsets(profile, segment_of(run), child(root, k), start=float(run.offset[0]))
+            for k, run in enumerate(runs)
+        ]
+    paths, step = [np.empty(0)] * len(runs), profile.model.step
+    of_drive: dict[str, list[int]] = {}
+    for k in sorted(range(len(runs)), key=lambda k: float(runs[k].time[0])):
+        of_drive.setdefault(runs[k].drive, []).append(k)
+    for number, drive in enumerate(dict.fromkeys(run.drive for run in runs)):
+        driver, end = OffsetSampler(profile, child(root, number)), 0.0
+        for k in of_drive[drive]:
+            driver.skip(float(runs[k].time[0]) - end)
+            paths[k], end = driver.sample(segment_of(runs[k])), float(runs[k].time[-1]) + step
+    return paths
 
 
 def sensor_noise(profile: DriverProfile, paths: Sequence[FloatArray], seed: int) -> list[FloatArray]:
