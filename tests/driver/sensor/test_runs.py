@@ -45,7 +45,9 @@ def test_a_sensors_share_is_over_time_not_over_rows() -> None:
     noise = 0.03 * rng.normal(size=len(offset))
     uneven = Drive("d", time[seen], (offset + noise)[seen], np.full(seen.sum(), 3.5))
     (run,) = cut_runs(uneven)
-    assert np.concatenate(durations_of([run], [uneven])).sum() == pytest.approx(run.time[-1] - run.time[0], abs=0.3)
+    durations = durations_of([run], [uneven])
+    assert durations is not None
+    assert np.concatenate(durations).sum() == pytest.approx(run.time[-1] - run.time[0], abs=0.3)
     _, sensor = driver_runs([run], [uneven])
     assert sensor is not None
     assert np.sqrt(sensor.sensor_variance) == pytest.approx(0.03, rel=0.3)

@@ -43,7 +43,7 @@ def driver_runs(
         [run.offset for run in runs],
         STEP,
         rows=rows,
-        durations=durations_of(runs, drives) if rows else None,
+        durations=durations_of(runs, drives),
         rate=rate,
         sensor_noise=sensor_noise,
         half_widths=half_widths_of(runs, drives),
@@ -54,34 +54,34 @@ def driver_runs(
 
 def rows_of(runs: Sequence[Run], drives: Sequence[Drive]) -> tuple[list[FloatArray] | None, float | None]:
     """Offsets of the runs as recorded [m], and rows per second [Hz]; None where not all drives are there."""
-    known = {drive.name: drive for drive in drives}
-    if not all(run.drive in known for run in runs):
+    cut = _recorded(runs, drives)
+    if cut is None:
         return None, None
-    cut = [(known[run.drive], _rows(known[run.drive], run)) for run in runs]
     steps = np.concatenate([np.diff(drive.time[rows]) for drive, rows in cut])
     return [drive.offset[rows] for drive, rows in cut], 1.0 / float(np.median(steps))
 
 
-def durations_of(runs: Sequence[Run], drives: Sequence[Drive]) -> list[FloatArray]:
-    """How long each row of the runs stands for, up to the middles between it and its neighbours. [s]"""
-    known = {drive.name: drive for drive in drives}
-    return [np.gradient(known[run.drive].time[_rows(known[run.drive], run)]) for run in runs]
+def durations_of(runs: Sequence[Run], drives: Sequence[Drive]) -> list[FloatArray] | None:
+    """How long each row of the runs stands for, up to the middles between it and its neighbours [s]; None as above."""
+    cut = _recorded(runs, drives)
+    return None if cut is None else [np.gradient(drive.time[rows]) for drive, rows in cut]
 
 
 def half_widths_of(runs: Sequence[Run], drives: Sequence[Drive]) -> list[FloatArray] | None:
     """Half the lane width in each run [m]; None where not all drives are there, or a camera measured not all."""
-    seen = {drive.name: (drive, drive.half_width) for drive in drives if drive.half_width is not None}
-    if not all(run.drive in seen for run in runs):
+    cut = _recorded(runs, [drive for drive in drives if drive.half_width is not None])
+    if cut is None:
         return None
-    found = []
-    for run in runs:
-        drive, half_width = seen[run.drive]
-        rows = _rows(drive, run)
-        found.append(resample(drive.time[rows], half_width[rows], run.time))
-    return found
+    return [
+        resample(drive.time[rows], np.asarray(drive.half_width)[rows], run.time)
+        for run, (drive, rows) in zip(runs, cut, strict=True)
+    ]
 
 
-def _rows(drive: Drive, run: Run) -> slice:
-    """Of a drive, that lie in one of its runs."""
-    first, last = np.searchsorted(drive.time, (run.time[0] - 1e-6, run.time[-1] + 1e-6))
-    return slice(int(first), int(last))
+def _recorded(runs: Sequence[Run], drives: Sequence[Drive]) -> list[tuple[Drive, slice]] | None:
+    """The drive that each run was cut from, and its rows there; None where not all drives are there."""
+    known = {drive.name: drive for drive in drives}
+    if not all(run.drive in known for run in runs):
+        return None
+    ends = [np.searchsorted(known[run.drive].time, (run.time[0] - 1e-6, run.time[-1] + 1e-6)) for run in runs]
+    return [(known[run.drive], slice(*map(int, two))) for run, two in zip(runs, ends, strict=True)]
