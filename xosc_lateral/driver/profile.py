@@ -88,8 +88,7 @@ class DriverProfile(Record, frozen=True):
         """Plain JSON values, as the profile file holds them."""
         values = plain(self)
         values["effects"] = [effect.to_dict() for effect in self.effects]
-        if self.sensor is not None and not self.sensor.second_view:
-            del values["sensor"]["second_view"]  # as files had it before there were second views
+        values["sensor"] = None if self.sensor is None else self.sensor.to_dict()
         hand = ("left_hand",) if self.left_hand else ()
         order = ("id", "metadata", "lane_width", *hand, "model", "effects", "sensor", "provenance")
         return {"format": FORMAT, "version": VERSION, **{name: values[name] for name in order}}

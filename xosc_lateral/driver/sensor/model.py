@@ -10,12 +10,13 @@ from __future__ import annotations
 
 from itertools import pairwise
 from math import inf, isfinite
+from typing import Any
 
 import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.driver.records import Record
+from xosc_lateral.driver.records import Record, plain
 from xosc_lateral.driver.sensor.kinks import CROSSING, Kinks
 from xosc_lateral.driver.sensor.likelihood import Colour
 from xosc_lateral.driver.sensor.texture import amplitude_factor
@@ -104,6 +105,13 @@ class SensorModel(Record, frozen=True):
         """Of the driver in the measured variance. [-]"""
         total = self.driver_variance + self.sensor_variance
         return self.driver_variance / total if total > 0 else 1.0
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain JSON values, as a profile's file holds them."""
+        values: dict[str, Any] = plain(self)
+        if not self.second_view:
+            del values["second_view"]  # as files had it before there were second views
+        return values
 
     def in_words(self) -> str:
         """How the measured variance is split, in a sentence."""
