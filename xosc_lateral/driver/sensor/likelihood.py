@@ -100,6 +100,10 @@ class Solution:
     colour: float
     loss: float
 
+    def coloured(self, colour: Colour, frequency: FloatArray) -> FloatArray:
+        """Density of the coloured part, which there is. [m2/Hz] Shape as `frequency` [Hz]."""
+        return np.asarray(np.exp(self.colour) * colour.shape(frequency))
+
 
 class _Problem:
     """Loss, gradient and Fisher information at a point (knots, white, colour)."""

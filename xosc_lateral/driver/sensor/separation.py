@@ -194,8 +194,7 @@ def _with_view(
     """Density of rounding, and of errors that a second view shows, where one does."""
     if colour.view is None:
         return rounding
-    view, level = colour.view, float(np.exp(found.colour))
-    return lambda frequency: rounding(frequency) + level * view.density(frequency)
+    return lambda frequency: rounding(frequency) + found.coloured(colour, frequency)
 
 
 def _other_views(colour: Colour, view: SecondView) -> list[Colour]:
@@ -275,7 +274,7 @@ def _chance(found: Solution, colour: Colour, data: Periodogram) -> float:
 
     Both are one draw each of the same density, of which a bin of weight w shows its mean to a share of 1 / sqrt(w).
     """
-    power = np.exp(found.colour) * colour.shape(data.frequency) * np.gradient(data.frequency)
+    power = found.coloured(colour, data.frequency) * np.gradient(data.frequency)
     return float(np.sqrt((2.0 * power**2 / data.weight).sum()))
 
 
@@ -286,7 +285,7 @@ def _in_band(found: Solution, colour: Colour, data: Periodogram) -> float:
     frequency = np.linspace(0.0, float(data.frequency[-1]), 400)
     total = np.full(len(frequency), np.exp(found.white))
     if colour.is_there:
-        total += np.exp(found.colour) * colour.shape(frequency)
+        total += found.coloured(colour, frequency)
     return float(trapezoid(total, frequency))
 
 
