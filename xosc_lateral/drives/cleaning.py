@@ -95,10 +95,9 @@ def _seen_through(drive: Drive) -> Drive:
     seen = both_markings(drive.time, drive.offset, drive.lane_width)
     if seen is None:
         return drive
-    drive = replace(drive, half_width=0.5 * drive.lane_width)
-    mended = seen.mended()
+    mended, half_width = seen.mended(), 0.5 * drive.lane_width
     if mended is None:
-        return drive
+        return replace(drive, half_width=half_width)
     kept = mended.kept
     context = {key: values[kept] for key, values in drive.context.items()} | {"lane_width": mended.lane_width[kept]}
     return replace(
@@ -108,7 +107,7 @@ def _seen_through(drive: Drive) -> Drive:
         lane_width=mended.lane_width[kept],
         context=context,
         mended=mended.shares,
-        half_width=0.5 * drive.lane_width[kept],
+        half_width=half_width[kept],
     )
 
 

@@ -90,9 +90,9 @@ def second_view(half_widths: Sequence[FloatArray], step: float) -> SecondView | 
     step : float
         [s]
     """
-    data = periodogram(*windows_of(half_widths, step))
     if np.ptp(np.concatenate(half_widths)) == 0.0:
         return None
+    data = periodogram(*windows_of(half_widths, step))
     frequencies = KNOTS[data.frequency[0] <= KNOTS]
     return SecondView(tuple(frequencies.tolist()), tuple(_fitted(data, frequencies).tolist()))
 
