@@ -146,7 +146,7 @@ def initial_terms(base: DriverProfile, timeline: Timeline) -> tuple[Term, ...]:
                 reference=(),
                 between_drivers=(),
                 response_range=(),
-                response_s=effect.response_s * effect.response_order,
+                response_s=effect.response_time,
                 response_order=1,
             )
             if effect.acts is Acts.LOCATION:

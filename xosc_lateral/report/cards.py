@@ -205,7 +205,7 @@ def effect_line(effect: Effect) -> str:
     """An effect in a line: what it changes, by which columns, of what shape; a hidden one by its parameters."""
     if isinstance(effect, ColumnEffect):
         lag = f", {abs(effect.lag_s):g} s {'ahead' if effect.lag_s < 0 else 'behind'}" if effect.lag_s else ""
-        response = f", response time {effect.response_s * effect.response_order:g} s" if effect.response_s else ""
+        response = f", response time {effect.response_time:g} s" if effect.response_time else ""
         return f"{CHANGED[effect.acts]} by {' and '.join(effect.columns)} ({effect.shape}{lag}{response})"
     plain = {name: value for name, value in effect.to_dict().items() if not isinstance(value, list | dict)}
     kind = str(plain.pop("kind")).replace("-", " ")

@@ -163,6 +163,11 @@ class ColumnEffect(Effect, frozen=True, kw_only=True):
         stand_in = self.reference if self.reference else tuple(_finite_mean(column) for column in values.T)
         return np.where(missing, np.asarray(stand_in), values)
 
+    @property
+    def response_time(self) -> float:
+        """Of all first-order lags together, as late as one of this time. [s]"""
+        return self.response_s * self.response_order
+
     def response(self, step: float, context: Mapping[str, FloatArray]) -> FloatArray:
         """Driving quantity as the driver responds to it, shape (n, k), on a grid of the given step [s]."""
         return respond(self.known(context), step, self.lag_s, self.response_s, order=self.response_order)
