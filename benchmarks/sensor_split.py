@@ -127,21 +127,22 @@ def split_drive(drive: Drive, *, second_view: bool) -> Iterator[tuple[tuple[str,
     rows = [(drive.time >= run.time[0] - 1e-9) & (drive.time <= run.time[-1] + 1e-9) for run in runs]
     truth = np.concatenate([run.offset for run in runs])
     calm = np.concatenate([np.diff(run.offset, 2) for run in runs]).std()
+
+    def in_runs(values: np.ndarray) -> list[np.ndarray]:
+        return [resample(drive.time[m], values[m], run.time) for m, run in zip(rows, runs, strict=True)]
+
     for ratio in RATIOS:
         rng = np.random.default_rng([int(10 * ratio), *map(ord, drive.name)])
         spread = truth.std() / np.sqrt(ratio)
         for kind, error in errors(drive, spread, rng):
             noisy = drive.offset + error
-            even, alone = (
-                [resample(drive.time[m], values[m], run.time) for m, run in zip(rows, runs, strict=True)]
-                for values in (noisy, error)
-            )
+            even, alone = in_runs(noisy), in_runs(error)
             half_widths = None
             if second_view:
                 if kind == QUANTISED:
                     continue
                 wavers = 0.5 * drive.lane_width + dict(errors(drive, spread, rng))[kind]
-                half_widths = [resample(drive.time[m], wavers[m], run.time) for m, run in zip(rows, runs, strict=True)]
+                half_widths = in_runs(wavers)
             split = separate(even, STEP, rows=[noisy[mine] for mine in rows], half_widths=half_widths)
             parts = [split.driver_part(one, STEP) for one in even]
             true = truth.var() / (truth.var() + np.concatenate([error[m] for m in rows]).var())
