@@ -115,6 +115,6 @@ def test_what_an_import_has_cut_is_not_cut_again() -> None:
         run=np.where(time[kept] < 28, 0, 1),
     )
     first, second = cut_runs(drive)
-    assert (first.time[-1], second.time[0]) == pytest.approx((24.8, 31.05))
+    assert (first.time[-1], second.time[0]) == pytest.approx((24.8, 31.2))
     again = cut_runs(Drive("d", drive.time, drive.offset, drive.lane_width, drive.context))
     assert again[0].time[-1] < 21.1, "without the mark the change is looked for"

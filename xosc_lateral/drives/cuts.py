@@ -30,6 +30,9 @@ HALF_WIDTH = 0.9
 MAX_GAP = 0.5
 """Missing rows up to this long are bridged; longer ones end a run. [s]"""
 
+ON_GRID = 1e-6
+"""Steps by which a row may miss an instant of the grid and still be at it: times are sums of steps. [-]"""
+
 MIN_RUN = 10.0
 """Shorter runs are left out: they hold no whole snippet. [s]"""
 
@@ -65,8 +68,9 @@ PAPER_RULES = CutRules()
 def cut_runs(drive: Drive, rules: CutRules = PAPER_RULES) -> list[Run]:
     """Road-following runs of one drive at an even step; empty when nothing is left."""
     keep = ~(lane_change_rows(drive, rules) | slow_rows(drive, rules))
-    parts = [rows for rows in _uninterrupted(drive, keep, rules.max_gap) if _lasts(drive, rows, rules)]
-    return [_run(drive, index, rows, rules.step) for index, rows in enumerate(parts)]
+    parts = [(rows, grid_of(drive, rows, rules.step)) for rows in _uninterrupted(drive, keep, rules.max_gap)]
+    lasting = [(rows, grid) for rows, grid in parts if len(grid) * rules.step >= rules.min_run - 0.5 * rules.step]
+    return [_run(drive, index, rows, grid) for index, (rows, grid) in enumerate(lasting)]
 
 
 def all_runs(drives: Sequence[Drive], rules: CutRules = PAPER_RULES) -> list[Run]:
@@ -85,7 +89,17 @@ def all_runs(drives: Sequence[Drive], rules: CutRules = PAPER_RULES) -> list[Run
 
 def whole_run(drive: Drive, step: float = STEP) -> Run:
     """The drive from its first row to its last at an even step, nothing cut out, gaps bridged: for its context. [s]"""
-    return _run(drive, 0, slice(0, len(drive)), step)
+    rows = slice(0, len(drive))
+    return _run(drive, 0, rows, grid_of(drive, rows, step))
+
+
+def grid_of(drive: Drive, rows: slice, step: float) -> FloatArray:
+    """Instants of the drive's grid, from its first row on every `step` [s], within some of its rows. [s]
+
+    All that is cut from a drive lies on one grid, so that it can be laid beside anything else of that drive.
+    """
+    first, last = (drive.time[[rows.start, rows.stop - 1]] - drive.time[0]) / step
+    return np.asarray(drive.time[0] + step * np.arange(np.ceil(first - ON_GRID), np.floor(last + ON_GRID) + 1.0))
 
 
 def lane_change_rows(drive: Drive, rules: CutRules = PAPER_RULES) -> BoolArray:
@@ -135,9 +149,8 @@ def slow_rows(drive: Drive, rules: CutRules = PAPER_RULES) -> BoolArray:
     return np.asarray(drive.speed < rules.min_speed)
 
 
-def _run(drive: Drive, index: int, rows: slice, step: float) -> Run:
+def _run(drive: Drive, index: int, rows: slice, grid: FloatArray) -> Run:
     time = drive.time[rows]
-    grid = time[0] + step * np.arange(int((time[-1] - time[0]) / step + 1e-6) + 1)
     context = {
         name: column_on_grid(time, values[rows], grid, held=name in drive.levels)
         for name, values in drive.context.items()
@@ -159,11 +172,6 @@ def _uninterrupted(drive: Drive, keep: BoolArray, max_gap: float) -> list[slice]
     firsts = np.concatenate([[0], ends + 1])
     lasts = np.concatenate([ends, [len(rows) - 1]])
     return [slice(int(rows[first]), int(rows[last]) + 1) for first, last in zip(firsts, lasts, strict=True)]
-
-
-def _lasts(drive: Drive, rows: slice, rules: CutRules) -> bool:
-    time = drive.time[rows]
-    return bool(time[-1] - time[0] >= rules.min_run - 0.5 * rules.step and len(time) > 1)
 
 
 def _why_nothing(drives: Sequence[Drive], rules: CutRules) -> str:

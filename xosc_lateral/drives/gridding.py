@@ -9,15 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.drives.circular import circular_period
-from xosc_lateral.drives.cuts import CutRules, cut_runs
+from xosc_lateral.drives.cuts import CutRules, cut_runs, grid_of
 from xosc_lateral.drives.drive import Drive, Run
-from xosc_lateral.drives.resampling import STEP, column_on_grid, in_digits, resample
+from xosc_lateral.drives.resampling import STEP, column_on_grid, in_digits
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
-
-ROUNDING_S = 1e-9
-"""Rows this far outside a run are in it: times are sums of steps. [s]"""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -97,7 +94,7 @@ def circular_columns(drives: Sequence[Drive]) -> dict[str, float]:
 
 
 def _gridded(drive: Drive, runs: Sequence[Run], circular: frozenset[str]) -> GriddedDrive:
-    grid = drive.time[0] + STEP * np.arange(int((drive.time[-1] - drive.time[0]) / STEP) + 1)
+    grid = grid_of(drive, slice(0, len(drive)), STEP)
     offset, valid = _offsets(drive, runs, grid)
     held = drive.levels | circular
     context = {name: _column(drive.time, values, grid, held=name in held) for name, values in drive.context.items()}
@@ -111,13 +108,12 @@ def _column(time: FloatArray, values: FloatArray, grid: FloatArray, *, held: boo
 
 
 def _offsets(drive: Drive, runs: Sequence[Run], grid: FloatArray) -> tuple[FloatArray, BoolArray]:
-    """Offsets within the runs, each resampled from its own rows alone, 0 elsewhere; and where that is."""
+    """Offsets within the runs, 0 elsewhere; and where that is."""
     offset, valid = np.zeros(len(grid)), np.zeros(len(grid), dtype=np.bool_)
     for run in runs:
-        first, last = np.searchsorted(grid, [run.time[0] - ROUNDING_S, run.time[-1] + ROUNDING_S])
-        rows = slice(*np.searchsorted(drive.time, [run.time[0] - ROUNDING_S, run.time[-1] + STEP]))
-        offset[first:last] = resample(drive.time[rows], drive.offset[rows], grid[first:last])
-        valid[first:last] = True
+        first = round((run.time[0] - grid[0]) / STEP)
+        rows = slice(first, first + len(run))
+        offset[rows], valid[rows] = run.offset, True
     return offset, valid
 
 
