@@ -65,7 +65,7 @@ def test_what_only_context_tells_is_told_with_context_alone():
     real = _walks(6) + 30.0 * side[:, None]
     other = _walks(7) - 30.0 * side[:, None]  # as often on either side, but on the wrong one
     assert classifier_two_sample_test(real, other, GROUPS, GROUPS).auc < 0.65
-    assert classifier_two_sample_test(real, other, GROUPS, GROUPS, context=(side[:, None], side[:, None])).auc > 0.8
+    assert classifier_two_sample_test(real, other, GROUPS, GROUPS, context=(side[:, None], side[:, None])).auc > 0.7
 
 
 def test_context_is_the_same_for_both_and_how_a_path_moves_with_it_is_not():

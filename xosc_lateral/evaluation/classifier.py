@@ -27,6 +27,8 @@ AUTOCORRELATION_LAGS = (1, 2, 3, 5, 8, 12)  # steps; of the first difference's a
 FOLDS = 5
 BANDS = 16
 """Of the log spectrum, from one period a snippet to the highest frequency, evenly on a logarithmic scale."""
+EVEN_BANDS = 25
+"""Of the log spectrum once more, evenly: what is smoothed piece by piece has its lines and holes at fast movement."""
 VALUES = 20
 """Values of a snippet, and differences over as much, that are shown: more slow a tree down and tell it nothing. [-]"""
 MOST = 1500
@@ -53,7 +55,7 @@ class TwoSampleResult:
 
 
 def snippet_features(snippets: FloatArray) -> FloatArray:
-    """Everything that gives a model away: values, differences, log spectrum, ten metrics, roughness, memory, shape.
+    """Everything that gives a model away: values, differences, log spectrum, metrics, roughness, memory, shape.
 
     Parameters
     ----------
@@ -73,20 +75,41 @@ def snippet_features(snippets: FloatArray) -> FloatArray:
         for lag in AUTOCORRELATION_LAGS
         if lag < difference.shape[1]
     ]
-    acceleration = np.abs(np.diff(difference, axis=1))
-    roughness = np.log(np.column_stack([acceleration.std(axis=1), acceleration.max(axis=1)]) + 1e-9)
     differences = DIFFERENCE_SCALE * np.diff(thin, axis=1)
     metrics = snippet_metrics(snippets)
     return np.column_stack(
-        [thin, differences, _log_power(snippets), metrics, roughness, *autocorrelation, shape_features(snippets)]
+        [
+            thin,
+            differences,
+            _log_power(snippets),
+            metrics,
+            _roughness(np.diff(difference, axis=1)),
+            _roughness(np.diff(difference, 2, axis=1)),
+            *autocorrelation,
+            shape_features(snippets),
+        ]
     )
+
+
+def _roughness(derivative: FloatArray) -> FloatArray:
+    """Size, largest, tails and turns of second or third differences, shape (n, 4). [log m], [log m], [-], [-]"""
+    mean_square = (derivative**2).mean(axis=1)
+    tails = (derivative**4).mean(axis=1) / np.maximum(mean_square**2, 1e-36)
+    turns = (derivative[:, 1:] * derivative[:, :-1] < 0.0).mean(axis=1)
+    size, largest = np.sqrt(mean_square), np.abs(derivative).max(axis=1)
+    return np.column_stack([np.log(size + 1e-9), np.log(largest + 1e-9), tails, turns])
 
 
 def _log_power(snippets: FloatArray) -> FloatArray:
     """Log power in bands, straight line from end to end removed, Hann window, shape (n, bands)."""
     power = tapered_powers(without_line(snippets), np.hanning(snippets.shape[1]))
-    edges = np.unique(np.geomspace(1, power.shape[1], BANDS + 1).astype(np.int64))
-    return np.column_stack([np.log(power[:, a:b].mean(axis=1) + 1e-12) for a, b in pairwise(edges.tolist())])
+    bins = power.shape[1]
+    bands = {
+        band
+        for edges in (np.geomspace(1, bins, BANDS + 1), np.linspace(1, bins, min(EVEN_BANDS, bins - 1) + 1))
+        for band in pairwise(np.unique(edges.astype(np.int64)).tolist())
+    }
+    return np.column_stack([np.log(power[:, a:b].mean(axis=1) + 1e-12) for a, b in sorted(bands)])
 
 
 def context_features(snippets: Snippets, paths: FloatArray) -> FloatArray:
