@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from xosc_lateral.driver.records import plain, read_as
-from xosc_lateral.driver.sensor.kinks import Kinks
+from xosc_lateral.driver.sensor.kinks import Kinks, shape_points
 from xosc_lateral.driver.sensor.kinks_fit import find_kinks, jumps_of
 from xosc_lateral.driver.sensor.model import SensorModel
 from xosc_lateral.driver.sensor.separation import separate
@@ -20,14 +20,18 @@ WHITE = 2.0 * EVERY * JUMP**2
 """One-sided density of jumps that know nothing of each other. [m2/s2/Hz]"""
 
 
-def track(rng: np.random.Generator, jump: float, seconds: float = 60.0) -> np.ndarray:
-    """Slow movement in millimetres, whose slope jumps once a second."""
+def track(
+    rng: np.random.Generator, jump: float, seconds: float = 60.0, *, moved: float = 2.0, with_movement: float = 0.0
+) -> np.ndarray:
+    """Slow movement in millimetres, whose slope jumps once a second, by more where it bends more."""
     n, size = round(seconds * RATE), round(EVERY * RATE)
     frequency = np.fft.rfftfreq(n, 1.0 / RATE)
-    slow = scale_frequencies(rng.normal(size=n), np.where((frequency > 0.0) & (frequency < 0.15), 2.0, 0.0))
+    slow = scale_frequencies(rng.normal(size=n), np.where((frequency > 0.0) & (frequency < 0.15), moved, 0.0))
     places = np.arange(int(rng.integers(size)) + 1, n - 1, size)
     steps = np.zeros(n)
-    steps[places] = jump * rng.normal(size=len(places))
+    bend = np.gradient(np.gradient(slow, 1.0 / RATE), 1.0 / RATE)
+    size_there = np.sqrt(1.0 - with_movement + with_movement * (bend / bend.std()) ** 2)
+    steps[places] = jump * size_there[places] * rng.normal(size=len(places))
     bent = np.cumsum(np.cumsum(steps)) / RATE
     bent -= np.polyval(np.polyfit(np.arange(n), bent, 6), np.arange(n))  # it would wander off
     return np.round(slow + bent, 3)
@@ -68,6 +72,26 @@ def test_kinks_are_found_with_their_period_size_and_the_rows_rounding(tracks):
     assert kinks.level_variance < 0.3  # of 0, with an error of about 0.1
 
 
+def test_what_makes_kinks_louder_is_found():
+    """As loud in all tracks and wherever they bend; louder in some tracks; louder where they bend."""
+    rng = np.random.default_rng(8)
+    sizes = np.exp(0.5 * np.sqrt(0.6) * rng.normal(size=80))
+    made = {
+        "even": [track(rng, JUMP) for _ in range(80)],
+        "by track": [track(rng, JUMP * size) for size in sizes],
+        "by movement": [track(rng, JUMP, moved=10.0, with_movement=0.5) for _ in range(80)],
+    }
+    found = {}
+    for name, rows in made.items():
+        frequency, density, _ = seen(rows)
+        found[name], _ = find_kinks(rows, RATE, frequency, density)
+    assert found["even"].track_variance < 0.15
+    assert found["by track"].track_variance == pytest.approx(np.var(2.0 * np.log(sizes)), abs=0.2)
+    assert found["by movement"].track_variance < 0.15
+    assert max(found[name].with_movement for name in ("even", "by track")) < 0.12
+    assert found["by movement"].with_movement == pytest.approx(0.5, abs=0.15)
+
+
 def test_smooth_tracks_have_none():
     rng = np.random.default_rng(6)
     smooth = [track(rng, 0.0) for _ in range(40)]
@@ -79,7 +103,7 @@ def test_what_kinks_add_is_the_sensors_above_half_a_kink_a_period_and_no_drivers
     frequency, density, runs = seen(tracks)
     split = separate(runs, STEP, rows=tracks, rate=RATE)
     images = (frequency > 0.6) & (frequency < 0.9)
-    assert split.driver_share_of(frequency)[images].mean() < 0.15
+    assert split.driver_share_of(frequency)[images].mean() < 0.2
     known = split.sensor.kinks.density(frequency)
     np.testing.assert_allclose(known[images].mean(), density[images].mean(), rtol=0.1)
 
@@ -97,6 +121,34 @@ def test_sampled_kinks_have_their_density_with_zeros_once_a_period():
     expected = WHITE / EVERY**2 / (2.0 * np.pi * frequency[slow]) ** 4
     np.testing.assert_allclose(np.log(density[slow] / expected).mean(), 0.0, atol=0.1)
     assert density[frequency < 0.05].max() < density[slow].max()
+
+
+def test_the_shape_is_a_factor_on_what_is_sampled_above_half_a_kink_a_period():
+    points = shape_points(0.5 / EVERY, 21)
+    shape = tuple(np.where(points > 1.0, 0.25, 1.0).tolist())
+    kinks = Kinks(EVERY, (WHITE,) * 5, (0.0,) * 5, 0.0, 5.0, shape=shape)
+    made = kinks.sample(np.zeros(30_000), STEP, np.random.default_rng(4))
+    frequency, density = np.fft.rfftfreq(200, STEP), 2.0 * STEP * periodograms(made, 200).mean(axis=0)
+    for band in ((0.65, 0.95), (1.15, 1.45)):
+        inside = (frequency > band[0]) & (frequency < band[1])
+        assert np.log(density[inside] / kinks.density(frequency[inside])).mean() == pytest.approx(0.0, abs=0.1)
+    bare = Kinks(EVERY, (WHITE,) * 5, (0.0,) * 5, 0.0, 5.0).density(frequency)
+    np.testing.assert_allclose(kinks.density(frequency)[inside], 0.25 * bare[inside])
+
+
+@pytest.mark.parametrize(("share", "least", "most"), [(0.0, 0.7, 1.4), (0.6, 2.0, 20.0)])
+def test_kinks_are_louder_where_the_sampled_path_bends(share: float, least: float, most: float):
+    """Ten seconds straight, ten seconds of a wave, and so on: power above half a kink a period of the one and other."""
+    kinks = Kinks(EVERY, (WHITE,) * 5, (0.0,) * 5, 0.0, 5.0, with_movement=share, acceleration=0.05)
+    time = STEP * np.arange(20_000)
+    wave = np.sin(0.5 * np.pi * time) * np.clip(4.0 * np.sin(0.1 * np.pi * time), 0.0, 1.0)
+    path = 0.1 / np.std(np.diff(wave, 2) / STEP**2) * wave
+    tracked = path + kinks.sample(path, STEP, np.random.default_rng(7))
+    frequency = np.fft.rfftfreq(len(tracked), STEP)
+    fast = scale_frequencies(tracked, np.where((frequency > 0.65) & (frequency < 1.45), 1.0, 0.0))
+    bends = np.sin(0.1 * np.pi * time) > 0.3
+    straight = np.sin(0.1 * np.pi * time) < -0.3
+    assert least < (fast[bends] ** 2).mean() / (fast[straight] ** 2).mean() < most
 
 
 def test_a_path_gives_up_what_the_kinks_have_in_it():
@@ -136,9 +188,12 @@ def test_power_below_half_a_kink_a_period_is_the_paths_and_as_loud_as_the_images
 
 
 def test_kinks_are_kept_in_files_and_checked():
-    kinks = Kinks(EVERY, (1e-3, 2e-3), (0.1, 0.2), 0.5, 5.0)
+    kinks = Kinks(EVERY, (1e-3, 2e-3), (0.1, 0.2), 0.5, 5.0, 0.2, 0.3, 0.04, (1.0, 0.9))
     sensor = SensorModel(white=1e-8, kinks=kinks)
     assert read_as(SensorModel, plain(sensor)) == sensor
     for wrong in ((0.0, (1.0, 1.0), (0.1, 0.1)), (1.0, (1.0,), (0.1,)), (1.0, (1.0, 1.0), (0.1, 2.0))):
         with pytest.raises(DriverProfileError, match="kinks"):
             Kinks(*wrong, 0.5, 5.0)
+    for other in ({"track_variance": -0.1}, {"with_movement": 1.1}, {"acceleration": 0.0}, {"shape": (np.nan,)}):
+        with pytest.raises(DriverProfileError, match="kinks"):
+            Kinks(1.0, (1.0, 1.0), (0.1, 0.1), 0.5, 5.0, **other)

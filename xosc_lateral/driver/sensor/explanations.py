@@ -53,9 +53,15 @@ class Explanation:
 
 
 def explanations(
-    data: Periodogram, base: FloatArray, known: Known | None, view: SecondView | None = None, *, only_view: bool = False
+    data: Periodogram,
+    base: FloatArray,
+    known: Known | None,
+    view: SecondView | None = None,
+    *,
+    only_view: bool = False,
+    only_white: bool = False,
 ) -> list[Explanation]:
-    """All that were tried; of a second view, also or only what it shows.
+    """All that were tried; of a second view, also or only what it shows; or only white noise.
 
     Other arguments as for `solve`.
     """
@@ -64,6 +70,8 @@ def explanations(
     if found and only_view:
         return found
     found.append(_explanation(data, Colour(), base, known))
+    if only_white:
+        return found
     for order in ORDERS:
         for alone in (False, True):
             found += _of_family(data, order, alone, base, known)

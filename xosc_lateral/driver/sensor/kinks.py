@@ -5,9 +5,10 @@ meet. Between the kinks such an error is a straight line, and its second derivat
 `every` seconds. Therefore its power density at any frequency is that of the jumps over the fourth power of the
 frequency (derived here): with zeros at all multiples of 1 / `every`, and images of what is slow between them. No
 vehicle moves like that. Below half a kink a period, an error is as smooth as driving, and is left to the driver; above,
-all is the sensor's. Where tracks are to be as they were recorded, both must be of the same kinks, which are louder at
-one place than at another: a sampled path then gives up as much of its power as the error has in it, and gets the error
-of the kinks drawn.
+all is the sensor's, and its density is what is seen there. Where tracks are to be as they were recorded, both must be
+of the same kinks: a sampled path then gives up as much of its power as the error has in it, and gets the error of the
+kinks drawn. They are louder for one vehicle than for another, at one place than at another, and where the path bends:
+a smoothing that makes pieces straighter than they were leaves the rest to the kinks between them.
 """
 
 from __future__ import annotations
@@ -37,6 +38,9 @@ SLOWEST = (0.1, 0.2)
 """Up to the first the error is too small a part of the movement to ask for (less than a tenth in the recording that
 kinks were found in), from the second on it is drawn. [Hz]"""
 
+SHAPE = 5
+"""Points of the shape in half a kink a period: a spectrum of snippets of 10 s sees no finer. [-]"""
+
 FINER = 4
 """Points per row of the grid that kinks are put on, between two of them in proportion. [-]"""
 
@@ -54,6 +58,15 @@ class Kinks(Record, frozen=True):
         What the kinks' error has in the power of all that is seen at those frequencies, driver included. [-]
     level_variance, level_duration : float
         Variance of the logarithm of their squares' level [-], and how long a level lasts [s].
+    track_variance : float
+        Variance from track to track of what of that level lasts all along. [-]
+    with_movement : float
+        Share of their squares that goes with the square of the path's acceleration. [-]
+    acceleration : float
+        Root mean square of the latter. [m/s2]
+    shape : tuple of float
+        Factors on their density above half a kink a period, from there on evenly, `SHAPE` in half a kink a period;
+        empty: 1. [-]
 
     Raises
     ------
@@ -66,13 +79,18 @@ class Kinks(Record, frozen=True):
     shares: tuple[float, ...]
     level_variance: float
     level_duration: float
+    track_variance: float = 0.0
+    with_movement: float = 0.0
+    acceleration: float = 1.0
+    shape: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
         """Check."""
-        numbers = (*self.densities, *self.shares, self.level_variance)
-        if not all(map(isfinite, numbers)) or min(numbers) < 0.0 or max(self.shares) > 1.0 or len(self.densities) < 2:
+        shares, scales = (*self.shares, self.with_movement), (self.every, self.level_duration, self.acceleration)
+        numbers = (*self.densities, *shares, self.level_variance, self.track_variance, *self.shape, *scales)
+        if not all(map(isfinite, numbers)) or min(numbers) < 0.0 or max(shares) > 1.0 or len(self.densities) < 2:
             raise DriverProfileError(f"kinks: {self}")
-        if len(self.densities) != len(self.shares) or not min(self.every, self.level_duration) > 0.0:
+        if len(self.densities) != len(self.shares) or not min(scales) > 0.0:
             raise DriverProfileError(f"kinks: {self}")
 
     @property
@@ -82,23 +100,31 @@ class Kinks(Record, frozen=True):
 
     def density(self, frequency: FloatArray) -> FloatArray:
         """One-sided power density of what the kinks add in runs at 5 Hz. [m2/Hz] Shape as `frequency` [Hz]."""
+        return self.of_jumps(frequency) * _rising(frequency, self._crossing) ** 2 * self._shape_at(frequency)
+
+    def of_jumps(self, frequency: FloatArray) -> FloatArray:
+        """The same of ideal kinks, straight lines between jumps, with what is left to the driver, from 0.1 Hz on."""
         folded = np.abs((frequency + self.highest) % (2.0 * self.highest) - self.highest)
         jumps = np.interp(folded, self._frequencies, self.densities) / self.every**2
-        return np.asarray(jumps * _gain(frequency, self._crossing) ** 2)
+        return np.asarray(jumps * _bent(frequency, SLOWEST[0]) ** 2)
 
     def sample(self, path: FloatArray, step: float, rng: np.random.Generator) -> FloatArray:
         """What to add to a sampled path so that it is one of pieces, shape (n,), at this step. [m]
 
         The error of the kinks drawn, at all frequencies that it shows at, less what the path has of it already.
         """
-        return np.asarray(self._error(len(path), step, rng) + _scaled(path, step, self._left) - path)
+        driver = _scaled(path, step, self._left)
+        return np.asarray(self._error(driver, step, rng) + driver - path)
 
-    def _error(self, n: int, step: float, rng: np.random.Generator) -> FloatArray:
-        """Of kinks at even times, from `SLOWEST` on, shape (n,). [m]"""
+    def _error(self, driver: FloatArray, step: float, rng: np.random.Generator) -> FloatArray:
+        """Of kinks at even times, from `SLOWEST` on, on the driver's part of a path; both of shape (n,). [m]"""
+        n = len(driver)
         count = round(n * step / self.every) + 2 * MARGIN + 2
         first = rng.random()
         times: FloatArray = self.every * (np.arange(count, dtype=np.float64) - MARGIN - first)
-        jumps = self._drawn(count, rng) * self._level(count, rng)
+        jumps = self._coloured(
+            np.sqrt(self._level(count, rng) * self._bends(driver, step, times)) * rng.normal(size=count)
+        )
         fine = step / FINER
         place = (times - times[0]) / fine
         before = place.astype(np.int64)
@@ -106,7 +132,8 @@ class Kinks(Record, frozen=True):
         np.add.at(impulses, before, jumps * (1.0 - place + before) / fine)
         np.add.at(impulses, before + 1, jumps * (place - before) / fine)
         frequency: FloatArray = np.asarray(np.fft.rfftfreq(len(impulses), fine), dtype=np.float64)
-        error = scale_frequencies(impulses, -_gain(frequency, SLOWEST))
+        gain = _rising(frequency, SLOWEST) * _bent(frequency, SLOWEST[0]) * np.sqrt(self._shape_at(frequency))
+        error = scale_frequencies(impulses, -gain)
         return np.asarray(np.interp(np.arange(n) * step, times[0] + fine * np.arange(len(error)), error))
 
     @property
@@ -114,34 +141,56 @@ class Kinks(Record, frozen=True):
         return np.linspace(0.0, self.highest, len(self.densities))
 
     def _left(self, frequency: FloatArray) -> FloatArray:
-        """Factor on a path's amplitude, so that there is room for the kinks. Shape as `frequency` [Hz]. [-]"""
+        """Factor on a path's amplitude, so that there is room for the kinks: all above half a kink a period. [-]
+
+        Shape as `frequency` [Hz].
+        """
         share = np.interp(frequency, self._frequencies, self.shares) * _rising(frequency, SLOWEST) ** 2
         of_path = 1.0 - _rising(frequency, self._crossing) ** 2
-        return np.asarray(np.sqrt(1.0 - share * of_path) * passed(frequency))
+        return np.asarray(np.sqrt((1.0 - share) * of_path) * passed(frequency))
 
     @property
     def _crossing(self) -> tuple[float, float]:
         return CROSSING[0] * self.highest, CROSSING[1] * self.highest
 
-    def _drawn(self, count: int, rng: np.random.Generator) -> FloatArray:
-        """Jumps of one level, shape (count,). [m/s]"""
-        frequency = np.fft.rfftfreq(count, self.every)
+    def _coloured(self, drawn: FloatArray) -> FloatArray:
+        """Jumps from numbers whose squares are 1 in the mean and that know nothing of each other. [m/s]"""
+        frequency = np.fft.rfftfreq(len(drawn), self.every)
         gain = np.sqrt(np.interp(frequency, self._frequencies, self.densities) / (2.0 * self.every))
-        return scale_frequencies(rng.normal(size=count), gain)
+        return scale_frequencies(drawn, gain)
 
     def _level(self, count: int, rng: np.random.Generator) -> FloatArray:
-        """Factor on the jumps, its square 1 in the mean, shape (count,). [-]"""
+        """Factor on the jumps' squares, 1 in the mean, shape (count,). [-]"""
         keep = float(np.exp(-self.every / self.level_duration))
         spread = float(np.sqrt(self.level_variance))
         kicks = spread * np.sqrt(1.0 - keep**2) * rng.normal(size=count - 1)
         level = recur(np.array([spread * rng.normal()]), kicks, np.array([keep]))
-        return np.asarray(np.exp(0.5 * (level - 0.5 * self.level_variance)))
+        whose = np.sqrt(self.track_variance) * rng.normal()
+        return np.asarray(np.exp(level + whose - 0.5 * (self.level_variance + self.track_variance)))
+
+    def _bends(self, driver: FloatArray, step: float, times: FloatArray) -> FloatArray:
+        """Factor on their squares where the path bends more or less than paths do, shape as `times` [s]. [-]"""
+        if not self.with_movement or len(driver) < 3:
+            return np.ones(len(times))
+        square = (np.diff(driver, 2) / step**2 / self.acceleration) ** 2
+        at = step * np.arange(1, len(driver) - 1)
+        return 1.0 + self.with_movement * (np.interp(times, at, square, left=1.0, right=1.0) - 1.0)
+
+    def _shape_at(self, frequency: FloatArray) -> FloatArray:
+        """Factor on the density of ideal kinks. [-] Shape as `frequency` [Hz]."""
+        if not self.shape:
+            return np.ones(np.shape(frequency))
+        return np.interp(frequency, shape_points(self.highest, len(self.shape)), self.shape, left=1.0)
 
 
-def _gain(frequency: FloatArray, edge: tuple[float, float]) -> FloatArray:
-    """From impulses of acceleration to what they add to the offset above an edge [Hz], in runs at 5 Hz. [s2]"""
-    bend = np.maximum(2.0 * np.pi * frequency, 2.0 * np.pi * edge[0]) ** 2
-    return np.asarray(_rising(frequency, edge) * passed(frequency) / bend)
+def shape_points(highest: float, count: int) -> FloatArray:
+    """Where the shape of kinks is known, from half a kink a period on, shape (count,). [Hz]"""
+    return highest * (1.0 + np.arange(count) / SHAPE)
+
+
+def _bent(frequency: FloatArray, slowest: float) -> FloatArray:
+    """From impulses of acceleration to what they add to the offset, from a frequency on [Hz], in runs at 5 Hz. [s2]"""
+    return np.asarray(passed(frequency) / np.maximum(2.0 * np.pi * frequency, 2.0 * np.pi * slowest) ** 2)
 
 
 def _rising(frequency: FloatArray, edge: tuple[float, float]) -> FloatArray:

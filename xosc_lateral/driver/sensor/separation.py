@@ -145,7 +145,8 @@ def separate(
             return _textured(_seen_through(wide, per_second), runs, frequency, windows, step)
     pieces = None if rows is None or rate is None else find_kinks(rows, rate, frequency, windows.mean(axis=0))
     kinks, noise = pieces or (None, 0.0)
-    if kinks is not None and known is None:
+    about_pieces = kinks is not None and known is None
+    if about_pieces:  # where nothing slower than a piece is left
         known = Known(noise, rate or 1.0 / step)
     rounding: Callable[[FloatArray], FloatArray] = _no_density
     if grain and not two_levels:
@@ -154,7 +155,7 @@ def separate(
     if kinks is not None:
         base = base + kinks.density(data.frequency)
     view = second_view(half_widths, step) if half_widths else None
-    found = explanations(data, base, known, view, only_view=one_camera)
+    found = explanations(data, base, known, view, only_view=one_camera, only_white=about_pieces)
     least = _taken(found)
     best, colour = least.solution, least.colour
     beside = _with_view(rounding, best, colour)
