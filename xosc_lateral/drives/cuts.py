@@ -69,7 +69,7 @@ def cut_runs(drive: Drive, rules: CutRules = PAPER_RULES) -> list[Run]:
     """Road-following runs of one drive at an even step; empty when nothing is left."""
     keep = ~(lane_change_rows(drive, rules) | slow_rows(drive, rules))
     parts = [(rows, grid_of(drive, rows, rules.step)) for rows in _uninterrupted(drive, keep, rules.max_gap)]
-    lasting = [(rows, grid) for rows, grid in parts if len(grid) * rules.step >= rules.min_run - 0.5 * rules.step]
+    lasting = [(rows, grid) for rows, grid in parts if (len(grid) - 0.5) * rules.step >= rules.min_run]
     return [_run(drive, index, rows, grid) for index, (rows, grid) in enumerate(lasting)]
 
 

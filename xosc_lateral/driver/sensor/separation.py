@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from xosc_lateral.driver.sensor.explanations import Explanation, explanations
 from xosc_lateral.driver.sensor.hidden_path import HiddenPath
+from xosc_lateral.driver.sensor.kinks import Kinks
 from xosc_lateral.driver.sensor.kinks_fit import find_kinks
 from xosc_lateral.driver.sensor.likelihood import Colour, Known, Solution, solve
 from xosc_lateral.driver.sensor.model import SensorModel
@@ -161,7 +162,8 @@ def separate(
     beside = _with_view(rounding, best, colour)
     result = Separation(best.knots, replace(_sensor(best, colour, grain), kinks=kinks), beside)
     driver = float(np.concatenate([result.driver_part(run, step) for run in runs]).var())
-    share = min(driver / variance, 1.0) if variance > 0.0 else 1.0
+    error = _in_band(best, colour, data, kinks)
+    share = min(driver, max(variance - error, 0.0)) / variance if variance > 0.0 else 1.0
     plausible = [(one.solution, one.colour) for one in found if one.criterion < least.criterion + PLAUSIBLE]
     if colour.view is not None:
         plausible += [(solve(data, one, base, known, best), one) for one in _other_views(colour, colour.view)]
@@ -279,7 +281,7 @@ def _chance(found: Solution, colour: Colour, data: Periodogram) -> float:
     return float(np.sqrt((2.0 * power**2 / data.weight).sum()))
 
 
-def _in_band(found: Solution, colour: Colour, data: Periodogram) -> float:
+def _in_band(found: Solution, colour: Colour, data: Periodogram, kinks: Kinks | None = None) -> float:
     """Sensor's power among what was seen. [m2]"""
     from scipy.integrate import trapezoid
 
@@ -287,6 +289,8 @@ def _in_band(found: Solution, colour: Colour, data: Periodogram) -> float:
     total = np.full(len(frequency), np.exp(found.white))
     if colour.is_there:
         total += found.coloured(colour, frequency)
+    if kinks is not None:
+        total += kinks.density(frequency)
     return float(trapezoid(total, frequency))
 
 
