@@ -10,6 +10,7 @@ of the runs, which is measured apart.
 from __future__ import annotations
 
 import argparse
+from collections.abc import Sequence
 from itertools import pairwise
 from pathlib import Path
 
@@ -17,22 +18,37 @@ import numpy as np
 
 from benchmarks.markers import write_between_markers
 from xosc_lateral.driver.sensor.kinks import Kinks
-from xosc_lateral.driver.sensor.kinks_fit import find_kinks
+from xosc_lateral.driver.sensor.kinks_fit import SHORTEST, bends_at, find_kinks, flat_jumps, jumps_of
 from xosc_lateral.driver.sensor.periodogram import windows_of
 from xosc_lateral.driver.sensor.runs import rows_of
 from xosc_lateral.drives.cuts import all_runs
-from xosc_lateral.drives.resampling import STEP, passed
+from xosc_lateral.drives.resampling import STEP
 from xosc_lateral.formats.drives import read_drives
 
 EDGES = (0.1, 0.15, 0.2, 0.25, 0.3, 0.35, 0.4, 0.45, 0.6, 0.7, 0.8, 0.9, 0.97, 1.03, 1.1, 1.3, 1.5, 1.6, 1.9)
 """[Hz]"""
 
 
-def all_of_theirs(kinks: Kinks, frequency: np.ndarray) -> np.ndarray:
-    """Density of the kinks in runs, what is left to the driver included. [m2/Hz]"""
-    folded = np.abs((frequency + kinks.highest) % (2.0 * kinks.highest) - kinks.highest)
-    jumps = np.interp(folded, np.linspace(0.0, kinks.highest, len(kinks.densities)), kinks.densities)
-    return jumps / kinks.every**2 / (2.0 * np.pi * frequency) ** 4 * passed(frequency) ** 2
+FIFTHS = 5
+"""Parts that the kinks are dealt into by how much the path bends at them. [-]"""
+
+
+def by_bend(kinks: Kinks, rows: Sequence[np.ndarray], rate: float) -> list[str]:
+    """How large jumps are where the path bends so much, and what the profile makes of it."""
+    size = round(kinks.every * rate)
+    found = [(one, *jumps_of(one, size, rate)) for one in rows if len(one) >= SHORTEST * size]
+    jumps = np.concatenate([flat_jumps(jump, np.array(kinks.densities), kinks.every) for _, jump, _ in found])
+    bends = np.concatenate([bends_at(one, jump, first, size, rate) for one, jump, first in found])
+    jumps, bends = jumps[np.isfinite(bends)], np.abs(bends[np.isfinite(bends)])
+    lines = [
+        "| acceleration of the path at the kink [m/s²] | mean square of the jumps | in the profile |",
+        "|---|---|---|",
+    ]
+    for low, high in pairwise(np.quantile(bends, np.linspace(0.0, 1.0, FIFTHS + 1)).tolist()):
+        inside = (bends >= low) & (bends <= high)
+        told = 1.0 + kinks.with_movement * ((bends[inside] / kinks.acceleration) ** 2 - 1.0)
+        lines.append(f"| {low:.3f} to {high:.3f} | {(jumps[inside] ** 2).mean():.2f} | {told.mean():.2f} |")
+    return lines
 
 
 def main() -> None:
@@ -53,13 +69,17 @@ def main() -> None:
     lines = ["| frequency [Hz] | measured [m²/Hz] | of the kinks | ratio |", "|---|---|---|---|"]
     for low, high in pairwise(EDGES):
         inside = (frequency >= low) & (frequency < high)
-        seen, theirs = density[inside].mean(), all_of_theirs(kinks, frequency[inside]).mean()
+        seen, theirs = density[inside].mean(), kinks.of_jumps(frequency[inside]).mean()
         lines.append(f"| {low:g} to {high:g} | {seen:.2g} | {theirs:.2g} | {theirs / seen:.2f} |")
     lines += [
         "",
         f"A kink every {kinks.every:g} s; about the pieces, rows lie within {1e3 * noise:.2f} mm rms (a millimetre's "
         f"rounding is {1e3 * 1e-3 / np.sqrt(12.0):.2f} mm). The logarithm of the squared jumps' level varies by "
-        f"{kinks.level_variance:.2f} and lasts {kinks.level_duration:.0f} s.",
+        f"{kinks.level_variance:.2f} and lasts {kinks.level_duration:.0f} s; what of it lasts all along a track varies "
+        f"by {kinks.track_variance:.2f} from track to track; {100 * kinks.with_movement:.0f} % of the squares go with the "
+        f"square of the path's acceleration, {kinks.acceleration:.3f} m/s² rms (mean square of all jumps: 1):",
+        "",
+        *by_bend(kinks, rows, rate),
     ]
     text = "\n".join(lines)
     print(text)

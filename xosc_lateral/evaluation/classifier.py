@@ -54,13 +54,15 @@ class TwoSampleResult:
     high: float
 
 
-def snippet_features(snippets: FloatArray) -> FloatArray:
-    """Everything that gives a model away: values, differences, log spectrum, metrics, roughness, memory, shape.
+def snippet_features(snippets: FloatArray, *, fast: bool = False) -> FloatArray:
+    """Everything that gives a model away: values, differences, log spectrum, ten metrics, roughness, memory, shape.
 
     Parameters
     ----------
     snippets : array, shape (n, m)
         [m]
+    fast : bool
+        Also what second and third differences and an even spectrum show: fast movement, with its sensor, as recorded.
 
     Returns
     -------
@@ -75,41 +77,36 @@ def snippet_features(snippets: FloatArray) -> FloatArray:
         for lag in AUTOCORRELATION_LAGS
         if lag < difference.shape[1]
     ]
+    acceleration = np.abs(np.diff(difference, axis=1))
+    roughness = np.log(np.column_stack([acceleration.std(axis=1), acceleration.max(axis=1)]) + 1e-9)
     differences = DIFFERENCE_SCALE * np.diff(thin, axis=1)
     metrics = snippet_metrics(snippets)
+    more = [_fast_features(difference), _log_power(snippets, even=True)] if fast else []
     return np.column_stack(
-        [
-            thin,
-            differences,
-            _log_power(snippets),
-            metrics,
-            _roughness(np.diff(difference, axis=1)),
-            _roughness(np.diff(difference, 2, axis=1)),
-            *autocorrelation,
-            shape_features(snippets),
-        ]
+        [thin, differences, _log_power(snippets), metrics, roughness, *autocorrelation, shape_features(snippets), *more]
     )
 
 
-def _roughness(derivative: FloatArray) -> FloatArray:
-    """Size, largest, tails and turns of second or third differences, shape (n, 4). [log m], [log m], [-], [-]"""
-    mean_square = (derivative**2).mean(axis=1)
-    tails = (derivative**4).mean(axis=1) / np.maximum(mean_square**2, 1e-36)
-    turns = (derivative[:, 1:] * derivative[:, :-1] < 0.0).mean(axis=1)
-    size, largest = np.sqrt(mean_square), np.abs(derivative).max(axis=1)
-    return np.column_stack([np.log(size + 1e-9), np.log(largest + 1e-9), tails, turns])
+def _fast_features(difference: FloatArray) -> FloatArray:
+    """Size, largest, tails and turns of second and third differences. [log m], [log m], [-], [-] Shape (n, 8)."""
+    found = []
+    for order in (1, 2):
+        values = np.diff(difference, order, axis=1)
+        square = (values**2).mean(axis=1)
+        tails = (values**4).mean(axis=1) / np.maximum(square**2, 1e-36)
+        turns = (values[:, 1:] * values[:, :-1] < 0.0).mean(axis=1)
+        largest = np.abs(values).max(axis=1)
+        found += [np.log(np.sqrt(square) + 1e-9), np.log(largest + 1e-9), tails, turns]
+    return np.column_stack(found)
 
 
-def _log_power(snippets: FloatArray) -> FloatArray:
+def _log_power(snippets: FloatArray, *, even: bool = False) -> FloatArray:
     """Log power in bands, straight line from end to end removed, Hann window, shape (n, bands)."""
     power = tapered_powers(without_line(snippets), np.hanning(snippets.shape[1]))
     bins = power.shape[1]
-    bands = {
-        band
-        for edges in (np.geomspace(1, bins, BANDS + 1), np.linspace(1, bins, min(EVEN_BANDS, bins - 1) + 1))
-        for band in pairwise(np.unique(edges.astype(np.int64)).tolist())
-    }
-    return np.column_stack([np.log(power[:, a:b].mean(axis=1) + 1e-12) for a, b in sorted(bands)])
+    edges = np.linspace(1, bins, EVEN_BANDS + 1) if even else np.geomspace(1, bins, BANDS + 1)
+    edges = np.unique(edges.astype(np.int64))
+    return np.column_stack([np.log(power[:, a:b].mean(axis=1) + 1e-12) for a, b in pairwise(edges.tolist())])
 
 
 def context_features(snippets: Snippets, paths: FloatArray) -> FloatArray:
@@ -163,6 +160,7 @@ def classifier_two_sample_test(
     groups_other: NDArray[np.generic],
     *,
     context: Sequence[FloatArray] | None = None,
+    fast: bool = False,
     rocket: bool = False,
     seed: int = 0,
 ) -> TwoSampleResult | None:
@@ -175,6 +173,8 @@ def classifier_two_sample_test(
         Drives: no drive is both learnt from and judged.
     context : two arrays, shape (n, c) and (k, c), optional
         Features of the context of either: then context and movement are judged jointly.
+    fast : bool
+        Look at fast movement closely, see `snippet_features`.
     rocket : bool
         Random convolutions (`rocket`) and a ridge classifier instead, as their authors have it.
 
@@ -192,8 +192,10 @@ def classifier_two_sample_test(
     groups = np.concatenate([groups_real[rows], groups_other[others]])
     if len(np.unique(groups)) < FOLDS:
         return None
-    seen_by = _by_convolutions if rocket else _by_features
-    features, model, method = seen_by(real[rows], other[others], seed)
+    if rocket:
+        features, model, method = _by_convolutions(real[rows], other[others], seed)
+    else:
+        features, model, method = _by_features(real[rows], other[others], seed, fast=fast)
     if context is not None:
         features = np.hstack([features, np.vstack([context[0][rows], context[1][others]])])
     label = np.r_[np.zeros(len(rows)), np.ones(len(others))]
@@ -204,11 +206,12 @@ def classifier_two_sample_test(
     return _judged(score, label.astype(bool), groups, seed)
 
 
-def _by_features(real: FloatArray, other: FloatArray, seed: int) -> tuple[FloatArray, Any, str]:
+def _by_features(real: FloatArray, other: FloatArray, seed: int, *, fast: bool) -> tuple[FloatArray, Any, str]:
     from sklearn.ensemble import HistGradientBoostingClassifier
 
     model = HistGradientBoostingClassifier(max_iter=100, max_bins=63, random_state=seed)
-    return np.vstack([snippet_features(real), snippet_features(other)]), model, "predict_proba"
+    both = [snippet_features(snippets, fast=fast) for snippets in (real, other)]
+    return np.vstack(both), model, "predict_proba"
 
 
 def _by_convolutions(real: FloatArray, other: FloatArray, seed: int) -> tuple[FloatArray, Any, str]:

@@ -178,9 +178,10 @@ def _under(
     if asked.rocket:
         convolved = classifier_two_sample_test(*shown, cut.group, cut.group, rocket=True, seed=seed)
     if asked.classify:
-        alone = classifier_two_sample_test(*shown, cut.group, cut.group, seed=seed)
+        fast = not condition.slow
+        alone = classifier_two_sample_test(*shown, cut.group, cut.group, fast=fast, seed=seed)
         if not condition.same_start:
-            floor = _separated_drivers(shown[0], cut.group, seed)
+            floor = _separated_drivers(shown[0], cut.group, seed, fast=fast)
         if condition.slow:
             context = context_features(cut, real), context_features(cut, sampled)
             jointly = classifier_two_sample_test(*shown, cut.group, cut.group, context=context, seed=seed)
@@ -228,10 +229,10 @@ def _stand_ins(
     ]
 
 
-def _separated_drivers(real: FloatArray, group: NDArray[np.str_], seed: int) -> TwoSampleResult | None:
+def _separated_drivers(real: FloatArray, group: NDArray[np.str_], seed: int, *, fast: bool) -> TwoSampleResult | None:
     """One random half of the drivers told from the other."""
     half = split_groups(group, np.random.default_rng(seed))
-    return classifier_two_sample_test(real[half], real[~half], group[half], group[~half], seed=seed)
+    return classifier_two_sample_test(real[half], real[~half], group[half], group[~half], fast=fast, seed=seed)
 
 
 def _with_proper_scores(scores: ConditionScores, profile: DriverProfile, cut: Snippets, seed: int) -> ConditionScores:
