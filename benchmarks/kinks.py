@@ -62,7 +62,7 @@ def main() -> None:
     assert rows is not None and rate is not None
     frequency, windows = windows_of([run.offset for run in runs], STEP)
     density = windows.mean(axis=0)
-    found = find_kinks(rows, rate, frequency, density)
+    found = find_kinks(rows, rate, [run.offset for run in runs])
     if found is None:
         raise SystemExit("no kinks at even times")
     kinks, noise = found
@@ -76,8 +76,8 @@ def main() -> None:
         f"A kink every {kinks.every:g} s; about the pieces, rows lie within {1e3 * noise:.2f} mm rms (a millimetre's "
         f"rounding is {1e3 * 1e-3 / np.sqrt(12.0):.2f} mm). The logarithm of the squared jumps' level varies by "
         f"{kinks.level_variance:.2f} and lasts {kinks.level_duration:.0f} s; what of it lasts all along a track varies "
-        f"by {kinks.track_variance:.2f} from track to track; {100 * kinks.with_movement:.0f} % of the squares go with the "
-        f"square of the path's acceleration, {kinks.acceleration:.3f} m/s² rms (mean square of all jumps: 1):",
+        f"by {kinks.track_variance:.2f} from track to track; {100 * kinks.with_movement:.0f} % of the squares go with "
+        f"the square of the path's acceleration, {kinks.acceleration:.3f} m/s² rms (mean square of all jumps: 1):",
         "",
         *by_bend(kinks, rows, rate),
     ]

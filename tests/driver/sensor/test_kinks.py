@@ -63,8 +63,8 @@ def test_jumps_between_cubics_are_read_exactly():
 
 
 def test_kinks_are_found_with_their_period_size_and_the_rows_rounding(tracks):
-    frequency, density, _ = seen(tracks)
-    kinks, noise = find_kinks(tracks, RATE, frequency, density)
+    _, _, runs = seen(tracks)
+    kinks, noise = find_kinks(tracks, RATE, runs)
     assert kinks.every == EVERY
     middle = np.array(kinks.densities[2:-2])
     assert middle.mean() == pytest.approx(WHITE, rel=0.1)  # 40 tracks of 58 jumps
@@ -83,8 +83,8 @@ def test_what_makes_kinks_louder_is_found():
     }
     found = {}
     for name, rows in made.items():
-        frequency, density, _ = seen(rows)
-        found[name], _ = find_kinks(rows, RATE, frequency, density)
+        _, _, runs = seen(rows)
+        found[name], _ = find_kinks(rows, RATE, runs)
     assert found["even"].track_variance < 0.15
     assert found["by track"].track_variance == pytest.approx(np.var(2.0 * np.log(sizes)), abs=0.2)
     assert found["by movement"].track_variance < 0.15
@@ -95,8 +95,8 @@ def test_what_makes_kinks_louder_is_found():
 def test_smooth_tracks_have_none():
     rng = np.random.default_rng(6)
     smooth = [track(rng, 0.0) for _ in range(40)]
-    frequency, density, _ = seen(smooth)
-    assert find_kinks(smooth, RATE, frequency, density) is None
+    _, _, runs = seen(smooth)
+    assert find_kinks(smooth, RATE, runs) is None
 
 
 def test_what_kinks_add_is_the_sensors_above_half_a_kink_a_period_and_no_drivers(tracks):

@@ -15,8 +15,9 @@ from msgspec.structs import replace
 from numpy.typing import NDArray
 
 from xosc_lateral.driver.sensor.kinks import SHAPE, Kinks, shape_points
+from xosc_lateral.driver.sensor.periodogram import windows_of
 from xosc_lateral.drives.filters import kaiser_design, low_pass, scale_frequencies
-from xosc_lateral.drives.periodogram import periodograms
+from xosc_lateral.drives.periodogram import Detrend, periodograms
 from xosc_lateral.drives.resampling import STEP, passed
 
 FloatArray = NDArray[np.float64]
@@ -45,6 +46,9 @@ LINE, DEVIATIONS = 2.0, 6.0
 WINDOW = 32
 """Kinks in a window of their spectrum. [-]"""
 
+SEEN = 64
+"""Rows at 5 Hz in a window of the spectrum of all: 12.8 s, which hardly a run is too short for. [-]"""
+
 DURATIONS = np.geomspace(1.0, 64.0, 13)
 """Of a level that are tried, in kinks. [-]"""
 
@@ -65,13 +69,14 @@ ROUNDS = 4
 """Of least squares, weighted by the inverse of what is expected: that of its square, which squares of normal numbers
 have, would ask most where paths hardly bend and their bend is known least. No digit changes after the fourth. [-]"""
 
+LEAST_PASSED = 0.1
+"""Of the amplitude, in runs at 5 Hz; where less is left, windows show what leaks from slower movement. [-]"""
+
 MANY = 100_000
 """Rows of ideal kinks that what is seen is held against: an error of 1 % in 0.1 Hz. [-]"""
 
 
-def find_kinks(
-    rows: Sequence[FloatArray], rate: float, frequency: FloatArray, density: FloatArray
-) -> tuple[Kinks, float] | None:
+def find_kinks(rows: Sequence[FloatArray], rate: float, runs: Sequence[FloatArray]) -> tuple[Kinks, float] | None:
     """Kinks at even times, and the standard deviation of the rows about the pieces [m]; None where there are none.
 
     Parameters
@@ -80,8 +85,8 @@ def find_kinks(
         Offsets as recorded, evenly in time. [m]
     rate : float
         Rows per second. [Hz]
-    frequency, density : array, shape (m,)
-        Of all that is seen in the runs. [Hz], [m2/Hz]
+    runs : sequence of array
+        The same, or the longer of them, at 5 Hz. [m]
     """
     size = _period(rows, rate)
     if size is None:
@@ -96,7 +101,8 @@ def find_kinks(
     densities = 2.0 * every * np.concatenate(powers).mean(axis=0)
     known = np.linspace(0.0, 0.5 / every, len(densities))
     at = np.maximum(known, known[1])  # of the slowest nothing is known: windows are no longer
-    seen = np.exp(np.interp(at, frequency[1:], np.log(density[1:])))
+    frequency, windows = windows_of(runs, STEP)  # the longest, for what is slow falls steeply
+    seen = np.exp(np.interp(at, frequency[1:], np.log(windows.mean(axis=0)[1:])))
     shares = np.minimum(densities / every**2 / (2.0 * np.pi * at) ** 4 / seen, 1.0)
     noise = np.concatenate([_about_pieces(one[first:], size) for one, (_, first) in zip(long, found, strict=True)])
     flat = [flat_jumps(one, densities, every) for one in jumps]
@@ -109,7 +115,7 @@ def find_kinks(
     )
     kinks = Kinks(period, _tidy(densities), _tidy(shares), level, lasts, track, with_movement, acceleration)
     white = 2.0 * float(noise.mean()) / rate
-    return replace(kinks, shape=_shape(kinks, frequency, density, white)), float(np.sqrt(noise.mean()))
+    return replace(kinks, shape=_shape(kinks, runs, white)), float(np.sqrt(noise.mean()))
 
 
 def _tidy(values: Sequence[float] | FloatArray) -> tuple[float, ...]:
@@ -172,16 +178,25 @@ def _size_spectrum(piece: FloatArray) -> tuple[FloatArray, float]:
     return power, float(power.mean()) + 1e-30
 
 
-def _shape(kinks: Kinks, frequency: FloatArray, density: FloatArray, white: float) -> tuple[float, ...]:
+def _seen(runs: Sequence[FloatArray]) -> tuple[FloatArray, FloatArray]:
+    """Frequencies [Hz] and density of all that is seen in runs at 5 Hz [m2/Hz], those of a window's length counted."""
+    powers = [periodograms(run, SEEN, detrend=Detrend.MEAN) for run in runs]
+    frequency: FloatArray = np.asarray(np.fft.rfftfreq(SEEN, STEP), dtype=np.float64)
+    return frequency, 2.0 * STEP * np.concatenate(powers).mean(axis=0)
+
+
+def _shape(kinks: Kinks, runs: Sequence[FloatArray], white: float) -> tuple[float, ...]:
     """Factors by which what is seen above half a kink a period differs from ideal kinks and white noise. [-]
 
     Ideal ones are sampled, as even as can be, so that windows smear both alike.
     """
+    frequency, density = _seen(runs)
     even = replace(kinks, level_variance=0.0, track_variance=0.0, with_movement=0.0)
     ideal = even.sample(np.zeros(MANY), STEP, np.random.default_rng(0))
-    theirs = 2.0 * STEP * periodograms(ideal, 2 * (len(frequency) - 1)).mean(axis=0)
+    _, theirs = _seen([ideal])
     rest = density - white * passed(frequency) ** 2
-    points = shape_points(kinks.highest, int((float(frequency[-1]) / kinks.highest - 1.0) * SHAPE) + 1)
+    fastest = float(frequency[passed(frequency) >= LEAST_PASSED][-1])
+    points = shape_points(kinks.highest, int((fastest / kinks.highest - 1.0) * SHAPE) + 1)
     factors = [1.0]
     for point in points[1:]:
         near = np.abs(frequency - point) <= 0.5 * kinks.highest / SHAPE

@@ -144,7 +144,7 @@ def separate(
         wide = split_wide_steps(data, windows, measured, grain, per_second, sensor_noise)
         if wide is not None:
             return _textured(_seen_through(wide, per_second), runs, frequency, windows, step)
-    pieces = None if rows is None or rate is None else find_kinks(rows, rate, frequency, windows.mean(axis=0))
+    pieces = None if rows is None or rate is None else find_kinks(rows, rate, runs)
     kinks, noise = pieces or (None, 0.0)
     about_pieces = kinks is not None and known is None
     if about_pieces:  # where nothing slower than a piece is left
