@@ -21,10 +21,16 @@ WHITE = 2.0 * EVERY * JUMP**2
 
 
 def track(
-    rng: np.random.Generator, jump: float, seconds: float = 60.0, *, moved: float = 2.0, with_movement: float = 0.0
+    rng: np.random.Generator,
+    jump: float,
+    seconds: float = 60.0,
+    *,
+    every: float = EVERY,
+    moved: float = 2.0,
+    with_movement: float = 0.0,
 ) -> np.ndarray:
     """Slow movement in millimetres, whose slope jumps once a second, by more where it bends more."""
-    n, size = round(seconds * RATE), round(EVERY * RATE)
+    n, size = round(seconds * RATE), round(every * RATE)
     frequency = np.fft.rfftfreq(n, 1.0 / RATE)
     slow = scale_frequencies(rng.normal(size=n), np.where((frequency > 0.0) & (frequency < 0.15), moved, 0.0))
     places = np.arange(int(rng.integers(size)) + 1, n - 1, size)
@@ -90,6 +96,19 @@ def test_what_makes_kinks_louder_is_found():
     assert found["by movement"].track_variance < 0.15
     assert max(found[name].with_movement for name in ("even", "by track")) < 0.12
     assert found["by movement"].with_movement == pytest.approx(0.5, abs=0.15)
+
+
+@pytest.mark.parametrize("every", [0.8, 1.25])
+def test_ideal_kinks_have_an_even_shape_whatever_their_period(every: float):
+    rng = np.random.default_rng(11)
+    rows = [track(rng, JUMP, every=every) for _ in range(40)]
+    kinks, _ = find_kinks(rows, RATE, seen(rows)[2])
+    assert kinks.every == every
+    points = shape_points(kinks.highest, len(kinks.shape))
+    shape = np.array(kinks.shape)[(points > 1.3 * kinks.highest) & (points < 1.45)]
+    assert len(shape) >= 2
+    assert np.median(shape) == pytest.approx(1.0, abs=0.15)
+    assert min(kinks.shape) > 0.0
 
 
 def test_smooth_tracks_have_none():

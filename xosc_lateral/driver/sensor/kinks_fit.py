@@ -197,9 +197,9 @@ def _shape(kinks: Kinks, runs: Sequence[FloatArray], white: float) -> tuple[floa
     rest = density - white * passed(frequency) ** 2
     fastest = float(frequency[passed(frequency) >= LEAST_PASSED][-1])
     points = shape_points(kinks.highest, int((fastest / kinks.highest - 1.0) * SHAPE) + 1)
-    factors = [1.0]
+    factors, band = [1.0], max(kinks.highest / SHAPE, float(frequency[1]))
     for point in points[1:]:
-        near = np.abs(frequency - point) <= 0.5 * kinks.highest / SHAPE
+        near = np.abs(frequency - point) <= 0.5 * band
         factors.append(max(float(rest[near].sum()), 0.0) / max(float(theirs[near].sum()), 1e-30))
     return _tidy(factors)
 
