@@ -180,7 +180,7 @@ def _size_spectrum(piece: FloatArray) -> tuple[FloatArray, float]:
 
 def _seen(runs: Sequence[FloatArray]) -> tuple[FloatArray, FloatArray]:
     """Frequencies [Hz] and density of all that is seen in runs at 5 Hz [m2/Hz], those of a window's length counted."""
-    powers = [periodograms(run, SEEN, detrend=Detrend.MEAN) for run in runs]
+    powers = [periodograms(run, SEEN, detrend=Detrend.ENDS) for run in runs]
     frequency: FloatArray = np.asarray(np.fft.rfftfreq(SEEN, STEP), dtype=np.float64)
     return frequency, 2.0 * STEP * np.concatenate(powers).mean(axis=0)
 

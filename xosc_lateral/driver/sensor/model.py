@@ -21,6 +21,7 @@ from xosc_lateral.driver.sensor.kinks import CROSSING, Kinks
 from xosc_lateral.driver.sensor.likelihood import Colour
 from xosc_lateral.driver.sensor.texture import amplitude_factor
 from xosc_lateral.drives.filters import scale_frequencies
+from xosc_lateral.drives.resampling import passed
 from xosc_lateral.errors import DriverProfileError
 
 FloatArray = NDArray[np.float64]
@@ -58,8 +59,8 @@ class SensorModel(Record, frozen=True):
         Share of the driver: 95 % interval. [-]
 
     frequencies, densities : tuple of float
-        Density of the error as it was measured in runs, without kinks, see `texture`; empty: as the parts above have
-        it. [Hz], [m2/Hz]
+        Density of the error as it was measured in runs, see `texture`; empty: as the parts above have it, as it is
+        beside kinks. [Hz], [m2/Hz]
     level_variance, level_duration : float
         Variance of the log of the density over time [-], and how long a level lasts [s]; in files `wanders`, `lasts`.
     kinks : Kinks or None
@@ -164,6 +165,8 @@ class SensorModel(Record, frozen=True):
 
     def in_runs(self, frequency: FloatArray) -> FloatArray:
         """One-sided power density of the noise in runs at 5 Hz. [m2/Hz] Shape as `frequency` [Hz]."""
+        if self.kinks is not None:
+            return np.asarray(self.noise_density(frequency) * passed(frequency) ** 2)
         if not self.frequencies:
             return np.asarray(self.noise_density(frequency) * (frequency <= HIGHEST))
         table = np.log(np.array(self.densities) + FAINTEST)

@@ -28,7 +28,6 @@ from xosc_lateral.driver.sensor.texture import FAST, LEAST_SHARE, MANY, level_va
 from xosc_lateral.driver.sensor.vehicle_bound import density
 from xosc_lateral.driver.sensor.wide_steps import WideSteps, split_wide_steps
 from xosc_lateral.drives.filters import scale_frequencies
-from xosc_lateral.drives.resampling import passed
 from xosc_lateral.normal import NORMAL_95
 
 FloatArray = NDArray[np.float64]
@@ -219,13 +218,10 @@ def _textured(
     split: Separation, runs: Sequence[FloatArray], frequency: FloatArray, windows: FloatArray, step: float
 ) -> Separation:
     """With the error's density as measured, and how its level varies where the sensor outweighs the driver."""
+    if split.sensor.kinks is not None:  # what varies in level is theirs, and what they leave is as the parts have it
+        return split
     share = 1.0 - split.driver_share_of(frequency)
     frequencies, densities = measured_density(frequency, windows, share)
-    if split.sensor.kinks is not None:  # what varies in level is theirs, and what they leave is as the parts have it
-        middles = np.array(frequencies)
-        densities = tuple((split.sensor.noise_density(middles) * passed(middles) ** 2).tolist())
-        sensor = replace(split.sensor, frequencies=rounded(frequencies), densities=rounded(densities))
-        return replaced(split, sensor=sensor)
     sensor = replace(split.sensor, frequencies=rounded(frequencies), densities=rounded(densities))
     fast = frequency > FAST
     if (windows.mean(axis=0) * share)[fast].sum() > LEAST_SHARE * windows.mean(axis=0)[fast].sum():
