@@ -118,3 +118,17 @@ def test_what_an_import_has_cut_is_not_cut_again() -> None:
     assert (first.time[-1], second.time[0]) == pytest.approx((24.8, 31.2))
     again = cut_runs(Drive("d", drive.time, drive.offset, drive.lane_width, drive.context))
     assert again[0].time[-1] < 21.1, "without the mark the change is looked for"
+
+
+def test_all_that_is_cut_from_a_drive_lies_on_one_grid_with_the_whole_of_it() -> None:
+    time = np.arange(0.0, 120.0, 0.043)
+    speed = np.where((time > 31.0) & (time < 37.77), 5.0, 30.0)
+    one = drive(time, np.sin(0.3 * time), speed=speed)
+    runs, whole = cut_runs(one), whole_run(one)
+    assert len(runs) == 2
+    assert runs[1].time[0] - time[speed == 5.0][-1] < STEP + 0.05
+    for run in runs:
+        at = np.searchsorted(whole.time, run.time - 1e-9)
+        np.testing.assert_allclose(whole.time[at], run.time, atol=1e-9)
+        np.testing.assert_allclose(whole.offset[at], run.offset, atol=5e-3)
+        assert (len(run) - 0.5) * STEP >= 10.0
