@@ -17,7 +17,7 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.markers import write_between_markers
-from xosc_lateral.driver.sensor.kinks import Kinks
+from xosc_lateral.driver.sensor.kinks import Kinks, mean_square
 from xosc_lateral.driver.sensor.kinks_fit import SHORTEST, bends_at, find_kinks, flat_jumps, jumps_of
 from xosc_lateral.driver.sensor.periodogram import windows_of
 from xosc_lateral.driver.sensor.runs import rows_of
@@ -46,7 +46,7 @@ def by_bend(kinks: Kinks, rows: Sequence[np.ndarray], rate: float) -> list[str]:
     ]
     for low, high in pairwise(np.quantile(bends, np.linspace(0.0, 1.0, FIFTHS + 1)).tolist()):
         inside = (bends >= low) & (bends <= high)
-        told = 1.0 + kinks.with_movement * ((bends[inside] / kinks.acceleration) ** 2 - 1.0)
+        told = mean_square(kinks.with_movement, (bends[inside] / kinks.acceleration) ** 2)
         lines.append(f"| {low:.3f} to {high:.3f} | {(jumps[inside] ** 2).mean():.2f} | {told.mean():.2f} |")
     return lines
 

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from xosc_lateral.drives.periodogram import tapered_powers, without_line
 from xosc_lateral.evaluation.metrics import DIFFERENCE_SCALE, snippet_metrics
 from xosc_lateral.evaluation.rocket import rocket_features
-from xosc_lateral.evaluation.shape import shape_features
+from xosc_lateral.evaluation.shape import shape_features, turns
 from xosc_lateral.evaluation.snippets import Snippets
 
 FloatArray = NDArray[np.float64]
@@ -81,9 +81,12 @@ def snippet_features(snippets: FloatArray, *, fast: bool = False) -> FloatArray:
     roughness = np.log(np.column_stack([acceleration.std(axis=1), acceleration.max(axis=1)]) + 1e-9)
     differences = DIFFERENCE_SCALE * np.diff(thin, axis=1)
     metrics = snippet_metrics(snippets)
-    more = [_fast_features(difference), _log_power(snippets, even=True)] if fast else []
+    power = tapered_powers(without_line(snippets), np.hanning(snippets.shape[1]))
+    bins = power.shape[1]
+    bands = _log_power(power, np.geomspace(1, bins, BANDS + 1))
+    more = [_fast_features(difference), _log_power(power, np.linspace(1, bins, EVEN_BANDS + 1))] if fast else []
     return np.column_stack(
-        [thin, differences, _log_power(snippets), metrics, roughness, *autocorrelation, shape_features(snippets), *more]
+        [thin, differences, bands, metrics, roughness, *autocorrelation, shape_features(snippets), *more]
     )
 
 
@@ -94,19 +97,15 @@ def _fast_features(difference: FloatArray) -> FloatArray:
         values = np.diff(difference, order, axis=1)
         square = (values**2).mean(axis=1)
         tails = (values**4).mean(axis=1) / np.maximum(square**2, 1e-36)
-        turns = (values[:, 1:] * values[:, :-1] < 0.0).mean(axis=1)
         largest = np.abs(values).max(axis=1)
-        found += [np.log(np.sqrt(square) + 1e-9), np.log(largest + 1e-9), tails, turns]
+        found += [np.log(np.sqrt(square) + 1e-9), np.log(largest + 1e-9), tails, turns(values)]
     return np.column_stack(found)
 
 
-def _log_power(snippets: FloatArray, *, even: bool = False) -> FloatArray:
-    """Log power in bands, straight line from end to end removed, Hann window, shape (n, bands)."""
-    power = tapered_powers(without_line(snippets), np.hanning(snippets.shape[1]))
-    bins = power.shape[1]
-    edges = np.linspace(1, bins, EVEN_BANDS + 1) if even else np.geomspace(1, bins, BANDS + 1)
-    edges = np.unique(edges.astype(np.int64))
-    return np.column_stack([np.log(power[:, a:b].mean(axis=1) + 1e-12) for a, b in pairwise(edges.tolist())])
+def _log_power(power: FloatArray, edges: FloatArray) -> FloatArray:
+    """Logarithm of the mean power [m2] between edges, which are counted in frequencies, shape (n, bands)."""
+    whole = np.unique(edges.astype(np.int64)).tolist()
+    return np.column_stack([np.log(power[:, a:b].mean(axis=1) + 1e-12) for a, b in pairwise(whole)])
 
 
 def context_features(snippets: Snippets, paths: FloatArray) -> FloatArray:

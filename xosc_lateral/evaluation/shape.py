@@ -81,7 +81,7 @@ def shape_features(snippets: FloatArray) -> FloatArray:
             _forecast_error(z),
             (z**4).mean(axis=1),
             _kurtosis(change),
-            (change[:, 1:] * change[:, :-1] < 0.0).mean(axis=1),
+            turns(change),
         ]
     )
 
@@ -94,6 +94,11 @@ def longest_true(flags: NDArray[np.bool_]) -> FloatArray:
         run = np.where(column, run + 1.0, 0.0)
         best = np.maximum(best, run)
     return np.asarray(best / flags.shape[1])
+
+
+def turns(values: FloatArray) -> FloatArray:
+    """Share of each row's values that have another sign than the one before, shape (n,). [-]"""
+    return np.asarray((values[:, 1:] * values[:, :-1] < 0.0).mean(axis=1))
 
 
 def _mode(z: FloatArray, bins: int) -> FloatArray:

@@ -170,17 +170,22 @@ class Kinks(Record, frozen=True):
 
     def _bends(self, driver: FloatArray, step: float, times: FloatArray) -> FloatArray:
         """Factor on their squares where the path bends more or less than paths do, shape as `times` [s]. [-]"""
-        if not self.with_movement or len(driver) < 3:
+        if len(driver) < 3:
             return np.ones(len(times))
         square = (np.diff(driver, 2) / step**2 / self.acceleration) ** 2
         at = step * np.arange(1, len(driver) - 1)
-        return 1.0 + self.with_movement * (np.interp(times, at, square, left=1.0, right=1.0) - 1.0)
+        return mean_square(self.with_movement, np.interp(times, at, square, left=1.0, right=1.0))
 
     def _shape_at(self, frequency: FloatArray) -> FloatArray:
         """Factor on the density of ideal kinks. [-] Shape as `frequency` [Hz]."""
         if not self.shape:
             return np.ones(np.shape(frequency))
         return np.interp(frequency, shape_points(self.highest, len(self.shape)), self.shape, left=1.0)
+
+
+def mean_square(with_movement: float, bend: FloatArray) -> FloatArray:
+    """Of jumps where the squared acceleration is `bend` times its mean; 1 in the mean. [-] Shape as `bend` [-]."""
+    return 1.0 + with_movement * (bend - 1.0)
 
 
 def shape_points(highest: float, count: int) -> FloatArray:

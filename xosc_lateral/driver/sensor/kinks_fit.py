@@ -14,8 +14,8 @@ import numpy as np
 from msgspec.structs import replace
 from numpy.typing import NDArray
 
-from xosc_lateral.driver.sensor.kinks import SHAPE, Kinks, shape_points
-from xosc_lateral.driver.sensor.periodogram import windows_of
+from xosc_lateral.driver.sensor.kinks import SHAPE, Kinks, mean_square, shape_points
+from xosc_lateral.driver.sensor.periodogram import WINDOWS, windows_of
 from xosc_lateral.drives.filters import kaiser_design, low_pass, scale_frequencies
 from xosc_lateral.drives.periodogram import Detrend, periodograms
 from xosc_lateral.drives.resampling import STEP, passed
@@ -46,8 +46,8 @@ LINE, DEVIATIONS = 2.0, 6.0
 WINDOW = 32
 """Kinks in a window of their spectrum. [-]"""
 
-SEEN = 64
-"""Rows at 5 Hz in a window of the spectrum of all: 12.8 s, which hardly a run is too short for. [-]"""
+SEEN = round(WINDOWS[-1] / STEP)
+"""Rows at 5 Hz in a window of the spectrum of all, which hardly a run is too short for. [-]"""
 
 DURATIONS = np.geomspace(1.0, 64.0, 13)
 """Of a level that are tried, in kinks. [-]"""
@@ -258,7 +258,7 @@ def _not_negative(parts: FloatArray, values: FloatArray, weight: FloatArray) -> 
 
 def _log_level(flat: FloatArray, bend: FloatArray, with_movement: float) -> FloatArray:
     """Logarithm of the squares beside what they are where the path bends so, shape (k,). [-]"""
-    usual = 1.0 + with_movement * (np.where(np.isfinite(bend), bend, 1.0) ** 2 - 1.0)
+    usual = mean_square(with_movement, np.where(np.isfinite(bend), bend, 1.0) ** 2)
     return np.asarray(np.log((flat**2 + FAINT**2) / usual))
 
 
