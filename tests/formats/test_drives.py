@@ -282,3 +282,43 @@ def test_words_that_change_on_the_way_are_categories_and_names_are_not(tmp_path:
     first, _ = read_drives(tmp_path / "mine.csv")
     assert {"surface=dry", "surface=wet"} <= first.levels
     assert not any("driver" in name for name in first.context)
+
+
+@pytest.mark.parametrize("suffix", [".csv", ".parquet"])
+def test_zones_are_names_even_where_they_are_numbers(tmp_path: Path, suffix: str) -> None:
+    made = table()
+    third = len(made) // 3
+    zones = {"text": [" south 1"] * third + ["south 2"] * third, "numbers": [101] * third + [102] * third}
+    for kind, names in zones.items():
+        path = tmp_path / f"{kind}{suffix}"
+        with_gap = made.assign(zone=pd.Series(names + [None] * (len(made) - 2 * third)))
+        with_gap.to_parquet(path) if suffix == ".parquet" else with_gap.to_csv(path, index=False)
+    text, numbers = read_drives(tmp_path / f"text{suffix}"), read_drives(tmp_path / f"numbers{suffix}")
+    assert np.unique(text[0].zone).tolist() == ["", "south 1", "south 2"]
+    assert np.unique(numbers[0].zone).tolist() == ["", "101", "102"]
+    assert (numbers[0].zone == "101").sum() == third
+    assert "zone" not in text[0].context and "zone" not in numbers[0].context
+    (run,) = all_runs(numbers)
+    assert len(run.zone) == len(run) and run.zone[0] == "101" and run.zone[len(run) // 2] == "102"
+    assert run.part(slice(5, 20)).zone.tolist() == run.zone[5:20].tolist()
+
+
+def test_many_zones_stay_names_and_an_empty_column_is_none(tmp_path: Path) -> None:
+    path = tmp_path / "mine.csv"
+    made = table()
+    made.assign(zone=np.arange(len(made)) // 4).to_csv(path, index=False)
+    (drive,) = read_drives(path)
+    assert len(np.unique(drive.zone)) == 150
+    made.assign(zone=None).to_csv(path, index=False)
+    (drive,) = read_drives(path)
+    assert drive.zone is None
+    assert all_runs([drive])[0].zone is None
+
+
+def test_zones_follow_rows_that_are_sorted_and_dropped(tmp_path: Path) -> None:
+    path = tmp_path / "mine.csv"
+    made = table().assign(zone=[f"z{k}" for k in range(600)])
+    made.loc[7, "distance_left"] = np.nan
+    made.sample(frac=1.0, random_state=1).to_csv(path, index=False)
+    (drive,) = read_drives(path)
+    assert drive.zone.tolist() == [f"z{k}" for k in range(600) if k != 7]

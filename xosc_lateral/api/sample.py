@@ -17,6 +17,7 @@ from xosc_lateral.api.inputs import (
     naming,
 )
 from xosc_lateral.api.result import Result
+from xosc_lateral.drives.zones import ZONE
 from xosc_lateral.formats.output_paths import claim, output_file
 
 if TYPE_CHECKING:
@@ -70,7 +71,7 @@ def sample(
     if duration is not None:
         made = list(sample_free(driver, duration, seed, speed=speed, lane_width=lane_width, with_sensor=with_sensor))
         settings: dict[str, Any] = {"duration_s": duration, "speed": speed}
-        unknown = [column for column in driver.columns if column not in {"speed", "lane_width"}]
+        unknown = [column for column in driver.columns if column not in {"speed", "lane_width", ZONE}]
         return Offsets(driver, made, seed, None, settings, [_neutral("a free run", unknown)] if unknown else [])
     given = given_drives(like if like is not None else context, columns)  # type: ignore[arg-type]
     warnings = _unknown_columns(driver, given.drives)
@@ -90,13 +91,17 @@ def _unknown_columns(profile: DriverProfile, drives: Sequence[Drive]) -> list[st
     """
     lacking: dict[tuple[str, ...], list[str]] = {}
     for column in profile.columns:
-        names = tuple(d.name for d in drives if column not in {"lane_width", *d.context, *d.empty})
+        names = tuple(d.name for d in drives if column not in _known(d))
         lacking.setdefault(names, []).append(column)
     return [
         _neutral(f"drive {names[0]}" if len(names) == 1 else f"{len(names)} of {len(drives)} drives", columns)
         for names, columns in lacking.items()
         if names
     ]
+
+
+def _known(drive: Drive) -> set[str]:
+    return {"lane_width", *drive.context, *drive.empty} | (set() if drive.zone is None else {ZONE})
 
 
 def _neutral(where: str, columns: Sequence[str]) -> str:

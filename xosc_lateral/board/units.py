@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,20 +27,8 @@ def units_of(runs: Sequence[Run]) -> list[Run]:
         for number in np.unique(block):
             rows = np.flatnonzero(block == number)
             if len(rows) > 1:
-                pieces.append(_piece(run, slice(int(rows[0]), int(rows[-1]) + 1), f"{run.drive} {number}"))
+                pieces.append(run.part(slice(int(rows[0]), int(rows[-1]) + 1), f"{run.drive} {number}"))
     return pieces
-
-
-def _piece(run: Run, rows: slice, name: str) -> Run:
-    context: Mapping[str, FloatArray] = {key: values[rows] for key, values in run.context.items()}
-    return replace(
-        run,
-        drive=name,
-        time=run.time[rows],
-        offset=run.offset[rows],
-        lane_width=run.lane_width[rows],
-        context=context,
-    )
 
 
 def halves(runs: Sequence[Run], seed: int) -> tuple[list[Run], list[Run]]:

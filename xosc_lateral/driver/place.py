@@ -1,8 +1,9 @@
-"""What class, lane and speed do to a population's level, spread and fine movement, fitted before the rest.
+"""What class, lane, speed and zone do to a population's level, spread and fine movement, fitted before the rest.
 
 Trucks, cars and lanes of one recording differ. What of it is beyond chance becomes effects of the profile, so that one
 profile gives each its own, wherever class, lane and speed are known. What neighbours do to the level is fitted along
-with them where they are known (`neighbours`).
+with them where they are known (`neighbours`). Where rows are known to be of zones, some zones show more fine movement
+than others, whoever passes: without a level of its own for each, drivers would seem to change with the place.
 """
 
 from __future__ import annotations
@@ -15,8 +16,10 @@ from numpy.typing import NDArray
 
 from xosc_lateral.driver.effects import Acts, ColumnEffect, Levels, Linear, Piecewise, Proximity
 from xosc_lateral.driver.effects.rounding import rounded_number
+from xosc_lateral.driver.loudness import quick_by_zone
 from xosc_lateral.driver.models.autoregressive.filters import split_bands
 from xosc_lateral.driver.neighbours import NEIGHBOURS, SCALE, most_beside, neighbour_shapes
+from xosc_lateral.driver.quick import quick_part
 from xosc_lateral.drives.drive import Run
 from xosc_lateral.drives.resampling import STEP
 from xosc_lateral.errors import NotEnoughDataError
@@ -64,7 +67,7 @@ class _Pieces:
 
 
 def fit_place(runs: Sequence[Run], *, neighbours: bool | None = None) -> tuple[ColumnEffect, ...]:
-    """Effects of class, lane, speed and neighbours; none where there are too few drives or columns.
+    """Effects of class, lane, speed, zone and neighbours; none where there are too few drives or columns.
 
     Drivers' own levels are a random effect, and errors are robust against whatever else the snippets of one drive
     share [1]_. The slopes of all columns are shrunk together, by the share of their size that chance would not make
@@ -95,7 +98,8 @@ def fit_place(runs: Sequence[Run], *, neighbours: bool | None = None) -> tuple[C
         raise NotEnoughDataError(_why_no_neighbours(runs, drives))
     if drives < LEAST_DRIVES or not (shapes or beside):
         return ()
-    pieces, found = _pieces(runs, [*shapes, *beside]), list[ColumnEffect]()
+    zones = quick_by_zone(runs, lambda run: _quantities(shapes, run))
+    pieces, found = _pieces(without_place(runs, zones), [*shapes, *beside]), list[ColumnEffect](zones)
     found += _effects([*shapes, *beside], Acts.LOCATION, pieces.mean, pieces)
     for acts, response in ((Acts.SPREAD, pieces.spread), (Acts.FINE, pieces.fine)):
         found += _effects(shapes, acts, response, pieces)
@@ -121,12 +125,15 @@ def without_place(runs: Sequence[Run], effects: Sequence[ColumnEffect]) -> list[
 
 
 def _neutral(run: Run, effects: Sequence[ColumnEffect]) -> Run:
-    strength = {acts: np.zeros(len(run)) for acts in (Acts.LOCATION, Acts.SPREAD, Acts.FINE)}
+    context = run.context_and_zone
+    strength = {acts: np.zeros(len(run)) for acts in (Acts.LOCATION, Acts.SPREAD, Acts.FINE, Acts.QUICK)}
     for effect in effects:
-        own = effect.strength(STEP, run.context)
+        own = effect.strength(STEP, context)
         if own is not None:
             strength[effect.acts] += own
     moved = run.offset - strength[Acts.LOCATION]
+    if strength[Acts.QUICK].any():
+        moved = moved + (np.exp(-strength[Acts.QUICK]) - 1.0) * quick_part(moved, STEP)
     level = float(moved.mean())
     slow, fast = split_bands(moved - level, STEP)
     return replace(run, offset=level + slow * np.exp(-strength[Acts.SPREAD]) + fast * np.exp(-strength[Acts.FINE]))
@@ -157,13 +164,18 @@ def _quantity(effect: ColumnEffect, run: Run) -> FloatArray:
     return values[:, 1] - values[:, 2] if isinstance(effect, Piecewise) else values[:, 0]
 
 
+def _quantities(effects: Sequence[ColumnEffect], run: Run) -> FloatArray:
+    """Of all effects, shape (n, effects)."""
+    return np.stack([_quantity(effect, run) for effect in effects], axis=1) if effects else np.empty((len(run), 0))
+
+
 def _pieces(runs: Sequence[Run], shapes: Sequence[ColumnEffect]) -> _Pieces:
     size = round(PIECE / STEP)
     number = {name: k for k, name in enumerate(dict.fromkeys(run.drive for run in runs))}
     mean, spread, fine, rows, drive = [], [], [], [], []
     for run in runs:
         slow, fast = split_bands(run.offset, STEP)
-        quantities = np.stack([_quantity(effect, run) for effect in shapes], axis=1)
+        quantities = _quantities(shapes, run)
         for piece in _successive(len(run), size):
             mean.append(run.offset[piece].mean())
             spread.append(np.log(slow[piece].std() + 1e-6))

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from xosc_lateral.driver.effects import ColumnEffect, EffectTerms, HiddenEffect
 from xosc_lateral.driver.models.base import CoreStream, Start
 from xosc_lateral.driver.profile import DriverProfile
+from xosc_lateral.driver.quick import quick_between, reach
 from xosc_lateral.driver.records import read_as
 from xosc_lateral.driver.seeds import DriveSeed, child, generator
 
@@ -33,22 +34,26 @@ class DriveState(msgspec.Struct, kw_only=True):
         None before the first offset.
     hidden : list of HiddenEffect.State
     terms : list of array or None
-        What the hidden effects do together at rows that were drawn and may still be asked for: location [m], spread,
-        rate and fine [-].
+        What the hidden effects do together at rows that were drawn and may still be asked for: the parts of
+        `EffectTerms`.
     first, drawn : int
         Rows of the drive that `terms` begins and ends at.
     coarse, fine : array, shape (k,)
         Core movement drawn ahead. [lane widths]
+    past : array, shape (m,), optional
+        Last coarse movement, as far back as what is quick of it hangs on it; None before an effect acts on that.
+        [lane widths]
     """
 
     begun_at: float | None = None
     core: Any = None
     hidden: list[Any]
-    terms: list[FloatArray | None] = msgspec.field(default_factory=lambda: [None] * 4)
+    terms: list[FloatArray | None] = msgspec.field(default_factory=lambda: [None] * len(EffectTerms().parts))
     first: int = 0
     drawn: int = 0
     coarse: FloatArray
     fine: FloatArray
+    past: FloatArray | None = None
 
 
 class DriveProcess:
@@ -135,10 +140,9 @@ class DriveProcess:
         assert state.begun_at is not None
         time = state.begun_at + step * np.arange(state.drawn, until, dtype=np.float64)
         new = combine([effect.advance(own, time, step) for effect, own in zip(self._hidden, state.hidden, strict=True)])
-        fresh = (new.location, new.spread, new.rate, new.fine)
         state.terms = [
             more if kept is None or more is None else np.concatenate([kept, more])
-            for kept, more in zip(state.terms, fresh, strict=True)
+            for kept, more in zip(state.terms, new.parts, strict=True)
         ]
         state.drawn = until
 
@@ -169,18 +173,36 @@ class DriveProcess:
             self.state.core = self._core.state
         elif start is not None:
             raise ValueError("a drive that continues from a state has no start")
-        coarse, fine = self._take_core(self._core, len(width), terms.rate)
-        mean = self._core.mean
+        acts_on_quick = (terms.quick is not None or self.state.past is not None) and terms.rate is None
+        coarse, fine = self._take_core(self._core, len(width), terms.rate, reach(self._model.step) * acts_on_quick)
+        mean, quick = self._core.mean, self._quick_of(coarse) if acts_on_quick else None
+        if terms.quick is not None:
+            fine = terms.quick * fine
+            coarse = coarse if quick is None else coarse + (terms.quick - 1.0) * quick
         moved = coarse if terms.spread is None else mean + terms.spread * (coarse - mean)
         moved = moved + (fine if terms.fine is None else terms.fine * fine)
         offset = moved * width
         return np.asarray(offset if terms.location is None else offset + terms.location)
 
-    def _take_core(self, core: CoreStream, n: int, rate: FloatArray | None) -> tuple[FloatArray, FloatArray]:
+    def _quick_of(self, coarse: FloatArray) -> FloatArray:
+        """What is quick of the coarse movement just taken, that drawn ahead being known. [lane widths]
+
+        Before the first row of the drive it is mirrored through that row's point, so that nothing of it is quick.
+        """
+        state, rows = self.state, reach(self._model.step)
+        seen = np.concatenate([coarse, state.coarse[:rows]])
+        past = 2.0 * seen[0] - seen[rows:0:-1] if state.past is None else state.past
+        state.past = np.concatenate([past, coarse])[-rows:]
+        return quick_between(np.concatenate([past, seen]), self._model.step)
+
+    def _take_core(
+        self, core: CoreStream, n: int, rate: FloatArray | None, beyond: int
+    ) -> tuple[FloatArray, FloatArray]:
+        """Next rows of the core movement; so many beyond are drawn as well."""
         state = self.state
-        if rate is not None or not (self._core_ahead or len(state.coarse)):
+        if rate is not None or not (self._core_ahead or len(state.coarse) or beyond):
             return core.take(n, rate)
-        missing = n - len(state.coarse)
+        missing = n + beyond - len(state.coarse)
         if missing > 0:
             coarse, fine = core.take(max(missing, self._core_ahead))
             state.coarse, state.fine = np.concatenate([state.coarse, coarse]), np.concatenate([state.fine, fine])
@@ -204,6 +226,8 @@ class DriveProcess:
         if state.core is not None:
             self._core = self._model.resume(read_as(self._model.State, state.core, f"{where}.core"))
             state.core = self._core.state
+        # States of older versions know of fewer terms.
+        state.terms += [None] * (len(EffectTerms().parts) - len(state.terms))
         self.state = state
 
 
@@ -216,7 +240,7 @@ def _refuse_strangers(profile: DriverProfile) -> None:
 
 def combine(terms: Sequence[EffectTerms]) -> EffectTerms:
     """What several effects do together: locations add up, factors multiply."""
-    location = spread = rate = fine = None
+    location = spread = rate = fine = quick = None
     for term in terms:
         if term.location is not None:
             location = term.location if location is None else location + term.location
@@ -226,15 +250,18 @@ def combine(terms: Sequence[EffectTerms]) -> EffectTerms:
             rate = term.rate if rate is None else rate * term.rate
         if term.fine is not None:
             fine = term.fine if fine is None else fine * term.fine
-    return EffectTerms(location, spread, rate, fine)
+        if term.quick is not None:
+            quick = term.quick if quick is None else quick * term.quick
+    return EffectTerms(location, spread, rate, fine, quick)
 
 
 def _start(offset: float | None, width: FloatArray, terms: EffectTerms) -> Start | None:
     if offset is None:
         return None
     location = 0.0 if terms.location is None else float(terms.location[0])
+    fine = [float(factor[0]) for factor in (terms.fine, terms.quick) if factor is not None]
     return Start(
         rel_offset=(offset - location) / float(width[0]),
         spread=1.0 if terms.spread is None else float(terms.spread[0]),
-        fine=1.0 if terms.fine is None else float(terms.fine[0]),
+        fine=float(np.prod(fine)),
     )

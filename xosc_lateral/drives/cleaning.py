@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from xosc_lateral.drives.drive import Drive
 from xosc_lateral.drives.markings import both_markings
+from xosc_lateral.drives.zones import ZONE
 from xosc_lateral.errors import FormatError
 from xosc_lateral.limits import DRIVE_SPAN, TIME
 
@@ -37,11 +38,17 @@ MAX_CONTRADICTIONS = 0.01
 RUN = "following_run"
 """Column of tables that an import has cut: number of the road-following stretch. What it has cut is not cut again."""
 
-OWN = frozenset({"time", "drive", "offset", "lane_width", "distance_left", "distance_right", RUN})
+OWN = frozenset({"time", "drive", "offset", "lane_width", "distance_left", "distance_right", RUN, ZONE})
 """Columns that are no context."""
 
 
-def clean_drive(name: str, columns: dict[str, FloatArray], levels: frozenset[str], path: Path) -> Drive | None:
+def clean_drive(
+    name: str,
+    columns: dict[str, FloatArray],
+    levels: frozenset[str],
+    path: Path,
+    zones: NDArray[np.str_] | None = None,
+) -> Drive | None:
     """Rows of one drive, from whatever source, as a `Drive`.
 
     Parameters
@@ -49,11 +56,14 @@ def clean_drive(name: str, columns: dict[str, FloatArray], levels: frozenset[str
     name : str
     columns : mapping of str to array, shape (n,)
         `time` [s], and `offset` and `lane_width` or `distance_left` and `distance_right` [m]; `speed` [m/s] if known;
-        `RUN` where an import has cut the drive; all others are context. NaN: missing, or "there is none".
+        `RUN` where an import has cut the drive; `ZONE` where there are `zones`; all others are context. NaN: missing,
+        or "there is none".
     levels : frozenset of str
         Columns that hold levels.
     path : Path
         What messages call the source.
+    zones : array of str, shape (k,), optional
+        Names of the zones, which the column counts from 0.
 
     Returns
     -------
@@ -84,10 +94,26 @@ def clean_drive(name: str, columns: dict[str, FloatArray], levels: frozenset[str
     context["lane_width"] = lane_width[good]
     held = frozenset(levels & context.keys())
     run = columns[RUN][good].astype(np.int64) if RUN in columns else None
+    zone = None if zones is None else _named(columns[ZONE][good], zones)
     drive = Drive(
-        name, columns["time"][good], offset[good], lane_width[good], context, held, str(path), run, empty=empty
+        name,
+        columns["time"][good],
+        offset[good],
+        lane_width[good],
+        context,
+        held,
+        str(path),
+        run,
+        empty=empty,
+        zone=zone,
     )
     return drive if run is not None else _seen_through(drive)
+
+
+def _named(numbers: FloatArray, names: NDArray[np.str_]) -> NDArray[np.str_]:
+    """Names by their numbers, empty where there is none."""
+    known = np.isfinite(numbers)
+    return np.where(known, names[np.where(known, numbers, 0.0).astype(np.int64)], "")
 
 
 def _seen_through(drive: Drive) -> Drive:
@@ -106,6 +132,7 @@ def _seen_through(drive: Drive) -> Drive:
         offset=mended.offset[kept],
         lane_width=mended.lane_width[kept],
         context=context,
+        zone=None if drive.zone is None else drive.zone[kept],
         mended=mended.shares,
         half_width=half_width[kept],
     )

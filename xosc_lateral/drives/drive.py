@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
+
+from xosc_lateral.drives.zones import ZONE, zone_codes
 
 FloatArray = NDArray[np.float64]
 
@@ -58,6 +60,8 @@ class Drive:
     half_width : array, shape (n,), optional
         Half the lane width as a camera recorded it, with errors of both markings, as the offset has them. None: the
         lane width comes from a map, or from elsewhere than the offset. [m]
+    zone : array of str, shape (n,), optional
+        Name of the zone that each row was recorded in (`zones`), empty where it is not known. None: the table has none.
     """
 
     name: str
@@ -71,6 +75,7 @@ class Drive:
     mended: MarkingShares | None = None
     empty: frozenset[str] = frozenset()
     half_width: FloatArray | None = None
+    zone: NDArray[np.str_] | None = None
 
     def __post_init__(self) -> None:
         """Copy and freeze; refuse unequal lengths and what readers must have taken out."""
@@ -108,6 +113,8 @@ class Run:
         As in `Drive`.
     levels, empty : frozenset of str
         As in `Drive`.
+    zone : array of str, shape (n,), optional
+        As in `Drive`.
     """
 
     drive: str
@@ -118,10 +125,28 @@ class Run:
     context: Mapping[str, FloatArray] = field(default_factory=dict)
     levels: frozenset[str] = frozenset()
     empty: frozenset[str] = frozenset()
+    zone: NDArray[np.str_] | None = None
 
     def __post_init__(self) -> None:
         """Copy and freeze; refuse unequal lengths and missing values."""
         _freeze(self)
+
+    @property
+    def context_and_zone(self) -> Mapping[str, FloatArray]:
+        """Its context, with the zones' codes where it has any, shape (n,) each."""
+        return self.context if self.zone is None else {**self.context, ZONE: zone_codes(self.zone)}
+
+    def part(self, rows: slice, drive: str | None = None) -> Run:
+        """Some of its rows, under its drive's name or another."""
+        return replace(
+            self,
+            drive=self.drive if drive is None else drive,
+            time=self.time[rows],
+            offset=self.offset[rows],
+            lane_width=self.lane_width[rows],
+            context={name: values[rows] for name, values in self.context.items()},
+            zone=None if self.zone is None else self.zone[rows],
+        )
 
     def __len__(self) -> int:
         """Count of rows."""
@@ -143,6 +168,8 @@ def _freeze(series: Drive | Run) -> None:
         object.__setattr__(series, "run", _frozen_numbers(series.run, len(series.time), f"drive {series.name}: run"))
     name = series.name if isinstance(series, Drive) else series.drive
     n = len(series.time)
+    if series.zone is not None:
+        object.__setattr__(series, "zone", _frozen_names(series.zone, n, f"drive {name}: zone"))
     half_width = ("half_width",) if isinstance(series, Drive) and series.half_width is not None else ()
     for label in ("time", "offset", "lane_width", *half_width):
         values = _frozen(getattr(series, label), n, f"drive {name}: {label}")
@@ -155,6 +182,14 @@ def _freeze(series: Drive | Run) -> None:
 
 def _frozen_numbers(values: NDArray[np.int64], n: int, what: str) -> NDArray[np.int64]:
     array = np.array(values, dtype=np.int64)
+    if array.shape != (n,):
+        raise ValueError(f"{what}: shape {array.shape}, expected ({n},)")
+    array.flags.writeable = False
+    return array
+
+
+def _frozen_names(values: NDArray[np.str_], n: int, what: str) -> NDArray[np.str_]:
+    array = np.array(values, dtype=np.str_)
     if array.shape != (n,):
         raise ValueError(f"{what}: shape {array.shape}, expected ({n},)")
     array.flags.writeable = False

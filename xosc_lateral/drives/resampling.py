@@ -104,9 +104,14 @@ def _hann_average(
 
 def nearest(time: FloatArray, values: FloatArray, grid: FloatArray) -> FloatArray:
     """Value [unit of the column] of the row nearest in time [s], shape of `grid`."""
+    return values[nearest_rows(time, grid)]
+
+
+def nearest_rows(time: FloatArray, grid: FloatArray) -> NDArray[np.intp]:
+    """The row nearest in time, shape of `grid`; both [s]."""
     right = np.clip(np.searchsorted(time, grid), 1, len(time) - 1) if len(time) > 1 else np.zeros(len(grid), dtype=int)
     left = np.maximum(right - 1, 0)
-    return values[np.where(grid - time[left] <= time[right] - grid, left, right)]
+    return np.where(grid - time[left] <= time[right] - grid, left, right)
 
 
 def column_on_grid(time: FloatArray, values: FloatArray, grid: FloatArray, *, held: bool) -> FloatArray:

@@ -13,7 +13,6 @@ from __future__ import annotations
 import tempfile
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from dataclasses import replace as replace_fields
 from pathlib import Path
 from typing import Any
 
@@ -245,16 +244,9 @@ def split_in_time(runs: Sequence[Run]) -> tuple[list[Run], list[Run]]:
     for run in runs:
         cut = min(max(left, 0), len(run))
         left -= len(run)
-        before += [_part(run, slice(0, cut))] if cut > 1 else []
-        after += [_part(run, slice(cut, len(run)))] if len(run) - cut > 1 else []
+        before += [run.part(slice(0, cut))] if cut > 1 else []
+        after += [run.part(slice(cut, len(run)))] if len(run) - cut > 1 else []
     return before, after
-
-
-def _part(run: Run, rows: slice) -> Run:
-    context = {name: values[rows] for name, values in run.context.items()}
-    return replace_fields(
-        run, time=run.time[rows], offset=run.offset[rows], lane_width=run.lane_width[rows], context=context
-    )
 
 
 def sliding_snippets(runs: Sequence[Run]) -> FloatArray:

@@ -29,6 +29,7 @@ from xosc_lateral.driver.effects.saturating import Saturating
 from xosc_lateral.driver.effects.step import Step
 from xosc_lateral.driver.effects.threshold import Threshold
 from xosc_lateral.driver.effects.variance_trend import VarianceTrend
+from xosc_lateral.driver.effects.zones import Zones
 from xosc_lateral.driver.records import read_as
 from xosc_lateral.errors import DriverProfileError
 
@@ -110,6 +111,7 @@ __all__ = [
     "Step",
     "Threshold",
     "VarianceTrend",
+    "Zones",
     "any_effect",
     "effect_from_dict",
     "known_effects",

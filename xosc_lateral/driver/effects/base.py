@@ -27,7 +27,9 @@ class EffectTerms:
 
     The offset of a profile with effects is, with m the base model's mean and kappa, phi its coarse and fine part [m]::
 
-        offset = location + m + spread * (kappa(tau) - m) + fine * phi,    d tau / dt = rate
+        offset = location + m + spread * (kappa(tau) - m + (quick - 1) * h) + fine * quick * phi,    d tau / dt = rate
+
+    where h is what is quick of kappa (`quick`).
 
     Parameters
     ----------
@@ -39,17 +41,24 @@ class EffectTerms:
         Rate of the coarse movement's mean reversion, > 0: 2 means that it restores twice as fast. [-]
     fine : array, shape (n,), optional
         Factor on the fine movement, > 0. [-]
+    quick : array, shape (n,), optional
+        Factor on the quick movement, coarse or fine, > 0. On the coarse one it does not act where a rate does. [-]
     """
 
     location: FloatArray | None = None
     spread: FloatArray | None = None
     rate: FloatArray | None = None
     fine: FloatArray | None = None
+    quick: FloatArray | None = None
 
     def rows(self, rows: slice | NDArray[np.int64]) -> EffectTerms:
         """The same at some rows. Shape of `rows` each. [m], [-]"""
-        values = (self.location, self.spread, self.rate, self.fine)
-        return EffectTerms(*(None if value is None else value[rows] for value in values))
+        return EffectTerms(*(None if value is None else value[rows] for value in self.parts))
+
+    @property
+    def parts(self) -> tuple[FloatArray | None, ...]:
+        """All of them, in the order of the fields. [m], [-]"""
+        return self.location, self.spread, self.rate, self.fine, self.quick
 
 
 FILE_WORDS = {"Cycle": "weave", "VarianceTrend": "growing-spread"}

@@ -29,15 +29,22 @@ def known_sensor(profile: DriverProfile) -> SensorModel:
 
 
 def sensor_error(
-    sensor: SensorModel | None, path: FloatArray, step: float, seed: np.random.SeedSequence, part: int = 0
+    sensor: SensorModel | None,
+    path: FloatArray,
+    step: float,
+    seed: np.random.SeedSequence,
+    part: int = 0,
+    *,
+    zone: FloatArray | None = None,
 ) -> FloatArray:
     """Error on a drive's sampled path, shape (n,), from random numbers of its own; zeros without a sensor. [m]
 
-    `part` tells the pieces of one drive apart: a sensor knows nothing of what it measured minutes ago.
+    `part` tells the pieces of one drive apart: a sensor knows nothing of what it measured minutes ago. `zone` has the
+    codes of the zones of its rows, where they are known.
     """
     if sensor is None:
         return np.zeros(len(path))
-    return sensor.error_on(path, step, generator(seed, DriveSeed.SENSOR, part))
+    return sensor.error_on(path, step, generator(seed, DriveSeed.SENSOR, part), zone)
 
 
 def recorded(
@@ -47,18 +54,20 @@ def recorded(
     start: float,
     step: float,
     seed: np.random.SeedSequence,
+    *,
+    zone: FloatArray | None = None,
 ) -> FloatArray:
     """A sampled path of n offsets with the sensor's error on it, the sum of which begins at `start`. [m]
 
-    `draw` samples the path from where it is told to begin [m].
+    `draw` samples the path from where it is told to begin [m]; `zone` as in `sensor_error`.
     """
     if sensor is None:
         return draw(start)
     rng = generator(seed, DriveSeed.SENSOR, 0)
-    noise = sensor.sample(n, step, rng)
+    noise = sensor.sample(n, step, rng, zone)
     path = draw(start - float(noise[0]))
     if sensor.kinks is None:
         return path + noise
-    kinked = sensor.kinks.sample(path, step, rng)
+    kinked = sensor.kinks.sample(path, step, rng, zone)
     # They hang on the path, so they come after it; where they begin is a matter of millimetres.
     return np.asarray(path + noise + (kinked - kinked[0]))

@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from xosc_lateral.driver.records import Record
 from xosc_lateral.driver.recursion import recur
+from xosc_lateral.driver.sensor.by_zone import ByZone
 from xosc_lateral.drives.filters import scale_frequencies
 from xosc_lateral.drives.resampling import passed
 from xosc_lateral.errors import DriverProfileError
@@ -64,6 +65,8 @@ class Kinks(Record, frozen=True):
         Share of their squares that goes with the square of the path's acceleration. [-]
     acceleration : float
         Root mean square of the latter. [m/s2]
+    by_zone : ByZone or None
+        Level of their squares in each zone, where the recording has zones.
     shape : tuple of float
         Factors on their density above half a kink a period, from there on evenly, `SHAPE` in half a kink a period;
         empty: 1. [-]
@@ -83,6 +86,7 @@ class Kinks(Record, frozen=True):
     with_movement: float = 0.0
     acceleration: float = 1.0
     shape: tuple[float, ...] = ()
+    by_zone: ByZone | None = None
 
     def __post_init__(self) -> None:
         """Check."""
@@ -108,23 +112,25 @@ class Kinks(Record, frozen=True):
         jumps = np.interp(folded, self._frequencies, self.densities) / self.every**2
         return np.asarray(jumps * _bent(frequency, SLOWEST[0]) ** 2)
 
-    def sample(self, path: FloatArray, step: float, rng: np.random.Generator) -> FloatArray:
+    def sample(
+        self, path: FloatArray, step: float, rng: np.random.Generator, zone: FloatArray | None = None
+    ) -> FloatArray:
         """What to add to a sampled path so that it is one of pieces, shape (n,), at this step. [m]
 
         The error of the kinks drawn, at all frequencies that it shows at, less what the path has of it already.
+        `zone` has the code of the zone of each row, where they are known.
         """
         driver = _scaled(path, step, self._left)
-        return np.asarray(self._error(driver, step, rng) + driver - path)
+        return np.asarray(self._error(driver, step, rng, zone) + driver - path)
 
-    def _error(self, driver: FloatArray, step: float, rng: np.random.Generator) -> FloatArray:
+    def _error(self, driver: FloatArray, step: float, rng: np.random.Generator, zone: FloatArray | None) -> FloatArray:
         """Of kinks at even times, from `SLOWEST` on, on the driver's part of a path; both of shape (n,). [m]"""
         n = len(driver)
         count = round(n * step / self.every) + 2 * MARGIN + 2
         first = rng.random()
         times: FloatArray = self.every * (np.arange(count, dtype=np.float64) - MARGIN - first)
-        jumps = self._coloured(
-            np.sqrt(self._level(count, rng) * self._bends(driver, step, times)) * rng.normal(size=count)
-        )
+        level = self._level(times, step, rng, zone)
+        jumps = self._coloured(np.sqrt(level * self._bends(driver, step, times)) * rng.normal(size=count))
         fine = step / FINER
         place = (times - times[0]) / fine
         before = place.astype(np.int64)
@@ -159,14 +165,22 @@ class Kinks(Record, frozen=True):
         gain = np.sqrt(np.interp(frequency, self._frequencies, self.densities) / (2.0 * self.every))
         return scale_frequencies(drawn, gain)
 
-    def _level(self, count: int, rng: np.random.Generator) -> FloatArray:
-        """Factor on the jumps' squares, 1 in the mean, shape (count,). [-]"""
-        keep = float(np.exp(-self.every / self.level_duration))
-        spread = float(np.sqrt(self.level_variance))
-        kicks = spread * np.sqrt(1.0 - keep**2) * rng.normal(size=count - 1)
+    def _level(self, times: FloatArray, step: float, rng: np.random.Generator, zone: FloatArray | None) -> FloatArray:
+        """Factor on the jumps' squares, 1 in the mean, shape as `times` [s]. [-]"""
+        known = self.by_zone if zone is not None and len(zone) else None
+        variance, duration, tracks = (
+            (self.level_variance, self.level_duration, self.track_variance)
+            if known is None
+            else (known.level_variance, known.level_duration, known.track_variance)
+        )
+        keep, spread = float(np.exp(-self.every / duration)), float(np.sqrt(variance))
+        kicks = spread * np.sqrt(1.0 - keep**2) * rng.normal(size=len(times) - 1)
         level = recur(np.array([spread * rng.normal()]), kicks, np.array([keep]))
-        whose = np.sqrt(self.track_variance) * rng.normal()
-        return np.asarray(np.exp(level + whose - 0.5 * (self.level_variance + self.track_variance)))
+        whose = np.sqrt(tracks) * rng.normal()
+        level = level + whose - 0.5 * (variance + tracks)
+        if known is not None and zone is not None:
+            level = level + known.at(zone[np.clip(np.rint(times / step).astype(np.int64), 0, len(zone) - 1)])
+        return np.asarray(np.exp(level))
 
     def _bends(self, driver: FloatArray, step: float, times: FloatArray) -> FloatArray:
         """Factor on their squares where the path bends more or less than paths do, shape as `times` [s]. [-]"""

@@ -14,6 +14,7 @@ import numpy as np
 from msgspec.structs import replace
 from numpy.typing import NDArray
 
+from xosc_lateral.driver.sensor.by_zone import ByZone, ZonedRows, left_by_zones, levels_by_zone
 from xosc_lateral.driver.sensor.kinks import SHAPE, Kinks, mean_square, shape_points
 from xosc_lateral.driver.sensor.periodogram import WINDOWS, windows_of
 from xosc_lateral.drives.filters import kaiser_design, low_pass, scale_frequencies
@@ -21,6 +22,7 @@ from xosc_lateral.drives.periodogram import Detrend, periodograms
 from xosc_lateral.drives.resampling import STEP, passed
 
 FloatArray = NDArray[np.float64]
+Names = NDArray[np.str_]
 
 PERIODS = (0.4, 2.5)
 """Shorter ones leave no images below the half rate of 5 Hz; of longer ones, runs show too few. [s]"""
@@ -76,7 +78,9 @@ MANY = 100_000
 """Rows of ideal kinks that what is seen is held against: an error of 1 % in 0.1 Hz. [-]"""
 
 
-def find_kinks(rows: Sequence[FloatArray], rate: float, runs: Sequence[FloatArray]) -> tuple[Kinks, float] | None:
+def find_kinks(
+    rows: Sequence[FloatArray], rate: float, runs: Sequence[FloatArray], zoned: ZonedRows | None = None
+) -> tuple[Kinks, float] | None:
     """Kinks at even times, and the standard deviation of the rows about the pieces [m]; None where there are none.
 
     Parameters
@@ -87,12 +91,15 @@ def find_kinks(rows: Sequence[FloatArray], rate: float, runs: Sequence[FloatArra
         Rows per second. [Hz]
     runs : sequence of array
         The same, or the longer of them, at 5 Hz. [m]
+    zoned : ZonedRows, optional
+        Where the rows were recorded.
     """
     size = _period(rows, rate)
     if size is None:
         return None
     every = size / rate
-    long = [one for one in rows if len(one) >= SHORTEST * size]
+    lasting = [k for k, one in enumerate(rows) if len(one) >= SHORTEST * size]
+    long = [rows[k] for k in lasting]
     found = [jumps_of(one, size, rate) for one in long]
     jumps = [one for one, _ in found]
     powers = [periodograms(one, WINDOW) for one in jumps if len(one) >= WINDOW]
@@ -114,8 +121,27 @@ def find_kinks(rows: Sequence[FloatArray], rate: float, runs: Sequence[FloatArra
         [every, variance, duration * every, track, with_movement, acceleration]
     )
     kinks = Kinks(period, _tidy(densities), _tidy(shares), level, lasts, track, with_movement, acceleration)
+    if zoned is not None:
+        there = [
+            zoned.rows[k][first::size][: len(one)] for k, one, (_, first) in zip(lasting, flat, found, strict=True)
+        ]
+        whose = [zoned.drives[k] for k in lasting]
+        kinks = replace(kinks, by_zone=_by_zone(levels, there, whose, every))
     white = 2.0 * float(noise.mean()) / rate
     return replace(kinks, shape=_shape(kinks, runs, white)), float(np.sqrt(noise.mean()))
+
+
+def _by_zone(
+    levels: Sequence[FloatArray], zones: Sequence[Names], drives: Sequence[str], every: float
+) -> ByZone | None:
+    """Levels of the zones, and what they leave; None where they are alike."""
+    known = levels_by_zone(levels, zones, drives)
+    if known is None:
+        return None
+    left = [left_by_zones(one, there, known) for one, there in zip(levels, zones, strict=True)]
+    variance, duration, track = _level(left)
+    variance, duration, track = _tidy([variance, duration * every, track])
+    return ByZone(tuple(known), _tidy(list(known.values())), variance, duration, track)
 
 
 def _tidy(values: Sequence[float] | FloatArray) -> tuple[float, ...]:

@@ -17,9 +17,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.driver.records import Record, plain
+from xosc_lateral.driver.sensor.by_zone import ByZone
 from xosc_lateral.driver.sensor.kinks import CROSSING, Kinks
 from xosc_lateral.driver.sensor.likelihood import Colour
-from xosc_lateral.driver.sensor.texture import amplitude_factor
+from xosc_lateral.driver.sensor.texture import amplitude_factor, smooth_level
 from xosc_lateral.drives.filters import scale_frequencies
 from xosc_lateral.drives.resampling import passed
 from xosc_lateral.errors import DriverProfileError
@@ -65,6 +66,8 @@ class SensorModel(Record, frozen=True):
         Variance of the log of the density over time [-], and how long a level lasts [s]; in files `wanders`, `lasts`.
     kinks : Kinks or None
         Of tracks that were smoothed piece by piece.
+    by_zone : ByZone or None
+        Level of the noise in each zone, where the recording has zones and there are no kinks, which have their own.
     second_view : float
         Power of the error over that of half the lane width, beside the white part, where that is how it was told
         (`second_view`); else 0. [-]
@@ -89,6 +92,7 @@ class SensorModel(Record, frozen=True):
     level_duration: float = msgspec.field(default=60.0, name="lasts")
     kinks: Kinks | None = None
     second_view: float = 0.0
+    by_zone: ByZone | None = None
 
     def __post_init__(self) -> None:
         """Check."""
@@ -112,6 +116,10 @@ class SensorModel(Record, frozen=True):
         values: dict[str, Any] = plain(self)
         if not self.second_view:
             del values["second_view"]  # as files had it before there were second views
+        if self.by_zone is None:
+            del values["by_zone"]
+        if self.kinks is not None and self.kinks.by_zone is None:
+            del values["kinks"]["by_zone"]
         return values
 
     def in_words(self) -> str:
@@ -143,12 +151,14 @@ class SensorModel(Record, frozen=True):
             total = total + self.coloured * Colour(self.order, self.corner).shape(frequency)
         return total
 
-    def error_on(self, path: FloatArray, step: float, rng: np.random.Generator) -> FloatArray:
-        """What the sensor adds to a sampled path, shape (n,). [m]"""
-        noise = self.sample(len(path), step, rng)
-        return noise if self.kinks is None or not len(path) else noise + self.kinks.sample(path, step, rng)
+    def error_on(
+        self, path: FloatArray, step: float, rng: np.random.Generator, zone: FloatArray | None = None
+    ) -> FloatArray:
+        """What the sensor adds to a sampled path, shape (n,) [m]; `zone` has the codes of its zones, if known."""
+        noise = self.sample(len(path), step, rng, zone)
+        return noise if self.kinks is None or not len(path) else noise + self.kinks.sample(path, step, rng, zone)
 
-    def sample(self, n: int, step: float, rng: np.random.Generator) -> FloatArray:
+    def sample(self, n: int, step: float, rng: np.random.Generator, zone: FloatArray | None = None) -> FloatArray:
         """Noise as it is in measured runs at this step, without kinks, shape (n,). [m]
 
         Without a measured density, what rounding adds is left out: runs are low-passed, and lie on its lattice no more.
@@ -159,9 +169,13 @@ class SensorModel(Record, frozen=True):
         frequency: FloatArray = np.asarray(np.fft.rfftfreq(padded, step), dtype=np.float64)
         gain = np.sqrt(self.in_runs(frequency) / (2.0 * step))
         error = scale_frequencies(rng.normal(size=padded), gain)[:n]
-        if not self.level_variance:
-            return error
-        return error * amplitude_factor(self.level_variance, self.level_duration, n, step, rng)
+        known = self.by_zone if zone is not None else None
+        level = self if known is None else known
+        if level.level_variance:
+            error = error * amplitude_factor(level.level_variance, level.level_duration, n, step, rng)
+        if known is not None and zone is not None:
+            error = error * np.exp(0.5 * smooth_level(known.at(zone), step))
+        return error
 
     def in_runs(self, frequency: FloatArray) -> FloatArray:
         """One-sided power density of the noise in runs at 5 Hz. [m2/Hz] Shape as `frequency` [Hz]."""

@@ -15,6 +15,7 @@ import numpy as np
 from msgspec.structs import replace
 from numpy.typing import NDArray
 
+from xosc_lateral.driver.sensor.by_zone import ZonedRows
 from xosc_lateral.driver.sensor.explanations import Explanation, explanations
 from xosc_lateral.driver.sensor.hidden_path import HiddenPath
 from xosc_lateral.driver.sensor.kinks import Kinks
@@ -24,7 +25,14 @@ from xosc_lateral.driver.sensor.model import SensorModel
 from xosc_lateral.driver.sensor.periodogram import Periodogram, periodogram, windows_of
 from xosc_lateral.driver.sensor.quantisation import quantisation_step, rounding_density
 from xosc_lateral.driver.sensor.second_view import LEVEL_SD, SecondView, second_view
-from xosc_lateral.driver.sensor.texture import FAST, LEAST_SHARE, MANY, level_variation, measured_density
+from xosc_lateral.driver.sensor.texture import (
+    FAST,
+    LEAST_SHARE,
+    MANY,
+    level_by_zone,
+    level_variation,
+    measured_density,
+)
 from xosc_lateral.driver.sensor.vehicle_bound import density
 from xosc_lateral.driver.sensor.wide_steps import WideSteps, split_wide_steps
 from xosc_lateral.drives.filters import scale_frequencies
@@ -103,6 +111,7 @@ def separate(
     sensor_noise: float | None = None,
     half_widths: Sequence[FloatArray] | None = None,
     one_camera: bool = False,
+    zoned: ZonedRows | None = None,
 ) -> Separation:
     """Tell driver and sensor apart.
 
@@ -125,6 +134,8 @@ def separate(
     one_camera : bool
         Whether that is known to be the camera that measured the offset; else what the width shows is taken where it is
         plausible.
+    zoned : ZonedRows, optional
+        Where the rows and runs were recorded: what their sensor's level hangs on.
 
     Raises
     ------
@@ -142,8 +153,8 @@ def separate(
         per_second = rate or sum(map(len, measured)) / (step * sum(map(len, runs)))
         wide = split_wide_steps(data, windows, measured, grain, per_second, sensor_noise)
         if wide is not None:
-            return _textured(_seen_through(wide, per_second), runs, frequency, windows, step)
-    pieces = None if rows is None or rate is None else find_kinks(rows, rate, runs)
+            return _textured(_seen_through(wide, per_second), runs, frequency, windows, step, zoned)
+    pieces = None if rows is None or rate is None else find_kinks(rows, rate, runs, zoned)
     kinks, noise = pieces or (None, 0.0)
     about_pieces = kinks is not None and known is None
     if about_pieces:  # where nothing slower than a piece is left
@@ -171,7 +182,7 @@ def separate(
     )
     sensor = _sensor(best, colour, grain, share * variance, (1.0 - share) * variance, interval)
     sensor = replace(sensor, kinks=kinks)
-    return _textured(Separation(best.knots, sensor, beside, two_levels), runs, frequency, windows, step)
+    return _textured(Separation(best.knots, sensor, beside, two_levels), runs, frequency, windows, step, zoned)
 
 
 def _taken(found: Sequence[Explanation]) -> Explanation:
@@ -215,7 +226,12 @@ def _seen_through(wide: WideSteps, rate: float) -> Separation:
 
 
 def _textured(
-    split: Separation, runs: Sequence[FloatArray], frequency: FloatArray, windows: FloatArray, step: float
+    split: Separation,
+    runs: Sequence[FloatArray],
+    frequency: FloatArray,
+    windows: FloatArray,
+    step: float,
+    zoned: ZonedRows | None,
 ) -> Separation:
     """With the error's density as measured, and how its level varies where the sensor outweighs the driver."""
     if split.sensor.kinks is not None:  # what varies in level is theirs, and what they leave is as the parts have it
@@ -225,8 +241,11 @@ def _textured(
     sensor = replace(split.sensor, frequencies=rounded(frequencies), densities=rounded(densities))
     fast = frequency > FAST
     if (windows.mean(axis=0) * share)[fast].sum() > LEAST_SHARE * windows.mean(axis=0)[fast].sum():
-        variance, duration = level_variation(runs, sensor.sample(MANY, step, np.random.default_rng(0)), step)
+        steady = sensor.sample(MANY, step, np.random.default_rng(0))
+        variance, duration = level_variation(runs, steady, step)
         sensor = replace(sensor, level_variance=rounded((variance,))[0], level_duration=rounded((duration,))[0])
+        if zoned is not None:
+            sensor = replace(sensor, by_zone=level_by_zone(runs, steady, step, zoned))
     return replaced(split, sensor=sensor)
 
 

@@ -15,10 +15,13 @@ from collections.abc import Sequence
 from itertools import pairwise
 
 import numpy as np
+from msgspec.structs import replace
 from numpy.typing import NDArray
 
 from xosc_lateral.driver.recursion import recur
+from xosc_lateral.driver.sensor.by_zone import ByZone, ZonedRows, levels_by_zone
 from xosc_lateral.drives.filters import kaiser_design, low_pass
+from xosc_lateral.drives.zones import passages, zone_codes
 
 FloatArray = NDArray[np.float64]
 
@@ -48,6 +51,9 @@ TIMES_TO_1_E = 2.146
 
 WARM_UP = 5.0
 """Levels' lasting times before the first row: the level is then one as any. [-]"""
+
+FAINTEST = 1e-16
+"""Added to mean squares, so that none at all has a logarithm. [m2]"""
 
 MANY = 50_000
 """Rows of stationary noise that the measured spread is held against: an error of 2 %. [-]"""
@@ -80,6 +86,31 @@ def measured_density(
     return middles, tuple(float(density[inside].mean()) for inside in rows)
 
 
+def level_by_zone(runs: Sequence[FloatArray], noise: FloatArray, step: float, zoned: ZonedRows) -> ByZone | None:
+    """Level of fast movement in each zone, and how it varies besides; None where zones are alike.
+
+    As `level_variation`, of runs whose zones are known.
+    """
+    rows = round(PIECE / step)
+    paths = [_fast(run, step) for run in runs]
+    cut = [zone[(len(zone) - len(path)) // 2 :][: len(path)] for path, zone in zip(paths, zoned.runs, strict=True)]
+    parts = [passages(zone, rows // 2) if len(path) else [] for path, zone in zip(paths, cut, strict=True)]
+    known = levels_by_zone(
+        [np.array([_log_mean_square(path[at]) for _, at in those]) for path, those in zip(paths, parts, strict=True)],
+        [np.array([name for name, _ in those], dtype=np.str_) for those in parts],
+        zoned.drives,
+    )
+    if known is None:
+        return None
+    found = ByZone(tuple(known), tuple(float(f"{level:.4g}") for level in known.values()), 0.0, LONGEST)
+    left = [
+        path * np.exp(-0.5 * smooth_level(found.at(zone_codes(zone)), step)) if len(path) else path
+        for path, zone in zip(paths, cut, strict=True)
+    ]
+    variance, duration = _variation([_of_pieces(path, rows) for path in left], _of_pieces(_fast(noise, step), rows))
+    return replace(found, level_variance=float(f"{variance:.4g}"), level_duration=float(f"{duration:.4g}"))
+
+
 def level_variation(runs: Sequence[FloatArray], noise: FloatArray, step: float) -> tuple[float, float]:
     """How the level of fast movement varies, beyond what chance does to stationary noise.
 
@@ -98,12 +129,16 @@ def level_variation(runs: Sequence[FloatArray], noise: FloatArray, step: float) 
         Variance of the log of the density [-] and how long a level lasts [s]; 0 where it doesn't vary.
     """
     rows = round(PIECE / step)
-    levels = [_log_power(run, rows, step) for run in runs]
+    return _variation([_log_power(run, rows, step) for run in runs], _log_power(noise, rows, step))
+
+
+def _variation(levels: Sequence[FloatArray], steady: FloatArray) -> tuple[float, float]:
+    """Of log powers of pieces, beyond those of steady noise."""
     levels = [one for one in levels if len(one) > LAG_PIECES]
     if not levels:
         return 0.0, LONGEST
     mean = float(np.concatenate(levels).mean())
-    variance = float(np.concatenate(levels).var() - _log_power(noise, rows, step).var())
+    variance = float(np.concatenate(levels).var() - steady.var())
     if variance <= 0.0:
         return 0.0, LONGEST
     products = np.concatenate([(one[LAG_PIECES:] - mean) * (one[:-LAG_PIECES] - mean) for one in levels])
@@ -120,13 +155,32 @@ def amplitude_factor(variance: float, duration: float, n: int, step: float, rng:
     return np.asarray(np.exp(0.5 * (level - 0.5 * variance)))
 
 
+def smooth_level(level: FloatArray, step: float) -> FloatArray:
+    """Levels by zone that go from one to the next within the pieces that they were seen in. Shape (n,). [-]"""
+    half = max(round(0.5 * PIECE / step), 1)
+    kernel = np.hanning(2 * half + 1)
+    return np.convolve(np.pad(level, half, mode="edge"), kernel / kernel.sum(), mode="valid")
+
+
 def _log_power(path: FloatArray, rows: int, step: float) -> FloatArray:
+    return _of_pieces(_fast(path, step), rows)
+
+
+def _of_pieces(fast: FloatArray, rows: int) -> FloatArray:
+    count = len(fast) // rows
+    return np.asarray(np.log((fast[: count * rows].reshape(count, rows) ** 2).mean(axis=1) + FAINTEST))
+
+
+def _log_mean_square(fast: FloatArray) -> float:
+    return float(np.log((fast**2).mean() + FAINTEST))
+
+
+def _fast(path: FloatArray, step: float) -> FloatArray:
+    """Movement above `FAST` but for the ends, where the filter needs more; empty where less than a piece is left."""
     nyquist = 0.5 / step
     half, beta = kaiser_design(ATTENUATION, TRANSITION / nyquist)
     kernel = -low_pass(half, FAST / nyquist, beta)
     kernel[half] += 1.0
-    if len(path) < len(kernel) + rows:
+    if len(path) < len(kernel) + round(PIECE / step):
         return np.empty(0)
-    fast = np.convolve(path, kernel, mode="valid")
-    count = len(fast) // rows
-    return np.asarray(np.log((fast[: count * rows].reshape(count, rows) ** 2).mean(axis=1) + 1e-16))
+    return np.convolve(path, kernel, mode="valid")

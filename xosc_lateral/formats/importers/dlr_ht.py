@@ -26,6 +26,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.drives.cleaning import RUN
+from xosc_lateral.drives.zones import ZONE, zones_along
 from xosc_lateral.errors import FormatError, NotEnoughDataError
 from xosc_lateral.formats.importers.cuts import (
     DEFAULT_CUTS,
@@ -90,9 +91,10 @@ def import_dlr_ht(source: Path, settings: CutSettings = DEFAULT_CUTS, *, keep_cu
         part, lanes[name] = _place_in_lanes(s[rows], d[rows], height[rows], vehicle[rows], gap[rows], settings)
         placed.put(rows, part)
     table = _context(tracks, placed, s, forward)
+    table[ZONE] = zones_along(_strands(forward, placed.lane), s_road)
     table["curvature"] = reference.curvature(s_road) * np.where(forward, 1.0, -1.0)
     # 0.1 mm, 0.1 per km: below any measurement, above what linear algebra does differently from machine to machine.
-    table = table.round({"curvature": 7, **dict.fromkeys(table.columns.drop(["curvature", "drive", "time"]), 4)})
+    table = table.round({"curvature": 7, **dict.fromkeys(table.columns.drop(["curvature", "drive", "time", ZONE]), 4)})
     reasons = {"no lane": placed.lane < 0, "lane change": placed.changing, "gap": gap}
     frame = np.round(tracks["time"].to_numpy() / STEP).astype(np.int64)
     table["state"] = name_states(reasons, placed.lane, vehicle, frame, STEP, settings)
@@ -308,6 +310,12 @@ def _context(tracks: pd.DataFrame, placed: _Placed, s: FloatArray, forward: NDAr
             "is_truck": (kind == "truck").astype(np.float64),
         }
     )
+
+
+def _strands(forward: NDArray[np.bool_], lane: IntArray) -> NDArray[np.str_]:
+    """Carriageway and lane of each row, empty in no lane."""
+    names = np.array([f"{name} lane {index}" for name in ("southbound", "northbound") for index in range(LANES)])
+    return np.where(lane >= 0, names[forward * LANES + np.clip(lane, 0, LANES - 1)], "")
 
 
 def _vehicle_class(tracks: pd.DataFrame) -> NDArray[np.str_]:

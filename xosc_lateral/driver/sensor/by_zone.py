@@ -1,0 +1,111 @@
+"""How loud a sensor is in each zone of a recording, and how its level varies where the zone is known."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import inf, isfinite
+
+import numpy as np
+from numpy.typing import NDArray
+
+from xosc_lateral.driver.records import Record
+from xosc_lateral.driver.zone_levels import Passages, zone_levels
+from xosc_lateral.drives.zones import at_zones, zone_codes
+from xosc_lateral.errors import DriverProfileError
+
+FloatArray = NDArray[np.float64]
+Names = NDArray[np.str_]
+
+
+class ByZone(Record, frozen=True):
+    """Level of a sensor's error in each zone.
+
+    Parameters
+    ----------
+    zones : tuple of str
+        Names in drive tables.
+    levels : tuple of float
+        Logarithm of the error's power in each, above that of all. [-]
+    level_variance, level_duration, track_variance : float
+        Of what varies besides, as of all (`SensorModel`, `Kinks`). [-], [s], [-]
+
+    Raises
+    ------
+    DriverProfileError
+        If there are not as many levels as zones, or a number is out of its range.
+    """
+
+    zones: tuple[str, ...]
+    levels: tuple[float, ...]
+    level_variance: float
+    level_duration: float
+    track_variance: float = 0.0
+
+    def __post_init__(self) -> None:
+        """Check."""
+        spreads = (self.level_variance, self.track_variance)
+        if len(self.zones) != len(self.levels) or not all(map(isfinite, (*self.levels, *spreads))):
+            raise DriverProfileError(f"sensor by zone: {self}")
+        if min(spreads) < 0.0 or not 0.0 < self.level_duration < inf:
+            raise DriverProfileError(f"sensor by zone: {self}")
+
+    def at(self, codes: FloatArray) -> FloatArray:
+        """Logarithm of the power at rows in zones of these codes, shape (n,); 0 in a zone that is not known. [-]"""
+        found = at_zones(codes, self.zones, self.levels)
+        return np.where(np.isnan(found), 0.0, found)
+
+
+@dataclass(frozen=True, eq=False)
+class ZonedRows:
+    """Where rows of runs were recorded, and by whom driven.
+
+    Parameters
+    ----------
+    rows, runs : sequence of array of str, shape (n_i,)
+        Zones of the rows as recorded, and of the runs at 5 Hz.
+    drives : sequence of str
+        Whose each run is.
+    """
+
+    rows: Sequence[Names]
+    runs: Sequence[Names]
+    drives: Sequence[str]
+
+
+def levels_by_zone(
+    levels: Sequence[FloatArray], zones: Sequence[Names], drives: Sequence[str]
+) -> dict[str, float] | None:
+    """Level of each zone above that of all, whose power is 1 in the mean; None if there is no more than chance.
+
+    Parameters
+    ----------
+    levels : sequence of array, shape (k_i,)
+        Logarithms of power, one array per run. [-]
+    zones : sequence of array of str, shape (k_i,)
+        Where each was recorded; empty: not known.
+    drives : sequence of str
+        Whose each run is.
+    """
+    parts = [
+        (float(one[there == name].mean()), str(name), drive)
+        for one, there, drive in zip(levels, zones, drives, strict=True)
+        for name in np.unique(there)
+        if name
+    ]
+    if not parts:
+        return None
+    level, zone, drive = zip(*parts, strict=True)
+    found = zone_levels(Passages(np.array(level), zone, drive, np.empty((len(parts), 0))))
+    if found is None:
+        return None
+    count = np.bincount(np.searchsorted(found.names, zone), minlength=len(found.names))
+    shift = float(np.log(np.average(np.exp(found.values), weights=count)))
+    return dict(zip(found.names, (found.values - shift).tolist(), strict=True))
+
+
+def left_by_zones(level: FloatArray, zone: Names, known: dict[str, float]) -> FloatArray:
+    """Levels without those of their zones, shape (k,). [-]"""
+    names = sorted(known)
+    found = at_zones(zone_codes(zone), names, [known[name] for name in names])
+    return np.asarray(level - np.where(np.isnan(found), 0.0, found))
