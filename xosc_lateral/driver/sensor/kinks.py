@@ -152,8 +152,11 @@ class Kinks(Record, frozen=True):
         Shape as `frequency` [Hz].
         """
         share = np.interp(frequency, self._frequencies, self.shares) * _rising(frequency, SLOWEST) ** 2
-        of_path = 1.0 - _rising(frequency, self._crossing) ** 2
-        return np.asarray(np.sqrt((1.0 - share) * of_path) * passed(frequency))
+        return np.asarray(np.sqrt((1.0 - share) * self.left_to_driver(frequency)) * passed(frequency))
+
+    def left_to_driver(self, frequency: FloatArray) -> FloatArray:
+        """Share of all power: 1 below half a kink a period, none above it. [-] Shape as `frequency` [Hz]."""
+        return np.asarray(1.0 - _rising(frequency, self._crossing) ** 2)
 
     @property
     def _crossing(self) -> tuple[float, float]:

@@ -98,7 +98,7 @@ class Separation:
         driver = density(self.knots, frequency)
         share = driver / (driver + self.sensor.density(frequency) + self.beside(frequency))
         share[0] = 1.0
-        return share
+        return share if self.sensor.kinks is None else share * self.sensor.kinks.left_to_driver(frequency)
 
 
 def separate(
