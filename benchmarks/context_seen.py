@@ -1,7 +1,7 @@
-"""What a classifier gains from the context: by which columns, with and without neighbours' effects.
+"""What a classifier gains from the context: by which columns, with and without neighbours' effects and zones.
 
     xosc-lateral import dlr-ht tasi-0.15.4-py3-none-any.whl -o dlr.parquet
-    python -m benchmarks.context_seen dlr.parquet [--seeds 10 11 12 13] [--write docs/validation/realism.md]
+    python -m benchmarks.context_seen dlr.parquet [--seeds 30 31 32 33] [--write docs/validation/realism.md]
 
 Free runs of the driver alone beside recorded ones, as in `fair_measure`; mean over several random halvings of the
 vehicles, each half in its turn held out, with the standard error over halvings. Some columns say where a vehicle is:
@@ -14,6 +14,7 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Sequence
+from dataclasses import replace
 from itertools import product
 from pathlib import Path
 
@@ -25,7 +26,7 @@ from benchmarks.markers import write_between_markers
 from xosc_lateral.driver.fitting import fit_profile
 from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.drives.cuts import all_runs
-from xosc_lateral.drives.drive import Run
+from xosc_lateral.drives.drive import Drive, Run
 from xosc_lateral.evaluation.classifier import classifier_two_sample_test, context_features
 from xosc_lateral.evaluation.filters import below_half_hertz, thinned
 from xosc_lateral.evaluation.sampled_snippets import sample_runs
@@ -33,8 +34,10 @@ from xosc_lateral.evaluation.snippets import snippets_of
 from xosc_lateral.formats.drives import read_drives
 
 FloatArray = NDArray[np.float64]
-LENGTHS = (10.0, 30.0)
+LENGTHS = (10.0, 30.0, 60.0)
 """Of snippets. [s]"""
+CONDITIONS = ((False, True), (True, False), (True, True))
+"""Whether neighbours are fitted, and whether zones are known."""
 OF_MAP = frozenset({"curvature", "lane_width"})
 OF_PLACE = OF_MAP | {"speed", "acceleration"}
 EACH = 3
@@ -61,37 +64,42 @@ def areas(profile: DriverProfile, runs: Sequence[Run], seed: int, seconds: float
     return found
 
 
-def table(found: dict[bool, FloatArray]) -> list[str]:
-    """Of areas, shape (halvings, 2, lengths, 4) each, by whether neighbours were fitted."""
+def without_zones(drives: Sequence[Drive]) -> list[Drive]:
+    return [replace(drive, zone=None) for drive in drives]
+
+
+def table(found: dict[tuple[bool, bool], FloatArray]) -> list[str]:
+    """Of areas, shape (halvings, 2, lengths, 4) each, by what was known."""
     lines = [
-        "| snippets | neighbours fitted | alone | all context | without the map's | without the place's |",
-        "|---|---|---|---|---|---|",
+        "| snippets | neighbours fitted | zones known | alone | with context | without map | without place |",
+        "|---|---|---|---|---|---|---|",
     ]
     for number, seconds in enumerate(LENGTHS):
-        for neighbours, several in found.items():
+        for (neighbours, zones), several in found.items():
             means = several[:, :, number].mean(axis=1)
             errors = means.std(axis=0, ddof=1) / np.sqrt(len(means))
             cells = " | ".join(f"{a:.3f} ± {b:.3f}" for a, b in zip(means.mean(axis=0), errors, strict=True))
-            lines.append(f"| {seconds:g} s | {'yes' if neighbours else 'no'} | {cells} |")
+            known = " | ".join("yes" if one else "no" for one in (neighbours, zones))
+            lines.append(f"| {seconds:g} s | {known} | {cells} |")
     return lines
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("table", type=Path, nargs="+")
-    parser.add_argument("--seeds", type=int, nargs="+", default=[10, 11, 12, 13], help="one halving each")
+    parser.add_argument("--seeds", type=int, nargs="+", default=[30, 31, 32, 33], help="one halving each")
     parser.add_argument("--write", type=Path, help="page with the markers")
     args = parser.parse_args()
     drives = read_drives(args.table)
-    found: dict[bool, list[list[list[float]]]] = {False: [], True: []}
-    for neighbours, seed in product((True, False), args.seeds):
-        one, other = halves(drives, seed)
+    found: dict[tuple[bool, bool], list[list[list[float]]]] = {known: [] for known in CONDITIONS}
+    for known, seed in product(CONDITIONS, args.seeds):
+        one, other = halves(drives if known[1] else without_zones(drives), seed)
         for fitted, held_out in ((one, other), (other, one)):
-            profile, runs = fit_profile(fitted, name="half", neighbours=neighbours), all_runs(held_out)
-            found[neighbours].append([areas(profile, runs, 0, seconds) for seconds in LENGTHS])
-            print(seed, neighbours, np.round(found[neighbours][-1], 3).tolist(), file=sys.stderr, flush=True)
+            profile, runs = fit_profile(fitted, name="half", neighbours=known[0]), all_runs(held_out)
+            found[known].append([areas(profile, runs, 0, seconds) for seconds in LENGTHS])
+            print(seed, known, np.round(found[known][-1], 3).tolist(), file=sys.stderr, flush=True)
     shape = (len(args.seeds), 2, len(LENGTHS), -1)
-    text = "\n".join(table({neighbours: np.array(several).reshape(shape) for neighbours, several in found.items()}))
+    text = "\n".join(table({known: np.array(several).reshape(shape) for known, several in found.items()}))
     print(text)
     if args.write is not None:
         write_between_markers(args.write, text, "context-seen")

@@ -1,13 +1,12 @@
 """What would the fair measure say of a model that is the truth? The recording replaced by sampled drives.
 
     xosc-lateral import dlr-ht tasi-0.15.4-py3-none-any.whl -o dlr.parquet
-    python -m benchmarks.fair_null dlr.parquet [--repeats 12] [--no-neighbours] [--cameras tasi-0.15.4-py3-none-any.whl]
+    python -m benchmarks.fair_null dlr.parquet [--repeats 12] [--no-neighbours]
         [--write docs/validation/realism.md]
 
 A profile is fitted to all vehicles, and stands for the truth: each recorded run is replaced by one that it sampled
 under the same context. These drives are halved, fitted and judged as the recording is (free runs below 0.5 Hz, both
-halves). What is left above 0.5 is chance: of the vehicles that a half holds, of the fit, and of the classifier. With
-`--cameras` these drives are as loud at each place as the recording is, which no driver's profile can know.
+halves). What is left above 0.5 is chance: of the vehicles that a half holds, of the fit, and of the classifier.
 """
 
 from __future__ import annotations
@@ -20,7 +19,6 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.camera_levels import CameraLevels
 from benchmarks.markers import write_between_markers
 from xosc_lateral.driver.fitting import fit_population, fit_profile
 from xosc_lateral.driver.profile import DriverProfile
@@ -73,12 +71,9 @@ def under_the_truth(
     seed: int,
     *,
     neighbours: bool | None = None,
-    cameras: CameraLevels | None = None,
 ) -> FloatArray:
     """Areas for both halves of drives that a known profile sampled, shape (2, measures). [-]"""
     sampled = sample_runs(truth, runs, seed, same_start=False)
-    if cameras is not None:
-        sampled = [cameras.on(run, path) for run, path in zip(runs, sampled, strict=True)]
     drives = [replace(run, offset=path) for run, path in zip(runs, sampled, strict=True)]
     names = sorted({run.drive for run in drives})
     chosen = set(np.random.default_rng(seed).permutation(names)[: len(names) // 2].tolist())
@@ -107,22 +102,16 @@ def main() -> None:
     parser.add_argument("table", type=Path, nargs="+")
     parser.add_argument("--repeats", type=int, default=12)
     parser.add_argument("--no-neighbours", dest="neighbours", action="store_false", default=None)
-    parser.add_argument("--cameras", type=Path, metavar="WHEEL", help="as loud at each place as this recording")
     parser.add_argument("--write", type=Path, help="page with the markers")
     args = parser.parse_args()
     drives = read_drives(args.table)
     truth, runs = fit_profile(drives, name="all", neighbours=args.neighbours), all_runs(drives)
-    cameras = None
-    if args.cameras is not None:
-        cameras = CameraLevels.found(args.cameras, runs, sample_runs(truth, runs, FIRST_SEED - 1, same_start=False))
     seeds = range(FIRST_SEED, FIRST_SEED + args.repeats)
-    found = np.array(
-        [under_the_truth(truth, runs, seed, neighbours=args.neighbours, cameras=cameras) for seed in seeds]
-    )
+    found = np.array([under_the_truth(truth, runs, seed, neighbours=args.neighbours) for seed in seeds])
     text = "\n".join(table(found))
     print(text)
     if args.write is not None:
-        write_between_markers(args.write, text, "fair-null" if cameras is None else "fair-null-cameras")
+        write_between_markers(args.write, text, "fair-null")
 
 
 if __name__ == "__main__":

@@ -93,11 +93,24 @@ def _unknown_columns(profile: DriverProfile, drives: Sequence[Drive]) -> list[st
     for column in profile.columns:
         names = tuple(d.name for d in drives if column not in _known(d))
         lacking.setdefault(names, []).append(column)
-    return [
+    found = [
         _neutral(f"drive {names[0]}" if len(names) == 1 else f"{len(names)} of {len(drives)} drives", columns)
         for names, columns in lacking.items()
         if names
     ]
+    return found + _unknown_zones(profile, drives)
+
+
+def _unknown_zones(profile: DriverProfile, drives: Sequence[Drive]) -> list[str]:
+    """How many zones of the tables the profile was not fitted on, in a line, if any."""
+    from xosc_lateral.driver.effects import Zones
+
+    known = {name for effect in profile.effects if isinstance(effect, Zones) for name in effect.zones}
+    there = {str(name) for drive in drives if drive.zone is not None for name in set(drive.zone.tolist()) if name}
+    strange = sorted(there - known)
+    if not known or not strange:
+        return []
+    return [f"{len(strange)} of {len(there)} zones are not the profile's ({strange[0]}, say), taken as neutral"]
 
 
 def _known(drive: Drive) -> set[str]:
