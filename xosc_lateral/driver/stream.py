@@ -21,6 +21,7 @@ from xosc_lateral.driver.records import plain, read_as
 from xosc_lateral.driver.response_stream import ResponseStream
 from xosc_lateral.driver.stream_state import SeedState, StreamState, sealed, upgraded
 from xosc_lateral.driver.upsampling import extrapolate, piece
+from xosc_lateral.drives.zones import ZONE
 from xosc_lateral.errors import DriverProfileError
 
 FloatArray = NDArray[np.float64]
@@ -39,7 +40,8 @@ class OffsetStream:
     rate, those that `upsample` makes of them. A driver who looks ahead, and a curve between samples, need to know what
     comes: `step` is therefore given the context `preview` seconds ahead of the offset that it returns, and `look`
     the context before that. A bench that doesn't know the future gives `step` the present context without a `look`:
-    then the driver responds to it `preview` seconds later; what is random is the same.
+    then the driver responds to it `preview` seconds later; what is random is the same. Zones of a recording are not
+    known to a stream: it is as the mean of all.
 
     Parameters
     ----------
@@ -80,7 +82,9 @@ class OffsetStream:
         self._start, self._time = start, time
         self._process = DriveProcess(profile, self._seed, ahead=BLOCK)
         self._process.begin_at(time)
-        self._responses = tuple(ResponseStream(effect, profile.model.step) for effect in self._process.columned)
+        # What drives now is in no zone of a recording, and must not look ahead for the next one.
+        columned = [effect for effect in self._process.columned if ZONE not in effect.columns]
+        self._responses = tuple(ResponseStream(effect, profile.model.step) for effect in columned)
         self._ahead = max([0, *(response.ahead for response in self._responses)]) + (
             _NEIGHBOURS if self._factor > 1 else 0
         )

@@ -42,13 +42,19 @@ def zone_codes(names: Names | Sequence[str]) -> FloatArray:
 
 def at_zones(codes: FloatArray, names: Sequence[str], values: Sequence[float]) -> FloatArray:
     """The value of the zone of each row, shape (n,); NaN where it is none of these. [unit of the values]"""
-    own = zone_codes(names)
-    order = np.argsort(own)
-    place = np.minimum(np.searchsorted(own[order], codes), max(len(own) - 1, 0))
+    own, order = _in_order(tuple(names))
     if not len(own):
         return np.full(np.shape(codes), np.nan)
-    found = order[place]
-    return np.where(own[found] == codes, np.asarray(values, dtype=np.float64)[found], np.nan)
+    place = np.minimum(np.searchsorted(own, codes), len(own) - 1)
+    return np.where(own[place] == codes, np.asarray(values, dtype=np.float64)[order[place]], np.nan)
+
+
+@lru_cache(maxsize=64)
+def _in_order(names: tuple[str, ...]) -> tuple[FloatArray, NDArray[np.intp]]:
+    """Codes of the names, rising, and which name each is of."""
+    codes = zone_codes(names)
+    order = np.argsort(codes)
+    return codes[order], order
 
 
 def zones_along(strand: Names, place: FloatArray) -> NDArray[np.object_]:
