@@ -25,16 +25,18 @@ _WHOLE = frozenset({ParameterType.INT, ParameterType.UNSIGNED_INT, ParameterType
 
 def holds(left: float, rule: Rule, right: float) -> bool:
     """Compare measured quantities with the reference player's tolerance."""
+    # One difference for all: the tolerance added to either side is rounded differently, and a rule and its mirror image
+    # would disagree about one and the same pair. Equal infinities have none.
+    beyond = 0.0 if left == right else left - right
     if rule is Rule.GREATER_THAN:
-        return left > right + EPSILON
+        return beyond > EPSILON
     if rule is Rule.LESS_THAN:
-        return left < right - EPSILON
+        return beyond < -EPSILON
     if rule is Rule.GREATER_OR_EQUAL:
-        return left >= right - EPSILON
+        return beyond >= -EPSILON
     if rule is Rule.LESS_OR_EQUAL:
-        return left <= right + EPSILON
-    near = left == right or abs(left - right) < EPSILON
-    return near if rule is Rule.EQUAL_TO else not near
+        return beyond <= EPSILON
+    return (abs(beyond) < EPSILON) is (rule is Rule.EQUAL_TO)
 
 
 def holds_exactly(left: Value, rule: Rule, right: Value) -> bool:
