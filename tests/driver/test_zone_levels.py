@@ -69,3 +69,30 @@ def test_few_drives_or_one_zone_are_none():
     assert zone_levels(Passages(seen.level, ["all"] * len(seen.level), seen.drive, seen.beside)) is None
     assert zone_levels(Passages(np.empty(0), [], [], np.empty((0, 0)))) is None
     assert zone_levels(Passages(np.zeros(len(seen.level)), seen.zone, seen.drive, seen.beside)) is None
+
+
+def test_a_recording_of_very_many_drives_takes_no_matrix_of_them():
+    import tracemalloc
+
+    rng, drivers = np.random.default_rng(8), 6000
+    planted = 0.5 * rng.normal(size=ZONES)
+    first = rng.integers(ZONES, size=drivers)
+    number = (first[:, None] + np.arange(10)).ravel() % ZONES
+    level = planted[number] + np.repeat(0.5 * rng.normal(size=drivers), 10) + rng.normal(size=len(number))
+    zone, drive = [f"zone {k:02}" for k in number.tolist()], [f"d{k // 10}" for k in range(len(number))]
+    tracemalloc.start()
+    found = zone_levels(Passages(level, zone, drive, np.empty((len(level), 0))))
+    most = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert found is not None
+    np.testing.assert_allclose(found.values, planted - planted.mean(), atol=0.12)
+    assert most < 0.3 * 8 * drivers**2
+
+
+def test_columns_that_a_driver_keeps_and_units_change_nothing():
+    seen, _ = made(3, zones=0.5, beside=0.3)
+    scaled = Passages(seen.level - 17.0, seen.zone, seen.drive, np.column_stack([1e3 * seen.beside, seen.beside]))
+    one, other = zone_levels(seen), zone_levels(scaled)
+    assert one is not None and other is not None
+    np.testing.assert_allclose(other.values, one.values, atol=1e-9)
+    np.testing.assert_allclose(other.errors, one.errors, atol=1e-9)

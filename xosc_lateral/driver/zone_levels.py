@@ -15,6 +15,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +25,9 @@ IntArray = NDArray[np.int64]
 
 LEAST_DRIVES = 30
 """Drives that must have passed, as of a population (`place`): with fewer, whose level it is can't be told. [-]"""
+
+RANK = 1e-10
+"""Mean square of a column, as large as an indicator, below which it is a sum of others. [-]"""
 
 SIGNIFICANCE = 0.01
 """Zones whose differences chance makes as large as this often are alike. [-]"""
@@ -74,7 +78,9 @@ def zone_levels(seen: Passages) -> Levels | None:
         return None
     part = _parts(zone, drive, len(names), len(drives))
     parts = int(part.max()) + 1
-    fixed = np.column_stack([part[zone][:, None] == np.arange(parts), seen.beside]).astype(np.float64)
+    spread = seen.beside.std(axis=0)
+    beside = (seen.beside - seen.beside.mean(axis=0)) / np.where(spread > 0.0, spread, 1.0)  # as large as indicators
+    fixed = np.column_stack([part[zone][:, None] == np.arange(parts), beside]).astype(np.float64)
     model = _Crossed(seen.level, fixed, zone, drive, len(names), len(drives))
     variance = model.variances()
     if variance is None:
@@ -106,7 +112,10 @@ def _shrunk_parts(means: FloatArray, covariance: FloatArray) -> tuple[FloatArray
 
 
 class _Crossed:
-    """Normal equations of fixed effects, drives and zones, in this order."""
+    """Normal equations of fixed effects and zones, in this order, with those of the drives worked into them.
+
+    Of the drives, of which a recording may have very many, nothing but counts is kept: their block is diagonal.
+    """
 
     def __init__(
         self, y: FloatArray, fixed: FloatArray, zone: IntArray, drive: IntArray, zones: int, drives: int
@@ -114,62 +123,70 @@ class _Crossed:
         from scipy.sparse import coo_array, hstack
 
         rows, ones = np.arange(len(y)), np.ones(len(y))
-        design = hstack(
-            [
-                coo_array(fixed),
-                coo_array((ones, (rows, drive)), shape=(len(y), drives)),
-                coo_array((ones, (rows, zone)), shape=(len(y), zones)),
-            ]
-        ).tocsr()
-        self._gram: FloatArray = np.asarray((design.T @ design).todense())
-        self._moment: FloatArray = np.asarray(design.T @ y)
+        by_drive = coo_array((ones, (drive, rows)), shape=(drives, len(y))).tocsr()
+        design = hstack([coo_array(fixed), coo_array((ones, (rows, zone)), shape=(len(y), zones))]).tocsr()
+        y = y - y.mean()
+        self._gram = _dense(design.T @ design)
+        self._moment = np.asarray(design.T @ y)
         self._square, self._n = float(y @ y), len(y)
-        self._fixed, self._drives, self._zones = fixed.shape[1], drives, zones
+        self._count = np.bincount(drive, minlength=drives).astype(np.float64)
+        self._sums: Any = by_drive @ design
+        self._sums_of_y = np.asarray(by_drive @ y)
+        self._fixed, self._drives = fixed.shape[1], drives
+
+    def _without_drives(self, penalty: float = 0.0) -> tuple[FloatArray, FloatArray, float]:
+        """Normal equations, and the sum of squares, that drives of a prior variance leave; none: whatever they are."""
+        share = 1.0 / (self._count + penalty)
+        weighted: Any = self._sums.T.multiply(share[None, :])
+        gram = self._gram - _dense(weighted @ self._sums)
+        moment = self._moment - np.asarray(weighted @ self._sums_of_y)
+        return gram, moment, self._square - float(share @ self._sums_of_y**2)
 
     def variances(self) -> tuple[float, float, float] | None:
         """Of zones, drives and the rest; None where the zones' is none beyond chance. [-]"""
         from scipy.stats import f as f_distribution
 
-        before = self._fixed + self._drives
-        every = np.arange(len(self._gram))
-        without_zones, without_drives = every[:before], np.concatenate([every[: self._fixed], every[before:]])
-        left, rank = self._left(every)
-        rest = left / max(self._n - rank, 1)
-        by_zone, rank_before = self._left(without_zones)
-        freedom = rank - rank_before
-        if freedom < 1 or rest <= 0.0:
+        gram, moment, square = self._without_drives()
+        first = slice(0, self._fixed)
+        explained, rank, _ = _solved(gram, moment, self._n)
+        by_fixed, rank_fixed, inverse = _solved(gram[first, first], moment[first], self._n)
+        left, freedom = square - explained, rank - rank_fixed
+        rows = self._n - self._drives - rank
+        if freedom < 1 or rows < 1 or left <= 0.0:
             return None
-        ratio = (by_zone - left) / freedom / rest
-        if f_distribution.sf(ratio, freedom, self._n - rank) > SIGNIFICANCE:
+        rest, told = left / rows, explained - by_fixed
+        if f_distribution.sf(told / freedom / rest, freedom, rows) > SIGNIFICANCE:
             return None
-        zones = max(by_zone - left - rest * freedom, 0.0) / self._amount(without_zones, every[before:])
-        by_drive, rank_before = self._left(without_drives)
-        drives = max(by_drive - left - rest * (rank - rank_before), 0.0)
-        return zones, drives / self._amount(without_drives, every[self._fixed : before]), rest
+        cross = gram[first, self._fixed :]
+        amount = float(np.trace(gram[self._fixed :, self._fixed :]) - (cross * (inverse @ cross)).sum())
+        zones = max(told - rest * freedom, 0.0) / max(amount, 1e-12)
 
-    def _left(self, used: IntArray) -> tuple[float, int]:
-        """Sum of squares that these columns leave, and their rank."""
-        gram, moment = self._gram[np.ix_(used, used)], self._moment[used]
-        values, vectors = np.linalg.eigh(gram)
-        kept = values > 1e-10 * values[-1]
-        part = vectors[:, kept].T @ moment
-        return self._square - float(part @ (part / values[kept])), int(kept.sum())
-
-    def _amount(self, others: IntArray, own: IntArray) -> float:
-        """Trace of the own columns' squares once the others are taken out of them: what a unit of variance adds."""
-        cross = self._gram[np.ix_(others, own)]
-        inverse = np.linalg.pinv(self._gram[np.ix_(others, others)], hermitian=True)
-        return max(float(np.trace(self._gram[np.ix_(own, own)]) - (cross * (inverse @ cross)).sum()), 1e-12)
+        explained, rank_zones, inverse = _solved(self._gram, self._moment, self._n)
+        told = self._square - explained - left
+        amount = self._n - float((inverse * _dense(self._sums.T @ self._sums)).sum())
+        drives = max(told - rest * (self._drives + rank - rank_zones), 0.0) / max(amount, 1e-12)
+        return zones, drives, rest
 
     def predicted(
         self, zones: float, drives: float, rest: float, parts: int
     ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
         """Level of each zone in its part, and its standard error; levels of the parts, and their covariance. [-]"""
-        first, before = self._fixed, self._fixed + self._drives
-        penalty = np.zeros(len(self._gram))
-        penalty[first:before] = rest / max(drives, 1e-12)
-        penalty[before:] = rest / max(zones, 1e-12)
-        inverse = np.asarray(np.linalg.pinv(self._gram + np.diag(penalty), hermitian=True), dtype=np.float64)
-        found = inverse @ self._moment
-        errors: FloatArray = np.sqrt(rest * np.diag(inverse)[before:])
-        return found[before:], errors, found[:parts], rest * inverse[:parts, :parts]
+        gram, moment, _ = self._without_drives(rest / max(drives, 1e-12))
+        gram[np.arange(self._fixed, len(gram)), np.arange(self._fixed, len(gram))] += rest / max(zones, 1e-12)
+        _, _, inverse = _solved(gram, moment, self._n)
+        found = inverse @ moment
+        errors = np.asarray(np.sqrt(rest * np.diag(inverse)[self._fixed :]), dtype=np.float64)
+        return found[self._fixed :], errors, found[:parts], rest * inverse[:parts, :parts]
+
+
+def _dense(matrix: Any) -> FloatArray:
+    return np.asarray(matrix.todense(), dtype=np.float64)
+
+
+def _solved(gram: FloatArray, moment: FloatArray, n: int) -> tuple[float, int, FloatArray]:
+    """Sum of squares that columns of n rows explain, their rank, and the generalised inverse of their squares."""
+    values, vectors = np.linalg.eigh(gram)
+    kept = values > RANK * n
+    vectors, values = vectors[:, kept], values[kept]
+    part = vectors.T @ moment
+    return float(part @ (part / values)), int(kept.sum()), np.asarray((vectors / values) @ vectors.T)
