@@ -20,6 +20,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from xosc_lateral.drives.zones import numbered
+
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
@@ -72,8 +74,8 @@ class Levels:
 
 def zone_levels(seen: Passages) -> Levels | None:
     """Levels of the zones; None where there are too few drives or zones, or chance makes as much."""
-    names, zone = np.unique(np.asarray(seen.zone, dtype=np.str_), return_inverse=True)
-    drives, drive = np.unique(np.asarray(seen.drive, dtype=np.str_), return_inverse=True)
+    names, zone = numbered(seen.zone)
+    drives, drive = numbered(seen.drive)
     if len(names) < 2 or len(drives) < LEAST_DRIVES or len(seen.level) <= len(names) + len(drives) + 1:
         return None
     part = _parts(zone, drive, len(names), len(drives))
@@ -88,7 +90,7 @@ def zone_levels(seen: Passages) -> Levels | None:
     values, errors, means, covariance = model.predicted(*variance, parts)
     above, doubt = _shrunk_parts(means, covariance)
     values, errors = values + above[part], np.hypot(errors, doubt[part])
-    return Levels(tuple(map(str, names)), values - float(values[zone].mean()), errors)
+    return Levels(tuple(names), values - float(values[zone].mean()), errors)
 
 
 def _parts(zone: IntArray, drive: IntArray, zones: int, drives: int) -> IntArray:

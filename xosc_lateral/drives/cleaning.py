@@ -47,7 +47,7 @@ def clean_drive(
     columns: dict[str, FloatArray],
     levels: frozenset[str],
     path: Path,
-    zones: NDArray[np.str_] | None = None,
+    zones: NDArray[np.object_] | None = None,
 ) -> Drive | None:
     """Rows of one drive, from whatever source, as a `Drive`.
 
@@ -110,7 +110,7 @@ def clean_drive(
     return drive if run is not None else _seen_through(drive)
 
 
-def _named(numbers: FloatArray, names: NDArray[np.str_]) -> NDArray[np.str_]:
+def _named(numbers: FloatArray, names: NDArray[np.object_]) -> NDArray[np.object_]:
     """Names by their numbers, empty where there is none."""
     known = np.isfinite(numbers)
     return np.where(known, names[np.where(known, numbers, 0.0).astype(np.int64)], "")

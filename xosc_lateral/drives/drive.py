@@ -75,7 +75,7 @@ class Drive:
     mended: MarkingShares | None = None
     empty: frozenset[str] = frozenset()
     half_width: FloatArray | None = None
-    zone: NDArray[np.str_] | None = None
+    zone: NDArray[np.object_] | None = None
 
     def __post_init__(self) -> None:
         """Copy and freeze; refuse unequal lengths and what readers must have taken out."""
@@ -125,7 +125,7 @@ class Run:
     context: Mapping[str, FloatArray] = field(default_factory=dict)
     levels: frozenset[str] = frozenset()
     empty: frozenset[str] = frozenset()
-    zone: NDArray[np.str_] | None = None
+    zone: NDArray[np.object_] | None = None
 
     def __post_init__(self) -> None:
         """Copy and freeze; refuse unequal lengths and missing values."""
@@ -188,8 +188,8 @@ def _frozen_numbers(values: NDArray[np.int64], n: int, what: str) -> NDArray[np.
     return array
 
 
-def _frozen_names(values: NDArray[np.str_], n: int, what: str) -> NDArray[np.str_]:
-    array = np.array(values, dtype=np.str_)
+def _frozen_names(values: NDArray[np.object_], n: int, what: str) -> NDArray[np.object_]:
+    array = np.array(values, dtype=np.object_)
     if array.shape != (n,):
         raise ValueError(f"{what}: shape {array.shape}, expected ({n},)")
     array.flags.writeable = False

@@ -15,7 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]
-Names = NDArray[np.str_]
+Names = NDArray[np.object_]
+"""Texts, each kept once however many rows it is of."""
 
 ZONE = "zone"
 """Column of drive tables, and of the context of what is sampled, where it holds `zone_codes`."""
@@ -36,8 +37,16 @@ def _code(name: str) -> float:
 
 def zone_codes(names: Names | Sequence[str]) -> FloatArray:
     """Names as numbers, the same in every table, shape (n,); NaN where a name is empty: not known. [-]"""
-    known, place = np.unique(np.asarray(names, dtype=np.str_), return_inverse=True)
-    return np.array([_code(str(name)) for name in known], dtype=np.float64)[place]
+    known, place = numbered(names)
+    return np.array([_code(name) for name in known], dtype=np.float64)[place]
+
+
+def numbered(names: Names | Sequence[str]) -> tuple[list[str], NDArray[np.int64]]:
+    """The different names, sorted, and which of them each row has, shape (n,)."""
+    rows = [*names]
+    known = sorted(set(rows))
+    number = {name: k for k, name in enumerate(known)}
+    return known, np.array([number[name] for name in rows], dtype=np.int64)
 
 
 def at_zones(codes: FloatArray, names: Sequence[str], values: Sequence[float]) -> FloatArray:
@@ -70,8 +79,8 @@ def zones_along(strand: Names, place: FloatArray) -> NDArray[np.object_]:
     """
     on = strand != ""
     number = np.floor(np.where(on, place, 0.0) / LENGTH).astype(np.int64)
-    strands, which = np.unique(strand, return_inverse=True)
-    kinds, row = np.unique(np.column_stack([which.ravel(), number]), axis=0, return_inverse=True)
+    strands, which = numbered(strand)
+    kinds, row = np.unique(np.column_stack([which, number]), axis=0, return_inverse=True)
     names = [f"{strands[one]}, {piece * LENGTH:.0f} m" if strands[one] else "" for one, piece in kinds.tolist()]
     return np.array(names, dtype=np.object_)[row.ravel()]
 

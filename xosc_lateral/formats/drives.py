@@ -184,7 +184,7 @@ def _numeric_columns(table: pd.DataFrame, path: Path) -> dict[str, FloatArray]:
     return columns
 
 
-def _zones(table: pd.DataFrame) -> tuple[FloatArray, NDArray[np.str_] | None]:
+def _zones(table: pd.DataFrame) -> tuple[FloatArray, NDArray[np.object_] | None]:
     """Number of each row's zone from 0, NaN where it has none, and the zones' names; None without any.
 
     Whole numbers are called alike whether a table keeps them as such or, beside empty cells, as fractions.
@@ -195,7 +195,7 @@ def _zones(table: pd.DataFrame) -> tuple[FloatArray, NDArray[np.str_] | None]:
         return np.empty(0), None
     codes, values = table[ZONE].factorize()
     numeric = types.is_numeric_dtype(table[ZONE]) and not types.is_bool_dtype(table[ZONE])
-    names = np.array([f"{value:.15g}" if numeric else str(value).strip() for value in values], dtype=np.str_)
+    names = np.array([f"{value:.15g}" if numeric else str(value).strip() for value in values], dtype=np.object_)
     return np.where(codes < 0, np.nan, codes.astype(np.float64)), names
 
 

@@ -11,11 +11,10 @@ from numpy.typing import NDArray
 
 from xosc_lateral.driver.records import Record
 from xosc_lateral.driver.zone_levels import Passages, zone_levels
-from xosc_lateral.drives.zones import at_zones, zone_codes
+from xosc_lateral.drives.zones import Names, at_zones, numbered, zone_codes
 from xosc_lateral.errors import DriverProfileError
 
 FloatArray = NDArray[np.float64]
-Names = NDArray[np.str_]
 
 
 class ByZone(Record, frozen=True):
@@ -90,7 +89,7 @@ def levels_by_zone(
     parts = [
         (float(one[there == name].mean()), str(name), drive)
         for one, there, drive in zip(levels, zones, drives, strict=True)
-        for name in np.unique(there)
+        for name in numbered(there)[0]
         if name
     ]
     if not parts:

@@ -20,9 +20,9 @@ from xosc_lateral.driver.sensor.periodogram import WINDOWS, windows_of
 from xosc_lateral.drives.filters import kaiser_design, low_pass, scale_frequencies
 from xosc_lateral.drives.periodogram import Detrend, periodograms
 from xosc_lateral.drives.resampling import STEP, passed
+from xosc_lateral.drives.zones import Names
 
 FloatArray = NDArray[np.float64]
-Names = NDArray[np.str_]
 
 PERIODS = (0.4, 2.5)
 """Shorter ones leave no images below the half rate of 5 Hz; of longer ones, runs show too few. [s]"""

@@ -97,7 +97,7 @@ def level_by_zone(runs: Sequence[FloatArray], noise: FloatArray, step: float, zo
     parts = [passages(zone, rows // 2) if len(path) else [] for path, zone in zip(paths, cut, strict=True)]
     known = levels_by_zone(
         [np.array([_log_mean_square(path[at]) for _, at in those]) for path, those in zip(paths, parts, strict=True)],
-        [np.array([name for name, _ in those], dtype=np.str_) for those in parts],
+        [np.array([name for name, _ in those], dtype=np.object_) for those in parts],
         zoned.drives,
     )
     if known is None:

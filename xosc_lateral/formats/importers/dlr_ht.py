@@ -312,9 +312,11 @@ def _context(tracks: pd.DataFrame, placed: _Placed, s: FloatArray, forward: NDAr
     )
 
 
-def _strands(forward: NDArray[np.bool_], lane: IntArray) -> NDArray[np.str_]:
+def _strands(forward: NDArray[np.bool_], lane: IntArray) -> NDArray[np.object_]:
     """Carriageway and lane of each row, empty in no lane."""
-    names = np.array([f"{name} lane {index}" for name in ("southbound", "northbound") for index in range(LANES)])
+    names = np.array(
+        [f"{name} lane {index}" for name in ("southbound", "northbound") for index in range(LANES)], dtype=np.object_
+    )
     return np.where(lane >= 0, names[forward * LANES + np.clip(lane, 0, LANES - 1)], "")
 
 

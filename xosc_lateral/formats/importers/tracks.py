@@ -136,7 +136,7 @@ def place(tracks: Tracks, network: RoadNetwork, pieces: dict[Piece, int]) -> Pla
         tracks.length,
         tracks.kind,
         columns,
-        zones_along(strand.astype(np.str_), s),
+        zones_along(strand, s),
     )
 
 
