@@ -13,10 +13,11 @@ from xosc_lateral.driver.effects import Acts, Linear, Zones
 from xosc_lateral.driver.fitting import fit_population, fit_profile
 from xosc_lateral.driver.models.autoregressive.filters import split_bands
 from xosc_lateral.driver.neighbours import SCALE
-from xosc_lateral.driver.place import LEAST_DRIVES, _shrunk, fit_place, without_place
+from xosc_lateral.driver.place import _shrunk, fit_place, without_place
 from xosc_lateral.driver.quick import quick_part
 from xosc_lateral.driver.sampling import sample_offsets
 from xosc_lateral.driver.snippets import segment_of
+from xosc_lateral.driver.zone_levels import LEAST_DRIVES
 from xosc_lateral.drives.cuts import CutRules
 from xosc_lateral.drives.drive import Drive, Run
 from xosc_lateral.drives.resampling import STEP

@@ -20,6 +20,7 @@ from xosc_lateral.driver.loudness import quick_by_zone
 from xosc_lateral.driver.models.autoregressive.filters import split_bands
 from xosc_lateral.driver.neighbours import NEIGHBOURS, SCALE, most_beside, neighbour_shapes
 from xosc_lateral.driver.quick import quick_part
+from xosc_lateral.driver.zone_levels import LEAST_DRIVES
 from xosc_lateral.drives.drive import Run
 from xosc_lateral.drives.resampling import STEP
 from xosc_lateral.errors import NotEnoughDataError
@@ -28,11 +29,6 @@ FloatArray = NDArray[np.float64]
 
 COLUMNS = ("is_truck", "lane_index", "speed")
 """What a population's drivers are told apart by: class, lane and speed."""
-
-LEAST_DRIVES = 30
-"""Fewer are no population: whose lane it was, and who he is, can't be told apart. As many are to have had a neighbour:
-errors clustered by drive are too small where few tell of it (where nothing acts, 90, 8 and 7 % of the effects are
-beyond two of their errors if 1, 5 and 20 of 60 drives do). [-]"""
 
 PIECE = 10.0
 """Snippets whose mean and spread are explained, the paper's. [s]"""

@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import DTypeLike, NDArray
 
 from xosc_lateral.drives.zones import ZONE, zone_codes
 
@@ -165,11 +166,11 @@ class Run:
 
 def _freeze(series: Drive | Run) -> None:
     if isinstance(series, Drive) and series.run is not None:
-        object.__setattr__(series, "run", _frozen_numbers(series.run, len(series.time), f"drive {series.name}: run"))
+        object.__setattr__(series, "run", _frozen(series.run, len(series.time), f"drive {series.name}: run", np.int64))
     name = series.name if isinstance(series, Drive) else series.drive
     n = len(series.time)
     if series.zone is not None:
-        object.__setattr__(series, "zone", _frozen_names(series.zone, n, f"drive {name}: zone"))
+        object.__setattr__(series, "zone", _frozen(series.zone, n, f"drive {name}: zone", np.object_))
     half_width = ("half_width",) if isinstance(series, Drive) and series.half_width is not None else ()
     for label in ("time", "offset", "lane_width", *half_width):
         values = _frozen(getattr(series, label), n, f"drive {name}: {label}")
@@ -180,24 +181,8 @@ def _freeze(series: Drive | Run) -> None:
     object.__setattr__(series, "context", MappingProxyType(context))
 
 
-def _frozen_numbers(values: NDArray[np.int64], n: int, what: str) -> NDArray[np.int64]:
-    array = np.array(values, dtype=np.int64)
-    if array.shape != (n,):
-        raise ValueError(f"{what}: shape {array.shape}, expected ({n},)")
-    array.flags.writeable = False
-    return array
-
-
-def _frozen_names(values: NDArray[np.object_], n: int, what: str) -> NDArray[np.object_]:
-    array = np.array(values, dtype=np.object_)
-    if array.shape != (n,):
-        raise ValueError(f"{what}: shape {array.shape}, expected ({n},)")
-    array.flags.writeable = False
-    return array
-
-
-def _frozen(values: FloatArray, n: int, what: str) -> FloatArray:
-    array = np.array(values, dtype=np.float64)
+def _frozen(values: NDArray[Any], n: int, what: str, kind: DTypeLike = np.float64) -> NDArray[Any]:
+    array = np.array(values, dtype=kind)
     if array.shape != (n,):
         raise ValueError(f"{what}: shape {array.shape}, expected ({n},)")
     array.flags.writeable = False
