@@ -215,7 +215,7 @@ def test_zones_have_their_values_and_nothing_happens_elsewhere() -> None:
     codes = zone_codes(["here", "there", "elsewhere", ""])
     assert strength(effect, zone=codes) == pytest.approx([0.4, -0.3, 0.0, 0.0])
     assert effect.strength(STEP, {"speed": codes}) is None
-    assert effect.shape == "2 zones"
+    assert effect.shape == "2 zones, least in 'there', most in 'here'"
 
 
 def test_between_zones_the_strength_goes_over_without_a_jump() -> None:
@@ -234,6 +234,7 @@ def test_between_zones_the_strength_goes_over_without_a_jump() -> None:
         {"values": (0.1, np.nan)},
         {"zones": ("here", "here")},
         {"zones": ("here", "")},
+        {"zones": (), "values": (), "value_errors": ()},
         {"value_errors": (0.1,)},
     ],
 )

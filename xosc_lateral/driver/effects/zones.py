@@ -29,7 +29,7 @@ class Zones(SingleColumnEffect, frozen=True, kw_only=True):
     Raises
     ------
     DriverProfileError
-        If the lengths disagree, a name is empty or there twice, or a value is not finite.
+        If the lengths disagree, there are none, a name is empty or there twice, or a value is not finite.
     """
 
     zones: tuple[str, ...]
@@ -44,7 +44,7 @@ class Zones(SingleColumnEffect, frozen=True, kw_only=True):
         """Check these, too."""
         super().__post_init__()
         alike = len(self.zones) == len(self.values) == len(self.value_errors)
-        distinct = all(self.zones) and len(set(self.zones)) == len(self.zones)
+        distinct = len(self.zones) > 0 and all(self.zones) and len(set(self.zones)) == len(self.zones)
         if not alike or not distinct or not np.isfinite([*self.values, *self.value_errors]).all():
             raise DriverProfileError(
                 f"effect {self.kind}: {len(self.zones)} zones, {len(self.values)} values and {len(self.value_errors)} "
@@ -53,8 +53,9 @@ class Zones(SingleColumnEffect, frozen=True, kw_only=True):
 
     @property
     def shape(self) -> str:
-        """Word for the report."""
-        return f"{len(self.zones)} zones"
+        """Words for the report."""
+        least, most = int(np.argmin(self.values)), int(np.argmax(self.values))
+        return f"{len(self.zones)} zones, least in {self.zones[least]!r}, most in {self.zones[most]!r}"
 
     def quantity(self, context: Mapping[str, FloatArray]) -> FloatArray:
         """Value of the zone, shape (n, 1); NaN in a zone that is not known. [m] or [-]"""

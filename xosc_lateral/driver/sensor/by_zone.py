@@ -32,7 +32,7 @@ class ByZone(Record, frozen=True):
     Raises
     ------
     DriverProfileError
-        If there are not as many levels as zones, or a number is out of its range.
+        If there is no zone, not as many levels as zones, or a number is out of its range.
     """
 
     zones: tuple[str, ...]
@@ -44,10 +44,15 @@ class ByZone(Record, frozen=True):
     def __post_init__(self) -> None:
         """Check."""
         spreads = (self.level_variance, self.track_variance)
-        if len(self.zones) != len(self.levels) or not all(map(isfinite, (*self.levels, *spreads))):
+        if not self.zones or len(self.zones) != len(self.levels) or not all(map(isfinite, (*self.levels, *spreads))):
             raise DriverProfileError(f"sensor by zone: {self}")
         if min(spreads) < 0.0 or not 0.0 < self.level_duration < inf:
             raise DriverProfileError(f"sensor by zone: {self}")
+
+    def in_words(self) -> str:
+        """How much the zones differ, in a sentence."""
+        low, high = np.exp(0.5 * np.quantile(self.levels, [0.05, 0.95]))
+        return f"in {len(self.zones)} zones the error is {low:.2g} to {high:.2g} times as large as on the whole (90 %)"
 
     def at(self, codes: FloatArray) -> FloatArray:
         """Logarithm of the power at rows in zones of these codes, shape (n,); 0 in a zone that is not known. [-]"""

@@ -123,7 +123,7 @@ class SensorModel(Record, frozen=True):
         return values
 
     def in_words(self) -> str:
-        """How the measured variance is split, in a sentence."""
+        """How the measured variance is split, and what is known of the error, in a sentence."""
         low, high = self.driver_share
         words = (
             f"{100 * self.share:.1f} % of the measured variance is the driver's (95 % interval: {100 * low:.1f} to "
@@ -131,13 +131,14 @@ class SensorModel(Record, frozen=True):
         )
         if self.second_view:
             words = f"{words}, told by the lane width, which the same camera measured"
-        if self.kinks is None:
-            return words
-        fastest = CROSSING[1] * self.kinks.highest
-        return (
-            f"{words}; tracks are made of pieces of {self.kinks.every:g} s, whose kinks are all that they show above "
-            f"{fastest:.2g} Hz"
-        )
+        if self.kinks is not None:
+            fastest = CROSSING[1] * self.kinks.highest
+            words = (
+                f"{words}; tracks are made of pieces of {self.kinks.every:g} s, whose kinks are all that they show "
+                f"above {fastest:.2g} Hz"
+            )
+        zones = self.by_zone if self.kinks is None else self.kinks.by_zone
+        return words if zones is None else f"{words}; {zones.in_words()}"
 
     def density(self, frequency: FloatArray) -> FloatArray:
         """One-sided power density of noise and kinks, without rounding. [m2/Hz] Shape as `frequency` [Hz]."""
