@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from xosc_lateral.drives.filters import kaiser_design, low_pass
+from xosc_lateral.drives.filters import kaiser_design, low_pass, mirrored
 from xosc_lateral.drives.periodogram import Detrend, hann, periodograms
 
 
@@ -64,3 +64,15 @@ def test_a_straight_line_has_no_power_once_its_ends_are_taken_out_and_a_short_ru
     line = np.linspace(3.0, 9.0, 300)
     assert periodograms(line, 50, detrend=Detrend.ENDS).max() < 1e-20
     assert periodograms(line[:49], 50).shape == (0, 26)
+
+
+@pytest.mark.parametrize("n", [1, 2, 5, 40])
+def test_a_series_goes_on_through_the_points_of_its_ends_and_stays_where_it_has_no_image(n: int) -> None:
+    line = 0.3 + 0.1 * np.arange(n)
+    long = mirrored(line, 7)
+    near = min(7, n - 1)
+    np.testing.assert_allclose(long[7 - near : n + 7 + near], 0.3 + 0.1 * np.arange(-near, n + near), atol=1e-15)
+    assert (long[: 7 - near] == long[7 - near]).all() and (long[n + 7 + near :] == long[n + 6 + near]).all()
+    values = np.random.default_rng(n).normal(size=n)
+    np.testing.assert_array_equal(mirrored(values, 7)[7 : n + 7], values)
+    np.testing.assert_array_equal(mirrored(values, 0), values)

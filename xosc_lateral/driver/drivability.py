@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.driver.sampling import sample_offsets
 from xosc_lateral.driver.sensor.model import WIDE
+from xosc_lateral.drives.filters import mirrored
 from xosc_lateral.segment import Segment
 
 FloatArray = NDArray[np.float64]
@@ -184,5 +185,4 @@ def _smoothed(values: FloatArray, width: float) -> FloatArray:
     """Gaussian smoothing, continued point-symmetrically past both ends, which stay where they are."""
     half = min(int(np.ceil(4.0 * width)), len(values) - 1)
     kernel = np.exp(-0.5 * (np.arange(-half, half + 1) / width) ** 2)
-    before, after = 2 * values[0] - values[half:0:-1], 2 * values[-1] - values[-2 : -half - 2 : -1]
-    return np.convolve(np.concatenate([before, values, after]), kernel / kernel.sum(), "valid")
+    return np.convolve(mirrored(values, half), kernel / kernel.sum(), "valid")

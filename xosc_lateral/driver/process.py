@@ -174,7 +174,8 @@ class DriveProcess:
         elif start is not None:
             raise ValueError("a drive that continues from a state has no start")
         acts_on_quick = (terms.quick is not None or self.state.past is not None) and terms.rate is None
-        coarse, fine = self._take_core(self._core, len(width), terms.rate, reach(self._model.step) * acts_on_quick)
+        beyond = reach(self._model.step) if acts_on_quick else 0
+        coarse, fine = self._take_core(self._core, len(width), terms.rate, beyond)
         mean, quick = self._core.mean, self._quick_of(coarse) if acts_on_quick else None
         if terms.quick is not None:
             fine = terms.quick * fine

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.driver.convolution import convolve
-from xosc_lateral.drives.filters import kaiser_design, low_pass
+from xosc_lateral.drives.filters import kaiser_design, low_pass, mirrored
 
 FloatArray = NDArray[np.float64]
 
@@ -53,9 +53,4 @@ def quick_part(path: FloatArray, step: float) -> FloatArray:
 
     In the unit of the path; nothing at the ends.
     """
-    if not len(path):
-        return path
-    rows = reach(step)
-    near = min(rows, len(path) - 1)
-    mirrored = np.pad(path, near, mode="reflect", reflect_type="odd") if near else path
-    return quick_between(np.pad(mirrored, rows - near, mode="edge"), step)
+    return quick_between(mirrored(path, reach(step)), step) if len(path) else path

@@ -82,6 +82,18 @@ def low_pass(half: int, cutoff: float, beta: float) -> FloatArray:
     return np.asarray(kernel / kernel.sum())
 
 
+def mirrored(values: FloatArray, rows: int) -> FloatArray:
+    """A series continued by so many rows at both ends, shape (n + 2 * rows,), for a symmetric kernel. [any unit]
+
+    Beyond each end it goes on as its mirror image through the end's point, as far as there is one, and stays there: a
+    filter without delay leaves the ends, and straight lines, where they are.
+    """
+    near = min(rows, len(values) - 1)
+    before, after = 2 * values[0] - values[near:0:-1], 2 * values[-1] - values[-2 : -near - 2 : -1]
+    extended = np.concatenate([before, values, after])
+    return np.pad(extended, rows - near, mode="edge") if near < rows else extended
+
+
 def first_order(
     values: FloatArray, keep: float, *, gain: float = 1.0, before: float | None = None, axis: int = -1
 ) -> FloatArray:

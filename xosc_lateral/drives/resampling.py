@@ -17,7 +17,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.drives.filters import kaiser_design, low_pass
+from xosc_lateral.drives.filters import kaiser_design, low_pass, mirrored
 
 FloatArray = NDArray[np.float64]
 
@@ -62,13 +62,7 @@ def resample(time: FloatArray, values: FloatArray, grid: FloatArray, *, oversamp
     kernel = _low_pass(oversampling)
     half = len(kernel) // 2
     fine = np.interp(_fine_grid(grid, oversampling), time, values)
-    half_extension = min(half, len(fine) - 1)
-    before = 2 * fine[0] - fine[half_extension:0:-1]
-    after = 2 * fine[-1] - fine[-2 : -half_extension - 2 : -1]
-    extended = np.concatenate([before, fine, after])
-    if half_extension < half:
-        extended = np.pad(extended, half - half_extension, mode="edge")
-    return _decimate(extended, kernel, oversampling, len(grid))
+    return _decimate(mirrored(fine, half), kernel, oversampling, len(grid))
 
 
 def average(time: FloatArray, values: FloatArray, grid: FloatArray, *, oversampling: int = OVERSAMPLING) -> FloatArray:

@@ -32,8 +32,8 @@ def test_levels_are_one_in_the_mean_and_those_planted():
     names = [np.array([f"z{k:02}" for k in range(12)]).repeat(4)] * 50
     found = levels_by_zone(levels, names, [f"d{k}" for k in range(50)])
     assert found is not None
-    assert np.mean(np.exp(list(found.values()))) == pytest.approx(1.0)
-    np.testing.assert_allclose(list(found.values()), planted - np.log(np.mean(np.exp(planted))), atol=0.15)
+    assert np.mean(np.exp(found.levels)) == pytest.approx(1.0)
+    np.testing.assert_allclose(found.levels, planted - np.log(np.mean(np.exp(planted))), atol=0.15)
 
 
 def test_levels_of_unknown_zones_are_none():

@@ -11,10 +11,15 @@ from numpy.typing import NDArray
 
 from xosc_lateral.driver.records import Record
 from xosc_lateral.driver.zone_levels import Passages, zone_levels
-from xosc_lateral.drives.zones import Names, at_zones, numbered, zone_codes
+from xosc_lateral.drives.zones import Names, at_zones, numbered
 from xosc_lateral.errors import DriverProfileError
 
 FloatArray = NDArray[np.float64]
+
+
+def tidy(values: Sequence[float] | FloatArray) -> tuple[float, ...]:
+    """As a profile keeps them: the same on any machine."""
+    return tuple(float(f"{value:.4g}") for value in values)
 
 
 class ByZone(Record, frozen=True):
@@ -77,10 +82,10 @@ class ZonedRows:
     drives: Sequence[str]
 
 
-def levels_by_zone(
-    levels: Sequence[FloatArray], zones: Sequence[Names], drives: Sequence[str]
-) -> dict[str, float] | None:
+def levels_by_zone(levels: Sequence[FloatArray], zones: Sequence[Names], drives: Sequence[str]) -> ByZone | None:
     """Level of each zone above that of all, whose power is 1 in the mean; None if there is no more than chance.
+
+    Of what varies besides, nothing is said yet.
 
     Parameters
     ----------
@@ -105,11 +110,4 @@ def levels_by_zone(
         return None
     count = np.bincount(np.searchsorted(found.names, zone), minlength=len(found.names))
     shift = float(np.log(np.average(np.exp(found.values), weights=count)))
-    return dict(zip(found.names, (found.values - shift).tolist(), strict=True))
-
-
-def left_by_zones(level: FloatArray, zone: Names, known: dict[str, float]) -> FloatArray:
-    """Levels without those of their zones, shape (k,). [-]"""
-    names = sorted(known)
-    found = at_zones(zone_codes(zone), names, [known[name] for name in names])
-    return np.asarray(level - np.where(np.isnan(found), 0.0, found))
+    return ByZone(found.names, tuple((found.values - shift).tolist()), level_variance=0.0, level_duration=1.0)

@@ -170,17 +170,13 @@ class Kinks(Record, frozen=True):
 
     def _level(self, times: FloatArray, step: float, rng: np.random.Generator, zone: FloatArray | None) -> FloatArray:
         """Factor on the jumps' squares, 1 in the mean, shape as `times` [s]. [-]"""
-        known = self.by_zone if zone is not None and len(zone) else None
-        variance, duration, tracks = (
-            (self.level_variance, self.level_duration, self.track_variance)
-            if known is None
-            else (known.level_variance, known.level_duration, known.track_variance)
-        )
-        keep, spread = float(np.exp(-self.every / duration)), float(np.sqrt(variance))
+        known = None if zone is None or not len(zone) else self.by_zone
+        varies = known or self
+        keep, spread = float(np.exp(-self.every / varies.level_duration)), float(np.sqrt(varies.level_variance))
         kicks = spread * np.sqrt(1.0 - keep**2) * rng.normal(size=len(times) - 1)
         level = recur(np.array([spread * rng.normal()]), kicks, np.array([keep]))
-        whose = np.sqrt(tracks) * rng.normal()
-        level = level + whose - 0.5 * (variance + tracks)
+        whose = np.sqrt(varies.track_variance) * rng.normal()
+        level = level + whose - 0.5 * (varies.level_variance + varies.track_variance)
         if known is not None and zone is not None:
             level = level + known.at(zone[np.clip(np.rint(times / step).astype(np.int64), 0, len(zone) - 1)])
         return np.asarray(np.exp(level))

@@ -14,13 +14,13 @@ import numpy as np
 from msgspec.structs import replace
 from numpy.typing import NDArray
 
-from xosc_lateral.driver.sensor.by_zone import ByZone, ZonedRows, left_by_zones, levels_by_zone
+from xosc_lateral.driver.sensor.by_zone import ByZone, ZonedRows, levels_by_zone, tidy
 from xosc_lateral.driver.sensor.kinks import SHAPE, Kinks, mean_square, shape_points
 from xosc_lateral.driver.sensor.periodogram import WINDOWS, windows_of
 from xosc_lateral.drives.filters import kaiser_design, low_pass, scale_frequencies
 from xosc_lateral.drives.periodogram import Detrend, periodograms
 from xosc_lateral.drives.resampling import STEP, passed
-from xosc_lateral.drives.zones import Names
+from xosc_lateral.drives.zones import Names, zone_codes
 
 FloatArray = NDArray[np.float64]
 
@@ -117,10 +117,10 @@ def find_kinks(
     with_movement, acceleration = _with_movement(flat, bends)
     levels = [_log_level(one, bend / acceleration, with_movement) for one, bend in zip(flat, bends, strict=True)]
     variance, duration, track = _level(levels)
-    period, level, lasts, track, with_movement, acceleration = _tidy(
+    period, level, lasts, track, with_movement, acceleration = tidy(
         [every, variance, duration * every, track, with_movement, acceleration]
     )
-    kinks = Kinks(period, _tidy(densities), _tidy(shares), level, lasts, track, with_movement, acceleration)
+    kinks = Kinks(period, tidy(densities), tidy(shares), level, lasts, track, with_movement, acceleration)
     if zoned is not None:
         there = [
             zoned.rows[k][first::size][: len(one)] for k, one, (_, first) in zip(lasting, flat, found, strict=True)
@@ -138,15 +138,10 @@ def _by_zone(
     known = levels_by_zone(levels, zones, drives)
     if known is None:
         return None
-    left = [left_by_zones(one, there, known) for one, there in zip(levels, zones, strict=True)]
-    variance, duration, track = _level(left)
-    variance, duration, track = _tidy([variance, duration * every, track])
-    return ByZone(tuple(known), _tidy(list(known.values())), variance, duration, track)
-
-
-def _tidy(values: Sequence[float] | FloatArray) -> tuple[float, ...]:
-    """As a profile keeps them: the same on any machine."""
-    return tuple(float(f"{value:.4g}") for value in values)
+    variance, duration, track = _level(
+        [one - known.at(zone_codes(there)) for one, there in zip(levels, zones, strict=True)]
+    )
+    return ByZone(known.zones, tidy(known.levels), *tidy([variance, duration * every, track]))
 
 
 def jumps_of(rows: FloatArray, size: int, rate: float) -> tuple[FloatArray, int]:
@@ -227,7 +222,7 @@ def _shape(kinks: Kinks, runs: Sequence[FloatArray], white: float) -> tuple[floa
     for point in points[1:]:
         near = np.abs(frequency - point) <= 0.5 * band
         factors.append(max(float(rest[near].sum()), 0.0) / max(float(theirs[near].sum()), 1e-30))
-    return _tidy(factors)
+    return tidy(factors)
 
 
 def flat_jumps(jumps: FloatArray, densities: FloatArray, every: float) -> FloatArray:

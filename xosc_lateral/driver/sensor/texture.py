@@ -19,7 +19,7 @@ from msgspec.structs import replace
 from numpy.typing import NDArray
 
 from xosc_lateral.driver.recursion import recur
-from xosc_lateral.driver.sensor.by_zone import ByZone, ZonedRows, levels_by_zone
+from xosc_lateral.driver.sensor.by_zone import ByZone, ZonedRows, levels_by_zone, tidy
 from xosc_lateral.drives.filters import kaiser_design, low_pass
 from xosc_lateral.drives.zones import passages, zone_codes
 
@@ -102,13 +102,14 @@ def level_by_zone(runs: Sequence[FloatArray], noise: FloatArray, step: float, zo
     )
     if known is None:
         return None
-    found = ByZone(tuple(known), tuple(float(f"{level:.4g}") for level in known.values()), 0.0, LONGEST)
+    found = replace(known, levels=tidy(known.levels))
     left = [
         path * np.exp(-0.5 * smooth_level(found.at(zone_codes(zone)), step)) if len(path) else path
         for path, zone in zip(paths, cut, strict=True)
     ]
     variance, duration = _variation([_of_pieces(path, rows) for path in left], _of_pieces(_fast(noise, step), rows))
-    return replace(found, level_variance=float(f"{variance:.4g}"), level_duration=float(f"{duration:.4g}"))
+    variance, duration = tidy([variance, duration])
+    return replace(found, level_variance=variance, level_duration=duration)
 
 
 def level_variation(runs: Sequence[FloatArray], noise: FloatArray, step: float) -> tuple[float, float]:

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.driver.jit_kernel import JitKernel, worth_compiling
-from xosc_lateral.drives.filters import low_pass
+from xosc_lateral.drives.filters import low_pass, mirrored
 
 FloatArray = NDArray[np.float64]
 
@@ -77,11 +77,7 @@ def split_bands(values: FloatArray, step: float) -> tuple[FloatArray, FloatArray
     Past their ends the values go on mirrored in a point.
     """
     kernel = measuring_low_pass(step)
-    half = len(kernel) // 2
-    reach = min(half, len(values) - 1)
-    before, after = 2 * values[0] - values[reach:0:-1], 2 * values[-1] - values[-2 : -reach - 2 : -1]
-    extended = np.pad(np.concatenate([before, values, after]), half - reach, mode="edge")
-    slow = np.convolve(extended, kernel, "valid")
+    slow = np.convolve(mirrored(values, len(kernel) // 2), kernel, "valid")
     return slow, values - slow
 
 
