@@ -9,7 +9,7 @@ from scipy.optimize import approx_fprime
 
 from xosc_lateral.driver.sensor.likelihood import Colour, Known, _Problem, solve
 from xosc_lateral.driver.sensor.periodogram import Periodogram, periodogram, windows_of
-from xosc_lateral.driver.sensor.vehicle_bound import KNOTS, N_KNOTS, interpolation
+from xosc_lateral.driver.sensor.vehicle_bound import KNOTS, N_KNOTS, density, interpolation
 from xosc_lateral.errors import NotEnoughDataError
 
 WHITE, COLOURED, CORNER = 2e-5, 4e-4, 0.8
@@ -65,6 +65,28 @@ def test_a_coloured_part_comes_apart_too() -> None:
     colour = Colour(2, CORNER)
     found = solve(measured(colour, weight=2000.0), colour, np.zeros(90))
     assert np.exp(found.colour) == pytest.approx(COLOURED, rel=0.3)
+
+
+@pytest.mark.parametrize("corner", [0.15, 0.2, 0.27])
+def test_how_a_driver_goes_on_below_the_noise_is_told_by_where_his_spectrum_turns(corner: float) -> None:
+    """Noise hides him from his corner on, and beyond it is most of his acceleration."""
+    frequency = np.geomspace(0.02, 1.5, 90)
+
+    def true(at: np.ndarray) -> np.ndarray:
+        shape = 1.0 / (at * (1.0 + (at / corner) ** 5) * (1.0 + at**2) ** 1.5)
+        return shape * corner * WHITE  # half the noise's at the corner
+
+    data = Periodogram(frequency, true(frequency) + WHITE, np.full(90, 400.0), 51.2)
+    found = solve(data, Colour(), np.zeros(90))
+    fine = np.linspace(0.02, 2.5, 2000)
+    accelerations = [float((fine**4 * one).sum()) for one in (density(found.knots, fine), true(fine))]
+    assert np.sqrt(accelerations[0] / accelerations[1]) == pytest.approx(1.0, abs=0.15)
+
+
+def test_beside_a_low_passed_error_the_corner_is_not_looked_for() -> None:
+    colour = Colour(2, CORNER)
+    found = solve(measured(colour, weight=2000.0), colour, np.zeros(90))
+    assert found.state[N_KNOTS] == pytest.approx(0.0, abs=1e-6)
 
 
 def test_a_floor_that_is_known_already_is_not_found_again() -> None:

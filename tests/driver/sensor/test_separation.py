@@ -14,7 +14,6 @@ from xosc_lateral.driver.records import plain, read_as
 from xosc_lateral.driver.sensor.model import SensorModel
 from xosc_lateral.driver.sensor.quantisation import quantisation_step, rounding_density
 from xosc_lateral.driver.sensor.separation import separate
-from xosc_lateral.driver.sensor.vehicle_bound import expected_slope
 from xosc_lateral.drives.resampling import resample
 from xosc_lateral.errors import DriverProfileError, NotEnoughDataError
 
@@ -214,12 +213,6 @@ def test_what_is_no_sensor_is_refused():
         SensorModel(-1.0)
     with pytest.raises(NotEnoughDataError, match=r"no run of 12\.8 s"):
         separate([np.zeros(20)], STEP)
-
-
-def test_the_prior_falls_ever_faster():
-    frequency = np.geomspace(0.1, 1.5, 30)
-    assert (np.diff(expected_slope(frequency)) <= 1e-12).all()
-    assert expected_slope(np.array([0.5]))[0] < -4.0, "two integrations at least"
 
 
 def test_a_profile_keeps_driver_and_sensor_apart_and_samples_either(tmp_path, capsys):

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from xosc_lateral.driver.sensor.ascent import climb
 from xosc_lateral.driver.sensor.periodogram import Periodogram
 from xosc_lateral.driver.sensor.second_view import LEVEL_SD, SecondView
-from xosc_lateral.driver.sensor.vehicle_bound import KNOTS, N_KNOTS, PRIOR_ROWS, PRIOR_VALUES, interpolation
+from xosc_lateral.driver.sensor.vehicle_bound import KNOTS, N_KNOTS, N_STATE, interpolation, prior
 
 FloatArray = NDArray[np.float64]
 
@@ -87,18 +87,23 @@ class Solution:
 
     Parameters
     ----------
-    knots : array, shape (N_KNOTS,)
-        Log density of the driver.
+    state : array, shape (N_STATE,)
+        The driver: log density at the knots, and the corner of his corrections, see `vehicle_bound`.
     white, colour : float
         Log densities of the sensor's two parts, of `colour` over its shape; -inf where there is none.
     loss : float
         Minus log posterior.
     """
 
-    knots: FloatArray
+    state: FloatArray
     white: float
     colour: float
     loss: float
+
+    @property
+    def knots(self) -> FloatArray:
+        """Log density of the driver, shape (N_KNOTS,)."""
+        return self.state[:N_KNOTS]
 
     def coloured(self, colour: Colour, frequency: FloatArray) -> FloatArray:
         """Density of the coloured part, which there is. [m2/Hz] Shape as `frequency` [Hz]."""
@@ -106,15 +111,15 @@ class Solution:
 
 
 class _Problem:
-    """Loss, gradient and Fisher information at a point (knots, white, colour)."""
+    """Loss, gradient and Fisher information at a point (state, white, colour)."""
 
     def __init__(self, data: Periodogram, colour: Colour, base: FloatArray, known: Known | None) -> None:
         self.data, self.base, self.known = data, base, known
         self.matrix = interpolation(data.frequency)
         self.shape = colour.shape(data.frequency) if colour.is_there else None
         self.integral = colour.integral(0.5 * known.rate) if colour.is_there and known else 0.0
-        self.size = N_KNOTS + 1 + colour.is_there
-        self.is_seen = colour.view is not None
+        self.size = N_STATE + 1 + colour.is_there
+        self.is_seen, self.is_low_passed = colour.view is not None, colour.order > 0
         high = data.frequency > ABOVE
         self.top = float(np.log(np.average(data.density[high], weights=data.weight[high])))
         self.corner, self.alone = colour.corner, colour.alone
@@ -128,19 +133,19 @@ class _Problem:
         at = int(np.argmin(np.abs(self.data.frequency - 0.7 * self.corner)))
         white = NO_WHITE if self.alone else self.top - 0.3
         rest = [white, 0.0 if self.is_seen else float(np.log(self.data.density[at])) - 0.7]
-        return np.concatenate([measured, rest[: self.size - N_KNOTS]])
+        return np.concatenate([measured, [0.0], rest[: self.size - N_STATE]])
 
     def at(self, point: FloatArray) -> tuple[float, FloatArray, FloatArray]:
         """Loss, gradient, information."""
-        driver, white = np.exp(self.matrix @ point[:N_KNOTS]), np.exp(point[N_KNOTS])
+        driver, white = np.exp(self.matrix @ point[:N_KNOTS]), np.exp(point[N_STATE])
         total = driver + white + self.base
         slope = np.zeros((len(total), self.size))
         if self.shape is not None:
-            coloured = np.exp(point[N_KNOTS + 1]) * self.shape
+            coloured = np.exp(point[N_STATE + 1]) * self.shape
             total = total + coloured
-            slope[:, N_KNOTS + 1] = coloured
+            slope[:, N_STATE + 1] = coloured
         slope[:, :N_KNOTS] = self.matrix * driver[:, None]
-        slope[:, N_KNOTS] = white
+        slope[:, N_STATE] = white
         slope /= total[:, None]
         ratio, weight = self.data.density / total, self.data.weight
         loss = float((weight * (np.log(total) + ratio)).sum())
@@ -156,30 +161,29 @@ class _Problem:
             loss += 0.5 * residual**2
             gradient += residual * row
             information += np.outer(row, row)
-        bend = PRIOR_ROWS @ point[:N_KNOTS] - PRIOR_VALUES
-        loss += 0.5 * float(bend @ bend)
-        gradient[:N_KNOTS] += PRIOR_ROWS.T @ bend
-        information[:N_KNOTS, :N_KNOTS] += PRIOR_ROWS.T @ PRIOR_ROWS
-        return loss
+        residuals, jacobian = prior(point[:N_STATE], is_corner_free=not self.is_low_passed)
+        gradient[:N_STATE] += jacobian.T @ residuals
+        information[:N_STATE, :N_STATE] += jacobian.T @ jacobian
+        return loss + 0.5 * float(residuals @ residuals)
 
     def _priors(self, point: FloatArray) -> list[tuple[FloatArray, float]]:
         """Weak priors of the sensor's levels, and the level that is known, linearised where it is looked at."""
         white = np.zeros(self.size)
-        white[N_KNOTS] = 1.0 / FLOOR_SD
+        white[N_STATE] = 1.0 / FLOOR_SD
         rows = [(white, (NO_WHITE if self.alone else self.top - 1.0) / FLOOR_SD)]
         if self.is_seen:
             level = np.zeros(self.size)
-            level[N_KNOTS + 1] = 1.0 / LEVEL_SD
+            level[N_STATE + 1] = 1.0 / LEVEL_SD
             rows.append((level, 0.0))
         elif self.shape is not None and not self.alone:
             both = np.zeros(self.size)
-            both[N_KNOTS], both[N_KNOTS + 1] = -1.0 / COLOUR_SD, 1.0 / COLOUR_SD
+            both[N_STATE], both[N_STATE + 1] = -1.0 / COLOUR_SD, 1.0 / COLOUR_SD
             rows.append((both, 0.0))
         if self.known is not None:
             parts = np.zeros(self.size)
-            parts[N_KNOTS] = np.exp(point[N_KNOTS]) * 0.5 * self.known.rate
+            parts[N_STATE] = np.exp(point[N_STATE]) * 0.5 * self.known.rate
             if self.shape is not None:
-                parts[N_KNOTS + 1] = np.exp(point[N_KNOTS + 1]) * self.integral
+                parts[N_STATE + 1] = np.exp(point[N_STATE + 1]) * self.integral
             variance = float(parts.sum())
             row = parts / variance / KNOWN_SD
             lacking = (2.0 * np.log(self.known.deviation) - np.log(variance)) / KNOWN_SD
@@ -207,7 +211,7 @@ def solve(
         To climb from, of the same colour.
     """
     problem = _Problem(data, colour, base, known)
-    point = problem.start() if start is None else np.array([*start.knots, start.white, start.colour])[: problem.size]
+    point = problem.start() if start is None else np.array([*start.state, start.white, start.colour])[: problem.size]
     point, loss = climb(problem.at, point)
-    coloured = float(point[N_KNOTS + 1]) if colour.is_there else -np.inf
-    return Solution(point[:N_KNOTS], float(point[N_KNOTS]), coloured, loss)
+    coloured = float(point[N_STATE + 1]) if colour.is_there else -np.inf
+    return Solution(point[:N_STATE], float(point[N_STATE]), coloured, loss)

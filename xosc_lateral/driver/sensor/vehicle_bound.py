@@ -1,17 +1,24 @@
 """What a driver and a vehicle can do to the side, as a prior on the spectrum of the offset.
 
 The logarithm of the driver's power density is a polygon over the logarithm of frequency. Its slope is free below
-0.1 Hz, where a lane is kept as somebody likes. Above, it falls, and ever faster:
+0.1 Hz, where a lane is kept as somebody likes. Above, what is expected is, up to its level::
 
-- a lateral acceleration takes two integrations to become an offset: -4 in log power;
-- steering comes in corrections that last some tenths of a second and are never undone within them [1]_ [2]_: drivers
-  cross over at 0.3 to 0.6 Hz, and beyond that the command itself falls, by about -1.5;
-- muscles and vehicle follow the command with lags that add up to a corner of about 1 Hz [1]_ [3]_: up to -3 more where
+    1 / (f * (1 + (f / corner)^5) * (1 + (f / 1 Hz)^2)^1.5)
+
+- Below the corner of the driver's corrections the power falls with the frequency.
+- Beyond it, with its sixth power: a lateral acceleration takes two integrations to become an offset, -4; steering comes
+  in corrections that last some tenths of a second and are never undone within them [1]_ [2]_, which a lag of first
+  order describes, -2.
+- Muscles and vehicle follow the command with lags that add up to a corner of about 1 Hz [1]_ [3]_: up to -3 more where
   the sensor is good enough to see it.
 
-Below the corner of the corrections, from 0.1 to 0.3 Hz, the slope passes from -1 to -3.5. The prior is a normal one, of
-standard deviation `SLOPE_SD` on each slope and `BEND_SD` on the change from one to the next: data with little noise
-override it, and where noise hides the driver it says how the spectrum goes on.
+How brisk corrections are differs from driver to driver, so that the corner is fitted with the rest: at `BRISKEST` or
+below. Where noise hides the driver, his spectrum goes on as the part of it that is seen lets expect. A corner that were
+as free upwards would make a driver of every low-passed error; and beside such an error, whose own corner is looked for,
+it is `BRISKEST`: a slower driver and a slower error are one spectrum.
+
+The prior is a normal one, of standard deviation `SLOPE_SD` on each slope and `BEND_SD` on the change from one to the
+next: data with little noise override it.
 
 References
 ----------
@@ -34,12 +41,20 @@ KNOTS = np.array([0.01, 0.02, 0.035, 0.05, 0.075, 0.1, 0.14, 0.2, 0.27, 0.35, 0.
 """[Hz]"""
 
 FREE_BELOW = 0.1
-CORRECTIONS = 0.3
 LAGS = 1.0
-"""Corners: of lane keeping at will, of corrections, of muscles and vehicle. [Hz]"""
+"""Corners: of lane keeping at will, of muscles and vehicle. [Hz]"""
+
+BRISKEST = 0.27
+"""Corner of the briskest corrections: that of drive tables whose sensor is good enough to see it. [Hz]"""
+
+BELOW, BEYOND, MOST_LAG = 1.0, 6.0, 3.0
+"""Powers of the frequency by which the density falls below the corner, beyond it, and more beyond that of the lags."""
+
+SLOWER_SD, BRISKER_SD = 0.5, 0.05
+"""Of the logarithm of the corner over `BRISKEST`, below it and above. [-]"""
 
 SLOPE_SD, BEND_SD, FREE_BEND_SD = 0.9, 1.0, 1.5
-"""Of log power over log frequency. `docs/design/sensor.md` shows how little the split depends on them. [-]"""
+"""Of log power over log frequency. [-] `docs/design/sensor.md` shows how little the split depends on them."""
 
 STEEPEST_KNOWN = -4.0
 """Beyond the last knot the density falls at least like this. [-]"""
@@ -47,15 +62,24 @@ STEEPEST_KNOWN = -4.0
 _LOG = np.log(KNOTS)
 N_KNOTS = len(KNOTS)
 
+N_STATE = N_KNOTS + 1
+"""Knots, then the logarithm of the corner over `BRISKEST`: what the prior is on."""
 
-def expected_slope(frequency: FloatArray) -> FloatArray:
-    """Mean of the prior on the slope of log power over log frequency, above `FREE_BELOW`.
 
-    Shape as `frequency` [Hz]. [-]
+def expected_log_density(frequency: FloatArray, shift: float = 0.0) -> FloatArray:
+    """Mean of the prior on log power, up to its level. Shape as `frequency` [Hz]. [-]
+
+    `shift` is the logarithm of the corner over `BRISKEST`.
     """
-    rising = np.clip(np.log(frequency / FREE_BELOW) / np.log(CORRECTIONS / FREE_BELOW), 0.0, 1.0)
-    lags = (frequency / LAGS) ** 2 / (1.0 + (frequency / LAGS) ** 2)
-    return np.where(frequency < CORRECTIONS, -1.0 - 2.5 * rising, -5.5 - 3.0 * lags)
+    steps = BEYOND - BELOW
+    bend = np.logaddexp(0.0, steps * (np.log(frequency / BRISKEST) - shift))
+    return np.asarray(-BELOW * np.log(frequency) - bend - 0.5 * MOST_LAG * np.log1p((frequency / LAGS) ** 2))
+
+
+def _change_with_corner(frequency: FloatArray, shift: float) -> FloatArray:
+    """Derivative of `expected_log_density` with respect to the shift. [-]"""
+    steps = BEYOND - BELOW
+    return np.asarray(steps / (1.0 + np.exp(-steps * (np.log(frequency / BRISKEST) - shift))))
 
 
 def _slopes() -> FloatArray:
@@ -70,23 +94,52 @@ SLOPES = _slopes()
 """From knot values to slopes, shape (n - 1, n)."""
 
 
-def _prior() -> tuple[FloatArray, FloatArray]:
-    middle = np.exp(0.5 * (_LOG[1:] + _LOG[:-1]))
-    bound = np.flatnonzero(middle > FREE_BELOW)
-    mean = expected_slope(middle)
-    pairs = bound[:-1]
-    free = np.arange(bound[0])
-    rows = [
-        SLOPES[bound] / SLOPE_SD,
-        (SLOPES[pairs + 1] - SLOPES[pairs]) / BEND_SD,
-        (SLOPES[free + 1] - SLOPES[free]) / FREE_BEND_SD,
-    ]
-    wanted = [mean[bound] / SLOPE_SD, (mean[pairs + 1] - mean[pairs]) / BEND_SD, np.zeros(len(free))]
-    return np.concatenate(rows), np.concatenate(wanted)
+_BOUND = np.flatnonzero(0.5 * (_LOG[1:] + _LOG[:-1]) > np.log(FREE_BELOW))
 
 
-PRIOR_ROWS, PRIOR_VALUES = _prior()
-"""The prior as independent standard normal residuals ``PRIOR_ROWS @ knots - PRIOR_VALUES``."""
+def _rows() -> FloatArray:
+    free = np.arange(_BOUND[0])
+    return np.concatenate(
+        [
+            SLOPES[_BOUND] / SLOPE_SD,
+            np.diff(SLOPES[_BOUND], axis=0) / BEND_SD,
+            (SLOPES[free + 1] - SLOPES[free]) / FREE_BEND_SD,
+        ]
+    )
+
+
+_ROWS = _rows()
+
+
+def _of_slopes(values: FloatArray) -> FloatArray:
+    """What slopes between the knots of such values are in units of the prior, shape (len(_ROWS),). [-]"""
+    slopes = (SLOPES @ values)[_BOUND]
+    return np.concatenate([slopes / SLOPE_SD, np.diff(slopes) / BEND_SD, np.zeros(_BOUND[0])])
+
+
+def prior(state: FloatArray, *, is_corner_free: bool = True) -> tuple[FloatArray, FloatArray]:
+    """Residuals of a state, shape (m,), each standard normal by the prior, and their Jacobian, shape (m, N_STATE).
+
+    Where the corner is not free, the slopes expected are those of `BRISKEST`, whatever the state says.
+    """
+    knots, own = state[:N_KNOTS], float(state[N_KNOTS])
+    shift, deviation = own if is_corner_free else 0.0, SLOWER_SD if own < 0.0 else BRISKER_SD
+    jacobian = np.zeros((len(_ROWS) + 1, N_STATE))
+    jacobian[:-1, :N_KNOTS] = _ROWS
+    if is_corner_free:
+        jacobian[:-1, N_KNOTS] = -_of_slopes(_change_with_corner(KNOTS, shift))
+    jacobian[-1, N_KNOTS] = 1.0 / deviation
+    residuals = _ROWS @ knots - _of_slopes(expected_log_density(KNOTS, shift))
+    return np.append(residuals, own / deviation), jacobian
+
+
+def expected_state() -> FloatArray:
+    """The likeliest of the prior, up to its level: straight on where slopes are free. Shape (N_STATE,). [-]"""
+    values = expected_log_density(KNOTS)
+    first = _BOUND[0]
+    slope = (SLOPES @ values)[first]
+    values[:first] = values[first] + slope * (_LOG[:first] - _LOG[first])
+    return np.append(values, 0.0)
 
 
 def interpolation(frequency: FloatArray) -> FloatArray:

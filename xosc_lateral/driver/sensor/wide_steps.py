@@ -21,7 +21,7 @@ from xosc_lateral.driver.sensor.likelihood import Colour, solve
 from xosc_lateral.driver.sensor.model import WIDE
 from xosc_lateral.driver.sensor.periodogram import PASSED, Periodogram
 from xosc_lateral.driver.sensor.rounded_gaussian import RoundedGaussian, gaussian_behind
-from xosc_lateral.driver.sensor.vehicle_bound import N_KNOTS, PRIOR_ROWS, PRIOR_VALUES, density
+from xosc_lateral.driver.sensor.vehicle_bound import N_KNOTS, N_STATE, density, expected_state, prior
 from xosc_lateral.normal import NORMAL_95
 
 FloatArray = NDArray[np.float64]
@@ -139,9 +139,10 @@ def split_wide_steps(
         data, _overdispersion(windows, data.window), gaussian, noise, rate, float(np.clip(unsure, *TIED))
     )
     starts = problem.starts()
-    knots = starts[-1]  # of the prior, which is all there is where hardly a step is crossed
+    state = starts[-1]  # of the prior, which is all there is where hardly a step is crossed
     if unsure <= UNSURE:
-        knots = min((climb(problem.at, start) for start in starts), key=lambda one: one[1])[0]
+        state = min((climb(problem.at, start) for start in starts), key=lambda one: one[1])[0]
+    knots = state[:N_KNOTS]
     knots = knots + np.log((gaussian.deviation**2 - noise) / problem.power(knots))
     white = 2.0 * noise / rate
     rest = np.maximum(problem.expected(knots)[0] - density(knots, problem.frequency) - white, 0.0)
@@ -180,7 +181,7 @@ def _overdispersion(windows: FloatArray, seconds: float) -> float:
 
 
 class _Problem:
-    """Loss, gradient and Fisher information at knots."""
+    """Loss, gradient and Fisher information at a state, see `vehicle_bound`."""
 
     def __init__(
         self, data: Periodogram, dispersion: float, gaussian: RoundedGaussian, noise: float, rate: float, unsure: float
@@ -193,10 +194,12 @@ class _Problem:
     def starts(self) -> list[FloatArray]:
         """The spectrum of the rows as if nothing were rounded, and that of the prior, both with the known variance."""
         found = [
-            solve(self.data, Colour(), np.zeros(len(self.data.frequency))).knots,
-            np.asarray(np.linalg.lstsq(PRIOR_ROWS, PRIOR_VALUES, rcond=None)[0], dtype=np.float64),
+            solve(self.data, Colour(), np.zeros(len(self.data.frequency))).state,
+            expected_state(),
         ]
-        return [knots + 2.0 * np.log(self.gaussian.deviation) - np.log(self.power(knots)) for knots in found]
+        for state in found:
+            state[:N_KNOTS] += 2.0 * np.log(self.gaussian.deviation) - np.log(self.power(state[:N_KNOTS]))
+        return found
 
     def power(self, knots: FloatArray) -> float:
         """Variance of a driver with these knots. [m2]"""
@@ -217,16 +220,17 @@ class _Problem:
         rounded, variance = self.expected(knots)
         return np.asarray(np.log(np.append(np.interp(self.data.frequency, self.frequency, rounded), variance)))
 
-    def at(self, knots: FloatArray) -> tuple[float, FloatArray, FloatArray]:
+    def at(self, state: FloatArray) -> tuple[float, FloatArray, FloatArray]:
         """Loss, gradient, information."""
+        knots, (residuals, own) = state[:N_KNOTS], prior(state)
         shown = self._shown(knots)
         ratio = self.data.density / np.exp(shown[:-1])
         lacking = (shown[-1] - 2.0 * np.log(self.gaussian.deviation)) / self.unsure
-        bend = PRIOR_ROWS @ knots - PRIOR_VALUES
-        loss = float((self.weight * (shown[:-1] + ratio)).sum() + 0.5 * lacking**2 + 0.5 * bend @ bend)
-        moved = [self._shown(knots + NUDGE * unit) for unit in np.eye(N_KNOTS)]
-        jacobian = (np.array(moved) - shown).T / NUDGE
+        loss = float((self.weight * (shown[:-1] + ratio)).sum() + 0.5 * lacking**2 + 0.5 * residuals @ residuals)
+        jacobian = np.zeros((len(shown), N_STATE))  # the corner shows by the prior alone
+        jacobian[:, :N_KNOTS] = (np.array([self._shown(knots + NUDGE * unit) for unit in np.eye(N_KNOTS)]) - shown).T
+        jacobian /= NUDGE
         weights = np.append(self.weight, 1.0 / self.unsure**2)
         pull = np.append(self.weight * (1.0 - ratio), lacking / self.unsure)
-        gradient = jacobian.T @ pull + PRIOR_ROWS.T @ bend
-        return loss, gradient, (jacobian.T * weights) @ jacobian + PRIOR_ROWS.T @ PRIOR_ROWS
+        gradient = jacobian.T @ pull + own.T @ residuals
+        return loss, gradient, (jacobian.T * weights) @ jacobian + own.T @ own
