@@ -207,6 +207,20 @@ def test_louder_zones_are_found_and_taken_out():
         assert abs(np.mean([rest[f"zone {k}"] for k in range(1, 12, 2)]) - np.mean(list(rest.values()))) < 0.12
 
 
+def test_zones_are_found_where_nothing_else_is_known():
+    """All at one speed in one lane, or with zones and nothing besides: the place is as loud."""
+    for constant in ({"speed": 30.0}, {}):
+        runs = [
+            replace(run, context={name: np.full(len(run), value) for name, value in constant.items()})
+            for run in zoned_population(1, loud=0.8)
+        ]
+        (found,) = fit_place(runs)
+        assert isinstance(found, Zones)
+        level = dict(zip(found.zones, found.values, strict=True))
+        loud, quiet = ([level[f"zone {k}"] for k in range(first, 12, 2)] for first in (1, 2))
+        assert np.mean(loud) - np.mean(quiet) == pytest.approx(0.8 * MEAN_OF_HALF_A_WAVE, abs=0.12)
+
+
 def test_wandering_is_left_as_it_is_where_a_zone_is_taken_out():
     runs = zoned_population(2, loud=0.8)
     for run, neutral in zip(runs, without_place(runs, fit_place(runs)), strict=True):

@@ -71,7 +71,7 @@ def sample(
     if duration is not None:
         made = list(sample_free(driver, duration, seed, speed=speed, lane_width=lane_width, with_sensor=with_sensor))
         settings: dict[str, Any] = {"duration_s": duration, "speed": speed}
-        unknown = [column for column in driver.columns if column not in {"speed", "lane_width", ZONE}]
+        unknown = [column for column in driver.columns_of_any_drive if column not in {"speed", "lane_width"}]
         return Offsets(driver, made, seed, None, settings, [_neutral("a free run", unknown)] if unknown else [])
     given = given_drives(like if like is not None else context, columns)  # type: ignore[arg-type]
     warnings = _unknown_columns(driver, given.drives)

@@ -63,7 +63,7 @@ class _Pieces:
 
 
 def fit_place(runs: Sequence[Run], *, neighbours: bool | None = None) -> tuple[ColumnEffect, ...]:
-    """Effects of class, lane, speed, zone and neighbours; none where there are too few drives or columns.
+    """Effects of class, lane, speed, zone and neighbours; none of too few drives, or where none of these is known.
 
     Drivers' own levels are a random effect, and errors are robust against whatever else the snippets of one drive
     share [1]_. The slopes of all columns are shrunk together, by the share of their size that chance would not make
@@ -92,9 +92,11 @@ def fit_place(runs: Sequence[Run], *, neighbours: bool | None = None) -> tuple[C
     beside = [] if neighbours is False else neighbour_shapes(runs, LEAST_DRIVES)
     if neighbours and not beside:
         raise NotEnoughDataError(_why_no_neighbours(runs, drives))
-    if drives < LEAST_DRIVES or not (shapes or beside):
+    if drives < LEAST_DRIVES:
         return ()
     zones = quick_by_zone(runs, lambda run: _quantities(shapes, run))
+    if not (shapes or beside):
+        return tuple(zones)
     pieces, found = _pieces(without_place(runs, zones), [*shapes, *beside]), list[ColumnEffect](zones)
     found += _effects([*shapes, *beside], Acts.LOCATION, pieces.mean, pieces)
     for acts, response in ((Acts.SPREAD, pieces.spread), (Acts.FINE, pieces.fine)):

@@ -84,6 +84,13 @@ class DriverProfile(Record, frozen=True):
         """Context columns that its effects read."""
         return tuple(sorted({column for effect in self.effects for column in effect.columns}))
 
+    @property
+    def columns_of_any_drive(self) -> tuple[str, ...]:
+        """Those that a drive can have which is of no recording, as in a scenario."""
+        return tuple(
+            sorted({column for effect in self.effects if not effect.is_of_recording for column in effect.columns})
+        )
+
     def to_dict(self) -> dict[str, Any]:
         """Plain JSON values, as the profile file holds them."""
         values = plain(self)

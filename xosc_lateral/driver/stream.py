@@ -21,7 +21,6 @@ from xosc_lateral.driver.records import plain, read_as
 from xosc_lateral.driver.response_stream import ResponseStream
 from xosc_lateral.driver.stream_state import SeedState, StreamState, sealed, upgraded
 from xosc_lateral.driver.upsampling import extrapolate, piece
-from xosc_lateral.drives.zones import ZONE
 from xosc_lateral.errors import DriverProfileError
 
 FloatArray = NDArray[np.float64]
@@ -82,8 +81,8 @@ class OffsetStream:
         self._start, self._time = start, time
         self._process = DriveProcess(profile, self._seed, ahead=BLOCK)
         self._process.begin_at(time)
-        # What drives now is in no zone of a recording, and must not look ahead for the next one.
-        columned = [effect for effect in self._process.columned if ZONE not in effect.columns]
+        # What drives now is in no recording, and must not look ahead for, say, its next zone.
+        columned = [effect for effect in self._process.columned if not effect.is_of_recording]
         self._responses = tuple(ResponseStream(effect, profile.model.step) for effect in columned)
         self._ahead = max([0, *(response.ahead for response in self._responses)]) + (
             _NEIGHBOURS if self._factor > 1 else 0

@@ -14,7 +14,6 @@ from xosc_lateral.driver.plausibility import check_offsets
 from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.driver.sampling import OffsetSampler
 from xosc_lateral.driver.sensor.error import known_sensor, sensor_error
-from xosc_lateral.drives.zones import ZONE
 from xosc_lateral.enrich.consequences import gaps_of, lane_departures
 from xosc_lateral.enrich.give_way import SampledVehicle, give_way
 from xosc_lateral.enrich.other_hand import mirrored, other_side
@@ -333,5 +332,5 @@ def _is_left_hand(entity: EntityMotion, network: RoadNetwork, knots: IntArray) -
 
 
 def _unknown(driver: DriverProfile, segment: Segment) -> set[str]:
-    """Columns that the scenario could have told; zones are those of a recording."""
-    return {column for column in driver.columns if column not in segment.context and column != ZONE}
+    """Columns that the scenario could have told."""
+    return {column for column in driver.columns_of_any_drive if column not in segment.context}

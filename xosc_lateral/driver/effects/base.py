@@ -79,6 +79,9 @@ class Effect(Record, frozen=True, kw_only=True, tag_field="kind", tag=kind_of):
     kind: ClassVar[str]
     """Name in the profile file: the class's, in lower case with hyphens, or its word of `FILE_WORDS`."""
 
+    is_of_recording: ClassVar[bool] = False
+    """Whether its columns are of one recording alone: no other drive lacks them, or looks out for them."""
+
     def __init_subclass__(cls, **settings: Any) -> None:
         super().__init_subclass__(**settings)
         cls.kind = kind_of(cls.__name__)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,6 +32,8 @@ class Zones(SingleColumnEffect, frozen=True, kw_only=True):
     DriverProfileError
         If the lengths disagree, there are none, a name is empty or there twice, or a value is not finite.
     """
+
+    is_of_recording: ClassVar[bool] = True
 
     zones: tuple[str, ...]
     values: tuple[float, ...]
