@@ -71,5 +71,10 @@ def stabilise(coefficients: FloatArray, largest: float = MAX_ROOT) -> FloatArray
     return np.asarray(-np.real(np.poly(pulled))[1:])
 
 
+def is_stable(coefficients: FloatArray) -> bool:
+    """Whether all roots lie within the unit circle; coefficients of shape (order,). [-]"""
+    return bool(np.abs(_roots(coefficients)).max(initial=0.0) < 1.0)
+
+
 def _roots(coefficients: FloatArray) -> NDArray[np.complex128]:
     return np.roots(np.concatenate([[1.0], -coefficients])).astype(np.complex128)

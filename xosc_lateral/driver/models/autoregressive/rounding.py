@@ -6,22 +6,31 @@ import numpy as np
 from msgspec.structs import replace
 from numpy.typing import NDArray
 
-from xosc_lateral.driver.models.autoregressive.autoregression import Autoregression
+from xosc_lateral.driver.models.autoregressive.autoregression import GRID, Autoregression, is_stable
 from xosc_lateral.driver.models.autoregressive.model import AutoregressiveModel
 from xosc_lateral.driver.models.autoregressive.volatility import Volatility
 
 FloatArray = NDArray[np.float64]
 
-DIGITS = 9
-"""Significant digits kept of a fitted number: what differs beyond is the processor's rounding. [-]"""
+DIGITS = 5
+"""Significant digits kept of a fitted number: a hundredth of its standard error and less. What another processor gives
+differs by up to a hundred millionth (linear algebra in another order), so that one number in 10,000 is rounded to
+another last digit there. [-]"""
+
+KEPT = 2e-3
+"""Largest change of the coarse movement's log power that rounding may make at any frequency: 0.01 dB. Coefficients of
+an autoregression nearly add up to one, and what they lack of it decides how far a driver wanders. [-]"""
+
+MOST_DIGITS = 17
+"""That a number has. [-]"""
 
 
 def rounded(model: AutoregressiveModel) -> AutoregressiveModel:
-    """The same with every number rounded to `DIGITS`."""
+    """The same with every number rounded to what is kept of it."""
     return AutoregressiveModel(
         mean=_tidy(model.mean),
         between_drivers=_tidy(model.between_drivers),
-        coarse=Autoregression(_tidy_all(model.coarse.coefficients), _tidy(model.coarse.scale)),
+        coarse=_tidy_coarse(model.coarse),
         fine=replace(model.fine, damping=_tidy_all(model.fine.damping)),
         coarse_volatility=_tidy_volatility(model.coarse_volatility),
         fine_volatility=_tidy_volatility(model.fine_volatility),
@@ -31,12 +40,26 @@ def rounded(model: AutoregressiveModel) -> AutoregressiveModel:
     )
 
 
-def _tidy(value: float) -> float:
-    return float(f"{value:.{DIGITS}g}")
+def _tidy_coarse(coarse: Autoregression) -> Autoregression:
+    """With as few digits as keep the spectrum, and with it a stable autoregression stable."""
+    frequency = np.arange(GRID // 2 + 1) / GRID
+    power = np.log(coarse.power(frequency))
+    for digits in range(DIGITS, MOST_DIGITS):
+        coefficients, scale = _tidy_all(coarse.coefficients, digits), _tidy(coarse.scale, digits)
+        if not is_stable(coefficients):
+            continue
+        short = Autoregression(coefficients, scale)
+        if np.abs(np.log(short.power(frequency)) - power).max() <= KEPT:
+            return short
+    return coarse
 
 
-def _tidy_all(values: FloatArray) -> FloatArray:
-    return np.array([_tidy(value) for value in values])
+def _tidy(value: float, digits: int = DIGITS) -> float:
+    return float(f"{value:.{digits}g}")
+
+
+def _tidy_all(values: FloatArray, digits: int = DIGITS) -> FloatArray:
+    return np.array([_tidy(value, digits) for value in values])
 
 
 def _tidy_volatility(part: Volatility) -> Volatility:
