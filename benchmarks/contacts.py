@@ -1,6 +1,7 @@
 """Contacts that lifelike movement brings into the dense template: conversions without resampling.
 
     python -m benchmarks.contacts [--profile auto motorway-refined] [--count 1000]
+        [--write docs/validation/pairs.md]
 
 A contact counts if the nominal scenario lacks it, a departure if a reference point leaves the lane that it keeps
 nominally.
@@ -14,6 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
+from benchmarks.markers import write_between_markers
 from xosc_lateral.api.templates import write_template
 from xosc_lateral.enrich.enrich import enrich
 from xosc_lateral.pipeline.drivers import choose_drivers
@@ -28,13 +30,15 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--profile", nargs="+", default=["auto", "motorway-refined"])
     parser.add_argument("--count", type=int, default=1000)
+    parser.add_argument("--write", type=Path, metavar="PAGE.md", help="page with the markers")
     args = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
         written = write_template("dense-traffic", Path(folder))
         played = play_scenario(next(path for path in written if path.suffix == ".xosc"))
-    print(f"Dense template, {args.count} conversions\n")
-    print("| profile | with contacts | with departures | smallest gap at quantiles 0, 1, 10, 50 % [m] |")
-    print("|---|---|---|---|")
+    lines = [
+        "| profile | conversions | with contacts | with departures | smallest gap at quantiles 0, 1, 10, 50 % [m] |",
+        "|---|---|---|---|---|",
+    ]
     for profile in args.profile:
         drivers = choose_drivers(played.scenario, ConvertSettings(profile=profile))
         contacts, departures, gaps = 0, 0, []
@@ -44,7 +48,11 @@ def main() -> None:
             departures += bool(made.departures)
             gaps.append(min(gap.distance for gap in made.gaps_after))
         told = ", ".join(f"{value:.2f}" for value in np.quantile(gaps, QUANTILES))
-        print(f"| `{profile}` | {contacts} | {departures} | {told} |")
+        lines.append(f"| `{profile}` | {args.count} | {contacts} | {departures} | {told} |")
+    text = "\n".join(lines)
+    print(text)
+    if args.write is not None:
+        write_between_markers(args.write, text, "contacts")
 
 
 if __name__ == "__main__":

@@ -2,19 +2,20 @@
 
     xosc-lateral import dlr-ht tasi-0.15.4-py3-none-any.whl -o dlr.parquet
     python -m benchmarks.converted_pairs dlr.parquet [--profile motorway motorway-refined] [--seeds 20] [--scene pairs]
+        [--write docs/validation/pairs.md]
 
 A car overtakes a truck and a car, then two cars drive at the same speed; in right-hand and left-hand traffic, on lanes
 along the road's s and against it. Every scenario is converted with both vehicles and with one of them alone, with the
 same seeds: what the other brings about is the difference, counted away from the other. Of overtaking, the mean in each
 band of distance less the mean beyond 100 m, as `benchmarks.clearance` has it of the recording; the last row is what is
-left beyond 100 m. Intervals are of 1,000 resamples of the conversions.
+left beyond 100 m. Intervals are of 1,000 resamples of the conversions, in the nearest row of each lane.
 """
 
 from __future__ import annotations
 
 import argparse
 import tempfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -23,6 +24,7 @@ from numpy.typing import NDArray
 
 import xosc_lateral as xl
 from benchmarks.clearance import BANDS, FAR, Clearance, band_name, resampled, within_vehicles
+from benchmarks.markers import write_between_markers
 from benchmarks.pair_scenarios import FAST, ROADS, SLOW, Driven, Road, write_scenario
 from xosc_lateral.formats.drives import read_drives
 from xosc_lateral.identification.timeline import join_drives
@@ -48,6 +50,9 @@ SETTLED_S = 10.0
 
 NEIGHBOUR = {SLOW: "left", FAST: "right"}
 """On which side the other is, in right-hand traffic."""
+
+LANES = {FAST: "overtaking", SLOW: "slow"}
+"""In the order of the tables."""
 
 Found = dict[tuple[int, int], list[float]]
 """Lane and row of a table -> one value for each conversion. [m]"""
@@ -138,6 +143,7 @@ def main() -> None:
     parser.add_argument("--profile", nargs="+", default=["motorway", "motorway-refined"])
     parser.add_argument("--seeds", type=int, default=20, help="conversions of each scenario")
     parser.add_argument("--scene", choices=("overtaking", "pairs", "both"), default="both")
+    parser.add_argument("--write", type=Path, metavar="PAGE.md", help="page with the markers")
     args = parser.parse_args()
     timeline, seeds = join_drives(list(read_drives(args.table))), range(args.seeds)
     recorded = {
@@ -154,44 +160,54 @@ def main() -> None:
                 for road in ROADS
             }
             names = [*map(band_name, BANDS), f"beyond {FAR:g} m"]
-            _print(f"A car overtakes a {passed.value[1]}", names, found, recorded)
+            _show(f"pairs-{passed.value[1]}", names, found, recorded, args.write)
         if args.scene != "overtaking":
             found = {
                 (profile, road): pair_clearances(road, folder, profile, seeds)
                 for profile in args.profile
                 for road in ROADS
             }
-            _print("Two cars at the same speed", [f"{gap:g} m" for gap in GAPS], found, {})
+            _show("pairs-beside", [f"{gap:g} m" for gap in GAPS], found, {}, args.write)
 
 
-def _print(
-    title: str,
-    names: list[str],
+def _show(
+    scene: str,
+    names: Sequence[str],
     found: Mapping[tuple[str, Road], Found],
     recorded: Mapping[tuple[int, int], Clearance | None],
+    page: Path | None,
 ) -> None:
-    """A table per lane: hands side by side, then every road by itself while alongside."""
+    """Print the table, and every road by itself while alongside; write the table where asked."""
+    text = "\n".join(table(names, found, recorded))
+    print(f"\n{scene}\n\n{text}\n")
+    for lane, lane_name in LANES.items():
+        for profile in dict.fromkeys(profile for profile, _ in found):
+            each = ", ".join(f"{road} {interval(found[profile, road][lane, 0])}" for road in ROADS)
+            print(f"Alongside, {lane_name} lane, `{profile}`, road by road: {each}")
+    if page is not None:
+        write_between_markers(page, text, scene)
+
+
+def table(
+    names: Sequence[str],
+    found: Mapping[tuple[str, Road], Found],
+    recorded: Mapping[tuple[int, int], Clearance | None],
+) -> list[str]:
+    """Lanes one below the other, hands side by side. [m]"""
     profiles = list(dict.fromkeys(profile for profile, _ in found))
-    for lane in (FAST, SLOW):
-        print(f"\n{title}; {'overtaking' if lane == FAST else 'slow'} lane, m (95 %)\n")
-        heads = [f"`{profile}`, {hand}-hand" for profile in profiles for hand in ("right", "left")]
-        heads = ["recorded", *heads] if recorded else heads
-        print(f"| distance | {' | '.join(heads)} |\n|{'---|' * (len(heads) + 1)}")
+    heads = [f"`{profile}`, {hand}" for profile in profiles for hand in ("right-hand", "left-hand")]
+    heads = ["lane", "distance", *(["recorded"] if recorded else []), *heads]
+    lines = [f"| {' | '.join(heads)} |", "|---" * len(heads) + "|"]
+    for lane, lane_name in LANES.items():
         for number, name in enumerate(names):
-            cells = [str(recorded.get((lane, number), ""))] if recorded else []
+            cells = [str(recorded.get((lane, number)) or "")] if recorded else []
             for profile in profiles:
                 for left_hand in (False, True):
-                    values = [
-                        value
-                        for road in ROADS
-                        if road.left_hand == left_hand
-                        for value in found[profile, road][lane, number]
-                    ]
-                    cells.append(str(interval(values)))
-            print(f"| {name} | {' | '.join(cells)} |")
-        for profile in profiles:
-            each = ", ".join(f"{road} {interval(found[profile, road][lane, 0])}" for road in ROADS)
-            print(f"\nAlongside, `{profile}`, road by road: {each}")
+                    roads = [road for road in ROADS if road.left_hand == left_hand]
+                    shown = interval([value for road in roads for value in found[profile, road][lane, number]])
+                    cells.append(str(shown) if number == 0 else f"{shown.mean:+.3f}")
+            lines.append(f"| {lane_name if number == 0 else ''} | {name} | {' | '.join(cells)} |")
+    return lines
 
 
 if __name__ == "__main__":
