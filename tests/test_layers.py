@@ -20,6 +20,7 @@ LAYERS = {
     "jit": 0,
     "mask": 0,
     "normal": 0,
+    "digits": 0,
     "road": 1,
     "scenario": 1,
     "motion": 2,

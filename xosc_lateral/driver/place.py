@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from xosc_lateral.digits import all_significant
 from xosc_lateral.driver.effects import Acts, ColumnEffect, Levels, Linear, Piecewise, Proximity
 from xosc_lateral.driver.effects.rounding import rounded_number
 from xosc_lateral.driver.loudness import quick_by_zone
@@ -148,7 +149,7 @@ def _shapes(runs: Sequence[Run]) -> list[ColumnEffect]:
     if "lane_index" in varying:
         found.append(Levels(acts=Acts.LOCATION, column="lane_index", levels=(RIGHTMOST,)))
     if "speed" in varying:
-        low, high = (float(f"{value:.3g}") for value in np.quantile(columns["speed"], WITHIN))
+        low, high = all_significant(np.quantile(columns["speed"], WITHIN), 3)
         if high > low:
             found.append(Piecewise(acts=Acts.LOCATION, column="speed", knots=(low, high)))
     return found

@@ -8,6 +8,7 @@ from typing import Any, TypeVar
 import msgspec
 import numpy as np
 
+from xosc_lateral.digits import significant
 from xosc_lateral.driver.effects.base import Effect
 
 E = TypeVar("E", bound=Effect)
@@ -16,9 +17,9 @@ DIGITS = 6
 """Significant digits kept: what differs beyond is the processor's rounding. [-]"""
 
 
-def rounded_number(value: float, digits: int = DIGITS) -> float:
-    """The nearest number with so many significant digits."""
-    return float(f"{value:.{digits}g}")
+def rounded_number(value: float) -> float:
+    """The nearest number with `DIGITS` significant digits."""
+    return significant(value, DIGITS)
 
 
 def rounded_effect(effect: E) -> E:

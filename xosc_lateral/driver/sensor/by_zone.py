@@ -9,6 +9,7 @@ from math import inf, isfinite
 import numpy as np
 from numpy.typing import NDArray
 
+from xosc_lateral.digits import all_significant
 from xosc_lateral.driver.records import Record
 from xosc_lateral.driver.zone_levels import Passages, zone_levels
 from xosc_lateral.drives.zones import Names, at_zones, numbered
@@ -17,9 +18,13 @@ from xosc_lateral.errors import DriverProfileError
 FloatArray = NDArray[np.float64]
 
 
+DIGITS = 4
+"""Significant digits kept of levels, and of what else is counted from jumps and windows. [-]"""
+
+
 def tidy(values: Sequence[float] | FloatArray) -> tuple[float, ...]:
-    """As a profile keeps them: the same on any machine."""
-    return tuple(float(f"{value:.4g}") for value in values)
+    """As a profile keeps them."""
+    return all_significant(values, DIGITS)
 
 
 class ByZone(Record, frozen=True):

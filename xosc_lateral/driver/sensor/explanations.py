@@ -17,6 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from xosc_lateral.digits import significant
 from xosc_lateral.driver.sensor.likelihood import Colour, Known, Solution, solve
 from xosc_lateral.driver.sensor.periodogram import Periodogram
 from xosc_lateral.driver.sensor.second_view import SecondView
@@ -103,7 +104,7 @@ def _of_family(
 
 def _in_digits(corner: float) -> float:
     """To the digits that the climb can tell: the same on any machine. [Hz]"""
-    return float(f"{corner:.3g}")
+    return significant(corner, 3)
 
 
 def _explanation(

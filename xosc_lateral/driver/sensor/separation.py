@@ -15,6 +15,7 @@ import numpy as np
 from msgspec.structs import replace
 from numpy.typing import NDArray
 
+from xosc_lateral.digits import all_significant
 from xosc_lateral.driver.sensor.by_zone import ZonedRows
 from xosc_lateral.driver.sensor.explanations import Explanation, explanations
 from xosc_lateral.driver.sensor.hidden_path import HiddenPath
@@ -270,7 +271,7 @@ DIGITS = 7
 
 def rounded(values: Sequence[float]) -> tuple[float, ...]:
     """Numbers as a profile keeps them: the same on any machine."""
-    return tuple(float(f"{value:.{DIGITS}g}") for value in values)
+    return all_significant(values, DIGITS)
 
 
 def _no_density(frequency: FloatArray) -> FloatArray:

@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 from msgspec.structs import replace
-from numpy.typing import NDArray
 
+from xosc_lateral.digits import all_significant, significant
 from xosc_lateral.driver.models.autoregressive.autoregression import GRID, Autoregression, is_stable
 from xosc_lateral.driver.models.autoregressive.model import AutoregressiveModel
 from xosc_lateral.driver.models.autoregressive.volatility import Volatility
-
-FloatArray = NDArray[np.float64]
 
 DIGITS = 5
 """Significant digits kept of a fitted number: a hundredth of its standard error and less. What another processor gives
@@ -31,7 +29,7 @@ def rounded(model: AutoregressiveModel) -> AutoregressiveModel:
         mean=_tidy(model.mean),
         between_drivers=_tidy(model.between_drivers),
         coarse=_tidy_coarse(model.coarse),
-        fine=replace(model.fine, damping=_tidy_all(model.fine.damping)),
+        fine=replace(model.fine, damping=np.array(all_significant(model.fine.damping, DIGITS))),
         coarse_volatility=_tidy_volatility(model.coarse_volatility),
         fine_volatility=_tidy_volatility(model.fine_volatility),
         correlation=_tidy(model.correlation),
@@ -45,7 +43,7 @@ def _tidy_coarse(coarse: Autoregression) -> Autoregression:
     frequency = np.arange(GRID // 2 + 1) / GRID
     power = np.log(coarse.power(frequency))
     for digits in range(DIGITS, MOST_DIGITS):
-        coefficients, scale = _tidy_all(coarse.coefficients, digits), _tidy(coarse.scale, digits)
+        coefficients, scale = np.array(all_significant(coarse.coefficients, digits)), significant(coarse.scale, digits)
         if not is_stable(coefficients):
             continue
         short = Autoregression(coefficients, scale)
@@ -54,12 +52,8 @@ def _tidy_coarse(coarse: Autoregression) -> Autoregression:
     return coarse
 
 
-def _tidy(value: float, digits: int = DIGITS) -> float:
-    return float(f"{value:.{digits}g}")
-
-
-def _tidy_all(values: FloatArray, digits: int = DIGITS) -> FloatArray:
-    return np.array([_tidy(value, digits) for value in values])
+def _tidy(value: float) -> float:
+    return significant(value, DIGITS)
 
 
 def _tidy_volatility(part: Volatility) -> Volatility:

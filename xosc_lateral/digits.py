@@ -1,0 +1,19 @@
+"""Numbers with as many significant digits as mean something: a file is short, and the same on any machine.
+
+What another processor gives differs in the last digits, since its linear algebra adds up in another order. Where many
+digits fewer are kept, hardly ever does a number lie so near the border of two that it is rounded to the other one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+
+def significant(value: float, digits: int) -> float:
+    """The nearest number with so many significant digits."""
+    return float(f"{value:.{digits}g}")
+
+
+def all_significant(values: Iterable[float], digits: int) -> tuple[float, ...]:
+    """Of each. In the unit of the values."""
+    return tuple(significant(value, digits) for value in values)
