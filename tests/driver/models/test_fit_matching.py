@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from msgspec.structs import replace
 
 from tests.driver.models.made_models import POPULATION, STEADY
+from xosc_lateral.driver.models.autoregressive.autoregression import GRID, Autoregression
+from xosc_lateral.driver.models.autoregressive.fit_coarse import scaled_spectrum
 from xosc_lateral.driver.models.autoregressive.fit_matching import (
     LARGEST_STEP,
     MOST_CORRELATED,
@@ -13,6 +16,7 @@ from xosc_lateral.driver.models.autoregressive.fit_matching import (
     SIMULATED,
     SNIPPETS_EACH,
     _asked,
+    _coarse_gain,
     _corrected,
     _drives_of,
     _gain,
@@ -20,6 +24,7 @@ from xosc_lateral.driver.models.autoregressive.fit_matching import (
     _moments,
     _volatile,
     _wiggle,
+    matched,
     simulate,
 )
 from xosc_lateral.driver.models.autoregressive.fit_settings import DEFAULT_SETTINGS
@@ -140,3 +145,46 @@ def test_simulated_drives_are_the_model_s_drives() -> None:
     assert made.shape == (3, 40)
     np.testing.assert_allclose(made[:, 0], starts, atol=1e-12)
     np.testing.assert_array_equal(made, simulate(STEADY, 40, 7, drivers=3, starts=starts))
+
+
+# ---- the coarse movement's spectrum ----------------------------------------------------------------------------------
+FREQUENCY = np.arange(GRID // 2 + 1) / GRID
+"""Cycles per coarse step, which is a second: [Hz]."""
+
+
+def bump(size: float) -> np.ndarray:
+    """Amplitude that many times as large from 0.3 to 0.4 Hz."""
+    return 1.0 + (size - 1.0) * np.exp(-(((FREQUENCY - 0.35) / 0.05) ** 2))
+
+
+def test_a_gain_of_one_leaves_the_autoregression_and_another_is_in_its_spectrum() -> None:
+    coarse = Autoregression(np.concatenate([POPULATION.coarse.coefficients, np.zeros(14)]), POPULATION.coarse.scale)
+    same = scaled_spectrum(coarse, np.ones(len(FREQUENCY)))
+    np.testing.assert_allclose(same.power(FREQUENCY), coarse.power(FREQUENCY), rtol=1e-3)
+    larger = scaled_spectrum(coarse, bump(1.3))
+    ratio = np.sqrt(larger.power(FREQUENCY) / coarse.power(FREQUENCY))
+    np.testing.assert_allclose(ratio, bump(1.3), rtol=0.03)
+
+
+def test_the_coarse_movement_is_raised_by_half_the_log_power_that_it_lacks_and_only_near_the_border() -> None:
+    gain = _coarse_gain(np.full(76, 0.2), DEFAULT_SETTINGS)
+    assert gain[(FREQUENCY >= 0.33) & (FREQUENCY <= 0.4)] == pytest.approx(np.exp(0.1))
+    assert gain[(FREQUENCY <= 0.2) | (FREQUENCY >= 0.45)] == pytest.approx(1.0)
+    assert _coarse_gain(np.full(76, 9.0), DEFAULT_SETTINGS).max() == pytest.approx(np.exp(LARGEST_STEP))
+
+
+@pytest.mark.parametrize("size", [0.8, 1.25])
+def test_power_that_a_model_lacks_or_has_too_much_near_the_border_comes_back(size: float) -> None:
+    """Runs are of a population; the model begins with a spectrum that is off by 2 dB from 0.3 to 0.4 Hz."""
+    long = np.concatenate([POPULATION.coarse.coefficients, np.zeros(14)])
+    truth = replace(POPULATION, coarse=Autoregression(long, POPULATION.coarse.scale))
+    runs = list(simulate(truth, 601, 3, drivers=300))
+    off = replace(truth, coarse=scaled_spectrum(truth.coarse, bump(size)))
+    found = matched(off, runs, DEFAULT_SETTINGS)
+    near = (FREQUENCY > 0.33) & (FREQUENCY < 0.38)
+    before, after = (
+        10.0 * np.abs(np.log10(model.coarse.power(FREQUENCY[near]) / truth.coarse.power(FREQUENCY[near]))).mean()
+        for model in (off, found)
+    )
+    assert before > 1.3
+    assert after < 0.3 * before

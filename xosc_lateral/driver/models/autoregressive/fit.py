@@ -6,7 +6,8 @@
 4. Volatility: how much more, and for how long, the power in short windows varies than it would in steady movement.
 5. Rounds of simulating: snippets of the model from the measured snippets' starts must show the same moments of log
    standard deviation, of the offset and of its differences. What differs corrects the scales, the volatilities and
-   their correlation (indirect inference: Gourieroux, Monfort, Renault 1993).
+   their correlation, and windows of both the spectrum of either part (indirect inference: Gourieroux, Monfort, Renault
+   1993).
 
 Everything is deterministic: the simulations draw from a fixed seed.
 """

@@ -13,10 +13,11 @@ import numpy as np
 from msgspec.structs import replace
 from numpy.typing import NDArray
 
-from xosc_lateral.driver.models.autoregressive.autoregression import Autoregression
-from xosc_lateral.driver.models.autoregressive.filters import COARSE_EVERY, split_bands
+from xosc_lateral.driver.models.autoregressive.autoregression import GRID, Autoregression
+from xosc_lateral.driver.models.autoregressive.filters import BORDER, COARSE_EVERY, split_bands
+from xosc_lateral.driver.models.autoregressive.fit_coarse import scaled_spectrum
 from xosc_lateral.driver.models.autoregressive.fit_settings import FitSettings
-from xosc_lateral.driver.models.autoregressive.fit_spectrum import window_of
+from xosc_lateral.driver.models.autoregressive.fit_spectrum import rise, window_of
 from xosc_lateral.driver.models.autoregressive.fit_volatility import MAX_LAG, autocovariance, fit_volatility, log_power
 from xosc_lateral.driver.models.autoregressive.model import AutoregressiveModel
 from xosc_lateral.driver.models.autoregressive.volatility import Volatility
@@ -47,7 +48,7 @@ MOST_CORRELATED = 0.95
 """Correlation of the volatilities at most: the two stay two. [-]"""
 
 LARGEST_STEP = float(np.log(1.5))
-"""By which the fine noise's log amplitude changes at a frequency in one round: a whole step would overshoot where the
+"""By which log amplitudes change at a frequency in one round: a whole step of the fine noise would overshoot where the
 coarse movement outweighs it. [-]"""
 
 
@@ -105,7 +106,7 @@ def _fine_of(pair: tuple[FloatArray, FloatArray]) -> FloatArray:
 
 
 def matched(model: AutoregressiveModel, runs: Sequence[FloatArray], settings: FitSettings) -> AutoregressiveModel:
-    """Correct scales and volatilities until simulated snippets vary as the measured ones do.
+    """Correct scales, volatilities and spectrum until simulated snippets vary as the measured ones do.
 
     From runs of shape (n_i,) [lane widths]; indirect inference: C. Gourieroux, A. Monfort, E. Renault, Journal of
     Applied Econometrics 8 (1993), S85-S118. Simulated snippets are cut from free runs, as the measured ones are:
@@ -125,8 +126,10 @@ def matched(model: AutoregressiveModel, runs: Sequence[FloatArray], settings: Fi
         if slopes is None:
             nudged = _drives_of(_volatile(model, NUDGE, NUDGE), length, settings.seed, len(simulated))
             slopes = _asked(_moments(nudged.reshape(-1, length)) - found) / NUDGE
-        model = _corrected(model, target - found, slopes, settings)
-        model = replace(model, fine=replace(model.fine, damping=model.fine.damping * _gain(model, lacks)))
+        fine = replace(model.fine, damping=model.fine.damping * _gain(model, lacks))
+        scale, model = model.coarse.scale, _corrected(model, target - found, slopes, settings)
+        still = lacks - 2.0 * np.log(model.coarse.scale / scale)  # lacking after the coarse movement was scaled
+        model = replace(model, coarse=scaled_spectrum(model.coarse, _coarse_gain(still, settings)), fine=fine)
     return model
 
 
@@ -153,6 +156,19 @@ def _gain(model: AutoregressiveModel, lacks: FloatArray) -> FloatArray:
     knots = np.linspace(0.0, 0.5, len(model.fine.damping))
     known = np.linspace(0.0, 0.5, len(lacks))
     return np.asarray(np.exp(np.clip(0.5 * np.interp(knots, known, lacks), -LARGEST_STEP, LARGEST_STEP)))
+
+
+def _coarse_gain(lacks: FloatArray, settings: FitSettings) -> FloatArray:
+    """Factor on the coarse movement's amplitude at the frequencies of `GRID`, likewise.
+
+    Where the fine noise could be and is not: from its slowest on up to the border, and a knot beyond. What is slower,
+    the covariances of whole runs tell: typical windows of a driver who drifts calmly and returns briskly lack it.
+    """
+    frequency = np.arange(GRID // 2 + 1) / GRID / (COARSE_EVERY * settings.step)
+    known = np.linspace(0.0, 0.5, len(lacks)) / settings.step
+    between = 0.5 / settings.step / (settings.n_knots - 1)
+    share = rise(frequency, settings) * np.interp(frequency, [BORDER, BORDER + between], [1.0, 0.0])
+    return np.asarray(np.exp(np.clip(0.5 * share * np.interp(frequency, known, lacks), -LARGEST_STEP, LARGEST_STEP)))
 
 
 def _moments(snippets: FloatArray) -> FloatArray:

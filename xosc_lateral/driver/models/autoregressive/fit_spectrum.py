@@ -48,8 +48,7 @@ def fit_spectrum(
     shared = (hertz >= settings.scale_band[0]) & (hertz <= settings.scale_band[1])
     scale = float(np.exp(np.log(measured[shared] / coarse_power[shared]).mean()))
     lacking = np.maximum(measured - scale * coarse_power, 0.0)
-    rise = _rise(hertz, settings)
-    noise = _shaped(np.sqrt(lacking / NOISE_VARIANCE) * rise, settings)
+    noise = _shaped(np.sqrt(lacking / NOISE_VARIANCE) * rise(hertz, settings), settings)
     return replace(coarse, scale=coarse.scale * np.sqrt(scale)), noise
 
 
@@ -60,11 +59,10 @@ def _coarse_power(coarse: Autoregression, knots: FloatArray) -> FloatArray:
     return np.asarray(coarse.power(knots * COARSE_EVERY) * gain**2 / COARSE_EVERY)
 
 
-def _rise(hertz: FloatArray, settings: FitSettings) -> FloatArray:
+def rise(hertz: FloatArray, settings: FitSettings) -> FloatArray:
     """From 0 to 1 where the fine noise begins, shape of `hertz` [Hz]. [-]"""
     low, high = settings.fine_from
-    rise = np.sin(0.5 * np.pi * np.clip((hertz - low) / (high - low), 0.0, 1.0)) ** 2
-    return np.asarray(rise)
+    return np.asarray(np.sin(0.5 * np.pi * np.clip((hertz - low) / (high - low), 0.0, 1.0)) ** 2)
 
 
 def window_of(runs: Sequence[FloatArray], lengths: Sequence[float], settings: FitSettings) -> int:
