@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from functools import lru_cache
 from typing import Any
 
@@ -82,14 +82,12 @@ class DriverProfile(Record, frozen=True):
     @property
     def columns(self) -> tuple[str, ...]:
         """Context columns that its effects read."""
-        return tuple(sorted({column for effect in self.effects for column in effect.columns}))
+        return _columns(self.effects)
 
     @property
     def columns_of_any_drive(self) -> tuple[str, ...]:
         """Those that a drive can have which is of no recording, as in a scenario."""
-        return tuple(
-            sorted({column for effect in self.effects if not effect.is_of_recording for column in effect.columns})
-        )
+        return _columns(effect for effect in self.effects if not effect.is_of_recording)
 
     def to_dict(self) -> dict[str, Any]:
         """Plain JSON values, as the profile file holds them."""
@@ -117,6 +115,10 @@ class DriverProfile(Record, frozen=True):
         kind = model.get("kind") if isinstance(model, Mapping) else None
         read = read_as(file_type(str(kind), frozenset(map(str, kinds))), present)
         return cls(**{name: getattr(read, name) for name in cls.__struct_fields__})
+
+
+def _columns(effects: Iterable[Effect]) -> tuple[str, ...]:
+    return tuple(sorted({column for effect in effects for column in effect.columns}))
 
 
 @lru_cache(maxsize=16)

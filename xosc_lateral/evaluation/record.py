@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from math import isfinite
 from typing import Any
 
+from xosc_lateral.digits import all_significant
 from xosc_lateral.evaluation.filters import CUTOFF
 from xosc_lateral.evaluation.lane_keeping import UNITS
 from xosc_lateral.evaluation.margins import Margins
@@ -41,8 +42,8 @@ def scores_to_dict(scores: ProfileScores) -> dict[str, Any]:
         ],
         "spectrum": {
             "frequency_hz": [round(float(f), 5) for f in scores.spectrum_real.frequency],
-            "real_m2_per_hz": [float(f"{v:.4g}") for v in scores.spectrum_real.density],
-            "sampled_m2_per_hz": [float(f"{v:.4g}") for v in scores.spectrum_sampled.density],
+            "real_m2_per_hz": list(all_significant(scores.spectrum_real.density, 4)),
+            "sampled_m2_per_hz": list(all_significant(scores.spectrum_sampled.density, 4)),
             "error_db": round(scores.spectrum_error, 3),
         },
         "autocorrelation": {

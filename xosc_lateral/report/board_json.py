@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
+from xosc_lateral.digits import significant
 from xosc_lateral.version import __version__
 
 if TYPE_CHECKING:
@@ -73,4 +74,4 @@ def _variance(parts: VarianceParts) -> dict[str, float | None]:
 
 
 def _short(value: float) -> float | None:
-    return None if value != value else float(f"{value:.5g}")
+    return None if value != value else significant(value, 5)

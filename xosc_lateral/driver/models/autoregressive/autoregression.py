@@ -21,6 +21,10 @@ MAX_ROOT = 0.995
 GRID = 8192
 """Points of the spectrum that covariances are taken from: at MAX_ROOT nothing is left after so many steps."""
 
+FREQUENCIES = np.arange(GRID // 2 + 1) / GRID
+"""Of that spectrum, shape (GRID / 2 + 1,). [cycles per step]"""
+FREQUENCIES.flags.writeable = False
+
 
 class Autoregression(Record, frozen=True, eq=False):
     """z[t] = sum over k of coefficients[k] z[t - 1 - k] + scale * noise[t], noise white with variance 1.
@@ -39,7 +43,7 @@ class Autoregression(Record, frozen=True, eq=False):
         coefficients = frozen_array(self.coefficients)
         if coefficients.ndim != 1 or not np.isfinite(coefficients).all() or not 0 <= self.scale < np.inf:
             raise DriverProfileError(f"autoregression: {coefficients.tolist()}, scale {self.scale}")
-        root = float(np.abs(_roots(coefficients)).max(initial=0.0))
+        root = largest_root(coefficients)
         if root >= 1.0:
             raise DriverProfileError(f"autoregression: a root of modulus {root:.4f} makes it unstable")
         set_once(self, coefficients=coefficients)
@@ -57,7 +61,7 @@ class Autoregression(Record, frozen=True, eq=False):
 
     def covariance(self, n_lags: int) -> FloatArray:
         """Autocovariance at lags 0 to n_lags - 1 steps, shape (n_lags,), n_lags <= `GRID` / 2. [square of the unit]"""
-        power = self.power(np.arange(GRID // 2 + 1) / GRID)
+        power = self.power(FREQUENCIES)
         return np.asarray(np.fft.irfft(power, GRID)[:n_lags])
 
 
@@ -71,9 +75,9 @@ def stabilise(coefficients: FloatArray, largest: float = MAX_ROOT) -> FloatArray
     return np.asarray(-np.real(np.poly(pulled))[1:])
 
 
-def is_stable(coefficients: FloatArray) -> bool:
-    """Whether all roots lie within the unit circle; coefficients of shape (order,). [-]"""
-    return bool(np.abs(_roots(coefficients)).max(initial=0.0) < 1.0)
+def largest_root(coefficients: FloatArray) -> float:
+    """Largest modulus of the roots, stable below 1; coefficients of shape (order,). [-]"""
+    return float(np.abs(_roots(coefficients)).max(initial=0.0))
 
 
 def _roots(coefficients: FloatArray) -> NDArray[np.complex128]:

@@ -13,7 +13,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.driver.models.autoregressive.autoregression import GRID, Autoregression, stabilise
+from xosc_lateral.driver.models.autoregressive.autoregression import FREQUENCIES, GRID, Autoregression, stabilise
 from xosc_lateral.driver.models.autoregressive.filters import COARSE_EVERY, measuring_low_pass
 from xosc_lateral.driver.models.autoregressive.fit_autoregression import RIDGE, fit_autoregression
 from xosc_lateral.driver.models.autoregressive.fit_settings import FitSettings
@@ -88,20 +88,19 @@ def _far_covariance(
 
 def _restored(coarse: Autoregression, step: float) -> Autoregression:
     """With what the measuring low-pass took below the border; `step` of the runs. [s]"""
-    frequency = np.arange(GRID // 2 + 1) / GRID
     kernel = measuring_low_pass(step)
-    gain = np.abs(np.exp(-2j * np.pi * np.outer(frequency / COARSE_EVERY, np.arange(len(kernel)))) @ kernel)
+    gain = np.abs(np.exp(-2j * np.pi * np.outer(FREQUENCIES / COARSE_EVERY, np.arange(len(kernel)))) @ kernel)
     return scaled_spectrum(coarse, 1.0 / np.maximum(gain, HALF_GAIN))
 
 
 def scaled_spectrum(coarse: Autoregression, gain: FloatArray) -> Autoregression:
     """One of the same order with the spectrum's amplitude times a gain, by the covariance of that spectrum.
 
-    `gain` at the frequencies of `GRID` from 0 on, shape (GRID / 2 + 1,). [-]
+    `gain` at `FREQUENCIES`. [-]
     """
     from scipy.linalg import solve_toeplitz
 
-    power = coarse.power(np.arange(GRID // 2 + 1) / GRID) * gain**2
+    power = coarse.power(FREQUENCIES) * gain**2
     covariance = np.fft.irfft(power, GRID)[: coarse.order + 1]
     row = covariance[:-1].copy()
     row[0] *= 1.0 + RIDGE

@@ -13,7 +13,7 @@ import numpy as np
 from msgspec.structs import replace
 from numpy.typing import NDArray
 
-from xosc_lateral.driver.models.autoregressive.autoregression import GRID, Autoregression
+from xosc_lateral.driver.models.autoregressive.autoregression import FREQUENCIES, Autoregression
 from xosc_lateral.driver.models.autoregressive.filters import BORDER, COARSE_EVERY, split_bands
 from xosc_lateral.driver.models.autoregressive.fit_coarse import scaled_spectrum
 from xosc_lateral.driver.models.autoregressive.fit_settings import FitSettings
@@ -153,22 +153,28 @@ def _log_spectrum(runs: Sequence[FloatArray], window: int) -> FloatArray:
 
 def _gain(model: AutoregressiveModel, lacks: FloatArray) -> FloatArray:
     """Factor on the damping at its knots from what the log spectrum of snippets lacks; knots without noise stay so."""
-    knots = np.linspace(0.0, 0.5, len(model.fine.damping))
-    known = np.linspace(0.0, 0.5, len(lacks))
-    return np.asarray(np.exp(np.clip(0.5 * np.interp(knots, known, lacks), -LARGEST_STEP, LARGEST_STEP)))
+    return _raised(lacks, np.linspace(0.0, 0.5, len(model.fine.damping)), np.ones(len(model.fine.damping)))
 
 
 def _coarse_gain(lacks: FloatArray, settings: FitSettings) -> FloatArray:
-    """Factor on the coarse movement's amplitude at the frequencies of `GRID`, likewise.
+    """Factor on the coarse movement's amplitude at `FREQUENCIES`, likewise.
 
     Where the fine noise could be and is not: from its slowest on up to the border, and a knot beyond. What is slower,
     the covariances of whole runs tell: typical windows of a driver who drifts calmly and returns briskly lack it.
     """
-    frequency = np.arange(GRID // 2 + 1) / GRID / (COARSE_EVERY * settings.step)
-    known = np.linspace(0.0, 0.5, len(lacks)) / settings.step
-    between = 0.5 / settings.step / (settings.n_knots - 1)
-    share = rise(frequency, settings) * np.interp(frequency, [BORDER, BORDER + between], [1.0, 0.0])
-    return np.asarray(np.exp(np.clip(0.5 * share * np.interp(frequency, known, lacks), -LARGEST_STEP, LARGEST_STEP)))
+    at = FREQUENCIES / COARSE_EVERY
+    hertz, between = at / settings.step, 0.5 / settings.step / (settings.n_knots - 1)
+    share = rise(hertz, settings) * np.interp(hertz, [BORDER, BORDER + between], [1.0, 0.0])
+    return _raised(lacks, at, share)
+
+
+def _raised(lacks: FloatArray, frequency: FloatArray, share: FloatArray) -> FloatArray:
+    """Factor on the amplitude by the log power that lacks evenly from 0 to 0.5 cycles per sample, shape of `frequency`.
+
+    `share` of it is to be made up for there. [-]
+    """
+    known = np.interp(frequency, np.linspace(0.0, 0.5, len(lacks)), lacks)
+    return np.asarray(np.exp(np.clip(0.5 * share * known, -LARGEST_STEP, LARGEST_STEP)))
 
 
 def _moments(snippets: FloatArray) -> FloatArray:

@@ -6,7 +6,7 @@ import numpy as np
 from msgspec.structs import replace
 
 from xosc_lateral.digits import all_significant, significant
-from xosc_lateral.driver.models.autoregressive.autoregression import GRID, Autoregression, is_stable
+from xosc_lateral.driver.models.autoregressive.autoregression import FREQUENCIES, Autoregression, largest_root
 from xosc_lateral.driver.models.autoregressive.model import AutoregressiveModel
 from xosc_lateral.driver.models.autoregressive.volatility import Volatility
 
@@ -40,14 +40,13 @@ def rounded(model: AutoregressiveModel) -> AutoregressiveModel:
 
 def _tidy_coarse(coarse: Autoregression) -> Autoregression:
     """With as few digits as keep the spectrum, and with it a stable autoregression stable."""
-    frequency = np.arange(GRID // 2 + 1) / GRID
-    power = np.log(coarse.power(frequency))
+    power = np.log(coarse.power(FREQUENCIES))
     for digits in range(DIGITS, MOST_DIGITS):
         coefficients, scale = np.array(all_significant(coarse.coefficients, digits)), significant(coarse.scale, digits)
-        if not is_stable(coefficients):
+        if largest_root(coefficients) >= 1.0:
             continue
         short = Autoregression(coefficients, scale)
-        if np.abs(np.log(short.power(frequency)) - power).max() <= KEPT:
+        if np.abs(np.log(short.power(FREQUENCIES)) - power).max() <= KEPT:
             return short
     return coarse
 
