@@ -9,7 +9,6 @@ from msgspec.structs import replace
 from tests.driver.models.made_models import POPULATION, STEADY
 from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.evaluation.comparison import compare_profiles
-from xosc_lateral.evaluation.filters import THINNED, below_half_hertz, thinned
 from xosc_lateral.evaluation.movement_summary import free_runs, summarise
 
 
@@ -54,27 +53,3 @@ def test_a_profile_is_nearer_to_itself_than_to_one_of_drivers_20_centimetres_far
     near, far = compare_profiles(own, own), compare_profiles(own, left)
     assert near.mean < 0.25 * far.mean
     assert far.by_metric["mean"] > 5.0 * far.by_metric["std"]
-
-
-@pytest.mark.parametrize(("frequency", "left"), [(0.1, 1.0), (0.4, 1.0), (0.5, 0.5), (0.6, 0.0), (1.5, 0.0)])
-def test_movement_above_half_a_hertz_is_gone(frequency: float, left: float) -> None:
-    wave = np.sin(2.0 * np.pi * frequency * 0.2 * np.arange(600) + 0.4)
-    found = below_half_hertz(wave, 0.2)[100:-100]
-    np.testing.assert_allclose(found, left * wave[100:-100], atol=0.012)
-
-
-def test_a_straight_path_stays_to_its_very_ends() -> None:
-    path = 0.3 + 0.01 * np.arange(200.0)
-    np.testing.assert_allclose(below_half_hertz(path, 0.2), path, atol=1e-12)
-
-
-@pytest.mark.parametrize("path", [[], [0.4]])
-def test_paths_of_nothing_stay_as_they_are(path: list[float]) -> None:
-    np.testing.assert_array_equal(below_half_hertz(np.array(path), 0.2), path)
-
-
-@pytest.mark.parametrize(("step", "every"), [(0.2, 4), (0.04, 20), (2.0, 1)])
-def test_rows_are_thinned_to_what_is_left(step: float, every: int) -> None:
-    paths = np.arange(80.0).reshape(2, 40)
-    np.testing.assert_array_equal(thinned(paths, step), paths[:, ::every])
-    assert every == max(1, round(THINNED / step))

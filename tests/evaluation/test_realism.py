@@ -14,7 +14,6 @@ from xosc_lateral.driver.snippets import segment_of
 from xosc_lateral.drives.drive import Run
 from xosc_lateral.drives.resampling import STEP
 from xosc_lateral.evaluation.condition import SnippetCondition
-from xosc_lateral.evaluation.filters import below_half_hertz
 from xosc_lateral.evaluation.realism import Beside, Realism, score_realism
 from xosc_lateral.evaluation.sampled_snippets import sample_runs, sensor_noise
 from xosc_lateral.evaluation.snippets import snippets_of
@@ -59,14 +58,6 @@ def test_free_runs_of_one_drive_are_of_one_driver(profile: DriverProfile) -> Non
         np.testing.assert_array_equal(path, uncut[k // 2][parts[k % 2]])
     started = sample_runs(profile, pieces, 5)
     assert [path[0] for path in started] == pytest.approx([piece.offset[0] for piece in pieces])
-
-
-def test_slow_movement_passes_and_fast_movement_does_not():
-    time = STEP * np.arange(200)
-    for frequency, gain in ((0.1, 1.0), (0.35, 1.0), (0.7, 0.0), (2.0, 0.0)):
-        wave = np.sin(2 * np.pi * frequency * time)
-        np.testing.assert_allclose(below_half_hertz(wave, STEP)[40:160], gain * wave[40:160], atol=0.02)
-    assert below_half_hertz(np.array([0.3]), STEP) == [0.3]
 
 
 def test_the_truth_is_as_near_as_other_drivers(realism: Realism):

@@ -1,5 +1,8 @@
 """Movement below 0.5 Hz: what drivers do, without most of what cameras add.
 
+Nothing faster is left to see. A logarithm of power sees a tenth of a millimetre as well as a metre, so that a filter
+which is still closing at 0.5 Hz shows a classifier what lies above.
+
 References
 ----------
 .. [1] J. F. Kaiser, "Nonrecursive digital filter design using the I0-sinh window function", Proc. IEEE ISCAS 1974.
@@ -10,22 +13,21 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.drives.filters import kaiser_design, low_pass
+from xosc_lateral.drives.filters import kaiser_design, low_pass, mirrored
 
 FloatArray = NDArray[np.float64]
 
-CUTOFF = 0.5
-"""Half the amplitude is left. Drivers steer against what they see below it; beyond it cameras show. [Hz]"""
+HIGHEST = 0.5
+"""Where the stop band begins. Drivers steer against what they see below it; beyond it cameras show. [Hz]"""
 
-TRANSITION = 0.2
-"""From the end of the pass band, 0.4 Hz, to the beginning of the stop band, 0.6 Hz. [Hz]"""
+PASSED = 0.4
+"""Where the pass band ends: the filter sees 11 s to each side, a quarter of most runs. [Hz]"""
 
 ATTENUATION = 40.0
 """Of the stop band: noise of 1 cm becomes 0.1 mm, far less than a difference between two models. [dB]"""
 
-
-THINNED = 0.8
-"""Seconds between values that say all about what is left: half that rate is the end of the stop band. [s]"""
+THINNED = 0.5 / HIGHEST
+"""Seconds between values that say all about what is left: half that rate is the beginning of the stop band. [s]"""
 
 
 def below_half_hertz(path: FloatArray, step: float) -> FloatArray:
@@ -36,7 +38,7 @@ def below_half_hertz(path: FloatArray, step: float) -> FloatArray:
     path : array, shape (n,)
         Evenly in time; continued beyond its ends by its mirror image through the end point. [m]
     step : float
-        [s]
+        At rates that show nothing above 0.5 Hz, the path stays as it is. [s]
 
     Returns
     -------
@@ -44,11 +46,11 @@ def below_half_hertz(path: FloatArray, step: float) -> FloatArray:
         [m]
     """
     nyquist = 0.5 / step
-    half, beta = kaiser_design(ATTENUATION, TRANSITION / nyquist)
-    kernel = low_pass(half, CUTOFF / nyquist, beta)
-    if len(path) < 2:
+    if len(path) < 2 or nyquist <= HIGHEST:
         return np.array(path)
-    return np.convolve(np.pad(path, half, mode="reflect", reflect_type="odd"), kernel, mode="valid")
+    half, beta = kaiser_design(ATTENUATION, (HIGHEST - PASSED) / nyquist)
+    kernel = low_pass(half, 0.5 * (PASSED + HIGHEST) / nyquist, beta)
+    return np.convolve(mirrored(path, half), kernel, mode="valid")
 
 
 def thinned(paths: FloatArray, step: float) -> FloatArray:

@@ -22,7 +22,7 @@ from xosc_lateral.evaluation.condition import LENGTHS, SnippetCondition
 from xosc_lateral.evaluation.differences import UNITS, differences, named_distances, named_means
 from xosc_lateral.evaluation.distances import split_groups
 from xosc_lateral.evaluation.ensemble_scores import PROPER, proper_scores
-from xosc_lateral.evaluation.filters import CUTOFF, TRANSITION, below_half_hertz, thinned
+from xosc_lateral.evaluation.filters import PASSED, below_half_hertz, thinned
 from xosc_lateral.evaluation.measures import Features, features_of
 from xosc_lateral.evaluation.same_start import FLOOR_DRAWS, real_against_real, windows_with_the_same_start
 from xosc_lateral.evaluation.sampled_snippets import sample_runs, sample_snippets, sensor_noise
@@ -170,7 +170,7 @@ def _under(
     condition: SnippetCondition, cut: Snippets, real: FloatArray, sampled: FloatArray, step: float, asked: _Asked
 ) -> ConditionScores:
     seed = asked.seed
-    highest = CUTOFF - 0.5 * TRANSITION if condition.slow else np.inf
+    highest = PASSED if condition.slow else np.inf
     own = features_of(real, cut.lane_width, step, highest=highest)
     made = features_of(sampled, cut.lane_width, step, highest=highest)
     families, named = _distances(condition, own, made, real, cut.group, seed)
