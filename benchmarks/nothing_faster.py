@@ -60,9 +60,8 @@ def main() -> None:
     args = parser.parse_args()
     runs = all_runs(read_drives(args.table))
     lines = ["| snippets | AUC | 95 % interval |", "|---|---|---|"]
-    for seconds in LENGTHS:
-        if (found := told(runs, seconds)) is not None:
-            lines.append(f"| {seconds:g} s | {found.auc:.3f} | {found.low:.3f} to {found.high:.3f} |")
+    areas = [(seconds, found) for seconds in LENGTHS if (found := told(runs, seconds)) is not None]
+    lines += [f"| {seconds:g} s | {one.auc:.3f} | {one.low:.3f} to {one.high:.3f} |" for seconds, one in areas]
     text = "\n".join(lines)
     print(text)
     if args.write is not None:

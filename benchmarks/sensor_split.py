@@ -8,7 +8,7 @@ rows at signal to noise ratios of 0.3, 1 and 3 (variance of the path over that o
 sets were fixed before the method was written: design 100, 101; validation 110, 111; test 120, 121. Report (130, 131) is
 looked at whenever the page is made. Accelerations are those of the driver's part of the measured runs, and of runs that
 a profile of it samples. With `--second-view` each of two lane markings has such an error of its own, and the lane width
-shows them, too.
+shows them, too; with `--known` the noise's standard deviation is given, as `fit --sensor-noise` takes it.
 """
 
 from __future__ import annotations
@@ -121,8 +121,11 @@ class Found:
     inside: bool
 
 
-def split_drive(drive: Drive, *, second_view: bool) -> Iterator[tuple[tuple[str, float], Found]]:
+def split_drive(
+    drive: Drive, *, second_view: bool = False, known: bool = False
+) -> Iterator[tuple[tuple[str, float], Found]]:
     """All kinds and ratios of noise on one drive; rounding has no second view."""
+    rate = float(1.0 / np.median(np.diff(drive.time)))
     runs = cut_runs(drive)
     rows = [(drive.time >= run.time[0] - 1e-9) & (drive.time <= run.time[-1] + 1e-9) for run in runs]
     truth = np.concatenate([run.offset for run in runs])
@@ -143,7 +146,14 @@ def split_drive(drive: Drive, *, second_view: bool) -> Iterator[tuple[tuple[str,
                     continue
                 wavers = 0.5 * drive.lane_width + dict(errors(drive, spread, rng))[kind]
                 half_widths = in_runs(wavers)
-            split = separate(even, STEP, rows=[noisy[mine] for mine in rows], half_widths=half_widths)
+            split = separate(
+                even,
+                STEP,
+                rows=[noisy[mine] for mine in rows],
+                rate=rate if known else None,
+                sensor_noise=spread if known else None,
+                half_widths=half_widths,
+            )
             parts = [split.driver_part(one, STEP) for one in even]
             true = truth.var() / (truth.var() + np.concatenate([error[m] for m in rows]).var())
             low, high = split.sensor.driver_share
@@ -201,17 +211,18 @@ def main() -> None:
     parser.add_argument("drives", nargs="*", type=Path)
     parser.add_argument("--set", choices=SEEDS, default="design")
     parser.add_argument("--second-view", action="store_true", help="the lane width shows errors of both markings")
+    parser.add_argument("--known", action="store_true", help="the noise's standard deviation is given")
     parser.add_argument("--write", type=Path, metavar="PAGE.md")
     args = parser.parse_args()
     made = [simulated(seed, gusts=gusts) for gusts in (False, True) for seed in SEEDS[args.set]]
     found: dict[tuple[str, float], list[Found]] = {}
     for drive in [*map(smoothed, args.drives), *made]:
-        for key, one in split_drive(drive, second_view=args.second_view):
+        for key, one in split_drive(drive, second_view=args.second_view, known=args.known):
             found.setdefault(key, []).append(one)
     if args.write is None:
         print(table(found))
     else:
-        marker = "sensor-split-second-view" if args.second_view else "sensor-split"
+        marker = "sensor-split" + "-second-view" * args.second_view + "-known" * args.known
         write_between_markers(args.write, table(found), marker)
 
 

@@ -58,7 +58,8 @@ def fit(
     source, licence : str
         Of the drives, for the provenance.
     sensor_noise : float, optional
-        Standard deviation of the sensor's error on the offset, where it is known; else found from the drives. [m]
+        Standard deviation of the sensor's error on the offset, rounding included, where it is known; else found from
+        the drives. [m]
     left_hand : bool
         The drives are of left-hand traffic: roads with right-hand traffic get their mirror image.
     neighbours : bool, optional

@@ -47,7 +47,9 @@ def fit(
     licence: Annotated[str, typer.Option(help="Licence of the drives, for the provenance.")] = "",
     sensor_noise: Annotated[
         float | None,
-        typer.Option(help="Standard deviation of the sensor's error [m]; default: estimated.", min=1e-4, max=2),
+        typer.Option(
+            help="Standard deviation of the sensor's error, rounding included [m]; default: estimated.", min=1e-4, max=2
+        ),
     ] = None,
     left_hand: Annotated[bool, typer.Option("--left-hand", help="Drives of left-hand traffic.")] = False,
     neighbours: Annotated[

@@ -51,7 +51,7 @@ def fit_profile(
     provenance : Provenance, optional
         What is known about the drives; hours, counts and fit settings are filled in.
     sensor_noise : float, optional
-        Standard deviation of the sensor's error on the rows, where it is known. [m]
+        Standard deviation of the sensor's error on the rows, rounding included, where it is known. [m]
     neighbours : bool, optional
         Whether a population's profile holds how its drivers keep away from vehicles beside them. None: where they are
         known.

@@ -61,6 +61,17 @@ def test_a_driver_and_a_white_floor_come_apart() -> None:
     assert len(found.knots) == len(KNOTS) == N_KNOTS
 
 
+def test_of_an_error_that_is_known_rounding_has_its_part() -> None:
+    """Where nobody could tell them apart by their spectra: both are white, and as large as one another."""
+    data, rate = measured(weight=20.0), 20.0
+    noise, level = 0.5 * WHITE * 0.5 * rate, np.full(90, 0.5 * WHITE)
+    known = Known(float(np.sqrt(2.0 * noise)), rate, rounding=noise)
+    found = solve(data, Colour(), level, known)
+    assert np.exp(found.white) == pytest.approx(0.5 * WHITE, rel=0.02)
+    told_twice = solve(data, Colour(), level, Known(known.deviation, rate))
+    assert np.exp(told_twice.white) > 0.7 * WHITE
+
+
 def test_a_coloured_part_comes_apart_too() -> None:
     colour = Colour(2, CORNER)
     found = solve(measured(colour, weight=2000.0), colour, np.zeros(90))

@@ -164,6 +164,18 @@ def test_a_known_noise_level_is_kept_to(truth):
     assert found.sensor.white * 10.0 == pytest.approx(level**2, rel=0.05)
 
 
+@pytest.mark.parametrize("steps", [0.3, 0.5, 1.0, 2.0])
+def test_an_error_that_is_known_and_is_rounding_s_is_not_looked_for_twice(truth, steps):
+    """Narrow steps and wide ones, of so many standard deviations."""
+    grain = steps * float(np.concatenate(truth[1]).std())
+    error = [np.round(x / grain) * grain - x for x in truth[1]]
+    found = split(truth, error, rate=20.0, sensor_noise=grain / np.sqrt(12.0))[0]
+    alone = split(truth, error, rate=20.0)[0]
+    assert found.sensor.rounding == pytest.approx(grain)
+    assert found.sensor.driver_variance == pytest.approx(alone.sensor.driver_variance, rel=0.02)
+    assert found.sensor.order == alone.sensor.order
+
+
 def test_rounding_noise_of_a_gaussian_signal_has_the_density_of_the_closed_form():
     rng = np.random.default_rng(5)
     n, step = 2**17, 0.1

@@ -75,10 +75,21 @@ class Colour:
 
 @dataclass(frozen=True, slots=True)
 class Known:
-    """A noise level that is known: standard deviation on the table's rows [m], and their rate [Hz]."""
+    """A sensor whose error is known.
+
+    Parameters
+    ----------
+    deviation : float
+        Standard deviation on the table's rows. [m]
+    rate : float
+        Rows per second. [Hz]
+    rounding : float
+        What rounding has of its square, which is known from the rows. [m2]
+    """
 
     deviation: float
     rate: float
+    rounding: float = 0.0
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -184,7 +195,7 @@ class _Problem:
             parts[N_STATE] = np.exp(point[N_STATE]) * 0.5 * self.known.rate
             if self.shape is not None:
                 parts[N_STATE + 1] = np.exp(point[N_STATE + 1]) * self.integral
-            variance = float(parts.sum())
+            variance = float(parts.sum()) + self.known.rounding
             row = parts / variance / KNOWN_SD
             lacking = (2.0 * np.log(self.known.deviation) - np.log(variance)) / KNOWN_SD
             rows.append((row, float(row @ point) + lacking))

@@ -28,6 +28,11 @@ def quantisation_step(values: FloatArray) -> float:
     return step if bool(np.all(np.abs(count - np.round(count)) < 1e-3)) else 0.0
 
 
+def uniform_variance(step: float) -> float:
+    """Of the error of rounding to a lattice of this step [m], where many steps are crossed. [m2]"""
+    return step**2 / 12.0
+
+
 def rounding_density(
     step: float, driver: Callable[[FloatArray], FloatArray], variance: float
 ) -> Callable[[FloatArray], FloatArray]:

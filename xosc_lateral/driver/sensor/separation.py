@@ -24,7 +24,7 @@ from xosc_lateral.driver.sensor.kinks_fit import find_kinks
 from xosc_lateral.driver.sensor.likelihood import Colour, Known, Solution, solve
 from xosc_lateral.driver.sensor.model import SensorModel
 from xosc_lateral.driver.sensor.periodogram import Periodogram, periodogram, windows_of
-from xosc_lateral.driver.sensor.quantisation import quantisation_step, rounding_density
+from xosc_lateral.driver.sensor.quantisation import quantisation_step, rounding_density, uniform_variance
 from xosc_lateral.driver.sensor.second_view import LEVEL_SD, SecondView, second_view
 from xosc_lateral.driver.sensor.texture import (
     FAST,
@@ -129,7 +129,7 @@ def separate(
     rate : float, optional
         Rows per second; needed with `sensor_noise`. [Hz]
     sensor_noise : float, optional
-        Standard deviation of the sensor's error on the rows, where it is known. [m]
+        Standard deviation of the sensor's error on the rows, rounding included, where it is known. [m]
     half_widths : sequence of array, optional
         Half the lane width in the same runs, where a camera measured it: a second view of its errors. [m]
     one_camera : bool
@@ -163,6 +163,7 @@ def separate(
     rounding: Callable[[FloatArray], FloatArray] = _no_density
     if grain and not two_levels:
         rounding = _rounding(data, grain, variance)
+        known = known and replaced(known, rounding=uniform_variance(grain))
     base = rounding(data.frequency)
     if kinks is not None:
         base = base + kinks.density(data.frequency)
@@ -280,11 +281,12 @@ def _no_density(frequency: FloatArray) -> FloatArray:
 
 def _rounding(data: Periodogram, grain: float, variance: float) -> Callable[[FloatArray], FloatArray]:
     """Density of rounding, which depends on the driver's, which depends on it: a few rounds."""
-    level = grain**2 / 12.0 / 10.0  # white over 10 Hz, to begin with
+    error = uniform_variance(grain)
+    level = error / 10.0  # white over 10 Hz, to begin with
     shape: Callable[[FloatArray], FloatArray] = lambda frequency: np.full(np.shape(frequency), level)  # noqa: E731
     for _ in range(ROUNDING_ROUNDS):
         found = solve(data, Colour(), shape(data.frequency))
-        shape = rounding_density(grain, lambda frequency: density(found.knots, frequency), variance - grain**2 / 12.0)  # noqa: B023
+        shape = rounding_density(grain, lambda frequency: density(found.knots, frequency), variance - error)  # noqa: B023
     return shape
 
 

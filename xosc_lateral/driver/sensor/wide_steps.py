@@ -20,6 +20,7 @@ from xosc_lateral.driver.sensor.hidden_path import HiddenPath
 from xosc_lateral.driver.sensor.likelihood import Colour, solve
 from xosc_lateral.driver.sensor.model import WIDE
 from xosc_lateral.driver.sensor.periodogram import PASSED, Periodogram
+from xosc_lateral.driver.sensor.quantisation import uniform_variance
 from xosc_lateral.driver.sensor.rounded_gaussian import RoundedGaussian, gaussian_behind
 from xosc_lateral.driver.sensor.vehicle_bound import N_KNOTS, N_STATE, density, expected_state, prior
 from xosc_lateral.normal import NORMAL_95
@@ -123,14 +124,14 @@ def split_wide_steps(
     rate : float
         Rows per second. [Hz]
     sensor_noise : float, optional
-        Standard deviation of the noise before rounding, where it is known. [m]
+        Standard deviation of the sensor's error, rounding included, where it is known. [m]
     """
     everything = np.concatenate(rows)
     phase = float(everything[0] - grain * np.round(everything[0] / grain))
     gaussian = gaussian_behind(everything - phase, grain)
     if grain <= WIDE * gaussian.deviation:
         return None
-    noise = _noise_before(rows, gaussian) if sensor_noise is None else sensor_noise**2
+    noise = _noise_before(rows, gaussian) if sensor_noise is None else _beyond_rounding(sensor_noise, gaussian)
     noise = min(noise, MOST_NOISE * gaussian.deviation**2)
     if np.sqrt(noise) > DITHER * grain:
         return None
@@ -157,6 +158,15 @@ def _noise_before(rows: Sequence[FloatArray], gaussian: RoundedGaussian) -> floa
     at_once = max(2.0 * one - two, 0.0)
     full = float(gaussian.covariance(np.ones(1))[0])
     return (1.0 - gaussian.correlation(full - 0.5 * at_once)) * gaussian.deviation**2
+
+
+def _beyond_rounding(deviation: float, gaussian: RoundedGaussian) -> float:
+    """Variance of noise before rounding by which an error that is known exceeds rounding's. [m2]
+
+    Whoever knows the error of a coarse sensor may know what it does to this movement, or that of a uniform one: what
+    neither explains is noise.
+    """
+    return max(deviation**2 - max(gaussian.error, uniform_variance(gaussian.step)), 0.0)
 
 
 def _error_of_variance(rows: Sequence[FloatArray], rate: float, phase: float, gaussian: RoundedGaussian) -> float:
