@@ -24,7 +24,6 @@ from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.drives.cuts import all_runs
 from xosc_lateral.drives.drive import Run
 from xosc_lateral.drives.periodogram import Detrend, periodograms
-from xosc_lateral.evaluation.filters import below_half_hertz
 from xosc_lateral.evaluation.sampled_snippets import sample_runs
 from xosc_lateral.formats.drives import read_drives
 
@@ -36,7 +35,7 @@ EDGES = (0.05, 0.1, 0.2, 0.3, 0.4, 0.45, 0.5)
 def power(paths: Sequence[FloatArray], step: float) -> FloatArray:
     """Mean power in the bands, windows of all paths alike. [arbitrary unit]"""
     size = round(SECONDS / step)
-    rows = np.concatenate([periodograms(below_half_hertz(path, step), size, detrend=Detrend.ENDS) for path in paths])
+    rows = np.concatenate([periodograms(path, size, detrend=Detrend.ENDS) for path in paths])
     frequency = np.fft.rfftfreq(size, step)
     mean = rows.mean(axis=0)
     return np.array([mean[(frequency >= low) & (frequency < high)].mean() for low, high in pairwise(EDGES)])
