@@ -1,6 +1,6 @@
 """Agreement with the reference player: every scenario of a folder is played here and there, and all rows compared.
 
-    python benchmarks/agreement.py FOLDER... --esmini PATH [--half 1 --without FOLDER] [--limit N] [--step 0.02]
+    python -m benchmarks.agreement FOLDER... --esmini PATH [--half 1 --without FOLDER] [--limit N] [--step 0.02]
 
 PATH is esmini's executable; a headless build is enough (docs/playing.md says which version was used). Several
 folders or scenarios may be given; `--limit N` takes N, evenly spread. A scenario agrees when no row is more than 0.10 m

@@ -1,6 +1,6 @@
 """Batch conversion: scenarios per second and core, memory, and how both grow with the number of outputs.
 
-    python benchmarks/batch.py SCENARIOS... [--profile NAME|PATH] [--outputs 100 1000 10000] [--jobs 2]
+    python -m benchmarks.batch SCENARIOS... [--profile NAME|PATH] [--outputs 100 1000 10000] [--jobs 2]
 
 The same files, read by a plain lxml parse and written again, stand beside it. Outputs beyond the number of scenarios
 are variants. On a busy machine look at the CPU time per output, not at the rate.

@@ -1,6 +1,6 @@
 """Memory and CPU time of a batch over its course: what a thousand outputs more cost.
 
-    python benchmarks/batch_memory.py [--outputs 1500] [--jobs 1 2]
+    python -m benchmarks.batch_memory [--outputs 1500] [--jobs 1 2]
 
 Variants of one template; the first third is left out of the slope, for caches fill up there. On a busy machine look at
 the CPU seconds, not at the rate: two workers that share the work cost what one does, plus their start.

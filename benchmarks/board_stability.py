@@ -18,7 +18,7 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks.markers import write_between_markers
+from benchmarks.markers import show
 from xosc_lateral.baselines.catalogue import MODELS
 from xosc_lateral.board.benchmark import fit_and_sample, split_in_halves
 from xosc_lateral.board.contestants import contestants
@@ -95,10 +95,11 @@ def main() -> None:
     if args.cache is not None:
         args.cache.mkdir(parents=True, exist_ok=True)
     runs = all_runs(read_drives(args.table))
-    text = table({seed: scores_of(runs, seed, args.model, args.cache) for seed in args.seeds})
-    print(text)
-    if args.write is not None:
-        write_between_markers(args.write, text, "board-stability")
+    show(
+        table({seed: scores_of(runs, seed, args.model, args.cache) for seed in args.seeds}),
+        args.write,
+        "board-stability",
+    )
 
 
 if __name__ == "__main__":

@@ -11,7 +11,7 @@ import json
 from pathlib import Path
 from typing import Any
 
-from benchmarks.markers import write_between_markers
+from benchmarks.markers import show
 
 SHOWN = {
     "metrics, 10 s, same start": "ten metrics, 10 s, same start [sd]",
@@ -70,10 +70,7 @@ def main() -> None:
     parser.add_argument("board", type=Path)
     parser.add_argument("--write", type=Path, help="page with the markers")
     args = parser.parse_args()
-    text = table(json.loads(args.board.read_text(encoding="utf-8")))
-    print(text)
-    if args.write is not None:
-        write_between_markers(args.write, text, "board")
+    show(table(json.loads(args.board.read_text(encoding="utf-8"))), args.write, "board")
 
 
 if __name__ == "__main__":

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.dlr_stretches import Recording
-from benchmarks.markers import write_between_markers
+from benchmarks.markers import show
 from xosc_lateral.formats.importers.dlr_ht import STEP
 
 FloatArray = NDArray[np.float64]
@@ -69,10 +69,7 @@ def main() -> None:
     parser.add_argument("source", type=Path)
     parser.add_argument("--write", type=Path, metavar="PAGE.md")
     args = parser.parse_args()
-    text = loud_pieces(args.source)
-    print(text)
-    if args.write is not None:
-        write_between_markers(args.write, text, "camera-noise")
+    show(loud_pieces(args.source), args.write, "camera-noise")
 
 
 if __name__ == "__main__":

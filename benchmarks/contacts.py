@@ -15,7 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks.markers import write_between_markers
+from benchmarks.markers import show
 from xosc_lateral.api.templates import write_template
 from xosc_lateral.enrich.enrich import enrich
 from xosc_lateral.pipeline.drivers import choose_drivers
@@ -49,10 +49,7 @@ def main() -> None:
             gaps.append(min(gap.distance for gap in made.gaps_after))
         told = ", ".join(f"{value:.2f}" for value in np.quantile(gaps, QUANTILES))
         lines.append(f"| `{profile}` | {args.count} | {contacts} | {departures} | {told} |")
-    text = "\n".join(lines)
-    print(text)
-    if args.write is not None:
-        write_between_markers(args.write, text, "contacts")
+    show("\n".join(lines), args.write, "contacts")
 
 
 if __name__ == "__main__":

@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.fair_measure import halves
-from benchmarks.markers import write_between_markers
+from benchmarks.markers import show
 from xosc_lateral.driver.fitting import fit_profile
 from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.drives.cuts import all_runs
@@ -99,10 +99,11 @@ def main() -> None:
             found[known].append([areas(profile, runs, 0, seconds) for seconds in LENGTHS])
             print(seed, known, np.round(found[known][-1], 3).tolist(), file=sys.stderr, flush=True)
     shape = (len(args.seeds), 2, len(LENGTHS), -1)
-    text = "\n".join(table({known: np.array(several).reshape(shape) for known, several in found.items()}))
-    print(text)
-    if args.write is not None:
-        write_between_markers(args.write, text, "context-seen")
+    show(
+        "\n".join(table({known: np.array(several).reshape(shape) for known, several in found.items()})),
+        args.write,
+        "context-seen",
+    )
 
 
 if __name__ == "__main__":

@@ -1,6 +1,6 @@
 """Is a profile of one vehicle told from another's? All pairs of vehicles with long drives.
 
-    python benchmarks/driver_discrimination.py dlr.parquet [--seconds 140] [--model best] [--write docs/real_data.md]
+    python -m benchmarks.driver_discrimination dlr.parquet [--seconds 140] [--model best] [--write docs/real_data.md]
 
 Each vehicle's profile is fitted to the first 60 % of its drive. Snippets sampled from it freely (no start given) are
 compared with the held-out last 40 % of its own drive and of every other vehicle's.
@@ -12,8 +12,8 @@ import argparse
 from pathlib import Path
 
 import numpy as np
-from markers import write_between_markers
 
+from benchmarks.markers import show
 from xosc_lateral.driver.fitting import fit_runs
 from xosc_lateral.drives.cuts import all_runs
 from xosc_lateral.drives.drive import Run
@@ -48,9 +48,7 @@ def main() -> None:
         f"driver's held-out part than to another's in {100 * right:.0f} % of {others.sum()} ordered pairs; its own "
         f"driver is the nearest of all {len(own)} for {100 * first:.0f} % (chance: {100 / len(own):.0f} %)."
     )
-    print(text)
-    if args.write is not None:
-        write_between_markers(args.write, text, "told-apart")
+    show(text, args.write, "told-apart")
 
 
 if __name__ == "__main__":

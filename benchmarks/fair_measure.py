@@ -16,7 +16,7 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks.markers import write_between_markers
+from benchmarks.markers import show
 from xosc_lateral.driver.fitting import fit_profile
 from xosc_lateral.driver.models.kinds import ModelKind
 from xosc_lateral.drives.cuts import all_runs
@@ -75,10 +75,7 @@ def main() -> None:
     parser.add_argument("--write", type=Path, help="page with the markers")
     args = parser.parse_args()
     parts = measure(read_drives(args.table), args.seed, args.model, classify=not args.no_classify, rocket=args.rocket)
-    text = "\n".join(table(parts))
-    print(text)
-    if args.write is not None:
-        write_between_markers(args.write, text, "fair-measure")
+    show("\n".join(table(parts)), args.write, "fair-measure")
 
 
 if __name__ == "__main__":

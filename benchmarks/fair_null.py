@@ -19,7 +19,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.markers import write_between_markers
+from benchmarks.markers import show
 from xosc_lateral.driver.fitting import fit_population, fit_profile
 from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.drives.cuts import all_runs
@@ -108,10 +108,7 @@ def main() -> None:
     truth, runs = fit_profile(drives, name="all", neighbours=args.neighbours), all_runs(drives)
     seeds = range(FIRST_SEED, FIRST_SEED + args.repeats)
     found = np.array([under_the_truth(truth, runs, seed, neighbours=args.neighbours) for seed in seeds])
-    text = "\n".join(table(found))
-    print(text)
-    if args.write is not None:
-        write_between_markers(args.write, text, "fair-null")
+    show("\n".join(table(found)), args.write, "fair-null")
 
 
 if __name__ == "__main__":

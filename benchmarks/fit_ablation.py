@@ -19,7 +19,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.markers import write_between_markers
+from benchmarks.markers import show
 from benchmarks.model_choice import LENGTHS, snippets
 from xosc_lateral.driver.models.autoregressive.filters import COARSE_EVERY, split_bands
 from xosc_lateral.driver.models.autoregressive.fit import fit_autoregressive
@@ -139,10 +139,7 @@ def main() -> None:
     args = parser.parse_args()
     drives = read_drives(args.table)
     runs, _ = driver_runs(all_runs(drives), drives)
-    text = "\n".join([*order_table(runs), "", *variant_table(runs, args.halves)])
-    print(text)
-    if args.write is not None:
-        write_between_markers(args.write, text, "fit-ablation")
+    show("\n".join([*order_table(runs), "", *variant_table(runs, args.halves)]), args.write, "fit-ablation")
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""Speed of the road geometry, beside plain numpy in the same run: `python benchmarks/geometry.py [ROAD.xodr ...]`."""
+"""Speed of the road geometry, beside plain numpy in the same run: `python -m benchmarks.geometry [ROAD.xodr ...]`."""
 
 from __future__ import annotations
 

@@ -15,7 +15,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from benchmarks.markers import write_between_markers
+from benchmarks.markers import show
 from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.driver.sampled_offsets import sample_context
 from xosc_lateral.enrich.enrich import NEIGHBOURS
@@ -109,10 +109,11 @@ def main() -> None:
         values = " | ".join(f"{np.quantile(gaps, quantile):.2f}" for gaps in columns.values())
         lines.append(f"| {100 * quantile:g} % | {values} |")
     lines.append(f"| mean | {' | '.join(f'{gaps.mean():.2f}' for gaps in columns.values())} |")
-    text = "\n".join([*lines, "", f"{len(pairs)} s side by side, {len(encounters)} encounters; {args.seeds} seeds."])
-    print(text)
-    if args.write is not None:
-        write_between_markers(args.write, text, "gaps")
+    show(
+        "\n".join([*lines, "", f"{len(pairs)} s side by side, {len(encounters)} encounters; {args.seeds} seeds."]),
+        args.write,
+        "gaps",
+    )
 
 
 if __name__ == "__main__":

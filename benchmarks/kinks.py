@@ -16,7 +16,7 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks.markers import write_between_markers
+from benchmarks.markers import show
 from xosc_lateral.driver.sensor.kinks import Kinks, mean_square
 from xosc_lateral.driver.sensor.kinks_fit import SHORTEST, bends_at, find_kinks, flat_jumps, jumps_of
 from xosc_lateral.driver.sensor.periodogram import windows_of
@@ -81,10 +81,7 @@ def main() -> None:
         "",
         *by_bend(kinks, rows, rate),
     ]
-    text = "\n".join(lines)
-    print(text)
-    if args.write is not None:
-        write_between_markers(args.write, text, "kinks")
+    show("\n".join(lines), args.write, "kinks")
 
 
 if __name__ == "__main__":

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.dlr_stretches import along_road
-from benchmarks.markers import write_between_markers
+from benchmarks.markers import show
 from xosc_lateral.driver.sensor.kinks_fit import jumps_of
 from xosc_lateral.formats.importers.dlr_ht import STEP, read_tracks
 
@@ -75,10 +75,7 @@ def main() -> None:
         count, correlation, told = told_by_place(logs, (place // length).astype(np.int64) * 2 + north, half)
         lines.append(f"| {length:g} m | {count} | {correlation:.2f} | {told:.2f} |")
     lines += ["", f"{len(logs)} jumps of {len(np.unique(vehicle))} vehicles, both carriageways apart."]
-    text = "\n".join(lines)
-    print(text)
-    if args.write is not None:
-        write_between_markers(args.write, text, "kinks-by-place")
+    show("\n".join(lines), args.write, "kinks-by-place")
 
 
 if __name__ == "__main__":

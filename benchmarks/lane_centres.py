@@ -1,6 +1,6 @@
 """Why lane centres are estimated as they are: error on vehicles that were not used, and what bridging a gap costs.
 
-python benchmarks/lane_centres.py tasi-0.15.4-py3-none-any.whl [--write docs/real_data.md]
+python -m benchmarks.lane_centres tasi-0.15.4-py3-none-any.whl [--write docs/real_data.md]
 """
 
 from __future__ import annotations
@@ -9,9 +9,9 @@ import argparse
 from pathlib import Path
 
 import numpy as np
-from markers import write_between_markers
 from numpy.typing import NDArray
 
+from benchmarks.markers import show
 from xosc_lateral.formats.importers import dlr_ht, lanes_from_tracks
 from xosc_lateral.formats.importers.cuts import KEPT
 from xosc_lateral.formats.importers.road_from_tracks import fit_reference_line
@@ -95,10 +95,7 @@ def main() -> None:
     parser.add_argument("--write", type=Path, help="document with the markers")
     args = parser.parse_args()
     lanes, stretches = lanes_of(args.source)
-    text = "\n".join([*knots_table(lanes), "", *gaps_table(stretches)])
-    print(text)
-    if args.write is not None:
-        write_between_markers(args.write, text, "lane-centres")
+    show("\n".join([*knots_table(lanes), "", *gaps_table(stretches)]), args.write, "lane-centres")
 
 
 if __name__ == "__main__":

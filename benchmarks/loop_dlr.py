@@ -13,7 +13,7 @@ import time
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from benchmarks.markers import write_between_markers
+from benchmarks.markers import show
 from xosc_lateral.formats.drives import read_drives
 from xosc_lateral.identification.close import LoopResult
 from xosc_lateral.identification.lack_of_fit import LackOfFit, lack_of_fit_of
@@ -42,10 +42,11 @@ def main() -> None:
     result = refine_population(read_drives([args.table]), args.seed)
     took = time.perf_counter() - started
     lack_of_fit = lack_of_fit_of(result)
-    text = f"```\n{loop_text(result, lack_of_fit)}\n```\n\nIn {took:.0f} s.\n\n{group_table(lack_of_fit)}"
-    print(text)
-    if args.write is not None:
-        write_between_markers(args.write, text, "loop-dlr")
+    show(
+        f"```\n{loop_text(result, lack_of_fit)}\n```\n\nIn {took:.0f} s.\n\n{group_table(lack_of_fit)}",
+        args.write,
+        "loop-dlr",
+    )
     if args.figures is not None:
         draw(result, lack_of_fit, args.figures)
 

@@ -16,3 +16,10 @@ def write_between_markers(path: Path, text: str, marker: str) -> None:
     if not pattern.search(document):
         raise SystemExit(f"{path}: no markers {begin} ... {end}")
     write_atomically(path, pattern.sub(lambda _: f"{begin}\n{text}\n{end}", document))
+
+
+def show(text: str, page: Path | None, marker: str) -> None:
+    """Print a table, and put it into a page where one is named."""
+    print(text)
+    if page is not None:
+        write_between_markers(page, text, marker)

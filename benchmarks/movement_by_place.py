@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.dlr_stretches import Recording
-from benchmarks.markers import write_between_markers
+from benchmarks.markers import show
 from xosc_lateral.formats.importers.dlr_ht import STEP
 
 FloatArray = NDArray[np.float64]
@@ -107,10 +107,7 @@ def main() -> None:
     parser.add_argument("source", type=Path)
     parser.add_argument("--write", type=Path, help="page with the markers")
     args = parser.parse_args()
-    text = "\n".join(table(Movement(args.source)))
-    print(text)
-    if args.write is not None:
-        write_between_markers(args.write, text, "movement-by-place")
+    show("\n".join(table(Movement(args.source))), args.write, "movement-by-place")
 
 
 if __name__ == "__main__":

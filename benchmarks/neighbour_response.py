@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.markers import write_between_markers
+from benchmarks.markers import show
 from xosc_lateral.driver.effects import Acts, Proximity
 from xosc_lateral.driver.neighbours import NEIGHBOURS
 from xosc_lateral.drives.cuts import all_runs
@@ -84,10 +84,7 @@ def main() -> None:
         ]
         cells = " | ".join(f"{100 * left(runs, effects):.1f} %" for effects in several)
         lines.append(f"| {lag:g}, {' and '.join([f'{response:g}'] * order)} | {cells} |")
-    text = "\n".join(lines)
-    print(text)
-    if args.write is not None:
-        write_between_markers(args.write, text, "neighbour-response")
+    show("\n".join(lines), args.write, "neighbour-response")
 
 
 if __name__ == "__main__":

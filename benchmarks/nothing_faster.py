@@ -17,7 +17,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.markers import write_between_markers
+from benchmarks.markers import show
 from xosc_lateral.drives.cuts import all_runs
 from xosc_lateral.drives.drive import Run
 from xosc_lateral.drives.filters import kaiser_design, low_pass, mirrored
@@ -62,10 +62,7 @@ def main() -> None:
     lines = ["| snippets | AUC | 95 % interval |", "|---|---|---|"]
     areas = [(seconds, found) for seconds in LENGTHS if (found := told(runs, seconds)) is not None]
     lines += [f"| {seconds:g} s | {one.auc:.3f} | {one.low:.3f} to {one.high:.3f} |" for seconds, one in areas]
-    text = "\n".join(lines)
-    print(text)
-    if args.write is not None:
-        write_between_markers(args.write, text, "nothing-faster")
+    show("\n".join(lines), args.write, "nothing-faster")
 
 
 if __name__ == "__main__":

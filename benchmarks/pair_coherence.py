@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.dlr_stretches import Recording
-from benchmarks.markers import write_between_markers
+from benchmarks.markers import show
 from xosc_lateral.formats.importers.dlr_ht import STEP
 
 FloatArray = NDArray[np.float64]
@@ -103,10 +103,7 @@ def main() -> None:
         lines.append(f"| {first:g} to {last:g} | {real[k]:.2f} | {low[k]:.2f} to {high[k]:.2f} |")
     several = len(np.unique(rows.vehicle[right] * (rows.vehicle.max() + 1) + rows.vehicle[left]))
     lines += ["", f"{several} pairs, {len(right) * EVERY * STEP:.0f} s side by side, swapped {SWAPS} times."]
-    text = "\n".join(lines)
-    print(text)
-    if args.write is not None:
-        write_between_markers(args.write, text, "pair-coherence")
+    show("\n".join(lines), args.write, "pair-coherence")
 
 
 if __name__ == "__main__":

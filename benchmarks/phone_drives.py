@@ -27,7 +27,7 @@ import pandas as pd
 from numpy.typing import NDArray
 from scipy.signal import butter, sosfiltfilt
 
-from benchmarks.markers import write_between_markers
+from benchmarks.markers import show
 from xosc_lateral.driver.drivability import drivable, strain
 from xosc_lateral.driver.fitting import fit_population, fit_profile
 from xosc_lateral.driver.profile import DriverProfile
@@ -297,9 +297,7 @@ def main() -> None:
         tables = {"phone-movement": movement_table(every), "phone-drowsy": drowsiness_table(every)}
         tables |= {"phone-loop": loop_table(every)} if args.loop else {}
     for marker, table in tables.items():
-        print(f"{table}\n", flush=True)
-        if args.write is not None:
-            write_between_markers(args.write, table, marker)
+        show(table, args.write, marker)
 
 
 if __name__ == "__main__":

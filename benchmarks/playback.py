@@ -1,6 +1,6 @@
 """How fast scenarios are played: all of a folder, one by one, in this process.
 
-    python benchmarks/playback.py FOLDER [--step 0.02] [--time-limit 60] [--slowest 10] [--repeat 3]
+    python -m benchmarks.playback FOLDER [--step 0.02] [--time-limit 60] [--slowest 10] [--repeat 3]
 
 Reading the scenario with its road and playing it are timed apart; starting Python counts in neither. A row is one
 entity at one step.

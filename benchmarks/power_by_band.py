@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.fair_measure import halves
-from benchmarks.markers import write_between_markers
+from benchmarks.markers import show
 from xosc_lateral.driver.fitting import fit_profile
 from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.drives.cuts import all_runs
@@ -64,10 +64,7 @@ def main() -> None:
     lines = ["| frequency [Hz] | vehicles of the fit [dB] | other vehicles [dB] |", "|---|---|---|"]
     for (low, high), a, b in zip(pairwise(EDGES), np.transpose(own), np.transpose(others), strict=True):
         lines.append(f"| {low:g} to {high:g} | {a[0]:.1f} / {a[1]:.1f} | {b[0]:.1f} / {b[1]:.1f} |")
-    text = "\n".join(lines)
-    print(text)
-    if args.write is not None:
-        write_between_markers(args.write, text, "power-by-band")
+    show("\n".join(lines), args.write, "power-by-band")
 
 
 if __name__ == "__main__":

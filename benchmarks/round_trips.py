@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.markers import write_between_markers
+from benchmarks.markers import show
 from xosc_lateral.driver.models.autoregressive.fit import fit_autoregressive
 from xosc_lateral.driver.models.autoregressive.model import AutoregressiveModel
 from xosc_lateral.drives.resampling import STEP
@@ -67,10 +67,7 @@ def main() -> None:
         errors = found.std(axis=0, ddof=1) / np.sqrt(len(found))
         cells = [f"{value:+.1%} ± {error:.1%}" for value, error in zip(found.mean(axis=0), errors, strict=True)]
         lines.append(f"| {name} | {' | '.join(cells)} |")
-    text = "\n".join(lines)
-    print(text)
-    if args.write is not None:
-        write_between_markers(args.write, text, "round-trips")
+    show("\n".join(lines), args.write, "round-trips")
 
 
 if __name__ == "__main__":

@@ -1,6 +1,6 @@
 """Speed of sampling beside the random generator's own, and of fitting, in one run.
 
-    python benchmarks/sampling.py [DRIVE_TABLE]
+    python -m benchmarks.sampling [DRIVE_TABLE]
 
 Times are processor time of one core, the best of several; compiling (once per machine, kept on disk) is left out.
 Without a table the profiles are fitted to simulated offsets.

@@ -21,7 +21,7 @@ from pathlib import Path
 import numpy as np
 from scipy.signal import butter, lfilter, sosfilt, sosfiltfilt
 
-from benchmarks.markers import write_between_markers
+from benchmarks.markers import show
 from xosc_lateral.datasets.driver_simulator import simulate_drive
 from xosc_lateral.driver.fitting import fit_runs
 from xosc_lateral.driver.sensor.separation import separate
@@ -219,11 +219,8 @@ def main() -> None:
     for drive in [*map(smoothed, args.drives), *made]:
         for key, one in split_drive(drive, second_view=args.second_view, known=args.known):
             found.setdefault(key, []).append(one)
-    if args.write is None:
-        print(table(found))
-    else:
-        marker = "sensor-split" + "-second-view" * args.second_view + "-known" * args.known
-        write_between_markers(args.write, table(found), marker)
+    marker = "sensor-split" + "-second-view" * args.second_view + "-known" * args.known
+    show(table(found), args.write, marker)
 
 
 if __name__ == "__main__":

@@ -1,6 +1,6 @@
 """One hour of `OffsetStream.step` at 100 Hz: time per call, memory, and equality with the batch call.
 
-python benchmarks/stream.py [PROFILE.json] [--seconds 3600] [--rate 100]
+python -m benchmarks.stream [PROFILE.json] [--seconds 3600] [--rate 100]
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Sets of variants in the reference player: what it draws from a set, row for row beside the variant itself.
 
-    python benchmarks/variant_sets.py SCENARIO... --esmini PATH [--variants 2]
+    python -m benchmarks.variant_sets SCENARIO... --esmini PATH [--variants 2]
 
 Converts each scenario into variants and their set, plays every variant alone and as drawn from the distribution, and
 prints the largest difference of any row.

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import firwin
 
-from benchmarks.markers import write_between_markers
+from benchmarks.markers import show
 from xosc_lateral.driver.fitting import fit_profile
 from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.driver.records import plain
@@ -119,10 +119,7 @@ def main() -> None:
     args = parser.parse_args()
     drives = read_drives(args.table)
     profiles = [fit_profile(some, name="all") for some in ([replace(drive, zone=None) for drive in drives], drives)]
-    text = "\n".join([*lasting(profiles, all_runs(drives), args.draws), "", *held(profiles)])
-    print(text)
-    if args.write is not None:
-        write_between_markers(args.write, text, "zones-told")
+    show("\n".join([*lasting(profiles, all_runs(drives), args.draws), "", *held(profiles)]), args.write, "zones-told")
 
 
 if __name__ == "__main__":
