@@ -95,7 +95,7 @@ loop-dlr: $(STAMP) $(WHEEL)
 	@mkdir -p out/loop-dlr
 	$(BIN)/xosc-lateral import dlr-ht $(WHEEL) -o out/loop-dlr/drives.parquet
 	$(BIN)/xosc-lateral fit out/loop-dlr/drives.parquet --model two-level -o out/loop-dlr/base.json
-	$(BIN)/xosc-lateral close-loop out/loop-dlr/drives.parquet --profile out/loop-dlr/base.json -o out/loop-dlr/refined.json --report out/loop-dlr --seed 1
+	$(BIN)/xosc-lateral close-loop out/loop-dlr/drives.parquet --profile out/loop-dlr/base.json -o out/loop-dlr/refined.json --report out/loop-dlr --seed 20241007
 
 $(WHEEL): | $(STAMP)
 	$(BIN)/python -m pip download --quiet --disable-pip-version-check --no-deps --dest $(@D) tasi==0.15.4
