@@ -1,7 +1,8 @@
 """The closed loop over real motorway traffic: figures and tables of docs/closing_the_loop.md, section 5.
 
     xosc-lateral import dlr-ht tasi-0.15.4-py3-none-any.whl -o dlr.parquet
-    python -m benchmarks.loop_dlr dlr.parquet [--seed 20241007] [--write docs/closing_the_loop.md] [--figures docs/figures]
+    python -m benchmarks.loop_dlr dlr.parquet [--seed 20241007] [--write docs/closing_the_loop.md]
+        [--figures docs/figures]
 
 Starts from a two-level model of the same drives, and from the seed of the library's `motorway-refined`, as
 `make loop-dlr` does.
