@@ -7,7 +7,7 @@ driver's, D, can subtract: the power of the acceleration is then off by a standa
 T) over the frequencies and T seconds, with H the gain from offset to second difference (E. Parzen, "On consistent
 estimates of the spectrum of a stationary time series", Annals of Mathematical Statistics 28, 1957). Half of that over
 the power itself is the relative error of its root mean square. `fit` knows less of the noise, and expects more of the
-driver. Noise in bursts is not stationary, and left out.
+driver. Noise in bursts, which is not stationary, and rounding, which hangs on the path, are left out.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.markers import show
-from benchmarks.sensor_split import CALM, GUSTS, QUANTISED, RATIOS, SEEDS, STEP, errors, simulated, smoothed
+from benchmarks.sensor_split import CALM, GUSTS, RATIOS, ROUNDED, SEEDS, STEP, errors, simulated, smoothed
 from xosc_lateral.drives.cuts import cut_runs
 from xosc_lateral.drives.drive import Drive
 from xosc_lateral.drives.periodogram import Detrend, periodograms
@@ -34,7 +34,7 @@ HIGHEST = 1.5
 """What resampling to 5 Hz keeps. [Hz]"""
 MOST = 0.95
 """Of the acceleration's power, within frequencies that somebody may know to be all. [-]"""
-NOT_STATIONARY = frozenset({"bursts", QUANTISED})
+LEFT_OUT = ROUNDED | {"bursts"}
 
 
 def density(paths: list[FloatArray]) -> FloatArray:
@@ -57,7 +57,7 @@ def bounds(drive: Drive) -> Iterator[tuple[tuple[str, float], tuple[float, float
     for ratio in RATIOS:
         rng = np.random.default_rng(int(10 * ratio))
         for kind, error in errors(drive, spread / np.sqrt(ratio), rng):
-            if kind in NOT_STATIONARY:
+            if kind in LEFT_OUT:
                 continue
             noise = density([resample(drive.time[m], error[m], run.time) for m, run in zip(rows, runs, strict=True)])
             square = np.cumsum((gain * (driver + noise)) ** 2) / WINDOW / seconds

@@ -3,7 +3,7 @@
     python -m benchmarks.sensor_split --set design [DRIVE...] [--write docs/design/sensor.md]
 
 Paths are those of the driver simulator, each with its gusts (which shake the car up to 2.5 Hz, and which nobody steers)
-and without, and those of drive tables, low-passed at 1 Hz to stand for a truth. Noise of seven kinds is added to the
+and without, and those of drive tables, low-passed at 1 Hz to stand for a truth. Noise of eight kinds is added to the
 rows at signal to noise ratios of 0.3, 1 and 3 (variance of the path over that of the noise). Seeds of the first three
 sets were fixed before the method was written: design 100, 101; validation 110, 111; test 120, 121. Report (130, 131) is
 looked at whenever the page is made. Accelerations are those of the driver's part of the measured runs, and of runs that
@@ -41,7 +41,12 @@ SAMPLED = range(3)
 CALM, GUSTS = "calm", "gusts"
 """What names of simulated drives begin with, without gusts and with."""
 
-QUANTISED = "quantised"
+QUANTISED, WHITE_AND_ROUNDED = "quantised", "white, rounded"
+ROUNDED = frozenset({QUANTISED, WHITE_AND_ROUNDED})
+"""Errors that hang on the path."""
+
+ROUNDING = 1.0 / 3.0
+"""Share of an error that is white and rounded that rounding has. [-]"""
 
 CLOSE, AS_BRISK = 0.1, 0.15
 """What is asked of the driver's variance and of the acceleration. [-]"""
@@ -90,8 +95,10 @@ def errors(drive: Drive, spread: float, rng: np.random.Generator) -> Iterator[tu
     }
     for kind, error in kinds.items():
         yield kind, spread * error / error.std()
-    grain = spread * np.sqrt(12.0)
-    yield QUANTISED, np.round(drive.offset / grain) * grain - drive.offset
+    white = spread * np.sqrt(1.0 - ROUNDING) * rng.spawn(1)[0].normal(size=n)
+    for kind, noise, share in ((QUANTISED, 0.0, 1.0), (WHITE_AND_ROUNDED, white, ROUNDING)):
+        grain = spread * np.sqrt(12.0 * share)
+        yield kind, np.round((drive.offset + noise) / grain) * grain - drive.offset
 
 
 def sampled_acceleration(runs: Sequence[Run]) -> float:
@@ -142,7 +149,7 @@ def split_drive(
             even, alone = in_runs(noisy), in_runs(error)
             half_widths = None
             if second_view:
-                if kind == QUANTISED:
+                if kind in ROUNDED:
                     continue
                 wavers = 0.5 * drive.lane_width + dict(errors(drive, spread, rng))[kind]
                 half_widths = in_runs(wavers)

@@ -173,23 +173,38 @@ def test_an_error_that_is_known_and_is_rounding_s_is_not_looked_for_twice(truth,
     alone = split(truth, error, rate=20.0)[0]
     assert found.sensor.rounding == pytest.approx(grain)
     assert found.sensor.driver_variance == pytest.approx(alone.sensor.driver_variance, rel=0.02)
-    assert found.sensor.order == alone.sensor.order
 
 
-def test_rounding_noise_of_a_gaussian_signal_has_the_density_of_the_closed_form():
+@pytest.mark.parametrize("grains", [0.1, 0.35, 0.5])
+def test_white_noise_is_found_beside_rounding(truth, grains):
+    """It makes rounding as white as it is itself."""
+    noise = noises(truth, 12.0, "white")
+    level, grain = float(np.concatenate(noise).std()), grains * float(np.concatenate(truth[1]).std())
+    rounded = [np.round((x + e) / grain) * grain - x for x, e in zip(truth[1], noise, strict=True)]
+    found, _ = split(truth, rounded, rate=20.0)
+    assert found.sensor.white * 10.0 == pytest.approx(level**2, rel=0.12)
+    exact, _ = split(truth, noise, rate=20.0)
+    assert found.sensor.driver_variance == pytest.approx(exact.sensor.driver_variance, rel=0.02)
+
+
+@pytest.mark.parametrize("step", [0.1, 0.05])
+@pytest.mark.parametrize("noise", [0.0, 0.04, 0.1])
+def test_rounding_noise_of_a_gaussian_signal_has_the_density_of_the_closed_form(noise, step):
+    """Simulated: a slow signal of 0.25 m, white noise of up to 0.4 grains, rows at 10 and 20 Hz."""
     rng = np.random.default_rng(5)
-    n, step = 2**17, 0.1
+    n = 2**17
     spectrum = np.fft.rfft(rng.normal(size=n)) / (1.0 + (np.fft.rfftfreq(n, step) / 0.1) ** 3)
     signal = np.fft.irfft(spectrum, n)
     signal *= 0.25 / signal.std()
+    signal += noise * rng.normal(size=n)
     grain = 0.25
     error = np.round(signal / grain) * grain - signal
     pieces = (error.reshape(-1, 1024) - error.mean()) * np.hanning(1024)
     frequency = np.fft.rfftfreq(1024, step)
     density = 2.0 * step * (np.abs(np.fft.rfft(pieces, axis=1)) ** 2).mean(axis=0) / (np.hanning(1024) ** 2).sum()
     power = lambda f: 1.0 / (1.0 + (f / 0.1) ** 3) ** 2  # noqa: E731
-    expected = rounding_density(grain, power, 0.0625)
-    for low, high in ((0.05, 0.1), (0.1, 0.3), (0.3, 1.0)):
+    expected = rounding_density(grain, power, 0.0625, rate=1.0 / step, noise=noise**2)
+    for low, high in ((0.05, 0.1), (0.1, 0.3), (0.3, 1.0), (1.0, 2.5)):
         band = (frequency > low) & (frequency < high)
         assert expected(frequency[band]).mean() == pytest.approx(density[band].mean(), rel=0.12)
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from dataclasses import replace as replaced
+from functools import partial
 
 import numpy as np
 from msgspec.structs import replace
@@ -35,7 +36,7 @@ from xosc_lateral.driver.sensor.texture import (
     measured_density,
 )
 from xosc_lateral.driver.sensor.vehicle_bound import density
-from xosc_lateral.driver.sensor.wide_steps import WideSteps, split_wide_steps
+from xosc_lateral.driver.sensor.wide_steps import MOST_NOISE, WideSteps, split_wide_steps
 from xosc_lateral.drives.filters import scale_frequencies
 from xosc_lateral.normal import NORMAL_95
 
@@ -127,7 +128,7 @@ def separate(
     durations : sequence of array, optional
         How long each row stands for, where rows are not even in time. [s]
     rate : float, optional
-        Rows per second; needed with `sensor_noise`. [Hz]
+        Rows per second; without, as many as there are in the time of the runs. [Hz]
     sensor_noise : float, optional
         Standard deviation of the sensor's error on the rows, rounding included, where it is known. [m]
     half_widths : sequence of array, optional
@@ -147,11 +148,11 @@ def separate(
     variance = _variance(measured, durations)
     frequency, windows = windows_of(runs, step)
     data = periodogram(frequency, windows)
-    known = None if sensor_noise is None else Known(sensor_noise, rate or 1.0 / step)
+    per_second = rate or sum(map(len, measured)) / (step * sum(map(len, runs)))
+    known = None if sensor_noise is None else Known(sensor_noise, per_second)
     grain = quantisation_step(np.concatenate(measured))
     two_levels = len(np.unique(np.concatenate(measured))) < LEAST_LEVELS
     if grain and not two_levels:
-        per_second = rate or sum(map(len, measured)) / (step * sum(map(len, runs)))
         wide = split_wide_steps(data, windows, measured, grain, per_second, sensor_noise)
         if wide is not None:
             return _textured(_seen_through(wide, per_second), runs, frequency, windows, step, zoned)
@@ -159,10 +160,10 @@ def separate(
     kinks, noise = pieces or (None, 0.0)
     about_pieces = kinks is not None and known is None
     if about_pieces:  # where nothing slower than a piece is left
-        known = Known(noise, rate or 1.0 / step)
+        known = Known(noise, per_second)
     rounding: Callable[[FloatArray], FloatArray] = _no_density
     if grain and not two_levels:
-        rounding = _rounding(data, grain, variance)
+        rounding = _rounding(data, grain, variance, per_second)
         known = known and replaced(known, rounding=uniform_variance(grain))
     base = rounding(data.frequency)
     if kinks is not None:
@@ -279,14 +280,16 @@ def _no_density(frequency: FloatArray) -> FloatArray:
     return np.zeros(np.shape(frequency))
 
 
-def _rounding(data: Periodogram, grain: float, variance: float) -> Callable[[FloatArray], FloatArray]:
-    """Density of rounding, which depends on the driver's, which depends on it: a few rounds."""
+def _rounding(data: Periodogram, grain: float, variance: float, rate: float) -> Callable[[FloatArray], FloatArray]:
+    """Density of rounding, which depends on the driver's and the noise's, which depend on it: a few rounds."""
     error = uniform_variance(grain)
-    level = error / 10.0  # white over 10 Hz, to begin with
+    level = 2.0 * error / rate  # white, to begin with
     shape: Callable[[FloatArray], FloatArray] = lambda frequency: np.full(np.shape(frequency), level)  # noqa: E731
     for _ in range(ROUNDING_ROUNDS):
         found = solve(data, Colour(), shape(data.frequency))
-        shape = rounding_density(grain, lambda frequency: density(found.knots, frequency), variance - error)  # noqa: B023
+        noise = min(0.5 * float(np.exp(found.white)) * rate, MOST_NOISE * (variance - error))
+        spectrum = partial(density, found.knots)
+        shape = rounding_density(grain, spectrum, variance - error - noise, rate=rate, noise=noise)
     return shape
 
 
