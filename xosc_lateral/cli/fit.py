@@ -94,5 +94,5 @@ def fit(
         say_json({"output": str(written), **profile_record(profile)})
     elif not quiet:
         typer.echo(describe_profile(profile), err=True)
-    for warning in fit_warnings(profile):
+    for warning in fit_warnings(profile, sensor_noise):
         typer.echo(f"xosc-lateral: warning: {warning}", err=True)

@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.driver.sampling import sample_offsets
 from xosc_lateral.driver.sensor.model import WIDE
+from xosc_lateral.driver.sensor.quantisation import uniform_variance
 from xosc_lateral.drives.filters import mirrored
 from xosc_lateral.segment import Segment
 
@@ -46,6 +47,9 @@ TRAFFIC = 0.6
 
 ROUGHEST, WIDEST = 0.1, 3.0
 """Standard deviations of the kernel by which paths are smoothed: from, to. [s]"""
+
+AS_GIVEN = 1.15
+"""A sensor's error found may be so many times the one given: by chance errors go along with the path. [-]"""
 
 FREE_RUN = 1200.0
 """Sampled to see what a profile writes. [s]"""
@@ -145,9 +149,35 @@ def drivable(offset: FloatArray, step: float, speed: FloatArray) -> tuple[FloatA
     return smooth, Bound(before, after, width / 1.3)
 
 
-def fit_warnings(profile: DriverProfile) -> list[str]:
-    """What to know about a profile's sensor and drivability, in lines."""
-    return [*_coarse_steps(profile), *_strained(profile)]
+def fit_warnings(profile: DriverProfile, sensor_noise: float | None = None) -> list[str]:
+    """What to know about a profile's sensor and drivability, in lines.
+
+    Parameters
+    ----------
+    profile : DriverProfile
+    sensor_noise : float, optional
+        Standard deviation of the sensor's error that it was fitted with. [m]
+    """
+    return [*_beside_given(profile, sensor_noise), *_coarse_steps(profile), *_strained(profile)]
+
+
+def _beside_given(profile: DriverProfile, given: float | None) -> list[str]:
+    """Where the drives don't bear out a sensor error that was given."""
+    sensor = profile.sensor
+    if given is None:
+        return []
+    if sensor is None:
+        return [f"runs are too short to tell a driver from a sensor: the error of {given:g} m is not used"]
+    least = float(np.sqrt(uniform_variance(sensor.rounding)))
+    if given < least / AS_GIVEN:
+        return [
+            f"a sensor error of {given:g} m is less than that of rounding to {sensor.rounding:.3g} m alone, "
+            f"{least:.2g} m: taken for rounding and nothing else"
+        ]
+    found = float(np.sqrt(sensor.sensor_variance))
+    if least > found / AS_GIVEN or found / AS_GIVEN < given < AS_GIVEN * found:  # rounding of coarse steps is not even
+        return []
+    return [f"the drives contradict a sensor error of {given:g} m: {found:.2g} m is what explains them best beside it"]
 
 
 def _coarse_steps(profile: DriverProfile) -> list[str]:

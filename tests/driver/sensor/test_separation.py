@@ -118,6 +118,29 @@ def test_steps_of_a_lattice_are_found_and_their_noise_is_known(truth):
     assert not any("rounded to" in line for line in fit_warnings(replace(profile, sensor=unsure)))
 
 
+def test_an_error_less_than_rounding_alone_is_told(truth):
+    noise = [np.round(x / 0.1) * 0.1 - x for x in truth[1]]
+    found = split(truth, noise, rate=20.0, sensor_noise=0.005)[0]
+    profile = replace(fit_runs([made_run(path) for path in truth[1]], name="rounded"), sensor=found.sensor)
+    assert any("0.005 m is less than that of rounding to 0.1 m alone" in line for line in fit_warnings(profile, 0.005))
+    assert not any("error" in line for line in (*fit_warnings(profile, 0.03), *fit_warnings(profile)))
+
+
+def test_an_error_that_the_drives_contradict_is_told(truth):
+    found = split(truth, noises(truth, 3.0, "white"), rate=20.0)[0]
+    level = float(np.sqrt(found.sensor.sensor_variance))
+    profile = replace(fit_runs([made_run(path) for path in truth[1]], name="noisy"), sensor=found.sensor)
+    for wrong in (0.5 * level, 2.0 * level):
+        assert any(f"contradict a sensor error of {wrong:g} m" in line for line in fit_warnings(profile, wrong))
+    assert not any("error" in line for line in fit_warnings(profile, 1.05 * level))
+    assert any("is not used" in line for line in fit_warnings(replace(profile, sensor=None), level))
+
+
+def test_an_error_of_more_than_all_that_was_measured_is_refused(truth):
+    with pytest.raises(DriverProfileError, match="1 m is more than all that was measured"):
+        split(truth, noises(truth, 3.0, "white"), rate=20.0, sensor_noise=1.0)
+
+
 def test_a_path_in_wide_steps_moves_between_them_as_the_driver_did(truth):
     """Steps of two standard deviations: the rounded path stands still, and jumps; what it may hide does neither."""
     grain = 2.0 * float(np.concatenate(truth[1]).std())

@@ -38,6 +38,7 @@ from xosc_lateral.driver.sensor.texture import (
 from xosc_lateral.driver.sensor.vehicle_bound import density
 from xosc_lateral.driver.sensor.wide_steps import MOST_NOISE, WideSteps, split_wide_steps
 from xosc_lateral.drives.filters import scale_frequencies
+from xosc_lateral.errors import DriverProfileError
 from xosc_lateral.normal import NORMAL_95
 
 FloatArray = NDArray[np.float64]
@@ -143,6 +144,8 @@ def separate(
     ------
     NotEnoughDataError
         If no run lasts 12.8 s.
+    DriverProfileError
+        If the error that is known is more than all that was measured.
     """
     measured = list(rows) if rows is not None else list(runs)
     variance = _variance(measured, durations)
@@ -151,6 +154,11 @@ def separate(
     per_second = rate or sum(map(len, measured)) / (step * sum(map(len, runs)))
     known = None if sensor_noise is None else Known(sensor_noise, per_second)
     grain = quantisation_step(np.concatenate(measured))
+    if sensor_noise is not None and sensor_noise**2 - uniform_variance(grain) >= variance:
+        raise DriverProfileError(
+            f"a sensor error of {sensor_noise:g} m is more than all that was measured: offsets vary by "
+            f"{np.sqrt(variance):.2g} m (standard deviation)"
+        )
     two_levels = len(np.unique(np.concatenate(measured))) < LEAST_LEVELS
     if grain and not two_levels:
         wide = split_wide_steps(data, windows, measured, grain, per_second, sensor_noise)
