@@ -44,8 +44,10 @@ OVERTAKING_SHARE = 0.84
 """Part of the one in the overtaking lane, by the law alone: it moves 0.239 m, the other 0.045 m (same recording,
 alongside; `benchmarks/clearance.py`). [-]"""
 
-FADES = 60.0
-"""Free space lengthwise within which neighbours matter less and less (same recording). [m]"""
+FADES, HEEDED_FADES = 60.0, 20.0
+"""Free space lengthwise within which neighbours matter less and less, to profiles that don't heed them and beyond what
+profiles do that do: `motorway` leaves 0.030 m of what real vehicles move from whom they overtake alongside, 0.002 m of
+it at up to 20 m of free space, and nothing farther away (same recording). [m]"""
 
 ENTERING = 0.5
 """Nominal lateral gap over which a vehicle that crosses into a lane becomes its neighbour. [m]"""
@@ -164,9 +166,15 @@ def _widening(own: _Frame, other: _Frame, heeds: frozenset[str]) -> tuple[FloatA
     nominal = np.abs(aside) - half
     gap = nominal + np.where(is_left, 1.0, -1.0) * (other.deviation - own.deviation)
     free = np.maximum(np.abs(along) - 0.5 * (own.length + other.length), 0.0)
-    weight = _fading(free / FADES) * (1.0 - _fading(nominal / ENTERING)) * (near & same_way)
-    wide = np.where(is_left, wider(gap, heeded="left" in heeds), wider(gap, heeded="right" in heeds))
-    return weight * wide, is_left
+    heeded = _heeded(is_left, heeds)
+    weight = _fading(free / np.where(heeded, HEEDED_FADES, FADES))
+    weight *= (1.0 - _fading(nominal / ENTERING)) * (near & same_way)
+    return weight * np.where(heeded, wider(gap, heeded=True), wider(gap, heeded=False)), is_left
+
+
+def _heeded(is_left: NDArray[np.bool_], heeds: frozenset[str]) -> NDArray[np.bool_]:
+    """Whether a profile heeds by itself who is on that side, shape (n,)."""
+    return np.where(is_left, "left" in heeds, "right" in heeds)
 
 
 def _part(is_left: NDArray[np.bool_], heeds: frozenset[str], *, left_hand: bool) -> FloatArray:
@@ -175,9 +183,8 @@ def _part(is_left: NDArray[np.bool_], heeds: frozenset[str], *, left_hand: bool)
     By itself `motorway` moves 0.209 m from whom it overtakes and 0.083 m from who overtakes it, where real vehicles
     move 0.239 and 0.045 m: the second has done more than its part already.
     """
-    overtakes, heeded = is_left == left_hand, np.where(is_left, "left" in heeds, "right" in heeds)
-    share = np.where(heeded, 1.0, OVERTAKING_SHARE)
-    return np.asarray(np.where(overtakes, share, 1.0 - share))
+    share = np.where(_heeded(is_left, heeds), 1.0, OVERTAKING_SHARE)
+    return np.asarray(np.where(is_left == left_hand, share, 1.0 - share))
 
 
 def wider(gap: FloatArray, *, heeded: bool) -> FloatArray:
