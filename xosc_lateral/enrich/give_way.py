@@ -27,18 +27,17 @@ FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
 GAPS = (
-    np.array([-0.79, -0.12, 0.36, 0.74, 1.28, 1.65, 3.0]),
+    np.array([-0.68, -0.05, 0.37, 0.76, 1.29, 1.65, 3.0]),
     np.array([0.41, 0.75, 0.99, 1.27, 1.59, 1.86, 3.0]),
 )
 """Lateral gap between any vehicles of neighbouring lanes, and between those side by side, at the same quantiles (the
-least, 0.1, 1, 5, 25 and 50 %): DLR Highway Traffic, 749 encounters of an early import (`benchmarks/give_way.py`; today
-744, the rarest two up to 0.11 m wider between any two, all others within 0.02 m). From 3 m on nobody gives way, which
-is assumed. [m]"""
+least, 0.1, 1, 5, 25 and 50 %): DLR Highway Traffic, 744 encounters (`benchmarks/give_way.py`). From 3 m on nobody
+gives way, which is assumed. [m]"""
 
-HEEDED = np.array([-0.03, 0.26, 0.55, 0.95, 1.43, 1.75, 3.0])
+HEEDED = np.array([0.04, 0.26, 0.56, 0.95, 1.43, 1.75, 3.0])
 """Lateral gap that vehicles leave by themselves whose profiles know what neighbours do, at the quantiles of `GAPS`:
 those side by side in the same recording, sampled from `motorway` under its context, 12 seeds
-(`benchmarks/give_way.py`; `motorway-refined` leaves 0.05 m more of the narrow ones). [m]"""
+(`benchmarks/give_way.py`; `motorway-refined` is within 0.03 m of it). [m]"""
 
 OVERTAKING_SHARE = 0.84
 """Part of the one in the overtaking lane, by the law alone: it moves 0.239 m, the other 0.045 m (same recording,
