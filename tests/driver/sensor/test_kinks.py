@@ -118,6 +118,11 @@ def test_smooth_tracks_have_none():
     assert find_kinks(smooth, RATE, runs) is None
 
 
+def test_rows_too_few_for_pieces_show_none():
+    time = np.arange(0.0, 300.0, 0.5)
+    assert find_kinks([np.sin(time)], 2.0, [np.sin(np.arange(0.0, 300.0, STEP))]) is None
+
+
 def test_what_kinks_add_is_the_sensors_above_half_a_kink_a_period_and_no_drivers(tracks):
     frequency, density, runs = seen(tracks)
     split = separate(runs, STEP, rows=tracks, rate=RATE)

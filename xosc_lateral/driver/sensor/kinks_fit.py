@@ -171,8 +171,10 @@ def _period(rows: Sequence[FloatArray], rate: float) -> int | None:
     length = round(PIECE * rate)
     pieces = [one[k : k + length] for one in rows for k in range(0, len(one), length)]
     sizes = np.arange(max(LEAST_ROWS, round(PERIODS[0] * rate)), round(PERIODS[1] * rate) + 1)
+    if not len(sizes):  # so few rows a second that no piece would have enough
+        return None
     pieces = [one for one in pieces if len(one) >= SHORTEST * sizes[-1]]
-    if len(pieces) < LEAST_PIECES or not len(sizes):
+    if len(pieces) < LEAST_PIECES:
         return None
     lines, around = np.zeros(len(sizes)), np.zeros(len(sizes))
     for piece in pieces:

@@ -36,6 +36,9 @@ def uniform_variance(step: float) -> float:
 LAGS = 60.0
 """Beyond it the error of rounding has forgotten: drivers have moved by many steps, or stood still throughout. [s]"""
 
+DENSE = 20.0
+"""What drivers do hardly shows between lags of this rate: of faster rows it is interpolated. [Hz]"""
+
 ORDERS = 59
 """Terms of the closed form, whose squares fall: what is left is 0.3 % of the variance. [-]"""
 
@@ -77,7 +80,9 @@ def rounding_density(
     power = driver(frequency) * spacing
     power *= variance / power.sum()
     lag = np.arange(1, max(round(LAGS * rate), 1) + 1) / rate
-    structure = 2.0 * (1.0 - np.cos(2.0 * np.pi * np.outer(lag, frequency))) @ power + 2.0 * noise
+    known = np.arange(round(LAGS * min(rate, DENSE)) + 2) / min(rate, DENSE)
+    moved = np.sqrt(2.0 * (1.0 - np.cos(2.0 * np.pi * np.outer(known, frequency))) @ power)
+    structure = np.interp(lag, known, moved) ** 2 + 2.0 * noise
     order = np.arange(1, ORDERS + 1)[:, None]
     terms = np.exp(-2.0 * (np.pi * order) ** 2 * structure / step**2) / order**2
     covariance = step**2 / (2.0 * np.pi**2) * terms.sum(axis=0)
