@@ -34,6 +34,8 @@ HIGHEST = 1.5
 """What resampling to 5 Hz keeps. [Hz]"""
 MOST = 0.95
 """Of the acceleration's power, within frequencies that somebody may know to be all. [-]"""
+UNKNOWN = 10.0
+"""Errors beyond tell no more: nothing is known. [-]"""
 LEFT_OUT = ROUNDED | {"bursts"}
 
 
@@ -73,9 +75,13 @@ def table(found: dict[tuple[str, float], list[tuple[str, float, float]]]) -> str
         cells = []
         for group in ("", CALM, GUSTS):
             own = [one[1:] for one in several if one[0] == group]
-            cells.append(" / ".join(f"{value:.0%}" for value in np.median(own, axis=0)) if own else "-")
+            cells.append(" / ".join(map(_percent, np.median(own, axis=0).tolist())) if own else "-")
         lines.append(f"| {kind} | {ratio:g} | {' | '.join(cells)} |")
     return "\n".join(lines)
+
+
+def _percent(share: float) -> str:
+    return f"{100.0 * share:.0f} %" if share < UNKNOWN else f"> {100.0 * UNKNOWN:.0f} %"
 
 
 def main() -> None:
