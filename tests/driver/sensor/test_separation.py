@@ -141,6 +141,12 @@ def test_an_error_of_more_than_all_that_was_measured_is_refused(truth):
         split(truth, noises(truth, 3.0, "white"), rate=20.0, sensor_noise=1.0)
 
 
+def test_where_nothing_moves_a_known_error_is_no_contradiction(truth):
+    """All was rounded to one level, whose step nobody can see."""
+    found = split(truth, [-x for x in truth[1]], rate=20.0, sensor_noise=1.0)[0]
+    assert found.sensor.driver_share == (0.0, 1.0)
+
+
 def test_a_path_in_wide_steps_moves_between_them_as_the_driver_did(truth):
     """Steps of two standard deviations: the rounded path stands still, and jumps; what it may hide does neither."""
     grain = 2.0 * float(np.concatenate(truth[1]).std())

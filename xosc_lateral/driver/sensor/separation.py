@@ -154,7 +154,7 @@ def separate(
     per_second = rate or sum(map(len, measured)) / (step * sum(map(len, runs)))
     known = None if sensor_noise is None else Known(sensor_noise, per_second)
     grain = quantisation_step(np.concatenate(measured))
-    if sensor_noise is not None and sensor_noise**2 - uniform_variance(grain) >= variance:
+    if sensor_noise is not None and 0.0 < variance <= sensor_noise**2 - uniform_variance(grain):
         raise DriverProfileError(
             f"a sensor error of {sensor_noise:g} m is more than all that was measured: offsets vary by "
             f"{np.sqrt(variance):.2g} m (standard deviation)"
