@@ -24,10 +24,10 @@ from xosc_lateral.driver.fitting import fit_population, fit_profile
 from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.drives.cuts import all_runs
 from xosc_lateral.drives.drive import Run
-from xosc_lateral.evaluation.classifier import classifier_two_sample_test, context_features
+from xosc_lateral.evaluation.classifier import TwoSampleResult, classifier_two_sample_test, context_features
 from xosc_lateral.evaluation.filters import below_half_hertz, thinned
 from xosc_lateral.evaluation.sampled_snippets import sample_runs
-from xosc_lateral.evaluation.snippets import snippets_of
+from xosc_lateral.evaluation.snippets import Snippets, snippets_of
 from xosc_lateral.formats.drives import read_drives
 
 FloatArray = NDArray[np.float64]
@@ -39,30 +39,31 @@ MEASURES = ((10.0, False), (10.0, True), (30.0, False), (30.0, True), (60.0, Fal
 """Length of the snippets [s], and whether the classifier sees the context, too."""
 
 
-def areas(
-    profile: DriverProfile, runs: Sequence[Run], seed: int, made: Sequence[FloatArray] | None = None
-) -> FloatArray:
-    """Area under the ROC curve for each of `MEASURES`, as in `score_realism`. [-]
+def slow_test(
+    cut: Snippets,
+    real: Sequence[FloatArray],
+    made: Sequence[FloatArray],
+    step: float,
+    *,
+    jointly: bool = False,
+    seed: int = 0,
+) -> TwoSampleResult:
+    """How well paths [m] beside runs are told from the runs' own, both below 0.5 Hz already, as in `score_realism`."""
+    own, others = cut.cut_from(real), cut.cut_from(made)
+    context = (context_features(cut, own), context_features(cut, others)) if jointly else None
+    shown = thinned(own, step), thinned(others, step)
+    result = classifier_two_sample_test(*shown, cut.group, cut.group, context=context, seed=seed)
+    assert result is not None
+    return result
 
-    Parameters
-    ----------
-    made : sequence of array, optional
-        Paths beside the runs, shape (n_i,) [m]; without, what the profile samples.
-    """
+
+def areas(profile: DriverProfile, runs: Sequence[Run], seed: int) -> FloatArray:
+    """Area under the ROC curve for each of `MEASURES`. [-]"""
     step = profile.model.step
-    paths = sample_runs(profile, runs, seed, same_start=False) if made is None else made
-    slow_real = [below_half_hertz(run.offset, step) for run in runs]
-    slow_made = [below_half_hertz(path, step) for path in paths]
-    found = []
-    for seconds, jointly in MEASURES:
-        cut = snippets_of(runs, seconds, step)
-        real, sampled = cut.cut_from(slow_real), cut.cut_from(slow_made)
-        context = (context_features(cut, real), context_features(cut, sampled)) if jointly else None
-        shown = thinned(real, step), thinned(sampled, step)
-        result = classifier_two_sample_test(*shown, cut.group, cut.group, context=context, seed=seed)
-        assert result is not None
-        found.append(result.auc)
-    return np.array(found)
+    real = [below_half_hertz(run.offset, step) for run in runs]
+    made = [below_half_hertz(path, step) for path in sample_runs(profile, runs, seed, same_start=False)]
+    cuts = [(snippets_of(runs, seconds, step), jointly) for seconds, jointly in MEASURES]
+    return np.array([slow_test(cut, real, made, step, jointly=jointly, seed=seed).auc for cut, jointly in cuts])
 
 
 def under_the_truth(

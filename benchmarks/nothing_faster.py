@@ -11,46 +11,23 @@ measure, whatever a model does.
 from __future__ import annotations
 
 import argparse
-from collections.abc import Sequence
 from pathlib import Path
 
-import numpy as np
-from numpy.typing import NDArray
-
+from benchmarks.fair_null import slow_test
 from benchmarks.markers import show
 from xosc_lateral.drives.cuts import all_runs
-from xosc_lateral.drives.drive import Run
-from xosc_lateral.drives.filters import kaiser_design, low_pass, mirrored
+from xosc_lateral.drives.filters import filtered, low_pass_between
 from xosc_lateral.drives.resampling import STEP
-from xosc_lateral.evaluation.classifier import TwoSampleResult, classifier_two_sample_test
-from xosc_lateral.evaluation.filters import HIGHEST, below_half_hertz, thinned
+from xosc_lateral.evaluation.filters import HIGHEST, below_half_hertz
 from xosc_lateral.evaluation.snippets import snippets_of
 from xosc_lateral.formats.drives import read_drives
 
-FloatArray = NDArray[np.float64]
 LENGTHS = (10.0, 30.0, 60.0)
 """Of snippets. [s]"""
 TRANSITION = 0.01
 """Of the filter that takes out what is faster. [Hz]"""
 ATTENUATION = 50.0
 """Of the same. [dB]"""
-
-
-def without_faster(path: FloatArray, step: float) -> FloatArray:
-    """A path without its movement above 0.5 Hz, and with all that is below. [m]"""
-    nyquist = 0.5 / step
-    half, beta = kaiser_design(ATTENUATION, TRANSITION / nyquist)
-    kernel = low_pass(half, (HIGHEST + 0.5 * TRANSITION) / nyquist, beta)
-    return np.convolve(mirrored(path, half), kernel, mode="valid")
-
-
-def told(runs: Sequence[Run], seconds: float) -> TwoSampleResult | None:
-    """How well runs are told from themselves without what is faster, both below 0.5 Hz."""
-    cut = snippets_of(runs, seconds, STEP)
-    own = [run.offset for run in runs]
-    slow = [without_faster(path, STEP) for path in own]
-    shown = [thinned(cut.cut_from([below_half_hertz(path, STEP) for path in paths]), STEP) for paths in (own, slow)]
-    return classifier_two_sample_test(shown[0], shown[1], cut.group, cut.group, seed=0)
 
 
 def main() -> None:
@@ -60,8 +37,12 @@ def main() -> None:
     args = parser.parse_args()
     runs = all_runs(read_drives(args.table))
     lines = ["| snippets | AUC | 95 % interval |", "|---|---|---|"]
-    areas = [(seconds, found) for seconds in LENGTHS if (found := told(runs, seconds)) is not None]
-    lines += [f"| {seconds:g} s | {one.auc:.3f} | {one.low:.3f} to {one.high:.3f} |" for seconds, one in areas]
+    kernel = low_pass_between(HIGHEST, HIGHEST + TRANSITION, STEP, ATTENUATION)
+    own = [below_half_hertz(run.offset, STEP) for run in runs]
+    slow = [below_half_hertz(filtered(run.offset, kernel), STEP) for run in runs]
+    for seconds in LENGTHS:
+        found = slow_test(snippets_of(runs, seconds, STEP), own, slow, STEP)
+        lines.append(f"| {seconds:g} s | {found.auc:.3f} | {found.low:.3f} to {found.high:.3f} |")
     show("\n".join(lines), args.write, "nothing-faster")
 
 

@@ -20,11 +20,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.markers import show
-from benchmarks.sensor_split import CALM, GUSTS, RATIOS, ROUNDED, SEEDS, STEP, errors, simulated, smoothed
+from benchmarks.sensor_split import CALM, GUSTS, RATIOS, ROUNDED, SEEDS, STEP, drives_of, errors, in_runs
 from xosc_lateral.drives.cuts import cut_runs
 from xosc_lateral.drives.drive import Drive
 from xosc_lateral.drives.periodogram import Detrend, periodograms
-from xosc_lateral.drives.resampling import resample
 
 FloatArray = NDArray[np.float64]
 
@@ -49,7 +48,6 @@ def density(paths: list[FloatArray]) -> FloatArray:
 def bounds(drive: Drive) -> Iterator[tuple[tuple[str, float], tuple[float, float]]]:
     """By noise and ratio: relative standard error of the acceleration up to 1.5 Hz, and up to where 95 % of it lies."""
     runs = cut_runs(drive)
-    rows = [(drive.time >= run.time[0] - 1e-9) & (drive.time <= run.time[-1] + 1e-9) for run in runs]
     driver, seconds = density([run.offset for run in runs]), STEP * sum(len(run.offset) for run in runs)
     frequency = np.arange(len(driver)) / WINDOW
     gain = np.where(frequency < HIGHEST, (2.0 * np.sin(np.pi * frequency * STEP)) ** 4, 0.0)
@@ -61,7 +59,7 @@ def bounds(drive: Drive) -> Iterator[tuple[tuple[str, float], tuple[float, float
         for kind, error in errors(drive, spread / np.sqrt(ratio), rng):
             if kind in LEFT_OUT:
                 continue
-            noise = density([resample(drive.time[m], error[m], run.time) for m, run in zip(rows, runs, strict=True)])
+            noise = density(in_runs(drive, runs, error))
             square = np.cumsum((gain * (driver + noise)) ** 2) / WINDOW / seconds
             whole, within = square[-1], square[most][-1]
             found = 0.5 * np.sqrt([whole, within]) / power[-1]
@@ -90,9 +88,8 @@ def main() -> None:
     parser.add_argument("--set", choices=SEEDS, default="design")
     parser.add_argument("--write", type=Path, metavar="PAGE.md")
     args = parser.parse_args()
-    made = [simulated(seed, gusts=gusts) for gusts in (False, True) for seed in SEEDS[args.set]]
     found: dict[tuple[str, float], list[tuple[str, float, float]]] = {}
-    for drive in [*map(smoothed, args.drives), *made]:
+    for drive in drives_of(args.drives, args.set):
         group = next((name for name in (CALM, GUSTS) if drive.name.startswith(name)), "")
         for key, one in bounds(drive):
             found.setdefault(key, []).append((group, *one))

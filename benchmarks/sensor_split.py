@@ -101,6 +101,23 @@ def errors(drive: Drive, spread: float, rng: np.random.Generator) -> Iterator[tu
         yield kind, np.round((drive.offset + noise) / grain) * grain - drive.offset
 
 
+def rows_of(drive: Drive, runs: Sequence[Run]) -> list[np.ndarray]:
+    """Which of a drive's rows each run was cut from, shape (rows,)."""
+    return [(drive.time >= run.time[0] - 1e-9) & (drive.time <= run.time[-1] + 1e-9) for run in runs]
+
+
+def in_runs(drive: Drive, runs: Sequence[Run], values: np.ndarray) -> list[np.ndarray]:
+    """What a drive's rows have, at the instants of its runs."""
+    pairs = zip(rows_of(drive, runs), runs, strict=True)
+    return [resample(drive.time[mine], values[mine], run.time) for mine, run in pairs]
+
+
+def drives_of(tables: Sequence[Path], chosen: str) -> list[Drive]:
+    """Tables, then simulated drivers of a set without gusts and with."""
+    made = [simulated(seed, gusts=gusts) for gusts in (False, True) for seed in SEEDS[chosen]]
+    return [*map(smoothed, tables), *made]
+
+
 def sampled_acceleration(runs: Sequence[Run]) -> float:
     """Second differences of what a profile of these runs samples, standard deviation; 0 where nothing moves. [m]"""
     try:
@@ -134,25 +151,22 @@ def split_drive(
     """All kinds and ratios of noise on one drive; rounding has no second view."""
     rate = float(1.0 / np.median(np.diff(drive.time)))
     runs = cut_runs(drive)
-    rows = [(drive.time >= run.time[0] - 1e-9) & (drive.time <= run.time[-1] + 1e-9) for run in runs]
+    rows = rows_of(drive, runs)
     truth = np.concatenate([run.offset for run in runs])
     calm = np.concatenate([np.diff(run.offset, 2) for run in runs]).std()
-
-    def in_runs(values: np.ndarray) -> list[np.ndarray]:
-        return [resample(drive.time[m], values[m], run.time) for m, run in zip(rows, runs, strict=True)]
 
     for ratio in RATIOS:
         rng = np.random.default_rng([int(10 * ratio), *map(ord, drive.name)])
         spread = truth.std() / np.sqrt(ratio)
         for kind, error in errors(drive, spread, rng):
             noisy = drive.offset + error
-            even, alone = in_runs(noisy), in_runs(error)
+            even, alone = in_runs(drive, runs, noisy), in_runs(drive, runs, error)
             half_widths = None
             if second_view:
                 if kind in ROUNDED:
                     continue
                 wavers = 0.5 * drive.lane_width + dict(errors(drive, spread, rng))[kind]
-                half_widths = in_runs(wavers)
+                half_widths = in_runs(drive, runs, wavers)
             split = separate(
                 even,
                 STEP,
@@ -221,9 +235,8 @@ def main() -> None:
     parser.add_argument("--known", action="store_true", help="the noise's standard deviation is given")
     parser.add_argument("--write", type=Path, metavar="PAGE.md")
     args = parser.parse_args()
-    made = [simulated(seed, gusts=gusts) for gusts in (False, True) for seed in SEEDS[args.set]]
     found: dict[tuple[str, float], list[Found]] = {}
-    for drive in [*map(smoothed, args.drives), *made]:
+    for drive in drives_of(args.drives, args.set):
         for key, one in split_drive(drive, second_view=args.second_view, known=args.known):
             found.setdefault(key, []).append(one)
     marker = "sensor-split" + "-second-view" * args.second_view + "-known" * args.known

@@ -23,7 +23,7 @@ from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.driver.sampling import sample_offsets
 from xosc_lateral.driver.sensor.model import WIDE
 from xosc_lateral.driver.sensor.quantisation import uniform_variance
-from xosc_lateral.drives.filters import mirrored
+from xosc_lateral.drives.filters import filtered
 from xosc_lateral.segment import Segment
 
 FloatArray = NDArray[np.float64]
@@ -215,4 +215,4 @@ def _smoothed(values: FloatArray, width: float) -> FloatArray:
     """Gaussian smoothing, continued point-symmetrically past both ends, which stay where they are."""
     half = min(int(np.ceil(4.0 * width)), len(values) - 1)
     kernel = np.exp(-0.5 * (np.arange(-half, half + 1) / width) ** 2)
-    return np.convolve(mirrored(values, half), kernel / kernel.sum(), "valid")
+    return filtered(values, kernel / kernel.sum())

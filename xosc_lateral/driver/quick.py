@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.driver.convolution import convolve
-from xosc_lateral.drives.filters import kaiser_design, low_pass, mirrored
+from xosc_lateral.drives.filters import low_pass_between, mirrored
 
 FloatArray = NDArray[np.float64]
 
@@ -30,9 +30,7 @@ ATTENUATION = 40.0
 @lru_cache(maxsize=8)
 def slow_kernel(step: float) -> FloatArray:
     """Symmetric low-pass of gain 1 for rows `step` [s] apart, shape (2 * reach + 1,), to what is not quick. [-]"""
-    nyquist = 0.5 / step
-    half, beta = kaiser_design(ATTENUATION, (BORDER[1] - BORDER[0]) / nyquist)
-    kernel = low_pass(half, 0.5 * sum(BORDER) / nyquist, beta)
+    kernel = low_pass_between(*BORDER, step, ATTENUATION)
     kernel.flags.writeable = False
     return kernel
 

@@ -82,6 +82,33 @@ def low_pass(half: int, cutoff: float, beta: float) -> FloatArray:
     return np.asarray(kernel / kernel.sum())
 
 
+def low_pass_between(passed: float, stopped: float, step: float, attenuation: float) -> FloatArray:
+    """Symmetric kernel of gain 1 that passes what is slower than one frequency, and stops what is faster than another.
+
+    Parameters
+    ----------
+    passed, stopped : float
+        Below half the sampling rate. [Hz]
+    step : float
+        Of the rows. [s]
+    attenuation : float
+        In the stop band, 21 to 50 dB.
+
+    Returns
+    -------
+    array, shape (2 * half + 1,)
+        [-]
+    """
+    nyquist = 0.5 / step
+    half, beta = kaiser_design(attenuation, (stopped - passed) / nyquist)
+    return low_pass(half, 0.5 * (passed + stopped) / nyquist, beta)
+
+
+def filtered(values: FloatArray, kernel: FloatArray) -> FloatArray:
+    """A series through a symmetric kernel, continued beyond its ends as by `mirrored`. Shape and unit of the values."""
+    return np.convolve(mirrored(values, len(kernel) // 2), kernel, mode="valid")
+
+
 def mirrored(values: FloatArray, rows: int) -> FloatArray:
     """A series continued by so many rows at both ends, shape (n + 2 * rows,), for a symmetric kernel. [any unit]
 

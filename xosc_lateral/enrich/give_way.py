@@ -104,8 +104,8 @@ def give_way(
                 widening = _widening(frames[own], frames[other], sampled[own].heeds)
                 if widening is None:
                     continue
-                aside, is_left = widening  # of `own`, by where `other` is
-                share = _part(is_left, sampled[own].heeds, left_hand=left_hand[own])
+                aside, is_left, heeded = widening  # of `own`, by where `other` is
+                share = _part(is_left == left_hand[own], heeded)
                 share = np.where(frames[other].can_move, share, 1.0) * frames[own].can_move
                 right[own] = np.maximum(right[own], np.where(is_left, share * aside, 0.0))
                 left[own] = np.maximum(left[own], np.where(is_left, 0.0, share * aside))
@@ -150,8 +150,13 @@ class _Frame:
         )
 
 
-def _widening(own: _Frame, other: _Frame, heeds: frozenset[str]) -> tuple[FloatArray, NDArray[np.bool_]] | None:
-    """By how much the gap to the other is widened, and whether the other is to the left; None if it never is near."""
+def _widening(
+    own: _Frame, other: _Frame, heeds: frozenset[str]
+) -> tuple[FloatArray, NDArray[np.bool_], NDArray[np.bool_]] | None:
+    """By how much the gap to the other is widened, whether the other is to the left, and whether its profile heeds it.
+
+    None if the other never is near.
+    """
     ahead_x, ahead_y = other.x - own.x, other.y - own.y
     reach = FADES + 0.5 * (own.length + other.length)
     near = own.present & other.present & (ahead_x**2 + ahead_y**2 < (reach + 10.0) ** 2)
@@ -165,25 +170,20 @@ def _widening(own: _Frame, other: _Frame, heeds: frozenset[str]) -> tuple[FloatA
     nominal = np.abs(aside) - half
     gap = nominal + np.where(is_left, 1.0, -1.0) * (other.deviation - own.deviation)
     free = np.maximum(np.abs(along) - 0.5 * (own.length + other.length), 0.0)
-    heeded = _heeded(is_left, heeds)
+    heeded = np.where(is_left, "left" in heeds, "right" in heeds)
     weight = _fading(free / np.where(heeded, HEEDED_FADES, FADES))
     weight *= (1.0 - _fading(nominal / ENTERING)) * (near & same_way)
-    return weight * np.where(heeded, wider(gap, heeded=True), wider(gap, heeded=False)), is_left
+    return weight * np.where(heeded, wider(gap, heeded=True), wider(gap, heeded=False)), is_left, heeded
 
 
-def _heeded(is_left: NDArray[np.bool_], heeds: frozenset[str]) -> NDArray[np.bool_]:
-    """Whether a profile heeds by itself who is on that side, shape (n,)."""
-    return np.where(is_left, "left" in heeds, "right" in heeds)
-
-
-def _part(is_left: NDArray[np.bool_], heeds: frozenset[str], *, left_hand: bool) -> FloatArray:
-    """What a vehicle takes of a widening, by where the other is, shape (n,). [-]
+def _part(overtakes: NDArray[np.bool_], heeded: NDArray[np.bool_]) -> FloatArray:
+    """What a vehicle takes of a widening, by whether it is the overtaking one and heeds the other, shape (n,). [-]
 
     By itself `motorway` moves 0.209 m from whom it overtakes and 0.083 m from who overtakes it, where real vehicles
     move 0.239 and 0.045 m: the second has done more than its part already.
     """
-    share = np.where(_heeded(is_left, heeds), 1.0, OVERTAKING_SHARE)
-    return np.asarray(np.where(is_left == left_hand, share, 1.0 - share))
+    share = np.where(heeded, 1.0, OVERTAKING_SHARE)
+    return np.asarray(np.where(overtakes, share, 1.0 - share))
 
 
 def wider(gap: FloatArray, *, heeded: bool) -> FloatArray:

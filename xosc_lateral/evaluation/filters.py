@@ -13,7 +13,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.drives.filters import kaiser_design, low_pass, mirrored
+from xosc_lateral.drives.filters import filtered, low_pass_between
 
 FloatArray = NDArray[np.float64]
 
@@ -45,12 +45,9 @@ def below_half_hertz(path: FloatArray, step: float) -> FloatArray:
     array, shape (n,)
         [m]
     """
-    nyquist = 0.5 / step
-    if len(path) < 2 or nyquist <= HIGHEST:
+    if len(path) < 2 or 0.5 / step <= HIGHEST:
         return np.array(path)
-    half, beta = kaiser_design(ATTENUATION, (HIGHEST - PASSED) / nyquist)
-    kernel = low_pass(half, 0.5 * (PASSED + HIGHEST) / nyquist, beta)
-    return np.convolve(mirrored(path, half), kernel, mode="valid")
+    return filtered(path, low_pass_between(PASSED, HIGHEST, step, ATTENUATION))
 
 
 def thinned(paths: FloatArray, step: float) -> FloatArray:

@@ -11,7 +11,7 @@ from xosc_lateral.driver.effects import Effect
 from xosc_lateral.driver.place import COLUMNS
 from xosc_lateral.drives.cuts import MIN_RUN
 from xosc_lateral.drives.drive import Run
-from xosc_lateral.drives.filters import mirrored
+from xosc_lateral.drives.filters import filtered
 from xosc_lateral.drives.resampling import STEP
 from xosc_lateral.identification.regression import Fitted
 from xosc_lateral.identification.terms.base import Removal, Term
@@ -86,5 +86,4 @@ def _run(timeline: Timeline, removal: Removal, rows: slice, name: str, index: in
 
 def _smooth(values: FloatArray) -> FloatArray:
     width = 2 * round(0.5 * FINE_S / STEP) + 1
-    half = width // 2
-    return np.convolve(mirrored(values, half), np.ones(width) / width, mode="valid")
+    return filtered(values, np.ones(width) / width)

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.driver.jit_kernel import JitKernel, worth_compiling
-from xosc_lateral.drives.filters import low_pass, mirrored
+from xosc_lateral.drives.filters import filtered, low_pass
 
 FloatArray = NDArray[np.float64]
 
@@ -77,7 +77,7 @@ def split_bands(values: FloatArray, step: float) -> tuple[FloatArray, FloatArray
     Past their ends the values go on mirrored in a point.
     """
     kernel = measuring_low_pass(step)
-    slow = np.convolve(mirrored(values, len(kernel) // 2), kernel, "valid")
+    slow = filtered(values, kernel)
     return slow, values - slow
 
 
