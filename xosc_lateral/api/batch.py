@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -40,7 +41,8 @@ def convert_many(
     report: PathLike | None = None,
     context: PathLike | None = None,
     parameters: Mapping[str, object] | None = None,
-    mode: Literal["trajectory", "lane-offset"] = "trajectory",
+    mode: Literal["auto", "trajectory", "lane-offset"] = "auto",
+    ego: Collection[str] | None = None,
     player: Literal["standard", "esmini", "carla"] = "standard",
     version: str | None = None,
     library: Paths = (),
@@ -68,7 +70,7 @@ def convert_many(
         if wanted `profile`, `profile:ENTITY`, `seed`, `variants`, `only`, `parameter:NAME`; or several of them.
     output : str or Path
         Folder; it mirrors the inputs, and holds `manifest.parquet` at the end.
-    profile, entity, only, seed, context, parameters, mode, player, version
+    profile, entity, only, seed, context, parameters, mode, ego, player, version
         See `convert`.
     library, allow, road, road_path, attempts, time_limit, with_sensor
         See `convert`.
@@ -104,6 +106,7 @@ def convert_many(
         context=context,
         parameters=parameters,
         mode=mode,
+        ego=ego,
         player=player,
         version=version,
         library=library,
@@ -115,6 +118,7 @@ def convert_many(
         with_sensor=with_sensor,
         strict=strict,
     )
+    settings = replace(settings, names_may_lack=True)
     if isinstance(scenarios, str | Path):
         inputs: list[Any] = [scenarios]
     elif isinstance(scenarios, Sequence):
@@ -124,6 +128,7 @@ def convert_many(
     batch = plan_batch(inputs, output_folder(output), settings, variants=variants, report=report)
     if not len(batch):
         raise FormatError(f"no scenario to convert{_left_out(batch)}", path=", ".join(map(str, inputs[:3])) or output)
+    _refuse_unknown_names(batch)
     # A folder in an output's place is that output's failure alone.
     claim((job.output for job in batch.jobs if not job.output.is_dir()), force=force)
     limits = JobLimits(job_timeout, job_memory)
@@ -132,6 +137,23 @@ def convert_many(
     summary = follow(_noted(outcomes, became, on_outcome), len(batch), Display(show))
     index = None if report is None else write_batch_index(batch, Path(report))
     return BatchResult(batch, summary, became, index)
+
+
+def _refuse_unknown_names(batch: Batch) -> None:
+    """An entity may be missing in some scenarios, but not in all."""
+    asked = dict[tuple[str, str], bool]()
+    texts = dict[Path, str]()
+    for job in batch.jobs:
+        given = job.settings
+        for option, names in (("--entity", given.entity_profiles), ("--only", given.only), ("--ego", given.ego)):
+            for name in names or ():
+                if not asked.get((option, name)):
+                    text = texts.setdefault(job.source, job.source.read_text("utf-8", errors="replace"))
+                    # A name may stand in an escaped form or in a parameter: then the conversion looks at it.
+                    asked[option, name] = f'"{name}"' in text or f"'{name}'" in text or not name.isidentifier()
+    for (option, name), found in asked.items():
+        if not found:
+            raise FormatError(f"{option} {name!r}: no scenario has such an entity", path=batch.base)
 
 
 def _noted(

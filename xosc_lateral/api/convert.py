@@ -9,10 +9,11 @@ from typing import TYPE_CHECKING, Any, Literal
 from xosc_lateral.api.inputs import PathLike, Paths, ProfileLike, as_paths, road_search
 from xosc_lateral.api.result import Result
 from xosc_lateral.errors import FormatError
+from xosc_lateral.formats.configuration import configured_egos
 from xosc_lateral.formats.openscenario.write.target import target
 from xosc_lateral.formats.output_paths import claim, output_file
 from xosc_lateral.pipeline.convert import convert_scenario
-from xosc_lateral.pipeline.settings import AUTO, TIME_LIMIT, ConvertSettings, OutputMode
+from xosc_lateral.pipeline.settings import AUTO, TIME_LIMIT, ConvertSettings, OutputMode, egos_named
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -37,7 +38,8 @@ def convert(
     report: PathLike | None = None,
     context: PathLike | None = None,
     parameters: Mapping[str, object] | None = None,
-    mode: Literal["trajectory", "lane-offset"] = "trajectory",
+    mode: Literal["auto", "trajectory", "lane-offset"] = "auto",
+    ego: Collection[str] | None = None,
     player: Literal["standard", "esmini", "carla"] = "standard",
     version: str | None = None,
     library: Paths = (),
@@ -73,8 +75,12 @@ def convert(
         Table of context over time that the scenario doesn't state: `time` [s], and a column each.
     parameters : mapping, optional
         Scenario parameters that replace those declared.
-    mode : {"trajectory", "lane-offset"}
-        Play maneuvers out, or keep them and add lane offsets between them.
+    mode : {"auto", "trajectory", "lane-offset"}
+        Play maneuvers out, or keep them and add lane offsets between them; "auto" decides by vehicle: lane offsets for
+        those whose motion depends on a vehicle under test.
+    ego : collection of str, optional
+        Vehicles under test, which are left as they are, beside those that the scenario leaves to somebody else (an
+        external controller, CARLA's `ego_vehicle`); ("none",): there is none.
     player : {"standard", "esmini", "carla"}
         Who is to play it: nobody in particular, or a player with ways of its own.
     version : str, optional
@@ -109,6 +115,7 @@ def convert(
         context=context,
         parameters=parameters,
         mode=mode,
+        ego=ego,
         player=player,
         version=version,
         library=library,
@@ -153,7 +160,8 @@ def convert_settings(
     seed: int = 0,
     context: PathLike | None = None,
     parameters: Mapping[str, object] | None = None,
-    mode: str = "trajectory",
+    mode: str = "auto",
+    ego: Collection[str] | None = None,
     player: str = "standard",
     version: str | None = None,
     library: Paths = (),
@@ -177,6 +185,7 @@ def convert_settings(
         parameters={name: str(value) for name, value in (parameters or {}).items()},
         attempts=attempts,
         mode=OutputMode(mode),
+        ego=_egos(ego),
         target=target(player, version),
         libraries=as_paths(library),
         allowed=as_paths(allow),
@@ -185,6 +194,12 @@ def convert_settings(
         with_sensor=with_sensor,
         strict=strict,
     )
+
+
+def _egos(ego: Collection[str] | None) -> frozenset[str] | None:
+    """As said, else as configured."""
+    names = configured_egos() if ego is None else (ego,) if isinstance(ego, str) else ego
+    return egos_named(names)
 
 
 def _named(profile: ProfileLike) -> str | DriverProfile:
@@ -230,6 +245,21 @@ class Conversion(Result):
     def enriched(self) -> tuple[str, ...]:
         """Those that got offsets."""
         return tuple(entity.name for entity in self._made.enriched.entities if entity.is_enriched)
+
+    @property
+    def ego(self) -> tuple[str, ...]:
+        """Vehicles under test: left as they are; empty: there is none, and everything is replayed."""
+        return self._made.provenance.ego
+
+    @property
+    def is_replay(self) -> bool:
+        """Whether everything happens by the clock of the nominal run."""
+        return self._made.is_replay
+
+    @property
+    def modes(self) -> dict[str, str]:
+        """Vehicle that was enriched -> "trajectory" or "lane-offset"."""
+        return dict(self._made.provenance.modes)
 
     @property
     def warnings(self) -> tuple[str, ...]:

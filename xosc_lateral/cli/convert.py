@@ -64,6 +64,14 @@ def convert(
     only: Annotated[
         list[str] | None, typer.Option(metavar="NAME", help="Enrich only this entity; may be repeated.")
     ] = None,
+    ego: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="NAME",
+            help="Vehicle under test: left as it is; may be repeated. Those with an external controller are found "
+            "by themselves. none: there is none.",
+        ),
+    ] = None,
     variants: Annotated[int, typer.Option(help="Number of outputs, each with different offsets.", min=1)] = 1,
     report: Annotated[
         str | None,
@@ -75,8 +83,12 @@ def convert(
     parameter: Parameters = None,
     library: Library = None,
     mode: Annotated[
-        OutputMode, typer.Option(help="trajectory: play the maneuvers out; lane-offset: keep them reactive.")
-    ] = OutputMode.TRAJECTORY,
+        OutputMode,
+        typer.Option(
+            help="trajectory: play the maneuvers out; lane-offset: keep them reactive; auto: by vehicle, as it depends "
+            "on a vehicle under test."
+        ),
+    ] = OutputMode.AUTO,
     player: Annotated[
         Player, typer.Option("--for", help="Who plays it: standard, or made for esmini or CARLA's ScenarioRunner.")
     ] = Player.STANDARD,
@@ -119,6 +131,7 @@ def convert(
         "profile": profile,
         "entity": pairs(entity, "--entity"),
         "only": only or None,
+        "ego": _egos(ego),
         "seed": seed,
         "context": context,
         "parameters": pairs(parameter, "--set"),
@@ -162,6 +175,16 @@ def convert(
         _convert_one(Path(scenario[0]), output, settings, variants, report, strict, quiet, as_json)
 
 
+def _egos(names: list[str] | None) -> list[str] | None:
+    from xosc_lateral.pipeline.settings import egos_named
+
+    try:
+        egos_named(names or None)
+    except ValueError as error:
+        raise typer.BadParameter(str(error), param_hint="--ego") from error
+    return names or None
+
+
 def _check_target(player: Player, version: str | None, mode: OutputMode) -> None:
     from xosc_lateral.formats.openscenario.write.target import target
 
@@ -202,12 +225,13 @@ def _convert_one(
         pages = [None if page is None else numbered(page, variant, variants) for variant in range(variants)]
         files = variant_files(written, variants, settings["mode"], settings["player"])
         claim([*outputs, *pages, *(files.all(variants) if files else ())], [source], force=settings["force"])
-        unclean = False
+        unclean, replayed = False, True
         for variant, (path, its_page) in enumerate(zip(outputs, pages, strict=True)):
             result = convert(source, path, variant=variant, report=its_page, **settings)
             say(result, as_json=as_json, quiet=quiet)
+            replayed &= result.is_replay
             unclean |= bool(result.warnings) or not result.enriched
-        if files is not None:
+        if files is not None and replayed:
             found = variant_set(outputs, written, source=source, force=True)
             if not (quiet or as_json):
                 typer.echo(str(found))

@@ -27,6 +27,14 @@ class ConversionProvenance:
         Offsets hold the sensor error of the drives that profiles were fitted on; else the driver alone.
     player, version : str
         What it was written for; version of the standard.
+    ego : tuple of str
+        Vehicles under test: left as they are. Empty: there is none, and everything is replayed.
+    modes : mapping of str to str
+        Vehicle that was enriched -> "trajectory" or "lane-offset".
+    only : tuple of str or None
+        Who alone was to be enriched.
+    attempts : int
+        Samplings at most while vehicles touch or leave their lane.
     """
 
     package_version: str
@@ -38,6 +46,16 @@ class ConversionProvenance:
     with_sensor: bool = False
     player: str = "standard"
     version: str = ""
+    ego: tuple[str, ...] = ()
+    modes: Mapping[str, str] = field(default_factory=dict)
+    only: tuple[str, ...] | None = None
+    attempts: int = 1
+
+    @property
+    def mode(self) -> str:
+        """Of all vehicles that were enriched: "trajectory", "lane-offset", "mixed"; empty: nobody was."""
+        found = sorted(set(self.modes.values()))
+        return "mixed" if len(found) > 1 else "".join(found)
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -56,6 +74,8 @@ class ConvertedScenario:
         What a user has to know, a line each.
     data : bytes
         The converted scenario, if it was not to be written.
+    is_replay : bool
+        Everything happens by the clock of the nominal run, whoever drives.
     """
 
     source: Path
@@ -65,3 +85,4 @@ class ConvertedScenario:
     provenance: ConversionProvenance
     warnings: tuple[str, ...]
     data: bytes = b""
+    is_replay: bool = True

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import zlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -57,6 +57,7 @@ def enrich(
     attempts: int = 1,
     joint: bool = True,
     with_sensor: bool = False,
+    uncertain: Collection[str] = (),
 ) -> Enriched:
     """Enrich a played scenario.
 
@@ -83,6 +84,9 @@ def enrich(
     with_sensor : bool
         Add what the sensor added to the drives that each profile was fitted on. Nobody drives that: it is added after
         drivers have given way and after what nobody could drive was smoothed.
+    uncertain : collection of str
+        Entities whose motion will be another one, since it depends on a vehicle under test: nobody responds to where
+        they nominally are, nor do they to others.
 
     Raises
     ------
@@ -108,10 +112,13 @@ def enrich(
                 ),
                 context or {},
                 with_sensor,
+                uncertain,
             )
             for index, entity in enumerate(motion.entities)
         ]
-        entities = tuple(_result(one, network) for one in (_apart(drawn, motion, network) if joint else drawn))
+        entities = tuple(
+            _result(one, network) for one in (_apart(drawn, motion, network, uncertain) if joint else drawn)
+        )
         entities = _with_trailers(entities, network, trailers)
         gaps_after = gaps_of(motion, [entity.trajectory for entity in entities])
         departures = tuple(found for entity in entities for found in lane_departures(entity, network))
@@ -172,8 +179,10 @@ def _draw(
     seed: np.random.SeedSequence,
     foreign_context: Mapping[str, tuple[FloatArray, FloatArray]],
     with_sensor: bool,
+    uncertain: Collection[str],
 ) -> _Drawn:
     entity = motion.entities[index]
+    motion, index = _foreseen(motion, index, uncertain)
     if isinstance(driver, str):
         return _Drawn(entity, spans, None, driver)
     sampler, sensor = OffsetSampler(driver, seed), known_sensor(driver) if with_sensor else None
@@ -209,8 +218,24 @@ def _heeded(driver: DriverProfile, *, other_hand: bool) -> set[str]:
     }
 
 
-def _apart(drawn: Sequence[_Drawn], motion: NominalMotion, network: RoadNetwork) -> list[_Drawn]:
-    """Neighbours give way to each other."""
+def _foreseen(motion: NominalMotion, index: int, uncertain: Collection[str]) -> tuple[NominalMotion, int]:
+    """The run with those alone whose place beside an entity is certain, and its index among them."""
+    if not uncertain:
+        return motion, index
+    own = motion.entities[index]
+    others = [one for one in motion.entities if own.name not in uncertain and one.name not in uncertain]
+    entities = [one for one in motion.entities if one is own or one in others]
+    return replace(motion, entities=tuple(entities)), next(k for k, one in enumerate(entities) if one is own)
+
+
+def _apart(
+    drawn: Sequence[_Drawn], motion: NominalMotion, network: RoadNetwork, uncertain: Collection[str]
+) -> list[_Drawn]:
+    """Neighbours give way to each other, where it is certain that they meet."""
+    if uncertain:
+        certain = [one for one in drawn if one.motion.name not in uncertain]
+        moved = {one.motion.name: one for one in _apart(certain, motion, network, ())}
+        return [moved.get(one.motion.name, one) for one in drawn]
     if sum(bool(one.segments) for one in drawn) == 0 or len(drawn) < 2:
         return list(drawn)
     sampled = [_sampled(one) for one in drawn]

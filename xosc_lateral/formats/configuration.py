@@ -1,4 +1,4 @@
-"""The user's configuration file, and what it says of libraries."""
+"""The user's configuration file: libraries and vehicles under test."""
 
 from __future__ import annotations
 
@@ -6,6 +6,8 @@ import os
 from pathlib import Path
 
 from xosc_lateral.errors import FormatError
+
+KEYS = ("library", "ego")
 
 
 def configuration_file() -> Path | None:
@@ -26,27 +28,48 @@ def configured_libraries() -> list[Path]:
     FormatError
         If it is no TOML, or says something else.
     """
+    path, library = _configured("library", "folders")
+    if path is None or library is None:
+        return []
+    try:
+        return [path.parent / Path(name).expanduser() for name in library]
+    except RuntimeError as error:
+        raise FormatError(f"library = {library!r}: there is no home that ~ could stand for", path=path) from error
+
+
+def configured_egos() -> list[str] | None:
+    """Vehicles under test that the configuration names; None: it names none.
+
+    Raises
+    ------
+    FormatError
+        If it is no TOML, or says something else.
+    """
+    return _configured("ego", "entities")[1]
+
+
+def _configured(key: str, what: str) -> tuple[Path | None, list[str] | None]:
+    """The file, and a list of texts in it; None where there is none."""
     path = configuration_file()
     try:
         if path is None or not path.is_file():
-            return []
+            return None, None
     except PermissionError:  # the home is somebody else's
-        return []
+        return None, None
     import tomllib
 
     try:
         values = tomllib.loads(path.read_text(encoding="utf-8"))
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise FormatError(f"not TOML: {error}", path=path) from error
-    unknown = sorted(values.keys() - {"library"})
-    library = values.get("library", [])
+    unknown = sorted(values.keys() - set(KEYS))
     if unknown:
-        raise FormatError(f"unknown key {unknown[0]!r}; there is library", path=path)
-    if isinstance(library, str):
-        library = [library]
-    if not isinstance(library, list) or not all(isinstance(name, str) for name in library):
-        raise FormatError(f"library = {library!r}: expected a list of folders", path=path)
-    try:
-        return [path.parent / Path(name).expanduser() for name in library]
-    except RuntimeError as error:
-        raise FormatError(f"library = {library!r}: there is no home that ~ could stand for", path=path) from error
+        raise FormatError(f"unknown key {unknown[0]!r}; there are {' and '.join(KEYS)}", path=path)
+    if key not in values:
+        return path, None
+    found = values[key]
+    if isinstance(found, str):
+        found = [found]
+    if not isinstance(found, list) or not all(isinstance(name, str) for name in found):
+        raise FormatError(f"{key} = {found!r}: expected a list of {what}", path=path)
+    return path, found

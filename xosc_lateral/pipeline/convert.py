@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import hashlib
 import os
-from collections.abc import Mapping
-from dataclasses import asdict
+from collections.abc import Collection, Mapping
+from dataclasses import asdict, replace
 from pathlib import Path
 
 import numpy as np
@@ -25,14 +25,17 @@ from xosc_lateral.formats.openscenario.write import (
     write_lane_offset_scenario,
     write_trajectory_scenario,
 )
+from xosc_lateral.formats.openscenario.write.replaced_maneuvers import replaced_groups
 from xosc_lateral.formats.profiles import profile_hash
 from xosc_lateral.formats.source import guarding_inputs
 from xosc_lateral.motion.nominal import Activity
 from xosc_lateral.pipeline.drivers import choose_drivers
 from xosc_lateral.pipeline.load import Played, input_hashes, play_scenario
+from xosc_lateral.pipeline.modes import WritingPlan, chosen_egos, writing_plan
 from xosc_lateral.pipeline.settings import ConvertSettings, OutputMode
 from xosc_lateral.pipeline.shifted import shifted_events
 from xosc_lateral.scenario import Scenario
+from xosc_lateral.scenario.dependence import dependence
 from xosc_lateral.version import __version__
 
 NO_WIDTH = 0.01
@@ -88,13 +91,15 @@ def _convert(
         strict=settings.strict,
     )
     _refuse_lane_offsets_for_carla(played.scenario, settings)
-    sampled = _sampled_too(played, settings)
+    egos = chosen_egos(played.scenario, settings)
+    depends = dependence(played.scenario, egos)
+    sampled = _sampled_too(played, settings, egos)
     context = None if settings.context is None else read_context(settings.context)
     inputs = dict(input_hashes(played.scenario, played.network))
     if context is not None and settings.context is not None:
         inputs[settings.context] = context.sha256
     refuse_outputs([output if save else None, report], inputs)
-    drivers = choose_drivers(played.scenario, settings)
+    drivers = choose_drivers(played.scenario, settings, egos)
     enriched = enrich(
         played.motion,
         played.network,
@@ -106,18 +111,23 @@ def _convert(
         trailers=played.trailers,
         attempts=settings.attempts,
         with_sensor=settings.with_sensor,
+        uncertain=depends.entities,
     )
     _refuse_lanes_without_width(played, enriched)
-    provenance = _provenance(played, enriched, settings, variant, inputs)
-    written = _write(played, enriched, output, provenance, settings, frozenset(sampled), save=save)
+    names = [entity.name for entity in enriched.entities if entity.is_enriched]
+    plan = writing_plan(played.scenario, settings, depends, names, pulled=played.trailers, sampled=sampled)
+    provenance = _provenance(played, enriched, settings, variant, inputs, egos, plan)
+    chosen = _in_replay(played, settings, egos, sampled)
+    written = _write(played, enriched, output, provenance, settings, plan, chosen, save=save)
     warnings = enriched.warnings() + tuple(
         f"{removed.place.element}: left out ({removed.reason})" for removed in written.removed
     )
     warnings += tuple(f"'{name}' follows a trajectory, too: {why}" for name, why in sampled.items()) + written.notes
-    if settings.mode is OutputMode.LANE_OFFSET and save:
-        warnings += tuple(_shifted(played, output, settings))
+    warnings += plan.frozen
+    if not plan.is_replay and save:
+        warnings += tuple(_shifted(played, output, settings, plan))
     data = b"" if save else written.data
-    return ConvertedScenario(source, output, written.sha256, enriched, provenance, warnings, data)
+    return ConvertedScenario(source, output, written.sha256, enriched, provenance, warnings, data, plan.is_replay)
 
 
 def _refuse_lane_offsets_for_carla(scenario: Scenario, settings: ConvertSettings) -> None:
@@ -133,7 +143,7 @@ def _refuse_lane_offsets_for_carla(scenario: Scenario, settings: ConvertSettings
         )
 
 
-def _shifted(played: Played, output: Path, settings: ConvertSettings) -> list[str]:
+def _shifted(played: Played, output: Path, settings: ConvertSettings, plan: WritingPlan) -> list[str]:
     """What happens at other times in the output, whose triggers look at what happens: it is played once more."""
     allowed = (*settings.allowed, *(path.parent for path in played.scenario.input_files))
     if played.scenario.road_file is not None:
@@ -141,7 +151,9 @@ def _shifted(played: Played, output: Path, settings: ConvertSettings) -> list[st
     again = play_scenario(
         output, step=settings.step, time_limit=settings.time_limit, allowed=allowed, roads=settings.roads
     )
-    return shifted_events(played.motion, again.motion)
+    gone = {one.path for one in replaced_groups(played.scenario, plan.trajectories)}
+    kept = [one for one in played.motion.actions if one.path[:3] not in gone and one.actor not in plan.trajectories]
+    return shifted_events(replace(played.motion, actions=tuple(kept)), again.motion)
 
 
 def _entropy(played: Played) -> dict[str, tuple[int, ...]]:
@@ -159,7 +171,13 @@ def _entropy(played: Played) -> dict[str, tuple[int, ...]]:
 
 
 def _provenance(
-    played: Played, enriched: Enriched, settings: ConvertSettings, variant: int, inputs: Mapping[Path, str]
+    played: Played,
+    enriched: Enriched,
+    settings: ConvertSettings,
+    variant: int,
+    inputs: Mapping[Path, str],
+    egos: Collection[str],
+    plan: WritingPlan,
 ) -> ConversionProvenance:
     scenario = played.scenario
     return ConversionProvenance(
@@ -176,6 +194,10 @@ def _provenance(
         with_sensor=settings.with_sensor,
         player=settings.target.player.value,
         version=named(settings.target.version_for(scenario)),
+        ego=tuple(egos),
+        modes={name: mode for name, mode in plan.modes().items() if enriched.entity(name).is_enriched},
+        only=None if settings.only is None else tuple(sorted(settings.only)),
+        attempts=settings.attempts,
     )
 
 
@@ -206,7 +228,8 @@ def _write(
     output: Path,
     provenance: ConversionProvenance,
     settings: ConvertSettings,
-    sampled: frozenset[str],
+    plan: WritingPlan,
+    replayed: frozenset[str] | None,
     *,
     save: bool,
 ) -> WrittenScenario:
@@ -214,10 +237,11 @@ def _write(
     summary = f"seed {provenance.seed}, variant {provenance.variant}, {', '.join(profiles) or 'no profile'}"
     summary += ", with sensor" if provenance.with_sensor else ""
     facts = asdict(provenance)
-    if settings.mode is OutputMode.LANE_OFFSET:
+    if not plan.is_replay:
         chains = [
             chain
             for entity in enriched.entities
+            if entity.name in plan.lane_offsets
             for chain in offset_chains(
                 entity.motion,
                 played.network,
@@ -235,11 +259,10 @@ def _write(
             summary=summary,
             save=save,
             target=settings.target,
+            trajectories={name: enriched.entity(name).trajectory for name in sorted(plan.trajectories)},
         )
-    # Whom --only leaves out keeps its maneuvers and its controller.
-    chosen = None if settings.only is None else settings.only | _pulled_by(played, settings.only) | sampled
     trajectories = {
-        entity.name: entity.trajectory for entity in enriched.entities if chosen is None or entity.name in chosen
+        entity.name: entity.trajectory for entity in enriched.entities if replayed is None or entity.name in replayed
     }
     return write_trajectory_scenario(
         played.scenario,
@@ -253,11 +276,23 @@ def _write(
     )
 
 
-def _sampled_too(played: Played, settings: ConvertSettings) -> dict[str, str]:
+def _in_replay(
+    played: Played, settings: ConvertSettings, egos: Collection[str], sampled: Collection[str]
+) -> frozenset[str] | None:
+    """Who follows a trajectory where everything happens by the clock; None: everybody."""
+    if settings.only is None and not egos:
+        return None
+    everybody = frozenset(entity.name for entity in played.motion.entities)
+    only = everybody if settings.only is None else settings.only
+    return (only | _pulled_by(played, only) | frozenset(sampled)) - frozenset(egos)
+
+
+def _sampled_too(played: Played, settings: ConvertSettings, egos: Collection[str]) -> dict[str, str]:
     """Entities that `only` leaves out, but whose maneuvers the target does not know, and why."""
     if settings.only is None or settings.mode is OutputMode.LANE_OFFSET:
         return {}
-    others = [entity.name for entity in played.motion.entities if entity.name not in settings.only]
+    left = {*settings.only, *egos}
+    others = [entity.name for entity in played.motion.entities if entity.name not in left]
     if settings.target.player is Player.CARLA:
         return dict.fromkeys(others, "CARLA's ScenarioRunner plays maneuvers in ways of its own")
     return motion_unknown_to(settings.target.version_for(played.scenario), played.scenario, played.motion, others)

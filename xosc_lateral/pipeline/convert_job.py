@@ -69,6 +69,10 @@ def describe(job: Job, conversion: ConvertedScenario) -> ManifestRow:
         gap_after=_smallest(enriched.gaps_after),
         warnings=conversion.warnings,
         version=provenance.version,
+        mode=provenance.mode,
+        modes=dict(provenance.modes),
+        only=provenance.only,
+        ego=provenance.ego,
     )
 
 

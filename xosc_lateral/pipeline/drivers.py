@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from functools import lru_cache
 from pathlib import Path
 
@@ -28,8 +29,8 @@ NO_DRIVER = {
 """Vehicles that "auto" leaves alone, and why."""
 
 
-def choose_drivers(scenario: Scenario, settings: ConvertSettings) -> Drivers:
-    """Per entity its profile, or why it gets none.
+def choose_drivers(scenario: Scenario, settings: ConvertSettings, egos: Mapping[str, str] | None = None) -> Drivers:
+    """Per entity its profile, or why it gets none; `egos` are the vehicles under test, and why each is one.
 
     Raises
     ------
@@ -39,14 +40,16 @@ def choose_drivers(scenario: Scenario, settings: ConvertSettings) -> Drivers:
         If a profile is not known.
     """
     known = {entity.name for entity in scenario.entities}
-    for option, names in (("--entity", settings.entity_profiles), ("--only", settings.only or ())):
-        for name in names:
+    asked = (("--entity", settings.entity_profiles), ("--only", settings.only or ()), ("--ego", settings.ego or ()))
+    for option, names in () if settings.names_may_lack else asked:
+        for name in sorted(names):
             if name not in known:
                 raise FormatError(
                     f"{option} {name!r}: no such entity; there are {', '.join(sorted(known)) or 'none'}",
                     path=scenario.path,
                 )
-    return {entity.name: _driver(entity, settings) for entity in scenario.entities}
+    under_test = {name: f"vehicle under test: {why}" for name, why in (egos or {}).items()}
+    return {entity.name: under_test.get(entity.name) or _driver(entity, settings) for entity in scenario.entities}
 
 
 def _driver(entity: Entity, settings: ConvertSettings) -> DriverProfile | str:

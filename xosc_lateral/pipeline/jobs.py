@@ -283,6 +283,7 @@ class _Fingerprints:
     def of(self, settings: ConvertSettings, variant: int) -> str:
         values = {item.name: getattr(settings, item.name) for item in fields(settings)}
         del values["libraries"], values["allowed"], values["roads"]  # where files are looked for, not what is in them
+        del values["names_may_lack"]  # refuses less
         if not settings.strict:  # refuses more, and changes no output; what was made without it is not trusted with it
             del values["strict"]
         if not settings.with_sensor:  # as it always was
@@ -297,6 +298,7 @@ class _Fingerprints:
         }
         values["context"] = None if settings.context is None else _hash_or_missing(settings.context)
         values["only"] = None if settings.only is None else sorted(settings.only)
+        values["ego"] = None if settings.ego is None else sorted(settings.ego)
         values["parameters"] = dict(settings.parameters)
         values |= {"package_version": __version__, "variant": variant}
         return hashlib.sha256(json.dumps(values, sort_keys=True).encode()).hexdigest()

@@ -84,6 +84,14 @@ class ManifestRow:
     warnings : tuple of str
     player, version : str, str
         What it was written for; version of the standard.
+    mode : str
+        How offsets are written: "trajectory", "lane-offset", "mixed"; empty: nobody got any.
+    modes : mapping of str to str
+        The same by vehicle.
+    only : tuple of str or None
+        Who alone was to be enriched; None: everybody.
+    ego : tuple of str
+        Vehicles under test: left as they are; empty: there is none.
     error : str
         One line; empty if the output is what the inputs and settings give.
     stale : bool
@@ -116,6 +124,10 @@ class ManifestRow:
     warnings: tuple[str, ...] = ()
     player: str = "standard"
     version: str = ""
+    mode: str = ""
+    modes: Mapping[str, str] = field(default_factory=dict)
+    only: tuple[str, ...] | None = None
+    ego: tuple[str, ...] = ()
     error: str = ""
     stale: bool = False
 
@@ -160,6 +172,7 @@ _MAPPINGS = (
     "profiles",
     "profile_sha256",
     "why_not",
+    "modes",
 )  # JSON text in the file: every reader takes it
 
 
@@ -170,7 +183,7 @@ def manifest_schema() -> pa.Schema:
     types: dict[str, pa.DataType] = {"stale": pa.bool_(), "with_sensor": pa.bool_()}
     types |= {"variant": pa.int64(), "seed": pa.int64(), "entities": pa.int64()}
     types |= dict.fromkeys(("segment_seconds", "offset_spread", "gap_before", "gap_after"), pa.float64())
-    types |= dict.fromkeys(("enriched", "warnings"), pa.list_(pa.string()))
+    types |= dict.fromkeys(("enriched", "warnings", "only", "ego"), pa.list_(pa.string()))
     return pa.schema([(item.name, types.get(item.name, pa.string())) for item in fields(ManifestRow)])
 
 
@@ -196,7 +209,10 @@ def read_manifest(path: Path) -> Iterator[ManifestRow]:
     """
     for values in _read_table(path):
         try:
-            unpacked = {name: json.loads(value) if name in _MAPPINGS else value for name, value in values.items()}
+            unpacked = {
+                name: json.loads(value) if name in _MAPPINGS and value is not None else value
+                for name, value in values.items()
+            }
             yield ManifestRow.from_dict(unpacked)
         except (TypeError, ValueError, RecursionError) as error:
             raise FormatError(f"not a manifest of this package: {error}", path=path) from error

@@ -13,7 +13,7 @@ from xosc_lateral.errors import FormatError
 from xosc_lateral.formats.tables import TABLE_SUFFIXES, as_text, read_text_table
 from xosc_lateral.pipeline.document_kind import DISTRIBUTIONS, document_kind
 from xosc_lateral.pipeline.manifest import MANIFEST
-from xosc_lateral.pipeline.settings import ConvertSettings
+from xosc_lateral.pipeline.settings import ConvertSettings, egos_named
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -90,8 +90,9 @@ def read_request_table(path: Path, settings: ConvertSettings, *, variants: int =
     """Scenarios of a table, one a row.
 
     Columns: ``scenario`` (path, from the table's folder), and if wanted ``profile``, ``profile:ENTITY``, ``seed``,
-    ``variants``, ``only`` (entities, separated by semicolons), ``parameter:NAME`` and ``parameters`` (JSON object). An
-    empty cell leaves what `settings` says. Other columns are for the user: tags, owners.
+    ``variants``, ``only`` and ``ego`` (entities, separated by semicolons; ego ``none``: there is none),
+    ``parameter:NAME`` and ``parameters`` (JSON object). An empty cell leaves what `settings` says. Other columns are
+    for the user: tags, owners.
 
     Raises
     ------
@@ -186,15 +187,20 @@ def _row_settings(cells: Mapping[str, str], settings: ConvertSettings, folder: P
             profiles[rest] = _profile(text, folder)
         elif colon and kind == "parameter":
             parameters[rest] = text
-    only = cells.get("only")
+    only, ego = cells.get("only"), cells.get("ego")
     return replace(
         settings,
         profile=_profile(cells["profile"], folder) if "profile" in cells else settings.profile,
         entity_profiles=profiles,
         parameters=parameters,
         seed=_whole_number(cells, "seed", settings.seed, smallest=0),
-        only=settings.only if only is None else frozenset(name.strip() for name in only.split(";") if name.strip()),
+        only=settings.only if only is None else _names(only),
+        ego=settings.ego if ego is None else egos_named(_names(ego)),
     )
+
+
+def _names(text: str) -> frozenset[str]:
+    return frozenset(name.strip() for name in text.split(";") if name.strip())
 
 
 def _profile(text: str, folder: Path) -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
 from pathlib import Path
@@ -25,10 +25,30 @@ AUTO = "auto"
 
 
 class OutputMode(StrEnum):
-    """How offsets are written."""
+    """How offsets are written: by vehicle as it depends on a vehicle under test, or the same for all."""
 
+    AUTO = "auto"
     TRAJECTORY = "trajectory"
     LANE_OFFSET = "lane-offset"
+
+
+NO_EGO = "none"
+"""In place of a vehicle under test: there is none."""
+
+
+def egos_named(names: Collection[str] | None) -> frozenset[str] | None:
+    """Vehicles under test as a user names them: None where nobody said anything, empty for "none".
+
+    Raises
+    ------
+    ValueError
+        For "none" beside a name.
+    """
+    if names is None:
+        return None
+    if NO_EGO in names and len(names) > 1:
+        raise ValueError(f"ego {', '.join(sorted(names))}: {NO_EGO!r} stands alone")
+    return frozenset(names) - {NO_EGO}
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,6 +71,10 @@ class ConvertSettings:
     attempts : int
         Sample anew up to so many times while vehicles touch or leave their lane that nominally don't.
     mode : OutputMode
+    ego : frozenset of str or None
+        Vehicles under test, beside those that the scenario leaves to somebody else; None: those alone; empty: none.
+    names_may_lack : bool
+        `entity_profiles`, `only` and `ego` apply where an entity of that name exists: one of many scenarios.
     target : TargetPlayer
         Player and version of the standard to write for.
     libraries : tuple of Path
@@ -74,7 +98,9 @@ class ConvertSettings:
     context: Path | None = None
     parameters: Mapping[str, str] = field(default_factory=dict)
     attempts: int = 1
-    mode: OutputMode = OutputMode.TRAJECTORY
+    mode: OutputMode = OutputMode.AUTO
+    ego: frozenset[str] | None = None
+    names_may_lack: bool = False
     target: TargetPlayer = STANDARD
     libraries: tuple[Path, ...] = ()
     allowed: tuple[Path, ...] = ()

@@ -9,15 +9,20 @@ from typing import Any
 from xosc_lateral.enrich.conversion import ConversionProvenance, ConvertedScenario
 from xosc_lateral.motion.gaps import Gap
 
+WRITTEN_AS = {"trajectory": "a trajectory", "lane-offset": "lane offsets"}
+
 
 def as_text(conversion: ConvertedScenario, report: Path | None = None) -> str:
     """What was done, what was not, what to know."""
     lines = [f"{conversion.source if conversion.data else conversion.output}"]
+    lines.append(f"  {under_test(conversion)}")
     for entity in conversion.enriched.entities:
         if entity.is_enriched and entity.profile is not None:
+            mode = conversion.provenance.modes.get(entity.name, "")
             lines.append(
                 f"  {entity.name}: {len(entity.segments)} segments, {entity.segment_seconds:.1f} s, "
-                f"offsets {entity.offset_spread:.2f} m (standard deviation), profile {entity.profile.name}"
+                f"offsets {entity.offset_spread:.2f} m (standard deviation), profile {entity.profile.name}, "
+                f"as {WRITTEN_AS.get(mode, mode)}"
             )
         else:
             lines.append(f"  {entity.name}: as in the scenario ({entity.why})")
@@ -30,6 +35,16 @@ def as_text(conversion: ConvertedScenario, report: Path | None = None) -> str:
     return "\n".join(lines)
 
 
+def under_test(conversion: ConvertedScenario) -> str:
+    """Who is under test, in a line."""
+    egos = conversion.provenance.ego
+    if egos:
+        return f"under test, left as written: {', '.join(egos)}"
+    return "no vehicle under test: " + (
+        "everything is replayed" if conversion.is_replay else "maneuvers that stay react to the run"
+    )
+
+
 def facts(conversion: ConvertedScenario, report: Path | None = None) -> dict[str, Any]:
     """Plain values about a conversion, rounded to what they are read for: a micrometre, a microsecond."""
     enriched = conversion.enriched
@@ -40,11 +55,13 @@ def facts(conversion: ConvertedScenario, report: Path | None = None) -> dict[str
         "sha256": conversion.output_sha256,
         "end_time": round(enriched.motion.end_time, 6),
         "ended_by": enriched.motion.ended_by,
+        "ego": list(conversion.provenance.ego),
         "entities": [
             {
                 "name": entity.name,
                 "profile": entity.profile.name if entity.is_enriched and entity.profile is not None else None,
                 "why_not": entity.why,
+                "mode": conversion.provenance.modes.get(entity.name),
                 "segments": [[round(segment.span.start, 6), round(segment.span.end, 6)] for segment in entity.segments],
                 "offset_spread": round(entity.offset_spread, 6),
                 "neutral_context": list(entity.neutral),

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from lxml import etree
 
-from xosc_lateral.formats.atomic import write_atomically
+from xosc_lateral.formats.atomic import write_pieces_atomically
 from xosc_lateral.formats.openscenario.element import local_name
 from xosc_lateral.formats.openscenario.provenance import mark
 from xosc_lateral.formats.openscenario.write import build
@@ -29,14 +29,18 @@ from xosc_lateral.formats.openscenario.write.lateral_actions import (
     lateral_actions,
 )
 from xosc_lateral.formats.openscenario.write.literal import inline_maneuvers, name_literally
+from xosc_lateral.formats.openscenario.write.moving import Moving
 from xosc_lateral.formats.openscenario.write.offset_chain import LEAST_CHANGE, OffsetChain, ramps
 from xosc_lateral.formats.openscenario.write.parameters import global_scope, override_parameters
 from xosc_lateral.formats.openscenario.write.ramp_targets import Ramp, acceleration
 from xosc_lateral.formats.openscenario.write.relative_paths import rewrite_paths
+from xosc_lateral.formats.openscenario.write.replaced_maneuvers import ReplacedManeuvers, put_last
 from xosc_lateral.formats.openscenario.write.result import WrittenScenario
 from xosc_lateral.formats.openscenario.write.target import STANDARD, TargetPlayer
+from xosc_lateral.formats.openscenario.write.vertices import Vertices
 from xosc_lateral.formats.xml import parse_xml
 from xosc_lateral.motion.nominal import NominalMotion, PlayedAction
+from xosc_lateral.motion.trajectory import WorldTrajectory
 from xosc_lateral.scenario import Scenario
 from xosc_lateral.scenario.enums import Priority
 
@@ -56,6 +60,7 @@ def write_lane_offset_scenario(
     summary: str,
     save: bool = True,
     target: TargetPlayer = STANDARD,
+    trajectories: Mapping[str, WorldTrajectory] | None = None,
 ) -> WrittenScenario:
     """Write the scenario with its maneuvers as they are and lane offset actions added.
 
@@ -76,6 +81,8 @@ def write_lane_offset_scenario(
         Write it; else the bytes are only handed back.
     target : TargetPlayer
         Player and version that it is made for.
+    trajectories : mapping of str to WorldTrajectory, optional
+        Entities that follow trajectories in place of their maneuvers: none that a chain is for.
 
     Raises
     ------
@@ -89,25 +96,30 @@ def write_lane_offset_scenario(
     output = Path(output)
     root = parse_xml(scenario.source, scenario.path)
     check_convertible(root, scenario, motion)
+    paths = trajectories or {}
+    moving = {one.name: Moving(one, paths[one.name], motion) for one in motion.entities if one.name in paths}
+    maneuvers = ReplacedManeuvers(root, scenario, motion, moving)
+    version, vertices = target.version_for(scenario), Vertices(scenario.source)
     story = build.story("xosc-lateral")
     lateral = lateral_actions(scenario)
     for number, chain in enumerate(chains, start=1):
         if not np.isfinite(chain.offset_t).all():
             raise ValueError(f"offsets of '{chain.entity}' are not finite")
-        _add_act(story, f"xosc-lateral offsets {number}", chain, motion, lateral, target.version_for(scenario))
+        _add_act(story, f"xosc-lateral offsets {number}", chain, motion, lateral, version)
     _put_into(root, story, scenario, chains)
     scope, referred = global_scope(scenario), _referred(story)
     name_literally(root, scenario.path, scope, referred)
     inline_maneuvers(root, scenario, scope, referred)
+    removed, frozen = maneuvers.replace(scope, version, vertices) if moving else ([], [])
     override_parameters(root, scenario)
-    notes = fit(root, scenario, motion, target, scope)
+    notes = (*frozen, *fit(root, scenario, motion, target, scope))
     rewrite_paths(root, scenario, output, scope)
     mark(root, provenance, summary)
-    data = build.document(root)
-    if save:
-        write_atomically(output, data)
-    names = tuple(dict.fromkeys(chain.entity for chain in chains))
-    return WrittenScenario(output, hashlib.sha256(data).hexdigest(), names, (), data, notes)
+    pieces = vertices.document(root) if moving else [build.document(root)]
+    data = b"" if save else b"".join(pieces)
+    sha256 = write_pieces_atomically(output, pieces) if save else hashlib.sha256(data).hexdigest()
+    names = tuple(dict.fromkeys([*moving, *(chain.entity for chain in chains)]))
+    return WrittenScenario(output, sha256, names, tuple(removed), data, notes)
 
 
 def _put_into(root: etree._Element, story: etree._Element, scenario: Scenario, chains: Sequence[OffsetChain]) -> None:
@@ -116,8 +128,7 @@ def _put_into(root: etree._Element, story: etree._Element, scenario: Scenario, c
     _place_aside(storyboard, scenario, chains)
     if len(story):
         # Last: a lane change that starts in the same frame has started before ours are looked at.
-        stop = next((element for element in storyboard if local_name(element) == "StopTrigger"), None)
-        build.insert_indented(storyboard, len(storyboard) if stop is None else storyboard.index(stop), story)
+        put_last(root, story)
 
 
 def _place_aside(storyboard: etree._Element, scenario: Scenario, chains: Sequence[OffsetChain]) -> None:
