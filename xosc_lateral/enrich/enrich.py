@@ -131,6 +131,26 @@ def enrich(
     return best
 
 
+def with_offsets(enriched: Enriched, names: Collection[str], factor: float, why: str) -> Enriched:
+    """With the offsets of some entities times a factor, and none where it is 0: `why` says the reason."""
+    entities = tuple(
+        _scaled(entity, enriched.network, factor, why) if entity.name in names else entity
+        for entity in enriched.entities
+    )
+    gaps_after = gaps_of(enriched.motion, [entity.trajectory for entity in entities])
+    departures = tuple(found for entity in entities for found in lane_departures(entity, enriched.network))
+    return replace(enriched, entities=entities, gaps_after=gaps_after, departures=departures)
+
+
+def _scaled(entity: EntityResult, network: RoadNetwork, factor: float, why: str) -> EntityResult:
+    if factor == 0.0:
+        return _untouched(entity.motion, entity.spans, why)
+    segments = tuple(replace(segment, offset=factor * segment.offset) for segment in entity.segments)
+    deviation = factor * entity.deviation
+    trajectory = displace(entity.motion, network, deviation)
+    return replace(entity, segments=segments, deviation=deviation, trajectory=trajectory)
+
+
 def _trouble(enriched: Enriched) -> int:
     return len(enriched.new_contacts) + len(enriched.departures)
 

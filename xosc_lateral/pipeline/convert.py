@@ -5,13 +5,13 @@ from __future__ import annotations
 import hashlib
 import os
 from collections.abc import Collection, Mapping
-from dataclasses import asdict, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
 from xosc_lateral.enrich.conversion import ConversionProvenance, ConvertedScenario
-from xosc_lateral.enrich.enrich import enrich
+from xosc_lateral.enrich.enrich import enrich, with_offsets
 from xosc_lateral.enrich.result import Enriched
 from xosc_lateral.errors import FormatError
 from xosc_lateral.formats.atomic import refuse_outputs
@@ -25,19 +25,20 @@ from xosc_lateral.formats.openscenario.write import (
     write_lane_offset_scenario,
     write_trajectory_scenario,
 )
-from xosc_lateral.formats.openscenario.write.replaced_maneuvers import replaced_groups
 from xosc_lateral.formats.profiles import profile_hash
-from xosc_lateral.formats.source import guarding_inputs
+from xosc_lateral.formats.source import edit_in_place, guarding_inputs
 from xosc_lateral.motion.nominal import Activity
 from xosc_lateral.pipeline.drivers import choose_drivers
 from xosc_lateral.pipeline.load import Played, input_hashes, play_scenario
+from xosc_lateral.pipeline.meaning import Meaning, keep_meaning
 from xosc_lateral.pipeline.modes import WritingPlan, chosen_egos, writing_plan
 from xosc_lateral.pipeline.settings import ConvertSettings, OutputMode
-from xosc_lateral.pipeline.shifted import shifted_events
+from xosc_lateral.pipeline.shifted import Shift
 from xosc_lateral.scenario import Scenario
 from xosc_lateral.scenario.dependence import dependence
 from xosc_lateral.version import __version__
 
+CHANGES = "with offsets, what happens would happen otherwise"
 NO_WIDTH = 0.01
 """A lane narrower than this is none. [m]"""
 
@@ -116,18 +117,81 @@ def _convert(
     _refuse_lanes_without_width(played, enriched)
     names = [entity.name for entity in enriched.entities if entity.is_enriched]
     plan = writing_plan(played.scenario, settings, depends, names, pulled=played.trailers, sampled=sampled)
-    provenance = _provenance(played, enriched, settings, variant, inputs, egos, plan)
-    chosen = _in_replay(played, settings, egos, sampled)
-    written = _write(played, enriched, output, provenance, settings, plan, chosen, save=save)
+    making = _Making(played, settings, variant, inputs, egos, output, save)
+    if plan.is_replay:
+        replayed = _in_replay(played, settings, egos, sampled)
+        provenance, written = making.write(enriched, plan, replayed)
+        changes: tuple[str, ...] = ()
+    else:
+        enriched, plan, provenance, written, changes = making.write_reactive(enriched, plan)
     warnings = enriched.warnings() + tuple(
         f"{removed.place.element}: left out ({removed.reason})" for removed in written.removed
     )
     warnings += tuple(f"'{name}' follows a trajectory, too: {why}" for name, why in sampled.items()) + written.notes
-    warnings += plan.frozen
-    if not plan.is_replay and save:
-        warnings += tuple(_shifted(played, output, settings, plan))
+    warnings += plan.frozen + changes
     data = b"" if save else written.data
     return ConvertedScenario(source, output, written.sha256, enriched, provenance, warnings, data, plan.is_replay)
+
+
+@dataclass(frozen=True, slots=True)
+class _Making:
+    """All that one output is made from, but for the offsets."""
+
+    played: Played
+    settings: ConvertSettings
+    variant: int
+    inputs: Mapping[Path, str]
+    egos: Mapping[str, str]
+    output: Path
+    save: bool
+
+    def write(
+        self, enriched: Enriched, plan: WritingPlan, replayed: frozenset[str] | None = None
+    ) -> tuple[ConversionProvenance, WrittenScenario]:
+        """Write it with these offsets."""
+        provenance = _provenance(self.played, enriched, self.settings, self.variant, self.inputs, self.egos, plan)
+        written = _write(self.played, enriched, self.output, provenance, self.settings, plan, replayed, save=self.save)
+        return provenance, written
+
+    def write_reactive(
+        self, enriched: Enriched, plan: WritingPlan
+    ) -> tuple[Enriched, WritingPlan, ConversionProvenance, WrittenScenario, tuple[str, ...]]:
+        """Write it with offsets that leave what happens as it was, and what there is to say of them."""
+        provenance, written = self.write(enriched, plan)
+        if not self.save:
+            return enriched, plan, provenance, written, ()
+        settings = self.settings
+        meaning = Meaning(self.played, self.egos, step=settings.step, time_limit=settings.time_limit)
+
+        def changed(names: Collection[str], factor: float) -> tuple[Enriched, WritingPlan]:
+            left = with_offsets(enriched, plan.lane_offsets - frozenset(names), 0.0, CHANGES)
+            left = left if factor == 1.0 else with_offsets(left, names, factor, "")
+            return left, replace(plan, lane_offsets=frozenset(names))
+
+        def attempt(names: Collection[str], factor: float) -> list[Shift]:
+            if (names, factor) != (plan.lane_offsets, 1.0):
+                self.write(*changed(names, factor))
+            return meaning.shifts(_played_again(self.played, self.output, settings), plan.trajectories)
+
+        names, factor, left = keep_meaning(plan.lane_offsets, attempt)
+        said = tuple(f"'{name}' stays as it is: {CHANGES}" for name in sorted(plan.lane_offsets - names))
+        if factor != 1.0:
+            said += (f"lane offsets are {factor:g} times what was sampled: larger ones change what happens",)
+        if (names, factor) != (plan.lane_offsets, 1.0):
+            enriched, plan = changed(names, factor)
+            provenance, written = self.write(enriched, plan)
+        return enriched, plan, provenance, written, said + tuple(map(str, left))
+
+
+def _played_again(played: Played, output: Path, settings: ConvertSettings) -> Played:
+    allowed = (*settings.allowed, *(path.parent for path in played.scenario.input_files))
+    if played.scenario.road_file is not None:
+        allowed = (*allowed, played.scenario.road_file.parent)
+    again = play_scenario(
+        output, step=settings.step, time_limit=settings.time_limit, allowed=allowed, roads=settings.roads
+    )
+    edit_in_place(output)  # ours: it may be written anew
+    return again
 
 
 def _refuse_lane_offsets_for_carla(scenario: Scenario, settings: ConvertSettings) -> None:
@@ -141,19 +205,6 @@ def _refuse_lane_offsets_for_carla(scenario: Scenario, settings: ConvertSettings
             path=scenario.path,
             element="FileHeader",
         )
-
-
-def _shifted(played: Played, output: Path, settings: ConvertSettings, plan: WritingPlan) -> list[str]:
-    """What happens at other times in the output, whose triggers look at what happens: it is played once more."""
-    allowed = (*settings.allowed, *(path.parent for path in played.scenario.input_files))
-    if played.scenario.road_file is not None:
-        allowed = (*allowed, played.scenario.road_file.parent)
-    again = play_scenario(
-        output, step=settings.step, time_limit=settings.time_limit, allowed=allowed, roads=settings.roads
-    )
-    gone = {one.path for one in replaced_groups(played.scenario, plan.trajectories)}
-    kept = [one for one in played.motion.actions if one.path[:3] not in gone and one.actor not in plan.trajectories]
-    return shifted_events(replace(played.motion, actions=tuple(kept)), again.motion)
 
 
 def _entropy(played: Played) -> dict[str, tuple[int, ...]]:

@@ -2,33 +2,77 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass
 
-from xosc_lateral.motion.nominal import NominalMotion, PlayedAction
+from xosc_lateral.motion.nominal import EntityMotion, NominalMotion, PlayedAction
 
 MOST = 0.05
 """An event may be this much earlier or later without a word. [s]"""
+OURS = "xosc-lateral"
+"""Begins the names of stories that we add."""
 
 Key = tuple[tuple[str, ...], str | None, int]
 
 
+@dataclass(frozen=True, slots=True)
+class Shift:
+    """One thing that happens otherwise: which, whose (None: nobody's), and in which way."""
+
+    what: str
+    actor: str | None
+    how: str
+
+    def __str__(self) -> str:
+        """One line."""
+        return f"{self.what} {self.how} with the offsets"
+
+
 def shifted_events(before: NominalMotion, after: NominalMotion) -> list[str]:
-    """A line for each event of the source whose actions start earlier, later or not at all in the other run.
+    """A line for each thing that happens otherwise in the other run; see `shifts`."""
+    return [str(shift) for shift in shifts(before, after)]
+
+
+def shifts(before: NominalMotion, after: NominalMotion, *, ignored: Collection[str] = ()) -> list[Shift]:
+    """Events of the source that start earlier, later, not at all or once more in the other run; other ends and lanes.
 
     A car that drives beside the middle of its lane comes to places, and to others, at other times: what it triggers is
-    triggered then.
+    triggered then. Entities that are ignored may end in any lane.
     """
-    now = _starts(after.actions)
-    found: dict[str, str] = {}
-    for key, start in _starts(before.actions).items():
+    then, now = _starts(before.actions), _starts(after.actions)
+    found: dict[str, Shift] = {}
+    for key, start in then.items():
         name, what = _named(key, start)
         if key not in now:
-            found.setdefault(name, f"{what} no longer happens with the offsets")
+            # Due in the last moments, it may come after the end just as well.
+            if start <= before.end_time - MOST:
+                found.setdefault(name, Shift(what, key[1], "no longer happens"))
         elif abs(now[key] - start) > MOST:
-            moved = now[key] - start
-            sense = "later" if moved > 0 else "earlier"
-            found.setdefault(name, f"{what} happens {abs(moved):.2f} s {sense} with the offsets")
+            found.setdefault(name, Shift(what, key[1], f"happens {_later(now[key] - start)}"))
+    for key, start in now.items():
+        if key not in then and (*key[:2], 0) in then and start <= before.end_time - MOST:
+            name, what = _named(key, start)
+            found.setdefault(name, Shift(what, key[1], "happens once more"))
+    if before.ended_by == after.ended_by and abs(after.end_time - before.end_time) > MOST + before.step:
+        what = f"the end ({before.ended_by}) at {before.end_time:.2f} s"
+        found.setdefault("", Shift(what, None, f"comes {_later(after.end_time - before.end_time)}"))
+    lanes = {entity.name: _last_lane(entity, after.end_time) for entity in before.entities}
+    for entity in after.entities:
+        lane = _last_lane(entity, before.end_time)
+        if not found and entity.name not in ignored and lanes.get(entity.name, lane) != lane:
+            what = f"the last lane of '{entity.name}', {lanes[entity.name]},"
+            found.setdefault(entity.name, Shift(what, entity.name, f"is {lane}"))
     return list(found.values())
+
+
+def _later(moved: float) -> str:
+    return f"{abs(moved):.2f} s {'later' if moved > 0 else 'earlier'}"
+
+
+def _last_lane(entity: EntityMotion, end: float) -> int:
+    """Where both runs are still on."""
+    row = max(int((entity.time <= end).sum()) - 1, 0)
+    return int(entity.lane[row])
 
 
 def _named(key: Key, start: float) -> tuple[str, str]:
@@ -40,11 +84,13 @@ def _named(key: Key, start: float) -> tuple[str, str]:
 
 
 def _starts(actions: Sequence[PlayedAction]) -> dict[Key, float]:
-    """Start of each action, counted for those that run several times. [s]"""
+    """Start of each action of the source, counted for those that run several times. [s]"""
     starts: dict[Key, float] = {}
+    numbers: dict[tuple[tuple[str, ...], str | None], int] = {}
     for played in actions:
-        if played.path == ("Init",):
+        if played.path == ("Init",) or played.path[0].startswith(OURS):
             continue
-        number = sum(1 for path, actor, _ in starts if path == played.path and actor == played.actor)
+        number = numbers.get((played.path, played.actor), 0)
+        numbers[played.path, played.actor] = number + 1
         starts[played.path, played.actor, number] = played.start
     return starts

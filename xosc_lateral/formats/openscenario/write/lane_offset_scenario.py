@@ -2,14 +2,15 @@
 
 For scenarios that have to stay reactive: triggers look at what happens, an ego under test may drive itself. Each
 road-following segment gets an act of its own. It starts when the lateral action before it has ended (or at its
-time), and is stopped by any lateral action of the same entity that has not run yet: a lane change overrules it,
-whenever it comes. Times inside an act count from the act's start where a lateral action starts it.
+time), and is stopped by any lateral action of the same entity: a lane change overrules it, whenever it comes. Each of
+its events begins when the one before has ended, and after the last the second comes again: the car goes on moving for
+as long as the segment lasts, which is not for the nominal run to say where somebody drives along.
 """
 
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -30,7 +31,7 @@ from xosc_lateral.formats.openscenario.write.lateral_actions import (
 )
 from xosc_lateral.formats.openscenario.write.literal import inline_maneuvers, name_literally
 from xosc_lateral.formats.openscenario.write.moving import Moving
-from xosc_lateral.formats.openscenario.write.offset_chain import LEAST_CHANGE, OffsetChain, ramps
+from xosc_lateral.formats.openscenario.write.offset_chain import LEAST_CHANGE, SLACK, OffsetChain, ramps
 from xosc_lateral.formats.openscenario.write.parameters import global_scope, override_parameters
 from xosc_lateral.formats.openscenario.write.ramp_targets import Ramp, acceleration
 from xosc_lateral.formats.openscenario.write.relative_paths import rewrite_paths
@@ -44,8 +45,17 @@ from xosc_lateral.motion.trajectory import WorldTrajectory
 from xosc_lateral.scenario import Scenario
 from xosc_lateral.scenario.enums import Priority
 
+CHAIN = "xosc-lateral offsets"
 AT_ONCE = 0.1
 """A segment that begins within this after a lateral action begins because of it. [s]"""
+TURNS = 10000
+"""Runs of a chain's events: as good as for ever. [-]"""
+LEAST_RING = 2
+"""Transitions at least of a chain that goes round. [-]"""
+PAUSE = 0.5
+"""Before a chain goes round: time for the maneuver that ends it in the nominal run. [s]"""
+SLOWEST = 10.0
+"""A car that gets slower keeps its place in the lane: a little below what counts as road-following. [m/s]"""
 PLACED = 1e-3
 """What begins with the scenario begins only now: it would overrule an init action that has not been stepped yet. [s]"""
 
@@ -105,7 +115,9 @@ def write_lane_offset_scenario(
     for number, chain in enumerate(chains, start=1):
         if not np.isfinite(chain.offset_t).all():
             raise ValueError(f"offsets of '{chain.entity}' are not finite")
-        _add_act(story, f"xosc-lateral offsets {number}", chain, motion, lateral, version)
+        later = [k for k, one in enumerate(chains, start=1) if k > number and one.entity == chain.entity and ramps(one)]
+        following = f"{CHAIN} {later[0]}" if later else None
+        _add_act(story, f"{CHAIN} {number}", chain, motion, lateral, version, following)
     _put_into(root, story, scenario, chains)
     scope, referred = global_scope(scenario), _referred(story)
     name_literally(root, scenario.path, scope, referred)
@@ -164,7 +176,9 @@ def _add_act(
     motion: NominalMotion,
     lateral: LateralActions,
     version: build.Version,
+    following: str | None,
 ) -> None:
+    """The act of one chain; `following` is the act of the entity's next one, which takes over from it."""
     found = ramps(chain)
     if not found:
         return
@@ -173,20 +187,49 @@ def _add_act(
     cause = _cause(before, begin)
     act = build.sub(story, "Act", name=name)
     maneuver = build.sub(build.maneuver_group(act, f"{name} group", chain.entity), "Maneuver", name=f"{name} maneuver")
+    ring = len(found) - 1 if chain.goes_on and len(found) > LEAST_RING else 0
     for number, ramp in enumerate(found, start=1):
-        event = build.event(maneuver, f"{name} event {number}", Priority.OVERRIDE, version)
-        _add_ramp(event, f"{name} action {number}", ramp)
-        if cause is None:
+        event = build.event(maneuver, f"{name}.{number}", Priority.OVERRIDE, version)
+        _add_ramp(event, f"{name}.{number} action", ramp)
+        if number == 1 and cause is None:
             build.time_trigger(event, "StartTrigger", max(ramp.start, PLACED), version)
-        else:
-            group = build.sub(build.sub(event, "StartTrigger"), "ConditionGroup")
+            continue
+        trigger = build.sub(event, "StartTrigger")
+        if number == 1:
+            group = build.sub(trigger, "ConditionGroup")
             build.state_condition(group, "act", name, "runningState", ramp.start - begin)
+            continue
+        _add_link(trigger, f"{name}.{number - 1}", ramp.start - found[number - 2].end)
+        if ring:
+            event.set("maximumExecutionCount", str(TURNS))
+            if number == 2:
+                _add_link(trigger, f"{name}.{len(found)}", PAUSE)
     if cause is None:
         build.time_trigger(act, "StartTrigger", begin, version)
     else:
         _add_start_after(act, lateral.by_path[cause.path])
-    already = {played.path for played in before}
-    _add_stop(act, [item for item in lateral.by_entity.get(chain.entity, ()) if item.path not in already])
+    _add_stop(act, lateral.by_entity.get(chain.entity, ()), {played.path for played in before})
+    if ring:
+        _add_end_of_ring(act, chain.entity, following)
+
+
+def _add_link(trigger: etree._Element, event: str, gap: float) -> None:
+    """Begin when an event has ended; the player takes a frame or two of the gap."""
+    group = build.sub(trigger, "ConditionGroup")
+    build.state_condition(group, "event", event, "endTransition", max(gap - SLACK, 0.0))
+
+
+def _add_end_of_ring(act: etree._Element, entity: str, following: str | None) -> None:
+    """What would go on for ever ends where the next chain takes over, or when the car hardly drives any more."""
+    trigger = next((item for item in act if local_name(item) == "StopTrigger"), None)
+    trigger = build.sub(act, "StopTrigger") if trigger is None else trigger
+    if following is not None:
+        build.state_condition(build.sub(trigger, "ConditionGroup"), "act", following, "runningState", 0.0)
+    group = build.sub(trigger, "ConditionGroup")
+    condition = build.sub(group, "Condition", name="slow", delay="0", conditionEdge="falling")
+    by_entity = build.sub(condition, "ByEntityCondition")
+    build.sub(build.sub(by_entity, "TriggeringEntities", triggeringEntitiesRule="any"), "EntityRef", entityRef=entity)
+    build.sub(build.sub(by_entity, "EntityCondition"), "SpeedCondition", value=str(SLOWEST), rule="greaterThan")
 
 
 def _add_ramp(event: etree._Element, name: str, ramp: Ramp) -> None:
@@ -216,13 +259,16 @@ def _add_start_after(act: etree._Element, cause: LateralAction) -> None:
         build.state_condition(group, cause.kind, cause.reference, state, 0.0)
 
 
-def _add_stop(act: etree._Element, overruling: Sequence[LateralAction]) -> None:
-    if not overruling:
+def _add_stop(act: etree._Element, overruling: Sequence[LateralAction], already: Collection[tuple[str, ...]]) -> None:
+    """By a lateral action that has not run yet, or that begins again."""
+    states = [(item, "startTransition" if item.path in already else "runningState") for item in overruling]
+    states = [(item, state) for item, state in states if item.repeats or item.path not in already]
+    if not states:
         return
     trigger = build.sub(act, "StopTrigger")
-    for item in overruling:
+    for item, state in states:
         group = build.sub(trigger, "ConditionGroup")
-        build.state_condition(group, item.kind, item.reference, "runningState", 0.0)
+        build.state_condition(group, item.kind, item.reference, state, 0.0)
 
 
 def _is_lateral(played: PlayedAction, entity: str) -> bool:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from xosc_lateral.scenario import Action, Event, Scenario
 from xosc_lateral.scenario.actions.lateral import LaneChangeAction, LaneOffsetAction, LateralDistanceAction
@@ -15,11 +15,15 @@ LATERAL = (LaneChangeAction, LaneOffsetAction, LateralDistanceAction, FollowTraj
 
 @dataclass(frozen=True, slots=True)
 class LateralAction:
-    """A lateral action: its names from the story down, and the type and name that a condition refers to it by."""
+    """A lateral action: its names from the story down, and the type and name that a condition refers to it by.
+
+    `repeats`: it may run more than once.
+    """
 
     path: tuple[str, ...]
     kind: str
     reference: str
+    repeats: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,9 +39,10 @@ def lateral_actions(scenario: Scenario) -> LateralActions:
     names = Counter(_names(scenario))
     by_entity: dict[str, dict[LateralAction, None]] = {}
     by_path = {}
-    for above, event, action, actors in _event_actions(scenario):
+    for above, event, action, actors, repeats in _event_actions(scenario):
         if isinstance(action.content, LATERAL):
             found = _referable((*above, event.name, action.name), len(event.actions) == 1, names)
+            found = replace(found, repeats=repeats)
             by_path[found.path] = found
             for actor in actors:
                 by_entity.setdefault(actor, {})[found] = None
@@ -56,8 +61,8 @@ def _referable(path: tuple[str, ...], is_alone: bool, names: Mapping[str, int]) 
     return LateralAction(path, "action", "::".join(path))
 
 
-def _event_actions(scenario: Scenario) -> Iterator[tuple[tuple[str, ...], Event, Action, tuple[str, ...]]]:
-    """Every action of every event, with the names above the event and the actors."""
+def _event_actions(scenario: Scenario) -> Iterator[tuple[tuple[str, ...], Event, Action, tuple[str, ...], bool]]:
+    """Every action of every event, with the names above the event, the actors, and whether it may run again."""
     for story in scenario.storyboard.stories:
         for act in story.acts:
             for group in act.maneuver_groups:
@@ -65,7 +70,8 @@ def _event_actions(scenario: Scenario) -> Iterator[tuple[tuple[str, ...], Event,
                     for event in maneuver.events:
                         for action in event.actions:
                             above = (story.name, act.name, group.name, maneuver.name)
-                            yield above, event, action, group.actors.entity_refs
+                            again = group.maximum_execution_count > 1 or event.maximum_execution_count > 1
+                            yield above, event, action, group.actors.entity_refs, again
 
 
 def _names(scenario: Scenario) -> Iterator[str]:

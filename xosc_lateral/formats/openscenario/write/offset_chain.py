@@ -70,6 +70,8 @@ class OffsetChain:
         Of the entity: how fast it may move sideways. Empty: 30 m/s. [m/s]
     is_placed : bool
         The chain begins with the scenario, and the entity is put down at its first offset: no ramp has to lead there.
+    goes_on : bool
+        Nothing but a lateral action or the run's end ends the segment: it may last longer, and the chain goes round.
     """
 
     entity: str
@@ -79,6 +81,7 @@ class OffsetChain:
     flips: tuple[float, ...] = ()
     speed: FloatArray = field(default_factory=lambda: np.empty(0))
     is_placed: bool = False
+    goes_on: bool = False
 
 
 def offset_chains(
@@ -97,12 +100,20 @@ def offset_chains(
             chain = replace(chain, start_t=float(chain.offset_t[0]), is_placed=True)
         if end >= 0 and not _moved_aside(motion, end + 1, span.first):
             chain = replace(chain, start_t=_direction(motion, network, span.first) * held)
+        chain = replace(chain, goes_on=_may_last(motion, span.last))
         chains.append(chain)
         found = ramps(chain)
         at = int(np.searchsorted(motion.time, found[-1].start)) if found else span.first
         held = _direction(motion, network, at) * (found[-1].target if found else chain.start_t)
         end = span.last
     return chains
+
+
+def _may_last(motion: EntityMotion, last: int) -> bool:
+    """Whether a segment that ends in a row would have gone on but for a lateral action or the end of the run."""
+    if last + 1 >= len(motion.time):
+        return True
+    return bool(motion.activity[last + 1] & (Activity.LATERAL | Activity.TRAJECTORY))
 
 
 def _moved_aside(motion: EntityMotion, first: int, last: int) -> bool:
