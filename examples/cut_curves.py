@@ -32,7 +32,9 @@ def main(out: Path) -> None:
     xl.write_profile(cutter, out / "curve-cutter.json")
 
     scenario, _road = xl.write_template("curves", out, radius=RADIUS)
-    drives = [xl.convert(scenario, profile=cutter, only=["Ego"], seed=seed).to_frame() for seed in range(20)]
+    drives = [
+        xl.convert(scenario, profile=cutter, only=["Ego"], ego="none", seed=seed).to_frame() for seed in range(20)
+    ]
     ego = [drive[drive["name"] == "Ego"] for drive in drives]  # one drive is mostly chance: take the mean of many
     deviation = np.mean([rows["deviation"] for rows in ego], axis=0)
 

@@ -81,7 +81,7 @@ def converted(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, list[Path
     source, _ = write_template("cut-in", folder)
     made = [folder / f"out_{number}.xosc" for number in (1, 2, 3)]
     for number, path in enumerate(made):
-        xl.convert(source, path, seed=3, variant=number, time_limit=4.0)
+        xl.convert(source, path, seed=3, variant=number, time_limit=4.0, ego="none")
     return source, made
 
 

@@ -116,7 +116,7 @@ def test_a_lane_without_width_is_refused_by_name(scenario: Path, capsys: pytest.
     before = _files(scenario.parent)
     assert main(["convert", str(scenario), "-o", str(scenario.parent / "out.xosc")]) == 1
     (line,) = capsys.readouterr().err.splitlines()
-    assert line.endswith("cut-in.xodr: road '1': lane -2 has no width where 'Ego' follows it")
+    assert line.endswith("cut-in.xodr: road '1': lane -1 has no width where 'CutIn' follows it")
     assert _files(scenario.parent) == before
 
 
@@ -199,7 +199,7 @@ def test_only_leaves_the_others_as_they_are(
     scenario: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.chdir(scenario.parent)
-    assert main(["convert", "cut-in.xosc", "-o", "one.xosc", "--only", "Ego", "-q"]) == 0
+    assert main(["convert", "cut-in.xosc", "-o", "one.xosc", "--only", "Ego", "--ego", "none", "-q"]) == 0
     written = Path("one.xosc").read_text()
     assert written.count("<FollowTrajectoryAction>") == 1
     assert "<LaneChangeAction>" in written

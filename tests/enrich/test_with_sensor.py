@@ -41,9 +41,9 @@ def _offsets(made: object) -> dict[str, np.ndarray]:
 
 
 def test_the_driver_stays_and_the_error_is_added(scenario: Path, profile: DriverProfile) -> None:
-    alone = convert(scenario, profile=profile, time_limit=10.0)
-    both = convert(scenario, profile=profile, time_limit=10.0, with_sensor=True)
-    again = convert(scenario, profile=profile, time_limit=10.0, with_sensor=True)
+    alone = convert(scenario, profile=profile, time_limit=10.0, ego="none")
+    both = convert(scenario, profile=profile, time_limit=10.0, ego="none", with_sensor=True)
+    again = convert(scenario, profile=profile, time_limit=10.0, ego="none", with_sensor=True)
     assert again.data == both.data != alone.data
     errors = [_offsets(both)[name] - offset for name, offset in _offsets(alone).items()]
     assert np.concatenate(errors).std() == pytest.approx(np.sqrt(NOISE.white * 1.5), rel=0.2)

@@ -116,7 +116,7 @@ def test_without_the_mark_positions_are_the_standards(tmp_path: Path, maps: Road
 
 def test_a_conversion_is_left_handed_too_and_keeps_the_town(tmp_path: Path, maps: RoadSearch) -> None:
     source = _scenario(tmp_path, WORLD.format(y=17.5, h=0.3))
-    settings = ConvertSettings(profile=simulated_profile(), seed=3, roads=maps)
+    settings = ConvertSettings(profile=simulated_profile(), seed=3, roads=maps, ego=frozenset())
     out = tmp_path / "out"
     out.mkdir()
     conversion = convert_scenario(source, out / "carla.xosc", settings)

@@ -34,7 +34,9 @@ def test_neither_the_order_of_entities_nor_one_far_away_changes_anybody(tmp_path
     frames = {}
     for name, changed in (("as it is", {}), ("reordered", {"reordered": True}), ("added", {"added": True})):
         (tmp_path / name).mkdir()
-        frames[name] = xl.convert(scenario(tmp_path / name, **changed), profile="motorway", seed=4).to_frame()
+        frames[name] = xl.convert(
+            scenario(tmp_path / name, **changed), profile="motorway", seed=4, ego="none"
+        ).to_frame()
     assert set(frames["added"]["name"]) == {"Ego", "Truck", "FarAhead", "Added"}
     assert frames["reordered"]["name"][0] == "FarAhead"
     for name in ("Ego", "Truck", "FarAhead"):
@@ -48,7 +50,7 @@ def test_a_vehicle_that_starts_elsewhere_or_faster_moves_otherwise(tmp_path: Pat
     path = scenario(tmp_path)
     moved = tmp_path / "moved.xosc"
     moved.write_text(path.read_text().replace('s="100.0"', 's="101.0"'))
-    first, second = (xl.convert(one, profile="motorway", seed=4).to_frame() for one in (path, moved))
+    first, second = (xl.convert(one, profile="motorway", seed=4, ego="none").to_frame() for one in (path, moved))
     for name, alike in (("Ego", False), ("FarAhead", True)):
         one, other = (frame.loc[frame["name"] == name, "deviation"].to_numpy() for frame in (first, second))
         assert np.array_equal(one, other) == alike

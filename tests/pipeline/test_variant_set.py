@@ -26,7 +26,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("set")
     assert main(["template", "write", "cut-in", "-o", str(folder / "in"), "-q"]) == 0
     words = ["convert", str(folder / "in" / "cut-in.xosc"), "-o", str(folder / "out" / "x.xosc"), "--variants", "3"]
-    assert main([*words, "--seed", "4", "--time-limit", str(END), "-q"]) == 0
+    assert main([*words, "--ego", "none", "--seed", "4", "--time-limit", str(END), "-q"]) == 0
     return folder
 
 
@@ -87,7 +87,7 @@ def test_draws_follow_the_weights(folder: Path) -> None:
 
 def test_the_same_seed_gives_the_same_bytes(folder: Path, tmp_path: Path) -> None:
     words = ["convert", str(folder / "in" / "cut-in.xosc"), "-o", str(tmp_path / "x.xosc"), "--variants", "3"]
-    assert main([*words, "--seed", "4", "--time-limit", str(END), "-q"]) == 0
+    assert main([*words, "--ego", "none", "--seed", "4", "--time-limit", str(END), "-q"]) == 0
     for part in ("x_distribution.xosc", "x_stochastic.xosc", "x_trajectories/variant_02.xosc"):
         assert (tmp_path / part).read_bytes() == (folder / "out" / part).read_bytes()
 
@@ -99,7 +99,7 @@ def test_converting_a_distribution_makes_the_variants_again_byte_for_byte(
     path = folder / "out" / f"x_{drawn_by}.xosc"
     words = ["convert", str(path), "-o", str(tmp_path / "again"), "--seed", "4"]
     # The road lies beside the source, whose folder is one of those around the set.
-    assert main([*words, "--time-limit", str(END), "-q"]) == 0
+    assert main([*words, "--ego", "none", "--time-limit", str(END), "-q"]) == 0
     for k, values in enumerate(read_distribution(path).parameter_sets()):
         again = tmp_path / "again" / f"x_{drawn_by}_p0000{k}.xosc"
         first = folder / "out" / f"x_{values['variant'].removeprefix('variant_')}.xosc"
@@ -120,7 +120,10 @@ def test_a_set_found_in_a_folder_is_left_out_as_what_was_converted(folder: Path,
 def test_there_is_no_set_where_none_can_be_drawn(folder: Path, tmp_path: Path, words: list[str]) -> None:
     source = str(folder / "in" / "cut-in.xosc")
     output = str(tmp_path / "y.xosc")
-    assert main(["convert", source, "-o", output, "--variants", "2", "--time-limit", "3", "-q", *words]) == 0
+    assert (
+        main(["convert", source, "-o", output, "--variants", "2", "--ego", "none", "--time-limit", "3", "-q", *words])
+        == 0
+    )
     assert sorted(path.name for path in tmp_path.iterdir()) == ["y_01.xosc", "y_02.xosc"]
 
 
@@ -135,7 +138,7 @@ def test_a_set_replaces_nothing_of_others(folder: Path, tmp_path: Path, capsys: 
 def test_files_of_other_scenarios_are_no_variants(folder: Path, tmp_path: Path) -> None:
     assert main(["template", "write", "braking-leader", "-o", str(tmp_path), "-q"]) == 0
     source = tmp_path / "braking-leader.xosc"
-    other = xl.convert(source, folder / "out" / "other.xosc", time_limit=3.0).output
+    other = xl.convert(source, folder / "out" / "other.xosc", time_limit=3.0, ego="none").output
     assert other is not None
     with pytest.raises(xl.FormatError, match="not a variant of the same scenario"):
         xl.variant_set([folder / "out" / "x_01.xosc", other], folder / "out" / "z.xosc", source=source)
@@ -146,7 +149,7 @@ def test_files_of_other_scenarios_are_no_variants(folder: Path, tmp_path: Path) 
 def test_a_set_of_version_1_0_is_one_of_1_1(folder: Path, tmp_path: Path) -> None:
     source = str(folder / "in" / "cut-in.xosc")
     words = ["convert", source, "-o", str(tmp_path / "x.xosc"), "--variants", "2", "--version", "1.0", "-q"]
-    assert main([*words, "--time-limit", "3"]) == 0
+    assert main([*words, "--ego", "none", "--time-limit", "3"]) == 0
     for part in ("x_set", "x_distribution", "x_stochastic", "x_trajectories/variant_01"):
         _assert_valid(tmp_path / f"{part}.xosc", "1.1.1")
 
@@ -173,7 +176,7 @@ def test_trajectories_that_others_follow_stay_within_reach(folder: Path, tmp_pat
     tree.write(str(source))
     (tmp_path / "cut-in.xodr").write_bytes((folder / "in" / "cut-in.xodr").read_bytes())
     words = ["convert", str(source), "-o", str(tmp_path / "x.xosc"), "--variants", "2", "--only", "Ego", "-q"]
-    assert main([*words, "--time-limit", "3"]) == 0
+    assert main([*words, "--ego", "none", "--time-limit", "3"]) == 0
     for values in read_distribution(tmp_path / "x_distribution.xosc").parameter_sets():
         motion = play_scenario(tmp_path / "x_set.xosc", parameters=values, time_limit=3.0).motion
         assert next(entity for entity in motion.entities if entity.name == "Truck").y[-1] == pytest.approx(-2)
@@ -186,7 +189,10 @@ def test_a_scenario_may_have_a_parameter_of_that_name(folder: Path, tmp_path: Pa
     source.write_text(text.replace("<ParameterDeclarations>", own), encoding="utf-8")
     (tmp_path / "cut-in.xodr").write_bytes((folder / "in" / "cut-in.xodr").read_bytes())
     output = tmp_path / "x.xosc"
-    assert main(["convert", str(source), "-o", str(output), "--variants", "2", "--time-limit", "3", "-q"]) == 0
+    assert (
+        main(["convert", str(source), "-o", str(output), "--variants", "2", "--ego", "none", "--time-limit", "3", "-q"])
+        == 0
+    )
     first, second = read_distribution(tmp_path / "x_distribution.xosc").parameter_sets()
     assert (first["variant_2"], second["variant_2"]) == ("variant_01", "variant_02")
     again = ["convert", str(tmp_path / "x_distribution.xosc"), "-o", str(tmp_path / "again"), "--time-limit", "3", "-q"]

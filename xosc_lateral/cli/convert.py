@@ -235,5 +235,7 @@ def _convert_one(
             found = variant_set(outputs, written, source=source, force=True)
             if not (quiet or as_json):
                 typer.echo(str(found))
+        elif files is not None and not quiet:
+            typer.echo("no set of the variants: it holds trajectories alone (--ego none writes them)", err=True)
     if strict and unclean:
         raise typer.Exit(1)
