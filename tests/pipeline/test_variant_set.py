@@ -175,7 +175,7 @@ def test_trajectories_that_others_follow_stay_within_reach(folder: Path, tmp_pat
     locations.append(etree.fromstring('<TrajectoryCatalog><Directory path="paths"/></TrajectoryCatalog>'))
     tree.write(str(source))
     (tmp_path / "cut-in.xodr").write_bytes((folder / "in" / "cut-in.xodr").read_bytes())
-    words = ["convert", str(source), "-o", str(tmp_path / "x.xosc"), "--variants", "2", "--only", "Ego", "-q"]
+    words = ["convert", str(source), "-o", str(tmp_path / "x.xosc"), "--variants", "2", "-q"]
     assert main([*words, "--ego", "none", "--time-limit", "3"]) == 0
     for values in read_distribution(tmp_path / "x_distribution.xosc").parameter_sets():
         motion = play_scenario(tmp_path / "x_set.xosc", parameters=values, time_limit=3.0).motion

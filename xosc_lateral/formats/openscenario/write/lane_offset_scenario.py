@@ -209,8 +209,10 @@ def _add_act(
     else:
         _add_start_after(act, lateral.by_path[cause.path])
     _add_stop(act, lateral.by_entity.get(chain.entity, ()), {played.path for played in before})
-    if ring:
-        _add_end_of_ring(act, chain.entity, following)
+    _add_end(act, chain.entity, following if ring else None)
+    for trigger in [item for item in act if local_name(item) == "StartTrigger"]:
+        for group in trigger:
+            _add_speed(group, chain.entity, "none")
 
 
 def _add_link(trigger: etree._Element, event: str, gap: float) -> None:
@@ -219,16 +221,21 @@ def _add_link(trigger: etree._Element, event: str, gap: float) -> None:
     build.state_condition(group, "event", event, "endTransition", max(gap - SLACK, 0.0))
 
 
-def _add_end_of_ring(act: etree._Element, entity: str, following: str | None) -> None:
-    """What would go on for ever ends where the next chain takes over, or when the car hardly drives any more."""
+def _add_end(act: etree._Element, entity: str, following: str | None) -> None:
+    """A chain ends where the next one takes over, or when the car hardly drives any more."""
     trigger = next((item for item in act if local_name(item) == "StopTrigger"), None)
     trigger = build.sub(act, "StopTrigger") if trigger is None else trigger
     if following is not None:
         build.state_condition(build.sub(trigger, "ConditionGroup"), "act", following, "runningState", 0.0)
-    group = build.sub(trigger, "ConditionGroup")
-    condition = build.sub(group, "Condition", name="slow", delay="0", conditionEdge="falling")
+    _add_speed(build.sub(trigger, "ConditionGroup"), entity, "falling")
+
+
+def _add_speed(group: etree._Element, entity: str, edge: str) -> None:
+    """The car is faster than what it needs to move aside without turning much; `edge` "falling": it no longer is."""
+    condition = build.sub(group, "Condition", name=f"speed {edge}", delay="0", conditionEdge=edge)
     by_entity = build.sub(condition, "ByEntityCondition")
-    build.sub(build.sub(by_entity, "TriggeringEntities", triggeringEntitiesRule="any"), "EntityRef", entityRef=entity)
+    triggering = build.sub(by_entity, "TriggeringEntities", triggeringEntitiesRule="any")
+    build.sub(triggering, "EntityRef", entityRef=entity)
     build.sub(build.sub(by_entity, "EntityCondition"), "SpeedCondition", value=str(SLOWEST), rule="greaterThan")
 
 
