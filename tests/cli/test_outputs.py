@@ -230,3 +230,13 @@ def test_a_target_is_in_the_json_and_in_the_file(
     provenance = json.loads(capsys.readouterr().out)["provenance"]
     assert (provenance["player"], provenance["version"]) == ("carla", "1.0")
     assert 'revMinor="0"' in output.read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("name", ["../evil", "..", "a/b", "a\\\\b"])
+def test_a_profiles_id_stays_inside_its_library(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], name: str
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert main(["profiles", "add", "motorway", "--library", "inner/lib", "--name", name]) == 1
+    assert "without a folder" in capsys.readouterr().err
+    assert not list(tmp_path.rglob("*.json"))

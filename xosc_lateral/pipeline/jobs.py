@@ -24,7 +24,7 @@ from xosc_lateral.pipeline.drivers import auto_profile, hidden_by_libraries, use
 from xosc_lateral.pipeline.manifest import ManifestRow, printable
 from xosc_lateral.pipeline.request import Request, find_requests
 from xosc_lateral.pipeline.settings import AUTO, ConvertSettings
-from xosc_lateral.version import __version__
+from xosc_lateral.version import BEHAVIOUR, __version__
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,6 +78,7 @@ class Job:
             parameters=dict(sorted(self.settings.parameters.items())),
             settings=self.fingerprint,
             package_version=self.package_version,
+            behaviour=BEHAVIOUR,
             with_sensor=self.settings.with_sensor,
             player=self.settings.target.player.value,
             error=error,
@@ -300,7 +301,7 @@ class _Fingerprints:
         values["only"] = None if settings.only is None else sorted(settings.only)
         values["ego"] = None if settings.ego is None else sorted(settings.ego)
         values["parameters"] = dict(settings.parameters)
-        values |= {"package_version": __version__, "variant": variant}
+        values |= {"behaviour": BEHAVIOUR, "variant": variant}
         return hashlib.sha256(json.dumps(values, sort_keys=True).encode()).hexdigest()
 
     def _profile(self, name: str | DriverProfile, libraries: tuple[Path, ...]) -> str:
