@@ -28,7 +28,7 @@ def _outputs(folder: Path) -> dict[str, bytes]:
 
 
 def test_bytes_change_only_together_with_the_behaviour_version(tmp_path: Path) -> None:
-    """After a change that was meant: add one to `BEHAVIOUR`, and write what this prints to tests/data/behaviour.json."""
+    """After a change that was meant: add one to `BEHAVIOUR` and write to tests/data/behaviour.json what this prints."""
     found = {name: hashlib.sha256(data).hexdigest() for name, data in _outputs(tmp_path).items()}
     now = {"behaviour": BEHAVIOUR, "sha256": found}
     golden = json.loads(GOLDEN.read_text(encoding="utf-8"))

@@ -5,6 +5,6 @@ __version__ = "0.2.0"
 BEHAVIOUR = 2
 """What decides the bytes of an output from the same inputs, settings and seed: playing, sampling, writing.
 
-It grows by one with every change of those bytes, so that batches make anew what an older program wrote, and nothing else.
+It grows by one with every change of those bytes, so that batches make anew what an older program wrote, and no more.
 `tests/test_behaviour.py` holds outputs that may change only together with it.
 """

@@ -232,7 +232,7 @@ def test_a_target_is_in_the_json_and_in_the_file(
     assert 'revMinor="0"' in output.read_text(encoding="utf-8")
 
 
-@pytest.mark.parametrize("name", ["../evil", "..", "a/b", "a\\\\b"])
+@pytest.mark.parametrize("name", ["../evil", "..", "a/b", "a\\b"])
 def test_a_profiles_id_stays_inside_its_library(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], name: str
 ) -> None:

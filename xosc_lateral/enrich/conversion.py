@@ -35,6 +35,8 @@ class ConversionProvenance:
         Who alone was to be enriched.
     attempts : int
         Samplings at most while vehicles touch or leave their lane.
+    behaviour : int
+        `version.BEHAVIOUR` of the program.
     """
 
     package_version: str
@@ -50,6 +52,7 @@ class ConversionProvenance:
     modes: Mapping[str, str] = field(default_factory=dict)
     only: tuple[str, ...] | None = None
     attempts: int = 1
+    behaviour: int = 1
 
     @property
     def mode(self) -> str:

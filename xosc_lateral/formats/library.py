@@ -116,11 +116,13 @@ def described(
     Raises
     ------
     XoscLateralError
-        For a field that there is not; `FIELDS` are known.
+        For a field that there is not; `FIELDS` are known. For an id that names another folder.
     """
     for field in fields or {}:
         if field not in FIELDS:
             raise XoscLateralError(f"profiles have no field {field!r} to set; there are {', '.join(FIELDS)}")
+    if name is not None and (name != Path(name).name or name in (".", "..") or "\\" in name or "\0" in name):
+        raise XoscLateralError(f"--name {name!r}: an id is the name of a file in the library, without a folder")
     tags = tuple(tag for tag in dict.fromkeys([*profile.metadata.tags, *add_tags]) if tag not in remove_tags)
     metadata = replace(profile.metadata, tags=tags, **(fields or {}))
     return replace(profile, name=name or profile.name, metadata=metadata)

@@ -36,7 +36,7 @@ from xosc_lateral.pipeline.settings import ConvertSettings, OutputMode
 from xosc_lateral.pipeline.shifted import Shift
 from xosc_lateral.scenario import Scenario
 from xosc_lateral.scenario.dependence import dependence
-from xosc_lateral.version import __version__
+from xosc_lateral.version import BEHAVIOUR, __version__
 
 CHANGES = "with offsets, what happens would happen otherwise"
 NO_WIDTH = 0.01
@@ -249,6 +249,7 @@ def _provenance(
         modes={name: mode for name, mode in plan.modes().items() if enriched.entity(name).is_enriched},
         only=None if settings.only is None else tuple(sorted(settings.only)),
         attempts=settings.attempts,
+        behaviour=BEHAVIOUR,
     )
 
 

@@ -55,7 +55,7 @@ class ManifestRow:
     parameters : mapping of str to str
         Scenario parameters that were replaced.
     settings : str
-        SHA-256 over package version, settings, variant, profile files and context table.
+        SHA-256 over the behaviour version, settings, variant, profile files and context table.
     package_version : str
     with_sensor : bool
         Offsets hold the sensor error of the drives that profiles were fitted on; else the driver alone.
@@ -92,6 +92,8 @@ class ManifestRow:
         Who alone was to be enriched; None: everybody.
     ego : tuple of str
         Vehicles under test: left as they are; empty: there is none.
+    behaviour : int
+        `version.BEHAVIOUR` of the program that wrote it.
     error : str
         One line; empty if the output is what the inputs and settings give.
     stale : bool
@@ -128,6 +130,7 @@ class ManifestRow:
     modes: Mapping[str, str] = field(default_factory=dict)
     only: tuple[str, ...] | None = None
     ego: tuple[str, ...] = ()
+    behaviour: int = 1
     error: str = ""
     stale: bool = False
 
@@ -181,7 +184,7 @@ def manifest_schema() -> pa.Schema:
     import pyarrow as pa
 
     types: dict[str, pa.DataType] = {"stale": pa.bool_(), "with_sensor": pa.bool_()}
-    types |= {"variant": pa.int64(), "seed": pa.int64(), "entities": pa.int64()}
+    types |= {"variant": pa.int64(), "seed": pa.int64(), "entities": pa.int64(), "behaviour": pa.int64()}
     types |= dict.fromkeys(("segment_seconds", "offset_spread", "gap_before", "gap_after"), pa.float64())
     types |= dict.fromkeys(("enriched", "warnings", "only", "ego"), pa.list_(pa.string()))
     return pa.schema([(item.name, types.get(item.name, pa.string())) for item in fields(ManifestRow)])
