@@ -142,7 +142,7 @@ def test_a_table_gives_each_scenario_its_settings(database: Path, tmp_path: Path
             "parameter:Speed": [None, 33.5],
             "parameters": ['{"Gap": 2, "Name": "x"}', None],
             "only": [None, "Ego; Truck"],
-            "tag": ["cut-in", "jam"],
+            "user:tag": ["cut-in", "jam"],
         }
     )
     path = database / f"table{suffix}"
@@ -161,6 +161,10 @@ def test_a_table_gives_each_scenario_its_settings(database: Path, tmp_path: Path
     ("table", "message"),
     [
         ("file,seed\nx.xosc,1\n", r"t\.csv:1: no column 'scenario'; there are file, seed"),
+        (
+            "scenario,output\nx.xosc,y\n",
+            r"t\.csv:1: unknown column 'output'; there are scenario, profile, seed",
+        ),
         ("scenario,seed\nx.xosc,1\ny.xosc,one\n", r"t\.csv:3: seed 'one' is not a whole number"),
         ("scenario,variants\nx.xosc,0\n", r"t\.csv:2: variants 0, at least 1"),
         ("scenario,seed\n,1\n", r"t\.csv:2: no scenario"),

@@ -20,6 +20,10 @@ if TYPE_CHECKING:
 
 SCENARIO_SUFFIX = ".xosc"
 
+COLUMNS = ("scenario", "profile", "seed", "variants", "only", "ego", "parameters")
+PREFIXES = ("profile:", "parameter:", "user:")
+"""What a table of scenarios may hold."""
+
 _GLOB_CHARACTERS = frozenset("*?[")
 
 
@@ -91,8 +95,8 @@ def read_request_table(path: Path, settings: ConvertSettings, *, variants: int =
 
     Columns: ``scenario`` (path, from the table's folder), and if wanted ``profile``, ``profile:ENTITY``, ``seed``,
     ``variants``, ``only`` and ``ego`` (entities, separated by semicolons; ego ``none``: there is none),
-    ``parameter:NAME`` and ``parameters`` (JSON object). An empty cell leaves what `settings` says. Other columns are
-    for the user: tags, owners.
+    ``parameter:NAME`` and ``parameters`` (JSON object). An empty cell leaves what `settings` says. Columns
+    ``user:NAME`` are for the user: tags, owners.
 
     Raises
     ------
@@ -113,6 +117,7 @@ def _table_requests(
     if "scenario" not in table.columns:
         known = ", ".join(map(str, table.columns[:12]))
         raise FormatError(f"no column 'scenario'; there are {known}", path=path, line=1)
+    _refuse_unknown_columns(table, path)
     folder = base or Path()
     for number, row in enumerate(table.to_dict("records"), start=2):
         cells = {str(name): text for name, value in row.items() if (text := str(value).strip())}
@@ -123,6 +128,14 @@ def _table_requests(
         except ValueError as error:
             raise FormatError(str(error), path=path, line=number) from error
         yield Request(folder / scenario, row_settings, rows_variants, base)
+
+
+def _refuse_unknown_columns(table: pd.DataFrame, path: Path) -> None:
+    """A column that is not understood is a setting that would be ignored."""
+    for name in map(str, table.columns):
+        if name not in COLUMNS and not name.startswith(PREFIXES):
+            known = ", ".join((*COLUMNS, *(f"{prefix}NAME" for prefix in PREFIXES)))
+            raise FormatError(f"unknown column {name!r}; there are {known} (user: is for your own)", path=path, line=1)
 
 
 def _scenario(cells: dict[str, str]) -> str:

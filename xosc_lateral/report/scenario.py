@@ -14,6 +14,7 @@ from xosc_lateral.motion.gaps import REACH, Gap
 from xosc_lateral.motion.nominal import Note
 from xosc_lateral.report import scenario_figures as figures
 from xosc_lateral.report import scenario_time_figures as over_time
+from xosc_lateral.report.conversion import WRITTEN_AS, under_test
 from xosc_lateral.report.path_dynamics import COMFORTABLE
 from xosc_lateral.report.player.scene import enriched_scene
 from xosc_lateral.report.render import KeyFigure, Tone, render_page
@@ -39,7 +40,10 @@ def conversion_page(conversion: ConvertedScenario) -> str:
         source=conversion.source.name,
         output=conversion.output.name,
         warnings=conversion.warnings,
+        under_test=under_test(conversion),
         provenance={
+            "under test": list(made.ego) or "none",
+            "written as": [f"{name}: {WRITTEN_AS[mode]}" for name, mode in made.modes.items()],
             "seed": made.seed,
             "variant": made.variant,
             "parameters set": [f"{name} = {value}" for name, value in made.parameters.items()],
@@ -57,6 +61,7 @@ def scenario_page(
     output: str,
     provenance: Mapping[str, object],
     warnings: Sequence[str] = (),
+    under_test: str = "",
 ) -> str:
     """HTML page on one converted scenario, self-contained; same input, same bytes.
 
@@ -69,6 +74,8 @@ def scenario_page(
         Shown in the footer: hashes, seed, profiles, version.
     warnings : sequence of str
         What the user has to know; shown on top.
+    under_test : str
+        Who is, in a line.
     """
     done = [entity for entity in enriched.entities if entity.is_enriched]
     others = [entity for entity in enriched.entities if not entity.is_enriched]
@@ -79,6 +86,7 @@ def scenario_page(
         enriched=enriched,
         output=output,
         warnings=warnings,
+        under_test=under_test,
         done=done,
         numbers=_key_figures(enriched),
         scene=enriched_scene(enriched),
