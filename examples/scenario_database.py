@@ -61,7 +61,7 @@ def enrich(database: sqlite3.Connection, tag: str, folder: Path) -> None:
         database,
         params=(tag,),
     )
-    batch = xl.convert_many(selected, folder, profile="motorway")  # columns scenario and seed; others are ours
+    batch = xl.convert_many(selected.drop(columns="id"), folder, profile="motorway")
     ids = {Path(path).name: int(number) for path, number in zip(selected["scenario"], selected["id"], strict=True)}
     known = dict(database.execute("SELECT path, sha256 FROM lifelike").fetchall())
     outputs = batch.to_frame()
