@@ -78,7 +78,7 @@ def _use_context(path: Path) -> None:
 def _request_files(folder: Path) -> Iterable[Path]:
     _scenario(folder)
     rows = [
-        "scenario,profile,profile:Ego,seed,variants,parameter:Twice,parameters,tag",
+        "scenario,profile,profile:Ego,seed,variants,parameter:Twice,parameters,user:tag",
         'a.xosc,motorway,motorway-vehicle-1,7,2,31.5,"{""Speed"": ""20""}",x',
         "a.xosc,,,1,,,,",
     ]
