@@ -11,6 +11,7 @@ from typer.testing import CliRunner
 from tests.playback.stage import Stage, after, event, lane_change, maneuvers, to_lane
 from xosc_lateral.cli import app
 from xosc_lateral.errors import FormatError
+from xosc_lateral.pipeline.manifest import read_manifest
 
 RUN = CliRunner()
 
@@ -36,6 +37,28 @@ def test_the_time_limit_counts(scenario: Path, tmp_path: Path) -> None:
     assert result.exit_code == 0
     assert (tmp_path / "s.csv").read_text().splitlines()[-1].startswith("1.000,")
     assert "time limit" in result.stderr
+
+
+@pytest.mark.parametrize("verb", ["play", "convert"])
+def test_a_run_that_is_cut_off_warns_when_quiet_and_fails_when_strict(
+    verb: str, scenario: Path, tmp_path: Path
+) -> None:
+    output = tmp_path / ("s.csv" if verb == "play" else "out.xosc")
+    words = [verb, str(scenario), "-o", str(output), "-q"]
+    cut = RUN.invoke(app, [*words, "--time-limit", "1"])
+    assert cut.exit_code == 0 and "time limit of 1 s" in cut.stderr
+    assert RUN.invoke(app, [*words, "--time-limit", "1", "--strict"]).exit_code == 1
+    whole = RUN.invoke(app, words)
+    assert whole.exit_code == 0 and not whole.stderr
+
+
+def test_a_batch_says_which_runs_are_cut_off(scenario: Path, tmp_path: Path) -> None:
+    words = ["convert", str(scenario), str(scenario), "-o", str(tmp_path / "out"), "-q", "--time-limit", "1"]
+    cut = RUN.invoke(app, words)
+    assert cut.exit_code == 0 and "1 runs end at the time limit" in cut.stderr
+    [row] = read_manifest(tmp_path / "out" / "manifest.parquet")
+    assert any("time limit of 1 s" in line for line in row.warnings)
+    assert RUN.invoke(app, [*words, "--strict"]).exit_code == 1
 
 
 def test_a_scenario_that_is_not_there_leaves_no_table(tmp_path: Path) -> None:

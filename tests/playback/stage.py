@@ -278,7 +278,7 @@ class Stage:
         act_stop: Trigger | None = None,
         signals: str = "",
         step: float = 0.02,
-        time_limit: float = 60.0,
+        time_limit: float | None = 60.0,
         minor: int = 2,
     ) -> Played:
         """Init actions of each entity in `start`, one act; ends after `last` seconds."""

@@ -57,7 +57,26 @@ def test_a_run_without_an_end_stops_at_the_time_limit_and_says_so(tmp_path: Path
     played = Stage(tmp_path).play(last=1e6, time_limit=5.0)
     assert entity(played).time[-1] == pytest.approx(5.0)
     assert played.motion.ended_by == "time limit"
-    assert any("time limit" in note.what for note in played.motion.notes)
+    assert "time limit of 5 s" in str(played.motion.cut_off)
+
+
+@pytest.mark.parametrize("end", [100.0, pytest.param(3000.0, marks=pytest.mark.slow)])
+def test_a_stop_trigger_counts_for_up_to_an_hour(tmp_path: Path, end: float) -> None:
+    start = {"Ego": teleport(on_lane(-1, 10.0)) + speed(0.01)}
+    motion = Stage(tmp_path).play(start=start, last=end, time_limit=None).motion
+    assert (motion.ended_by, motion.end_time, motion.cut_off) == ("stop trigger", pytest.approx(end), None)
+
+
+def test_without_an_end_a_run_is_cut_off_after_a_minute_only_if_something_is_still_to_come(tmp_path: Path) -> None:
+    empty = when()
+    done = Stage(tmp_path).play(maneuvers(event(speed(30.0))), stop=empty, time_limit=None, step=0.5).motion
+    waits = (
+        Stage(tmp_path)
+        .play(maneuvers(event(speed(30.0), trigger=after(70.0))), stop=empty, time_limit=None, step=0.5)
+        .motion
+    )
+    assert (done.end_time, done.cut_off) == (60.0, None)
+    assert waits.end_time == 60.0 and "time limit of 60 s" in str(waits.cut_off)
 
 
 def test_act_event_and_action_start_in_one_frame(tmp_path: Path) -> None:

@@ -21,7 +21,7 @@ from xosc_lateral.pipeline.manifest import MANIFEST, ManifestRow, read_manifest
 from xosc_lateral.pipeline.progress import Display, Summary, follow
 from xosc_lateral.pipeline.reports import write_batch_index
 from xosc_lateral.pipeline.request import frame_requests
-from xosc_lateral.pipeline.settings import AUTO, TIME_LIMIT
+from xosc_lateral.pipeline.settings import AUTO
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -50,7 +50,7 @@ def convert_many(
     road: PathLike | None = None,
     road_path: Paths = (),
     attempts: int = 1,
-    time_limit: float = TIME_LIMIT,
+    time_limit: float | None = None,
     with_sensor: bool = False,
     strict: bool = False,
     workers: int = 1,
@@ -214,6 +214,11 @@ class BatchResult(Result):
     def nobody_enriched(self) -> int:
         """Outputs in which no entity got offsets."""
         return sum(self._summary.nobody_enriched.values())
+
+    @property
+    def cut_off(self) -> tuple[str, ...]:
+        """Outputs whose runs end at the time limit, though their scenarios go on."""
+        return tuple(self._summary.cut_off)
 
     def headline(self) -> str:
         """One line."""

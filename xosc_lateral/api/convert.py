@@ -13,7 +13,7 @@ from xosc_lateral.formats.configuration import configured_egos
 from xosc_lateral.formats.openscenario.write.target import target
 from xosc_lateral.formats.output_paths import claim, output_file
 from xosc_lateral.pipeline.convert import convert_scenario
-from xosc_lateral.pipeline.settings import AUTO, TIME_LIMIT, ConvertSettings, OutputMode, egos_named
+from xosc_lateral.pipeline.settings import AUTO, ConvertSettings, OutputMode, egos_named
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -47,7 +47,7 @@ def convert(
     road: PathLike | None = None,
     road_path: Paths = (),
     attempts: int = 1,
-    time_limit: float = TIME_LIMIT,
+    time_limit: float | None = None,
     with_sensor: bool = False,
     strict: bool = False,
     force: bool = False,
@@ -92,8 +92,8 @@ def convert(
         The road, whatever the scenario says; folders to look for it by its name ("Town04").
     attempts : int
         Sample anew up to so many times while cars touch or leave their lane.
-    time_limit : float
-        End of a scenario that has none. [s]
+    time_limit : float, optional
+        Where a run is cut off; without it a scenario that never ends after 60 s, one with an end after an hour. [s]
     with_sensor : bool
         Add the sensor error of the drives that profiles were fitted on, for tests of a perception chain; without, the
         driver alone is written.
@@ -169,7 +169,7 @@ def convert_settings(
     road: PathLike | None = None,
     road_path: Paths = (),
     attempts: int = 1,
-    time_limit: float = TIME_LIMIT,
+    time_limit: float | None = None,
     with_sensor: bool = False,
     strict: bool = False,
 ) -> ConvertSettings:
@@ -265,6 +265,12 @@ class Conversion(Result):
     def warnings(self) -> tuple[str, ...]:
         """What a user has to know, a line each."""
         return self._made.warnings
+
+    @property
+    def cut_off(self) -> str | None:
+        """The warning of a run that the time limit cut off."""
+        note = self._made.enriched.motion.cut_off
+        return None if note is None else str(note)
 
     @property
     def end_time(self) -> float:

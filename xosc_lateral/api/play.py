@@ -13,7 +13,7 @@ from xosc_lateral.formats.output_paths import claim, output_file
 from xosc_lateral.motion.segments import SegmentRow
 from xosc_lateral.pipeline.load import Played, play_scenario
 from xosc_lateral.pipeline.segments import scenario_segments
-from xosc_lateral.pipeline.settings import STEP, TIME_LIMIT
+from xosc_lateral.pipeline.settings import STEP
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -27,7 +27,7 @@ def play(
     scenario: PathLike,
     *,
     step: float = STEP,
-    time_limit: float = TIME_LIMIT,
+    time_limit: float | None = None,
     parameters: Mapping[str, object] | None = None,
     allow: Paths = (),
     road: PathLike | None = None,
@@ -42,8 +42,8 @@ def play(
         Maneuver-based OpenSCENARIO file.
     step : float
         Length of a frame. [s]
-    time_limit : float
-        End of a scenario that does not end by itself. [s]
+    time_limit : float, optional
+        Where a run is cut off; without it a scenario that never ends after 60 s, one with an end after an hour. [s]
     parameters : mapping, optional
         Scenario parameters that replace those declared.
     allow : path or paths
@@ -78,7 +78,7 @@ def segments(
     scenario: PathLike | Playback,
     *,
     step: float = STEP,
-    time_limit: float = TIME_LIMIT,
+    time_limit: float | None = None,
     parameters: Mapping[str, object] | None = None,
     allow: Paths = (),
 ) -> Segments:
@@ -124,6 +124,12 @@ class Playback(Result):
         """What was not played, or not as written: a line each, with file and line."""
         return tuple(map(str, self._played.motion.notes))
 
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """That the time limit cut the run off."""
+        note = self._played.motion.cut_off
+        return () if note is None else (str(note),)
+
     def headline(self) -> str:
         """One line."""
         noted = f", {len(self.notes)} notes" if self.notes else ""
@@ -131,7 +137,8 @@ class Playback(Result):
         return f"{self.scenario.name}: {len(self.entities)} entities, {self.end_time:.2f} s ({ended}){noted}"
 
     def __str__(self) -> str:
-        return "\n".join([self.headline(), *(f"  note: {note}" for note in self.notes)])
+        warned = [f"  warning: {line}" for line in self.warnings]
+        return "\n".join([self.headline(), *(f"  note: {note}" for note in self.notes), *warned])
 
     def to_frame(self) -> pd.DataFrame:
         """One row per entity and step: `time,name,x,y,z,h,speed,road,lane,offset_t,s`, SI units."""
@@ -148,6 +155,7 @@ class Playback(Result):
             "step": self._played.motion.step,
             "entities": list(self.entities),
             "notes": list(self.notes),
+            "warnings": list(self.warnings),
             "provenance": self._provenance(),
         }
 

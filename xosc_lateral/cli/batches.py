@@ -7,7 +7,7 @@ from typing import Any
 
 import typer
 
-from xosc_lateral.cli.words import say_json
+from xosc_lateral.cli.words import say_json, warn
 
 
 def is_batch(inputs: Sequence[str]) -> bool:
@@ -51,5 +51,7 @@ def convert_batch(
         say_json({"kind": "summary", **result.totals()})
     elif not quiet:
         typer.echo(str(result))
+    if result.cut_off and (quiet or as_json):
+        warn([f"{len(result.cut_off)} runs end at the time limit, not by themselves: {result.cut_off[0]} is one"])
     if result.failed or (strict and (result.with_warnings or result.nobody_enriched)):
         raise typer.Exit(1)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -22,11 +22,15 @@ from xosc_lateral.cli.words import (
     examples,
     pairs,
     say,
+    warn,
     write_stdout,
 )
 from xosc_lateral.formats.openscenario.write.target import Player
 from xosc_lateral.limits import JOB_MEMORY, JOB_TIMEOUT
 from xosc_lateral.pipeline.settings import OutputMode
+
+if TYPE_CHECKING:
+    from xosc_lateral.api.convert import Conversion
 
 EXAMPLES = examples(
     "convert cut-in.xosc -o lifelike.xosc --seed 1 --report report.html",
@@ -104,7 +108,7 @@ def convert(
     resample: Annotated[
         int, typer.Option(help="Attempts at most, while vehicles collide or leave their lane.", min=1)
     ] = 1,
-    time_limit: TimeLimit = 60.0,
+    time_limit: TimeLimit = None,
     with_: With = None,
     jobs: Annotated[int, typer.Option(help="Batch: number of processes; -1: one per core.")] = 1,
     job_timeout: Annotated[
@@ -175,6 +179,12 @@ def convert(
         _convert_one(Path(scenario[0]), output, settings, variants, report, strict, quiet, as_json)
 
 
+def _warn_if_cut_off(result: Conversion, unsaid: bool) -> None:
+    """Quiet, too: an output that ends before its scenario does is not what was asked for."""
+    if unsaid and result.cut_off is not None:
+        warn([result.cut_off])
+
+
 def _egos(names: list[str] | None) -> list[str] | None:
     from xosc_lateral.pipeline.settings import egos_named
 
@@ -217,6 +227,7 @@ def _convert_one(
         result = convert(source, None, report=report, **settings)
         write_stdout(result.data)
         say(result, as_json=False, quiet=quiet, aside=True)
+        _warn_if_cut_off(result, quiet)
         unclean = bool(result.warnings) or not result.enriched
     else:
         written = lifelike(source) if output is None else output_scenario(output, source)
@@ -229,6 +240,7 @@ def _convert_one(
         for variant, (path, its_page) in enumerate(zip(outputs, pages, strict=True)):
             result = convert(source, path, variant=variant, report=its_page, **settings)
             say(result, as_json=as_json, quiet=quiet)
+            _warn_if_cut_off(result, quiet or as_json)
             replayed &= result.is_replay
             unclean |= bool(result.warnings) or not result.enriched
         if files is not None and replayed:

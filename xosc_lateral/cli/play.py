@@ -19,6 +19,7 @@ from xosc_lateral.cli.words import (
     examples,
     pairs,
     say_json,
+    warn,
     write_stdout,
 )
 
@@ -38,12 +39,14 @@ def play(
         str, typer.Option("--output", "-o", help="Table: .csv, .csv.gz, .parquet, folder/, - .", show_default=False)
     ],
     step: Annotated[float, typer.Option(help="Length of a frame [s].", min=0.001, max=1.0)] = 0.02,
-    time_limit: TimeLimit = 60.0,
+    time_limit: TimeLimit = None,
     parameter: Parameters = None,
     allow: Allow = None,
     road: Road = None,
     road_path: RoadPath = None,
-    strict: Annotated[bool, typer.Option("--strict", help="A missing vehicle catalog is an error.")] = False,
+    strict: Annotated[
+        bool, typer.Option("--strict", help="A missing vehicle catalog, or a run cut off, is an error.")
+    ] = False,
     force: Force = False,
     quiet: Quiet = False,
     as_json: AsJson = False,
@@ -75,3 +78,6 @@ def play(
     elif not quiet:
         for note in played.notes:
             typer.echo(note, err=True)
+    warn(played.warnings)
+    if strict and played.warnings:
+        raise typer.Exit(1)

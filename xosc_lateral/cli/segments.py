@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from xosc_lateral.cli.words import Allow, AsJson, Parameters, Quiet, TimeLimit, examples, pairs, say
+from xosc_lateral.cli.words import Allow, AsJson, Parameters, Quiet, TimeLimit, examples, pairs, say, warn
 
 
 def register(app: typer.Typer) -> None:
@@ -18,14 +18,16 @@ def register(app: typer.Typer) -> None:
 
 def segments(
     scenario: Annotated[Path, typer.Argument(help="Maneuver-based scenario (.xosc).", show_default=False)],
-    time_limit: TimeLimit = 60.0,
+    time_limit: TimeLimit = None,
     parameter: Parameters = None,
     allow: Allow = None,
     quiet: Quiet = False,
     as_json: AsJson = False,
 ) -> None:
     """List each entity's road-following segments, and the reason for everything else."""
-    from xosc_lateral import segments
+    from xosc_lateral import play, segments
 
-    found = segments(scenario, time_limit=time_limit, parameters=pairs(parameter, "--set"), allow=allow or ())
+    played = play(scenario, time_limit=time_limit, parameters=pairs(parameter, "--set"), allow=allow or ())
+    found = segments(played)
+    warn(played.warnings)
     say(found, as_json=as_json, quiet=quiet)

@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from xosc_lateral.cli.words import Allow, Force, Parameters, Quiet, TimeLimit, examples, pairs
+from xosc_lateral.cli.words import Allow, Force, Parameters, Quiet, TimeLimit, examples, pairs, warn
 
 EXAMPLES = examples("view cut-in.xosc", "view cut-in_lifelike.xosc -o pages/", "view cut-in.xosc -o cut-in.mcap")
 
@@ -26,7 +26,7 @@ def view(
     ] = None,
     parameter: Parameters = None,
     allow: Allow = None,
-    time_limit: TimeLimit = 60.0,
+    time_limit: TimeLimit = None,
     open_page: Annotated[
         bool | None, typer.Option("--open/--no-open", help="Open the page in the browser. Default: from a terminal.")
     ] = None,
@@ -38,6 +38,7 @@ def view(
 
     played = play(scenario, time_limit=time_limit, parameters=pairs(parameter, "--set"), allow=allow or ())
     page = played.write_page(output or scenario.with_name(f"{scenario.stem}_view.html"), force=force)
+    warn(played.warnings)
     if not quiet:
         typer.echo(str(page))
     if page.suffix == ".mcap":

@@ -45,7 +45,13 @@ RoadPath = Annotated[
     typer.Option("--road-path", metavar="DIR", help='Folder with roads known by name ("Town04"); may be repeated.'),
 ]
 TimeLimit = Annotated[
-    float, typer.Option(help="End time of a scenario that has none of its own [s].", min=0.1, max=86_400)
+    float | None,
+    typer.Option(
+        help="Cut runs off here [s]; default: 60 without a stop trigger, 3600 with one.",
+        min=0.1,
+        max=86_400,
+        show_default=False,
+    ),
 ]
 
 
@@ -76,6 +82,12 @@ def pairs(words: Iterable[str] | None, option: str) -> dict[str, str]:
             raise typer.BadParameter(f"{name!r} is given twice", param_hint=option)
         found[name] = value
     return found
+
+
+def warn(lines: Iterable[str]) -> None:
+    """Say on standard error what has to be known whatever was asked to be kept quiet."""
+    for line in lines:
+        typer.echo(f"xosc-lateral: warning: {line}", err=True)
 
 
 def say(result: Result, *, as_json: bool, quiet: bool, aside: bool = False) -> None:

@@ -123,6 +123,10 @@ class Note:
         return " ".join(locate(self.what, path=self.path, line=self.line, element=self.element).split())
 
 
+CUT_OFF = "still runs at the time limit"
+"""How a warning of a run that was cut off begins."""
+
+
 @dataclass(frozen=True, eq=False, slots=True)
 class NominalMotion:
     """A played scenario.
@@ -141,6 +145,8 @@ class NominalMotion:
         ``"stop trigger"`` or ``"time limit"`` or what else ended the run.
     notes : tuple of Note
         What could not be played as written.
+    cut_off : Note or None
+        Says that the time limit came before the scenario's end, or before all its stories were over.
     """
 
     step: float
@@ -149,3 +155,4 @@ class NominalMotion:
     end_time: float
     ended_by: str
     notes: tuple[Note, ...]
+    cut_off: Note | None = None

@@ -129,6 +129,8 @@ def _convert(
     )
     warnings += tuple(f"'{name}' follows a trajectory, too: {why}" for name, why in sampled.items()) + written.notes
     warnings += plan.frozen + changes
+    if played.motion.cut_off is not None:
+        warnings = (str(played.motion.cut_off), *warnings)
     data = b"" if save else written.data
     return ConvertedScenario(source, output, written.sha256, enriched, provenance, warnings, data, plan.is_replay)
 

@@ -12,7 +12,7 @@ from xosc_lateral.formats.openscenario import read_scenario
 from xosc_lateral.formats.openscenario.read import NO_ROADS, RoadSearch
 from xosc_lateral.formats.source import check_regular, guard_input
 from xosc_lateral.motion.nominal import NominalMotion
-from xosc_lateral.pipeline.settings import STEP, TIME_LIMIT
+from xosc_lateral.pipeline.settings import STEP
 from xosc_lateral.playback.player import play
 from xosc_lateral.road.network import RoadNetwork
 from xosc_lateral.scenario import Scenario
@@ -37,7 +37,7 @@ def play_scenario(
     *,
     parameters: Mapping[str, str] | None = None,
     step: float = STEP,
-    time_limit: float = TIME_LIMIT,
+    time_limit: float | None = None,
     allowed: Iterable[Path] = (),
     roads: RoadSearch = NO_ROADS,
     strict: bool = False,
@@ -50,7 +50,8 @@ def play_scenario(
         The ``.xosc`` file.
     parameters : mapping of str to str, optional
         Values that replace those declared.
-    step, time_limit : float
+    step : float
+    time_limit : float or None
         [s]
     allowed : iterable of Path
         Folders, besides those around the scenario, that its road and catalogs may lie in.
@@ -83,7 +84,7 @@ class _Playable:
     files: tuple[tuple[Path, str], ...]
     parameters: tuple[tuple[str, str], ...]
     step: float
-    time_limit: float
+    time_limit: float | None
     scenario: Scenario = field(compare=False)
     network: RoadNetwork = field(compare=False)
 

@@ -40,11 +40,12 @@ class Meaning:
         The source and its nominal run.
     egos : collection of str
         Vehicles under test.
-    step, time_limit : float
+    step : float
+    time_limit : float or None
         Of playback. [s]
     """
 
-    def __init__(self, played: Played, egos: Collection[str], *, step: float, time_limit: float) -> None:
+    def __init__(self, played: Played, egos: Collection[str], *, step: float, time_limit: float | None) -> None:
         self._played, self._egos = played, tuple(egos)
         self._step, self._time_limit = step, time_limit
         self._before = list(self._runs(played))

@@ -11,6 +11,7 @@ from dataclasses import asdict, dataclass, field
 from enum import StrEnum
 from typing import TextIO
 
+from xosc_lateral.motion.nominal import CUT_OFF
 from xosc_lateral.pipeline.batch import JobOutcome, JobState
 from xosc_lateral.pipeline.manifest import ManifestRow
 
@@ -47,6 +48,8 @@ class Summary:
         Output and error.
     with_warnings : int
         Outputs with at least one.
+    cut_off : list of str
+        Outputs of runs that the time limit cut off.
     nobody_enriched : mapping of str to int
         Why no entity of an output got offsets -> how many outputs.
     """
@@ -59,6 +62,7 @@ class Summary:
     seconds: float = 0.0
     failures: list[tuple[str, str]] = field(default_factory=list)
     with_warnings: int = 0
+    cut_off: list[str] = field(default_factory=list)
     nobody_enriched: dict[str, int] = field(default_factory=dict)
     _said: set[tuple[str, str]] = field(default_factory=set, repr=False)
 
@@ -74,6 +78,8 @@ class Summary:
             self.failures.append((outcome.row.output, outcome.row.error))
             return
         self.with_warnings += bool(outcome.row.warnings)
+        if any(CUT_OFF in line for line in outcome.row.warnings):
+            self.cut_off.append(outcome.row.output)
         if not outcome.row.enriched:
             why = _why_nobody(outcome.row)
             self.nobody_enriched[why] = self.nobody_enriched.get(why, 0) + 1
@@ -109,6 +115,8 @@ class Summary:
             lines.append(f"  {sum(self.nobody_enriched.values())} in which nobody was enriched:")
             reasons = sorted(self.nobody_enriched.items(), key=lambda item: (-item[1], item[0]))
             lines += [f"    {count}: {why}" for why, count in reasons]
+        if self.cut_off:
+            lines.append(f"  {len(self.cut_off)} end at the time limit, not by themselves ({self.cut_off[0]})")
         return lines
 
     def to_dict(self) -> dict[str, object]:

@@ -17,9 +17,6 @@ if TYPE_CHECKING:
 STEP = 0.02
 """Of playback, as in the reference logs. [s]"""
 
-TIME_LIMIT = 60.0
-"""A scenario that does not end by itself is ended after this. [s]"""
-
 AUTO = "auto"
 """Profile name for the shipped population, and for nobody who has no driver (a trailer, a tram)."""
 
@@ -85,8 +82,9 @@ class ConvertSettings:
         Where else its road may lie.
     strict : bool
         Refuse a missing vehicle catalog, instead of playing a usual car.
-    step, time_limit : float
-        Of playback. [s]
+    step : float
+    time_limit : float or None
+        Of playback; None: see `playback.player.play`. [s]
     with_sensor : bool
         Add the sensor error of the drives that profiles were fitted on.
     """
@@ -107,5 +105,5 @@ class ConvertSettings:
     roads: RoadSearch = NO_ROADS
     strict: bool = False
     step: float = STEP
-    time_limit: float = TIME_LIMIT
+    time_limit: float | None = None
     with_sensor: bool = False

@@ -14,7 +14,7 @@ from math import cos, hypot, sin
 import numpy as np
 
 from xosc_lateral.errors import PlaybackError
-from xosc_lateral.motion.nominal import Activity, NominalMotion
+from xosc_lateral.motion.nominal import CUT_OFF, Activity, NominalMotion, Note
 from xosc_lateral.playback.drive import drive, halt_at_road_end
 from xosc_lateral.playback.placement import NOWHERE
 from xosc_lateral.playback.recorder import NO_LANE, Rows
@@ -33,7 +33,13 @@ STANDING = 1e-3
 """Below this speed an entity stands. [m/s]"""
 
 
-def play(scenario: Scenario, network: RoadNetwork, *, step: float = 0.02, time_limit: float = 60.0) -> NominalMotion:
+TIME_LIMIT, LONGEST = 60.0, 3600.0
+"""Where runs end unless told otherwise: of scenarios that never end, and of those with an end of their own. [s]"""
+
+
+def play(
+    scenario: Scenario, network: RoadNetwork, *, step: float = 0.02, time_limit: float | None = None
+) -> NominalMotion:
     """Play a scenario to its stop trigger, or to the time limit.
 
     Parameters
@@ -43,8 +49,8 @@ def play(scenario: Scenario, network: RoadNetwork, *, step: float = 0.02, time_l
         Its roads; one without roads where the scenario has none.
     step : float
         Length of a frame. [s]
-    time_limit : float
-        Where runs end that don't stop by themselves. [s]
+    time_limit : float or None
+        Where runs end that don't stop before; None: `TIME_LIMIT`, or `LONGEST` with a stop trigger that can hold. [s]
 
     Returns
     -------
@@ -58,9 +64,16 @@ def play(scenario: Scenario, network: RoadNetwork, *, step: float = 0.02, time_l
     UnsupportedElementError
         If it needs something that can't be played and that motion depends on.
     """
+    if time_limit is None:
+        time_limit = LONGEST if _has_end(scenario) else TIME_LIMIT
     if not step > 0.0 or not time_limit >= 0.0:
         raise ValueError(f"step {step!r} s must be above 0, time limit {time_limit!r} s not below")
     return _Player(scenario, network, step).play(time_limit)
+
+
+def _has_end(scenario: Scenario) -> bool:
+    trigger = scenario.storyboard.stop_trigger
+    return trigger is not None and any(group.conditions for group in trigger.groups)
 
 
 class _Player:
@@ -88,9 +101,14 @@ class _Player:
             if going:
                 self._write(simulation.time)
         ended_by = "time limit" if going else "stop trigger"
-        if going:
-            simulation.note(f"still runs at the time limit of {time_limit:g} s", simulation.scenario.storyboard.place)
-        return self._result(ended_by)
+        place, cut_off = simulation.scenario.storyboard.place, None
+        if going and (_has_end(simulation.scenario) or self._goes_on()):
+            cut_off = Note(f"{CUT_OFF} of {time_limit:g} s", place.path, place.line, place.element)
+        return self._result(ended_by, cut_off)
+
+    def _goes_on(self) -> bool:
+        """Whether a story still has something to do."""
+        return any(story.state is not ElementState.COMPLETE for story in self.root.children)
 
     def _begin(self) -> bool:
         """The moment in which everything starts; whether there is another."""
@@ -195,7 +213,7 @@ class _Player:
         for rows in self.rows:
             rows.write(time)
 
-    def _result(self, ended_by: str) -> NominalMotion:
+    def _result(self, ended_by: str, cut_off: Note | None) -> NominalMotion:
         simulation = self.simulation
         time = np.frombuffer(self.times, dtype=np.float64).copy()
         return NominalMotion(
@@ -205,6 +223,7 @@ class _Player:
             end_time=float(time[-1]),
             ended_by=ended_by,
             notes=tuple(simulation.notes),
+            cut_off=cut_off,
         )
 
 
