@@ -55,7 +55,7 @@ class TwoLevel(ProfileModel):
     title: ClassVar[str] = "two levels (Neis and Beyerer)"
     source: ClassVar[str] = (
         "N. Neis, J. Beyerer, A Two-Level Stochastic Model for the Lateral Movement of Vehicles Within Their Lane, "
-        "IEEE Intelligent Vehicles Symposium 2023, arXiv:2405.17080"
+        "IEEE ITSC 2023, pp. 1896-1903, arXiv:2405.17080"
     )
     departures: ClassVar[str] = "docs/model.md says how each gap in the paper's description is filled"
 

@@ -3,7 +3,7 @@
 References
 ----------
 .. [1] N. Neis, J. Beyerer, "A two-level stochastic model for the lateral movement of vehicles within their lane", IEEE
-       Intelligent Vehicles Symposium 2023, arXiv:2405.17080: what its evaluation compares.
+       ITSC 2023, pp. 1896-1903, arXiv:2405.17080: what its evaluation compares.
 """
 
 from __future__ import annotations

@@ -28,7 +28,7 @@ def parse_json(data: bytes, path: Path) -> Any:
     try:
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
-        raise FormatError(f"not JSON: {error}", path=path) from error
+        raise FormatError(f"not JSON in UTF-8 ({error}): save it as UTF-8", path=path) from error
     _check_depth(text, path)
     try:
         return json.loads(text, parse_constant=_refuse_constant)

@@ -145,7 +145,7 @@ def read_header(root: XmlElement) -> FileHeader:
     minor = int(minor_text[:-1]) if re.fullmatch(r"\d{1,3}\+", minor_text) else header.integer("revMinor", 0)
     major = header.integer("revMajor", 1)
     if major != 1:
-        header.fail(f"OpenSCENARIO {major}.{minor} is not read; versions 1.0 to 1.3 are")
+        header.fail(f"OpenSCENARIO {major}.{minor} is not read; versions 1.0 to 1.3 are, later 1.x as 1.3")
     return FileHeader(major, minor, header.text("author", ""), header.text("description", ""), header.text("date", ""))
 
 
