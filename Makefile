@@ -22,7 +22,7 @@ $(STAMP): pyproject.toml
 # And what checking needs: linters, types, tests, every extra.
 $(DEV_STAMP): pyproject.toml | $(STAMP)
 	@echo "Setting up what the tests need: ruff, mypy, pytest, dask, scikit-learn, asammdf ... (another minute or two)"
-	@$(BIN)/python -m pip install $(QUICK) -e '.[dev,mdf,cluster,classifier,mcap]'
+	@$(BIN)/python -m pip install $(QUICK) -e '.[dev,mdf,cluster,classifier,mcap,osi]'
 	@touch $@
 
 # And what building the documentation needs.
@@ -126,7 +126,7 @@ licences: $(DEV_STAMP)
 test-matrix: $(DEV_STAMP)
 	for python in $(MATRIX); do \
 		$(UV) venv --quiet --clear --python $$python out/matrix/$$python && \
-		$(UV) pip install --quiet --python out/matrix/$$python/bin/python -e '.[dev,cluster,classifier,mdf]' && \
+		$(UV) pip install --quiet --python out/matrix/$$python/bin/python -e '.[dev,cluster,classifier,mdf,osi]' && \
 		out/matrix/$$python/bin/python -m pytest -q $(TESTS) || exit 1; \
 	done
 	$(UV) venv --quiet --clear --python 3.11 out/matrix/lowest
