@@ -100,13 +100,15 @@ loop-dlr: $(STAMP) $(WHEEL)
 $(WHEEL): | $(STAMP)
 	$(BIN)/python -m pip download --quiet --disable-pip-version-check --no-deps --dest $(@D) tasi==0.15.4
 
-# Every package that development and CI install, with hashes; see SECURITY.md.
+# Every package that development and CI install, with hashes; see SECURITY.md. All extras but `commonroad`, whose protobuf
+# is not the one of `osi`.
 LOCK := requirements/lock.txt
+EXTRAS := mdf osi cluster classifier board sumo mcap docs dev
 UV ?= $(BIN)/uv
 MATRIX ?= 3.11 3.12 3.13
 
 lock: $(DEV_STAMP)
-	$(UV) pip compile pyproject.toml --all-extras --generate-hashes --python-version 3.11 --universal --quiet \
+	$(UV) pip compile pyproject.toml $(addprefix --extra ,$(EXTRAS)) --generate-hashes --python-version 3.11 --universal --quiet \
 		--custom-compile-command 'make lock' -o $(LOCK)
 
 install-locked:

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from xosc_lateral.errors import FormatError
 from xosc_lateral.formats.atomic import replace_atomically
+from xosc_lateral.formats.osi.axes import axes
 from xosc_lateral.formats.osi.extra import SUFFIXES, osi
 from xosc_lateral.formats.osi.lanes import RoadIds, write_lanes
 from xosc_lateral.motion.nominal import Activity, EntityMotion, NominalMotion
@@ -202,7 +203,7 @@ def _kinematics(motion: EntityMotion, path: WorldTrajectory | None, network: Roa
     x, y, z, heading = network.header_offset.apply(pose.x, pose.y, pose.z, pose.heading)
     yaw, pitch, roll = np.unwrap(heading), pose.pitch, pose.roll
     box = motion.entity.bounding_box
-    ahead, leftwards, upwards = _axes(yaw, pitch, roll)
+    ahead, leftwards, upwards = axes(yaw, pitch, roll)
     arm = box.center_x * ahead + box.center_y * leftwards + box.center_z * upwards
     centre = np.stack([x, y, z], axis=1) + arm
     rate = _rate(yaw[:, None], motion)[:, 0]
@@ -215,16 +216,6 @@ def _kinematics(motion: EntityMotion, path: WorldTrajectory | None, network: Roa
         where[moved] = np.stack([found.road, found.lane, found.s], axis=1)
     angles = np.stack([np.angle(np.exp(1j * yaw)), pitch, roll, rate], axis=1)
     return np.concatenate([centre, velocity, _rate(velocity, motion), angles, where], axis=1)
-
-
-def _axes(yaw: FloatArray, pitch: FloatArray, roll: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Ahead, left and up of a body turned by Rz(yaw) Ry(pitch) Rx(roll), as OpenSCENARIO and OSI turn; (n, 3) each."""
-    (cy, sy), (cp, sp), (cr, sr) = ((np.cos(a), np.sin(a)) for a in (yaw, pitch, roll))
-    return (
-        np.stack([cy * cp, sy * cp, -sp], axis=1),
-        np.stack([cy * sp * sr - sy * cr, sy * sp * sr + cy * cr, cp * sr], axis=1),
-        np.stack([cy * sp * cr + sy * sr, sy * sp * cr - cy * sr, cp * cr], axis=1),
-    )
 
 
 def _rate(values: FloatArray, motion: EntityMotion) -> FloatArray:
