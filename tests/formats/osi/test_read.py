@@ -181,6 +181,21 @@ def test_lanes_come_in_two_encodings_two_directions_and_messages(tmp_path, lanes
     assert mine["speed"].to_numpy() == pytest.approx(SPEED, abs=0.01)  # from positions
 
 
+@pytest.mark.parametrize("says", [True, False])
+def test_a_lane_that_says_nothing_of_its_direction(tmp_path, says: bool) -> None:
+    """Is driven against its centre line where another one says that it is driven along; else along it."""
+    made = drives(lambda message: physical(message, ahead=not says))
+    for message in made:
+        for lane in message.lane:
+            lane.classification.ClearField("centerline_is_driving_direction")
+        if says:
+            other = message.lane.add()
+            other.id.value = 900
+            other.classification.centerline_is_driving_direction = True
+    found = import_drives("osi", saved(tmp_path / "trace.mcap", made)).to_frame().set_index("drive")
+    assert found.loc["7", "offset"].to_numpy() == pytest.approx(sway(found.loc["7", "time"].to_numpy()), abs=1e-9)
+
+
 def test_lane_changes_are_cut(tmp_path) -> None:
     time = np.arange(0.0, 40.0, 0.05)
     aside = WIDTH / (1.0 + np.exp(-(time - 20.0)))
@@ -224,9 +239,7 @@ def test_of_several_channels_the_true_one_is_read_and_the_others_are_named(tmp_p
             writer.write_message(message, "truth")
     (note,) = import_drives("osi", path).to_dict()["notes"]
     assert note == "trace.mcap: read channel truth of view (SENSOR_VIEW), truth (GROUND_TRUTH)"
-    with pytest.raises(
-        Exception, match="a sensor view named .other.; there are: view"
-    ):
+    with pytest.raises(Exception, match=r"a sensor view named .other.; there are: view"):
         import_drives("osi", path, channel="other")
 
 

@@ -58,6 +58,8 @@ def _way(strip: Strip) -> FloatArray:
 def _physical(recorded: Recorded) -> Iterable[_Lane]:
     kinds = osi("osi3.osi_lane_pb2").Lane.Classification
     edges = recorded.boundaries
+    # writers of proto3 leave out what is false: a lane that says nothing is driven backwards, unless none says anything
+    known = any(lane.classification.HasField("centerline_is_driving_direction") for lane in recorded.lanes.values())
     for number, lane in recorded.lanes.items():
         about = lane.classification
         if about.type not in (kinds.TYPE_DRIVING, kinds.TYPE_INTERSECTION):
@@ -69,7 +71,7 @@ def _physical(recorded: Recorded) -> Iterable[_Lane]:
         if left is None or right is None:
             continue
         centre = np.array([(p.x, p.y, p.z) for p in about.centerline], dtype=np.float64).reshape(-1, 3)
-        ahead = about.centerline_is_driving_direction or not about.HasField("centerline_is_driving_direction")
+        ahead = about.centerline_is_driving_direction or not known
         if len(centre) > 1:
             left, right = _aligned(left, centre), _aligned(right, centre)
         else:
