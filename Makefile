@@ -22,7 +22,7 @@ $(STAMP): pyproject.toml
 # And what checking needs: linters, types, tests, every extra.
 $(DEV_STAMP): pyproject.toml | $(STAMP)
 	@echo "Setting up what the tests need: ruff, mypy, pytest, dask, scikit-learn, asammdf ... (another minute or two)"
-	@$(BIN)/python -m pip install $(QUICK) -e '.[dev,mdf,cluster,classifier,mcap]'
+	@$(BIN)/python -m pip install $(QUICK) -e '.[dev,mdf,cluster,classifier,mcap,osi]'
 	@touch $@
 
 # And what building the documentation needs.
@@ -100,13 +100,15 @@ loop-dlr: $(STAMP) $(WHEEL)
 $(WHEEL): | $(STAMP)
 	$(BIN)/python -m pip download --quiet --disable-pip-version-check --no-deps --dest $(@D) tasi==0.15.4
 
-# Every package that development and CI install, with hashes; see SECURITY.md.
+# Every package that development and CI install, with hashes; see SECURITY.md. All extras but `commonroad`, whose protobuf
+# is not the one of `osi`.
 LOCK := requirements/lock.txt
+EXTRAS := mdf osi cluster classifier board sumo mcap docs dev
 UV ?= $(BIN)/uv
 MATRIX ?= 3.11 3.12 3.13
 
 lock: $(DEV_STAMP)
-	$(UV) pip compile pyproject.toml --all-extras --generate-hashes --python-version 3.11 --universal --quiet \
+	$(UV) pip compile pyproject.toml $(addprefix --extra ,$(EXTRAS)) --generate-hashes --python-version 3.11 --universal --quiet \
 		--custom-compile-command 'make lock' -o $(LOCK)
 
 install-locked:
@@ -126,7 +128,7 @@ licences: $(DEV_STAMP)
 test-matrix: $(DEV_STAMP)
 	for python in $(MATRIX); do \
 		$(UV) venv --quiet --clear --python $$python out/matrix/$$python && \
-		$(UV) pip install --quiet --python out/matrix/$$python/bin/python -e '.[dev,cluster,classifier,mdf]' && \
+		$(UV) pip install --quiet --python out/matrix/$$python/bin/python -e '.[dev,cluster,classifier,mdf,osi]' && \
 		out/matrix/$$python/bin/python -m pytest -q $(TESTS) || exit 1; \
 	done
 	$(UV) venv --quiet --clear --python 3.11 out/matrix/lowest

@@ -91,10 +91,23 @@ def _use_commonroad(path: Path) -> None:
     sane_table(import_commonroad(path).table)
 
 
+def _osi_files(folder: Path) -> Iterable[Path]:
+    from tests.formats.osi.test_read import drives, saved
+
+    return [saved(folder / "trace.mcap", drives()[:200]), saved(folder / "trace_gt.osi", drives()[:200])]
+
+
+def _use_osi(path: Path) -> None:
+    from xosc_lateral.formats.importers.osi import import_osi
+
+    sane_table(import_osi(path).table)
+
+
 RECORDINGS = (
     Reader("levelx", _levelx_files, _use_levelx),
     Reader("dlr", _dlr_files, _use_dlr, 0.1),
     Reader("mf4", _mf4_files, _use_mf4, needs="asammdf"),
     Reader("tracks", _tracks_files, _use_tracks),
     Reader("commonroad", _commonroad_files, _use_commonroad, 0.3, needs="commonroad"),
+    Reader("osi", _osi_files, _use_osi, 0.3, needs="osi_utilities"),
 )

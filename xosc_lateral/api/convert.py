@@ -206,6 +206,14 @@ def _named(profile: ProfileLike) -> str | DriverProfile:
     return str(profile) if isinstance(profile, Path) else profile
 
 
+def osi_files(output: PathLike, source: Path) -> tuple[Path, Path]:
+    """Files of the enriched and of the nominal trace; an output that is a folder gets a usual name."""
+    from xosc_lateral.formats.osi.extra import SUFFIXES
+
+    enriched = output_file(output, f"{source.stem}_gt.mcap", SUFFIXES)
+    return enriched, enriched.with_name(f"{enriched.stem}_nominal{enriched.suffix}")
+
+
 class Conversion(Result):
     """A converted scenario: nominal and enriched motion, what to know about it, and how to get it again."""
 
@@ -317,6 +325,27 @@ class Conversion(Result):
         from xosc_lateral.report.scenario_figures import paths_stretched
 
         return paths_stretched(self._made.enriched)
+
+    def write_osi(self, path: PathLike, *, force: bool = False) -> tuple[Path, Path]:
+        """Write two ASAM OSI traces (extra `osi`), enriched and, as ``NAME_nominal``, what the maneuvers alone give.
+
+        Returns
+        -------
+        tuple of Path
+            The two files: ``.mcap`` or ``.osi``, one `GroundTruth` per step.
+        """
+        from xosc_lateral.formats.osi.write import host_of, write_osi
+
+        enriched, nominal = outputs = osi_files(path, self.source)
+        claim(outputs, [self.source], force=force)
+        made = self._made.enriched
+        host = host_of(made.motion, self.ego)
+        said = f"{self.source.name}, enriched by xosc-lateral, seed {made.seed}, variant {made.variant}"
+        paths = [entity.trajectory for entity in made.entities]
+        write_osi(enriched, made.motion, made.network, paths, host=host, description=said)
+        said = f"{self.source.name}, as its maneuvers say"
+        write_osi(nominal, made.motion, made.network, host=host, description=said)
+        return outputs
 
     def write_report(self, path: PathLike, *, force: bool = False) -> Path:
         """Write the HTML page about what was changed."""

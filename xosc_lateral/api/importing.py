@@ -28,7 +28,8 @@ def import_drives(
     ----------
     format : str
         "dlr-ht" (DLR Highway Traffic), "levelx" (highD, exiD), "mf4" (ASAM MDF; extra `mdf`),
-        "tracks" (x, y on an OpenDRIVE road), "commonroad" (extra `commonroad`), or a plug-in's.
+        "tracks" (x, y on an OpenDRIVE road), "commonroad" (extra `commonroad`),
+        "osi" (ASAM OSI traces; extra `osi`), or a plug-in's.
     source : path or paths
         File or folder; "mf4" and some plug-ins take several files.
     options

@@ -208,6 +208,18 @@ class Playback(Result):
             return write_atomically(output, scene_recording(self._played.motion, self._played.network))
         return write_atomically(output, self.page())
 
+    def write_osi(self, path: PathLike, *, force: bool = False) -> Path:
+        """Write an ASAM OSI trace (extra `osi`): ``.mcap`` or ``.osi``, one `GroundTruth` per step."""
+        from xosc_lateral.formats.osi.extra import SUFFIXES
+        from xosc_lateral.formats.osi.write import host_of, write_osi
+        from xosc_lateral.scenario.under_test import vehicles_under_test
+
+        output = output_file(path, f"{self.scenario.stem}_gt.mcap", SUFFIXES)
+        claim([output], self._inputs(), force=force)
+        motion, network = self._played.motion, self._played.network
+        host = host_of(motion, vehicles_under_test(self._played.scenario))
+        return write_osi(output, motion, network, host=host, description=f"{self.scenario.name}, as its maneuvers say")
+
     def _inputs(self) -> list[Path]:
         scenario = self._played.scenario
         return [*scenario.input_files, *([scenario.road_file] if scenario.road_file else [])]

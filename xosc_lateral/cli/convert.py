@@ -12,6 +12,7 @@ from xosc_lateral.cli.words import (
     AsJson,
     Force,
     Library,
+    Osi,
     Parameters,
     Quiet,
     Road,
@@ -81,6 +82,7 @@ def convert(
         str | None,
         typer.Option(metavar="PAGE.html", help="Page that shows what was added; for a batch, a folder of pages."),
     ] = None,
+    osi: Osi = None,
     context: Annotated[
         Path | None, typer.Option(help="Table of context over time (columns time, wind_speed, ...).")
     ] = None,
@@ -153,6 +155,8 @@ def convert(
         "force": force,
     }
     if is_batch(scenario):
+        if osi is not None:
+            raise typer.BadParameter("traces are written for a single scenario", param_hint="--osi")
         if jobs == 0 or jobs < -1:
             raise typer.BadParameter("at least 1, or -1 for one per core", param_hint="--jobs")
         if report is not None and Path(report).is_file():
@@ -176,7 +180,7 @@ def convert(
             as_json=as_json,
         )
     else:
-        _convert_one(Path(scenario[0]), output, settings, variants, report, strict, quiet, as_json)
+        _convert_one(Path(scenario[0]), output, settings, variants, report, osi, strict, quiet, as_json)
 
 
 def _warn_if_cut_off(result: Conversion, unsaid: bool) -> None:
@@ -212,17 +216,19 @@ def _convert_one(
     settings: dict[str, Any],
     variants: int,
     report: str | None,
+    osi: str | None,
     strict: bool,
     quiet: bool,
     as_json: bool,
 ) -> None:
-    from xosc_lateral.api.convert import REPORT_SUFFIXES, convert, lifelike, output_scenario
+    from xosc_lateral.api.convert import REPORT_SUFFIXES, convert, lifelike, osi_files, output_scenario
     from xosc_lateral.api.variants import variant_files, variant_set
+    from xosc_lateral.formats.osi.extra import osi_wanted
     from xosc_lateral.formats.output_paths import STDOUT, claim, output_file
     from xosc_lateral.pipeline.convert import numbered
 
     if output == STDOUT:
-        if variants > 1 or as_json:
+        if variants > 1 or as_json or osi is not None:
             raise typer.BadParameter("standard output takes a single scenario and no other output", param_hint="-o -")
         result = convert(source, None, report=report, **settings)
         write_stdout(result.data)
@@ -235,10 +241,17 @@ def _convert_one(
         outputs = [numbered(written, variant, variants) for variant in range(variants)]
         pages = [None if page is None else numbered(page, variant, variants) for variant in range(variants)]
         files = variant_files(written, variants, settings["mode"], settings["player"])
-        claim([*outputs, *pages, *(files.all(variants) if files else ())], [source], force=settings["force"])
+        traces = [
+            None if osi is None else numbered(osi_files(osi, source)[0], one, variants) for one in range(variants)
+        ]
+        both = [path for trace in traces if trace is not None for path in osi_files(trace, source)]
+        osi_wanted(traces[0])
+        claim([*outputs, *pages, *both, *(files.all(variants) if files else ())], [source], force=settings["force"])
         unclean, replayed = False, True
-        for variant, (path, its_page) in enumerate(zip(outputs, pages, strict=True)):
+        for variant, (path, its_page, trace) in enumerate(zip(outputs, pages, traces, strict=True)):
             result = convert(source, path, variant=variant, report=its_page, **settings)
+            if trace is not None:
+                result.write_osi(trace, force=True)
             say(result, as_json=as_json, quiet=quiet)
             _warn_if_cut_off(result, quiet or as_json)
             replayed &= result.is_replay

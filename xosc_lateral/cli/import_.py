@@ -34,6 +34,10 @@ def register(app: typer.Typer) -> None:
     formats.command("tracks", short_help="Tracks on an OpenDRIVE road.", epilog=tracks_example)(tracks)
     commonroad_example = examples("import commonroad DEU_A9-1_1_T-1.xml -o drives.parquet")
     formats.command("commonroad", short_help="CommonRoad scenarios.", epilog=commonroad_example)(commonroad)
+    osi_example = examples(
+        "import osi cut-in_gt.mcap -o drives.parquet", "import osi a.mcap b.mcap --host host -o ego.csv"
+    )
+    formats.command("osi", short_help="ASAM OSI traces.", epilog=osi_example)(osi)
     app.add_typer(formats, name="import", short_help="Convert recordings into drive tables.", no_args_is_help=True)
 
 
@@ -127,6 +131,29 @@ def commonroad(
 ) -> None:
     """CommonRoad scenarios (extra `commonroad`): recorded obstacles between the bounds of their lanelets."""
     _import("commonroad", sources, output, {"keep_cut": keep_cut}, force, quiet, as_json)
+
+
+def osi(
+    sources: Annotated[
+        list[Path], typer.Argument(metavar="TRACE...", help="Traces (.mcap, .osi).", show_default=False)
+    ],
+    output: Output,
+    host: Annotated[
+        str | None,
+        typer.Option("--host", metavar="ID", help="Keep this vehicle alone: its id or name; host: the host vehicle."),
+    ] = None,
+    road: Annotated[
+        Path | None, typer.Option("--road", metavar="FILE.xodr", help="Take lanes from here, not from the trace.")
+    ] = None,
+    channel: Annotated[str | None, typer.Option("--channel", metavar="TOPIC", help="Of an MCAP file.")] = None,
+    keep_cut: KeepCut = False,
+    force: Force = False,
+    quiet: Quiet = False,
+    as_json: AsJson = False,
+) -> None:
+    """ASAM OSI traces of ground truth or sensor views (extra `osi`): vehicles between the boundaries of their lanes."""
+    options = {"host": host, "road": road, "channel": channel, "keep_cut": keep_cut}
+    _import("osi", sources, output, options, force, quiet, as_json)
 
 
 def _import(

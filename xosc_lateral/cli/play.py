@@ -11,6 +11,7 @@ from xosc_lateral.cli.words import (
     Allow,
     AsJson,
     Force,
+    Osi,
     Parameters,
     Quiet,
     Road,
@@ -24,7 +25,10 @@ from xosc_lateral.cli.words import (
 )
 
 EXAMPLES = examples(
-    "play cut-in.xosc -o states.csv", "play cut-in.xosc -o states.parquet", "play cut-in.xosc -o - | head"
+    "play cut-in.xosc -o states.csv",
+    "play cut-in.xosc --osi cut-in_gt.mcap",
+    "play cut-in.xosc -o states.parquet",
+    "play cut-in.xosc -o - | head",
 )
 
 
@@ -36,8 +40,10 @@ def register(app: typer.Typer) -> None:
 def play(
     scenario: Annotated[Path, typer.Argument(help="Maneuver-based scenario (.xosc).", show_default=False)],
     output: Annotated[
-        str, typer.Option("--output", "-o", help="Table: .csv, .csv.gz, .parquet, folder/, - .", show_default=False)
-    ],
+        str | None,
+        typer.Option("--output", "-o", help="Table: .csv, .csv.gz, .parquet, folder/, - .", show_default=False),
+    ] = None,
+    osi: Osi = None,
     step: Annotated[float, typer.Option(help="Length of a frame [s].", min=0.001, max=1.0)] = 0.02,
     time_limit: TimeLimit = None,
     parameter: Parameters = None,
@@ -53,11 +59,17 @@ def play(
 ) -> None:
     """Play a scenario without offsets and write every entity's position at every step."""
     from xosc_lateral import play
+    from xosc_lateral.formats.osi.extra import SUFFIXES, osi_wanted
     from xosc_lateral.formats.output_paths import STDOUT, claim, output_file
     from xosc_lateral.formats.tables import TABLE_SUFFIXES
 
-    if output != STDOUT:
-        claim([output_file(output, f"{scenario.stem}.csv", TABLE_SUFFIXES)], [scenario], force=force)
+    if output is None and osi is None:
+        raise typer.BadParameter("a table or, with --osi, a trace has to be named", param_hint="--output")
+    is_file = output is not None and output != STDOUT
+    table = output_file(output, f"{scenario.stem}.csv", TABLE_SUFFIXES) if output is not None and is_file else None
+    trace = None if osi is None else output_file(osi, f"{scenario.stem}_gt.mcap", SUFFIXES)
+    claim([table, trace], [scenario], force=force)
+    osi_wanted(trace)
     played = play(
         scenario,
         step=step,
@@ -71,10 +83,13 @@ def play(
     written = None
     if output == STDOUT:
         write_stdout(played.csv())
-    else:
+    elif output is not None:
         written = played.write(output, force=force)
+    if trace is not None:
+        played.write_osi(trace, force=force)
     if as_json:
-        say_json({"output": None if written is None else str(written), **played.to_dict()})
+        traces = {} if trace is None else {"osi": str(trace)}
+        say_json({"output": None if written is None else str(written), **traces, **played.to_dict()})
     elif not quiet:
         for note in played.notes:
             typer.echo(note, err=True)

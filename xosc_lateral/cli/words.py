@@ -16,6 +16,10 @@ if TYPE_CHECKING:
 
 AsJson = Annotated[bool, typer.Option("--json", help="Machine-readable: JSON on standard output, errors included.")]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print errors only.")]
+Osi = Annotated[
+    str | None,
+    typer.Option("--osi", metavar="TRACE", help="ASAM OSI trace too (.mcap, .osi): lanes, boxes, motion; extra osi."),
+]
 Force = Annotated[bool, typer.Option("--force", help="Replace files that xosc-lateral did not write itself.")]
 Seed = Annotated[int, typer.Option(help="Random seed; the same inputs and seed give the same bytes.", min=0)]
 Library = Annotated[

@@ -73,6 +73,10 @@ def _own_html(path: Path) -> bool:
     return b'content="xosc-lateral ' in _head(path)
 
 
+def _own_recording(path: Path) -> bool:
+    return PACKAGE in _head(path)  # MCAP's header and metadata are not compressed
+
+
 _CHECKS: dict[str, Callable[[Path], bool]] = {
     ".xosc": _own_xml,
     ".xodr": _own_xml,
@@ -81,6 +85,7 @@ _CHECKS: dict[str, Callable[[Path], bool]] = {
     ".csv.gz": _own_table,
     ".parquet": _own_parquet,
     ".html": _own_html,
+    ".mcap": _own_recording,
 }
 
 

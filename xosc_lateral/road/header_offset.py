@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from math import cos, sin
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]
+Place = TypeVar("Place", float, NDArray[np.float64])
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,8 +48,8 @@ class HeaderOffset:
         x, y = x + self.x, y + self.y
         return c * x - s * y, s * x + c * y, z + self.z, (heading + self.heading) % (2.0 * np.pi)
 
-    def undo(self, x: float, y: float) -> tuple[float, float]:
-        """Coordinates of the file of an inertial place. [m]"""
+    def undo(self, x: Place, y: Place) -> tuple[Place, Place]:
+        """Coordinates of the file of an inertial place, or of several. [m]"""
         c, s = cos(self.heading), sin(self.heading)
         return c * x + s * y - self.x, c * y - s * x - self.y
 

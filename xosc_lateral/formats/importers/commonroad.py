@@ -20,20 +20,21 @@ from numpy.typing import NDArray
 from xosc_lateral.errors import FormatError, NotEnoughDataError
 from xosc_lateral.formats.importers.cuts import DEFAULT_CUTS, CutSettings
 from xosc_lateral.formats.importers.lane_graph import LaneGraph
-from xosc_lateral.formats.importers.placed import PlacedTracks, ground_speed, import_placed, travel_heading
-from xosc_lateral.formats.importers.table import Imported, ImportRecord, guarded
+from xosc_lateral.formats.importers.lane_shapes import curvature_along, find_lanes, lanes_beside
+from xosc_lateral.formats.importers.placed import (
+    PlacedTracks,
+    ground_speed,
+    import_each,
+    import_placed,
+    travel_heading,
+)
+from xosc_lateral.formats.importers.table import Imported, guarded
 from xosc_lateral.formats.xml import read_xml
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
 LICENCE = "that of the CommonRoad scenario and of the recording that it was made from"
-
-LEAST_AGREEMENT = 0.7
-"""Cosine between a vehicle's heading and the lanelet's that is taken to be driven along. [-]"""
-
-SMOOTHED = 20.0
-"""Way over which a lanelet's turning is averaged into a curvature: bounds are polygons. [m]"""
 
 
 @guarded
@@ -49,41 +50,7 @@ def import_commonroad(
     NotEnoughDataError
         If nothing is left once lane changes are cut.
     """
-    import pandas as pd
-
-    files = [sources] if isinstance(sources, Path) else list(sources)
-    parts = [_read(file, settings) for file in files]
-    record = parts[0].provenance
-    if len(parts) > 1:
-        record = _put_together(parts, files)
-    table = pd.concat([part.table for part in parts], ignore_index=True)
-    if not keep_cut:
-        table = table[table["state"] == "kept"].drop(columns="state").reset_index(drop=True)
-    if table.empty:
-        raise NotEnoughDataError(
-            f"{files[0]}: nothing is left of {sum(record.rows.values())} rows ({dict(record.rows)})"
-        )
-    return Imported(table, record)
-
-
-def _put_together(parts: Sequence[Imported], files: Sequence[Path]) -> ImportRecord:
-    """One record of several files."""
-    from dataclasses import replace
-
-    from xosc_lateral.formats.importers.table import hash_files
-
-    rows: dict[str, int] = {}
-    for part in parts:
-        for state, count in part.provenance.rows.items():
-            rows[state] = rows.get(state, 0) + count
-    return replace(
-        parts[0].provenance,
-        source=", ".join(file.name for file in files),
-        sha256=hash_files(files),
-        rows=rows,
-        vehicles=sum(part.provenance.vehicles for part in parts),
-        hours=round(sum(part.provenance.hours for part in parts), 3),
-    )
+    return import_each(sources, lambda file: _read(file, settings), keep_cut=keep_cut)
 
 
 def _read(path: Path, settings: CutSettings) -> Imported:
@@ -122,6 +89,10 @@ def _opened(path: Path) -> Any:
         raise FormatError(
             "reading CommonRoad needs commonroad-io: pip install 'xosc-lateral[commonroad]'", path=path
         ) from error
+    except TypeError as error:  # what its generated code raises under another protobuf
+        raise FormatError(
+            "commonroad-io needs protobuf 3.20, the extra `osi` a later one: use an environment for each", path=path
+        ) from error
     read_xml(path)  # no entities, and no larger than ours may be
     try:
         scenario, _ = CommonRoadFileReader(str(path)).open()
@@ -158,8 +129,8 @@ def _placed(scenario: Any, shapes: list[_Shape], left: IntArray, path: Path) -> 
     x, y = values[:, 2], values[:, 3]
     heading = np.where(np.isfinite(values[:, 4]), values[:, 4], travel_heading(x, y, vehicle, step))
     speed = np.where(np.isfinite(values[:, 5]), values[:, 5], ground_speed(x, y, vehicle, step))
-    piece, along, offset, width, curvature = _find(shapes, x, y, heading)
-    index, count = _lanes_beside(left)
+    piece, along, offset, width, curvature = find_lanes(shapes, x, y, heading)
+    index, count = lanes_beside(left)
     inside = piece >= 0
     road = {
         "curvature": curvature,
@@ -170,43 +141,6 @@ def _placed(scenario: Any, shapes: list[_Shape], left: IntArray, path: Path) -> 
     return PlacedTracks(
         names, vehicle, step * values[:, 1], step, piece, along, offset, width, np.abs(speed), length, kind, road
     )
-
-
-def _find(
-    shapes: list[_Shape], x: FloatArray, y: FloatArray, heading: FloatArray
-) -> tuple[IntArray, FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Lanelet that every row drives along (-1: none), way in it, offset, width and curvature: the one it is amid."""
-    n = len(x)
-    piece = np.full(n, -1)
-    along, offset, width, curvature = (np.full(n, np.nan) for _ in range(4))
-    nearest = np.full(n, np.inf)
-    for number, shape in enumerate(shapes):
-        near = np.flatnonzero(shape.may_hold(x, y))
-        if not len(near):
-            continue
-        way, aside, wide, ahead, bend = shape.place(x[near], y[near])
-        inside = (np.abs(aside) <= 0.5 * wide) & np.isfinite(way) & (np.cos(heading[near] - ahead) > LEAST_AGREEMENT)
-        better = inside & (np.abs(aside) < nearest[near])
-        rows = near[better]
-        piece[rows], nearest[rows] = number, np.abs(aside[better])
-        along[rows], offset[rows], width[rows], curvature[rows] = way[better], aside[better], wide[better], bend[better]
-    return piece, np.nan_to_num(along), offset, width, curvature
-
-
-def _lanes_beside(left: IntArray) -> tuple[IntArray, IntArray]:
-    """Lanes to the right of each lanelet that are driven the same way, and all of them, itself included."""
-    right = np.full(len(left), -1)
-    right[left[left >= 0]] = np.flatnonzero(left >= 0)
-    counts = []
-    for beside in (right, left):
-        steps = np.zeros(len(left), dtype=np.int64)
-        for start in range(len(left)):
-            here = start
-            while beside[here] >= 0 and steps[start] < len(left):
-                here = int(beside[here])
-                steps[start] += 1
-        counts.append(steps)
-    return counts[0], counts[0] + counts[1] + 1
 
 
 class _Shape:
@@ -246,7 +180,7 @@ class _Shape:
         width = ((left - right) * normal).sum(axis=1)
         way = self.start[k] + u[:, 0] * self.size[k]
         beyond = self._beyond(x, y, k)
-        curvature = self._curvature(way)
+        curvature = curvature_along(self.start, self.direction, way)
         return np.where(beyond, np.nan, way), offset, width, direction, curvature
 
     def _beyond(self, x: FloatArray, y: FloatArray, k: NDArray[np.intp]) -> NDArray[np.bool_]:
@@ -254,13 +188,3 @@ class _Shape:
         at_start = (k == 0) & (((np.stack([x, y], axis=1) - self.centre[0]) @ self.step[0]) < 0)
         at_end = (k == len(self.size) - 1) & (((np.stack([x, y], axis=1) - self.centre[-1]) @ self.step[-1]) > 0)
         return np.asarray(at_start | at_end)
-
-    def _curvature(self, way: FloatArray) -> FloatArray:
-        """Of the middle, smoothed, shape (n,). [1/m]"""
-        middles = 0.5 * (self.start[1:] + self.start[:-1])
-        bend = np.interp(way + 0.5 * SMOOTHED, middles, self.direction) - np.interp(
-            way - 0.5 * SMOOTHED, middles, self.direction
-        )
-        span = np.minimum(way + 0.5 * SMOOTHED, middles[-1]) - np.maximum(way - 0.5 * SMOOTHED, middles[0])
-        curvature = np.where(span > 1.0, bend / np.maximum(span, 1.0), 0.0)
-        return np.asarray(curvature)

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from collections import Counter
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -16,7 +17,7 @@ from xosc_lateral.errors import NotEnoughDataError
 from xosc_lateral.formats.importers.cuts import CutSettings, lane_changes, name_states, number_runs
 from xosc_lateral.formats.importers.lane_graph import LaneGraph
 from xosc_lateral.formats.importers.neighbours import find_neighbours
-from xosc_lateral.formats.importers.table import Imported, drop_cut, make_provenance
+from xosc_lateral.formats.importers.table import Imported, drop_cut, hash_files, make_provenance
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -87,8 +88,10 @@ def import_placed(
     sources: Sequence[Path],
     version: str,
     licence: str,
+    only: Collection[str] | None = None,
+    notes: Sequence[str] = (),
 ) -> Imported:
-    """Neighbours, cuts and the record of the import.
+    """Neighbours, cuts and the record of the import; of the vehicles in `only` alone, if it is given.
 
     Raises
     ------
@@ -96,6 +99,8 @@ def import_placed(
         If nothing is left.
     """
     table = placed_table(tracks, graph, settings)
+    if only is not None:
+        table = table[table["drive"].isin(only)].reset_index(drop=True)
     record = make_provenance(
         table,
         format=format,
@@ -104,10 +109,44 @@ def import_placed(
         licence=licence,
         settings=asdict(settings),
         step=tracks.step,
+        notes=notes,
     )
     kept = drop_cut(table, keep_cut)
     if kept.empty:
         raise NotEnoughDataError(f"{sources[0]}: nothing is left of {len(table)} rows ({dict(record.rows)})")
+    return Imported(kept, record)
+
+
+def import_each(sources: Path | Sequence[Path], read: Callable[[Path], Imported], *, keep_cut: bool) -> Imported:
+    """One table and one record of one or several files, each read with what would be cut.
+
+    Raises
+    ------
+    NotEnoughDataError
+        If nothing is left.
+    """
+    import pandas as pd
+
+    files = [sources] if isinstance(sources, Path) else list(sources)
+    parts = [read(file) for file in files]
+    record = parts[0].provenance
+    if len(parts) > 1:
+        rows = Counter[str]()
+        for part in parts:
+            rows.update(part.provenance.rows)
+        record = replace(
+            record,
+            source=", ".join(file.name for file in files),
+            sha256=hash_files(files),
+            rows=dict(rows),
+            vehicles=sum(part.provenance.vehicles for part in parts),
+            hours=round(sum(part.provenance.hours for part in parts), 3),
+            notes=tuple(note for part in parts for note in part.provenance.notes),
+        )
+    table = pd.concat([part.table for part in parts], ignore_index=True)
+    kept = drop_cut(table, keep_cut)
+    if kept.empty:
+        raise NotEnoughDataError(f"{files[0]}: nothing is left of {len(table)} rows ({dict(record.rows)})")
     return Imported(kept, record)
 
 

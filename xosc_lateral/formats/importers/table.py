@@ -40,6 +40,7 @@ class ImportRecord:
     vehicles: int
     hours: float
     lanes: Sequence[Mapping[str, object]] = ()
+    notes: Sequence[str] = ()
     package_version: str = field(default=__version__)
 
 
@@ -61,6 +62,7 @@ def make_provenance(
     settings: Mapping[str, object],
     step: float,
     lanes: Sequence[Mapping[str, object]] = (),
+    notes: Sequence[str] = (),
 ) -> ImportRecord:
     """Record of an import, from the table with its column `state` and rows `step` seconds apart."""
     return ImportRecord(
@@ -74,6 +76,7 @@ def make_provenance(
         vehicles=int(table["drive"].nunique()),
         hours=round(float((table["state"] == KEPT).sum()) * step / 3600.0, 3),
         lanes=lanes,
+        notes=notes,
     )
 
 
@@ -207,4 +210,5 @@ def describe(provenance: ImportRecord) -> str:
     rows = ", ".join(f"{count} {state}" for state, count in provenance.rows.items())
     head = f"{provenance.source}: {provenance.vehicles} vehicles, {provenance.hours:g} h kept (rows: {rows})"
     lanes = ["  " + ", ".join(f"{name} {value}" for name, value in lane.items()) for lane in provenance.lanes]
-    return "\n".join([head, *lanes, f"licence: {provenance.licence}"])
+    notes = [f"  note: {note}" for note in provenance.notes]
+    return "\n".join([head, *lanes, *notes, f"licence: {provenance.licence}"])

@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.motion.nominal import Activity, EntityMotion
-from xosc_lateral.report.player.packing import simplify
 from xosc_lateral.road import RoadNetwork
+from xosc_lateral.road.simplify import simplify
 
 FloatArray = NDArray[np.float64]
 

@@ -1,0 +1,83 @@
+"""Which lane a row of a recording lies in, where lanes are given as shapes; lanes that are side by side."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+
+LEAST_AGREEMENT = 0.7
+"""Cosine between a vehicle's heading and the lane's that is taken to be driven along. [-]"""
+
+SMOOTHED = 20.0
+"""Way over which a lane's turning is averaged into a curvature: bounds are polygons. [m]"""
+
+
+class LaneShape(Protocol):
+    """A lane of some form."""
+
+    def may_hold(self, x: FloatArray, y: FloatArray) -> NDArray[np.bool_]:
+        """Points that may lie in it, quickly told; shape as the arguments."""
+
+    def place(self, x: FloatArray, y: FloatArray) -> tuple[FloatArray, ...]:
+        """Way along it (NaN beyond its ends), offset, width, direction and curvature there; shape as the arguments."""
+
+
+def find_lanes(
+    shapes: Sequence[LaneShape], x: FloatArray, y: FloatArray, heading: FloatArray
+) -> tuple[IntArray, FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Lanelet that every row drives along (-1: none), way in it, offset, width and curvature: the one it is amid."""
+    n = len(x)
+    piece = np.full(n, -1)
+    along, offset, width, curvature = (np.full(n, np.nan) for _ in range(4))
+    nearest = np.full(n, np.inf)
+    for number, shape in enumerate(shapes):
+        near = np.flatnonzero(shape.may_hold(x, y))
+        if not len(near):
+            continue
+        way, aside, wide, ahead, bend = shape.place(x[near], y[near])
+        inside = (np.abs(aside) <= 0.5 * wide) & np.isfinite(way) & (np.cos(heading[near] - ahead) > LEAST_AGREEMENT)
+        better = inside & (np.abs(aside) < nearest[near])
+        rows = near[better]
+        piece[rows], nearest[rows] = number, np.abs(aside[better])
+        along[rows], offset[rows], width[rows], curvature[rows] = way[better], aside[better], wide[better], bend[better]
+    return piece, np.nan_to_num(along), offset, width, curvature
+
+
+def lanes_beside(left: IntArray) -> tuple[IntArray, IntArray]:
+    """Lanes to the right of each lanelet that are driven the same way, and all of them, itself included."""
+    right = np.full(len(left), -1)
+    right[left[left >= 0]] = np.flatnonzero(left >= 0)
+    counts = []
+    for beside in (right, left):
+        steps = np.zeros(len(left), dtype=np.int64)
+        for start in range(len(left)):
+            here = start
+            while beside[here] >= 0 and steps[start] < len(left):
+                here = int(beside[here])
+                steps[start] += 1
+        counts.append(steps)
+    return counts[0], counts[0] + counts[1] + 1
+
+
+def curvature_along(start: FloatArray, direction: FloatArray, way: FloatArray) -> FloatArray:
+    """Curvature of a polyline, smoothed, shape as `way`. [1/m]
+
+    Parameters
+    ----------
+    start : array, shape (n + 1,)
+        Way along it to each of its points. [m]
+    direction : array, shape (n,)
+        Of its pieces, unwrapped. [rad]
+    way : array
+        Where. [m]
+    """
+    middles = 0.5 * (start[1:] + start[:-1])
+    bend = np.interp(way + 0.5 * SMOOTHED, middles, direction) - np.interp(way - 0.5 * SMOOTHED, middles, direction)
+    span = np.minimum(way + 0.5 * SMOOTHED, middles[-1]) - np.maximum(way - 0.5 * SMOOTHED, middles[0])
+    return np.asarray(np.where(span > 1.0, bend / np.maximum(span, 1.0), 0.0))

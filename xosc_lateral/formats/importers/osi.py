@@ -1,0 +1,158 @@
+"""ASAM OSI traces [1]_ into the standard drive table (extra `osi`).
+
+Vehicles are placed between the boundaries of their lanes, as the trace has them or, with `road`, as an OpenDRIVE file
+has them. The offset is that of the rear axle where the trace says where it is, else of the vehicle's middle.
+
+References
+----------
+.. [1] ASAM OSI (Open Simulation Interface) 3.8: osi_groundtruth.proto, osi_lane.proto, osi_logicallane.proto.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from xosc_lateral.errors import FormatError
+from xosc_lateral.formats.importers.cuts import DEFAULT_CUTS, CutSettings
+from xosc_lateral.formats.importers.lane_graph import LaneGraph
+from xosc_lateral.formats.importers.lane_shapes import find_lanes, lanes_beside
+from xosc_lateral.formats.importers.placed import PlacedTracks, import_each, import_placed
+from xosc_lateral.formats.importers.strips import Strip
+from xosc_lateral.formats.importers.table import Imported, guarded
+from xosc_lateral.formats.importers.track_table import Tracks
+from xosc_lateral.formats.importers.tracks import lane_graph, place
+from xosc_lateral.formats.opendrive import read_opendrive
+from xosc_lateral.formats.osi.read import Recorded, read_osi
+from xosc_lateral.formats.osi.shapes import lanes_of
+
+LICENCE = "that of the trace"
+
+HOST = "host"
+"""Stands for the trace's own host vehicle."""
+
+
+@guarded
+def import_osi(
+    sources: Path | Sequence[Path],
+    settings: CutSettings = DEFAULT_CUTS,
+    *,
+    host: str | None = None,
+    road: Path | str | None = None,
+    channel: str | None = None,
+    keep_cut: bool = False,
+) -> Imported:
+    """Read one or several traces of ground truth or sensor views.
+
+    Parameters
+    ----------
+    host : str, optional
+        Keep this vehicle alone: its identifier or name in the trace; "host": the trace's host vehicle.
+    road : path, optional
+        OpenDRIVE file to take lanes from.
+    channel : str, optional
+        Topic of an MCAP file with several.
+
+    Raises
+    ------
+    FormatError
+        The extra is missing; no trace; no lanes; no such vehicle.
+    NotEnoughDataError
+        If nothing is left once lane changes are cut.
+    """
+    several = not isinstance(sources, Path) and len(sources) > 1
+
+    def read(path: Path) -> Imported:
+        recorded = read_osi(path, channel)
+        only = None if host is None else _named(recorded, host, path)
+        placed, graph, files = _placed(recorded, path, None if road is None else Path(road))
+        if several:
+            names = [f"{path.stem}:{name}" for name in placed.names]
+            only = None if only is None else {f"{path.stem}:{name}" for name in only}
+            placed = replace(placed, names=names)
+        return import_placed(
+            placed,
+            graph,
+            settings,
+            keep_cut=True,
+            format="osi",
+            sources=files,
+            version="unknown",
+            licence=LICENCE,
+            only=only,
+            notes=recorded.notes,
+        )
+
+    return import_each(sources, read, keep_cut=keep_cut)
+
+
+def _named(recorded: Recorded, host: str, path: Path) -> set[str]:
+    """Tracks of the vehicle that is wanted."""
+    wanted = host
+    if host == HOST:
+        if len(recorded.hosts) != 1:
+            there = ", ".join(recorded.hosts) or "none"
+            raise FormatError(f"host vehicles: {there}; name one with --host", path=path)
+        wanted = recorded.hosts[0]
+    names = {recorded.numbers.get(name.split("#")[0]): name.split("#")[0] for name in recorded.tracks.names}
+    wanted = names.get(wanted, wanted)
+    found = {name for name in recorded.tracks.names if name.split("#")[0] == wanted}
+    if not found:
+        there = ", ".join(recorded.tracks.names[:20])
+        raise FormatError(f"no vehicle {host!r}; there are {there}", path=path)
+    return found
+
+
+def _placed(recorded: Recorded, path: Path, road: Path | None) -> tuple[PlacedTracks, LaneGraph, list[Path]]:
+    """Every row in its lane; what the lanes are; the files that said so."""
+    tracks = recorded.tracks
+    if road is not None:
+        network = read_opendrive(road)
+        pieces, graph = lane_graph(network)
+        x, y = network.header_offset.undo(tracks.x, tracks.y)
+        heading = tracks.heading - network.header_offset.heading
+        placed = place(replace(tracks, x=x, y=y, heading=heading), network, pieces)
+        files, where = [path, road], road.name
+    else:
+        lanes = lanes_of(recorded)
+        if lanes is None:
+            raise FormatError("has no lanes with boundaries: give the road with --road FILE.xodr", path=path)
+        strips, graph = lanes
+        placed = _between(tracks, strips, graph)
+        files, where = [path], "the trace"
+    if not (placed.piece >= 0).any():
+        raise FormatError(
+            f"no vehicle is in a lane of {where}: x from {tracks.x.min():.1f} to {tracks.x.max():.1f} m, "
+            f"y from {tracks.y.min():.1f} to {tracks.y.max():.1f} m",
+            path=path,
+        )
+    # gaps count from the middle, wherever the offset is measured
+    return replace(placed, along=placed.along + recorded.rear), graph, files
+
+
+def _between(tracks: Tracks, strips: Sequence[Strip], graph: LaneGraph) -> PlacedTracks:
+    piece, along, offset, width, curvature = find_lanes(strips, tracks.x, tracks.y, tracks.heading)
+    index, count = lanes_beside(graph.left)
+    inside = piece >= 0
+    road = {
+        "curvature": curvature,
+        "lane_index": np.where(inside, index[piece], np.nan),
+        "lane_count": np.where(inside, count[piece], np.nan),
+    }
+    return PlacedTracks(
+        tracks.names,
+        tracks.vehicle,
+        tracks.time,
+        tracks.step,
+        piece,
+        along,
+        offset,
+        width,
+        tracks.speed,
+        tracks.length,
+        tracks.kind,
+        road,
+    )

@@ -1,0 +1,116 @@
+"""Messages of an OSI trace, one after the other: the ground truth of `.mcap` and `.osi` files."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from xosc_lateral.errors import FormatError
+from xosc_lateral.formats.osi.extra import SUFFIXES, osi
+from xosc_lateral.formats.source import check_regular
+
+TRUTHS = ("GroundTruth", "SensorView")
+"""Messages that hold the true world; a sensor view as its global ground truth."""
+
+
+class Trace:
+    """An open trace; use it as a context.
+
+    Parameters
+    ----------
+    path : path
+    channel : str, optional
+        Topic of an MCAP file; without it the one that holds ground truth, else a sensor view.
+
+    Attributes
+    ----------
+    notes : list of str
+        Channels that are not read.
+
+    Raises
+    ------
+    FormatError
+        No trace, or none of ground truth.
+    XoscLateralError
+        The extra `osi` is not installed.
+    """
+
+    def __init__(self, path: Path, channel: str | None = None) -> None:
+        if path.suffix.lower() not in SUFFIXES:
+            raise FormatError(f"an OSI trace ends in {' or '.join(SUFFIXES)}", path=path)
+        check_regular(path)
+        if path.stat().st_size == 0:
+            raise FormatError("is empty", path=path)
+        self.path = path
+        self.notes: list[str] = []
+        self._reader = self._of_mcap(channel) if path.suffix.lower() == ".mcap" else self._of_messages(channel)
+
+    def __enter__(self) -> Trace:
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        self._reader.close()
+
+    def __iter__(self) -> Iterator[Any]:
+        """Every `GroundTruth`, in the order of the file."""
+        number = 0
+        while (result := self._reader.read_message()) is not None:
+            number += 1
+            if result.message is None:
+                why = " ".join(str(result.error_message).split())
+                raise FormatError(f"damaged: {why}", path=self.path, element=f"message {number}")
+            is_view = type(result.message).__name__ == "SensorView"
+            yield result.message.global_ground_truth if is_view else result.message
+
+    def _of_mcap(self, channel: str | None) -> Any:
+        reader = osi("osi_utilities").MultiTraceReader()
+        if not reader.open(self.path):
+            raise FormatError("not an MCAP file, or one that was not closed", path=self.path)
+        names = {kind: name for name, kind in osi("osi_utilities").MessageType.__members__.items()}
+        found = {one.topic: names[one.message_type] for one in reader.list_channel_specifications()}
+        others = [topic for topic in reader.get_available_topics() if topic not in found]
+        said = ", ".join([f"{topic} ({kind})" for topic, kind in found.items()] + others) or "none"
+        chosen = _chosen({topic: kind.replace("_", "").lower() for topic, kind in found.items()}, channel)
+        if chosen is None:
+            reader.close()
+            what = "ground truth or a sensor view" + ("" if channel is None else f" named {channel!r}")
+            raise FormatError(f"no channel with {what}; there are: {said}", path=self.path)
+        if len(found) + len(others) > 1:
+            self.notes.append(f"{self.path.name}: read channel {chosen} of {said}")
+        reader.set_topics([chosen])
+        return reader
+
+    def _of_messages(self, channel: str | None) -> Any:
+        if channel is not None:
+            raise FormatError(f"has no channels, so no channel {channel!r}", path=self.path)
+        utilities = osi("osi_utilities")
+        kinds = utilities.MessageType
+        named = utilities.infer_message_type_from_filename(self.path.name)
+        if named not in (kinds.UNKNOWN, kinds.GROUND_TRUTH, kinds.SENSOR_VIEW):
+            raise FormatError(f"its name says {named.name}: neither ground truth nor a sensor view", path=self.path)
+        for kind in (kinds.SENSOR_VIEW, kinds.GROUND_TRUTH) if named is kinds.UNKNOWN else (named,):
+            reader = utilities.SingleTraceReader()
+            reader.set_message_type(kind)
+            if not reader.open(self.path):
+                raise FormatError("not an OSI trace", path=self.path)
+            if named is kinds.UNKNOWN and kind is kinds.SENSOR_VIEW:
+                # nothing in the file says what its messages are: a sensor view is one that shows moving objects
+                first = reader.read_message()
+                is_view = first.message is not None and first.message.global_ground_truth.moving_object
+                reader.close()
+                if not is_view:
+                    continue
+                reader = utilities.SingleTraceReader()
+                reader.set_message_type(kind)
+                reader.open(self.path)
+            return reader
+        raise AssertionError("ground truth is always tried")
+
+
+def _chosen(kinds: dict[str, str], channel: str | None) -> str | None:
+    """Topic to read among those of each kind."""
+    truths = [topic for wanted in TRUTHS for topic, kind in kinds.items() if kind == wanted.lower()]
+    if channel is None:
+        return truths[0] if truths else None
+    return channel if channel in truths else None
