@@ -11,6 +11,7 @@ from tests.motion.made_motion import RADIUS, drive, entity, together, two_roads
 from tests.profiles import simulated_profile
 from xosc_lateral.driver.effects import Acts, Effect, Factor, Form, Linear, Product
 from xosc_lateral.enrich.enrich import enrich
+from xosc_lateral.enrich.neighbours import Neighbours
 from xosc_lateral.motion.nominal import NominalMotion, PlayedAction
 from xosc_lateral.road.network import RoadNetwork
 from xosc_lateral.scenario import Action, Place
@@ -25,8 +26,10 @@ def _effect_alone(motion: NominalMotion, network: RoadNetwork, effect: Effect) -
     """Time and what the effect adds to the first vehicle's offset: the same seed with and without it."""
     base = simulated_profile()
     name = motion.entities[0].name
-    without = enrich(motion, network, {name: base}, seed=4, joint=False).entity(name)
-    with_it = enrich(motion, network, {name: replace(base, effects=(effect,))}, seed=4, joint=False).entity(name)
+    without = enrich(motion, network, {name: base}, seed=4, neighbours=Neighbours.PROFILE).entity(name)
+    with_it = enrich(
+        motion, network, {name: replace(base, effects=(effect,))}, seed=4, neighbours=Neighbours.PROFILE
+    ).entity(name)
     assert not with_it.neutral
     (plain,), (changed,) = without.segments, with_it.segments
     return changed.time, changed.offset - plain.offset

@@ -8,6 +8,7 @@ from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from xosc_lateral.enrich.neighbours import Neighbours
 from xosc_lateral.formats.openscenario.read import NO_ROADS, RoadSearch
 from xosc_lateral.formats.openscenario.write.target import STANDARD, TargetPlayer
 
@@ -89,6 +90,8 @@ class ConvertSettings:
         Of playback. [s]
     with_sensor : bool
         Add the sensor error of the drives that profiles were fitted on.
+    neighbours : Neighbours
+        Whose answer to vehicles beside them drivers have.
     """
 
     profile: str | DriverProfile = AUTO
@@ -109,3 +112,4 @@ class ConvertSettings:
     step: float = STEP
     time_limit: float = TIME_LIMIT
     with_sensor: bool = False
+    neighbours: Neighbours = Neighbours.BORROW
