@@ -19,6 +19,8 @@ from xosc_lateral.scenario.actions.environment import EnvironmentAction
 from xosc_lateral.scenario.enums import VehicleCategory
 from xosc_lateral.scenario.environment import Environment, Weather
 
+PROFILE = Neighbours.PROFILE
+
 SIZE, LOOK_AHEAD, RESPONSE = 0.3, 1.2, 2.0
 
 
@@ -26,10 +28,8 @@ def _effect_alone(motion: NominalMotion, network: RoadNetwork, effect: Effect) -
     """Time and what the effect adds to the first vehicle's offset: the same seed with and without it."""
     base = simulated_profile()
     name = motion.entities[0].name
-    without = enrich(motion, network, {name: base}, seed=4, neighbours=Neighbours.PROFILE).entity(name)
-    with_it = enrich(
-        motion, network, {name: replace(base, effects=(effect,))}, seed=4, neighbours=Neighbours.PROFILE
-    ).entity(name)
+    without = enrich(motion, network, {name: base}, seed=4, neighbours=PROFILE).entity(name)
+    with_it = enrich(motion, network, {name: replace(base, effects=(effect,))}, seed=4, neighbours=PROFILE).entity(name)
     assert not with_it.neutral
     (plain,), (changed,) = without.segments, with_it.segments
     return changed.time, changed.offset - plain.offset

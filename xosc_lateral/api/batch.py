@@ -68,7 +68,8 @@ def convert_many(
     ----------
     scenarios : str, Path, DataFrame, or sequence of paths
         A file, a folder (searched to the bottom), a glob, a table (CSV, Parquet) or frame with a column `scenario` and
-        if wanted `profile`, `profile:ENTITY`, `seed`, `variants`, `only`, `neighbours`, `parameter:NAME`; or several of them.
+        if wanted `profile`, `profile:ENTITY`, `seed`, `variants`, `only`, `neighbours`, `parameter:NAME`; or several of
+        them.
     output : str or Path
         Folder; it mirrors the inputs, and holds `manifest.parquet` at the end.
     profile, entity, only, seed, context, parameters, mode, ego, neighbours, player, version

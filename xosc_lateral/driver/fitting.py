@@ -9,7 +9,7 @@ import numpy as np
 from msgspec.structs import replace
 from numpy.typing import NDArray
 
-from xosc_lateral.driver.beside import answer_effects, measure_beside
+from xosc_lateral.driver.answers import answer_effects, measure_beside
 from xosc_lateral.driver.effects import ColumnEffect
 from xosc_lateral.driver.models.base import CoreModel
 from xosc_lateral.driver.models.kinds import ModelKind

@@ -9,7 +9,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.driver.beside import COLUMNS, SIDES, Basis, basis_of
+from xosc_lateral.driver.answers import basis_of
+from xosc_lateral.driver.beside import COLUMNS, SIDES, Basis
 from xosc_lateral.driver.drivability import drivable
 from xosc_lateral.driver.plausibility import check_offsets
 from xosc_lateral.driver.profile import DriverProfile
@@ -119,10 +120,9 @@ def enrich(
             )
             for index, entity in enumerate(motion.entities)
         ]
-        entities = tuple(
-            _result(one, network)
-            for one in (_apart(drawn, motion, network, uncertain) if neighbours is Neighbours.BORROW else drawn)
-        )
+        if neighbours is Neighbours.BORROW:
+            drawn = _apart(drawn, motion, network, uncertain)
+        entities = tuple(_result(one, network) for one in drawn)
         entities = _with_trailers(entities, network, trailers)
         gaps_after = gaps_of(motion, [entity.trajectory for entity in entities])
         departures = tuple(found for entity in entities for found in lane_departures(entity, network))

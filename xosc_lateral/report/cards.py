@@ -6,7 +6,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from typing import Any
 
-from xosc_lateral.driver.beside import SIDES, basis_of, beside_line
+from xosc_lateral.driver.answers import basis_of, beside_line
+from xosc_lateral.driver.beside import SIDES
 from xosc_lateral.driver.effects import Acts, ColumnEffect, Effect
 from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.driver.provenance import Provenance

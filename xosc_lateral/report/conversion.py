@@ -6,7 +6,8 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from xosc_lateral.driver.beside import SIDES, basis_of, beside_line, borrows
+from xosc_lateral.driver.answers import basis_of, beside_line, borrows
+from xosc_lateral.driver.beside import SIDES
 from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.enrich.conversion import ConversionProvenance, ConvertedScenario
 from xosc_lateral.enrich.neighbours import Neighbours
