@@ -13,10 +13,14 @@ from xosc_lateral.driver.answers import basis_of, measure_beside
 from xosc_lateral.driver.beside import Basis, Beside
 from xosc_lateral.driver.effects import Acts, Proximity
 from xosc_lateral.driver.fitting import fit_population
-from xosc_lateral.driver.neighbours import SCALE
+from xosc_lateral.driver.neighbours import LAG, ORDER, RESPONSE, SCALE
 from xosc_lateral.drives.drive import Run
 from xosc_lateral.enrich.enrich import enrich
 from xosc_lateral.enrich.neighbours import Neighbours
+
+BESIDE = Proximity(
+    acts=Acts.LOCATION, column="right_distance", scale=SCALE, lag_s=LAG, response_s=RESPONSE, response_order=ORDER
+)
 
 
 def runs_beside(shift: float, *, drives: int = 3, minutes: float = 10.0, seed: int = 0) -> list[Run]:
@@ -31,10 +35,11 @@ def runs_beside(shift: float, *, drives: int = 3, minutes: float = 10.0, seed: i
             own[i] = 0.98 * own[i - 1] + 0.02 * noise[i]
         distance = np.where(there, 0.0, np.inf)
         context = {"right_distance": distance, "left_distance": np.full(n, np.nan), "speed": np.full(n, 30.0)}
+        near = BESIDE.response(0.2, context)[:, 0]
         width = np.full(n, LANE_WIDTH)
         time = 0.2 * np.arange(n)
         made.append(
-            Run(drive=f"d{k}", index=0, time=time, offset=own + shift * there, lane_width=width, context=context)
+            Run(drive=f"d{k}", index=0, time=time, offset=own + shift * near, lane_width=width, context=context)
         )
     return made
 
