@@ -11,12 +11,15 @@ from tests.motion.made_motion import RADIUS, drive, entity, together, two_roads
 from tests.profiles import simulated_profile
 from xosc_lateral.driver.effects import Acts, Effect, Factor, Form, Linear, Product
 from xosc_lateral.enrich.enrich import enrich
+from xosc_lateral.enrich.neighbours import Neighbours
 from xosc_lateral.motion.nominal import NominalMotion, PlayedAction
 from xosc_lateral.road.network import RoadNetwork
 from xosc_lateral.scenario import Action, Place
 from xosc_lateral.scenario.actions.environment import EnvironmentAction
 from xosc_lateral.scenario.enums import VehicleCategory
 from xosc_lateral.scenario.environment import Environment, Weather
+
+PROFILE = Neighbours.PROFILE
 
 SIZE, LOOK_AHEAD, RESPONSE = 0.3, 1.2, 2.0
 
@@ -25,8 +28,8 @@ def _effect_alone(motion: NominalMotion, network: RoadNetwork, effect: Effect) -
     """Time and what the effect adds to the first vehicle's offset: the same seed with and without it."""
     base = simulated_profile()
     name = motion.entities[0].name
-    without = enrich(motion, network, {name: base}, seed=4, joint=False).entity(name)
-    with_it = enrich(motion, network, {name: replace(base, effects=(effect,))}, seed=4, joint=False).entity(name)
+    without = enrich(motion, network, {name: base}, seed=4, neighbours=PROFILE).entity(name)
+    with_it = enrich(motion, network, {name: replace(base, effects=(effect,))}, seed=4, neighbours=PROFILE).entity(name)
     assert not with_it.neutral
     (plain,), (changed,) = without.segments, with_it.segments
     return changed.time, changed.offset - plain.offset

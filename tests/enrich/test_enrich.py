@@ -15,8 +15,11 @@ from tests.profiles import simulated_profile
 from xosc_lateral.driver.effects import Acts, ColumnEffect
 from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.enrich.enrich import enrich
+from xosc_lateral.enrich.neighbours import Neighbours
 from xosc_lateral.motion.nominal import Activity
 from xosc_lateral.motion.trajectory import distance_driven
+
+PROFILE = Neighbours.PROFILE
 
 
 class Shift(ColumnEffect, frozen=True, kw_only=True):
@@ -92,7 +95,7 @@ def test_each_entity_has_random_numbers_of_its_own(tmp_path: Path) -> None:
     profile = simulated_profile()
     a, b = drive(network, entity("a")), drive(network, entity("b"), lane=-1)
     alone = enrich(together(a), network, {"a": profile}, seed=5)
-    both = enrich(together(b, a), network, {"a": profile, "b": profile}, seed=5, joint=False)
+    both = enrich(together(b, a), network, {"a": profile, "b": profile}, seed=5, neighbours=PROFILE)
     np.testing.assert_array_equal(alone.entity("a").deviation, both.entity("a").deviation)
     assert not np.array_equal(both.entity("a").deviation, both.entity("b").deviation)
     for other in ({"seed": 6}, {"seed": 5, "variant": 1}, {"seed": 5, "entropy": {"a": [1]}}):
@@ -134,11 +137,11 @@ def test_touching_and_leaving_the_lane_are_reported_and_resampled_on_request(tmp
     motion = together(drive(network, entity("a"), lane=-2), drive(network, entity("b"), lane=-1))
     far_left = (np.array([0.0, 10.0]), np.array([2.2, 2.2]))
     driver = _with(simulated_profile(), Shift(column="push"))
-    result = enrich(motion, network, {"a": driver}, seed=1, context={"push": far_left}, joint=False)
+    result = enrich(motion, network, {"a": driver}, seed=1, context={"push": far_left}, neighbours=PROFILE)
     assert [departure.name for departure in result.departures] == ["a"]
     assert [gap.names for gap in result.new_contacts] == [("a", "b")]
     assert len(result.warnings()) == 2
-    again = enrich(motion, network, {"a": driver}, seed=1, context={"push": far_left}, attempts=3, joint=False)
+    again = enrich(motion, network, {"a": driver}, seed=1, context={"push": far_left}, attempts=3, neighbours=PROFILE)
     assert len(again.departures) == 1  # nothing helps against a driver who is pushed over the marking
     jointly = enrich(motion, network, {"a": driver}, seed=1, context={"push": far_left})
     assert not jointly.new_contacts, "a car that is there is given way to"

@@ -43,6 +43,7 @@ def convert_many(
     parameters: Mapping[str, object] | None = None,
     mode: Literal["auto", "trajectory", "lane-offset"] = "auto",
     ego: Collection[str] | None = None,
+    neighbours: Literal["profile", "borrow", "none"] | None = None,
     player: Literal["standard", "esmini", "carla"] = "standard",
     version: str | None = None,
     library: Paths = (),
@@ -67,10 +68,11 @@ def convert_many(
     ----------
     scenarios : str, Path, DataFrame, or sequence of paths
         A file, a folder (searched to the bottom), a glob, a table (CSV, Parquet) or frame with a column `scenario` and
-        if wanted `profile`, `profile:ENTITY`, `seed`, `variants`, `only`, `parameter:NAME`; or several of them.
+        if wanted `profile`, `profile:ENTITY`, `seed`, `variants`, `only`, `neighbours`, `parameter:NAME`; or several of
+        them.
     output : str or Path
         Folder; it mirrors the inputs, and holds `manifest.parquet` at the end.
-    profile, entity, only, seed, context, parameters, mode, ego, player, version
+    profile, entity, only, seed, context, parameters, mode, ego, neighbours, player, version
         See `convert`.
     library, allow, road, road_path, attempts, time_limit, with_sensor
         See `convert`.
@@ -107,6 +109,7 @@ def convert_many(
         parameters=parameters,
         mode=mode,
         ego=ego,
+        neighbours=neighbours,
         player=player,
         version=version,
         library=library,

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from xosc_lateral.api.inputs import PathLike, Paths, ProfileLike, as_paths, road_search
 from xosc_lateral.api.result import Result
+from xosc_lateral.enrich.neighbours import Neighbours
 from xosc_lateral.errors import FormatError
-from xosc_lateral.formats.configuration import configured_egos
+from xosc_lateral.formats.configuration import configured_egos, configured_neighbours
 from xosc_lateral.formats.openscenario.write.target import target
 from xosc_lateral.formats.output_paths import claim, output_file
 from xosc_lateral.pipeline.convert import convert_scenario
@@ -40,6 +41,7 @@ def convert(
     parameters: Mapping[str, object] | None = None,
     mode: Literal["auto", "trajectory", "lane-offset"] = "auto",
     ego: Collection[str] | None = None,
+    neighbours: Literal["profile", "borrow", "none"] | None = None,
     player: Literal["standard", "esmini", "carla"] = "standard",
     version: str | None = None,
     library: Paths = (),
@@ -81,6 +83,9 @@ def convert(
     ego : collection of str, optional
         Vehicles under test, which are left as they are, beside those that the scenario leaves to somebody else (an
         external controller, CARLA's `ego_vehicle`); ("none",): there is none.
+    neighbours : {"profile", "borrow", "none"}, optional
+        How drivers answer to vehicles beside them: as the profile alone says; by a population's law, too, where the
+        profile's answer is not known; not at all. None: as configured, else "borrow".
     player : {"standard", "esmini", "carla"}
         Who is to play it: nobody in particular, or a player with ways of its own.
     version : str, optional
@@ -116,6 +121,7 @@ def convert(
         parameters=parameters,
         mode=mode,
         ego=ego,
+        neighbours=neighbours,
         player=player,
         version=version,
         library=library,
@@ -162,6 +168,7 @@ def convert_settings(
     parameters: Mapping[str, object] | None = None,
     mode: str = "auto",
     ego: Collection[str] | None = None,
+    neighbours: str | None = None,
     player: str = "standard",
     version: str | None = None,
     library: Paths = (),
@@ -186,6 +193,7 @@ def convert_settings(
         attempts=attempts,
         mode=OutputMode(mode),
         ego=_egos(ego),
+        neighbours=Neighbours(neighbours or configured_neighbours() or Neighbours.BORROW),
         target=target(player, version),
         libraries=as_paths(library),
         allowed=as_paths(allow),

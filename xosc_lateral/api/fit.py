@@ -64,7 +64,8 @@ def fit(
         The drives are of left-hand traffic: roads with right-hand traffic get their mirror image.
     neighbours : bool, optional
         Whether the profile holds how drivers keep away from vehicles beside them, from `left_distance` and
-        `right_distance`. That takes 30 drives that had somebody there, and not the two-level model. None: where it can
+        `right_distance`: of 30 drives that had somebody there, or of fewer that are taken as one driver's and say it
+        surely enough; not in the two-level model. None: where it can
         be fitted; True: or an error says why not; False: in no case.
 
     Raises

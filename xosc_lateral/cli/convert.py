@@ -26,6 +26,7 @@ from xosc_lateral.cli.words import (
     warn,
     write_stdout,
 )
+from xosc_lateral.enrich.neighbours import Neighbours
 from xosc_lateral.formats.openscenario.write.target import Player
 from xosc_lateral.limits import JOB_MEMORY, JOB_TIMEOUT
 from xosc_lateral.pipeline.settings import OutputMode
@@ -75,6 +76,14 @@ def convert(
             metavar="NAME",
             help="Vehicle under test: left as it is; may be repeated. Those with an external controller are found "
             "by themselves. none: there is none.",
+        ),
+    ] = None,
+    neighbours: Annotated[
+        Neighbours | None,
+        typer.Option(
+            help="How drivers answer to vehicles beside them: as their profile alone says; borrow: by a population's "
+            "law where that is not known (default); none: not at all.",
+            show_default=False,
         ),
     ] = None,
     variants: Annotated[int, typer.Option(help="Number of outputs, each with different offsets.", min=1)] = 1,
@@ -138,6 +147,7 @@ def convert(
         "entity": pairs(entity, "--entity"),
         "only": only or None,
         "ego": _egos(ego),
+        "neighbours": None if neighbours is None else neighbours.value,
         "seed": seed,
         "context": context,
         "parameters": pairs(parameter, "--set"),

@@ -9,6 +9,8 @@ import numpy as np
 from msgspec.structs import replace
 from numpy.typing import NDArray
 
+from xosc_lateral.driver.answers import answer_effects, measure_beside
+from xosc_lateral.driver.effects import ColumnEffect
 from xosc_lateral.driver.models.base import CoreModel
 from xosc_lateral.driver.models.kinds import ModelKind
 from xosc_lateral.driver.models.registry import model_named
@@ -17,6 +19,7 @@ from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.driver.provenance import Provenance
 from xosc_lateral.driver.sensor.model import SensorModel
 from xosc_lateral.driver.sensor.runs import driver_runs
+from xosc_lateral.driver.zone_levels import LEAST_DRIVES
 from xosc_lateral.drives.cuts import PAPER_RULES, CutRules, all_runs
 from xosc_lateral.drives.drive import Drive, Run
 from xosc_lateral.errors import DriverProfileError
@@ -107,9 +110,15 @@ def fit_population(
     neighbours : bool, optional
         Whether also what vehicles beside them do; None: where they are known (`fit_place`).
     """
-    place = fit_place(runs, neighbours=neighbours)
+    few = len({run.drive for run in runs}) < LEAST_DRIVES
+    beside = measure_beside(runs)
+    place: tuple[ColumnEffect, ...]
+    if few and neighbours is not False and beside:
+        place = tuple(answer_effects(runs, beside))
+    else:
+        place = fit_place(runs, neighbours=neighbours)
     profile = fit_runs(without_place(runs, place), name=name, model=model, provenance=provenance)
-    return replace(profile, sensor=sensor, effects=place)
+    return replace(profile, sensor=sensor, effects=place, beside=beside)
 
 
 def fit_runs(

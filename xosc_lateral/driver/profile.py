@@ -11,6 +11,7 @@ from typing import Any
 import msgspec
 from msgspec import defstruct, field, structs
 
+from xosc_lateral.driver.beside import SIDES, Beside
 from xosc_lateral.driver.effects import Effect, any_effect
 from xosc_lateral.driver.models.base import CoreModel
 from xosc_lateral.driver.models.registry import CORE_MODELS, any_model
@@ -44,6 +45,8 @@ class DriverProfile(Record, frozen=True):
         What the sensor added to the drives it was fitted on, where that is known.
     left_hand : bool
         Fitted on left-hand traffic. On a road of the other hand it is sampled as in a mirror.
+    beside : mapping of str to Beside
+        By side, "left" and "right": whether its answer to neighbours there is known, and how.
 
     Raises
     ------
@@ -59,6 +62,7 @@ class DriverProfile(Record, frozen=True):
     metadata: Metadata = field(default_factory=Metadata)
     sensor: SensorModel | None = None
     left_hand: bool = False
+    beside: Mapping[str, Beside] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         """Check."""
@@ -68,6 +72,9 @@ class DriverProfile(Record, frozen=True):
             raise DriverProfileError(
                 f"profile {self.name}: lane width {self.lane_width} m, expected above 0, at most {MAX_LANE_WIDTH:g} m"
             )
+        for side in self.beside:
+            if side not in SIDES:
+                raise DriverProfileError(f"profile {self.name}: beside {side!r}, expected left or right")
         set_once(self, effects=tuple(self.effects))
 
     def __repr__(self) -> str:
@@ -95,7 +102,8 @@ class DriverProfile(Record, frozen=True):
         values["effects"] = [effect.to_dict() for effect in self.effects]
         values["sensor"] = None if self.sensor is None else self.sensor.to_dict()
         hand = ("left_hand",) if self.left_hand else ()
-        order = ("id", "metadata", "lane_width", *hand, "model", "effects", "sensor", "provenance")
+        beside = ("beside",) if self.beside else ()
+        order = ("id", "metadata", "lane_width", *hand, "model", "effects", *beside, "sensor", "provenance")
         return {"format": FORMAT, "version": VERSION, **{name: values[name] for name in order}}
 
     @classmethod

@@ -35,6 +35,8 @@ class ConversionProvenance:
         Who alone was to be enriched.
     attempts : int
         Samplings at most while vehicles touch or leave their lane.
+    neighbours : str
+        Whose answer to vehicles beside them drivers have: "profile", "borrow" or "none".
     behaviour : int
         `version.BEHAVIOUR` of the program.
     """
@@ -52,6 +54,7 @@ class ConversionProvenance:
     modes: Mapping[str, str] = field(default_factory=dict)
     only: tuple[str, ...] | None = None
     attempts: int = 1
+    neighbours: str = "borrow"
     behaviour: int = 1
 
     @property

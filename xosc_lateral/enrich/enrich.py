@@ -9,6 +9,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from xosc_lateral.driver.answers import basis_of
+from xosc_lateral.driver.beside import COLUMNS, SIDES, Basis
 from xosc_lateral.driver.drivability import drivable
 from xosc_lateral.driver.plausibility import check_offsets
 from xosc_lateral.driver.profile import DriverProfile
@@ -16,6 +18,7 @@ from xosc_lateral.driver.sampling import OffsetSampler
 from xosc_lateral.driver.sensor.error import known_sensor, sensor_error
 from xosc_lateral.enrich.consequences import gaps_of, lane_departures
 from xosc_lateral.enrich.give_way import SampledVehicle, give_way
+from xosc_lateral.enrich.neighbours import Neighbours
 from xosc_lateral.enrich.other_hand import mirrored, other_side
 from xosc_lateral.enrich.result import Enriched, EntityResult, SampledSegment
 from xosc_lateral.motion.context import entity_context
@@ -35,9 +38,7 @@ SAMPLE_STEP = 0.2
 PAST, FUTURE = 30.0, 10.0
 """Context before and after a segment that its effects may look at [s]: several response times, and any look-ahead."""
 
-NEIGHBOURS = frozenset(
-    f"{side}_{what}" for side in ("left", "right") for what in ("distance", "is_truck", "truck", "car")
-) | {"truck_left", "truck_right", "car_left", "car_right"}
+NEIGHBOURS = frozenset(column for columns in COLUMNS.values() for column in columns)
 """Columns by which a profile responds to neighbours by itself."""
 
 Drivers = Mapping[str, DriverProfile | str]
@@ -55,7 +56,7 @@ def enrich(
     context: Mapping[str, tuple[FloatArray, FloatArray]] | None = None,
     trailers: Mapping[str, str] | None = None,
     attempts: int = 1,
-    joint: bool = True,
+    neighbours: Neighbours = Neighbours.BORROW,
     with_sensor: bool = False,
     uncertain: Collection[str] = (),
 ) -> Enriched:
@@ -79,8 +80,10 @@ def enrich(
         Entity that is pulled -> entity that pulls it: it follows in the tractor's track.
     attempts : int
         Sample anew up to so many times while vehicles touch or leave their lane that nominally don't; the best is kept.
-    joint : bool
-        Neighbours give way to each other (`give_way`); False: every vehicle as its profile alone has it.
+    neighbours : Neighbours
+        `profile`: every vehicle answers to those beside it as its profile alone has it. `borrow`: neighbours give way
+        to each other by a population's law, too, where a profile's answer is not known (`give_way`). `none`: nobody
+        answers to anybody beside him.
     with_sensor : bool
         Add what the sensor added to the drives that each profile was fitted on. Nobody drives that: it is added after
         drivers have given way and after what nobody could drive was smoothed.
@@ -113,12 +116,13 @@ def enrich(
                 context or {},
                 with_sensor,
                 uncertain,
+                neighbours,
             )
             for index, entity in enumerate(motion.entities)
         ]
-        entities = tuple(
-            _result(one, network) for one in (_apart(drawn, motion, network, uncertain) if joint else drawn)
-        )
+        if neighbours is Neighbours.BORROW:
+            drawn = _apart(drawn, motion, network, uncertain)
+        entities = tuple(_result(one, network) for one in drawn)
         entities = _with_trailers(entities, network, trailers)
         gaps_after = gaps_of(motion, [entity.trajectory for entity in entities])
         departures = tuple(found for entity in entities for found in lane_departures(entity, network))
@@ -168,7 +172,9 @@ class _Drawn:
     errors : tuple of array
         What a sensor adds to each segment's offsets; zeros unless asked for. [m]
     heeds : frozenset of str
-        Sides on which the profile responds to neighbours by itself.
+        Sides on which the profile responds to neighbours by itself, as its population does.
+    alone : frozenset of str
+        Sides on which that is known of the driver himself: nothing is borrowed.
     """
 
     motion: EntityMotion
@@ -179,6 +185,7 @@ class _Drawn:
     neutral: tuple[str, ...] = ()
     errors: tuple[FloatArray, ...] = ()
     heeds: frozenset[str] = frozenset()
+    alone: frozenset[str] = frozenset()
 
     def deviation(self, distance: FloatArray) -> FloatArray:
         """On every row, positive left. [m]"""
@@ -200,6 +207,7 @@ def _draw(
     foreign_context: Mapping[str, tuple[FloatArray, FloatArray]],
     with_sensor: bool,
     uncertain: Collection[str],
+    neighbours: Neighbours,
 ) -> _Drawn:
     entity = motion.entities[index]
     motion, index = _foreseen(motion, index, uncertain)
@@ -209,15 +217,18 @@ def _draw(
     every = max(1, round(SAMPLE_STEP / motion.step))
     segments: list[tuple[SegmentSpan, IntArray, FloatArray]] = []
     errors: list[FloatArray] = []
-    neutral, heeds = set[str](), set[str]()
+    neutral, heeds, alone = set[str](), set[str](), set[str]()
     for span in spans:
         knots = np.arange(span.first, span.last + 1, every)
         if not span.is_road_following or len(knots) < 2:
             continue
         segment = _segment(motion, network, index, knots, every, foreign_context)
+        if neighbours is Neighbours.NONE:
+            segment = _with_nobody_beside(segment)
         neutral |= _unknown(driver, segment)
         other_hand = _is_left_hand(entity, network, knots) != driver.left_hand
-        heeds |= _heeded(driver, other_hand=other_hand)
+        heeds |= _sides(driver, {Basis.POPULATION}, other_hand=other_hand)
+        alone |= _sides(driver, {Basis.MEASURED, Basis.DECLARED}, other_hand=other_hand)
         wanted = -sampler.sample(mirrored(segment)) if other_hand else sampler.sample(segment)
         inside = segment.inside
         who = f"profile {driver.name} for {entity.name!r}"
@@ -227,15 +238,23 @@ def _draw(
     if not segments:
         return _Drawn(entity, spans, None, "no road-following segment")
     unknown = tuple(sorted(neutral))
-    return _Drawn(entity, spans, driver, "", tuple(segments), unknown, tuple(errors), frozenset(heeds))
+    return _Drawn(
+        entity, spans, driver, "", tuple(segments), unknown, tuple(errors), frozenset(heeds), frozenset(alone)
+    )
 
 
-def _heeded(driver: DriverProfile, *, other_hand: bool) -> set[str]:
-    """Sides, "left" and "right", on which a profile responds to neighbours by itself."""
-    columns = NEIGHBOURS & set(driver.columns)
-    return {"left", "right"} & {
-        word for column in columns for word in (other_side(column) if other_hand else column).split("_")
+def _sides(driver: DriverProfile, known: set[Basis], *, other_hand: bool) -> set[str]:
+    """Sides of the road, "left" and "right", on which the driver's answer to neighbours is known in such a way."""
+    return {other_side(side) if other_hand else side for side in SIDES if basis_of(driver, side) in known}
+
+
+def _with_nobody_beside(segment: Segment) -> Segment:
+    nobody = {
+        name: np.full_like(values, np.nan if name.endswith("distance") else 0.0)
+        for name, values in segment.context.items()
+        if name in NEIGHBOURS
     }
+    return replace(segment, context={**segment.context, **nobody})
 
 
 def _foreseen(motion: NominalMotion, index: int, uncertain: Collection[str]) -> tuple[NominalMotion, int]:
@@ -277,7 +296,7 @@ def _sampled(one: _Drawn) -> SampledVehicle:
         deviation = one.deviation(distance_driven(one.motion))
         for span, _, _ in one.segments:
             can_move[span.first : span.last + 1] = True
-    return SampledVehicle(one.motion, deviation, can_move, one.heeds)
+    return SampledVehicle(one.motion, deviation, can_move, one.heeds, one.alone)
 
 
 def _result(drawn: _Drawn, network: RoadNetwork) -> EntityResult:

@@ -70,12 +70,15 @@ class SampledVehicle:
     heeds : frozenset of str
         Sides, "left" and "right", on which its profile responds to neighbours by itself: there, gaps are widened by
         what that leaves to be widened.
+    alone : frozenset of str
+        Sides on which its answer to neighbours is known to be what its profile says: there the law moves it nowhere.
     """
 
     motion: EntityMotion
     deviation: FloatArray
     can_move: NDArray[np.bool_]
     heeds: frozenset[str] = frozenset()
+    alone: frozenset[str] = frozenset()
 
 
 def give_way(
@@ -107,6 +110,7 @@ def give_way(
                 aside, is_left, heeded = widening  # of `own`, by where `other` is
                 share = _part(is_left == left_hand[own], heeded)
                 share = np.where(frames[other].can_move, share, 1.0) * frames[own].can_move
+                share *= np.where(is_left, "left" not in sampled[own].alone, "right" not in sampled[own].alone)
                 right[own] = np.maximum(right[own], np.where(is_left, share * aside, 0.0))
                 left[own] = np.maximum(left[own], np.where(is_left, 0.0, share * aside))
     every = max(1, int(rows[1] - rows[0])) if n > 1 else 1

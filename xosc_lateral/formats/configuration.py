@@ -1,13 +1,16 @@
-"""The user's configuration file: libraries and vehicles under test."""
+"""The user's configuration file: libraries, vehicles under test, and whose answer to neighbours drivers have."""
 
 from __future__ import annotations
 
 import os
 from pathlib import Path
 
+from xosc_lateral.enrich.neighbours import Neighbours
 from xosc_lateral.errors import FormatError
 
-KEYS = ("library", "ego")
+NEIGHBOURS = tuple(map(str, Neighbours))
+
+KEYS = ("library", "ego", "neighbours")
 
 
 def configuration_file() -> Path | None:
@@ -48,6 +51,20 @@ def configured_egos() -> list[str] | None:
     return _configured("ego", "entities")[1]
 
 
+def configured_neighbours() -> str | None:
+    """Whose answer to neighbours the configuration names; None: it names none.
+
+    Raises
+    ------
+    FormatError
+        If it is no TOML, or says something else.
+    """
+    path, found = _configured("neighbours", "texts")
+    if found is not None and (len(found) != 1 or found[0] not in NEIGHBOURS):
+        raise FormatError(f"neighbours = {found!r}: expected one of {', '.join(NEIGHBOURS)}", path=path)
+    return None if found is None else found[0]
+
+
 def _configured(key: str, what: str) -> tuple[Path | None, list[str] | None]:
     """The file, and a list of texts in it; None where there is none."""
     path = configuration_file()
@@ -64,7 +81,7 @@ def _configured(key: str, what: str) -> tuple[Path | None, list[str] | None]:
         raise FormatError(f"not TOML: {error}", path=path) from error
     unknown = sorted(values.keys() - set(KEYS))
     if unknown:
-        raise FormatError(f"unknown key {unknown[0]!r}; there are {' and '.join(KEYS)}", path=path)
+        raise FormatError(f"unknown key {unknown[0]!r}; there are {', '.join(KEYS)}", path=path)
     if key not in values:
         return path, None
     found = values[key]

@@ -9,6 +9,7 @@ import numpy as np
 from msgspec import structs
 from numpy.typing import NDArray
 
+from xosc_lateral.driver.beside import COLUMNS
 from xosc_lateral.driver.effects import ColumnEffect, Effect
 from xosc_lateral.driver.fitting import fit_population, fit_runs
 from xosc_lateral.driver.models.kinds import ModelKind
@@ -132,7 +133,9 @@ def fit_without(
     else:
         profile = fit_population(runs, name=name, model=kind, provenance=provenance, neighbours=False)
     effects: tuple[Effect, ...] = tuple(effect for _, own in estimates.values() for effect in own)
-    return structs.replace(profile, effects=(*profile.effects, *effects))
+    read = {column for effect in effects for column in effect.columns}  # what they say is measured, and taken out here
+    beside = {side: one for side, one in profile.beside.items() if read.isdisjoint(COLUMNS[side])}
+    return structs.replace(profile, effects=(*profile.effects, *effects), beside=beside)
 
 
 def _quantities(selection: Selection, columns: list[Column]) -> dict[str, FloatArray]:

@@ -112,6 +112,7 @@ def _convert(
         trailers=played.trailers,
         attempts=settings.attempts,
         with_sensor=settings.with_sensor,
+        neighbours=settings.neighbours,
         uncertain=depends.entities,
     )
     _refuse_lanes_without_width(played, enriched)
@@ -251,6 +252,7 @@ def _provenance(
         modes={name: mode for name, mode in plan.modes().items() if enriched.entity(name).is_enriched},
         only=None if settings.only is None else tuple(sorted(settings.only)),
         attempts=settings.attempts,
+        neighbours=settings.neighbours.value,
         behaviour=BEHAVIOUR,
     )
 

@@ -20,6 +20,7 @@ import numpy as np
 from msgspec.structs import replace
 from numpy.typing import NDArray
 
+from xosc_lateral.driver.beside import POPULATION as ANSWERS
 from xosc_lateral.driver.fitting import fit_population, fit_runs
 from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.driver.provenance import Metadata, Provenance
@@ -82,7 +83,8 @@ def build_library(source: Path, *, model: str = "best", refine: bool = True) -> 
     known = Provenance(source=SOURCE, licence=LICENCE, inputs={source.name: parsed_hash(source)})
     population = _population_profile(seen, known, model)
     refined = [_refined_profile(drives, runs, known)] if refine else []
-    profiles = [population, *refined, *_single_profiles(seen, kind, known, model)]
+    of_all = [replace(profile, beside=ANSWERS) for profile in (population, *refined)]
+    profiles = [*of_all, *_single_profiles(seen, kind, known, model)]
     return [replace(profile, metadata=shipped_metadata(profile)) for profile in profiles]
 
 

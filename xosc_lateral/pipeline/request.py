@@ -9,6 +9,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from xosc_lateral.enrich.neighbours import Neighbours
 from xosc_lateral.errors import FormatError
 from xosc_lateral.formats.tables import TABLE_SUFFIXES, as_text, read_text_table
 from xosc_lateral.pipeline.document_kind import DISTRIBUTIONS, document_kind
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
 
 SCENARIO_SUFFIX = ".xosc"
 
-COLUMNS = ("scenario", "profile", "seed", "variants", "only", "ego", "parameters")
+COLUMNS = ("scenario", "profile", "seed", "variants", "only", "ego", "neighbours", "parameters")
 PREFIXES = ("profile:", "parameter:", "user:")
 """What a table of scenarios may hold."""
 
@@ -94,7 +95,7 @@ def read_request_table(path: Path, settings: ConvertSettings, *, variants: int =
     """Scenarios of a table, one a row.
 
     Columns: ``scenario`` (path, from the table's folder), and if wanted ``profile``, ``profile:ENTITY``, ``seed``,
-    ``variants``, ``only`` and ``ego`` (entities, separated by semicolons; ego ``none``: there is none),
+    ``variants``, ``only`` and ``ego`` (entities, separated by semicolons; ego ``none``: there is none), ``neighbours``,
     ``parameter:NAME`` and ``parameters`` (JSON object). An empty cell leaves what `settings` says. Columns
     ``user:NAME`` are for the user: tags, owners.
 
@@ -209,7 +210,15 @@ def _row_settings(cells: Mapping[str, str], settings: ConvertSettings, folder: P
         seed=_whole_number(cells, "seed", settings.seed, smallest=0),
         only=settings.only if only is None else _names(only),
         ego=settings.ego if ego is None else egos_named(_names(ego)),
+        neighbours=_neighbours(cells.get("neighbours"), settings.neighbours),
     )
+
+
+def _neighbours(text: str | None, otherwise: Neighbours) -> Neighbours:
+    try:
+        return otherwise if text is None else Neighbours(text)
+    except ValueError as error:
+        raise ValueError(f"neighbours {text!r}, expected one of {', '.join(Neighbours)}") from error
 
 
 def _names(text: str) -> frozenset[str]:

@@ -8,6 +8,7 @@ from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from xosc_lateral.enrich.neighbours import Neighbours
 from xosc_lateral.formats.openscenario.read import NO_ROADS, RoadSearch
 from xosc_lateral.formats.openscenario.write.target import STANDARD, TargetPlayer
 
@@ -87,6 +88,8 @@ class ConvertSettings:
         Of playback; None: see `playback.player.play`. [s]
     with_sensor : bool
         Add the sensor error of the drives that profiles were fitted on.
+    neighbours : Neighbours
+        Whose answer to vehicles beside them drivers have.
     """
 
     profile: str | DriverProfile = AUTO
@@ -107,3 +110,4 @@ class ConvertSettings:
     step: float = STEP
     time_limit: float | None = None
     with_sensor: bool = False
+    neighbours: Neighbours = Neighbours.BORROW

@@ -6,6 +6,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from typing import Any
 
+from xosc_lateral.driver.answers import basis_of, beside_line
+from xosc_lateral.driver.beside import SIDES
 from xosc_lateral.driver.effects import Acts, ColumnEffect, Effect
 from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.driver.provenance import Provenance
@@ -90,6 +92,7 @@ def card(profile: DriverProfile) -> dict[str, Any]:
         "sha256": profile_hash(profile),
         "model": profile.model.kind,
         "effects": [effect.to_dict() for effect in profile.effects],
+        "neighbours": {side: basis_of(profile, side).value for side in SIDES},
         "lane_width": profile.lane_width,
         "summary": {name: round(value, 4) for name, value in asdict(summary_of(profile)).items()},
         "provenance": known.to_dict(),
@@ -104,6 +107,7 @@ def card_text(profile: DriverProfile) -> str:
         *_indented("", known.notes),
         f"  model      {profile.model.kind}, {_effects(profile)}, lane width {profile.lane_width:.2f} m",
         *(f"  effect     {effect_line(effect)}" for effect in profile.effects),
+        f"  neighbours {'; '.join(beside_line(profile, side) for side in SIDES)}",
         *_summary_lines(profile, summary_of(profile)),
         f"  fitted on  {amount(profile)}",
         *_indented("source", known.source),

@@ -6,7 +6,11 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+from xosc_lateral.driver.answers import basis_of, beside_line, borrows
+from xosc_lateral.driver.beside import SIDES
+from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.enrich.conversion import ConversionProvenance, ConvertedScenario
+from xosc_lateral.enrich.neighbours import Neighbours
 from xosc_lateral.motion.gaps import Gap
 
 WRITTEN_AS = {"trajectory": "a trajectory", "lane-offset": "lane offsets"}
@@ -24,6 +28,7 @@ def as_text(conversion: ConvertedScenario, report: Path | None = None) -> str:
                 f"offsets {entity.offset_spread:.2f} m (standard deviation), profile {entity.profile.name}, "
                 f"as {WRITTEN_AS.get(mode, mode)}"
             )
+            lines.append(f"    neighbours: {beside_text(entity.profile, conversion.provenance.neighbours)}")
         else:
             lines.append(f"  {entity.name}: as in the scenario ({entity.why})")
     if conversion.provenance.with_sensor:
@@ -33,6 +38,17 @@ def as_text(conversion: ConvertedScenario, report: Path | None = None) -> str:
     if report is not None:
         lines.append(f"report: {report}")
     return "\n".join(lines)
+
+
+def beside_text(profile: DriverProfile, neighbours: str) -> str:
+    """How a driver answers to vehicles beside him, and where that is known from, in a line."""
+    if neighbours == Neighbours.NONE:
+        return "no answer (--neighbours none)"
+    return "; ".join(
+        beside_line(profile, side)
+        + (": borrowed from the population" * (neighbours == Neighbours.BORROW and borrows(profile, side)))
+        for side in SIDES
+    )
 
 
 def under_test(conversion: ConvertedScenario) -> str:
@@ -61,6 +77,7 @@ def facts(conversion: ConvertedScenario, report: Path | None = None) -> dict[str
                 "name": entity.name,
                 "profile": entity.profile.name if entity.is_enriched and entity.profile is not None else None,
                 "why_not": entity.why,
+                "neighbours": _beside_facts(entity.profile) if entity.is_enriched else None,
                 "mode": conversion.provenance.modes.get(entity.name),
                 "segments": [[round(segment.span.start, 6), round(segment.span.end, 6)] for segment in entity.segments],
                 "offset_spread": round(entity.offset_spread, 6),
@@ -74,6 +91,10 @@ def facts(conversion: ConvertedScenario, report: Path | None = None) -> dict[str
         "warnings": list(conversion.warnings),
         "provenance": provenance_record(conversion.provenance),
     }
+
+
+def _beside_facts(profile: DriverProfile | None) -> dict[str, str] | None:
+    return None if profile is None else {side: basis_of(profile, side).value for side in SIDES}
 
 
 def provenance_record(provenance: ConversionProvenance) -> dict[str, Any]:

@@ -14,7 +14,7 @@ from xosc_lateral.motion.gaps import REACH, Gap
 from xosc_lateral.motion.nominal import Note
 from xosc_lateral.report import scenario_figures as figures
 from xosc_lateral.report import scenario_time_figures as over_time
-from xosc_lateral.report.conversion import WRITTEN_AS, under_test
+from xosc_lateral.report.conversion import WRITTEN_AS, beside_text, under_test
 from xosc_lateral.report.path_dynamics import COMFORTABLE
 from xosc_lateral.report.player.scene import enriched_scene
 from xosc_lateral.report.render import KeyFigure, Tone, render_page
@@ -44,6 +44,11 @@ def conversion_page(conversion: ConvertedScenario) -> str:
         provenance={
             "under test": list(made.ego) or "none",
             "written as": [f"{name}: {WRITTEN_AS[mode]}" for name, mode in made.modes.items()],
+            "neighbours": [
+                f"{one.name}: {beside_text(one.profile, made.neighbours)}"
+                for one in conversion.enriched.entities
+                if one.is_enriched and one.profile is not None
+            ],
             "seed": made.seed,
             "variant": made.variant,
             "parameters set": [f"{name} = {value}" for name, value in made.parameters.items()],

@@ -1,0 +1,175 @@
+"""Whether a driver answers to vehicles beside him: measured, declared, or unknown.
+
+Measured means that enough driving beside somebody was seen to say how far he moves, also when that is not at all. What
+is unknown is a population's to lend.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from xosc_lateral.driver.beside import COLUMNS, SIDES, Basis, Beside
+from xosc_lateral.driver.effects import Acts, ColumnEffect, Linear, Proximity
+from xosc_lateral.driver.neighbours import LAG, ORDER, RESPONSE, SCALE
+from xosc_lateral.drives.drive import Run
+from xosc_lateral.drives.resampling import STEP
+
+if TYPE_CHECKING:
+    from xosc_lateral.driver.profile import DriverProfile
+
+FloatArray = NDArray[np.float64]
+
+SURE = 0.05
+"""A shift is measured when its standard error is at most this: what separates drivers who answer (0.2 m) from those who
+don't by four errors. [m]"""
+
+LEAST_SECONDS = 60.0
+"""Driving beside somebody, and away from anybody, below which no error is trusted. [s]"""
+
+AMONG_DRIVERS = {"left": (-0.0917, 0.1), "right": (0.2551, 0.1)}
+"""Shift alongside, positive left: mean (of the shipped `motorway`: DLR Highway Traffic v1.1.0), and how far single
+drivers are from it, which no recording that we have can tell: assumed, so that errors of 0.05 m weigh a fifth. [m]"""
+
+SIGNIFICANT = 2.6
+"""Standard errors from which a shift becomes an effect: one of a hundred by chance. [-]"""
+
+CLUSTERED = 1.2
+"""By which errors clustered by `BLOCK` are too small, found with simulated drivers whose memory is 10 s (60 seeds: 1.15
+to 1.2 with 12 to 30 minutes). [-]"""
+
+PIECE, BLOCK = 10.0, 60.0
+"""Driving whose mean is one observation, and that is one cluster of the errors: several memories of a driver. [s]"""
+
+
+def basis_of(profile: DriverProfile, side: str) -> Basis:
+    """Where a profile's answer to neighbours on a side is known from.
+
+    A shift that was measured and that no effect of the profile makes is as good as unknown; one that its effects make
+    and of which nothing else is said was measured by who found them.
+    """
+    answers = any(column in COLUMNS[side] for column in profile.columns)
+    known = profile.beside.get(side)
+    if known is None or known.basis is Basis.UNKNOWN:
+        return Basis.MEASURED if answers else Basis.UNKNOWN
+    if known.basis is Basis.MEASURED and not answers and abs(known.shift) > SIGNIFICANT * known.error:
+        return Basis.UNKNOWN
+    return known.basis
+
+
+def borrows(profile: DriverProfile, side: str) -> bool:
+    """Whether a conversion borrows the population's answer on a side unless told otherwise."""
+    return basis_of(profile, side) is Basis.UNKNOWN
+
+
+def measure_beside(runs: Sequence[Run]) -> dict[str, Beside]:
+    """What runs of one driver say of his shift beside somebody, by side; absent where they are too few to say.
+
+    Means over `PIECE` within each drive, speed and lane taken out, errors clustered by `BLOCK`.
+    """
+    shapes = {side: shape for side in SIDES if (shape := _shape(runs, side)) is not None}
+    if not shapes:
+        return {}
+    near = {side: [_near(run, shape) for run in runs] for side, shape in shapes.items()}
+    slopes, errors = _within_drives(runs, near)
+    found = {}
+    for side, slope, error in zip(shapes, slopes, errors, strict=True):
+        beside = np.concatenate(near[side]) > np.exp(-1.0)
+        seconds, away = STEP * beside.sum(), STEP * (~beside).sum()
+        sure = error <= SURE and min(seconds, away) >= LEAST_SECONDS
+        if sure:
+            found[side] = Beside(
+                Basis.MEASURED, round(float(seconds), 1), round(float(slope), 4), round(float(error), 4)
+            )
+    return found
+
+
+def answer_effects(runs: Sequence[Run], known: Mapping[str, Beside]) -> list[ColumnEffect]:
+    """Effects of measured shifts that are beyond chance, pooled with the population's as their errors ask."""
+    from msgspec.structs import replace
+
+    found: list[ColumnEffect] = []
+    for side, one in known.items():
+        shape = _shape(runs, side)
+        if shape is None or one.basis is not Basis.MEASURED or abs(one.shift) <= SIGNIFICANT * one.error:
+            continue
+        mean, spread = AMONG_DRIVERS[side]
+        own = spread**2 / (spread**2 + one.error**2)
+        size, error = own * one.shift + (1.0 - own) * mean, np.sqrt(own) * one.error
+        numbers = {"coefficients": (round(size, 4),), "errors": (round(float(error), 4),), "reference": (0.0,)}
+        found.append(replace(shape, **numbers))
+    return found
+
+
+def _shape(runs: Sequence[Run], side: str) -> ColumnEffect | None:
+    """By the distance, else by the flag for trucks or cars: of which there is somebody, without a coefficient."""
+    for column in (f"{side}_distance", f"truck_{side}", f"car_{side}"):
+        shared = {"acts": Acts.LOCATION, "column": column, "lag_s": LAG, "response_s": RESPONSE}
+        shape: ColumnEffect
+        if column.endswith("distance"):
+            shape = Proximity(scale=SCALE, response_order=ORDER, **shared)  # type: ignore[arg-type]
+        else:
+            shape = Linear(response_order=ORDER, **shared)  # type: ignore[arg-type]
+        if any(column in run.context and (_near(run, shape) > np.exp(-1.0)).any() for run in runs):
+            return shape
+    return None
+
+
+def _near(run: Run, shape: ColumnEffect) -> FloatArray:
+    """From 0 (nobody) to 1 (alongside), shape (n,); a run without the column had nobody there."""
+    if any(column not in run.context for column in shape.columns):
+        return np.zeros(len(run))
+    return np.nan_to_num(shape.response(STEP, run.context)[:, 0])
+
+
+def _within_drives(runs: Sequence[Run], near: Mapping[str, Sequence[FloatArray]]) -> tuple[FloatArray, FloatArray]:
+    """Slopes of the offset by each side's nearness and their errors, shape (sides,) each. [m]"""
+    size, per_block = round(PIECE / STEP), round(BLOCK / PIECE)
+    rows, drive, block = [], [], []
+    numbers = {name: k for k, name in enumerate(dict.fromkeys(run.drive for run in runs))}
+    for k, run in enumerate(runs):
+        columns = [run.offset, *(values[k] for values in near.values()), *_others(run)]
+        for j in range(len(run) // size):
+            rows.append([float(column[j * size : (j + 1) * size].mean()) for column in columns])
+            drive.append(numbers[run.drive])
+            block.append((k, j // per_block))
+    sides = len(near)
+    if len(rows) < len(numbers) + sides + 2:
+        return np.zeros(sides), np.full(sides, np.inf)
+    table, groups = np.array(rows), np.array(drive)
+    counts = np.maximum(np.bincount(groups, minlength=len(numbers)), 1)
+    for column in table.T:
+        column -= (np.bincount(groups, column, minlength=len(numbers)) / counts)[groups]
+    observed, design = table[:, 0], table[:, 1:]
+    inverse = np.linalg.pinv(design.T @ design)
+    slopes = inverse @ design.T @ observed
+    _, cluster = np.unique(np.array(block), axis=0, return_inverse=True)
+    scores = design * (observed - design @ slopes)[:, None]
+    by_block = np.column_stack([np.bincount(cluster.ravel(), column) for column in scores.T])
+    blocks, free = len(by_block), max(len(observed) - len(numbers) - design.shape[1], 1)
+    covariance = inverse @ (by_block.T @ by_block) @ inverse
+    covariance *= blocks / max(blocks - 1, 1) * len(observed) / free
+    told = np.diag(design.T @ design)[:sides] > 1e-6
+    errors = np.where(told & (blocks > 2), CLUSTERED * np.sqrt(np.maximum(np.diag(covariance)[:sides], 0.0)), np.inf)
+    return np.where(told, slopes[:sides], 0.0), errors
+
+
+def _others(run: Run) -> list[FloatArray]:
+    """What else moves a driver and goes along with having somebody beside: speed and lane; 0 where unknown."""
+    return [np.nan_to_num(run.context.get(name, np.zeros(len(run)))) for name in ("speed", "lane_index")]
+
+
+def beside_line(profile: DriverProfile, side: str) -> str:
+    """In words: what is known of a side."""
+    basis, known = basis_of(profile, side), profile.beside.get(side)
+    if known is None or not known.seconds:
+        answer = ", as its effects have it" if basis is not Basis.UNKNOWN else ""
+        return f"{side} {basis}{answer}"
+    way = "left" if known.shift > 0 else "right"
+    return (
+        f"{side} {basis} ({abs(known.shift):.2f} +- {known.error:.2f} m to the {way} alongside, "
+        f"{known.seconds:.0f} s beside somebody)"
+    )
