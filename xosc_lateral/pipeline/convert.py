@@ -29,7 +29,7 @@ from xosc_lateral.formats.profiles import profile_hash
 from xosc_lateral.formats.source import edit_in_place, guarding_inputs
 from xosc_lateral.motion.nominal import Activity
 from xosc_lateral.pipeline.drivers import choose_drivers
-from xosc_lateral.pipeline.load import Played, input_hashes, play_scenario
+from xosc_lateral.pipeline.load import Played, input_hashes, play_longer, play_scenario
 from xosc_lateral.pipeline.meaning import Meaning, keep_meaning
 from xosc_lateral.pipeline.modes import WritingPlan, chosen_egos, writing_plan
 from xosc_lateral.pipeline.settings import ConvertSettings, OutputMode
@@ -39,6 +39,9 @@ from xosc_lateral.scenario.dependence import dependence
 from xosc_lateral.version import BEHAVIOUR, __version__
 
 CHANGES = "with offsets, what happens would happen otherwise"
+LONGER = 1.3
+"""A vehicle under test may be that much later at what ends the run: the others are played, and move in their lanes,
+for that long. A fifth slower takes a quarter longer. [-]"""
 NO_WIDTH = 0.01
 """A lane narrower than this is none. [m]"""
 
@@ -101,8 +104,11 @@ def _convert(
         inputs[settings.context] = context.sha256
     refuse_outputs([output if save else None, report], inputs)
     drivers = choose_drivers(played.scenario, settings, egos)
+    lasting = played
+    if settings.mode is OutputMode.AUTO and depends.of_trigger(played.scenario.storyboard.stop_trigger):
+        lasting = play_longer(played, LONGER, step=settings.step, time_limit=settings.time_limit)
     enriched = enrich(
-        played.motion,
+        lasting.motion,
         played.network,
         drivers,
         seed=settings.seed,
@@ -118,7 +124,7 @@ def _convert(
     _refuse_lanes_without_width(played, enriched)
     names = [entity.name for entity in enriched.entities if entity.is_enriched]
     plan = writing_plan(played.scenario, settings, depends, names, pulled=played.trailers, sampled=sampled)
-    making = _Making(played, settings, variant, inputs, egos, output, save)
+    making = _Making(played, lasting, settings, variant, inputs, egos, output, save)
     if plan.is_replay:
         replayed = _in_replay(played, settings, egos, sampled)
         provenance, written = making.write(enriched, plan, replayed)
@@ -138,9 +144,10 @@ def _convert(
 
 @dataclass(frozen=True, slots=True)
 class _Making:
-    """All that one output is made from, but for the offsets."""
+    """All that one output is made from, but for the offsets; `lasting` is the run that they are for."""
 
     played: Played
+    lasting: Played
     settings: ConvertSettings
     variant: int
     inputs: Mapping[Path, str]
@@ -153,7 +160,7 @@ class _Making:
     ) -> tuple[ConversionProvenance, WrittenScenario]:
         """Write it with these offsets."""
         provenance = _provenance(self.played, enriched, self.settings, self.variant, self.inputs, self.egos, plan)
-        written = _write(self.played, enriched, self.output, provenance, self.settings, plan, replayed, save=self.save)
+        written = _write(self.lasting, enriched, self.output, provenance, self.settings, plan, replayed, save=self.save)
         return provenance, written
 
     def write_reactive(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from pathlib import Path
 
@@ -69,6 +69,14 @@ def play_scenario(
     network = RoadNetwork(()) if scenario.road_file is None else road_network(scenario.road_file)
     values = tuple(sorted((parameters or {}).items()))
     return _played(_Playable(input_hashes(scenario, network), values, step, time_limit, scenario, network))
+
+
+def play_longer(played: Played, factor: float, *, step: float, time_limit: float) -> Played:
+    """The same run, going on beyond what stops it: until `factor` times its end, and the limit at most. [s]"""
+    scenario = played.scenario
+    endless = replace(scenario, storyboard=replace(scenario.storyboard, stop_trigger=None))
+    end = min(factor * played.motion.end_time, time_limit)
+    return replace(played, motion=play(endless, played.network, step=step, time_limit=end))
 
 
 def input_hashes(scenario: Scenario, network: RoadNetwork) -> tuple[tuple[Path, str], ...]:
