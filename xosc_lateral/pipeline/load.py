@@ -71,11 +71,12 @@ def play_scenario(
     return _played(_Playable(input_hashes(scenario, network), values, step, time_limit, scenario, network))
 
 
-def play_longer(played: Played, factor: float, *, step: float, time_limit: float) -> Played:
+def play_longer(played: Played, factor: float, *, step: float, time_limit: float | None) -> Played:
     """The same run, going on beyond what stops it: until `factor` times its end, and the limit at most. [s]"""
     scenario = played.scenario
     endless = replace(scenario, storyboard=replace(scenario.storyboard, stop_trigger=None))
-    end = min(factor * played.motion.end_time, time_limit)
+    end = factor * played.motion.end_time
+    end = end if time_limit is None else min(end, time_limit)
     return replace(played, motion=play(endless, played.network, step=step, time_limit=end))
 
 
