@@ -37,6 +37,11 @@ SWERVE = (
     'dynamicsShape="sinusoidal" maxLateralAcc="0.05"/><LaneOffsetTarget><AbsoluteTargetLaneOffset value="0.4"/>'
     "</LaneOffsetTarget></LaneOffsetAction></LateralAction></PrivateAction>"
 )
+TRAVELLED = (
+    '<ConditionGroup><Condition name="far" delay="0" conditionEdge="none"><ByEntityCondition><TriggeringEntities '
+    'triggeringEntitiesRule="any"><EntityRef entityRef="Ego"/></TriggeringEntities><EntityCondition>'
+    '<TraveledDistanceCondition value="250"/></EntityCondition></ByEntityCondition></Condition></ConditionGroup>'
+)
 EXTERNAL = controller("esminiController", "ExternalController")
 
 
@@ -143,6 +148,28 @@ def test_lane_offsets_go_on_for_as_long_as_the_segment_lasts(scenario: Path, tmp
             rows = (one.time >= start) & (one.time < start + 5)
             assert np.ptp(one.offset[rows]) > 0.005, (one.name, start)
         assert one.name != "Ego" or np.ptp(one.offset) < 1e-9
+
+
+@pytest.mark.parametrize("player", ["standard", "carla"])
+def test_a_longer_run_is_not_one_that_was_cut_off_and_a_replay_ends_when_it_did(tmp_path: Path, player: str) -> None:
+    text = scenario_text(
+        entities=entity("Ego", controller=EXTERNAL) + entity("A"),
+        init=private("Ego", teleport("50"), speed_action("30")) + private("A", teleport("110"), speed_action("25")),
+        stories=stories(("A", event("late", at(100.0), speed_action("20")))),
+        stop=TRAVELLED,
+    )
+    path = write_scenario(tmp_path, text)
+    nominal = xl.play(path)
+    assert nominal.ended_by == "stop trigger"
+    made = xl.convert(path, tmp_path / "out.xosc", seed=1, player=player)
+    assert made.cut_off is None and not any("time limit" in line for line in (*made.warnings, str(made.to_dict())))
+    if player == "carla":
+        ends = re.findall(
+            r'<SimulationTimeCondition value="([^"]+)"', (tmp_path / "out.xosc").read_text().split("</Story>")[-1]
+        )
+        assert [float(end) for end in ends] == [pytest.approx(nominal.end_time, abs=0.02)]
+    else:
+        assert made.end_time == pytest.approx(1.3 * nominal.end_time, abs=0.02)
 
 
 def test_offsets_that_change_what_happens_are_left_out_by_name(tmp_path: Path) -> None:

@@ -31,7 +31,7 @@ from xosc_lateral.motion.nominal import Activity
 from xosc_lateral.pipeline.drivers import choose_drivers
 from xosc_lateral.pipeline.load import Played, input_hashes, play_longer, play_scenario
 from xosc_lateral.pipeline.meaning import Meaning, keep_meaning
-from xosc_lateral.pipeline.modes import WritingPlan, chosen_egos, writing_plan
+from xosc_lateral.pipeline.modes import WritingPlan, chosen_egos, is_replay, writing_plan
 from xosc_lateral.pipeline.settings import ConvertSettings, OutputMode
 from xosc_lateral.pipeline.shifted import Shift
 from xosc_lateral.scenario import Scenario
@@ -105,7 +105,8 @@ def _convert(
     refuse_outputs([output if save else None, report], inputs)
     drivers = choose_drivers(played.scenario, settings, egos)
     lasting = played
-    if settings.mode is OutputMode.AUTO and depends.of_trigger(played.scenario.storyboard.stop_trigger):
+    reacts = settings.mode is OutputMode.AUTO and not is_replay(settings, depends)
+    if reacts and depends.of_trigger(played.scenario.storyboard.stop_trigger):
         lasting = play_longer(played, LONGER, step=settings.step, time_limit=settings.time_limit)
     enriched = enrich(
         lasting.motion,

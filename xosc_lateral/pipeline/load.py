@@ -16,6 +16,7 @@ from xosc_lateral.pipeline.settings import STEP
 from xosc_lateral.playback.player import play
 from xosc_lateral.road.network import RoadNetwork
 from xosc_lateral.scenario import Scenario
+from xosc_lateral.scenario.conditions.value import at_time
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -71,13 +72,20 @@ def play_scenario(
     return _played(_Playable(input_hashes(scenario, network), values, step, time_limit, scenario, network))
 
 
+@lru_cache(maxsize=2)  # as `_played`, whose result is the same object for all variants
 def play_longer(played: Played, factor: float, *, step: float, time_limit: float | None) -> Played:
-    """The same run, going on beyond what stops it: until `factor` times its end, and the limit at most. [s]"""
-    scenario = played.scenario
-    endless = replace(scenario, storyboard=replace(scenario.storyboard, stop_trigger=None))
+    """The same run, stopped at `factor` times its end instead, and at the limit at most. [s]
+
+    One that was cut off comes back as it is.
+    """
+    if played.motion.cut_off is not None:
+        return played
     end = factor * played.motion.end_time
     end = end if time_limit is None else min(end, time_limit)
-    return replace(played, motion=play(endless, played.network, step=step, time_limit=end))
+    storyboard = played.scenario.storyboard
+    later = replace(storyboard, stop_trigger=at_time(end, "later", storyboard.place))
+    scenario = replace(played.scenario, storyboard=later)
+    return replace(played, motion=play(scenario, played.network, step=step, time_limit=end + 1.0))
 
 
 def input_hashes(scenario: Scenario, network: RoadNetwork) -> tuple[tuple[Path, str], ...]:

@@ -16,11 +16,10 @@ from xosc_lateral.pipeline.shifted import Shift, shifts
 from xosc_lateral.playback.player import play
 from xosc_lateral.scenario import Action, Event, Maneuver, ManeuverGroup, Scenario, Story
 from xosc_lateral.scenario.actions.longitudinal import AbsoluteTargetSpeed, SpeedAction
-from xosc_lateral.scenario.conditions.value import SimulationTimeCondition
+from xosc_lateral.scenario.conditions.value import at_time
 from xosc_lateral.scenario.dynamics import TransitionDynamics
-from xosc_lateral.scenario.enums import ConditionEdge, DynamicsDimension, DynamicsShape, Priority, Rule
+from xosc_lateral.scenario.enums import DynamicsDimension, DynamicsShape, Priority
 from xosc_lateral.scenario.storyboard import Act, Actors
-from xosc_lateral.scenario.trigger import Condition, ConditionGroup, Trigger
 
 FACTORS = (0.8, 1.2)
 """Of the initial speed of the vehicles under test, beside the nominal run. [-]"""
@@ -70,8 +69,7 @@ class Meaning:
 def with_speeds(scenario: Scenario, motion: NominalMotion, egos: Collection[str], factor: float) -> Scenario:
     """A scenario in which vehicles under test change to `factor` of their initial speed."""
     place = scenario.storyboard.place
-    condition = SimulationTimeCondition(CHANGE_AT, Rule.GREATER_THAN, place)
-    trigger = Trigger((ConditionGroup((Condition(STORY, 0.0, ConditionEdge.NONE, condition, None, place),)),), place)
+    trigger = at_time(CHANGE_AT, STORY, place)
     groups = []
     for entity in motion.entities:
         if entity.name in egos:

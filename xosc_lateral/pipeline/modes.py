@@ -64,6 +64,13 @@ class WritingPlan:
         return dict(sorted((modes | dict.fromkeys(self.trajectories, OutputMode.TRAJECTORY.value)).items()))
 
 
+def is_replay(settings: ConvertSettings, depends: Dependence) -> bool:
+    """Whether everything happens by the clock of the nominal run, whoever drives."""
+    if settings.mode is OutputMode.LANE_OFFSET:
+        return False
+    return settings.target.player is Player.CARLA or not (depends.entities or settings.only is not None)
+
+
 def writing_plan(
     scenario: Scenario,
     settings: ConvertSettings,
@@ -90,8 +97,7 @@ def writing_plan(
     """
     if settings.mode is OutputMode.LANE_OFFSET:
         return WritingPlan(frozenset(), frozenset(enriched), is_replay=False)
-    spares_somebody = bool(depends.entities) or settings.only is not None
-    if not spares_somebody or settings.target.player is Player.CARLA:
+    if is_replay(settings, depends):
         return WritingPlan(
             frozenset(enriched), frozenset(), is_replay=True, frozen=tuple(_frozen(scenario, depends, None))
         )

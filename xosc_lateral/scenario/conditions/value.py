@@ -5,8 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from datetime import datetime
 
-from xosc_lateral.scenario.enums import Rule, StoryboardElementState, StoryboardElementType
+from xosc_lateral.scenario.enums import ConditionEdge, Rule, StoryboardElementState, StoryboardElementType
 from xosc_lateral.scenario.place import Place
+from xosc_lateral.scenario.trigger import Condition, ConditionGroup, Trigger
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,6 +37,12 @@ class SimulationTimeCondition:
     value: float
     rule: Rule
     place: Place
+
+
+def at_time(moment: float, name: str, place: Place) -> Trigger:
+    """Trigger of our own that holds from a moment on. [s]"""
+    condition = SimulationTimeCondition(moment, Rule.GREATER_THAN, place)
+    return Trigger((ConditionGroup((Condition(name, 0.0, ConditionEdge.NONE, condition, None, place),)),), place)
 
 
 @dataclass(frozen=True, slots=True)
