@@ -251,11 +251,10 @@ def _convert_one(
         outputs = [numbered(written, variant, variants) for variant in range(variants)]
         pages = [None if page is None else numbered(page, variant, variants) for variant in range(variants)]
         files = variant_files(written, variants, settings["mode"], settings["player"])
-        traces = [
-            None if osi is None else numbered(osi_files(osi, source)[0], one, variants) for one in range(variants)
-        ]
-        both = [path for trace in traces if trace is not None for path in osi_files(trace, source)]
-        osi_wanted(traces[0])
+        trace = None if osi is None else osi_files(osi, source)[0]
+        traces = [None if trace is None else numbered(trace, variant, variants) for variant in range(variants)]
+        both = [path for one in traces if one is not None for path in osi_files(one, source)]
+        osi_wanted(trace)
         claim([*outputs, *pages, *both, *(files.all(variants) if files else ())], [source], force=settings["force"])
         unclean, replayed = False, True
         for variant, (path, its_page, trace) in enumerate(zip(outputs, pages, traces, strict=True)):

@@ -10,7 +10,6 @@ from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 
 from xosc_lateral.driver.profile import DriverProfile
-from xosc_lateral.enrich.neighbours import Neighbours
 from xosc_lateral.errors import FormatError, XoscLateralError
 from xosc_lateral.formats.hashes import file_hash
 from xosc_lateral.formats.openscenario.references import require_folders
@@ -290,8 +289,6 @@ class _Fingerprints:
             del values["strict"]
         if not settings.with_sensor:  # as it always was
             del values["with_sensor"]
-        if settings.neighbours is Neighbours.BORROW:
-            del values["neighbours"]
         player, version = settings.target.player.value, settings.target.version
         values["target"] = [player, None if version is None else list(version)]
         if settings.target == STANDARD:  # what was made before there were others is trusted

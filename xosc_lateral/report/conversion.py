@@ -44,11 +44,12 @@ def beside_text(profile: DriverProfile, neighbours: str) -> str:
     """How a driver answers to vehicles beside him, and where that is known from, in a line."""
     if neighbours == Neighbours.NONE:
         return "no answer (--neighbours none)"
-    return "; ".join(
-        beside_line(profile, side)
-        + (": borrowed from the population" * (neighbours == Neighbours.BORROW and borrows(profile, side)))
-        for side in SIDES
-    )
+    may_borrow = neighbours == Neighbours.BORROW
+    lines = []
+    for side in SIDES:
+        borrowed = ": borrowed from the population" if may_borrow and borrows(profile, side) else ""
+        lines.append(beside_line(profile, side) + borrowed)
+    return "; ".join(lines)
 
 
 def under_test(conversion: ConvertedScenario) -> str:

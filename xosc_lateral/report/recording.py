@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.errors import XoscLateralError
+from xosc_lateral.motion.axes import axes
 from xosc_lateral.motion.nominal import Activity, EntityMotion, NominalMotion
 from xosc_lateral.report.figures import PALETTE
 from xosc_lateral.report.player.roads import mark_points
@@ -194,14 +195,8 @@ def _color(name: str) -> dict[str, float]:
 
 def _rotation(heading: float, pitch: float, roll: float) -> NDArray[np.float64]:
     """Rz(heading) Ry(pitch) Rx(roll), as OpenSCENARIO turns."""
-    (ch, sh), (cp, sp), (cr, sr) = ((np.cos(a), np.sin(a)) for a in (heading, pitch, roll))
-    return np.array(
-        [
-            [ch * cp, ch * sp * sr - sh * cr, ch * sp * cr + sh * sr],
-            [sh * cp, sh * sp * sr + ch * cr, sh * sp * cr - ch * sr],
-            [-sp, cp * sr, cp * cr],
-        ]
-    )
+    turned = axes(*(np.array([angle]) for angle in (heading, pitch, roll)))
+    return np.stack([axis[0] for axis in turned], axis=1)
 
 
 def _quaternion(heading: float, pitch: float, roll: float) -> dict[str, float]:

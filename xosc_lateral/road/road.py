@@ -63,8 +63,11 @@ class Road:
 
     def section_at(self, s: float) -> LaneSection:
         """The lane section at s; beyond the ends the first or last one. `s` in [m]."""
-        i = bisect_right(self.section_starts, s) - 1
-        return self.sections[i if i > 0 else 0]
+        return self.sections[self.section_number(s)]
+
+    def section_number(self, s: float) -> int:
+        """Index of the lane section at s; beyond the ends the first or last one. `s` in [m]."""
+        return max(bisect_right(self.section_starts, s) - 1, 0)
 
     def reference_at(self, s: float) -> tuple[float, float, float]:
         """x, y, heading of the reference line. [m], [rad]"""

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from xosc_lateral.errors import FormatError, NotEnoughDataError
 from xosc_lateral.formats.importers.cuts import DEFAULT_CUTS, CutSettings
 from xosc_lateral.formats.importers.lane_graph import LaneGraph
-from xosc_lateral.formats.importers.lane_shapes import curvature_along, find_lanes, lanes_beside
+from xosc_lateral.formats.importers.lane_shapes import curvature_along, place_in_shapes
 from xosc_lateral.formats.importers.placed import (
     PlacedTracks,
     ground_speed,
@@ -29,6 +29,7 @@ from xosc_lateral.formats.importers.placed import (
     travel_heading,
 )
 from xosc_lateral.formats.importers.table import Imported, guarded
+from xosc_lateral.formats.importers.track_table import Tracks
 from xosc_lateral.formats.xml import read_xml
 
 FloatArray = NDArray[np.float64]
@@ -129,18 +130,10 @@ def _placed(scenario: Any, shapes: list[_Shape], left: IntArray, path: Path) -> 
     x, y = values[:, 2], values[:, 3]
     heading = np.where(np.isfinite(values[:, 4]), values[:, 4], travel_heading(x, y, vehicle, step))
     speed = np.where(np.isfinite(values[:, 5]), values[:, 5], ground_speed(x, y, vehicle, step))
-    piece, along, offset, width, curvature = find_lanes(shapes, x, y, heading)
-    index, count = lanes_beside(left)
-    inside = piece >= 0
-    road = {
-        "curvature": curvature,
-        "lane_index": np.where(inside, index[piece], np.nan),
-        "lane_count": np.where(inside, count[piece], np.nan),
-    }
     length, kind = np.array(lengths)[vehicle], np.array(kinds)[vehicle]
-    return PlacedTracks(
-        names, vehicle, step * values[:, 1], step, piece, along, offset, width, np.abs(speed), length, kind, road
-    )
+    time = step * values[:, 1]
+    tracks = Tracks(tuple(names), vehicle, time, step, x, y, heading, np.abs(speed), length, kind)
+    return place_in_shapes(tracks, shapes, left)
 
 
 class _Shape:

@@ -8,6 +8,9 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from xosc_lateral.formats.importers.placed import PlacedTracks
+from xosc_lateral.formats.importers.track_table import Tracks
+
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
@@ -26,6 +29,19 @@ class LaneShape(Protocol):
 
     def place(self, x: FloatArray, y: FloatArray) -> tuple[FloatArray, ...]:
         """Way along it (NaN beyond its ends), offset, width, direction and curvature there; shape as the arguments."""
+
+
+def place_in_shapes(tracks: Tracks, shapes: Sequence[LaneShape], left: IntArray) -> PlacedTracks:
+    """Every row in the lane that it drives along; `left`: on the left of each lane, driven the same way, or -1."""
+    piece, along, offset, width, curvature = find_lanes(shapes, tracks.x, tracks.y, tracks.heading)
+    index, count = lanes_beside(left)
+    inside = piece >= 0
+    road = {
+        "curvature": curvature,
+        "lane_index": np.where(inside, index[piece], np.nan),
+        "lane_count": np.where(inside, count[piece], np.nan),
+    }
+    return tracks.placed(piece, along, offset, width, road)
 
 
 def find_lanes(

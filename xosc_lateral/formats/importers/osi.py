@@ -14,16 +14,12 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
-
 from xosc_lateral.errors import FormatError
 from xosc_lateral.formats.importers.cuts import DEFAULT_CUTS, CutSettings
 from xosc_lateral.formats.importers.lane_graph import LaneGraph
-from xosc_lateral.formats.importers.lane_shapes import find_lanes, lanes_beside
+from xosc_lateral.formats.importers.lane_shapes import place_in_shapes
 from xosc_lateral.formats.importers.placed import PlacedTracks, import_each, import_placed
-from xosc_lateral.formats.importers.strips import Strip
 from xosc_lateral.formats.importers.table import Imported, guarded
-from xosc_lateral.formats.importers.track_table import Tracks
 from xosc_lateral.formats.importers.tracks import lane_graph, place
 from xosc_lateral.formats.opendrive import read_opendrive
 from xosc_lateral.formats.osi.read import Recorded, read_osi
@@ -97,9 +93,8 @@ def _named(recorded: Recorded, host: str, path: Path) -> set[str]:
             there = ", ".join(recorded.hosts) or "none"
             raise FormatError(f"host vehicles: {there}; name one with --host", path=path)
         wanted = recorded.hosts[0]
-    names = {recorded.numbers.get(name.split("#")[0]): name.split("#")[0] for name in recorded.tracks.names}
-    wanted = names.get(wanted, wanted)
-    found = {name for name in recorded.tracks.names if name.split("#")[0] == wanted}
+    wanted = {number: name for name, number in recorded.numbers.items()}.get(wanted, wanted)
+    found = {name for name in recorded.tracks.names if name.split("#")[0] == wanted}  # NAME#2 after a leap
     if not found:
         there = ", ".join(recorded.tracks.names[:20])
         raise FormatError(f"no vehicle {host!r}; there are {there}", path=path)
@@ -121,7 +116,7 @@ def _placed(recorded: Recorded, path: Path, road: Path | None) -> tuple[PlacedTr
         if lanes is None:
             raise FormatError("has no lanes with boundaries: give the road with --road FILE.xodr", path=path)
         strips, graph = lanes
-        placed = _between(tracks, strips, graph)
+        placed = place_in_shapes(tracks, strips, graph.left)
         files, where = [path], "the trace"
     if not (placed.piece >= 0).any():
         raise FormatError(
@@ -131,28 +126,3 @@ def _placed(recorded: Recorded, path: Path, road: Path | None) -> tuple[PlacedTr
         )
     # gaps count from the middle, wherever the offset is measured
     return replace(placed, along=placed.along + recorded.rear), graph, files
-
-
-def _between(tracks: Tracks, strips: Sequence[Strip], graph: LaneGraph) -> PlacedTracks:
-    piece, along, offset, width, curvature = find_lanes(strips, tracks.x, tracks.y, tracks.heading)
-    index, count = lanes_beside(graph.left)
-    inside = piece >= 0
-    road = {
-        "curvature": curvature,
-        "lane_index": np.where(inside, index[piece], np.nan),
-        "lane_count": np.where(inside, count[piece], np.nan),
-    }
-    return PlacedTracks(
-        tracks.names,
-        tracks.vehicle,
-        tracks.time,
-        tracks.step,
-        piece,
-        along,
-        offset,
-        width,
-        tracks.speed,
-        tracks.length,
-        tracks.kind,
-        road,
-    )

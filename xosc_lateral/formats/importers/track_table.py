@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from xosc_lateral.errors import FormatError, NotEnoughDataError
 from xosc_lateral.formats.drives import parse_map
-from xosc_lateral.formats.importers.placed import ground_speed, travel_heading
+from xosc_lateral.formats.importers.placed import PlacedTracks, ground_speed, travel_heading
 from xosc_lateral.formats.tables import read_table
 from xosc_lateral.formats.text_columns import comma_numbers, seconds_of_text
 
@@ -52,6 +52,19 @@ class Tracks:
     speed: FloatArray
     length: FloatArray
     kind: NDArray[np.str_]
+
+    def placed(
+        self,
+        piece: IntArray,
+        along: FloatArray,
+        offset: FloatArray,
+        lane_width: FloatArray,
+        road: Mapping[str, FloatArray],
+        zone: NDArray[np.object_] | None = None,
+    ) -> PlacedTracks:
+        """These tracks with where each row lies; see `PlacedTracks`."""
+        who = self.names, self.vehicle, self.time, self.step
+        return PlacedTracks(*who, piece, along, offset, lane_width, self.speed, self.length, self.kind, road, zone)
 
 
 def read_tracks(path: Path, columns: Sequence[str] = ()) -> Tracks:

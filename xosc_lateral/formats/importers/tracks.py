@@ -123,21 +123,8 @@ def place(tracks: Tracks, network: RoadNetwork, pieces: dict[Piece, int]) -> Pla
     width = columns.pop("lane_width")
     strand = np.full(len(road), "", dtype=np.object_)
     strand[there] = [f"road {network.roads[index].id} lane {name}" for index, name in zip(*where[:2], strict=True)]
-    return PlacedTracks(
-        tracks.names,
-        tracks.vehicle,
-        tracks.time,
-        tracks.step,
-        piece,
-        along,
-        np.where(piece >= 0, found.offset, np.nan),
-        width,
-        tracks.speed,
-        tracks.length,
-        tracks.kind,
-        columns,
-        zones_along(strand, s),
-    )
+    offset = np.where(piece >= 0, found.offset, np.nan)
+    return tracks.placed(piece, along, offset, width, columns, zones_along(strand, s))
 
 
 def lane_graph(network: RoadNetwork) -> tuple[dict[Piece, int], LaneGraph]:

@@ -85,9 +85,7 @@ class RoadIds:
         """Lane of a place; None: there is none."""
         if road < 0:
             return None
-        sections = self.network.roads[road].section_starts
-        k = max(int(np.searchsorted(sections, s, side="right")) - 1, 0)
-        return self.lanes.get((road, k, lane))
+        return self.lanes.get((road, self.network.roads[road].section_number(s), lane))
 
 
 def write_lanes(message: Any, ids: RoadIds) -> None:

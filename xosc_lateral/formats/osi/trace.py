@@ -10,8 +10,8 @@ from xosc_lateral.errors import FormatError
 from xosc_lateral.formats.osi.extra import SUFFIXES, osi
 from xosc_lateral.formats.source import check_regular
 
-TRUTHS = ("GroundTruth", "SensorView")
-"""Messages that hold the true world; a sensor view as its global ground truth."""
+TRUTHS = ("GROUND_TRUTH", "SENSOR_VIEW")
+"""Kinds of messages that hold the true world; a sensor view as its global ground truth."""
 
 
 class Trace:
@@ -71,7 +71,7 @@ class Trace:
         found = {one.topic: names[one.message_type] for one in reader.list_channel_specifications()}
         others = [topic for topic in reader.get_available_topics() if topic not in found]
         said = ", ".join([f"{topic} ({kind})" for topic, kind in found.items()] + others) or "none"
-        chosen = _chosen({topic: kind.replace("_", "").lower() for topic, kind in found.items()}, channel)
+        chosen = _chosen(found, channel)
         if chosen is None:
             reader.close()
             what = "ground truth or a sensor view" + ("" if channel is None else f" named {channel!r}")
@@ -89,28 +89,26 @@ class Trace:
         named = utilities.infer_message_type_from_filename(self.path.name)
         if named not in (kinds.UNKNOWN, kinds.GROUND_TRUTH, kinds.SENSOR_VIEW):
             raise FormatError(f"its name says {named.name}: neither ground truth nor a sensor view", path=self.path)
-        for kind in (kinds.SENSOR_VIEW, kinds.GROUND_TRUTH) if named is kinds.UNKNOWN else (named,):
-            reader = utilities.SingleTraceReader()
-            reader.set_message_type(kind)
-            if not reader.open(self.path):
-                raise FormatError("not an OSI trace", path=self.path)
-            if named is kinds.UNKNOWN and kind is kinds.SENSOR_VIEW:
-                # nothing in the file says what its messages are: a sensor view is one that shows moving objects
-                first = reader.read_message()
-                is_view = first.message is not None and first.message.global_ground_truth.moving_object
-                reader.close()
-                if not is_view:
-                    continue
-                reader = utilities.SingleTraceReader()
-                reader.set_message_type(kind)
-                reader.open(self.path)
-            return reader
-        raise AssertionError("ground truth is always tried")
+        if named is not kinds.UNKNOWN:
+            return self._opened(named)
+        # nothing in the file says what its messages are: a sensor view is one that shows moving objects
+        reader = self._opened(kinds.SENSOR_VIEW)
+        first = reader.read_message()
+        reader.close()
+        is_view = first.message is not None and first.message.global_ground_truth.moving_object
+        return self._opened(kinds.SENSOR_VIEW if is_view else kinds.GROUND_TRUTH)
+
+    def _opened(self, kind: Any) -> Any:
+        reader = osi("osi_utilities").SingleTraceReader()
+        reader.set_message_type(kind)
+        if not reader.open(self.path):
+            raise FormatError("not an OSI trace", path=self.path)
+        return reader
 
 
 def _chosen(kinds: dict[str, str], channel: str | None) -> str | None:
     """Topic to read among those of each kind."""
-    truths = [topic for wanted in TRUTHS for topic, kind in kinds.items() if kind == wanted.lower()]
+    truths = [topic for wanted in TRUTHS for topic, kind in kinds.items() if kind == wanted]
     if channel is None:
         return truths[0] if truths else None
     return channel if channel in truths else None
