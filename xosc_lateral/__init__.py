@@ -32,6 +32,7 @@ _HOME = {
     "DriverProfile": "driver.profile",
     "Drive": "drives.drive",
     "Conversion": "api.convert",
+    "ConvertOptions": "pipeline.settings",
     "BatchResult": "api.batch",
     "Playback": "api.play",
     "Segments": "api.play",
@@ -70,6 +71,7 @@ __all__ = [  # noqa: RUF022 (the order of the documentation)
     "DriverProfile",
     "Drive",
     "Conversion",
+    "ConvertOptions",
     "BatchResult",
     "Playback",
     "Segments",
@@ -108,6 +110,7 @@ if TYPE_CHECKING:
         PlaybackError,
         XoscLateralError,
     )
+    from xosc_lateral.pipeline.settings import ConvertOptions
 
 
 def __getattr__(name: str) -> object:
