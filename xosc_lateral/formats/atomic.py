@@ -41,28 +41,6 @@ def write_atomically(path: Path | str, data: bytes | str, *, durable: bool = Fal
     return replace_atomically(path, write)
 
 
-def write_pieces_atomically(path: Path | str, pieces: Iterable[bytes]) -> str:
-    """Write a file piece by piece, as `write_atomically` does, for one that need not be in memory as a whole.
-
-    Returns
-    -------
-    str
-        SHA-256 of what was written, in hexadecimal.
-    """
-    import hashlib
-
-    digest = hashlib.sha256()
-
-    def write(temporary: Path) -> None:
-        with temporary.open("wb") as file:
-            for piece in pieces:
-                digest.update(piece)
-                file.write(piece)
-
-    replace_atomically(path, write)
-    return digest.hexdigest()
-
-
 def replace_atomically(path: Path | str, write: Callable[[Path], object]) -> Path:
     """Let `write` fill a temporary file beside the output, then move it there: for writers that want a path.
 

@@ -6,7 +6,7 @@ import hashlib
 import json
 import os
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from xosc_lateral.driver.profile import DriverProfile
@@ -43,7 +43,7 @@ class Job:
     settings : ConvertSettings
     variant : int
     fingerprint : str
-        SHA-256 over everything but the input files that decides on the output's bytes.
+        SHA-256 over everything but the input files and the program that decides on the output's bytes.
     error : str
         Why it can't even be tried (a distribution that can't be read); empty normally.
     page : Path or None
@@ -71,7 +71,7 @@ class Job:
             output=self.name,
             scenario=self.scenario,
             scenario_sha256=scenario_sha256,
-            variant=self.variant,
+            variant=self.variant + 1,
             seed=self.settings.seed,
             profile=self.settings.profile if isinstance(self.settings.profile, str) else self.settings.profile.name,
             parameters=dict(sorted(self.settings.parameters.items())),
@@ -80,6 +80,8 @@ class Job:
             behaviour=BEHAVIOUR,
             with_sensor=self.settings.with_sensor,
             player=self.settings.player.value,
+            only=None if self.settings.only is None else tuple(sorted(self.settings.only)),
+            options=self.settings.record(self.source.parent),
             error=error,
         )
 
@@ -279,16 +281,11 @@ class _Fingerprints:
     _profiles: dict[tuple[str, tuple[Path, ...]], str] = field(default_factory=dict)
 
     def of(self, settings: ConvertSettings, variant: int) -> str:
-        # Where files are looked for does not count, but what is in them; nor what refuses less.
-        aside = {"library", "allow", "road", "road_path", "names_may_lack"}
-        values = {item.name: getattr(settings, item.name) for item in fields(settings) if item.name not in aside}
+        values = settings.record(Path()) | {"road": None, "strict": settings.strict}  # a road counts by its hash
         values["profile"] = self._profile(settings.profile, settings.library)
         values["entity"] = {name: self._profile(one, settings.library) for name, one in settings.entity.items()}
         values["context"] = None if settings.context is None else _hash_or_missing(settings.context)
-        values["only"] = None if settings.only is None else sorted(settings.only)
-        values["ego"] = None if settings.ego is None else sorted(settings.ego)
-        values["parameters"] = dict(settings.parameters)
-        values |= {"behaviour": BEHAVIOUR, "variant": variant}
+        values["variant"] = variant
         return hashlib.sha256(json.dumps(values, sort_keys=True).encode()).hexdigest()
 
     def _profile(self, name: str | DriverProfile, libraries: tuple[Path, ...]) -> str:

@@ -9,7 +9,6 @@ as long as the segment lasts, which is not for the nominal run to say where some
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -17,9 +16,8 @@ from typing import Any
 import numpy as np
 from lxml import etree
 
-from xosc_lateral.formats.atomic import write_pieces_atomically
 from xosc_lateral.formats.openscenario.element import local_name
-from xosc_lateral.formats.openscenario.provenance import mark
+from xosc_lateral.formats.openscenario.provenance import mark, write_sealed
 from xosc_lateral.formats.openscenario.write import build
 from xosc_lateral.formats.openscenario.write.checks import check_convertible
 from xosc_lateral.formats.openscenario.write.fit import fit
@@ -128,10 +126,9 @@ def write_lane_offset_scenario(
     rewrite_paths(root, scenario, output, scope)
     mark(root, provenance, summary)
     pieces = vertices.document(root) if moving else [build.document(root)]
-    data = b"" if save else b"".join(pieces)
-    sha256 = write_pieces_atomically(output, pieces) if save else hashlib.sha256(data).hexdigest()
+    sha256, content, data = write_sealed(output, pieces, save=save)
     names = tuple(dict.fromkeys([*moving, *(chain.entity for chain in chains)]))
-    return WrittenScenario(output, sha256, names, tuple(removed), data, notes)
+    return WrittenScenario(output, sha256, content, names, tuple(removed), data, notes)
 
 
 def _put_into(root: etree._Element, story: etree._Element, scenario: Scenario, chains: Sequence[OffsetChain]) -> None:

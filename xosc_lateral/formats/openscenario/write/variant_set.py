@@ -19,7 +19,7 @@ from lxml import etree
 from xosc_lateral.errors import FormatError
 from xosc_lateral.formats.atomic import write_atomically
 from xosc_lateral.formats.openscenario.element import local_name
-from xosc_lateral.formats.openscenario.provenance import HEADER_MARK, mark, provenance_of
+from xosc_lateral.formats.openscenario.provenance import CONTENT, HEADER_MARK, mark, provenance_of
 from xosc_lateral.formats.openscenario.write import build, distributions
 from xosc_lateral.formats.openscenario.write.distributions import VariantFiles, variant_name
 from xosc_lateral.formats.xml import read_document
@@ -87,10 +87,11 @@ def write_variant_set(
         _compare(root, roots, difference)
     except _NotAlikeError as error:
         raise FormatError(f"is not a variant of the same scenario ({error})", path=variants[0]) from error
-    facts = dict(provenance_of(roots[0]) or {})
+    facts = {name: value for name, value in (provenance_of(roots[0]) or {}).items() if name != CONTENT}
+    seed = facts.get("options", {}).get("seed")
     facts |= {"variant": None, "variants": len(roots), SOURCE: [source, difference.parameter]}
     _unmark(root, header)
-    summary = f"set of {len(roots)} variants, seed {facts.get('seed')}"
+    summary = f"set of {len(roots)} variants, seed {seed}"
     names = [variant_name(k, len(roots)) for k in range(len(roots))]
     _declare(root, header, difference.parameter, names[0])
     if any(difference.catalogs):
@@ -101,7 +102,7 @@ def write_variant_set(
             write_atomically(files.catalog(name), distributions.catalog(name, catalog, version, summary))
     write_atomically(files.logical, build.document(root))
     drawn = distributions.Drawn(difference.parameter, names, files.logical.name, version, summary)
-    _write_distributions(files, drawn, weights, facts.get("seed"))
+    _write_distributions(files, drawn, weights, seed)
 
 
 def _write_distributions(
