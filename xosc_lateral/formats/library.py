@@ -11,6 +11,7 @@ from msgspec.structs import replace
 from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.driver.provenance import Metadata
 from xosc_lateral.errors import FormatError, XoscLateralError
+from xosc_lateral.formats.output_paths import file_name
 from xosc_lateral.formats.profile_folders import SHIPPED, find_profile, list_profiles
 from xosc_lateral.formats.profiles import read_profile
 
@@ -116,13 +117,12 @@ def described(
     Raises
     ------
     XoscLateralError
-        For a field that there is not; `FIELDS` are known. For an id that names another folder.
+        For a field that there is not; `FIELDS` are known. For an id that can't be a file's name.
     """
     for field in fields or {}:
         if field not in FIELDS:
             raise XoscLateralError(f"profiles have no field {field!r} to set; there are {', '.join(FIELDS)}")
-    if name is not None and (name != Path(name).name or name in (".", "..") or "\\" in name or "\0" in name):
-        raise XoscLateralError(f"--name {name!r}: an id is the name of a file in the library, without a folder")
+    file_name(profile.name if name is None else name, "profile's id")
     tags = tuple(tag for tag in dict.fromkeys([*profile.metadata.tags, *add_tags]) if tag not in remove_tags)
     metadata = replace(profile.metadata, tags=tags, **(fields or {}))
     return replace(profile, name=name or profile.name, metadata=metadata)

@@ -18,6 +18,41 @@ STDOUT = "-"
 """Name of the standard output where an output is asked for."""
 
 
+LONGEST_NAME = 255
+"""Of a file, on all common systems. [byte]"""
+
+
+def file_name(name: str, what: str) -> str:
+    """A name that others gave, as the name of a file: the one gate to paths.
+
+    Parameters
+    ----------
+    name : str
+    what : str
+        Whose name it is, for the message.
+
+    Raises
+    ------
+    FormatError
+        It could lead to another folder, or no file can have it.
+    """
+    wrong = name in ("", ".", "..") or any(sign in "/\\" or sign < " " for sign in name)
+    if wrong or len(name.encode(errors="replace")) > LONGEST_NAME:
+        raise FormatError(f"{what} {name[:60]!r}: expected the name of a file, without a folder")
+    return name
+
+
+def path_below(folder: Path, name: str, what: str) -> Path:
+    """A path below a folder from names that others gave, with forward slashes.
+
+    Raises
+    ------
+    FormatError
+        It leads elsewhere.
+    """
+    return folder.joinpath(*(file_name(part, what) for part in name.split("/")))
+
+
 def output_file(output: str | Path, usual_name: str, suffixes: Sequence[str]) -> Path:
     """Path of an output file.
 
@@ -35,7 +70,7 @@ def output_file(output: str | Path, usual_name: str, suffixes: Sequence[str]) ->
     FormatError
         For another suffix.
     """
-    path = output_folder(output) / usual_name if is_folder(output) else Path(output)
+    path = output_folder(output) / file_name(usual_name, "name") if is_folder(output) else Path(output)
     if not path.name.lower().endswith(tuple(suffixes)):
         kind = path.suffix or "a file without suffix"
         raise FormatError(f"can't write {kind}: expected a name ending in {' or '.join(suffixes)}", path=path)

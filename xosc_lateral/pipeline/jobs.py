@@ -139,8 +139,8 @@ def plan_batch(
     folder : str or Path
         Output tree. It mirrors the inputs below their common folder: ``db/a/x.xosc`` of the input ``db`` becomes
         ``folder/a/x.xosc``, its variants ``folder/a/x_01.xosc`` and so on, the scenarios that a parameter value
-        distribution stands for ``folder/a/x_p00000.xosc`` and so on; a scenario named
-        again with other settings becomes ``folder/a/x_r001.xosc``.
+        distribution stands for ``folder/a/x_p00000.xosc`` and so on. A row of a table
+        with settings of its own becomes ``folder/a/x_PROFILE_HASH.xosc``: its profile, and a hash of what else it says.
     settings : ConvertSettings, optional
         For every input that has none of its own.
     variants : int
@@ -170,7 +170,7 @@ def plan_batch(
     fingerprints = _Fingerprints()
     jobs: dict[str, Job] = {}
     left_out: list[tuple[Path, DocumentKind]] = []
-    asked: dict[Path, dict[tuple[str, int], None]] = {}
+    asked: dict[Path, set[tuple[str, int, str]]] = {}
     for request in requests:
         if request.variants > VARIANTS.value:
             raise FormatError(VARIANTS.refusal(request.variants), path=request.scenario)
@@ -179,16 +179,18 @@ def plan_batch(
         if ours_or_catalog and not request.listed:
             left_out.append((request.scenario, kind))
             continue
-        before = asked.setdefault(request.scenario, {})
-        key = (fingerprints.of(request.settings, 0), request.variants)
+        before = asked.setdefault(request.scenario, set())
+        key = (fingerprints.of(request.settings, 0), request.variants, request.name)
         if key in before:
             continue  # named twice, by a folder and by itself, say
-        repeat = f"_r{len(before):03d}" if before else ""
-        before[key] = None
-        for job in _jobs(request, kind, base, root, fingerprints, repeat):
+        before.add(key)
+        for job in _jobs(request, kind, base, root, fingerprints):
             earlier = jobs.setdefault(job.name, job)
             if earlier is not job:
+                if earlier.source == job.source and earlier.fingerprint == job.fingerprint:
+                    continue  # the first variants of more
                 what = f"would be written twice: from {earlier.scenario} and from {job.scenario}"
+                what += " with other settings; a column `name` tells them apart" if earlier.source == job.source else ""
                 raise FormatError(what, path=job.output)
             if len(jobs) > BATCH_JOBS.value:
                 raise FormatError(BATCH_JOBS.refusal(len(jobs)), path=request.scenario)
@@ -235,15 +237,14 @@ def _common_folder(requests: Sequence[Request]) -> Path:
         raise FormatError(f"inputs have no folder in common: {', '.join(sorted(bases)[:3])}") from error
 
 
-def _jobs(
-    request: Request, kind: DocumentKind, base: Path, root: Path, fingerprints: _Fingerprints, repeat: str
-) -> Iterator[Job]:
+def _jobs(request: Request, kind: DocumentKind, base: Path, root: Path, fingerprints: _Fingerprints) -> Iterator[Job]:
     relative = request.scenario.relative_to(base)
+    stem = request.name.removesuffix(relative.suffix) or f"{relative.stem}{request.label}"
     for one in concrete(request, kind):
         source, settings, error = one.source, one.settings, one.error
         for number in range(request.variants):
             variant = number if one.variant is None else one.variant
-            named = relative.with_name(f"{relative.stem}{repeat}{one.suffix}{relative.suffix}")
+            named = relative.with_name(f"{stem}{one.suffix}{relative.suffix}")
             output = numbered(named, number, request.variants)
             name = printable(output.as_posix())
             if name != output.as_posix():
