@@ -31,6 +31,7 @@ _HOME = {
     "DriverProfile": "driver.profile",
     "Drive": "drives.drive",
     "Conversion": "api.convert",
+    "ConvertOptions": "pipeline.settings",
     "BatchResult": "api.batch",
     "Playback": "api.play",
     "Segments": "api.play",
@@ -68,6 +69,7 @@ __all__ = [  # noqa: RUF022 (the order of the documentation)
     "DriverProfile",
     "Drive",
     "Conversion",
+    "ConvertOptions",
     "BatchResult",
     "Playback",
     "Segments",
@@ -105,6 +107,7 @@ if TYPE_CHECKING:
         PlaybackError,
         XoscLateralError,
     )
+    from xosc_lateral.pipeline.settings import ConvertOptions
 
 
 def __getattr__(name: str) -> object:

@@ -63,7 +63,7 @@ def _refused(request: Request, why: str) -> Concrete:
 
 def _sets(request: Request) -> tuple[Path, list[ParameterSet]]:
     """The logical scenario's file, and every set of its parameters."""
-    logical = read_distribution(request.scenario, allowed=request.settings.allowed)
+    logical = read_distribution(request.scenario, allowed=request.settings.allow)
     sets = list(islice(logical.parameter_sets(request.settings.seed), int(PARAMETER_SETS.value) + 1))
     if len(sets) > PARAMETER_SETS.value:
         raise FormatError(f"{PARAMETER_SETS.refusal(logical.count)}", path=request.scenario)
@@ -84,7 +84,7 @@ def _one(request: Request, scenario: Path, index: int, values: ParameterSet) -> 
     variant = variant_index(name)
     if variant is None:
         raise FormatError(f"{parameter} '{name[:20]}' names no variant ('variant_1' would)", path=request.scenario)
-    boundary = Boundary(scenario.parent, allowed_roots(scenario, request.settings.allowed))
+    boundary = Boundary(scenario.parent, allowed_roots(scenario, request.settings.allow))
     path = boundary.inside(source, Place(str(scenario), None, "provenance"))
     if not path.is_file():
         raise FormatError(f"its scenario '{source}' is not there", path=scenario)
