@@ -239,10 +239,9 @@ def _jobs(
     relative = request.scenario.relative_to(base)
     for one in concrete(request, kind):
         source, settings, error = one.source, one.settings, one.error
-        for number in range(request.variants):
-            variant = number if one.variant is None else one.variant
+        for variant in range(request.variants):
             named = relative.with_name(f"{relative.stem}{repeat}{one.suffix}{relative.suffix}")
-            output = numbered(named, number, request.variants)
+            output = numbered(named, variant, request.variants)
             name = printable(output.as_posix())
             if name != output.as_posix():
                 error = error or f"{printable(str(source))}: the file's name is not valid UTF-8; rename it"
