@@ -178,7 +178,6 @@ def _convert_one(
     as_json: bool,
 ) -> None:
     from xosc_lateral.api.convert import REPORT_SUFFIXES, convert, lifelike, osi_files, output_scenario
-    from xosc_lateral.api.variants import variant_files, variant_set
     from xosc_lateral.formats.osi.extra import osi_wanted
     from xosc_lateral.formats.output_paths import STDOUT, claim, output_file
     from xosc_lateral.pipeline.convert import numbered
@@ -196,26 +195,18 @@ def _convert_one(
         page = None if report is None else output_file(report, f"{written.stem}.html", REPORT_SUFFIXES)
         outputs = [numbered(written, variant, variants) for variant in range(variants)]
         pages = [None if page is None else numbered(page, variant, variants) for variant in range(variants)]
-        files = variant_files(written, variants, options["mode"], options["player"])
         trace = None if osi is None else osi_files(osi, source)[0]
         traces = [None if trace is None else numbered(trace, variant, variants) for variant in range(variants)]
         both = [path for one in traces if one is not None for path in osi_files(one, source)]
         osi_wanted(trace)
-        claim([*outputs, *pages, *both, *(files.all(variants) if files else ())], [source], force=options["force"])
-        unclean, replayed = False, True
+        claim([*outputs, *pages, *both], [source], force=options["force"])
+        unclean = False
         for variant, (path, its_page, trace) in enumerate(zip(outputs, pages, traces, strict=True)):
             result = convert(source, path, variant=variant + 1, report=its_page, **options)
             if trace is not None:
                 result.write_osi(trace, force=True)
             say(result, as_json=as_json, quiet=quiet)
             _warn_if_cut_off(result, quiet or as_json)
-            replayed &= result.is_replay
             unclean |= bool(result.warnings) or not result.enriched
-        if files is not None and replayed:
-            found = variant_set(outputs, written, source=source, force=True)
-            if not (quiet or as_json):
-                typer.echo(str(found))
-        elif files is not None and not quiet:
-            typer.echo("no set of the variants: it holds trajectories alone (--ego none writes them)", err=True)
     if strict and unclean:
         raise typer.Exit(1)

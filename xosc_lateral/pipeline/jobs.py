@@ -242,10 +242,9 @@ def _jobs(request: Request, kind: DocumentKind, base: Path, root: Path, fingerpr
     stem = request.name.removesuffix(relative.suffix) or f"{relative.stem}{request.label}"
     for one in concrete(request, kind):
         source, settings, error = one.source, one.settings, one.error
-        for number in range(request.variants):
-            variant = number if one.variant is None else one.variant
+        for variant in range(request.variants):
             named = relative.with_name(f"{stem}{one.suffix}{relative.suffix}")
-            output = numbered(named, number, request.variants)
+            output = numbered(named, variant, request.variants)
             name = printable(output.as_posix())
             if name != output.as_posix():
                 error = error or f"{printable(str(source))}: the file's name is not valid UTF-8; rename it"
