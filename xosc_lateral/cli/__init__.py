@@ -28,6 +28,8 @@ app = typer.Typer(
 # One module per verb, named like it; each has `register(app)`. They import nothing heavy at the top.
 VERBS = (
     "convert",
+    "verify",
+    "reproduce",
     "view",
     "play",
     "segments",

@@ -248,7 +248,7 @@ def _provenance(
     return ConversionProvenance(
         package_version=__version__,
         behaviour=BEHAVIOUR,
-        scenario=relative(scenario.path, output.parent),
+        scenario=f"{relative(scenario.path.parent, output.parent)}/{scenario.path.name}",
         inputs={relative(path, scenario.path.parent): sha256 for path, sha256 in inputs.items()},
         profiles={
             entity.name: (entity.profile.name, profile_hash(entity.profile))

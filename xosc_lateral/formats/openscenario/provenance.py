@@ -65,10 +65,13 @@ def facts_in(data: bytes) -> Mapping[str, Any] | None:
 
 def content_hash(data: bytes) -> str:
     """SHA-256 of a file of ours without its provenance, in hexadecimal."""
+    return hashlib.sha256(without_provenance(data)).hexdigest()
+
+
+def without_provenance(data: bytes) -> bytes:
+    """A file of ours without its provenance, which alone may differ where the content is the same."""
     begin, end = _comment_in(data)
-    digest = hashlib.sha256(data[:begin])
-    digest.update(data[end:])
-    return digest.hexdigest()
+    return data[:begin] + data[end:]
 
 
 def write_sealed(path: Path, pieces: Iterable[bytes], *, save: bool) -> tuple[str, str, bytes]:
