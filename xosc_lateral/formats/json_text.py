@@ -31,11 +31,18 @@ def parse_json(data: bytes, path: Path) -> Any:
         raise FormatError(f"not JSON in UTF-8 ({error}): save it as UTF-8", path=path) from error
     _check_depth(text, path)
     try:
-        return json.loads(text, parse_constant=_refuse_constant)
+        return json.loads(text, parse_constant=_refuse_constant, parse_float=_finite)
     except json.JSONDecodeError as error:
         raise FormatError(f"not JSON: {error.msg}", path=path, line=error.lineno) from error
     except ValueError as error:
         raise FormatError(f"not JSON: {error}", path=path) from error
+
+
+def _finite(text: str) -> float:
+    number = float(text)
+    if not math.isfinite(number):
+        raise ValueError(f"{text[:40]} is no number that a computer holds")
+    return number
 
 
 def _check_depth(text: str, path: Path) -> None:

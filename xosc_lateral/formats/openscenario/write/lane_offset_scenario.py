@@ -147,7 +147,7 @@ def _place_aside(storyboard: etree._Element, scenario: Scenario, chains: Sequenc
         for chain in chains
         if chain.is_placed
     }
-    owners = list(storyboard.iter("{*}Private"))
+    owners = storyboard.findall("{*}Init/{*}Actions/{*}Private")
     # The reader's order is the file's: names need no parameters filled in again.
     last = {
         private.entity_ref: owner
