@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
+import time
 from collections.abc import Sequence
 from importlib import import_module
 from typing import Annotated, Any, cast
@@ -90,7 +91,10 @@ def main(argv: Sequence[str] | None = None) -> int:
             sys.stderr.close()
             code = 0
         else:
-            print(f"xosc-lateral: {' '.join(_in_words(error).split())}", file=sys.stderr)
+            line = f"xosc-lateral: {' '.join(_in_words(error).split())}"
+            if "--log-json" in words:
+                line = json.dumps({"event": "error", "time": round(time.time(), 3), **_as_dict(error)})
+            print(line, file=sys.stderr)
             if "--json" in words:
                 print(json.dumps(_as_dict(error), ensure_ascii=False))
             code = 1

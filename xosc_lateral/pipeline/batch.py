@@ -6,7 +6,7 @@ import errno
 import os
 import re
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from enum import StrEnum
@@ -156,10 +156,28 @@ def _outcomes(
     notify: Callable[[str], None],
 ) -> Iterator[JobOutcome]:
     state = batch.folder / STATE
+    new = [folder for folder in (batch.folder, *batch.folder.parents) if not folder.exists()]
+    try:
+        yield from _locked(batch, work, workers, cluster, again, keep_old, notify, state)
+    finally:
+        _remove_empty([state, *new])
+
+
+def _locked(
+    batch: Batch,
+    work: Callable[[Job], _Reply],
+    workers: int,
+    cluster: str | None,
+    again: bool,
+    keep_old: bool,
+    notify: Callable[[str], None],
+    state: Path,
+) -> Iterator[JobOutcome]:
     with folder_lock(state / "lock"):
         _sweep(batch.folder)
         with Journal(batch.folder, state / "journal.jsonl", notify) as journal:
             todo, anew = [], {}
+            failed: set[Path] = set()
             for job in batch.jobs:
                 former = journal.row(job.name) if job.name in journal else None
                 why = _why_anew(job, former)
@@ -174,12 +192,22 @@ def _outcomes(
             if todo:
                 with open_pool(min(workers, len(todo)), cluster) as pool:
                     for job, reply in run_tasks(pool, work, todo):
-                        yield _noted(job, reply, journal, anew[job.name])
+                        outcome = _noted(job, reply, journal, anew[job.name])
+                        failed |= {job.output.parent} if outcome.row.error else set()
+                        yield outcome
                 _sweep(batch.folder)
             _forget_missing(batch, journal)
             journal.finish()
-    with suppress(OSError):  # the next run has begun already
-        state.rmdir()
+            _remove_empty(
+                place for folder in failed for place in (folder, *folder.parents) if batch.folder in place.parents
+            )
+
+
+def _remove_empty(folders: Iterable[Path]) -> None:
+    """Those with nothing in them, inner ones first; a run that has just begun may have its lock there."""
+    for folder in folders:
+        with suppress(OSError):
+            folder.rmdir()
 
 
 @dataclass(frozen=True, slots=True)
