@@ -353,7 +353,8 @@ def test_a_recording_of_omega_prime_gives_what_the_trace_gives(trace: Path, tmp_
     assert rows["offset"].to_numpy() == pytest.approx(sway(rows["time"].to_numpy()), abs=3e-3)
     for name in ("lane_width", "lane_index", "lane_count", "lead_is_truck"):
         assert rows[name].to_numpy() == pytest.approx(rows[f"{name}_trace"].to_numpy(), abs=1e-3)
-    assert rows["lead_distance"].to_numpy() == pytest.approx(rows["lead_distance_trace"].to_numpy(), abs=0.05)
+    # by the road, gaps in the arc count along its reference line, 1.75 m inside: 50 m are 0.2 m less
+    assert rows["lead_distance"].to_numpy() == pytest.approx(rows["lead_distance_trace"].to_numpy(), abs=0.25)
 
 
 def test_parquet_that_is_no_recording_is_refused(trace: Path, tmp_path: Path) -> None:
