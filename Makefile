@@ -77,10 +77,10 @@ schema: $(STAMP)
 # the closed loop made stays as it is; `make refined` makes it anew.
 WHEEL := out/data/tasi-0.15.4-py3-none-any.whl
 profiles: $(STAMP) $(WHEEL)
-	$(BIN)/python -m benchmarks.build_library $(WHEEL) -o driver_profiles --cards docs/profiles.md --keep-refined
+	$(BIN)/python -m benchmarks.build_library $(WHEEL) -o driver_profiles --keep-refined
 
 refined: $(STAMP) $(WHEEL)
-	$(BIN)/python -m benchmarks.build_library $(WHEEL) -o driver_profiles --cards docs/profiles.md
+	$(BIN)/python -m benchmarks.build_library $(WHEEL) -o driver_profiles
 
 # The README's picture.
 picture: $(STAMP)

@@ -24,6 +24,7 @@ def on_files(files: Any, config: Any) -> Any:
     generated = {
         "reference/cli.md": command_line(),
         "reference/api.md": python(),
+        "reference/limits.md": limits(),
         "changelog.md": (ROOT / "CHANGELOG.md").read_text(encoding="utf-8"),
     }
     for name, text in generated.items():
@@ -41,6 +42,14 @@ def on_page_markdown(markdown: str, page: Any, **_: Any) -> str:
         return match[0] if is_page else f"{match[1]} (`{target}`)"
 
     return LINK.sub(outside, markdown)
+
+
+def limits() -> str:
+    """Every limit of input files, as the code has it."""
+    from xosc_lateral.limits import limits_table
+
+    intro = "What is beyond one of these is refused in one line. Only `--job-timeout` and `--job-memory` can be changed."
+    return f"# Limits of input files\n\n{intro}\n\n{limits_table()}\n"
 
 
 def command_line() -> str:
