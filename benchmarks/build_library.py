@@ -9,8 +9,8 @@ import argparse
 from collections.abc import Sequence
 from pathlib import Path
 
+from benchmarks.library import build_library
 from xosc_lateral.formats.profiles import write_profile
-from xosc_lateral.pipeline.library import build_library
 
 
 def main(argv: Sequence[str] | None = None) -> None:

@@ -1,7 +1,7 @@
 """Tracks made of pieces: how much of what a recording shows at each frequency are the kinks between them?
 
     xosc-lateral import dlr-ht tasi-0.15.4-py3-none-any.whl -o dlr.parquet
-    python -m benchmarks.kinks dlr.parquet [--write docs/design/sensor.md]
+    python -m benchmarks.kinks dlr.parquet [--write PAGE.md]
 
 Jumps of the slope are read off the rows; their density over the fourth power of the frequency stands beside the density
 of the runs, which is measured apart.

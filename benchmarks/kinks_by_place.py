@@ -1,6 +1,6 @@
 """Does the place say how large the kinks of a recording's tracks are? One half of the vehicles tells for the other.
 
-    python -m benchmarks.kinks_by_place tasi-0.15.4-py3-none-any.whl [--write docs/design/sensor.md]
+    python -m benchmarks.kinks_by_place tasi-0.15.4-py3-none-any.whl [--write PAGE.md]
 
 The logarithm of the squared jumps of the slope, averaged in pieces of the road over the vehicles of one half: how these
 means correlate with the other half's, and how much of that half's variance they tell. `python -m benchmarks.kinks` says

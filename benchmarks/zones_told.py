@@ -1,7 +1,7 @@
 """What do the zones of a recording tell? Loudness that lasts, recorded and sampled, and what a fit takes drivers for.
 
     xosc-lateral import dlr-ht tasi-0.15.4-py3-none-any.whl -o dlr.parquet
-    python -m benchmarks.zones_told dlr.parquet [--draws 4] [--write docs/design/sensor.md]
+    python -m benchmarks.zones_told dlr.parquet [--draws 4] [--write PAGE.md]
 
 One profile is fitted to all drives with their zones, and one without. First table: covariance of the log power of two
 bands, 10 to 20 s apart in a run, recorded (with a standard error over drives) and sampled under the same context: what

@@ -19,7 +19,6 @@ _HOME = {
     "sample": "api.sample",
     "evaluate": "api.evaluate",
     "close_loop": "api.loop",
-    "benchmark_realism": "api.benchmark",
     "read_drives": "api.fit",
     "import_drives": "api.importing",
     "read_profile": "api.profiles",
@@ -57,7 +56,6 @@ __all__ = [  # noqa: RUF022 (the order of the documentation)
     "sample",
     "evaluate",
     "close_loop",
-    "benchmark_realism",
     "read_drives",
     "import_drives",
     "read_profile",
@@ -87,7 +85,6 @@ __all__ = [  # noqa: RUF022 (the order of the documentation)
 
 if TYPE_CHECKING:
     from xosc_lateral.api.batch import BatchResult, convert_many
-    from xosc_lateral.api.benchmark import benchmark_realism
     from xosc_lateral.api.convert import Conversion, convert
     from xosc_lateral.api.evaluate import Evaluation, evaluate
     from xosc_lateral.api.fit import fit, read_drives
