@@ -48,7 +48,7 @@ def limits() -> str:
     """Every limit of input files, as the code has it."""
     from xosc_lateral.limits import limits_table
 
-    intro = "What is beyond one of these is refused in one line. Only `--job-timeout` and `--job-memory` can be changed."
+    intro = "Beyond one of these, one line says so. Only `--job-timeout` and `--job-memory` can be changed."
     return f"# Limits of input files\n\n{intro}\n\n{limits_table()}\n"
 
 

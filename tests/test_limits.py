@@ -6,7 +6,6 @@ from xosc_lateral.limits import CONTEXT_RANGES, FILE_SIZE, limits_table
 from xosc_lateral.segment import CONTEXT_UNITS
 
 
-
 def test_the_table_has_every_limit_and_context() -> None:
     table = limits_table()
     assert f"| {FILE_SIZE.what} | {FILE_SIZE} | {FILE_SIZE.reason} |" in table

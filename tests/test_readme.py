@@ -48,7 +48,7 @@ def test_every_command_runs_as_printed_in_a_new_shell(checkout):
     assert len(lines) > 6
     script = "\n".join(["set -e", *(f"echo '$ {line}'\n{line}" for line in lines)])
     home = {"HOME": str(checkout), "PATH": "/usr/bin:/bin", "LANG": "C.UTF-8", "OMP_NUM_THREADS": "1"}
-    cache = {name: os.environ[name] for name in ("NUMBA_CACHE_DIR", "MPLCONFIGDIR") if name in os.environ}
+    cache = {name: os.environ[name] for name in ("NUMBA_CACHE_DIR", "MPLCONFIGDIR", "PYTHONPATH") if name in os.environ}
     run = subprocess.run(
         ["bash", "-c", script], cwd=checkout, env=home | cache, capture_output=True, text=True, timeout=900, check=False
     )

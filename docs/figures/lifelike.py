@@ -1,4 +1,4 @@
-"""Draw the README's moving picture from a real conversion: as the maneuvers say, and as people drive (`make picture`)."""
+"""The README's moving picture, from a real conversion: as the maneuvers say, and as people drive (`make picture`)."""
 
 from __future__ import annotations
 

@@ -165,6 +165,14 @@ def test_links_lead_somewhere(page):
         assert (path.parent / unquote(target)).exists(), f"{page}: {target}"
 
 
+def test_files_that_contributing_names_are_there():
+    text = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
+    named = [name for name in re.findall(r"`([\w./]+(?:\.py|\.md|\.json|/))`", text) if "NAME" not in name]
+    found = [ROOT / name if (ROOT / name).exists() else ROOT / "xosc_lateral" / name for name in named]
+    assert len(named) > 40
+    assert [path for path in found if not path.exists()] == []
+
+
 def test_every_page_is_in_the_menu():
     menu = (ROOT / "mkdocs.yml").read_text(encoding="utf-8")
     missing = [page for page in PAGES if page.startswith("docs/") and page.removeprefix("docs/") not in menu]

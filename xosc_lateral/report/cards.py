@@ -145,8 +145,8 @@ def _evaluation_items(evaluation: Mapping[str, Any]) -> list[tuple[str, str]]:
 
 def _scores(short: Mapping[str, Any]) -> str:
     return (
-        f"distance {short['mean_distance']:.3f}, between real drivers {short['mean_floor']:.3f}, ratio {short['mean_ratio']:.2f}, "
-        f"worst {short['worst_metric']} {short['worst_ratio']:.2f}"
+        f"distance {short['mean_distance']:.3f}, between real drivers {short['mean_floor']:.3f}, "
+        f"ratio {short['mean_ratio']:.2f}, worst {short['worst_metric']} {short['worst_ratio']:.2f}"
     )
 
 
