@@ -1,7 +1,8 @@
-"""docs/playing.md names every action, condition and position of OpenSCENARIO 1.3, and says what is done with it."""
+"""docs/elements.csv names every action, condition and position of OpenSCENARIO 1.3, and says what is done with it."""
 
 from __future__ import annotations
 
+import csv
 import re
 from collections.abc import Mapping
 from importlib import import_module
@@ -37,9 +38,9 @@ HOLDERS = {
 
 
 def _rows() -> dict[str, tuple[str, str]]:
-    text = (ROOT / "docs" / "playing.md").read_text(encoding="utf-8")
-    found = re.findall(r"^\| `(\w+(?:Action|Condition|Position))` \| (.*?) \| (.*?) \|$", text, re.MULTILINE)
-    return {name: (what, how) for name, what, how in found}
+    with (ROOT / "docs" / "elements.csv").open(encoding="utf-8", newline="") as lines:
+        _header, *rows = csv.reader(lines)
+    return {name: (what, how) for name, what, how in rows}
 
 
 def _standard() -> list[str]:

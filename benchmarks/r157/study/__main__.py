@@ -139,7 +139,7 @@ def main() -> None:
     print(markdown(record))
     if args.page is not None:
         _put_into(args.page, markdown(record))
-        shutil.copyfile(args.output / "verdict.svg", args.page.parent / "figures" / "r157_verdict.svg")
+        shutil.copyfile(args.output / "verdict.svg", args.page.parent / "verdict.svg")
 
 
 def _put_into(page: Path, text: str) -> None:
