@@ -103,11 +103,11 @@ def held(profiles: Sequence[DriverProfile]) -> list[str]:
         for part in ("coarse", "fine"):
             for kept, words in (("between", "variance between drivers"), ("within", "variance within drivers")):
                 rows.setdefault(f"{part} movement, {words}", []).append(model[f"{part}_volatility"][kept])
-        kinks = None if sensor is None else sensor.kinks
-        if kinks is not None:
-            level = kinks if kinks.by_zone is None else kinks.by_zone
-            rows.setdefault("kinks, variance within tracks", []).append(0.25 * level.level_variance)
-            rows.setdefault("kinks, variance between tracks", []).append(0.25 * level.track_variance)
+        slope_jumps = None if sensor is None else sensor.slope_jumps
+        if slope_jumps is not None:
+            level = slope_jumps if slope_jumps.by_zone is None else slope_jumps.by_zone
+            rows.setdefault("slope jumps, variance within tracks", []).append(0.25 * level.level_variance)
+            rows.setdefault("slope jumps, variance between tracks", []).append(0.25 * level.track_variance)
     return lines + [f"| {name} | {' | '.join(f'{value:.3f}' for value in values)} |" for name, values in rows.items()]
 
 

@@ -77,7 +77,7 @@ class ConditionScores:
     alone, jointly : TwoSampleResult or None
         Classifier on movement, and on context and movement jointly (below 0.5 Hz). None: not trained.
     floor : TwoSampleResult or None
-        Half of the real drivers told from the others, by movement. Jointly it is 0.5: both kinds have the same
+        A classifier between two halves of the real drivers, by movement. Jointly it is 0.5: both kinds have the same
         context. With the same start it is as with any: both halves start alike.
     """
 
@@ -219,7 +219,7 @@ def _stand_ins(
 
 
 def _separated_drivers(real: FloatArray, group: NDArray[np.str_], seed: int, *, fast: bool) -> TwoSampleResult | None:
-    """One random half of the drivers told from the other."""
+    """A classifier between one random half of the drivers and the other."""
     half = split_groups(group, np.random.default_rng(seed))
     return classifier_two_sample_test(real[half], real[~half], group[half], group[~half], fast=fast, seed=seed)
 

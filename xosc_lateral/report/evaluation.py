@@ -145,7 +145,7 @@ def _snippet_lines(scores: SnippetScores) -> list[str]:
 
 
 def _key_figures(realism: Realism) -> list[KeyFigure]:
-    """Of the shortest free runs: how near, how well told apart."""
+    """Of the shortest free runs: how near, how well separated."""
     figures = []
     slow = next((one for one in realism.conditions if one.condition.slow), None)
     free = next((one for one in realism.conditions if not one.condition.slow and not one.condition.same_start), None)
@@ -162,7 +162,7 @@ def _key_figures(realism: Realism) -> list[KeyFigure]:
 def blocks_of(scores: ProfileScores) -> dict[str, float]:
     """Every block of the fair measure as a ratio to what other real drivers get: 1 is as good as it gets. [-]
 
-    Families of differences by condition; the classifiers: 1 where they can't tell (AUC 0.5), 2 where they always can.
+    Families of differences by condition; the classifiers: 1 at AUC 0.5, 2 at AUC 1.
     """
     blocks = {}
     for one in scores.realism.conditions:
