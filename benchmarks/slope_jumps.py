@@ -77,7 +77,7 @@ def main() -> None:
         "",
         f"A slope jump every {slope_jumps.every:g} s; about the pieces, rows lie within {1e3 * noise:.2f} mm rms (a "
         f"millimetre's rounding is {1e3 * 1e-3 / np.sqrt(12.0):.2f} mm). The logarithm of the squared jumps' level "
-        f"varies by {slope_jumps.level_variance:.2f} and lasts {slope_jumps.level_duration:.0f} s; what of it lasts all "
+        f"varies by {slope_jumps.level_variance:.2f} and lasts {slope_jumps.level_duration:.0f} s; what lasts all "
         f"along a track varies by {slope_jumps.track_variance:.2f} from track to track; "
         f"{100 * slope_jumps.with_movement:.0f} % of the squares go with the square of the path's acceleration, "
         f"{slope_jumps.acceleration:.3f} m/s² rms (mean square of all: 1):",
