@@ -2,8 +2,8 @@
 
 Snippets of 10, 30 and 60 s are compared under three conditions: sampled from where the real ones start; cut from free
 runs that know no start; and free runs again, movement below 0.5 Hz alone. Every number stands beside that of real
-snippets of other drivers that know as much about the start. What was recorded is the driver and the sensor, so a profile that knows
-its sensor is compared with it; below 0.5 Hz the driver is compared alone, as `convert` writes him.
+snippets of other drivers that know as much about the start. What was recorded is the driver and the sensor, so a
+profile that knows its sensor is compared with it; below 0.5 Hz the driver is compared alone, as `convert` writes him.
 """
 
 from __future__ import annotations
