@@ -12,7 +12,6 @@ TYPE_CHECKING = False  # importing `typing` for it would take longer than all th
 _HOME = {
     "convert": "api.convert",
     "convert_many": "api.batch",
-    "variant_set": "api.variants",
     "play": "api.play",
     "segments": "api.play",
     "fit": "api.fit",
@@ -31,6 +30,7 @@ _HOME = {
     "DriverProfile": "driver.profile",
     "Drive": "drives.drive",
     "Conversion": "api.convert",
+    "ConvertOptions": "pipeline.settings",
     "BatchResult": "api.batch",
     "Playback": "api.play",
     "Segments": "api.play",
@@ -49,7 +49,6 @@ _HOME = {
 __all__ = [  # noqa: RUF022 (the order of the documentation)
     "convert",
     "convert_many",
-    "variant_set",
     "play",
     "segments",
     "fit",
@@ -68,6 +67,7 @@ __all__ = [  # noqa: RUF022 (the order of the documentation)
     "DriverProfile",
     "Drive",
     "Conversion",
+    "ConvertOptions",
     "BatchResult",
     "Playback",
     "Segments",
@@ -94,7 +94,6 @@ if TYPE_CHECKING:
     from xosc_lateral.api.profiles import compare_profiles, list_profiles, read_profile, write_profile
     from xosc_lateral.api.sample import Offsets, sample
     from xosc_lateral.api.templates import list_templates, write_template
-    from xosc_lateral.api.variants import variant_set
     from xosc_lateral.driver.profile import DriverProfile
     from xosc_lateral.driver.stream import OffsetStream
     from xosc_lateral.drives.drive import Drive
@@ -105,6 +104,7 @@ if TYPE_CHECKING:
         PlaybackError,
         XoscLateralError,
     )
+    from xosc_lateral.pipeline.settings import ConvertOptions
 
 
 def __getattr__(name: str) -> object:

@@ -1,4 +1,4 @@
-"""Templates as a notebook writes them, sets of variants, and drives from other formats: files, names and refusals."""
+"""Templates as a notebook writes them, and drives from other formats: files, names and refusals."""
 
 from __future__ import annotations
 
@@ -12,7 +12,6 @@ from lxml import etree
 import xosc_lateral as xl
 from xosc_lateral.api.importing import import_drives
 from xosc_lateral.api.templates import list_templates, write_template
-from xosc_lateral.api.variants import variant_files, variant_set
 from xosc_lateral.errors import FormatError, XoscLateralError
 
 
@@ -72,51 +71,6 @@ def test_what_is_not_there_or_out_of_range_is_refused_by_name(
     with pytest.raises(XoscLateralError, match=message):
         write_template(name, tmp_path, **settings)
     assert not list(tmp_path.iterdir())
-
-
-# ---- sets of variants ------------------------------------------------------------------------------------------------
-@pytest.fixture(scope="module")
-def converted(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, list[Path]]:
-    folder = tmp_path_factory.mktemp("variants")
-    source, _ = write_template("cut-in", folder)
-    made = [folder / f"out_{number}.xosc" for number in (1, 2, 3)]
-    for number, path in enumerate(made):
-        xl.convert(source, path, seed=3, variant=number, time_limit=4.0, ego="none")
-    return source, made
-
-
-def test_a_set_has_every_variant_once_and_draws_by_weight(converted: tuple[Path, list[Path]]) -> None:
-    source, made = converted
-    files = variant_set(made, made[0].with_name("out.xosc"), source=source, weights=[1.0, 2.0, 1.0])
-    named = [element.get("value") for element in etree.parse(files.distribution).iter("Element")]
-    assert len(named) == len(set(named)) == 3
-    weighted = {
-        element.get("value"): float(element.get("weight"))
-        for element in etree.parse(files.stochastic).iter("ProbabilityDistributionSet", "Element")
-        if element.get("weight")
-    }
-    assert sorted(weighted) == sorted(named)
-    total = sum(weighted.values())
-    assert sorted(weight / total for weight in weighted.values()) == pytest.approx([0.25, 0.25, 0.5])
-    assert files.logical.name in str(files)
-    assert len(list(files.folder.iterdir())) >= 3
-
-
-@pytest.mark.parametrize("weights", [[1.0, 1.0], [0.0, 0.0, 0.0], [1.0, -1.0, 1.0], [float("inf"), 1.0, 1.0]], ids=str)
-def test_weights_that_are_no_weights_are_refused(converted: tuple[Path, list[Path]], weights: list[float]) -> None:
-    source, made = converted
-    with pytest.raises(ValueError, match="one per variant"):
-        variant_set(made, made[0].with_name("other.xosc"), source=source, weights=weights)
-
-
-def test_one_variant_lane_offsets_and_carla_have_no_set(tmp_path: Path) -> None:
-    output = tmp_path / "x.xosc"
-    assert variant_files(output, 1, "trajectory", "standard") is None
-    assert variant_files(output, 3, "lane-offset", "standard") is None
-    assert variant_files(output, 3, "trajectory", "carla") is None
-    files = variant_files(output, 3, "trajectory", "esmini")
-    assert files is not None
-    assert len(set(files.all(3))) == len(list(files.all(3)))
 
 
 # ---- other formats ---------------------------------------------------------------------------------------------------
