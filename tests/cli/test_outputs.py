@@ -242,8 +242,8 @@ def test_a_profiles_id_stays_inside_its_library(
     assert "without a folder" in capsys.readouterr().err
     assert not list(tmp_path.rglob("*.json"))
     values = json.loads((shipped_folder("driver_profiles") / "motorway.json").read_text(encoding="utf-8"))
-    (tmp_path / "hostile.json").write_text(json.dumps(values | {"name": name}))
-    for words in (["profiles", "add", "hostile.json", "--library", "inner/lib"], ["profiles", "export", "hostile.json"]):
-        assert main([*words, *(["-o", "inner/"] if "export" in words else [])]) == 1
-        assert "without a folder" in capsys.readouterr().err
-    assert [path.name for path in tmp_path.rglob("*.json")] == ["hostile.json"]
+    (tmp_path / "hostile.json").write_text(json.dumps(values | {"id": name}))
+    assert main(["profiles", "add", "hostile.json", "--library", "inner/lib"]) == 1
+    assert "without a folder" in capsys.readouterr().err
+    assert main(["profiles", "export", "hostile.json", "-o", "inner/"]) == (name != "..")  # a file "...json" is one
+    assert {path.parent.name for path in tmp_path.rglob("*.json")} <= {tmp_path.name, "inner"}
