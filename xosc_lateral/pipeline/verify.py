@@ -98,7 +98,7 @@ def _places(search: ConvertSettings) -> dict[str, Any]:
 
 
 def verify(outputs: Sequence[Path], search: ConvertSettings) -> Iterator[Checked]:
-    """Check outputs one by one: files, and folders by their manifests.
+    """Check outputs one by one: files, and folders by their manifests, which may be named as well.
 
     Raises
     ------
@@ -106,6 +106,7 @@ def verify(outputs: Sequence[Path], search: ConvertSettings) -> Iterator[Checked
         There is no such file, or no manifest in a folder.
     """
     for given in outputs:
+        given = given.parent if given.name == MANIFEST else given
         if given.is_dir():
             for row in _rows(given):
                 path = path_below(given, row.output, "output")
