@@ -54,9 +54,13 @@ def configured_libraries() -> list[Path]:
     path, found = configuration()
     library = found.get("library", [])
     try:
-        return [path.parent / Path(name).expanduser() for name in library] if path is not None else []
+        folders = [path.parent / Path(name).expanduser() for name in library] if path is not None else []
     except RuntimeError as error:
         raise FormatError(f"library = {library!r}: there is no home that ~ could stand for", path=path) from error
+    for folder in folders:
+        if not folder.is_dir():
+            raise FormatError(f"library: no such folder {str(folder)!r}", path=path)
+    return folders
 
 
 @lru_cache(maxsize=8)
