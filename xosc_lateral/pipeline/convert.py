@@ -12,7 +12,7 @@ import numpy as np
 from xosc_lateral.enrich.conversion import ConversionProvenance, ConvertedScenario
 from xosc_lateral.enrich.enrich import enrich, with_offsets
 from xosc_lateral.enrich.result import Enriched
-from xosc_lateral.errors import FormatError
+from xosc_lateral.errors import DriverProfileError, FormatError
 from xosc_lateral.formats.atomic import refuse_outputs
 from xosc_lateral.formats.context_table import read_context
 from xosc_lateral.formats.openscenario.provenance import PENDING
@@ -108,20 +108,23 @@ def _convert(
     reacts = settings.mode is OutputMode.AUTO and not is_replay(settings, depends)
     if reacts and depends.of_trigger(played.scenario.storyboard.stop_trigger):
         lasting = play_longer(played, LONGER, step=settings.step, time_limit=settings.time_limit)
-    enriched = enrich(
-        lasting.motion,
-        played.network,
-        drivers,
-        seed=settings.seed,
-        variant=variant,
-        entropy=_entropy(played),
-        context=context,
-        trailers=played.trailers,
-        attempts=settings.attempts,
-        with_sensor=settings.with_sensor,
-        neighbours=settings.neighbours,
-        uncertain=depends.entities,
-    )
+    try:
+        enriched = enrich(
+            lasting.motion,
+            played.network,
+            drivers,
+            seed=settings.seed,
+            variant=variant,
+            entropy=_entropy(played),
+            context=context,
+            trailers=played.trailers,
+            attempts=settings.attempts,
+            with_sensor=settings.with_sensor,
+            neighbours=settings.neighbours,
+            uncertain=depends.entities,
+        )
+    except DriverProfileError as error:  # found in the movement: who sampled knows the profile by its name alone
+        raise DriverProfileError(f"{source}: {error}") from error
     _refuse_lanes_without_width(played, enriched)
     names = [entity.name for entity in enriched.entities if entity.is_enriched]
     plan = writing_plan(played.scenario, settings, depends, names, pulled=played.trailers, sampled=sampled)
