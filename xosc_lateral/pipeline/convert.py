@@ -95,7 +95,7 @@ def _convert(
         parameters=settings.parameters,
         step=settings.step,
         time_limit=settings.time_limit,
-        allowed=settings.allowed,
+        allowed=settings.allow,
         roads=settings.roads,
         strict=settings.strict,
     )
@@ -216,7 +216,7 @@ class _Making:
     def _played_again(self, time_limit: float) -> Played:
         source, settings = self.played.scenario, self.settings
         roads = () if source.road_file is None else (source.road_file.parent,)
-        allowed = (*settings.allowed, *(path.parent for path in source.input_files), *roads)
+        allowed = (*settings.allow, *(path.parent for path in source.input_files), *roads)
         again = play_scenario(
             self.output, step=settings.step, time_limit=time_limit, allowed=allowed, roads=settings.roads
         )
