@@ -311,7 +311,7 @@ def chosen(options: argparse.Namespace, folder: Path) -> Iterator[tuple[str, Pat
     for path in paths:
         text = path.read_text(encoding="utf-8", errors="replace")
         if 'name="Ego"' in text and "<Storyboard" in text:
-            yield path.stem, path
+            yield path.stem if path.stem != "scenario" else path.parent.name, path
     for name, road, scenario in reactive_scenarios() if options.made else ():
         own = folder / "made" / name.replace(" ", "_")
         own.mkdir(parents=True)

@@ -14,6 +14,8 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
+from itertools import product
+from math import inf
 from pathlib import Path
 from typing import Any
 
@@ -58,6 +60,8 @@ SLOWEST = 10.0
 """A car that gets slower keeps its place in the lane: a little below what counts as road-following. [m/s]"""
 FIRST = 0.05
 """After a lateral action its chain waits so long, a few frames: what overrules the action begins with its end. [s]"""
+MOST_AGAIN = 4
+"""Actions that run again and are waited for: conditions for each combination of their states. [-]"""
 PLACED = 1e-3
 """What begins with the scenario begins only now: it would overrule an init action that has not been stepped yet. [s]"""
 
@@ -223,7 +227,8 @@ class _Acts:
         act, events = self._act((back, *others), 0.0, is_clocked=False)
         self._start_after(act, item)
         self._go_round(events, chain)
-        self._stop(act, {item.path, *self._last}, None)
+        first = next((played.start for played in self._played if played.path == item.path), inf)
+        self._stop(act, {item.path, *(played.path for played in self._played if played.start < first)}, None)
 
     def _before(self, chain: OffsetChain) -> list[PlayedAction]:
         return [played for played in self._played if played.start < chain.time[0]]
@@ -273,11 +278,17 @@ class _Acts:
 
     def _start_after(self, act: etree._Element, item: LateralAction) -> None:
         """When it ends, not when it is stopped midway: who is keeps his heading."""
-        group = build.sub(build.sub(act, "StartTrigger"), "ConditionGroup")
-        build.state_condition(group, item.kind, item.reference, "endTransition", 0.0)
-        if item.path in self._last:
-            build.state_condition(group, "act", self._last[item.path], "completeState", 0.0)
-        _add_speed(group, self._entity, SLOWEST, "none")
+        trigger = build.sub(act, "StartTrigger")
+        again = [one for one in self._items if one.repeats and one != item][:MOST_AGAIN]
+        # One that runs again may do so with the end: a condition with a delay is looked at all the time, and knows.
+        for states in product(("standbyState", "completeState"), repeat=len(again)):
+            group = build.sub(trigger, "ConditionGroup")
+            build.state_condition(group, item.kind, item.reference, "endTransition", FIRST if again else 0.0)
+            for one, state in zip(again, states, strict=True):
+                build.state_condition(group, "event", "::".join(one.path[:-1]), state, SLACK / 3.0)
+            if item.path in self._last:
+                build.state_condition(group, "act", self._last[item.path], "completeState", 0.0)
+            _add_speed(group, self._entity, SLOWEST, "none")
 
     def _start_when_faster(self, act: etree._Element, before: Sequence[PlayedAction]) -> None:
         """Again, if it was fast enough before."""

@@ -34,7 +34,7 @@ them, and 1 % of the chains more err by over 2 cm. [m]"""
 MOST_TURNING = 0.026
 """Of the heading, within a transition: 0.26 mrad in a frame of 0.01 s. The reference player ends an action 1e-6 m short
 of its target, up to 2 ms early, and turns the car by that much more in its last frame: up to 0.31 mrad. [rad/s]"""
-MOST_HEADING = 0.8e-3
+MOST_HEADING = 0.9e-3
 """To the lane, of a car that a lateral action may come to at any time: it turns by so much in a frame then. 1 mrad may
 be seen; the rest is for cars that are slower than nominally, up to the fifth by which egos are varied. [rad]"""
 ASKEW = 2e-3
