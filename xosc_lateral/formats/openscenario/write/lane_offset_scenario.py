@@ -227,8 +227,8 @@ class _Acts:
         act, events = self._act((back, *others), 0.0, is_clocked=False)
         self._start_after(act, item)
         self._go_round(events, chain)
-        first = next((played.start for played in self._played if played.path == item.path), inf)
-        self._stop(act, {item.path, *(played.path for played in self._played if played.start < first)}, None)
+        begin = next((played.start for played in self._played if played.path == item.path), inf)
+        self._stop(act, {item.path, *(played.path for played in self._played if played.start < begin)}, None)
 
     def _before(self, chain: OffsetChain) -> list[PlayedAction]:
         return [played for played in self._played if played.start < chain.time[0]]

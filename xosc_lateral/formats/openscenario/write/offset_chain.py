@@ -43,6 +43,8 @@ GRID = 0.1
 """Time between places where a transition may begin or end. [s]"""
 LONGEST = 4.0
 """Of a transition, once it has settled. [s]"""
+LONGEST_CHAIN = 300.0
+"""Of a chain that goes round: a run that is stopped by something that never happens lasts an hour. [s]"""
 SLACK = 0.03
 """A transition is over that long before the next begins: a frame of the player and one more, to come to rest. [s]"""
 LEAST_CHANGE = 1e-3
@@ -120,6 +122,9 @@ def offset_chains(
     held, end = 0.0, -1
     for k, span in enumerate(spans):
         overruled, lasts = bool(motion.time[span.first] < overruled_until), _may_last(motion, span.last)
+        if lasts and span.end - span.start > LONGEST_CHAIN:
+            last = int(np.searchsorted(motion.time, span.start + LONGEST_CHAIN))
+            span = replace(span, last=last, end=float(motion.time[last]))
         is_supplied = k < len(beyond) and lasts and (overruled or not _is_lateral(motion, span.last + 1))
         chain = _offset_chain(motion, network, deviation, span, *(beyond[k] if is_supplied else (_NONE, _NONE)))
         chain = replace(chain, goes_on=lasts, is_overruled=overruled)
