@@ -15,7 +15,7 @@ import numpy as np
 import pandas as pd
 
 from benchmarks.markers import write_between_markers
-from xosc_lateral.datasets.assist import FLAG, OPENLKA_MAP, LaneKeepingAssist, openlka_layout
+from benchmarks.simulated.assist import FLAG, OPENLKA_MAP, LaneKeepingAssist, openlka_layout
 from xosc_lateral.datasets.driver_simulator import simulate_drive
 from xosc_lateral.driver.fitting import fit_profile
 from xosc_lateral.drives.cuts import all_runs

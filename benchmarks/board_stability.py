@@ -18,11 +18,11 @@ from pathlib import Path
 
 import numpy as np
 
+from benchmarks.board.benchmark import fit_and_sample, split_in_halves
+from benchmarks.board.contestants import contestants
+from benchmarks.board.models.catalogue import MODELS
+from benchmarks.board.ranking import half_score, kendall_tau
 from benchmarks.markers import show
-from xosc_lateral.baselines.catalogue import MODELS
-from xosc_lateral.board.benchmark import fit_and_sample, split_in_halves
-from xosc_lateral.board.contestants import contestants
-from xosc_lateral.board.ranking import half_score, kendall_tau
 from xosc_lateral.drives.cuts import all_runs
 from xosc_lateral.drives.drive import Run
 from xosc_lateral.formats.drives import read_drives

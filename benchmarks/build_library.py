@@ -9,10 +9,10 @@ import argparse
 from collections.abc import Sequence
 from pathlib import Path
 
+from benchmarks.library import build_library
+from benchmarks.refined import NAME
 from xosc_lateral.formats.atomic import write_atomically
 from xosc_lateral.formats.profiles import read_profile, write_profile
-from xosc_lateral.pipeline.library import build_library
-from xosc_lateral.pipeline.refined import NAME
 from xosc_lateral.report.cards import library_page
 
 

@@ -15,12 +15,12 @@ import time
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from benchmarks.library import SEED
 from benchmarks.markers import show
+from benchmarks.refined import refine_population
 from xosc_lateral.formats.drives import read_drives
 from xosc_lateral.identification.close import LoopResult
 from xosc_lateral.identification.lack_of_fit import LackOfFit, lack_of_fit_of
-from xosc_lateral.pipeline.library import SEED
-from xosc_lateral.pipeline.refined import refine_population
 from xosc_lateral.report.figures import PAPER
 from xosc_lateral.report.loop import loop_text
 from xosc_lateral.report.loop_figures import effect_figure, residual_figure, spectrum_figure

@@ -35,7 +35,6 @@ RUN = (
     "how_to/carla.md",
     "how_to/esmini.md",
     "how_to/osi.md",
-    "how_to/variants.md",
     "pipeline.md",
     "api.md",
 )

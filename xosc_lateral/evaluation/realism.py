@@ -79,8 +79,6 @@ class ConditionScores:
     floor : TwoSampleResult or None
         Half of the real drivers told from the others, by movement. Jointly it is 0.5: both kinds have the same
         context. With the same start it is as with any: both halves start alike.
-    convolved : TwoSampleResult or None
-        Classifier on random convolutions of the movement. None: not asked for.
     """
 
     condition: SnippetCondition
@@ -92,7 +90,6 @@ class ConditionScores:
     alone: TwoSampleResult | None
     jointly: TwoSampleResult | None
     floor: TwoSampleResult | None
-    convolved: TwoSampleResult | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,9 +113,7 @@ class Realism:
         return next((one for one in self.conditions if one.condition == condition), None)
 
 
-def score_realism(
-    profile: DriverProfile, runs: Sequence[Run], *, seed: int, classify: bool = True, rocket: bool = False
-) -> Realism:
+def score_realism(profile: DriverProfile, runs: Sequence[Run], *, seed: int, classify: bool = True) -> Realism:
     """Compare a profile's snippets with real ones under every condition that has enough of them.
 
     Parameters
@@ -127,8 +122,6 @@ def score_realism(
         Measured, at the profile's step.
     classify : bool
         Train classifiers too: most of the work.
-    rocket : bool
-        And one on random convolutions (`rocket`).
     """
     step = profile.model.step
     driver = sample_runs(profile, runs, seed, same_start=False)
@@ -149,7 +142,7 @@ def score_realism(
             (SnippetCondition(seconds, False, slow=True), *slow),
         ):
             with_sensor = profile.sensor is not None and not condition.slow
-            asked = _Asked(seed, classify, rocket, with_sensor)
+            asked = _Asked(seed, classify, with_sensor)
             found.append(_under(condition, cut, real, sampled, step, asked))
     short = snippets_of(runs, LENGTHS[0], step)
     whose = np.array([str(number) for number, _ in short.place])
@@ -162,7 +155,6 @@ def score_realism(
 class _Asked:
     seed: int
     classify: bool
-    rocket: bool
     with_sensor: bool
 
 
@@ -174,10 +166,8 @@ def _under(
     own = features_of(real, cut.lane_width, step, highest=highest)
     made = features_of(sampled, cut.lane_width, step, highest=highest)
     families, named = _distances(condition, own, made, real, cut.group, seed)
-    alone = jointly = floor = convolved = None
+    alone = jointly = floor = None
     shown = (thinned(real, step), thinned(sampled, step)) if condition.slow else (real, sampled)
-    if asked.rocket:
-        convolved = classifier_two_sample_test(*shown, cut.group, cut.group, rocket=True, seed=seed)
     if asked.classify:
         fast = not condition.slow
         alone = classifier_two_sample_test(*shown, cut.group, cut.group, fast=fast, seed=seed)
@@ -187,9 +177,7 @@ def _under(
             context = context_features(cut, real), context_features(cut, sampled)
             jointly = classifier_two_sample_test(*shown, cut.group, cut.group, context=context, seed=seed)
     means = named_means(own, made)
-    return ConditionScores(
-        condition, asked.with_sensor, len(cut), families, named, means, alone, jointly, floor, convolved
-    )
+    return ConditionScores(condition, asked.with_sensor, len(cut), families, named, means, alone, jointly, floor)
 
 
 def _distances(

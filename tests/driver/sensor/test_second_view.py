@@ -9,7 +9,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy.signal import butter, lfilter, sosfilt
 
-from tests.baselines.made_runs import made_run
+from tests.benchmarks.models.made_runs import made_run
 from xosc_lateral.driver.sensor.model import SensorModel
 from xosc_lateral.driver.sensor.runs import driver_runs, half_widths_of
 from xosc_lateral.driver.sensor.second_view import KNOTS, SecondView, second_view

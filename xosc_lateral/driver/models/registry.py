@@ -25,7 +25,7 @@ ENTRY_POINTS = "xosc_lateral.models"
 """Group of entry points under which other packages offer core models: each names a `KnownModel`."""
 
 ALIASES = {"best": "autoregressive"}
-"""Names that models had in older versions."""
+"""Other names of models, on the command line."""
 
 
 @dataclass(frozen=True, slots=True)
