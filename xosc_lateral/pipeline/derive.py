@@ -36,7 +36,8 @@ DESIGN, PROOF = 20261, 20262
 """Seeds of the runs that handles are corrected by, and of those that the result is measured with. [-]"""
 
 DRIVES = 240
-"""Of an hour each: standard errors are below 0.4 % of an SDLP, 1 % of a memory, 2 % of a share near a line of 0.02."""
+"""Of an hour each, twice as many for a memory or a share near a line: standard errors are 0.3 % of an SDLP, 0.6 % of a
+memory, 2 % of a share of 0.02."""
 
 CORRECTIONS = 4
 """At most; one is enough where figures answer to the handles as the closed form has it. [-]"""
@@ -189,7 +190,8 @@ def derive(base: DriverProfile, asked: Asked, name: str, *, preset: Preset | Non
     plain = structs.replace(plain, name=name)
 
     def measured(handles: Adapted, seed: int) -> tuple[LaneKeeping, FloatArray]:
-        drives = highway_drives(plain.with_effects(handles), seed, speed=speed, drives=DRIVES)
+        count = DRIVES if asked.memory is None and asked.near_line is None else 2 * DRIVES
+        drives = highway_drives(plain.with_effects(handles), seed, speed=speed, drives=count)
         return lane_keeping(drives, plain.lane_width, plain.model.step, half_width=half_width), drives
 
     known, drives = measured(adapted, DESIGN)
@@ -356,7 +358,8 @@ def _missed(asked: Asked, reached: LaneKeeping, *, share: float = 1.0) -> list[s
     for name, value in _targets(asked).items():
         had = getattr(reached, name)
         scale = reached.sdlp if name == "mean" else value
-        if abs(had - value) > share * TOLERANCE * scale:
+        known_to = 0.0 if share < 1.0 else 2.0 * reached.errors.get(name, 0.0)  # what runs as many can't tell
+        if abs(had - value) > share * TOLERANCE * scale + known_to:
             found.append(f"{name.replace('_', ' ')} {value:.4g} asked, {had:.4g} reached")
     return found
 
