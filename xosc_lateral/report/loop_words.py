@@ -273,8 +273,7 @@ def beside_words(effect: ColumnEffect, error: float = 0.0) -> str:
         off, on = effect.weighed(effect.quantity({column: np.array([0.0, 1.0])}))
         return _moves(float(on - off), error, OTHERS[column], "")
     free = np.linspace(0.0, FAR, 2001)
-    both = [effect.weighed(effect.quantity({column: sign * free})) for sign in (1.0, -1.0)]
-    place = 0.5 * (both[0] + both[1])  # of a signed distance, as much ahead as behind
+    place = effect.weighed(effect.quantity({column: free}))
     shift = place - place[-1]
     largest = int(np.argmax(np.abs(shift)))
     near = np.flatnonzero(np.abs(shift) >= np.abs(shift[largest]) * np.exp(-1.0))
