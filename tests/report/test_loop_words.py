@@ -16,7 +16,7 @@ def _words(*arguments: object) -> str:
 def test_a_shift_beside_trucks_is_told_with_its_side_and_range() -> None:
     effect = made(Proximity, 0.22, column="right_distance", scale=40.0)
     assert _words(effect) == "moves 0.22 m left beside vehicles on his right, from 40 m on"
-    assert _words(effect, 0.25).startswith("moves 0.22 ± 0.06 m left beside")  # of 0.22 m, to two digits
+    assert _words(effect, 0.5).startswith("moves 0.22 ± 0.11 m left beside")
     flag = made(Linear, -0.1, column="truck_left")
     assert _words(flag) == "moves 0.10 m right beside trucks on his left"
 

@@ -277,7 +277,7 @@ def beside_words(effect: ColumnEffect, error: float = 0.0) -> str:
     shift = place - place[-1]
     largest = int(np.argmax(np.abs(shift)))
     near = np.flatnonzero(np.abs(shift) >= np.abs(shift[largest]) * np.exp(-1.0))
-    begins = f", from {free[near[-1]]:.0f}{GAP}m on" if 0 < near[-1] < FAR - 1.0 else ""
+    begins = f", from {free[near[-1]]:.0f}{GAP}m on" if near[-1] > 0 and free[near[-1]] < FAR - 1.0 else ""
     return _moves(float(shift[largest]), error, OTHERS[column], begins)
 
 
