@@ -1,6 +1,6 @@
 """Does the loop name a lane-keeping assist as the cause? Made drives in OpenLKA's layout, with known truth.
 
-    python -m benchmarks.assist [--drives 4] [--seconds 1800] [--write docs/board.md]
+    python -m benchmarks.assist [--drives 4] [--seconds 1800] [--write PAGE.md]
 
 Three kinds: an assist with a place of its own that is tighter than the driver, one that is only tighter, and a flag
 that does nothing. Beside it the spread of either's own profile within runs, sampled over measured.

@@ -2,7 +2,7 @@
 
     xosc-lateral import dlr-ht tasi-0.15.4-py3-none-any.whl -o dlr.parquet
     python -m benchmarks.board_stability dlr.parquet [--seeds 0 1 2 ...] [--model NAME ...] [--cache FOLDER]
-        [--write docs/board.md]
+        [--write PAGE.md]
 
 Seed 0 is the split of the published board. Every split fits every model twice, which takes a quarter of an hour of
 processor time; with `--cache`, what is there is not done again.

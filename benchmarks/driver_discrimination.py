@@ -1,6 +1,6 @@
 """Is a profile of one vehicle told from another's? All pairs of vehicles with long drives.
 
-    python -m benchmarks.driver_discrimination dlr.parquet [--seconds 140] [--model best] [--write docs/real_data.md]
+    python -m benchmarks.driver_discrimination dlr.parquet [--seconds 140] [--model best] [--write PAGE.md]
 
 Each vehicle's profile is fitted to the first 60 % of its drive. Snippets sampled from it freely (no start given) are
 compared with the held-out last 40 % of its own drive and of every other vehicle's.

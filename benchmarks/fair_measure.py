@@ -2,7 +2,7 @@
 
     xosc-lateral import dlr-ht tasi-0.15.4-py3-none-any.whl -o dlr.parquet
     python -m benchmarks.fair_measure dlr.parquet [--seed 0] [--no-classify]
-        [--write docs/validation/realism.md]
+        [--write PAGE.md]
 
 A profile is fitted to a random half of the vehicles and measured on the other half, and the other way round; numbers
 are means of both.

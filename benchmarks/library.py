@@ -1,6 +1,6 @@
 """The shipped profile library, built from the public recording.
 
-    python -m benchmarks.build_library tasi-0.15.4-py3-none-any.whl -o FOLDER [--cards docs/profiles.md]
+    python -m benchmarks.build_library tasi-0.15.4-py3-none-any.whl -o FOLDER
 
 The same wheel gives the same bytes on the same kind of processor. Every profile is scored before it is written: for
 the population a fit to half of the vehicles (for the refined profile, a closed loop over them) is scored on the other

@@ -1,7 +1,7 @@
-"""The closed loop over real motorway traffic: figures and tables of docs/closing_the_loop.md, section 5.
+"""The closed loop over real motorway traffic: figures and tables of docs/closing_the_loop.md.
 
     xosc-lateral import dlr-ht tasi-0.15.4-py3-none-any.whl -o dlr.parquet
-    python -m benchmarks.loop_dlr dlr.parquet [--seed 20241007] [--write docs/closing_the_loop.md]
+    python -m benchmarks.loop_dlr dlr.parquet [--seed 20241007] [--write PAGE.md]
         [--figures docs/figures]
 
 Starts from a two-level model of the same drives, and from the seed of the library's `motorway-refined`, as

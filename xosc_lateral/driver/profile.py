@@ -153,7 +153,7 @@ def file_type(model: str, effects: frozenset[str]) -> type[DriverProfile]:
     ----------
     model : str
     effects : frozenset of str
-        Kinds in the file; plug-ins are looked for when one is not of this package.
+        Kinds in the file; plug-ins are searched when one is not of this package.
     """
     known: Any = tuple[any_effect(effects), ...]  # type: ignore[misc]  # known only now
     fields: list[Any] = [("model", any_model(model)), ("effects", known, ())]
@@ -174,7 +174,7 @@ def profile_schema() -> dict[str, Any]:
 
 
 def sampling_hash(profile: DriverProfile) -> str:
-    """SHA-256 of what a profile's offsets depend on; what is only told about it may change."""
+    """SHA-256 of what a profile's offsets depend on; what only describes it may change."""
     values = profile.to_dict()
     parts = {name: values[name] for name in ("lane_width", "model", "effects")}
     return hashlib.sha256(json.dumps(parts, sort_keys=True).encode()).hexdigest()

@@ -1,4 +1,4 @@
-"""Can a classifier tell sampled snippets from real ones? The strictest of the scores, since it looks at everything.
+"""Does a classifier separate sampled snippets from real ones? The strictest score, since it looks at everything.
 
 References
 ----------
@@ -28,7 +28,7 @@ BANDS = 16
 EVEN_BANDS = 25
 """Of the log spectrum once more, evenly: what is smoothed piece by piece has its lines and holes at fast movement."""
 VALUES = 20
-"""Values of a snippet, and differences over as much, that are shown: more slow a tree down and tell it nothing. [-]"""
+"""Values of a snippet, and differences over as much, that are shown: more slow a tree down and add nothing. [-]"""
 MOST = 1500
 """Snippets of either kind that a classifier sees, spread evenly: an error of 0.01 in the area. [-]"""
 RESAMPLES = 200
@@ -37,12 +37,12 @@ RESAMPLES = 200
 
 @dataclass(frozen=True)
 class TwoSampleResult:
-    """How well two sets of snippets are told apart.
+    """How well two sets of snippets are separated.
 
     Parameters
     ----------
     auc : float
-        Area under the ROC curve, cross-validated: 0.5 can't tell, 1 always can. [-]
+        Area under the ROC curve, cross-validated: 0.5 by chance, 1 always. [-]
     low, high : float
         95 % interval, drives resampled. [-]
     """
@@ -160,7 +160,7 @@ def classifier_two_sample_test(
     fast: bool = False,
     seed: int = 0,
 ) -> TwoSampleResult | None:
-    """Train a gradient-boosted classifier to tell two sets of snippets apart, and judge it on drives it has not seen.
+    """Train a gradient-boosted classifier to separate two sets of snippets, and judge it on drives it has not seen.
 
     Parameters
     ----------

@@ -1,9 +1,9 @@
 """How near sampled driving is to real driving, beside how near other real drivers are: the fair measure.
 
 Snippets of 10, 30 and 60 s are compared under three conditions: sampled from where the real ones start; cut from free
-runs that know no start; and free runs again, movement below 0.5 Hz alone. Every number has a floor of other drivers'
-real snippets that know as much about the start. What was recorded is the driver and the sensor, so a profile that knows
-its sensor is compared with it; below 0.5 Hz the driver is compared alone, as `convert` writes him.
+runs that know no start; and free runs again, movement below 0.5 Hz alone. Every number stands beside that of real
+snippets of other drivers that know as much about the start. What was recorded is the driver and the sensor, so a
+profile that knows its sensor is compared with it; below 0.5 Hz the driver is compared alone, as `convert` writes him.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
 SPLITS = 8
-"""Random halves of the drives that distances and floors are averaged over."""
+"""Random halves of the drives that both are averaged over."""
 
 LEAST = 20
 """Fewer snippets of a length: it is left out."""
@@ -44,7 +44,7 @@ ENSEMBLE, SCORED = 8, 200
 
 @dataclass(frozen=True)
 class Beside:
-    """A number and its floor: what real driving of other drivers gets. Unit in its name's table."""
+    """A number, and what real driving of other drivers gets (the floor). Unit in its name's table."""
 
     value: float
     floor: float
@@ -52,7 +52,7 @@ class Beside:
 
     @property
     def ratio(self) -> float:
-        """Value over floor; 1: as near as other real drivers. [-]"""
+        """Value over that of real drivers; 1: as near as other real drivers. [-]"""
         return self.value / self.floor if self.floor > 0.0 else float("nan")
 
 
@@ -77,7 +77,7 @@ class ConditionScores:
     alone, jointly : TwoSampleResult or None
         Classifier on movement, and on context and movement jointly (below 0.5 Hz). None: not trained.
     floor : TwoSampleResult or None
-        Half of the real drivers told from the others, by movement. Jointly it is 0.5: both kinds have the same
+        A classifier between two halves of the real drivers, by movement. Jointly it is 0.5: both kinds have the same
         context. With the same start it is as with any: both halves start alike.
     """
 
@@ -219,7 +219,7 @@ def _stand_ins(
 
 
 def _separated_drivers(real: FloatArray, group: NDArray[np.str_], seed: int, *, fast: bool) -> TwoSampleResult | None:
-    """One random half of the drivers told from the other."""
+    """A classifier between one random half of the drivers and the other."""
     half = split_groups(group, np.random.default_rng(seed))
     return classifier_two_sample_test(real[half], real[~half], group[half], group[~half], fast=fast, seed=seed)
 

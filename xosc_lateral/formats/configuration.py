@@ -16,7 +16,7 @@ KEYS = ("library", *sorted(SETTINGS))
 
 
 def configuration_file() -> Path | None:
-    """Where the user's configuration is looked for; None: whoever runs this has no home (a service in a container)."""
+    """Where the user's configuration lies; None: whoever runs this has no home (a service in a container)."""
     named = os.environ.get("APPDATA" if os.name == "nt" else "XDG_CONFIG_HOME")
     try:
         home = Path(named) if named else Path.home() / ".config"

@@ -35,7 +35,7 @@ def read_drives(paths: str | Path | Sequence[str | Path], mapping: MappingLike |
     Parameters
     ----------
     paths : path or sequence of paths
-        Tables; the suffix tells the format.
+        Tables; the suffix gives the format.
     mapping : TableMapping, mapping of str to str, or path, optional
         What columns are called, and how tables are written; see `formats.mapping`.
 

@@ -1,7 +1,7 @@
 """What lifelike traffic does to a safety verdict: the public ALKS scenarios, nominal against many seeds.
 
     python -m benchmarks.r157.study FOLDER_OF_SCENARIOS OUTPUT_FOLDER [--seeds 100] [--profile NAME] [--table DRIVES]
-        [--page docs/r157.md]
+        [--page PAGE.md]
 
 FOLDER_OF_SCENARIOS holds the concrete scenarios of github.com/openMSL/sl-3-1-osc-alks-scenarios. Written are
 study.json (all numbers), study.md (tables) and verdict.svg (one figure). With a drive table, false alarms are counted
@@ -139,7 +139,7 @@ def main() -> None:
     print(markdown(record))
     if args.page is not None:
         _put_into(args.page, markdown(record))
-        shutil.copyfile(args.output / "verdict.svg", args.page.parent / "figures" / "r157_verdict.svg")
+        shutil.copyfile(args.output / "verdict.svg", args.page.parent / "verdict.svg")
 
 
 def _put_into(page: Path, text: str) -> None:

@@ -1,4 +1,4 @@
-"""Driver and sensor, told apart where the truth is known."""
+"""Driver and sensor, separated where the truth is known."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Are recorded tracks made of pieces, and what do their kinks look like?
+"""Are recorded tracks made of pieces, and what do their slope jumps look like?
 
 Whether: the size of third differences of the rows, folded. A period shows as a line in the spectrum of that size,
 beside what the frequencies around it have. How large: each jump of the slope by least squares over the pieces on both
@@ -15,8 +15,8 @@ from msgspec.structs import replace
 from numpy.typing import NDArray
 
 from xosc_lateral.driver.sensor.by_zone import ByZone, ZonedRows, levels_by_zone, tidy
-from xosc_lateral.driver.sensor.kinks import SHAPE, Kinks, mean_square, shape_points
 from xosc_lateral.driver.sensor.periodogram import WINDOWS, windows_of
+from xosc_lateral.driver.sensor.slope_jumps import SHAPE, SlopeJumps, mean_square, shape_points
 from xosc_lateral.drives.filters import kaiser_design, low_pass, scale_frequencies
 from xosc_lateral.drives.periodogram import Detrend, periodograms
 from xosc_lateral.drives.resampling import STEP, passed
@@ -31,7 +31,7 @@ LEAST_ROWS = 8
 """Of a piece: its six numbers, and some to average over. [-]"""
 
 PIECE, LEAST_PIECES = 60.0, 16
-"""Length of what is looked at by itself [s], and how many there must be for a line to be told from chance. [-]"""
+"""Length of a window [s], and how many there must be for a line to be beyond chance. [-]"""
 
 SHORTEST = 20.0
 """Periods that a piece, and a run, must hold. [-]"""
@@ -46,16 +46,16 @@ LINE, DEVIATIONS = 2.0, 6.0
 """A line is at least so many times its surroundings, and so many standard errors of chance beyond them. [-]"""
 
 WINDOW = 32
-"""Kinks in a window of their spectrum. [-]"""
+"""Slope jumps in a window of their spectrum. [-]"""
 
 SEEN = round(WINDOWS[-1] / STEP)
 """Rows at 5 Hz in a window of the spectrum of all, which hardly a run is too short for. [-]"""
 
 DURATIONS = np.geomspace(1.0, 64.0, 13)
-"""Of a level that are tried, in kinks. [-]"""
+"""Of a level that are tried, in slope jumps. [-]"""
 
 LAGS = 24
-"""Up to which levels are compared, in kinks. [-]"""
+"""Up to which levels are compared, in slope jumps. [-]"""
 
 FAINT = 1e-3
 """Share of the typical jump below which differences in the logarithm mean nothing. [-]"""
@@ -65,7 +65,7 @@ HOLE = 0.1
 jumps. With 0.05 and 0.2 the levels' variance in the motorway recording is 0.51 and 0.59 (0.61). [-]"""
 
 TRANSITION, ATTENUATION = (0.8, 1.2), 40.0
-"""Of the low-pass to the path's own movement, in multiples of half a kink a period [-]; of what is faster [dB]."""
+"""Of the low-pass to the path's own movement, in multiples of half a jump a period [-]; of what is faster [dB]."""
 
 ROUNDS = 4
 """Of least squares, weighted by the inverse of what is expected: that of its square, which squares of normal numbers
@@ -75,13 +75,13 @@ LEAST_PASSED = 0.1
 """Of the amplitude, in runs at 5 Hz; where less is left, windows show what leaks from slower movement. [-]"""
 
 MANY = 100_000
-"""Rows of ideal kinks that what is seen is held against: an error of 1 % in 0.1 Hz. [-]"""
+"""Rows of ideal jumps that what is seen is held against: an error of 1 % in 0.1 Hz. [-]"""
 
 
-def find_kinks(
+def find_slope_jumps(
     rows: Sequence[FloatArray], rate: float, runs: Sequence[FloatArray], zoned: ZonedRows | None = None
-) -> tuple[Kinks, float] | None:
-    """Kinks at even times, and the standard deviation of the rows about the pieces [m]; None where there are none.
+) -> tuple[SlopeJumps, float] | None:
+    """Slope jumps at even times, and the standard deviation of the rows about the pieces [m]; None: there are none.
 
     Parameters
     ----------
@@ -113,22 +113,22 @@ def find_kinks(
     shares = np.minimum(densities / every**2 / (2.0 * np.pi * at) ** 4 / seen, 1.0)
     noise = np.concatenate([_about_pieces(one[first:], size) for one, (_, first) in zip(long, found, strict=True)])
     flat = [flat_jumps(one, densities, every) for one in jumps]
-    bends = [bends_at(one, *kinks, size, rate) for one, kinks in zip(long, found, strict=True)]
+    bends = [bends_at(one, *slope_jumps, size, rate) for one, slope_jumps in zip(long, found, strict=True)]
     with_movement, acceleration = _with_movement(flat, bends)
     levels = [_log_level(one, bend / acceleration, with_movement) for one, bend in zip(flat, bends, strict=True)]
     variance, duration, track = _level(levels)
     period, level, lasts, track, with_movement, acceleration = tidy(
         [every, variance, duration * every, track, with_movement, acceleration]
     )
-    kinks = Kinks(period, tidy(densities), tidy(shares), level, lasts, track, with_movement, acceleration)
+    slope_jumps = SlopeJumps(period, tidy(densities), tidy(shares), level, lasts, track, with_movement, acceleration)
     if zoned is not None:
         there = [
             zoned.rows[k][first::size][: len(one)] for k, one, (_, first) in zip(lasting, flat, found, strict=True)
         ]
         whose = [zoned.drives[k] for k in lasting]
-        kinks = replace(kinks, by_zone=_by_zone(levels, there, whose, every))
+        slope_jumps = replace(slope_jumps, by_zone=_by_zone(levels, there, whose, every))
     white = 2.0 * float(noise.mean()) / rate
-    return replace(kinks, shape=_shape(kinks, runs, white)), float(np.sqrt(noise.mean()))
+    return replace(slope_jumps, shape=_shape(slope_jumps, runs, white)), float(np.sqrt(noise.mean()))
 
 
 def _by_zone(
@@ -159,7 +159,7 @@ def jumps_of(rows: FloatArray, size: int, rate: float) -> tuple[FloatArray, int]
 
 
 def _about_pieces(rows: FloatArray, size: int) -> FloatArray:
-    """Mean square of the rows about a cubic for each piece from kink to kink, the first at row 0. Shape (k,). [m2]"""
+    """Mean square of the rows about a cubic for each piece between jumps, the first at row 0. Shape (k,). [m2]"""
     pieces = rows[: len(rows) // size * size].reshape(-1, size)
     cubic = np.vander(np.linspace(-1.0, 1.0, size), 4)
     rest = pieces - pieces @ (cubic @ np.linalg.pinv(cubic))
@@ -167,7 +167,7 @@ def _about_pieces(rows: FloatArray, size: int) -> FloatArray:
 
 
 def _period(rows: Sequence[FloatArray], rate: float) -> int | None:
-    """Rows from one kink to the next; None where no line is beyond chance."""
+    """Rows from one slope jump to the next; None where no line is beyond chance."""
     length = round(PIECE * rate)
     pieces = [one[k : k + length] for one in rows for k in range(0, len(one), length)]
     sizes = np.arange(max(LEAST_ROWS, round(PERIODS[0] * rate)), round(PERIODS[1] * rate) + 1)
@@ -208,19 +208,19 @@ def _seen(runs: Sequence[FloatArray]) -> tuple[FloatArray, FloatArray]:
     return frequency, 2.0 * STEP * np.concatenate(powers).mean(axis=0)
 
 
-def _shape(kinks: Kinks, runs: Sequence[FloatArray], white: float) -> tuple[float, ...]:
-    """Factors by which what is seen above half a kink a period differs from ideal kinks and white noise. [-]
+def _shape(slope_jumps: SlopeJumps, runs: Sequence[FloatArray], white: float) -> tuple[float, ...]:
+    """Factors by which what is seen above half a jump a period differs from ideal jumps and white noise. [-]
 
     Ideal ones are sampled, as even as can be, so that windows smear both alike.
     """
     frequency, density = _seen(runs)
-    even = replace(kinks, level_variance=0.0, track_variance=0.0, with_movement=0.0)
+    even = replace(slope_jumps, level_variance=0.0, track_variance=0.0, with_movement=0.0)
     ideal = even.sample(np.zeros(MANY), STEP, np.random.default_rng(0))
     _, theirs = _seen([ideal])
     rest = density - white * passed(frequency) ** 2
     fastest = float(frequency[passed(frequency) >= LEAST_PASSED][-1])
-    points = shape_points(kinks.highest, int((fastest / kinks.highest - 1.0) * SHAPE) + 1)
-    factors, band = [1.0], max(kinks.highest / SHAPE, float(frequency[1]))
+    points = shape_points(slope_jumps.highest, int((fastest / slope_jumps.highest - 1.0) * SHAPE) + 1)
+    factors, band = [1.0], max(slope_jumps.highest / SHAPE, float(frequency[1]))
     for point in points[1:]:
         near = np.abs(frequency - point) <= 0.5 * band
         factors.append(max(float(rest[near].sum()), 0.0) / max(float(theirs[near].sum()), 1e-30))
@@ -231,13 +231,13 @@ def flat_jumps(jumps: FloatArray, densities: FloatArray, every: float) -> FloatA
     """Jumps with a flat spectrum, of mean square 1 if theirs is the one given, shape (k,). [-]"""
     known = np.linspace(0.0, 0.5, len(densities))
     at = np.interp(np.fft.rfftfreq(len(jumps)), known, densities)
-    floor = HOLE * float(densities.mean())
-    left = float(np.mean(densities / np.maximum(densities, floor)))
-    return scale_frequencies(jumps, np.sqrt(2.0 * every / left / np.maximum(at, floor)))
+    least = HOLE * float(densities.mean())
+    left = float(np.mean(densities / np.maximum(densities, least)))
+    return scale_frequencies(jumps, np.sqrt(2.0 * every / left / np.maximum(at, least)))
 
 
 def bends_at(rows: FloatArray, jumps: FloatArray, first: int, size: int, rate: float) -> FloatArray:
-    """Lateral acceleration of the path at each kink, slower than half a kink a period, shape (k,); NaN near the ends.
+    """Lateral acceleration of the path at each jump, slower than half a jump a period, shape (k,); NaN near the ends.
 
     What the jumps themselves have in it is taken out, or else they would go with it for that. [m/s2]
     """
@@ -286,7 +286,7 @@ def _log_level(flat: FloatArray, bend: FloatArray, with_movement: float) -> Floa
 
 
 def _level(levels: Sequence[FloatArray]) -> tuple[float, float, float]:
-    """Variance of the level about its track's mean [-], how long it lasts, in kinks, and the tracks' variance. [-]"""
+    """Variance of the level about its track's mean [-], how long it lasts, in jumps, and the tracks' variance. [-]"""
     mean = float(np.concatenate(levels).mean())
     sums, counts = np.zeros(LAGS), np.zeros(LAGS)
     for one in levels:

@@ -1,14 +1,14 @@
 """Tracks that bend abruptly at even times: what a provider's smoothing piece by piece adds to them.
 
 A track that was put together from smooth pieces of one length is continuous, but its slope jumps where two of them
-meet. Between the kinks such an error is a straight line, and its second derivative a train of impulses, one every
+meet. Between the slope jumps such an error is a straight line, and its second derivative a train of impulses, one every
 `every` seconds. Therefore its power density at any frequency is that of the jumps over the fourth power of the
 frequency (derived here): with zeros at all multiples of 1 / `every`, and images of what is slow between them. No
-vehicle moves like that. Below half a kink a period, an error is as smooth as driving, and is left to the driver; above,
+vehicle moves like that. Below half a jump a period, an error is as smooth as driving, and is left to the driver; above,
 all is the sensor's, and its density is what is seen there. Where tracks are to be as they were recorded, both must be
-of the same kinks: a sampled path then gives up as much of its power as the error has in it, and gets the error of the
-kinks drawn. They are louder for one vehicle than for another, at one place than at another, and where the path bends:
-a smoothing that makes pieces straighter than they were leaves the rest to the kinks between them.
+of the same jumps: a sampled path then gives up as much of its power as the error has in it, and gets the error of the
+jumps drawn. They are louder for one vehicle than for another, at one place than at another, and where the path bends:
+a smoothing that makes pieces straighter than they were leaves the rest to the slope jumps between them.
 """
 
 from __future__ import annotations
@@ -29,24 +29,24 @@ from xosc_lateral.errors import DriverProfileError
 FloatArray = NDArray[np.float64]
 
 CROSSING = (1.0, 1.2)
-"""Between these multiples of half a kink a period, what is left to the driver passes into what is the sensor's: all
+"""Between these multiples of half a jump a period, what is left to the driver passes into what is the sensor's: all
 below, as far as the filter by which movement below 0.5 Hz is judged can see, is the driver's. [-]"""
 
 MARGIN = 30
-"""Kinks drawn before the first row and after the last: slow errors must not come round to their own beginning. [-]"""
+"""Jumps drawn before the first row and after the last: slow errors must not come round to their own beginning. [-]"""
 
 SLOWEST = (0.1, 0.2)
 """Up to the first the error is too small a part of the movement to ask for (less than a tenth in the recording that
-kinks were found in), from the second on it is drawn. [Hz]"""
+slope jumps were found in), from the second on it is drawn. [Hz]"""
 
 SHAPE = 5
-"""Points of the shape in half a kink a period: a spectrum of snippets of 10 s sees no finer. [-]"""
+"""Points of the shape in half a jump a period: a spectrum of snippets of 10 s sees no finer. [-]"""
 
 FINER = 4
-"""Points per row of the grid that kinks are put on, between two of them in proportion. [-]"""
+"""Points per row of the grid that slope jumps are put on, between two of them in proportion. [-]"""
 
 
-class Kinks(Record, frozen=True):
+class SlopeJumps(Record, frozen=True):
     """Jumps of the slope at even times.
 
     Parameters
@@ -54,9 +54,9 @@ class Kinks(Record, frozen=True):
     every : float
         Time from one to the next. [s]
     densities : tuple of float
-        One-sided power density of the jumps, at even frequencies from 0 to half a kink a period. [m2/s2/Hz]
+        One-sided power density of the jumps, at even frequencies from 0 to half a jump a period. [m2/s2/Hz]
     shares : tuple of float
-        What the kinks' error has in the power of all that is seen at those frequencies, driver included. [-]
+        What the slope jumps' error has in the power of all that is seen at those frequencies, driver included. [-]
     level_variance, level_duration : float
         Variance of the logarithm of their squares' level [-], and how long a level lasts [s].
     track_variance : float
@@ -68,7 +68,7 @@ class Kinks(Record, frozen=True):
     by_zone : ByZone or None
         Level of their squares in each zone, where the recording has zones.
     shape : tuple of float
-        Factors on their density above half a kink a period, from there on evenly, `SHAPE` in half a kink a period;
+        Factors on their density above half a jump a period, from there on evenly, `SHAPE` in half a jump a period;
         empty: 1. [-]
 
     Raises
@@ -93,21 +93,21 @@ class Kinks(Record, frozen=True):
         shares, scales = (*self.shares, self.with_movement), (self.every, self.level_duration, self.acceleration)
         numbers = (*self.densities, *shares, self.level_variance, self.track_variance, *self.shape, *scales)
         if not all(map(isfinite, numbers)) or min(numbers) < 0.0 or max(shares) > 1.0 or len(self.densities) < 2:
-            raise DriverProfileError(f"kinks: {self}")
+            raise DriverProfileError(f"slope jumps: {self}")
         if len(self.densities) != len(self.shares) or not min(scales) > 0.0:
-            raise DriverProfileError(f"kinks: {self}")
+            raise DriverProfileError(f"slope jumps: {self}")
 
     @property
     def highest(self) -> float:
-        """Half a kink a period: images begin there. [Hz]"""
+        """Half a jump a period: images begin there. [Hz]"""
         return 0.5 / self.every
 
     def density(self, frequency: FloatArray) -> FloatArray:
-        """One-sided power density of what the kinks add in runs at 5 Hz. [m2/Hz] Shape as `frequency` [Hz]."""
+        """One-sided power density of what the slope jumps add in runs at 5 Hz. [m2/Hz] Shape as `frequency` [Hz]."""
         return self.of_jumps(frequency) * _rising(frequency, self._crossing) ** 2 * self._shape_at(frequency)
 
     def of_jumps(self, frequency: FloatArray) -> FloatArray:
-        """The same of ideal kinks, straight lines between jumps, with what is left to the driver, from 0.1 Hz on."""
+        """The same of ideal jumps, straight lines between jumps, with what is left to the driver, from 0.1 Hz on."""
         folded = np.abs((frequency + self.highest) % (2.0 * self.highest) - self.highest)
         jumps = np.interp(folded, self._frequencies, self.densities) / self.every**2
         return np.asarray(jumps * _bent(frequency, SLOWEST[0]) ** 2)
@@ -117,14 +117,14 @@ class Kinks(Record, frozen=True):
     ) -> FloatArray:
         """What to add to a sampled path so that it is one of pieces, shape (n,), at this step. [m]
 
-        The error of the kinks drawn, at all frequencies that it shows at, less what the path has of it already.
+        The error of the jumps drawn, at all frequencies that it shows at, less what the path has of it already.
         `zone` has the code of the zone of each row, where they are known.
         """
         driver = _scaled(path, step, self._left)
         return np.asarray(self._error(driver, step, rng, zone) + driver - path)
 
     def _error(self, driver: FloatArray, step: float, rng: np.random.Generator, zone: FloatArray | None) -> FloatArray:
-        """Of kinks at even times, from `SLOWEST` on, on the driver's part of a path; both of shape (n,). [m]"""
+        """Of slope jumps at even times, from `SLOWEST` on, on the driver's part of a path; both of shape (n,). [m]"""
         n = len(driver)
         count = round(n * step / self.every) + 2 * MARGIN + 2
         first = rng.random()
@@ -147,7 +147,7 @@ class Kinks(Record, frozen=True):
         return np.linspace(0.0, self.highest, len(self.densities))
 
     def _left(self, frequency: FloatArray) -> FloatArray:
-        """Factor on a path's amplitude, so that there is room for the kinks: all above half a kink a period. [-]
+        """Factor on a path's amplitude, so that there is room for the slope jumps: all above half a jump a period. [-]
 
         Shape as `frequency` [Hz].
         """
@@ -155,7 +155,7 @@ class Kinks(Record, frozen=True):
         return np.asarray(np.sqrt((1.0 - share) * self.left_to_driver(frequency)) * passed(frequency))
 
     def left_to_driver(self, frequency: FloatArray) -> FloatArray:
-        """Share of all power: 1 below half a kink a period, none above it. [-] Shape as `frequency` [Hz]."""
+        """Share of all power: 1 below half a jump a period, none above it. [-] Shape as `frequency` [Hz]."""
         return np.asarray(1.0 - _rising(frequency, self._crossing) ** 2)
 
     @property
@@ -190,7 +190,7 @@ class Kinks(Record, frozen=True):
         return mean_square(self.with_movement, np.interp(times, at, square, left=1.0, right=1.0))
 
     def _shape_at(self, frequency: FloatArray) -> FloatArray:
-        """Factor on the density of ideal kinks. [-] Shape as `frequency` [Hz]."""
+        """Factor on the density of ideal jumps. [-] Shape as `frequency` [Hz]."""
         if not self.shape:
             return np.ones(np.shape(frequency))
         return np.interp(frequency, shape_points(self.highest, len(self.shape)), self.shape, left=1.0)
@@ -202,7 +202,7 @@ def mean_square(with_movement: float, bend: FloatArray) -> FloatArray:
 
 
 def shape_points(highest: float, count: int) -> FloatArray:
-    """Where the shape of kinks is known, from half a kink a period on, shape (count,). [Hz]"""
+    """Where the shape of slope jumps is known, from half a jump a period on, shape (count,). [Hz]"""
     return highest * (1.0 + np.arange(count) / SHAPE)
 
 

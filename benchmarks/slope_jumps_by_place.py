@@ -1,10 +1,10 @@
-"""Does the place say how large the kinks of a recording's tracks are? One half of the vehicles tells for the other.
+"""Does the place predict how large the slope jumps of tracks are, for vehicles that were not used?
 
-    python -m benchmarks.kinks_by_place tasi-0.15.4-py3-none-any.whl [--write docs/design/sensor.md]
+    python -m benchmarks.slope_jumps_by_place tasi-0.15.4-py3-none-any.whl [--write PAGE.md]
 
 The logarithm of the squared jumps of the slope, averaged in pieces of the road over the vehicles of one half: how these
-means correlate with the other half's, and how much of that half's variance they tell. `python -m benchmarks.kinks` says
-by how much the level varies in all.
+means correlate with the other half's, and how much of that half's variance they explain.
+`python -m benchmarks.slope_jumps` says by how much the level varies in all.
 """
 
 from __future__ import annotations
@@ -17,12 +17,12 @@ from numpy.typing import NDArray
 
 from benchmarks.dlr_stretches import along_road
 from benchmarks.markers import show
-from xosc_lateral.driver.sensor.kinks_fit import jumps_of
+from xosc_lateral.driver.sensor.slope_jumps_fit import jumps_of
 from xosc_lateral.formats.importers.dlr_ht import STEP, read_tracks
 
 FloatArray = NDArray[np.float64]
 EVERY = 1.0
-"""From one kink to the next; `python -m benchmarks.kinks` finds it. [s]"""
+"""From one slope jump to the next; `python -m benchmarks.slope_jumps` finds it. [s]"""
 PIECES = (50.0, 100.0, 200.0, 500.0)
 """[m]"""
 LARGEST = 0.15
@@ -34,7 +34,7 @@ LEAST = 8
 
 
 def jumps_and_places(source: Path) -> tuple[FloatArray, FloatArray, NDArray[np.bool_], NDArray[np.int64]]:
-    """Log squared jump [-], place [m], direction (True: north) and vehicle of every kink."""
+    """Log squared jump [-], place [m], direction (True: north) and vehicle of every slope jump."""
     tracks = read_tracks(source)
     vehicle = tracks["vehicle"].to_numpy()
     forward, place, aside = along_road(tracks)
@@ -75,7 +75,7 @@ def main() -> None:
         count, correlation, told = told_by_place(logs, (place // length).astype(np.int64) * 2 + north, half)
         lines.append(f"| {length:g} m | {count} | {correlation:.2f} | {told:.2f} |")
     lines += ["", f"{len(logs)} jumps of {len(np.unique(vehicle))} vehicles, both carriageways apart."]
-    show("\n".join(lines), args.write, "kinks-by-place")
+    show("\n".join(lines), args.write, "slope-jumps-by-place")
 
 
 if __name__ == "__main__":
