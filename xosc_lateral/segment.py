@@ -41,6 +41,11 @@ CONTEXT_UNITS: Mapping[str, str] = MappingProxyType(
 )
 
 
+FADES = "_fades"
+"""Ends the name of a column that says how far another column's is there, 0 to 1, where it comes and goes, as a lane
+that opens does: `left_distance_fades` is of `left_distance`. [-]"""
+
+
 @dataclass(frozen=True, eq=False, slots=True)
 class Segment:
     """A road-following segment: a part of one vehicle's motion with no lateral action running, on a uniform time grid.

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -18,6 +17,7 @@ from xosc_lateral.api.inputs import (
     naming,
 )
 from xosc_lateral.api.result import Result
+from xosc_lateral.formats.mapping import MappingLike
 from xosc_lateral.formats.output_paths import claim, output_file
 
 if TYPE_CHECKING:
@@ -35,7 +35,7 @@ def evaluate(
     *,
     seed: int = 0,
     classify: bool = True,
-    columns: Mapping[str, str] | None = None,
+    columns: MappingLike | None = None,
     library: Paths = (),
 ) -> Evaluation:
     """Score a profile beside other real drivers, and by the paper's four evaluations.

@@ -19,6 +19,7 @@ from xosc_lateral.formats.importers.lane_graph import LaneGraph
 from xosc_lateral.formats.importers.placed import PlacedTracks, import_placed
 from xosc_lateral.formats.importers.table import Imported, guarded
 from xosc_lateral.formats.importers.track_table import Tracks, read_tracks
+from xosc_lateral.formats.mapping import MappingLike
 from xosc_lateral.formats.opendrive import read_opendrive
 from xosc_lateral.road.network import DRIVING, RoadNetwork
 
@@ -40,6 +41,7 @@ def import_tracks(
     *,
     road: Path | str,
     columns: Sequence[str] = (),
+    mapping: MappingLike | None = None,
     settings: CutSettings = DEFAULT_CUTS,
     keep_cut: bool = False,
 ) -> Imported:
@@ -55,6 +57,8 @@ def import_tracks(
     columns : sequence of str
         ``NAME=COLUMN[:UNIT]`` for `vehicle`, `time`, `x`, `y`, `heading`, `speed`, `length`,
         `rear`, `vehicle_class`.
+    mapping : TableMapping, mapping of str to str, or path, optional
+        More of them, saved.
 
     Raises
     ------
@@ -64,7 +68,7 @@ def import_tracks(
         If nothing is left once lane changes are cut.
     """
     network = read_opendrive(road)
-    tracks = read_tracks(source, columns)
+    tracks = read_tracks(source, columns, mapping)
     pieces, graph = lane_graph(network)
     if not pieces:
         raise FormatError("the road has no driving lane that tracks could lie in", path=Path(road))
