@@ -70,17 +70,14 @@ def fit_place(runs: Sequence[Run], *, neighbours: bool | None = None) -> tuple[C
     share [1]_. The slopes of all columns are shrunk together, by the share of their size that chance would not make
     (`_shrunk`): dropping the uncertain ones predicts other vehicles worse. Nothing is left where chance makes all.
 
+    Raises `NotEnoughDataError`: Neighbours are asked for (True), and there are too few drives, or too few that had any.
+
     Parameters
     ----------
     runs : sequence of Run
     neighbours : bool, optional
         Whether also of the distances to vehicles in the neighbouring lanes, on the level (`neighbours`). None: of each
         side on which `LEAST_DRIVES` drives had somebody; with fewer, chance would pass for an effect.
-
-    Raises
-    ------
-    NotEnoughDataError
-        Neighbours are asked for (True), and there are too few drives, or too few that had any.
 
     References
     ----------

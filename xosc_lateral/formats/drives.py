@@ -43,10 +43,7 @@ class ColumnSource:
 def parse_map(words: Iterable[str]) -> dict[str, ColumnSource]:
     """Read ``NAME=COLUMN`` or ``NAME=COLUMN:UNIT`` (``speed=v_kmh:km/h``, ``offset=lat:-cm``).
 
-    Raises
-    ------
-    FormatError
-        When a word has no ``=`` or its unit does not fit the column.
+    Raises `FormatError` when a word has no ``=`` or its unit does not fit the column.
     """
     mapping: dict[str, ColumnSource] = {}
     for word in words:
@@ -72,6 +69,9 @@ def read_drives(
 ) -> list[Drive]:
     """Read the drives of one or several tables.
 
+    Raises `FormatError` when a file can't be read, a column is missing, or its values can't be in the unit meant;
+    `NotEnoughDataError` when a file holds no drive with two rows of time, offset and lane width.
+
     Parameters
     ----------
     paths : path or sequence of paths
@@ -84,13 +84,6 @@ def read_drives(
     list of Drive
         In the order of the files and of first appearance; a drive without a name is called after its file. Rows are
         sorted by time, repeated times dropped, rows with a missing value left out (a gap).
-
-    Raises
-    ------
-    FormatError
-        When a file can't be read, a column is missing, or its values can't be in the unit meant.
-    NotEnoughDataError
-        When a file holds no drive with two rows of time, offset and lane width.
     """
     files = [Path(path) for path in ([paths] if isinstance(paths, str | Path) else paths)]
     if twice := {str(path) for path in files if files.count(path) > 1}:

@@ -45,6 +45,9 @@ def import_tracks(
 ) -> Imported:
     """Read tracks on a known road.
 
+    Raises `FormatError`: A missing column, or tracks that lie beside the road; `NotEnoughDataError` if nothing is left
+    once lane changes are cut.
+
     Parameters
     ----------
     source : path
@@ -54,13 +57,6 @@ def import_tracks(
         OpenDRIVE file.
     columns : sequence of str
         ``NAME=COLUMN[:UNIT]`` for `vehicle`, `time`, `x`, `y`, `heading`, `speed`, `length`, `vehicle_class`.
-
-    Raises
-    ------
-    FormatError
-        A missing column, or tracks that lie beside the road.
-    NotEnoughDataError
-        If nothing is left once lane changes are cut.
     """
     network = read_opendrive(road)
     tracks = read_tracks(source, columns)

@@ -17,6 +17,8 @@ TRUTHS = ("GROUND_TRUTH", "SENSOR_VIEW")
 class Trace:
     """An open trace; use it as a context.
 
+    Raises `FormatError`: No trace, or none of ground truth; `XoscLateralError`: The extra `osi` is not installed.
+
     Parameters
     ----------
     path : path
@@ -27,13 +29,6 @@ class Trace:
     ----------
     notes : list of str
         Channels that are not read.
-
-    Raises
-    ------
-    FormatError
-        No trace, or none of ground truth.
-    XoscLateralError
-        The extra `osi` is not installed.
     """
 
     def __init__(self, path: Path, channel: str | None = None) -> None:

@@ -37,10 +37,7 @@ def fit_autoregressive(
 ) -> AutoregressiveModel:
     """Fit to relative offsets [-], one array of shape (n_i,) per run at 5 Hz; runs of one drive are of one driver.
 
-    Raises
-    ------
-    NotEnoughDataError
-        When no run lasts one snippet, or the offset never moves.
+    Raises `NotEnoughDataError` when no run lasts one snippet, or the offset never moves.
     """
     runs = [np.asarray(run, dtype=np.float64) for run in rel_offsets]
     longest = max(map(len, runs), default=0)
