@@ -14,9 +14,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from benchmarks.rounding import rounded_number
 from xosc_lateral.digits import all_significant
 from xosc_lateral.driver.effects import Acts, ColumnEffect, Levels, Linear, Piecewise, Proximity
-from xosc_lateral.driver.effects.rounding import rounded_number
 from xosc_lateral.driver.loudness import quick_by_zone
 from xosc_lateral.driver.models.autoregressive.filters import split_bands
 from xosc_lateral.driver.neighbours import NEIGHBOURS, SCALE, most_beside, neighbour_shapes
