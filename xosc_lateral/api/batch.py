@@ -71,7 +71,7 @@ def convert_many(
     show : {"auto", "quiet", "json", "nothing"}
         What is said on standard error meanwhile.
     on_outcome : callable, optional
-        Told each output's row of the manifest as it comes, with `state` and `seconds`.
+        Called with each output's row of the manifest as it comes, with `state` and `seconds`.
     options
         `ConvertOptions`, for all of them.
 
@@ -123,12 +123,12 @@ def _refuse_unknown_names(batch: Batch) -> None:
 def _noted(
     outcomes: Iterator[JobOutcome],
     became: dict[str, tuple[JobState, float]],
-    tell: Callable[[Mapping[str, Any]], None] | None,
+    report_row: Callable[[Mapping[str, Any]], None] | None,
 ) -> Iterator[JobOutcome]:
     for outcome in outcomes:
         became[outcome.row.output] = outcome.state, outcome.seconds
-        if tell is not None:
-            tell(_row(outcome.state, outcome.seconds, outcome.row))
+        if report_row is not None:
+            report_row(_row(outcome.state, outcome.seconds, outcome.row))
         yield outcome
 
 

@@ -105,7 +105,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         )
         code = 130
     except Exception as error:
-        # Typer's usage errors come from a click that is vendored in some of its releases: told by their duck shape.
+        # Typer's usage errors come from a click that is vendored in some of its releases: known by attributes.
         if not hasattr(error, "exit_code") or not hasattr(error, "format_message"):
             raise
         usage = cast(Any, error)

@@ -28,10 +28,7 @@ def configuration_file() -> Path | None:
 def configuration() -> tuple[Path | None, Mapping[str, list[str]]]:
     """The file, None where there is none, and what it says, each key's value as a list.
 
-    Raises
-    ------
-    FormatError
-        If it is no TOML, or says something else.
+    Raises `FormatError` if it is no TOML, or says something else.
     """
     path = configuration_file()
     try:
@@ -46,10 +43,7 @@ def configuration() -> tuple[Path | None, Mapping[str, list[str]]]:
 def configured_libraries() -> list[Path]:
     """Folders of profiles that the configuration names.
 
-    Raises
-    ------
-    FormatError
-        See `configuration`.
+    Raises `FormatError`: see `configuration`.
     """
     path, found = configuration()
     library = found.get("library", [])

@@ -20,10 +20,7 @@ _BRACKETS = re.compile(r"[\[\]{}]")
 def parse_json(data: bytes, path: Path) -> Any:
     """JSON of an input file.
 
-    Raises
-    ------
-    FormatError
-        Not UTF-8, no JSON, NaN or infinity in it, or nested deeper than `limits.JSON_DEPTH`.
+    Raises `FormatError`: Not UTF-8, no JSON, NaN or infinity in it, or nested deeper than `limits.JSON_DEPTH`.
     """
     try:
         text = data.decode("utf-8-sig")
@@ -57,10 +54,7 @@ def _check_depth(text: str, path: Path) -> None:
 def canonical_json(value: Any, indent: int = 0) -> str:
     """JSON text of plain values: keys as they come, one item a line, lists of numbers on one line.
 
-    Raises
-    ------
-    ValueError
-        For a number that is not finite: JSON has none.
+    Raises `ValueError` for a number that is not finite: JSON has none.
     """
     pad = " " * (indent + 1)
     if isinstance(value, Mapping):

@@ -53,10 +53,7 @@ class Entry:
 def read_library(folders: Iterable[Path] = ()) -> list[Entry]:
     """Every file of the library; a broken or foreign one costs one entry, not the listing.
 
-    Raises
-    ------
-    FormatError
-        If a folder isn't there.
+    Raises `FormatError` if a folder isn't there.
     """
     first: dict[str, Path] = {}
     entries = []
@@ -80,10 +77,7 @@ def _entry(path: Path, hidden_by: Path | None) -> Entry:
 def matching(entries: Iterable[Entry], tags: Collection[str], where: Mapping[str, str]) -> list[Entry]:
     """Entries that carry all the tags and whose metadata (or `id`, or `model`) are as given, letters big or small.
 
-    Raises
-    ------
-    XoscLateralError
-        If `where` names something that profiles don't have.
+    Raises `XoscLateralError` if `where` names something that profiles don't have.
     """
     for field in where:
         if field not in (*FIELDS, "id", "model"):
@@ -114,10 +108,7 @@ def described(
 ) -> DriverProfile:
     """The profile under another id, with other tags and metadata; what is not mentioned stays.
 
-    Raises
-    ------
-    XoscLateralError
-        For a field that there is not; `FIELDS` are known. For an id that can't be a file's name.
+    Raises `XoscLateralError` for a field that there is not (`FIELDS` are known) and for an id that is no file name.
     """
     for field in fields or {}:
         if field not in FIELDS:
@@ -131,10 +122,7 @@ def described(
 def own_path(name: str, folders: Iterable[Path]) -> Path:
     """Path of a profile that may be changed.
 
-    Raises
-    ------
-    FormatError
-        If it comes with the package.
+    Raises `FormatError` if it comes with the package.
     """
     path = find_profile(name, folders)
     if path.parent == SHIPPED:

@@ -56,6 +56,8 @@ def path_below(folder: Path, name: str, what: str) -> Path:
 def output_file(output: str | Path, usual_name: str, suffixes: Sequence[str]) -> Path:
     """Path of an output file.
 
+    Raises `FormatError` for another suffix.
+
     Parameters
     ----------
     output : str or Path
@@ -64,11 +66,6 @@ def output_file(output: str | Path, usual_name: str, suffixes: Sequence[str]) ->
         File name in a folder.
     suffixes : sequence of str
         Formats that can be written, lower case with their dot.
-
-    Raises
-    ------
-    FormatError
-        For another suffix.
     """
     path = output_folder(output) / file_name(usual_name, "name") if is_folder(output) else Path(output)
     if not path.name.lower().endswith(tuple(suffixes)):
@@ -86,10 +83,7 @@ def is_folder(output: str | Path) -> bool:
 def output_folder(output: str | Path) -> Path:
     """Path of an output folder, which need not be there yet.
 
-    Raises
-    ------
-    FormatError
-        If a file is there.
+    Raises `FormatError` if a file is there.
     """
     path = Path(output)
     if path.is_file():
@@ -100,6 +94,8 @@ def output_folder(output: str | Path) -> Path:
 def claim(outputs: Iterable[Path | None], inputs: Iterable[Path] = (), *, force: bool = False) -> None:
     """Refuse outputs that can't be meant, or that would replace somebody else's file, before any work is done.
 
+    Raises `FormatError`: see `refuse_outputs`; or a file is there that this package did not write.
+
     Parameters
     ----------
     outputs : iterable of Path or None
@@ -108,11 +104,6 @@ def claim(outputs: Iterable[Path | None], inputs: Iterable[Path] = (), *, force:
         Files that are read.
     force : bool
         Replace whatever is there, apart from inputs.
-
-    Raises
-    ------
-    FormatError
-        See `refuse_outputs`; or a file is there that this package did not write.
     """
     wanted = [output for output in outputs if output is not None]
     refuse_outputs(wanted, inputs)

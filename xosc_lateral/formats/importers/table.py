@@ -86,12 +86,8 @@ Importer = TypeVar("Importer", bound=Callable[..., Imported])
 def guarded(read: Importer) -> Importer:
     """An importer whose source, damaged in whatever way, ends in one line, and never in a table of nonsense.
 
-    Raises
-    ------
-    NotEnoughDataError
-        Too little is left; the message begins with the source.
-    FormatError
-        Whatever else breaks in the source; offsets and lane widths that are none; a column beyond `limits`.
+    Raises `NotEnoughDataError`: Too little is left; the message begins with the source; `FormatError`: whatever else
+    breaks in the source; offsets and lane widths that are none; a column beyond `limits`.
     """
 
     @wraps(read)
