@@ -60,7 +60,7 @@ class Segment:
         [m/s]
     context : mapping of str to array, shape (n,)
         What the driver may react to, under DESIGN's names or any other; NaN where there is nothing (no leader).
-        A name that is absent is neutral.
+        A name that is absent has no effect.
     before, after : int
         Rows at the start and at the end of the arrays that lie outside the segment: context only, no offsets are
         sampled there. Effects that look ahead or respond slowly need what comes after and what went before.

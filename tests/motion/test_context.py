@@ -97,6 +97,24 @@ def test_oncoming_traffic_is_seen_ahead_only(tmp_path: Path) -> None:
     assert np.isnan(context["oncoming_distance"][~ahead]).all()
 
 
+def test_against_the_lanes_traffic_everything_is_seen_the_other_way_round(tmp_path: Path) -> None:
+    network = two_roads(tmp_path)
+    own = drive(network, entity("own"), lane=-3, start=550.0)
+    others = [
+        drive(network, entity("inner"), lane=-2, start=550.0),
+        drive(network, entity("behind"), lane=-3, start=600.0),
+        drive(network, entity("same way"), lane=-3, start=500.0),
+    ]
+    for one in (own, others[0], others[2]):
+        one.heading_relative[:] = np.pi
+    context = entity_context(together(own, *others), network, 0, GRID)
+    assert set(context["right_distance"]) == {0.0} and set(context["lane_index"]) == {2.0}
+    assert np.isnan(context["left_distance"]).all()
+    np.testing.assert_allclose(context["lead_distance"], 45.0, atol=1e-6)
+    assert np.isnan(context["oncoming_distance"]).all()  # it has passed
+    np.testing.assert_allclose(context["curvature"], -1.0 / (RADIUS + 2.5 * LANE_WIDTH), rtol=1e-9)
+
+
 def test_weather_holds_from_the_time_of_its_action_and_wind_is_relative_to_travel(tmp_path: Path) -> None:
     network = two_roads(tmp_path)
     place = Place("made", 1, "Environment")

@@ -111,7 +111,7 @@ def _unknown_zones(profile: DriverProfile, drives: Sequence[Drive]) -> list[str]
     strange = sorted(there - known)
     if not known or not strange:
         return []
-    return [f"{len(strange)} of {len(there)} zones are not the profile's ({strange[0]}, say), taken as neutral"]
+    return [f"{len(strange)} of {len(there)} zones are not the profile's ({strange[0]}, say), taken as the mean of all"]
 
 
 def _known(drive: Drive) -> set[str]:
@@ -119,7 +119,7 @@ def _known(drive: Drive) -> set[str]:
 
 
 def _neutral(where: str, columns: Sequence[str]) -> str:
-    return f"{where}: {', '.join(columns)} not known, taken as neutral"
+    return f"{where}: {', '.join(columns)} not known, left without effect"
 
 
 class Offsets(Result):

@@ -41,7 +41,7 @@ def evaluate(
     quiet: Quiet = False,
     as_json: AsJson = False,
 ) -> None:
-    """Score a profile on measured drives and on a floor of other real drivers: metrics, spectrum, classifiers."""
+    """Score a profile on measured drives, beside other real drivers: metrics, spectrum, classifiers."""
     from xosc_lateral import evaluate
     from xosc_lateral.api.convert import REPORT_SUFFIXES
     from xosc_lateral.formats.output_paths import claim, output_file

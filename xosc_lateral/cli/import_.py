@@ -221,7 +221,7 @@ def _import(
 ) -> None:
     from xosc_lateral import import_drives
     from xosc_lateral.formats.output_paths import STDOUT, claim, output_file
-    from xosc_lateral.formats.output_tables import output_suffixes
+    from xosc_lateral.formats.output_tables import harmless_frame, output_suffixes
 
     if output != STDOUT:
         files = [source for source in sources if source.is_file()]
@@ -229,7 +229,7 @@ def _import(
     imported = import_drives(name, sources[0] if len(sources) == 1 else sources, **options)
     written = None
     if output == STDOUT:
-        write_stdout(imported.to_frame().to_csv(index=False, lineterminator="\n"))
+        write_stdout(harmless_frame(imported.to_frame()).to_csv(index=False, lineterminator="\n"))
     else:
         written = imported.write(output, force=force)
     if as_json and written is not None:

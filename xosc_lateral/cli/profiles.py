@@ -107,7 +107,7 @@ def compare(
     quiet: Quiet = False,
     as_json: AsJson = False,
 ) -> None:
-    """Compare profiles, and show which cannot be told apart."""
+    """Compare profiles, and show which are not distinguishable."""
     from xosc_lateral import compare_profiles
 
     if len(names) < 2:

@@ -32,6 +32,9 @@ MAX_LEVELS = 12
 def read_drives(paths: str | Path | Sequence[str | Path], mapping: MappingLike | None = None) -> list[Drive]:
     """Read the drives of one or several tables.
 
+    Raises `FormatError` when a file can't be read, a column is missing, or its values can't be in the unit meant;
+    `NotEnoughDataError` when a file holds no drive with two rows of time, offset and lane width.
+
     Parameters
     ----------
     paths : path or sequence of paths
@@ -44,13 +47,6 @@ def read_drives(paths: str | Path | Sequence[str | Path], mapping: MappingLike |
     list of Drive
         In the order of the files and of first appearance; a drive without a name is called after its file. Rows are
         sorted by time, repeated times dropped, rows with a missing value left out (a gap).
-
-    Raises
-    ------
-    FormatError
-        When a file can't be read, a column is missing, or its values can't be in the unit meant.
-    NotEnoughDataError
-        When a file holds no drive with two rows of time, offset and lane width.
     """
     known = as_mapping(mapping)
     files = [Path(path) for path in ([paths] if isinstance(paths, str | Path) else paths)]

@@ -32,15 +32,12 @@ _DOUBLE = 8
 def read_table(path: Path, mapping: TableMapping | None = None) -> tuple[pd.DataFrame, str]:
     """Read a CSV, CSV.gz or Parquet file as it is; a mapping may say how text is written.
 
+    Raises `FormatError` when it isn't one, or is beyond the limits.
+
     Returns
     -------
     DataFrame, str
         The table, and the SHA-256 of the bytes that it was parsed from.
-
-    Raises
-    ------
-    FormatError
-        When it isn't one, or is beyond the limits.
     """
     import pandas as pd
 
@@ -65,10 +62,7 @@ def read_table(path: Path, mapping: TableMapping | None = None) -> tuple[pd.Data
 def read_text_table(path: Path) -> pd.DataFrame:
     """A table with all cells as text, missing ones empty.
 
-    Raises
-    ------
-    FormatError
-        See `read_table`.
+    Raises `FormatError`: see `read_table`.
     """
     import pandas as pd
 
@@ -91,10 +85,7 @@ def as_text(table: pd.DataFrame) -> pd.DataFrame:
 def foreign_errors(path: Path, what: str) -> Iterator[None]:
     """Whatever a library raises about a file becomes one line that names the file.
 
-    Raises
-    ------
-    FormatError
-        In place of anything that is no error of ours.
+    Raises `FormatError` in place of anything that is no error of ours.
     """
     try:
         yield
@@ -110,10 +101,7 @@ def foreign_errors(path: Path, what: str) -> Iterator[None]:
 def unpacked_text(source: Source) -> IO[bytes]:
     """The file, unpacked if it is gzip (by its first bytes, whatever its name).
 
-    Raises
-    ------
-    FormatError
-        It unpacks to more than `limits` allow.
+    Raises `FormatError`: It unpacks to more than `limits` allow.
     """
     packed = source.file.read(2) == b"\x1f\x8b"
     source.file.seek(0)

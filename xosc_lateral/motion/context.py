@@ -95,13 +95,16 @@ def _road(entity: EntityMotion, network: RoadNetwork, grid: IntArray) -> dict[st
     rows = grid[on]
     road, lane, s = entity.road[rows], entity.lane[rows], entity.s[rows]
     lane_index, lane_count = network.lane_index(road, lane, s)
+    # Against the lane's traffic all is seen the other way round.
+    along = np.where(np.cos(entity.heading_relative[rows]) < 0.0, -1.0, 1.0)
+    lane_seen = np.where(along > 0, lane_index, lane_count - 1 - lane_index)
     values: dict[str, FloatArray] = {
-        "curvature": network.lane_curvature(road, lane, s, entity.offset[rows]),
+        "curvature": along * network.lane_curvature(road, lane, s, entity.offset[rows]),
         "lane_width": network.lane_width(road, lane, s),
-        "lane_index": np.where(lane_index >= 0, lane_index, np.nan).astype(np.float64),
+        "lane_index": np.where(lane_index >= 0, lane_seen, np.nan).astype(np.float64),
         "lane_count": lane_count.astype(np.float64),
-        "crossfall": network.crossfall(road, lane, s),
-        "grade": network.grade(road, lane, s),
+        "crossfall": along * network.crossfall(road, lane, s),
+        "grade": along * network.grade(road, lane, s),
     }
     context = {}
     for name, part in values.items():
@@ -135,9 +138,8 @@ class _Reach(NamedTuple):
     sign: int
 
 
-def _lane_path(network: RoadNetwork, road: int, lane: int, s: float) -> list[_Reach]:
+def _lane_path(network: RoadNetwork, road: int, lane: int, s: float, forward: int) -> list[_Reach]:
     """Sections along a lane within `REACH` both ways, in a coordinate u that is 0 at `s` and grows along travel."""
-    forward = network.travel_direction(road, lane)
     low, high = network.section_at(road, s)
     path = [_Reach(road, low, high, lane, 0.0, s, forward)]
     for way in (1, -1):
@@ -295,17 +297,18 @@ def _own_lane_groups(
     own: EntityMotion, network: RoadNetwork, grid: IntArray
 ) -> list[tuple[IntArray, FloatArray, list[_Reach]]]:
     """Rows of the grid that share one lane path: positions in the grid, own u there, and the path."""
-    groups: dict[tuple[int, int, float], list[int]] = {}
+    groups: dict[tuple[int, int, float, int], list[int]] = {}
     present = ((own.activity[grid] & Activity.ACTIVE) != 0) & (own.road[grid] >= 0) & (own.lane[grid] != 0)
+    direction = _travel(own, network, grid, present)
     for k in np.flatnonzero(present):
         row = grid[k]
         road, lane, s = int(own.road[row]), int(own.lane[row]), float(own.s[row])
-        groups.setdefault((road, lane, network.section_at(road, s)[0]), []).append(int(k))
+        groups.setdefault((road, lane, network.section_at(road, s)[0], int(direction[k])), []).append(int(k))
     result = []
-    for (road, lane, _), members in groups.items():
+    for (road, lane, _, forward), members in groups.items():
         rows = np.array(members)
         along = own.s[grid[rows]]
-        path = _lane_path(network, road, lane, float(along[0]))
+        path = _lane_path(network, road, lane, float(along[0]), forward)
         result.append((rows, path[0].sign * (along - along[0]), path))
     return result
 
@@ -343,7 +346,7 @@ def _see(
 
 
 def _travel(other: EntityMotion, network: RoadNetwork, grid: IntArray, present: NDArray[np.bool_]) -> NDArray[np.int64]:
-    """Which way the other one drives along s, +1 or -1, shape (n,); 0 where it is on no lane."""
+    """Which way somebody drives along s, +1 or -1, shape (n,); 0 where it is on no lane."""
     road, lane = other.road[grid], other.lane[grid]
     direction = np.zeros(len(grid), dtype=np.int64)
     direction[present] = network.travel_directions(road[present], lane[present])

@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.driver.profile import DriverProfile
-from xosc_lateral.evaluation.comparison import SNIPPET
 from xosc_lateral.evaluation.distances import wasserstein
 from xosc_lateral.evaluation.lane_keeping import LaneKeeping, keeping_of
 from xosc_lateral.evaluation.metrics import METRICS, cut_snippets, snippet_metrics
@@ -26,6 +25,9 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 FloatArray = NDArray[np.float64]
+
+SNIPPET = 10.0
+"""Length of the snippets that are compared. [s]"""
 
 SHOWN_S = 120.0
 """Length of the sample paths in the figure. [s]"""

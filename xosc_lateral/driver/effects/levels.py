@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.driver.effects.single_column import SingleColumnEffect
+from xosc_lateral.errors import DriverProfileError
 
 FloatArray = NDArray[np.float64]
 
@@ -21,9 +22,21 @@ class Levels(SingleColumnEffect, frozen=True, kw_only=True):
         Column of whole numbers, or between them while it changes.
     levels : tuple of float
         Those that differ from the rest. [unit of the column]
+
+    Raises
+    ------
+    DriverProfileError
+        No level, or not a coefficient for each.
     """
 
     levels: tuple[float, ...]
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if not self.levels or len(self.coefficients) not in (0, len(self.levels)):
+            raise DriverProfileError(
+                f"effect {self.kind} by {self.column}: {len(self.levels)} levels, {len(self.coefficients)} coefficients"
+            )
 
     @property
     def shape(self) -> str:

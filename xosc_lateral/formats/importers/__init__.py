@@ -39,10 +39,7 @@ GROUP = "xosc_lateral.importers"
 def find_importer(name: str) -> Importer:
     """The reader of a format.
 
-    Raises
-    ------
-    FormatError
-        If there is none.
+    Raises `FormatError` if there is none.
     """
     if name in IMPORTERS:
         module, _, function = IMPORTERS[name].partition(":")

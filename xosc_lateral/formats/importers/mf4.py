@@ -92,6 +92,9 @@ def import_mf4(
 ) -> Imported:
     """Read mapped channels of bus logs at an even step, over the time that all position channels of a log cover.
 
+    Raises `FormatError` if the map lacks the position, asammdf is not installed, a log can't be read, a channel is not
+    in it, or the unit in the file measures something else.
+
     Parameters
     ----------
     sources : path or sequence of paths
@@ -102,12 +105,6 @@ def import_mf4(
         More of them, saved.
     step : float
         Of the table. Messages that stay away for longer than a second leave a gap. [s]
-
-    Raises
-    ------
-    FormatError
-        If the map lacks the position, asammdf is not installed, a log can't be read, a channel is not in it, or the
-        unit in the file measures something else.
     """
     import pandas as pd
 
@@ -136,10 +133,7 @@ def import_mf4(
 def channels_wanted(source: Path) -> str:
     """What the channel map has to name, and the channels that there are to choose from: for who has no map yet.
 
-    Raises
-    ------
-    FormatError
-        When it can't be read as MDF.
+    Raises `FormatError` when it can't be read as MDF.
     """
     with _opened(source) as log:
         names = _names(log)

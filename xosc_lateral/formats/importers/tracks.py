@@ -47,6 +47,9 @@ def import_tracks(
 ) -> Imported:
     """Read tracks on a known road.
 
+    Raises `FormatError`: A missing column, or tracks that lie beside the road; `NotEnoughDataError` if nothing is left
+    once lane changes are cut.
+
     Parameters
     ----------
     source : path
@@ -59,13 +62,6 @@ def import_tracks(
         `rear`, `vehicle_class`.
     mapping : TableMapping, mapping of str to str, or path, optional
         More of them, saved.
-
-    Raises
-    ------
-    FormatError
-        A missing column, or tracks that lie beside the road.
-    NotEnoughDataError
-        If nothing is left once lane changes are cut.
     """
     network = read_opendrive(road)
     tracks = read_tracks(source, columns, mapping)
