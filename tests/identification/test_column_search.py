@@ -11,7 +11,7 @@ from tests.identification.made_coarse import coarse_of, movement, wander
 from xosc_lateral.driver.effects import Acts, Linear
 from xosc_lateral.driver.effects.response import respond
 from xosc_lateral.identification.column_search import find_column, likely_response
-from xosc_lateral.identification.columns import Column, Role
+from xosc_lateral.identification.columns import Column, Values
 from xosc_lateral.identification.regression import Coarse, fit_model
 from xosc_lateral.identification.search import Search
 from xosc_lateral.identification.selection import select
@@ -22,7 +22,7 @@ from xosc_lateral.identification.terms.restoring import RestoringTerm
 from xosc_lateral.identification.terms.spread import SpreadTerm
 
 SECONDS = 700.0
-COLUMNS = [Column(name, Role.NUMBER, False) for name in ("idle", "x")]
+COLUMNS = [Column(name, Values.NUMBER, False) for name in ("idle", "x")]
 
 
 def drive(seed: int, shift: float = 0.0, *, lag_s: float = 0.0, log_spread: float = 0.0) -> Coarse:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from xosc_lateral.identification.columns import Column, Role
+from xosc_lateral.identification.columns import Column, Values
 from xosc_lateral.identification.feedback import Feedback, find_feedback
 from xosc_lateral.identification.timeline import Timeline
 
@@ -35,8 +35,8 @@ def driven(seed: int) -> tuple[np.ndarray, np.random.Generator]:
     return 0.15 * low_passed(6.0, rng) + 0.05 * low_passed(1.0, rng), rng
 
 
-def feedback(offset: np.ndarray, values: np.ndarray, role: Role = Role.NUMBER) -> Feedback | None:
-    found = find_feedback(timeline(offset, x=values), [Column("x", role, False)])
+def feedback(offset: np.ndarray, values: np.ndarray, kind: Values = Values.NUMBER) -> Feedback | None:
+    found = find_feedback(timeline(offset, x=values), [Column("x", kind, False)])
     return found[0] if found else None
 
 
@@ -84,8 +84,8 @@ def test_what_has_nothing_to_do_with_the_car_does_not_follow_from_it(seed: int) 
         "fast": rng.normal(size=N),
         "switch": (low_passed(10.0, rng) > 1).astype(float),
     }
-    roles = {"slow": Role.NUMBER, "fast": Role.NUMBER, "switch": Role.SWITCH}
-    found = find_feedback(timeline(offset, **columns), [Column(name, role, False) for name, role in roles.items()])
+    kinds = {"slow": Values.NUMBER, "fast": Values.NUMBER, "switch": Values.SWITCH}
+    found = find_feedback(timeline(offset, **columns), [Column(name, kind, False) for name, kind in kinds.items()])
     assert not found
 
 
@@ -95,18 +95,18 @@ def test_gaps_and_missing_values_are_no_evidence() -> None:
     column[rng.random(N) < 0.05] = np.nan
     valid = np.ones(N, dtype=bool)
     valid[4000:5000] = False
-    assert not find_feedback(timeline(offset, valid, x=column), [Column("x", Role.NUMBER, True)])
+    assert not find_feedback(timeline(offset, valid, x=column), [Column("x", Values.NUMBER, True)])
 
 
 def test_a_direction_that_turns_by_itself_is_no_feedback() -> None:
     offset, rng = driven(52)
-    assert feedback(offset, 2.0 * low_passed(30.0, rng) % 3.0, Role.ANGLE) is None
+    assert feedback(offset, 2.0 * low_passed(30.0, rng) % 3.0, Values.ANGLE) is None
 
 
 def test_what_jumps_like_an_angle_may_follow_too() -> None:
     """A torque that keeps the lane changes its sign at each lane change."""
     offset, rng = driven(52)
-    found = feedback(offset, -2.0 * offset + 0.05 * rng.normal(size=N), Role.ANGLE)
+    found = feedback(offset, -2.0 * offset + 0.05 * rng.normal(size=N), Values.ANGLE)
     assert found is not None
     assert not found.doubtful
 
@@ -133,7 +133,7 @@ def test_what_makes_a_car_restless_does_not_follow_from_it(seed: int) -> None:
 def test_too_short_a_drive_says_nothing() -> None:
     offset, _ = driven(53)
     short = offset[: round(12.0 / STEP)]
-    assert not find_feedback(timeline(short, x=-short), [Column("x", Role.NUMBER, False)])
+    assert not find_feedback(timeline(short, x=-short), [Column("x", Values.NUMBER, False)])
 
 
 @pytest.mark.parametrize("seed", [61, 62, 63, 64])
@@ -144,7 +144,7 @@ def test_runs_of_seconds_tell_too(seed: int) -> None:
     valid = (seconds < 750.0) & (seconds % 18.75 < 15.0)
     acceleration = np.gradient(np.gradient(offset, STEP), STEP)
     acceleration += 1.0 * acceleration.std() * rng.normal(size=N)
-    columns = [Column("acceleration", Role.NUMBER, False), Column("speed", Role.NUMBER, False)]
+    columns = [Column("acceleration", Values.NUMBER, False), Column("speed", Values.NUMBER, False)]
     found = find_feedback(timeline(offset, valid, acceleration=acceleration, speed=low_passed(30.0, rng)), columns)
     assert [one.column for one in found] == ["acceleration"]
 
@@ -157,4 +157,4 @@ def test_runs_of_seconds_bar_no_cause(seed: int) -> None:
     cause = low_passed(20.0, rng)
     keep = np.exp(-STEP / 2.0)
     moved = offset + 0.1 * lfilter([1.0 - keep], [1.0, -keep], cause)
-    assert not find_feedback(timeline(moved, valid, x=cause), [Column("x", Role.NUMBER, False)])
+    assert not find_feedback(timeline(moved, valid, x=cause), [Column("x", Values.NUMBER, False)])

@@ -167,7 +167,7 @@ def test_an_error_clearly_above_the_floor_is_called_unexplained(
 ) -> None:
     # the base in the place of the refined profile: the effect is in the drives, and nobody has explained it
     worse = replace(
-        result, findings=(), after=result.before, error_after=3.0 * result.floor, runs_after=result.runs_before
+        result, findings=(), after=result.scored.before, error_after=3.0 * result.floor, runs_after=result.scored.runs_before
     )
     left = lack_of_fit_of(worse)
     assert left.clear
@@ -197,7 +197,7 @@ def test_the_json_keeps_to_the_schema_and_adds_the_meaning(
     finding = record["findings"][0]
     assert finding["kind"] == "location"
     assert "grade" in finding["meaning"]
-    assert {row["group"] for row in record["residual"]} == set(result.real)
+    assert {row["group"] for row in record["residual"]} == set(result.scored.real)
     assert record["unexplained"]["clear"] is lack_of_fit.clear
 
 
@@ -248,8 +248,8 @@ def test_courses_leave_out_what_is_cut(result: LoopResult) -> None:
 def test_drives_are_described_one_by_one(result: LoopResult) -> None:
     means, spreads = by_drive(result, 20.0)
     assert len(means["measured"]) == 1
-    assert len(spreads["after"]) == len(result.runs_after)
-    timeline = result.statistics.timeline
+    assert len(spreads["after"]) == len(result.scored.runs_after)
+    timeline = result.scored.statistics.timeline
     assert means["measured"][0] == pytest.approx(timeline.offset[timeline.valid].mean())
 
 

@@ -35,6 +35,7 @@ def close_loop(
     seed: int = 0,
     name: str = "refined",
     leave_out: Collection[str] = (),
+    roles: Mapping[str, str] | None = None,
     columns: Mapping[str, str] | None = None,
     library: Paths = (),
     progress: Callable[[float, str], None] | None = None,
@@ -53,6 +54,10 @@ def close_loop(
         Of the refined profile.
     leave_out : collection of str
         Columns not to look at.
+    roles : mapping of str to str, optional
+        What columns are: column -> road, weather, traffic, time, own, driver or unknown. Road, weather and traffic are
+        never dismissed as consequences of the car's movement, own movement and time are never causes. Default: by name
+        and values.
     library : path or paths
         Folders with further profiles.
     progress : callable, optional
@@ -62,6 +67,8 @@ def close_loop(
     ------
     NotEnoughDataError
         Too little road-following is left after cutting.
+    FormatError
+        A role that there is not, or of a column that the drives lack.
     """
     from dataclasses import replace
 
@@ -81,6 +88,7 @@ def close_loop(
             name=name,
             provenance=Provenance(source=", ".join(given.inputs), inputs=dict(given.inputs)),
             excluded=list(leave_out),
+            roles=dict(roles or {}),
             progress=progress or (lambda share, what: None),
         )
     if base is not None:

@@ -31,6 +31,13 @@ def close_loop(
     leave_out: Annotated[
         list[str] | None, typer.Option(metavar="COLUMN", help="Context column to ignore; may be repeated.")
     ] = None,
+    role: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="COLUMN=ROLE",
+            help="What a column is: road, weather, traffic, time, own, driver or unknown; may be repeated.",
+        ),
+    ] = None,
     columns: Columns = None,
     library: Library = None,
     force: Force = False,
@@ -53,6 +60,7 @@ def close_loop(
             seed=seed,
             name=written.stem,
             leave_out=leave_out or (),
+            roles=pairs(role, "--role"),
             columns=pairs(columns, "--map"),
             library=library or (),
             progress=progress,

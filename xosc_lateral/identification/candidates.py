@@ -35,7 +35,7 @@ from xosc_lateral.driver.effects import (
     Saturating,
     Threshold,
 )
-from xosc_lateral.identification.columns import Column, Role
+from xosc_lateral.identification.columns import Column, Values
 from xosc_lateral.identification.offered import offered_effects
 
 FloatArray = NDArray[np.float64]
@@ -108,7 +108,7 @@ def candidates_of(columns: Sequence[Column], context: Mapping[str, FloatArray], 
     pairs: list[tuple[ColumnEffect, tuple[float, ...]]] = [
         (Product(acts=Acts.LOCATION, factors=pair), (1.0,))
         for first, second in combinations(columns, 2)
-        if len(columns) <= most or {first.role, second.role} & {Role.LEVELS, Role.SWITCH}
+        if len(columns) <= most or {first.values, second.values} & {Values.LEVELS, Values.SWITCH}
         for pair in _pairs(first, second, factors)
     ]
     families = {Family.PLAIN: plain, Family.BENT: bent, Family.PRODUCT: pairs}
@@ -146,7 +146,7 @@ def shapes_of(column: Column, values: FloatArray, *, curves: bool) -> Shapes:
 
 
 def _fading(column: Column, values: FloatArray) -> Iterator[tuple[ColumnEffect, tuple[float, ...]]]:
-    if column.gaps and column.role is Role.NUMBER and (scale := _scale(values, 0.5)) > 0.0:
+    if column.gaps and column.values is Values.NUMBER and (scale := _scale(values, 0.5)) > 0.0:
         for share in FINE_SCALES:
             yield Proximity(acts=Acts.LOCATION, column=column.name, scale=share * scale), (1.0,)
 
@@ -157,7 +157,7 @@ def _unique(shapes: Iterator[tuple[ColumnEffect, tuple[float, ...]]]) -> list[Co
 
 def _curves(column: Column, values: FloatArray) -> list[ColumnEffect]:
     """Curves with one or two bends; a neighbour that is not there is far away, which a curve does not say."""
-    if column.role is not Role.NUMBER or column.gaps:
+    if column.values is not Values.NUMBER or column.gaps:
         return []
     knots = np.unique(_quantiles(values[np.isfinite(values)], KNOTS)).tolist()
     return [
@@ -169,7 +169,7 @@ def _curves(column: Column, values: FloatArray) -> list[ColumnEffect]:
 
 def _plain(column: Column, values: FloatArray) -> Iterator[tuple[ColumnEffect, tuple[float, ...]]]:
     name = column.name
-    if column.role is Role.ANGLE:
+    if column.values is Values.ANGLE:
         angular = Angular(acts=Acts.LOCATION, column=name, period=column.period)
         yield from ((angular, (float(np.sin(phase)), float(np.cos(phase)))) for phase in PHASES)
         return
@@ -177,7 +177,7 @@ def _plain(column: Column, values: FloatArray) -> Iterator[tuple[ColumnEffect, t
         yield Linear(acts=Acts.LOCATION, column=name), (1.0,)
     if column.gaps:
         yield Nearness(acts=Acts.LOCATION, column=name, presence=True), (1.0,)
-        if column.role is Role.NUMBER and (scale := _scale(values, 0.5)) > 0.0:
+        if column.values is Values.NUMBER and (scale := _scale(values, 0.5)) > 0.0:
             yield Proximity(acts=Acts.LOCATION, column=name, scale=scale), (1.0,)
 
 
@@ -187,10 +187,10 @@ def _bent(
     name, seen = column.name, values[np.isfinite(values)]
     for effect in offered_effects(name, values):
         yield effect, (1.0,) * effect.quantity({name: values[:1]}).shape[1]
-    if column.role is Role.LEVELS:
+    if column.values is Values.LEVELS:
         for level in column.levels:
             yield Levels(acts=Acts.LOCATION, column=name, levels=(level,)), (1.0,)
-    if column.role is not Role.NUMBER or not _varies(values):
+    if column.values is not Values.NUMBER or not _varies(values):
         return
     for at in np.unique(_quantiles(seen, limits)):
         if seen.min() < at < seen.max():
@@ -215,12 +215,12 @@ def _bent(
 def _factors(column: Column, values: FloatArray) -> list[Factor]:
     """How a column enters products: a number about its natural zero, else about its median."""
     name = column.name
-    if column.role is Role.ANGLE:
+    if column.values is Values.ANGLE:
         return [Factor(column=name, form=form, at=column.period) for form in (Form.SINE, Form.COSINE)]
-    if column.role is Role.LEVELS:
+    if column.values is Values.LEVELS:
         return [Factor(column=name, form=Form.EQUALS, at=level) for level in column.levels]
     found = []
-    if column.role is Role.SWITCH:
+    if column.values is Values.SWITCH:
         high = max(column.levels)
         return [
             Factor(column=name, form=Form.EQUALS, at=high)
@@ -240,7 +240,7 @@ def _factors(column: Column, values: FloatArray) -> list[Factor]:
 def _pairs(first: Column, second: Column, factors: Mapping[str, list[Factor]]) -> Iterator[tuple[Factor, Factor]]:
     for one in factors[first.name]:
         for other in factors[second.name]:
-            if Role.ANGLE in (first.role, second.role):  # a vector's component: speed counts from its own zero
+            if Values.ANGLE in (first.values, second.values):  # a vector's component: speed counts from its own zero
                 one_, other_ = (Factor(column=f.column) if f.form is Form.VALUE else f for f in (one, other))
                 yield one_, other_
             else:

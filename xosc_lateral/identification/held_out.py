@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,7 +10,7 @@ from msgspec import structs
 from numpy.typing import NDArray
 
 from xosc_lateral.driver.beside import COLUMNS
-from xosc_lateral.driver.effects import ColumnEffect, Effect
+from xosc_lateral.driver.effects import ColumnEffect, Effect, TimeSmooth
 from xosc_lateral.driver.fitting import fit_population, fit_runs
 from xosc_lateral.driver.models.kinds import ModelKind
 from xosc_lateral.driver.profile import DriverProfile
@@ -32,7 +32,7 @@ from xosc_lateral.identification.seeds import LoopSeed
 from xosc_lateral.identification.selection import Selection
 from xosc_lateral.identification.terms.base import Term
 from xosc_lateral.identification.terms.cycle import CycleTerm
-from xosc_lateral.identification.terms.step import StepTerm
+from xosc_lateral.identification.terms.time import StepTerm
 from xosc_lateral.identification.timeline import COARSE
 
 FloatArray = NDArray[np.float64]
@@ -63,6 +63,11 @@ class HeldOut:
     after: dict[str, FloatArray]
     runs_before: FloatArray
     runs_after: FloatArray
+
+    @property
+    def compared(self) -> tuple[Mapping[str, FloatArray], Mapping[str, FloatArray], Mapping[str, FloatArray]]:
+        """Summary statistics of measured offsets, before, after. [m]"""
+        return self.real, self.before, self.after
 
     @property
     def errors(self) -> tuple[float, float]:
@@ -151,6 +156,9 @@ def _quantities(selection: Selection, columns: list[Column]) -> dict[str, FloatA
         effect = effects[0] if effects else None
         if isinstance(effect, ColumnEffect):
             quantities[f"effect: {key}"] = coarse.strength(effect)
+        elif isinstance(effect, TimeSmooth):
+            path = effect.path(effect.location or effect.spread, coarse.timeline.time)
+            quantities[f"effect: {key}"] = path
         elif isinstance(term, StepTerm):
             quantities[f"effect: {key}"] = (np.arange(len(coarse.timeline)) >= term.at * COARSE).astype(float)
     return quantities

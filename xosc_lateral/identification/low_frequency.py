@@ -24,9 +24,10 @@ from itertools import islice
 import numpy as np
 from numpy.typing import NDArray
 
+from xosc_lateral.driver.effects.time_smooth import half_cosines
 from xosc_lateral.identification.autocorrelation import Whitener, fit_autoregression
 from xosc_lateral.identification.innovations import ORDER
-from xosc_lateral.identification.regression import MIN_DRIFT_S, Coarse, Fitted
+from xosc_lateral.identification.regression import Coarse, Fitted
 from xosc_lateral.identification.significance import as_one_degree, upper_tail
 
 FloatArray = NDArray[np.float64]
@@ -80,6 +81,8 @@ class LowFrequency:
     ----------
     drift, step : float
         Score of either. [chi-square]
+    size : int
+        Half cosines that the drift takes.
     at : int
         Coarse row of the best step.
     p_value : float
@@ -87,6 +90,7 @@ class LowFrequency:
     """
 
     drift: float
+    size: int
     step: float
     at: int
     p_value: float
@@ -99,9 +103,9 @@ class LowFrequency:
 
 def find_low_frequency(coarse: Coarse, fitted: Fitted, rng: np.random.Generator) -> LowFrequency | None:
     """Drift and step at once; None when no drive is long enough."""
-    drift = half_cosines(coarse)
-    if drift.shape[1] == 0:
+    if not coarse.lasts:
         return None
+    drift = half_cosines_of(coarse, DRIFT_TERMS)
     left = np.where(coarse.valid, fitted.movement * fitted.scale, 0.0)
     basis = np.linalg.qr(np.column_stack([np.ones(len(left)), drift]) * coarse.valid[:, None])[0]
     movement = np.where(coarse.valid, (left - basis @ (basis.T @ left)) / fitted.scale, 0.0)
@@ -111,15 +115,15 @@ def find_low_frequency(coarse: Coarse, fitted: Fitted, rng: np.random.Generator)
     rows = rows / float(np.sqrt(np.mean(rows[coarse.valid] ** 2)))
     steps, moments = _steps(coarse, whitener)
     scores = _Scores(whitener.rows(drift), steps)
-    drift_score, step_score, best = scores(rows)
+    drift_score, size, step_score, best = scores(rows)
     at = int(moments[best]) if len(moments) else 0
     score = max(drift_score, step_score)
     p_value = 1.0
     if score >= UNREMARKABLE:
         nulls = (_simulated(rows, whitener, rng), _resigned(rows, whitener, rng))
-        p_value = max(_probability(score, (max(scores(one)[:2]) for one in null)) for null in nulls)
+        p_value = max(_probability(score, (max(scores(one)[::2]) for one in null)) for null in nulls)
         at = _moment(coarse, whitener, rows, at)
-    return LowFrequency(drift_score, step_score, at, p_value)
+    return LowFrequency(drift_score, size, step_score, at, p_value)
 
 
 def _probability(score: float, null: Iterator[float]) -> float:
@@ -134,7 +138,7 @@ class _Scores:
 
     Parameters
     ----------
-    drift : array, shape (n, `DRIFT_TERMS` * drives)
+    drift : array, shape (n, `DRIFT_TERMS`)
         Whitened.
     steps : array, shape (n, moments)
         Whitened.
@@ -146,26 +150,24 @@ class _Scores:
         self._n = n
         self._kept = (frequency > 0.0) & (frequency <= 1.0 / SHORTEST_S)
         self._drift, self._steps = self._transform(drift), self._transform(steps)
-        self._drives = drift.shape[1] // DRIFT_TERMS
 
-    def __call__(self, rows: FloatArray) -> tuple[float, float, int]:
-        """Best scores of a drift and of a step [chi-square], and which step."""
+    def __call__(self, rows: FloatArray) -> tuple[float, int, float, int]:
+        """Best score of a drift [chi-square] and of how many half cosines, best score of a step, and which."""
         observed = self._transform(rows)
         # each frequency stands for itself and its mirror image
         weight = 2.0 / self._n / _OrdinaryDrift.of(rows).typical()[self._kept]
         weighed = np.conj(self._drift) * weight[:, None]
         gram, moments = (weighed.T @ self._drift).real, (weighed.T @ observed).real
-        best = 0.0
+        best = (0.0, DRIFT_SIZES[0])
         for size in DRIFT_SIZES:
-            chosen = (DRIFT_TERMS * np.arange(self._drives)[:, None] + np.arange(size)).ravel()
-            gained = float(moments[chosen] @ np.linalg.pinv(gram[np.ix_(chosen, chosen)]) @ moments[chosen])
-            best = max(best, float(as_one_degree(gained, len(chosen))) - DRIFT_COST)
+            gained = float(moments[:size] @ np.linalg.pinv(gram[:size, :size]) @ moments[:size])
+            best = max(best, (float(as_one_degree(gained, size)) - DRIFT_COST, size))
         if self._steps.shape[1] == 0:
-            return best, 0.0, 0
+            return *best, 0.0, 0
         jumped = (np.conj(self._steps).T @ (weight * observed)).real
         chi_square = jumped**2 / np.maximum(np.square(np.abs(self._steps)).T @ weight, 1e-12)
         at = int(np.argmax(chi_square))
-        return best, float(chi_square[at]) - STEP_COST, at
+        return *best, float(chi_square[at]) - STEP_COST, at
 
     def _transform(self, values: FloatArray) -> ComplexArray:
         return np.asarray(np.fft.rfft(values, axis=0)[self._kept])
@@ -244,17 +246,12 @@ def _steps(coarse: Coarse, whitener: Whitener) -> tuple[FloatArray, NDArray[np.i
     return whitener.rows(jumps), inside
 
 
-def half_cosines(coarse: Coarse) -> FloatArray:
-    """Half cosines over every drive that lasts at least `MIN_DRIFT_S`, within -1..1, shape (n, terms). [-]"""
-    columns = []
-    for index in range(coarse.drives):
-        rows = np.flatnonzero(coarse.drive == index)
-        inside = rows[coarse.valid[rows]]
-        if len(inside) < MIN_DRIFT_S:
-            continue
-        share = np.clip((rows - inside[0]) / (inside[-1] - inside[0]), 0.0, 1.0)
-        for term in range(1, DRIFT_TERMS + 1):
-            column = np.zeros(len(coarse))
-            column[rows] = np.cos(np.pi * term * share)
-            columns.append(column)
-    return np.stack(columns, axis=1) if columns else np.zeros((len(coarse), 0))
+def clock_range(coarse: Coarse) -> tuple[float, float]:
+    """First and last valid time of all drives, in their clocks. [s]"""
+    seen = coarse.time[coarse.valid]
+    return float(seen.min()), float(seen.max())
+
+
+def half_cosines_of(coarse: Coarse, number: int) -> FloatArray:
+    """Half cosines of the drives' clock, within -1..1, shape (n, number). [-]"""
+    return half_cosines(coarse.time, *clock_range(coarse), number)

@@ -34,8 +34,8 @@ def traces_figure(result: LoopResult) -> Figure:
     parts = longest_parts(result)
     columns = (
         ("measured", timeline.offset, DRIVES),
-        ("profile before", result.runs_before[0], BEFORE),
-        ("profile after", result.runs_after[0], AFTER),
+        ("profile before", result.scored.runs_before[0], BEFORE),
+        ("profile after", result.scored.runs_after[0], AFTER),
     )
     figure, axes = new_panels(len(parts), len(columns), panel_height=0.75, sharex=True, sharey=True)
     for row, rows in zip(axes, parts, strict=True):

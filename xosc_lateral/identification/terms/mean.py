@@ -13,7 +13,7 @@ from xosc_lateral.driver.effects import Acts, Effect
 from xosc_lateral.identification.problem import Problem
 from xosc_lateral.identification.random_slopes import slope_deviation
 from xosc_lateral.identification.regression import Coarse, Fitted
-from xosc_lateral.identification.terms.base import Stage
+from xosc_lateral.identification.terms.base import Stage, Term
 from xosc_lateral.identification.terms.column import ColumnTerm
 from xosc_lateral.identification.timeline import coarse_mean
 from xosc_lateral.identification.timing import widening
@@ -41,6 +41,10 @@ class MeanTerm(ColumnTerm):
         """The response as the profile gives it: steps of a second would be noise."""
         response = coarse.fine_response(self.effect)
         return np.asarray(response - coarse_mean(response)[coarse.valid].mean(axis=0))
+
+    def may_be_explained_by(self, later: Term, coarse: Coarse) -> bool:
+        """What changes the spread: the null keeps how loud the movement is, not where."""
+        return bool(later.scale_columns(coarse).shape[1]) or later.known_scale(coarse) is not None
 
     @classmethod
     def problem(cls, fitted: Fitted) -> Problem:

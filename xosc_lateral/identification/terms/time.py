@@ -1,0 +1,324 @@
+"""What changes with time and no column explains: the mean or the spread as a smooth function, or one step of the mean.
+
+A driver learns or tires, a camera warms up or is calibrated anew. The smooths are half cosines over the drive, as many
+as the test asks for; what the profile gets is penalised: the k-th one's size has a prior variance that falls with the
+fourth power of k, as of an integrated random walk, at the scale that the sizes themselves make likeliest [1]_.
+
+References
+----------
+.. [1] S. N. Wood, "Generalized Additive Models", 2nd ed., 2017, section 5.8 and chapter 6: smooths as random effects.
+.. [2] E. Lazarus, D. Lewis, J. Stock, M. Watson, "HAR inference: recommendations for practice", J. Business & Economic
+   Statistics 36, 2018: a long-run variance from cosines.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, ClassVar, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from xosc_lateral.driver.effects import Effect, Step, TimeSmooth
+from xosc_lateral.identification.dictionary import orthonormal
+from xosc_lateral.identification.log_scale import squared_innovations
+from xosc_lateral.identification.low_frequency import DRIFT_SIZES, clock_range, find_low_frequency, half_cosines_of
+from xosc_lateral.identification.regression import MIN_DRIFT_S, Coarse, Fitted
+from xosc_lateral.identification.seeds import LoopSeed
+from xosc_lateral.identification.significance import LEAST
+from xosc_lateral.identification.squares import SLOW_S, fine_squares, log_sizes, slow_squares
+from xosc_lateral.identification.terms.base import Description, Outcome, Removal, Stage, Term, centred
+from xosc_lateral.identification.terms.cycle import latent_path
+from xosc_lateral.identification.terms.spread import what_columns_may_do
+
+if TYPE_CHECKING:
+    from xosc_lateral.identification.search import Search
+from xosc_lateral.identification.timeline import on_fine_grid
+
+FloatArray = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
+
+SAME_S = 90
+"""Steps of two fits that are so close are the same one. [s]"""
+
+SPREAD_SIZES = (1, 2, 4)
+"""Half cosines tried for the spread: its square scatters more than an offset does."""
+
+SHORTEST_S = 240.0
+"""Half cosines whose period is down to this say how much the slower ones are by chance; four times as long as what a
+regime lasts, so that regimes count as chance. [s]"""
+
+LEAST_OTHERS = 8
+"""So many of them at least, also on a short drive."""
+
+
+@dataclass(frozen=True, eq=False)
+class StepTerm(Term):
+    """The mean jumps once.
+
+    Parameters
+    ----------
+    at : int
+        Row of the 1 Hz grid.
+    """
+
+    component: ClassVar[str] = "time_mean"
+    kind: ClassVar[str] = "step"
+    stages: ClassVar[tuple[Stage, ...]] = (Stage.LOW_FREQUENCY,)
+    weight: ClassVar[float] = 3.0
+    seen_held_out: ClassVar[bool] = False
+    at: int
+
+    def mean_columns(self, coarse: Coarse) -> FloatArray:
+        """0 before, 1 after, shape (n, 1). [-]"""
+        return (np.arange(len(coarse)) >= self.at).astype(np.float64)[:, None]
+
+    @classmethod
+    def test(cls, search: Search, fitted: Fitted) -> Outcome | None:
+        """Step or smooth, whichever explains more, beyond what an ordinary drift continues to."""
+        if any(isinstance(term, StepTerm | TimeMeanTerm) for term in fitted.terms):
+            return None
+        found = find_low_frequency(fitted.coarse, fitted, search.rng(LoopSeed.LOW_FREQUENCY))
+        if found is None:
+            return None
+        term: Term = cls(found.at) if found.is_step else TimeMeanTerm(found.size)
+        return Outcome(term, (), found.p_value)
+
+    def matches(self, other: Self) -> bool:
+        """About the same moment."""
+        return isinstance(other, StepTerm) and abs(self.at - other.at) <= SAME_S
+
+    def estimate(self, fitted: Fitted) -> tuple[Effect, ...]:
+        """Height, moment, and the share of the drive before it: the mean stays."""
+        coarse, part = fitted.coarse, fitted.mean_part(self)
+        before = coarse.valid & (np.arange(len(coarse)) < self.at)
+        return (
+            Step(
+                size=float(fitted.sizes[part][0]),
+                size_error=float(np.sqrt(fitted.covariance[part, part][0, 0])),
+                at_s=float(coarse.time[self.at]),
+                share_before=float(before.sum() / coarse.valid.sum()),
+            ),
+        )
+
+    def remove(self, fitted: Fitted, effects: tuple[Effect, ...], removal: Removal) -> None:
+        """As fitted."""
+        removal.location += on_fine_grid(centred(latent_path(self, fitted), fitted.coarse), fitted.coarse.timeline)
+
+    def describe(self, fitted: Fitted, effects: tuple[Effect, ...], key: str) -> Description:
+        """Height and moment."""
+        effect = effects[0]
+        assert isinstance(effect, Step)
+        statistic = f"mean by effect: {key}"
+        return Description("step", f"at {effect.at_s:.0f} s", effect.size, effect.size_error, statistic, statistic)
+
+
+@dataclass(frozen=True, eq=False)
+class TimeMeanTerm(Term):
+    """The mean is a smooth function of time; `StepTerm` tests both.
+
+    Parameters
+    ----------
+    order : int
+        Half cosines that it is made of.
+    """
+
+    component: ClassVar[str] = "time_mean"
+    kind: ClassVar[str] = "drift"
+    weight: ClassVar[float] = 3.0
+    order: int = max(DRIFT_SIZES)
+
+    def mean_columns(self, coarse: Coarse) -> FloatArray:
+        """Half cosines, within -1..1, shape (n, order). [-]"""
+        return half_cosines_of(coarse, self.order)
+
+    @classmethod
+    def test(cls, search: Search, fitted: Fitted) -> Outcome | None:
+        """Nothing of its own: a step is looked for at the same time."""
+        return None
+
+    def estimate(self, fitted: Fitted) -> tuple[Effect, ...]:
+        """Penalised sizes."""
+        part = fitted.mean_part(self)
+        sizes, covariance = penalised(fitted.sizes[part], fitted.covariance[part, part])
+        errors = np.sqrt(np.diag(covariance))
+        return (_smooth(fitted.coarse, location=tuple(sizes), location_errors=tuple(errors)),)
+
+    def remove(self, fitted: Fitted, effects: tuple[Effect, ...], removal: Removal) -> None:
+        """As the profile has it."""
+        effect, timeline = effects[0], fitted.coarse.timeline
+        assert isinstance(effect, TimeSmooth)
+        path = effect.path(effect.location, timeline.time)
+        removal.location += path - path[timeline.valid].mean()
+
+    def describe(self, fitted: Fitted, effects: tuple[Effect, ...], key: str) -> Description:
+        """Change between its extremes, in the order of time."""
+        effect = effects[0]
+        assert isinstance(effect, TimeSmooth)
+        size, error, shape = _swing(fitted.coarse, effect, effect.location, effect.location_errors)
+        statistic = f"mean by effect: {key}"
+        return Description("mean offset by time", shape, size, error, statistic, statistic)
+
+
+@dataclass(frozen=True, eq=False)
+class TimeSpreadTerm(Term):
+    """The logarithm of the spread is a smooth function of time.
+
+    Parameters
+    ----------
+    order : int
+        Half cosines that it is made of.
+    slow : bool
+        Of the slower movement only.
+    """
+
+    component: ClassVar[str] = "time_spread"
+    kind: ClassVar[str] = "scale"
+    stages: ClassVar[tuple[Stage, ...]] = (Stage.SPREAD,)
+    weight: ClassVar[float] = 2.0
+    order: int = max(SPREAD_SIZES)
+    slow: bool = False
+
+    @property
+    def predictable(self) -> bool:
+        """As far as the innovations change."""
+        return not self.slow
+
+    def scale_columns(self, coarse: Coarse) -> FloatArray:
+        """Half cosines, shape (n, order); none where only slow movement changes. [-]"""
+        return np.zeros((len(coarse), 0)) if self.slow else half_cosines_of(coarse, self.order)
+
+    def size_columns(self, coarse: Coarse) -> FloatArray:
+        """Half cosines, shape (n, order), whichever movement changes. [-]"""
+        return half_cosines_of(coarse, self.order)
+
+    @classmethod
+    def test(cls, search: Search, fitted: Fitted) -> Outcome | None:
+        """The slowest half cosines of the squares beside those that are a little quicker, by an F test."""
+        if not fitted.coarse.lasts or any(isinstance(term, cls) for term in fitted.terms):
+            return None
+        # what a column does to the size of any part of the movement is not time's doing, slow as the column may be
+        known = what_columns_may_do(search, fitted)
+        own = slow_squares(fitted)
+        looked_at = (
+            (squared_innovations(fitted.innovations, fitted.coarse.valid), fitted.coarse.valid),
+            (own.standardised, own.valid),
+        )
+        found = [
+            (p_value, order, slow)
+            for slow, (squares, valid) in enumerate(looked_at)
+            for order, p_value in probability_of_orders(squares, valid, fitted.coarse.drive, known).items()
+        ]
+        if not found:
+            return None
+        p_value, order, slow = min(found)
+        return Outcome(cls(order, bool(slow)), (), min(1.0, p_value * len(found)))
+
+    def matches(self, other: Self) -> bool:
+        """Whichever movement changes."""
+        return isinstance(other, TimeSpreadTerm)
+
+    def estimate(self, fitted: Fitted) -> tuple[Effect, ...]:
+        """Penalised sizes; the fine noise goes along as far as it does."""
+        coarse = fitted.coarse
+        columns = half_cosines_of(coarse, self.order)
+        fine = penalised(*_log_sizes(log_sizes(fine_squares(fitted), columns), 1.0))[0]
+        if self.slow:
+            sizes, covariance = penalised(*_log_sizes(log_sizes(slow_squares(fitted), columns), SLOW_S))
+            fine = 0.0 * fine
+        else:
+            part = fitted.scale_part(self)
+            sizes, covariance = penalised(fitted.log_sizes[part], fitted.log_covariance[part, part])
+        errors = np.sqrt(np.diag(covariance))
+        return (_smooth(coarse, spread=tuple(sizes), spread_errors=tuple(errors), fine=tuple(fine)),)
+
+    def remove(self, fitted: Fitted, effects: tuple[Effect, ...], removal: Removal) -> None:
+        """A plain function of time."""
+        effect, time = effects[0], fitted.coarse.timeline.time
+        assert isinstance(effect, TimeSmooth)
+        removal.spread += effect.path(effect.spread, time)
+        removal.fine += effect.path(effect.fine, time)
+
+    def describe(self, fitted: Fitted, effects: tuple[Effect, ...], key: str) -> Description:
+        """Factor between its extremes, in the order of time."""
+        effect = effects[0]
+        assert isinstance(effect, TimeSmooth)
+        size, error, shape = _swing(fitted.coarse, effect, effect.spread, effect.spread_errors)
+        statistic = f"spread by effect: {key}"
+        factor = float(np.exp(size))
+        return Description("spread by time", shape, factor, factor * error, statistic, statistic)
+
+
+def penalised(sizes: FloatArray, covariance: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Sizes of half cosines, shape (k,), and their covariance, given that rougher ones are smaller beforehand.
+
+    The prior's scale is the one under which the sizes are likeliest (restricted maximum likelihood).
+    """
+    shape = np.arange(1, len(sizes) + 1, dtype=np.float64) ** -4.0
+    largest = float(np.max(np.square(sizes) / shape, initial=1e-300))
+    best, found = -np.inf, np.zeros(len(sizes))
+    for scale in largest * np.geomspace(1e-6, 10.0, 60):
+        total = covariance + np.diag(scale * shape)
+        sign, volume = np.linalg.slogdet(total)
+        likelihood = -0.5 * float(sizes @ np.linalg.solve(total, sizes)) - 0.5 * volume if sign > 0 else -np.inf
+        if likelihood > best:
+            best, found = likelihood, scale * shape
+    gain = np.linalg.solve(covariance + np.diag(found), np.diag(found)).T
+    return gain @ sizes, np.asarray(gain @ covariance)
+
+
+def probability_of_orders(
+    squares: FloatArray, valid: BoolArray, drive: NDArray[np.intp], known: FloatArray
+) -> dict[int, float]:
+    """p-value of each number of half cosines of the squares, shape (n,), over the drives that last.
+
+    Their power is compared with that of the next quicker ones, a long-run variance by cosines [2]_ that leaves out what
+    is tested. `known`, shape (n, k), is taken out.
+    """
+    from scipy.fft import dct
+    from scipy.stats import f
+
+    basis = orthonormal(np.column_stack([np.ones(valid.sum()), known[valid]]))
+    left = np.zeros(len(squares))
+    left[valid] = squares[valid] - basis @ (basis.T @ squares[valid])
+    sizes = []
+    for index in np.unique(drive):
+        own = left[valid & (drive == index)]
+        if len(own) >= MIN_DRIFT_S:
+            sizes.append(dct(own - own.mean(), type=2, norm="ortho")[1:])
+    if not sizes:
+        return {}
+    least = min(map(len, sizes))
+    common = np.sum([one[:least] for one in sizes], axis=0) / np.sqrt(len(sizes))
+    found = {}
+    for order in SPREAD_SIZES:
+        lasts = [max(round(2.0 * len(one) / SHORTEST_S), order + LEAST_OTHERS) for one in sizes]
+        others = np.concatenate([one[order:last] for one, last in zip(sizes, lasts, strict=True)])
+        ratio = float(np.mean(common[:order] ** 2) / max(float(np.mean(others**2)), 1e-300))
+        found[order] = max(float(f.sf(ratio, order, len(others))), LEAST)
+    return found
+
+
+def _log_sizes(found: tuple[FloatArray, FloatArray], rows_each: float) -> tuple[FloatArray, FloatArray]:
+    """Sizes and covariance, where so many neighbouring rows count as one."""
+    sizes, errors = found
+    return sizes, np.diag(np.square(errors) * rows_each)
+
+
+def _smooth(coarse: Coarse, **sizes: tuple[float, ...]) -> TimeSmooth:
+    from_s, to_s = clock_range(coarse)
+    return TimeSmooth(from_s=from_s, to_s=to_s, **sizes)
+
+
+def _swing(
+    coarse: Coarse, effect: TimeSmooth, sizes: tuple[float, ...], errors: tuple[float, ...]
+) -> tuple[float, float, str]:
+    """Later extreme less earlier, its standard error, and when they are. [m] or natural logarithm"""
+    time = np.unique(coarse.time[coarse.valid])
+    path = effect.path(sizes, time)
+    first, last = sorted((int(np.argmin(path)), int(np.argmax(path))))
+    contrast = np.diff(
+        np.stack([effect.path(tuple(row), time[[first, last]]) for row in np.eye(len(sizes))], axis=1), axis=0
+    )[0]
+    error = float(np.sqrt(np.sum(np.square(contrast * np.asarray(errors)))))
+    return float(path[last] - path[first]), error, f"smooth, from {time[first]:.0f} s to {time[last]:.0f} s"
