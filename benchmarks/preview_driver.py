@@ -72,13 +72,13 @@ def kinds() -> dict[str, Act]:
         ),
         "rain": Act(log_spread=lambda c, t: 0.11 * c["rain"], columns=("rain",)),
         "learning": Act(log_spread=lambda c, t: 0.75 * np.exp(-t / 420.0)),
-        "settling": Act(lambda c, t: 0.42 * np.exp(-t / 420.0)),
+        "settling": Act(lambda c, t: 0.90 * np.exp(-t / 420.0)),
         "fatigue": Act(log_spread=lambda c, t: 0.42 * np.cos(2.0 * np.pi * (t / t[-1] - 0.5))),
         "two_drivers": Act(
-            lambda c, t: np.where(t < 0.5 * t[-1], -0.11, 0.11),
+            lambda c, t: np.where(t < 0.5 * t[-1], -0.22, 0.22),
             lambda c, t: np.where(t < 0.5 * t[-1], -0.12, 0.12),
         ),
-        "camera": Act(camera=lambda t: np.where(t < 0.37 * t[-1], -0.09, 0.09)),
+        "camera": Act(camera=lambda t: np.where(t < 0.37 * t[-1], -0.18, 0.18)),
     }
 
 

@@ -137,12 +137,12 @@ def best_probability(search: Search, kind: type[ColumnKind], fitted: Fitted) -> 
     return 1.0 if best is None else best.p_value
 
 
-def likely_response(search: Search, kind: type[ColumnKind], fitted: Fitted, level: float) -> FloatArray:
-    """Response of the best candidate, shape (n, 1), where its p-value is at most `level`; else of shape (n, 0)."""
+def likely_response(search: Search, kind: type[ColumnKind], fitted: Fitted, level: float) -> tuple[FloatArray, float]:
+    """Response of the best candidate and its p-value, shape (n, 1) where that is at most `level`; else (n, 0)."""
     best = _likeliest(search, kind, fitted)
     if best is None or best.p_value > level:
-        return np.zeros((len(fitted.coarse), 0))
-    return fitted.coarse.response(best.effect)
+        return np.zeros((len(fitted.coarse), 0)), 1.0
+    return fitted.coarse.response(best.effect), best.p_value
 
 
 def _likeliest(search: Search, kind: type[ColumnKind], fitted: Fitted) -> Likeliest | None:

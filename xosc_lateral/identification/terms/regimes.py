@@ -23,15 +23,14 @@ from numpy.typing import NDArray
 from xosc_lateral.driver.effects import Effect, Regimes
 from xosc_lateral.identification.dictionary import in_another_order
 from xosc_lateral.identification.log_scale import squared_innovations
-from xosc_lateral.identification.low_frequency import half_cosines_of
 from xosc_lateral.identification.markov_switching import RegimeFit, fit_regimes
 from xosc_lateral.identification.regression import Coarse, Fitted
 from xosc_lateral.identification.seeds import LoopSeed
 from xosc_lateral.identification.significance import HEAVY_TAIL_SHARE, upper_tail
 from xosc_lateral.identification.squares import SLOW_S, fine_squares, log_sizes, slow_squares
 from xosc_lateral.identification.terms.base import Description, Outcome, Removal, Stage, Term
-from xosc_lateral.identification.terms.spread import known_log_scale, what_columns_may_do
-from xosc_lateral.identification.terms.time import SPREAD_SIZES
+from xosc_lateral.identification.terms.spread import known_log_scale, what_a_column_may_do, what_columns_do
+from xosc_lateral.identification.terms.time import SPREAD_ORDERS, half_cosines_of
 
 if TYPE_CHECKING:
     from xosc_lateral.identification.search import Search
@@ -87,8 +86,9 @@ class RegimesTerm(Term):
         # what a column does to the size in another shape than the one that was found is no regime
         known = [
             known_log_scale(fitted),
-            what_columns_may_do(search, fitted),
-            half_cosines_of(coarse, max(SPREAD_SIZES)),  # nor is what a smooth of time may do
+            what_columns_do(search, fitted),
+            what_a_column_may_do(search, fitted)[0],
+            half_cosines_of(coarse, max(SPREAD_ORDERS)),  # nor is what a smooth of time may do
         ]
         p_value = probability_of_persistence(
             squared_innovations(fitted.innovations, coarse.valid),

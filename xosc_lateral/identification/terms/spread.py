@@ -91,10 +91,14 @@ def known_log_scale(fitted: Fitted) -> FloatArray:
     return np.concatenate([np.zeros((len(coarse), 0)), *columns, *known], axis=1)
 
 
-def what_columns_may_do(search: Search, fitted: Fitted) -> FloatArray:
-    """What columns do to the movement's size, in any shape, and what the best of the others may do, shape (n, k).
+def what_columns_do(search: Search, fitted: Fitted) -> FloatArray:
+    """What columns that were found do to the movement's size, in any shape, shape (n, k)."""
+    return search.cross_basis(columns_on_size(fitted))
 
-    Beside it hidden changes of the size have to stand: regimes, a trend.
+
+def what_a_column_may_do(search: Search, fitted: Fitted) -> tuple[FloatArray, float]:
+    """What the best of the other columns may do to the movement's size, shape (n, k), and its p-value.
+
+    Beside it hidden changes of the size have to stand: regimes, a smooth of time.
     """
-    may = likely_response(search, SpreadTerm, fitted, MAY_ACT)
-    return np.concatenate([search.cross_basis(columns_on_size(fitted)), may], axis=1)
+    return likely_response(search, SpreadTerm, fitted, MAY_ACT)

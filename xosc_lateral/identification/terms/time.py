@@ -13,6 +13,7 @@ References
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar, Self
 
@@ -20,16 +21,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.driver.effects import Effect, Step, TimeSmooth
+from xosc_lateral.driver.effects.time_smooth import half_cosines
+from xosc_lateral.identification.autocorrelation import Whitener, fit_autoregression
 from xosc_lateral.identification.dictionary import orthonormal
+from xosc_lateral.identification.innovations import LONGEST, ORDER
 from xosc_lateral.identification.log_scale import squared_innovations
-from xosc_lateral.identification.low_frequency import DRIFT_SIZES, clock_range, find_low_frequency, half_cosines_of
 from xosc_lateral.identification.regression import MIN_DRIFT_S, Coarse, Fitted
 from xosc_lateral.identification.seeds import LoopSeed
-from xosc_lateral.identification.significance import LEAST
+from xosc_lateral.identification.significance import LEAST, as_one_degree, upper_tail
 from xosc_lateral.identification.squares import SLOW_S, fine_squares, log_sizes, slow_squares
 from xosc_lateral.identification.terms.base import Description, Outcome, Removal, Stage, Term, centred
 from xosc_lateral.identification.terms.cycle import latent_path
-from xosc_lateral.identification.terms.spread import what_columns_may_do
+from xosc_lateral.identification.terms.spread import what_a_column_may_do, what_columns_do
 
 if TYPE_CHECKING:
     from xosc_lateral.identification.search import Search
@@ -41,12 +44,27 @@ BoolArray = NDArray[np.bool_]
 SAME_S = 90
 """Steps of two fits that are so close are the same one. [s]"""
 
-SPREAD_SIZES = (1, 2, 4)
+ORDERS = (1, 2, 4, 8)
+"""Half cosines tried for the mean."""
+
+SPREAD_ORDERS = (1, 2, 4)
 """Half cosines tried for the spread: its square scatters more than an offset does."""
+
+EDGE_S, STEP_GRID_S, STEP_SHORTEST_S = 60, 15, 12.0
+"""Least time on either side of a step, between the moments that are tried, and least period that a step is seen at. [s]"""
+
+STEP_DRAWS = 2000
+"""Draws of white rows that the best step is compared with."""
+
+STEP_COST = 5.0
+"""A step has a free moment. [chi-square]"""
 
 SHORTEST_S = 240.0
 """Half cosines whose period is down to this say how much the slower ones are by chance; four times as long as what a
 regime lasts, so that regimes count as chance. [s]"""
+
+SURER = 0.01
+"""Where it is surer than the best column by this factor, what that column may do is left to time. [-]"""
 
 LEAST_OTHERS = 8
 """So many of them at least, also on a short drive."""
@@ -76,13 +94,25 @@ class StepTerm(Term):
     @classmethod
     def test(cls, search: Search, fitted: Fitted) -> Outcome | None:
         """Step or smooth, whichever explains more, beyond what an ordinary drift continues to."""
-        if any(isinstance(term, StepTerm | TimeMeanTerm) for term in fitted.terms):
+        coarse = fitted.coarse
+        if not coarse.lasts or any(isinstance(term, StepTerm | TimeMeanTerm) for term in fitted.terms):
             return None
-        found = find_low_frequency(fitted.coarse, fitted, search.rng(LoopSeed.LOW_FREQUENCY))
-        if found is None:
-            return None
-        term: Term = cls(found.at) if found.is_step else TimeMeanTerm(found.size)
-        return Outcome(term, (), found.p_value)
+        rows, whitener = slow_rows(fitted)
+        moments = step_moments(coarse)
+        jumps = whitener.rows((np.arange(len(coarse))[:, None] >= moments).astype(np.float64))
+        waves = whitener.rows(half_cosines_of(coarse, max(ORDERS)))
+        slow = [low_frequencies(one, coarse, coarse.valid, SHORTEST_S) for one in (rows[:, None], waves, jumps)]
+        smooth = smooth_probabilities(slow[0][:, 0], slow[1], ORDERS)
+        order = min(smooth, key=lambda one: smooth[one])
+        p_step = step_probability(slow[0][:, 0], slow[2], search.rng(LoopSeed.LOW_FREQUENCY))
+        p_value = min(1.0, 2.0 * min(p_step, len(smooth) * smooth[order]))
+        # which of the two it is, quicker movement tells as well
+        quick = [low_frequencies(one, coarse, coarse.valid, STEP_SHORTEST_S) for one in (rows[:, None], waves, jumps)]
+        gains = explained(quick[0][:, 0], quick[2], len(slow[0]))
+        gain = explained_jointly(quick[0][:, 0], quick[1][:, :order], len(slow[0]))
+        if len(moments) and gains.max() - STEP_COST > float(as_one_degree(gain, order)):
+            return Outcome(cls(_moment(rows, whitener, int(moments[np.argmax(gains)]))), (), p_value)
+        return Outcome(TimeMeanTerm(order), (), p_value)
 
     def matches(self, other: Self) -> bool:
         """About the same moment."""
@@ -126,7 +156,7 @@ class TimeMeanTerm(Term):
     component: ClassVar[str] = "time_mean"
     kind: ClassVar[str] = "drift"
     weight: ClassVar[float] = 3.0
-    order: int = max(DRIFT_SIZES)
+    order: int = max(ORDERS)
 
     def mean_columns(self, coarse: Coarse) -> FloatArray:
         """Half cosines, within -1..1, shape (n, order). [-]"""
@@ -176,7 +206,7 @@ class TimeSpreadTerm(Term):
     kind: ClassVar[str] = "scale"
     stages: ClassVar[tuple[Stage, ...]] = (Stage.SPREAD,)
     weight: ClassVar[float] = 2.0
-    order: int = max(SPREAD_SIZES)
+    order: int = max(SPREAD_ORDERS)
     slow: bool = False
 
     @property
@@ -198,21 +228,28 @@ class TimeSpreadTerm(Term):
         if not fitted.coarse.lasts or any(isinstance(term, cls) for term in fitted.terms):
             return None
         # what a column does to the size of any part of the movement is not time's doing, slow as the column may be
-        known = what_columns_may_do(search, fitted)
+        known = what_columns_do(search, fitted)
         own = slow_squares(fitted)
         looked_at = (
             (squared_innovations(fitted.innovations, fitted.coarse.valid), fitted.coarse.valid),
             (own.standardised, own.valid),
         )
-        found = [
-            (p_value, order, slow)
-            for slow, (squares, valid) in enumerate(looked_at)
-            for order, p_value in probability_of_orders(squares, valid, fitted.coarse.drive, known).items()
-        ]
-        if not found:
-            return None
-        p_value, order, slow = min(found)
-        return Outcome(cls(order, bool(slow)), (), min(1.0, p_value * len(found)))
+        may_act, p_column = what_a_column_may_do(search, fitted)
+        columns = half_cosines_of(fitted.coarse, max(SPREAD_ORDERS))
+
+        def best_beside(known: FloatArray) -> tuple[float, int, bool] | None:
+            found = []
+            for slow, (squares, valid) in enumerate(looked_at):
+                own, basis = _beside(known, squares, columns, valid)
+                own, basis = (low_frequencies(one, fitted.coarse, valid, SHORTEST_S) for one in (own, basis))
+                tests = smooth_probabilities(own[:, 0], basis, SPREAD_ORDERS)
+                found += [(p_value, order, bool(slow)) for order, p_value in tests.items()]
+            return (min(1.0, min(found)[0] * len(found)), *min(found)[1:]) if found else None
+
+        best = best_beside(known)
+        if best is not None and best[0] > SURER * p_column:
+            best = best_beside(np.concatenate([known, may_act], axis=1))
+        return None if best is None else Outcome(cls(*best[1:]), (), best[0])
 
     def matches(self, other: Self) -> bool:
         """Whichever movement changes."""
@@ -267,36 +304,119 @@ def penalised(sizes: FloatArray, covariance: FloatArray) -> tuple[FloatArray, Fl
     return gain @ sizes, np.asarray(gain @ covariance)
 
 
-def probability_of_orders(
-    squares: FloatArray, valid: BoolArray, drive: NDArray[np.intp], known: FloatArray
-) -> dict[int, float]:
-    """p-value of each number of half cosines of the squares, shape (n,), over the drives that last.
+def slow_rows(fitted: Fitted) -> tuple[FloatArray, Whitener]:
+    """White rows, shape (n,), by an autoregression that has not seen what changes over the whole drive."""
+    coarse = fitted.coarse
+    left = np.where(coarse.valid, fitted.movement * fitted.scale, 0.0)
+    slow = np.column_stack([np.ones(len(left)), half_cosines_of(coarse, max(ORDERS))]) * coarse.valid[:, None]
+    basis = np.linalg.qr(slow)[0]
+    movement = np.where(coarse.valid, (left - basis @ (basis.T @ left)) / fitted.scale, 0.0)
+    process = fit_autoregression(movement, coarse.valid, ORDER, longest=LONGEST)
+    whitener = Whitener(process, coarse.valid, coarse.drive, fitted.scale)
+    return whitener.rows(left), whitener
 
-    Their power is compared with that of the next quicker ones, a long-run variance by cosines [2]_ that leaves out what
-    is tested. `known`, shape (n, k), is taken out.
+
+def low_frequencies(values: FloatArray, coarse: Coarse, valid: BoolArray, shortest_s: float) -> FloatArray:
+    """Cosine transform of each drive that lasts, without the mean and what is quicker, shape (frequencies, k).
+
+    `values` of shape (n, k); the drives one after the other. Of white rows all are independent and of one variance.
     """
     from scipy.fft import dct
+
+    found = []
+    for index in range(coarse.drives):
+        own = values[valid & (coarse.drive == index)]
+        if len(own) >= MIN_DRIFT_S:
+            number = max(round(2.0 * len(own) / shortest_s), max(ORDERS) + LEAST_OTHERS)
+            found.append(dct(own, type=2, norm="ortho", axis=0)[1 : number + 1])
+    return np.concatenate(found) if found else np.zeros((0, values.shape[1]))
+
+
+def smooth_probabilities(rows: FloatArray, columns: FloatArray, orders: Sequence[int]) -> dict[int, float]:
+    """p-value of the first so many columns, shape (frequencies, k), by an F test at low frequencies alone.
+
+    What is left there says how much chance does, a long-run variance by cosines [2]_: rows need not be white beyond.
+    """
     from scipy.stats import f
 
-    basis = orthonormal(np.column_stack([np.ones(valid.sum()), known[valid]]))
-    left = np.zeros(len(squares))
-    left[valid] = squares[valid] - basis @ (basis.T @ squares[valid])
-    sizes = []
-    for index in np.unique(drive):
-        own = left[valid & (drive == index)]
-        if len(own) >= MIN_DRIFT_S:
-            sizes.append(dct(own - own.mean(), type=2, norm="ortho")[1:])
-    if not sizes:
-        return {}
-    least = min(map(len, sizes))
-    common = np.sum([one[:least] for one in sizes], axis=0) / np.sqrt(len(sizes))
     found = {}
-    for order in SPREAD_SIZES:
-        lasts = [max(round(2.0 * len(one) / SHORTEST_S), order + LEAST_OTHERS) for one in sizes]
-        others = np.concatenate([one[order:last] for one, last in zip(sizes, lasts, strict=True)])
-        ratio = float(np.mean(common[:order] ** 2) / max(float(np.mean(others**2)), 1e-300))
-        found[order] = max(float(f.sf(ratio, order, len(others))), LEAST)
+    for order in orders:
+        basis = orthonormal(columns[:, :order])
+        others = len(rows) - basis.shape[1]
+        if basis.shape[1] and others > 0:
+            explained = float(np.sum(np.square(basis.T @ rows)))
+            left = max(float(rows @ rows) - explained, 1e-300)
+            ratio = explained / basis.shape[1] / (left / others)
+            found[order] = max(float(f.sf(ratio, basis.shape[1], others)), LEAST)
     return found
+
+
+def step_moments(coarse: Coarse) -> NDArray[np.intp]:
+    """Rows of the 1 Hz grid at which a single drive may step, shape (moments,); several drives have no common step."""
+    count = np.cumsum(coarse.valid)
+    inside = coarse.valid & (count >= EDGE_S) & (count <= count[-1] - EDGE_S)
+    return np.flatnonzero(inside)[::STEP_GRID_S] if coarse.drives == 1 else np.zeros(0, dtype=np.intp)
+
+
+def step_probability(rows: FloatArray, jumps: FloatArray, rng: np.random.Generator) -> float:
+    """p-value of the best of all steps, shape (frequencies, moments), at low frequencies alone, against white rows."""
+    if not jumps.shape[1]:
+        return 1.0
+    unit = jumps / np.maximum(np.linalg.norm(jumps, axis=0), 1e-12)
+
+    def best(drawn: FloatArray) -> FloatArray:
+        explained = np.square(drawn @ unit).max(axis=1)
+        return np.asarray(explained / (np.square(drawn).sum(axis=1) - explained))
+
+    null = best(rng.normal(size=(STEP_DRAWS, len(rows))))
+    # a ratio's tail is no exponential: its logarithm's is
+    return upper_tail(float(np.log(best(rows[None])[0])), np.log(null), least_excess=0.0)
+
+
+def explained(rows: FloatArray, columns: FloatArray, slow: int) -> FloatArray:
+    """Chi-square of each column alone, shape (k,), where `slow` first frequencies count by what is left there."""
+    size = (columns.T @ rows) / np.maximum(np.square(columns).sum(axis=0), 1e-12)
+    left = np.square(rows[:, None] - columns * size)
+    level = np.maximum(left[:slow].mean(axis=0), left[slow:].mean(axis=0)), left[slow:].mean(axis=0)
+    moment = sum((columns[part].T @ rows[part]) / one for part, one in zip((slice(slow), slice(slow, None)), level))
+    power = sum(
+        np.square(columns[part]).sum(axis=0) / one for part, one in zip((slice(slow), slice(slow, None)), level)
+    )
+    return np.asarray(np.square(moment) / np.maximum(power, 1e-12))
+
+
+def explained_jointly(rows: FloatArray, columns: FloatArray, slow: int) -> float:
+    """The same of all columns, shape (frequencies, k), together."""
+    fit = columns @ np.linalg.lstsq(columns, rows, rcond=None)[0]
+    return float(explained(rows, fit[:, None], slow)[0])
+
+
+def _moment(rows: FloatArray, whitener: Whitener, at: int) -> int:
+    """The second at which a step near `at` is likeliest: a jump leaves its mark in the movement of that very second."""
+    near = np.arange(max(at - SAME_S, 1), min(at + SAME_S + 1, len(rows)))
+    jumps = whitener.rows((np.arange(len(rows))[:, None] >= near).astype(np.float64))
+    return int(near[np.argmax(np.square(jumps.T @ rows) / np.maximum(np.square(jumps).sum(axis=0), 1e-12))])
+
+
+def clock_range(coarse: Coarse) -> tuple[float, float]:
+    """First and last valid time of all drives, in their clocks. [s]"""
+    seen = coarse.time[coarse.valid]
+    return float(seen.min()), float(seen.max())
+
+
+def half_cosines_of(coarse: Coarse, number: int) -> FloatArray:
+    """Half cosines of the drives' clock, within -1..1, shape (n, number). [-]"""
+    return half_cosines(coarse.time, *clock_range(coarse), number)
+
+
+def _beside(
+    known: FloatArray, squares: FloatArray, columns: FloatArray, valid: BoolArray
+) -> tuple[FloatArray, FloatArray]:
+    """Squares, shape (n, 1), and columns, shape (n, k), without what is known to go with the size."""
+    basis = orthonormal(np.column_stack([np.ones(valid.sum()), known[valid]]))
+    both = np.column_stack([squares, columns])
+    both[valid] -= basis @ (basis.T @ both[valid])
+    return both[:, :1], both[:, 1:]
 
 
 def _log_sizes(found: tuple[FloatArray, FloatArray], rows_each: float) -> tuple[FloatArray, FloatArray]:
