@@ -17,7 +17,7 @@ from xosc_lateral.identification.timeline import join_drives
 
 def selected(drives: Sequence[Drive], excluded: Sequence[str] = ()) -> Selection:
     coarse = Coarse.of(join_drives(drives))
-    columns, _, _ = usable_columns(coarse.timeline, excluded)
+    columns = usable_columns(coarse.timeline, excluded).columns
     return select(Search.over(coarse, columns, np.random.SeedSequence(1), ERROR_BUDGET))
 
 

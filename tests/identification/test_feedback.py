@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from scipy.signal import lfilter
+from scipy.signal import butter, lfilter
 
 from xosc_lateral.identification.columns import Column, Values
 from xosc_lateral.identification.feedback import Feedback, find_feedback
+from xosc_lateral.identification.roles import Assigned, Role
 from xosc_lateral.identification.timeline import Timeline
 
 STEP = 0.2
@@ -158,3 +159,50 @@ def test_runs_of_seconds_bar_no_cause(seed: int) -> None:
     keep = np.exp(-STEP / 2.0)
     moved = offset + 0.1 * lfilter([1.0 - keep], [1.0, -keep], cause)
     assert not find_feedback(timeline(moved, valid, x=cause), [Column("x", Values.NUMBER, False)])
+
+
+def warning(offset: np.ndarray, on: float, off: float) -> np.ndarray:
+    """1 from `on` metres away until it is nearer than `off` metres."""
+    state, out = False, np.zeros(len(offset))
+    for row, distance in enumerate(np.abs(offset)):
+        state = distance > (off if state else on)
+        out[row] = state
+    return out
+
+
+@pytest.mark.parametrize("seed", [81, 82, 83])
+@pytest.mark.parametrize("hysteresis", [0.0, 0.06])
+def test_a_warning_is_a_function_of_the_present_offset(seed: int, hysteresis: float) -> None:
+    offset, _ = driven(seed)
+    found = feedback(offset, warning(offset, 0.3, 0.3 - hysteresis), Values.SWITCH)
+    assert found is not None
+    assert (found.of, found.doubtful) == ("offset", False)
+    assert found.function > 0.5
+
+
+@pytest.mark.parametrize("seed", [84, 85, 86])
+def test_a_switch_that_moves_the_car_is_no_function_of_where_it_is(seed: int) -> None:
+    offset, rng = driven(seed)
+    switch = (low_passed(15.0, rng) > 0.8).astype(float)
+    keep = np.exp(-STEP / 1.5)
+    assert feedback(offset + 0.3 * lfilter([1.0 - keep], [1.0, -keep], switch), switch, Values.SWITCH) is None
+
+
+def test_declared_road_is_never_dismissed_and_a_name_alone_only_if_both_marks_are_strong() -> None:
+    offset, rng = driven(87)
+    columns = {"curvature": -2.0 * offset + 0.05 * rng.normal(size=N)}
+    kinds = [Column("curvature", Values.NUMBER, False)]
+    by_name = {"curvature": Assigned("curvature", Role.ROAD, "name")}
+    declared = {"curvature": Assigned("curvature", Role.ROAD, "declared")}
+    assert find_feedback(timeline(offset, **columns), kinds, by_name)
+    assert not find_feedback(timeline(offset, **columns), kinds, declared)
+
+
+@pytest.mark.parametrize("seed", [88, 89, 90, 91])
+def test_a_bend_that_is_answered_before_it_comes_stays_a_cause(seed: int) -> None:
+    """The car is at its place a second before the bend is: what it does predicts the column."""
+    offset, rng = driven(seed)
+    bend = lfilter(*butter(2, 0.1, fs=1.0 / STEP), low_passed(8.0, rng))
+    moved = offset + 0.5 * np.roll(bend, -round(1.0 / STEP))
+    by_name = {"curvature": Assigned("curvature", Role.ROAD, "name")}
+    assert not find_feedback(timeline(moved, curvature=bend), [Column("curvature", Values.NUMBER, False)], by_name)

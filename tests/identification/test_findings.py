@@ -10,7 +10,7 @@ from xosc_lateral.identification.findings import describe_finding, population_fi
 from xosc_lateral.identification.population import DriverVariance
 from xosc_lateral.identification.selection import Accepted
 from xosc_lateral.identification.spectrum_shape import TIMES_S, SpectrumShape
-from xosc_lateral.identification.terms.step import StepTerm
+from xosc_lateral.identification.terms.time import StepTerm
 
 REAL = {"mean by effect: step 0": np.array([0.1, -0.1]), "movement by band": np.array([0.2, 0.1, np.nan])}
 BEFORE = {"mean by effect: step 0": np.array([0.0, 0.0]), "movement by band": np.array([0.2, 0.4, 0.3])}

@@ -19,7 +19,7 @@ from xosc_lateral.identification.selection import Accepted, Selection
 from xosc_lateral.identification.terms.base import Term
 from xosc_lateral.identification.terms.cycle import CycleTerm
 from xosc_lateral.identification.terms.mean import MeanTerm
-from xosc_lateral.identification.terms.step import StepTerm
+from xosc_lateral.identification.terms.time import StepTerm
 
 SECONDS = 900.0
 N = round(SECONDS / 0.2)

@@ -19,7 +19,7 @@ from xosc_lateral.identification.moving_statistics import (
 )
 from xosc_lateral.identification.regression import fit_model
 from xosc_lateral.identification.terms.regimes import RegimesTerm
-from xosc_lateral.identification.terms.step import StepTerm
+from xosc_lateral.identification.terms.time import StepTerm
 
 N = 6000
 

@@ -21,7 +21,7 @@ from xosc_lateral.formats.drives import read_drives
 from xosc_lateral.identification.identify import usable_columns
 from xosc_lateral.identification.selection import Selection
 from xosc_lateral.identification.terms.column import ColumnTerm
-from xosc_lateral.identification.terms.step import StepTerm
+from xosc_lateral.identification.terms.time import StepTerm
 from xosc_lateral.identification.timeline import join_drives
 
 Driven = Callable[..., list[Drive]]

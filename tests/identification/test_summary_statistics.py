@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 from scipy.stats import chi2
+from xosc_lateral.identification.low_frequency import DRIFT_TERMS, MIN_DRIFT_S, half_cosines
 
 from xosc_lateral.identification.lack_of_fit import _beyond, _mean_of_finite
-from xosc_lateral.identification.low_frequency import DRIFT_TERMS, MIN_DRIFT_S, half_cosines
 from xosc_lateral.identification.residual import (
     OSCILLATION,
     SPARE_ROWS,

@@ -45,7 +45,7 @@ SAME_S = 90
 """Steps of two fits that are so close are the same one. [s]"""
 
 ORDERS = (1, 2, 4, 8)
-"""Half cosines tried for the mean."""
+"""Half cosines tried for the mean. The fit has the most of them, penalised: a test wants few, a curve its shape."""
 
 SPREAD_ORDERS = (1, 2, 4)
 """Half cosines tried for the spread: its square scatters more than an offset does."""
@@ -112,7 +112,7 @@ class StepTerm(Term):
         gain = explained_jointly(quick[0][:, 0], quick[1][:, :order], len(slow[0]))
         if len(moments) and gains.max() - STEP_COST > float(as_one_degree(gain, order)):
             return Outcome(cls(_moment(rows, whitener, int(moments[np.argmax(gains)]))), (), p_value)
-        return Outcome(TimeMeanTerm(order), (), p_value)
+        return Outcome(TimeMeanTerm(), (), p_value)
 
     def matches(self, other: Self) -> bool:
         """About the same moment."""
@@ -206,7 +206,7 @@ class TimeSpreadTerm(Term):
     kind: ClassVar[str] = "scale"
     stages: ClassVar[tuple[Stage, ...]] = (Stage.SPREAD,)
     weight: ClassVar[float] = 2.0
-    order: int = max(SPREAD_ORDERS)
+    order: int = max(ORDERS)
     slow: bool = False
 
     @property
@@ -237,19 +237,19 @@ class TimeSpreadTerm(Term):
         may_act, p_column = what_a_column_may_do(search, fitted)
         columns = half_cosines_of(fitted.coarse, max(SPREAD_ORDERS))
 
-        def best_beside(known: FloatArray) -> tuple[float, int, bool] | None:
+        def best_beside(known: FloatArray) -> tuple[float, bool] | None:
             found = []
             for slow, (squares, valid) in enumerate(looked_at):
                 own, basis = _beside(known, squares, columns, valid)
                 own, basis = (low_frequencies(one, fitted.coarse, valid, SHORTEST_S) for one in (own, basis))
                 tests = smooth_probabilities(own[:, 0], basis, SPREAD_ORDERS)
-                found += [(p_value, order, bool(slow)) for order, p_value in tests.items()]
-            return (min(1.0, min(found)[0] * len(found)), *min(found)[1:]) if found else None
+                found += [(p_value, bool(slow)) for p_value in tests.values()]
+            return (min(1.0, min(found)[0] * len(found)), min(found)[1]) if found else None
 
         best = best_beside(known)
         if best is not None and best[0] > SURER * p_column:
             best = best_beside(np.concatenate([known, may_act], axis=1))
-        return None if best is None else Outcome(cls(*best[1:]), (), best[0])
+        return None if best is None else Outcome(cls(slow=best[1]), (), best[0])
 
     def matches(self, other: Self) -> bool:
         """Whichever movement changes."""
