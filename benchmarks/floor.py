@@ -61,7 +61,7 @@ def measured(case: dict[str, Any], protocol: dict[str, Any]) -> list[dict[str, A
     for smooth in (False, True):
         table = smoothed_tracks(planted) if smooth else planted
         coarse = Coarse.of(join_drives(drives_of_table(table, {})))
-        search = Search.over(coarse, usable_columns(coarse.timeline)[0], np.random.SeedSequence(1), ERROR_BUDGET)
+        search = Search.over(coarse, usable_columns(coarse.timeline).columns, np.random.SeedSequence(1), ERROR_BUDGET)
         for floor in FLOORS:
             regression.FLOOR = floor
             p_value = best_probability(search, MeanTerm, fit_model(coarse, ()))

@@ -40,7 +40,7 @@ def probabilities(movement: str, seed: int, seconds: float, smoothed: bool) -> d
     coarse = coarse_of(smoothed_tracks(table) if smoothed else table)
     found: dict[str, float] = {}
     with threadpool_limits(1, user_api="blas"):
-        columns, _, _ = usable_columns(coarse.timeline)
+        columns = usable_columns(coarse.timeline).columns
         search = Search.over(coarse, columns, np.random.SeedSequence(1), ERROR_BUDGET)
         fitted = fit_model(coarse, ())
         for kind in {kind.component: kind for stage in STAGES for kind in stage}.values():

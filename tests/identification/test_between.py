@@ -57,7 +57,7 @@ def wander(rng: np.random.Generator, n: int, time_constant: float) -> np.ndarray
 
 def outcome_of(made: list[Drive], seed: int = 2) -> tuple[Coarse, Outcome | None]:
     coarse = Coarse.of(join_drives(made))
-    search = Search.over(coarse, usable_columns(coarse.timeline)[0], np.random.SeedSequence(seed), ERROR_BUDGET)
+    search = Search.over(coarse, usable_columns(coarse.timeline).columns, np.random.SeedSequence(seed), ERROR_BUDGET)
     return coarse, BetweenTerm.test(search, fit_model(coarse, ()))
 
 
