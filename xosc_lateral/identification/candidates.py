@@ -55,6 +55,9 @@ SCALES = (0.25, 0.5, 0.75)
 FINE_SCALES = (0.35, 0.5, 0.7, 1.0, 1.4, 2.0)
 """Scales that refinement tries, alone and in products, as shares of the median distance. [-]"""
 
+NEAR = 2.0 / 3.0
+"""A distance comes near: its 5 % quantile is below this share of its median. [-]"""
+
 PHASES = np.pi * np.arange(4) / 4.0
 """Directions that an angle is projected on: at most 8 % of a score is lost between two of them. [rad]"""
 
@@ -263,10 +266,15 @@ def _quantiles(seen: FloatArray, shares: Sequence[float]) -> FloatArray:
 
 
 def _scale(values: FloatArray, share: float) -> float:
-    """Quantile of the size of what is there and not zero: overlapping vehicles have distance 0 and tell no scale."""
+    """Quantile of the size of what is there and not zero: overlapping vehicles have distance 0 and tell no scale.
+
+    0 for what never comes near, as a leader's speed: nearness to it is whether there is a leader, and no more.
+    """
     size = np.abs(values[np.isfinite(values)])
     size = size[size > 0.0]
-    return float(np.quantile(size, share)) if len(size) else 0.0
+    if not len(size) or float(np.quantile(size, 0.05)) > NEAR * float(np.median(size)):
+        return 0.0
+    return float(np.quantile(size, share))
 
 
 def _varies(values: FloatArray) -> bool:

@@ -287,7 +287,7 @@ def _contenders(dictionary: Dictionary, scores: Scores) -> list[int]:
 
     A product of a column and what is nearly constant wherever it acts is that column: refined, the cheaper one wins.
     """
-    order = np.argsort(-scores.scores)
+    order = np.argsort(-scores.scores, kind="stable")
     best: dict[tuple[str, ...], int] = {}
     for index in order:
         if scores.scores[index] < scores.scores[scores.best] - WITHIN or len(best) == CONTENDERS:
