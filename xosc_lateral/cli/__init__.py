@@ -36,7 +36,6 @@ VERBS = (
     "sample",
     "evaluate",
     "close_loop",
-    "benchmark",
     "profiles",
     "template",
 )
