@@ -24,7 +24,7 @@ from xosc_lateral.identification.column_search import best_probability
 from xosc_lateral.identification.identify import usable_columns
 from xosc_lateral.identification.regression import Coarse, fit_model
 from xosc_lateral.identification.search import Search
-from xosc_lateral.identification.stages import ERROR_BUDGET
+from xosc_lateral.identification.selection import ERROR_BUDGET
 from xosc_lateral.identification.terms.mean import MeanTerm
 from xosc_lateral.identification.timeline import join_drives
 from xosc_lateral.normal import NORMAL_95

@@ -22,7 +22,7 @@ from xosc_lateral.identification.identify import usable_columns
 from xosc_lateral.identification.innovations import LONGEST
 from xosc_lateral.identification.regression import Coarse, fit_model
 from xosc_lateral.identification.search import Search
-from xosc_lateral.identification.stages import ERROR_BUDGET
+from xosc_lateral.identification.selection import ERROR_BUDGET
 from xosc_lateral.identification.terms.spread import SpreadTerm
 from xosc_lateral.identification.timeline import join_drives
 

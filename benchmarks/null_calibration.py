@@ -24,7 +24,7 @@ from xosc_lateral.identification import dictionary
 from xosc_lateral.identification.identify import usable_columns
 from xosc_lateral.identification.regression import fit_model
 from xosc_lateral.identification.search import Search
-from xosc_lateral.identification.stages import ERROR_BUDGET, STAGES
+from xosc_lateral.identification.selection import ERROR_BUDGET, STAGES
 
 FIRST_SEED = 310_000
 """Of drives that serve for nothing else; those from 300,000 on were what the null was mended with."""

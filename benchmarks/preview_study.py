@@ -1,4 +1,6 @@
-"""What the loop names on drives of `preview_driver`: `python -m benchmarks.preview_study validation [KIND ...]`.
+"""What the loop names on drives of `simulated.preview_driver`.
+
+`python -m benchmarks.preview_study design|validation|test [KIND ...]`
 
 One line per drive: what was found, whether it is what was planted, columns that were dismissed, and for a spread that
 changes with time the ratio of the loudest sixth of the drive to the quietest, measured and sampled.
@@ -10,7 +12,7 @@ import sys
 
 import numpy as np
 
-from benchmarks import preview_driver
+from benchmarks.simulated import preview_driver
 from xosc_lateral.formats.drives import drives_of_table
 from xosc_lateral.identification.close import LoopResult, close_loop
 
@@ -41,7 +43,9 @@ def spread_ratio(result: LoopResult) -> tuple[float, float]:
 
 def main(which: str, names: list[str]) -> None:
     """Print a line per drive, then the sums."""
-    seeds = {"design": preview_driver.DESIGN, "validation": preview_driver.VALIDATION, "test": preview_driver.TEST}[which]
+    seeds = {"design": preview_driver.DESIGN, "validation": preview_driver.VALIDATION, "test": preview_driver.TEST}[
+        which
+    ]
     hits = wrongs = 0
     for kind in names or list(seeds):
         drive = preview_driver.simulate(kind, seeds[kind])

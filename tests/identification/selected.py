@@ -10,8 +10,7 @@ from xosc_lateral.drives.drive import Drive
 from xosc_lateral.identification.identify import usable_columns
 from xosc_lateral.identification.regression import Coarse
 from xosc_lateral.identification.search import Search
-from xosc_lateral.identification.selection import Selection, select
-from xosc_lateral.identification.stages import ERROR_BUDGET
+from xosc_lateral.identification.selection import ERROR_BUDGET, Selection, select
 from xosc_lateral.identification.timeline import join_drives
 
 

@@ -14,8 +14,7 @@ from xosc_lateral.identification.column_search import find_column, likely_respon
 from xosc_lateral.identification.columns import Column, Values
 from xosc_lateral.identification.regression import Coarse, fit_model
 from xosc_lateral.identification.search import Search
-from xosc_lateral.identification.selection import select
-from xosc_lateral.identification.stages import ERROR_BUDGET
+from xosc_lateral.identification.selection import ERROR_BUDGET, select
 from xosc_lateral.identification.terms.base import Outcome
 from xosc_lateral.identification.terms.mean import MeanTerm
 from xosc_lateral.identification.terms.restoring import RestoringTerm

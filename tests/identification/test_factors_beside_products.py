@@ -10,7 +10,7 @@ from xosc_lateral.identification.column_search import best_probability, probabil
 from xosc_lateral.identification.identify import usable_columns
 from xosc_lateral.identification.regression import fit_model
 from xosc_lateral.identification.search import Search
-from xosc_lateral.identification.stages import ERROR_BUDGET
+from xosc_lateral.identification.selection import ERROR_BUDGET
 from xosc_lateral.identification.terms.mean import MeanTerm
 
 PRODUCT = MeanTerm.of(

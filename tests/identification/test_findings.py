@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 
 from xosc_lateral.driver.effects import Step
+from xosc_lateral.identification.core_model import TIMES_S, DriverVariance, SpectrumShape
 from xosc_lateral.identification.findings import describe_finding, population_finding, spectrum_finding
-from xosc_lateral.identification.population import DriverVariance
 from xosc_lateral.identification.selection import Accepted
-from xosc_lateral.identification.spectrum_shape import TIMES_S, SpectrumShape
 from xosc_lateral.identification.terms.time import StepTerm
 
 REAL = {"mean by effect: step 0": np.array([0.1, -0.1]), "movement by band": np.array([0.2, 0.1, np.nan])}

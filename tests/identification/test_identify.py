@@ -17,9 +17,8 @@ from xosc_lateral.identification.identify import CLOCK, UNSURE, _of_some_size, i
 from xosc_lateral.identification.regression import Coarse, fit_model
 from xosc_lateral.identification.selection import Accepted, Selection
 from xosc_lateral.identification.terms.between import BetweenTerm
-from xosc_lateral.identification.terms.fine_noise import FineNoiseTerm
 from xosc_lateral.identification.terms.mean import MeanTerm
-from xosc_lateral.identification.terms.spread import SpreadTerm
+from xosc_lateral.identification.terms.spread import FineNoiseTerm, SpreadTerm
 from xosc_lateral.identification.terms.time import TimeMeanTerm, TimeSpreadTerm
 from xosc_lateral.identification.timeline import Timeline, join_drives
 

@@ -9,7 +9,7 @@ import numpy as np
 from tests.identification.made_coarse import coarse_of, movement, wander
 from xosc_lateral.identification.columns import Column, Values
 from xosc_lateral.identification.search import Recent, Search
-from xosc_lateral.identification.stages import ERROR_BUDGET
+from xosc_lateral.identification.selection import ERROR_BUDGET
 
 
 def test_the_last_few_are_kept() -> None:

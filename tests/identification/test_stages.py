@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from xosc_lateral.identification.stages import ERROR_BUDGET, STAGES, TERMS
+from xosc_lateral.identification.selection import ERROR_BUDGET, STAGES, TERMS
 from xosc_lateral.identification.terms.cycle import CycleTerm
 from xosc_lateral.identification.terms.mean import MeanTerm
 from xosc_lateral.identification.terms.regimes import RegimesTerm

@@ -38,9 +38,9 @@ from xosc_lateral.formats.drives import read_drives
 from xosc_lateral.identification.close import LoopResult, close_loop
 from xosc_lateral.identification.findings import Finding
 from xosc_lateral.identification.lack_of_fit import LackOfFit, lack_of_fit_of
-from xosc_lateral.identification.moving_statistics import by_drive, moving_spread
-from xosc_lateral.identification.partial import curve_of
 from xosc_lateral.report.loop import finding_sentence, loop_page, loop_text
+from xosc_lateral.report.loop_courses import by_drive, moving_spread
+from xosc_lateral.report.loop_curves import curve_of
 from xosc_lateral.report.loop_figures import DRIVES, draw_spectra, effect_figure, residual_figure
 from xosc_lateral.report.loop_hidden_figures import DRAWINGS
 from xosc_lateral.report.loop_json import finding_record, loop_json
@@ -167,7 +167,11 @@ def test_an_error_clearly_above_the_floor_is_called_unexplained(
 ) -> None:
     # the base in the place of the refined profile: the effect is in the drives, and nobody has explained it
     worse = replace(
-        result, findings=(), after=result.scored.before, error_after=3.0 * result.floor, runs_after=result.scored.runs_before
+        result,
+        findings=(),
+        after=result.scored.before,
+        error_after=3.0 * result.floor,
+        runs_after=result.scored.runs_before,
     )
     left = lack_of_fit_of(worse)
     assert left.clear

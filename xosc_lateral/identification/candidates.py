@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.driver.effects import (
+    EFFECTS,
     Acts,
     Angular,
     ColumnEffect,
@@ -34,9 +35,10 @@ from xosc_lateral.driver.effects import (
     Proximity,
     Saturating,
     Threshold,
+    known_effects,
 )
 from xosc_lateral.identification.columns import Column, Values
-from xosc_lateral.identification.offered import offered_effects
+from xosc_lateral.identification.roles import Role
 
 FloatArray = NDArray[np.float64]
 
@@ -103,15 +105,16 @@ class Candidate:
 def candidates_of(columns: Sequence[Column], context: Mapping[str, FloatArray], *, most: int) -> list[Candidate]:
     """All candidates; `context` holds the road-following rows alone.
 
-    Beyond `most` columns, products are those of levels and switches with all others.
+    Beyond `most` columns, products are of those whose role is known before any others.
     """
     plain = [shape for column in columns for shape in _plain(column, context[column.name])]
     bent = [shape for column in columns for shape in _bent(column, context[column.name])]
+    known_first = sorted(columns, key=lambda column: column.role is Role.UNKNOWN)[:most]
+    paired = [column for column in columns if column in known_first]
     factors = {column.name: _factors(column, context[column.name]) for column in columns}
     pairs: list[tuple[ColumnEffect, tuple[float, ...]]] = [
         (Product(acts=Acts.LOCATION, factors=pair), (1.0,))
-        for first, second in combinations(columns, 2)
-        if len(columns) <= most or {first.values, second.values} & {Values.LEVELS, Values.SWITCH}
+        for first, second in combinations(paired, 2)
         for pair in _pairs(first, second, factors)
     ]
     families = {Family.PLAIN: plain, Family.BENT: bent, Family.PRODUCT: pairs}
@@ -280,3 +283,9 @@ def _scale(values: FloatArray, share: float) -> float:
 def _varies(values: FloatArray) -> bool:
     seen = values[np.isfinite(values)]
     return len(seen) > 1 and bool(np.ptp(seen) > 0.0)
+
+
+def offered_effects(column: str, values: NDArray[np.float64]) -> list[ColumnEffect]:
+    """What installed plug-ins propose for a column with these values, shape (n,), without coefficients."""
+    kinds = [kind for kind in known_effects() if kind not in EFFECTS and issubclass(kind, ColumnEffect)]
+    return [effect for kind in kinds for effect in kind.proposals(column, values)]

@@ -14,18 +14,22 @@ from xosc_lateral.driver.models.kinds import ModelKind
 from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.driver.provenance import Provenance
 from xosc_lateral.drives.drive import Drive
-from xosc_lateral.identification.blocks import held_out_words, hold_out_blocks
+from xosc_lateral.identification.core_model import (
+    DriverVariance,
+    SpectrumShape,
+    compare_spectrum_shapes,
+    test_population,
+)
 from xosc_lateral.identification.findings import Finding, describe_finding, population_finding, spectrum_finding
 from xosc_lateral.identification.held_out import HeldOut, Setting, fit_without, score_held_out
+from xosc_lateral.identification.held_out_gain import held_out_words, hold_out_blocks
 from xosc_lateral.identification.identify import Identified, Progress, identify, initial_terms
-from xosc_lateral.identification.population import DriverVariance, test_population
 from xosc_lateral.identification.regression import Coarse, Fitted, fit_model
 from xosc_lateral.identification.removal import Estimates, estimate_all, removal_of
 from xosc_lateral.identification.residual import floor_of, size_of, split_differences
 from xosc_lateral.identification.scorecard import Scorecard, score_runs
-from xosc_lateral.identification.seeds import LoopSeed
 from xosc_lateral.identification.selection import Accepted, Selection
-from xosc_lateral.identification.spectrum_shape import SpectrumShape, compare_spectrum_shapes
+from xosc_lateral.identification.significance import LoopSeed
 from xosc_lateral.identification.terms.base import Term
 from xosc_lateral.identification.terms.between import between_shift
 from xosc_lateral.identification.timeline import join_drives

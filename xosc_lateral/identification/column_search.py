@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.driver.effects import ColumnEffect
-from xosc_lateral.identification.alternatives import Alternatives
 from xosc_lateral.identification.dictionary import (
     CROSS_BASIS,
     NULL_DRAWS,
@@ -21,11 +20,10 @@ from xosc_lateral.identification.dictionary import (
     score_entries,
 )
 from xosc_lateral.identification.problem import Problem
-from xosc_lateral.identification.refinement import Refined, Refinement
+from xosc_lateral.identification.refinement import Alternatives, Refined, Refinement
 from xosc_lateral.identification.regression import Fitted, ModelTerm, fit_model
 from xosc_lateral.identification.search import Likeliest, Search
-from xosc_lateral.identification.seeds import LoopSeed
-from xosc_lateral.identification.significance import upper_tail
+from xosc_lateral.identification.significance import LoopSeed, upper_tail
 from xosc_lateral.identification.terms.base import Outcome, Term
 
 FloatArray = NDArray[np.float64]

@@ -8,6 +8,7 @@ from enum import Enum
 import numpy as np
 from numpy.typing import NDArray
 
+from xosc_lateral.identification.roles import Role
 from xosc_lateral.identification.timeline import Timeline
 
 FloatArray = NDArray[np.float64]
@@ -44,6 +45,8 @@ class Column:
         Values, for a switch or levels; those that are rare left out.
     period : float
         Full circle of an angle, else 0.
+    role : Role
+        What it is.
     """
 
     name: str
@@ -51,6 +54,7 @@ class Column:
     gaps: bool
     levels: tuple[float, ...] = ()
     period: float = 0.0
+    role: Role = Role.UNKNOWN
 
 
 def known_columns(timeline: Timeline) -> tuple[list[Column], dict[str, str]]:

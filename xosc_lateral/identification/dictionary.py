@@ -280,8 +280,8 @@ def _beside_loud_stretches(
     """
     order = np.argsort(-scores)[:ROBUST]
     order = order[np.isfinite(scores[order])]
-    rows = dictionary.rows[order]
-    rows = rows - (rows @ basis) @ basis.T
+    rows = dictionary.rows[order].astype(np.float64)
+    rows -= (rows @ basis) @ basis.T
     power = np.maximum(np.square(rows).sum(axis=1), TINY)
     size = rows @ left / power
     scatter = np.maximum(np.square(rows * (left - size[:, None] * rows)).sum(axis=1) / power, 1.0)

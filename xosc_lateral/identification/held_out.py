@@ -16,8 +16,8 @@ from xosc_lateral.driver.models.kinds import ModelKind
 from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.driver.provenance import Provenance
 from xosc_lateral.errors import NotEnoughDataError
-from xosc_lateral.identification.blocks import folds_of
 from xosc_lateral.identification.columns import Column
+from xosc_lateral.identification.held_out_gain import folds_of
 from xosc_lateral.identification.nested import Nested
 from xosc_lateral.identification.regression import Coarse, Fitted, fit_model
 from xosc_lateral.identification.removal import Estimates, bare_runs, estimate_all, removal_of
@@ -28,8 +28,8 @@ from xosc_lateral.identification.residual import (
     simulated_runs,
     statistics_of,
 )
-from xosc_lateral.identification.seeds import LoopSeed
 from xosc_lateral.identification.selection import Selection
+from xosc_lateral.identification.significance import LoopSeed
 from xosc_lateral.identification.terms.base import Term
 from xosc_lateral.identification.terms.cycle import CycleTerm
 from xosc_lateral.identification.terms.time import StepTerm

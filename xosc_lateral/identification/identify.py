@@ -12,16 +12,14 @@ from msgspec import structs
 
 from xosc_lateral.driver.effects import Acts, ColumnEffect, Drift, TimeSmooth, VarianceTrend
 from xosc_lateral.driver.profile import DriverProfile
-from xosc_lateral.identification.blocks import hold_out_blocks
 from xosc_lateral.identification.columns import Column, known_columns
 from xosc_lateral.identification.feedback import Feedback, find_feedback
-from xosc_lateral.identification.held_out_gain import Gain
+from xosc_lateral.identification.held_out_gain import Gain, hold_out_blocks
 from xosc_lateral.identification.nested import Nested, nest
 from xosc_lateral.identification.regression import Coarse
 from xosc_lateral.identification.roles import Assigned, Role, roles_of
 from xosc_lateral.identification.search import Search
-from xosc_lateral.identification.selection import Rejected, Selection, select
-from xosc_lateral.identification.stages import ERROR_BUDGET
+from xosc_lateral.identification.selection import ERROR_BUDGET, Rejected, Selection, select
 from xosc_lateral.identification.terms.base import Term
 from xosc_lateral.identification.terms.between import BetweenTerm, is_between
 from xosc_lateral.identification.terms.mean import MeanTerm
@@ -160,7 +158,7 @@ def usable_columns(
     unused |= dict.fromkeys(excluded, "left out on request")
     clocks = (column.name for column in columns if assigned[column.name].role is Role.TIME)
     unused |= {name: CLOCK for name in clocks if name not in unused}
-    columns = [column for column in columns if column.name not in unused]
+    columns = [replace(one, role=assigned[one.name].role) for one in columns if one.name not in unused]
     feedback = find_feedback(timeline, columns, assigned)
     follow = {one.column for one in feedback}
     return Usable([column for column in columns if column.name not in follow], feedback, unused, assigned)

@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.identification.blocks import hold_out_blocks
 from xosc_lateral.identification.close import LoopResult
+from xosc_lateral.identification.held_out_gain import hold_out_blocks
 from xosc_lateral.identification.residual import size_of, split_differences
-from xosc_lateral.identification.seeds import LoopSeed
+from xosc_lateral.identification.significance import LoopSeed
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]

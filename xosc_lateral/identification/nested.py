@@ -15,8 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.identification.blocks import folds_of
-from xosc_lateral.identification.held_out_gain import Gain, held_out_gain
+from xosc_lateral.identification.held_out_gain import Gain, folds_of, held_out_gain
 from xosc_lateral.identification.regression import Coarse, fit_model
 from xosc_lateral.identification.search import Search
 from xosc_lateral.identification.selection import Selection, select

@@ -5,12 +5,35 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from xosc_lateral.identification.alternatives import Alternatives
+from xosc_lateral.discovery import defined_in
+from xosc_lateral.identification import terms
 from xosc_lateral.identification.held_out_gain import Gain
+from xosc_lateral.identification.refinement import Alternatives
 from xosc_lateral.identification.regression import Fitted, fit_model
 from xosc_lateral.identification.search import Search
-from xosc_lateral.identification.stages import STAGES
-from xosc_lateral.identification.terms.base import Outcome, Term
+from xosc_lateral.identification.significance import Budget
+from xosc_lateral.identification.terms.base import Outcome, Stage, Term
+
+TERMS: tuple[type[Term], ...] = defined_in(terms.__name__, Term)  # type: ignore[type-abstract]
+"""Every term that a file of `terms` defines, by the file's name."""
+
+
+def in_stages(kinds: tuple[type[Term], ...]) -> tuple[tuple[type[Term], ...], ...]:
+    """What is looked for at each stage, in the order in which it is asked."""
+    asked = sorted(kinds, key=lambda kind: kind.place)
+    return tuple(tuple(kind for kind in asked if stage in kind.stages) for stage in Stage)
+
+
+def shared_among(kinds: tuple[type[Term], ...]) -> Budget:
+    """The error budget by the terms' own weights; those of one component compete, and share one part of it."""
+    return Budget({kind.component: kind.weight for kind in kinds})
+
+
+STAGES = in_stages(TERMS)
+"""Of a stage, what has the smallest p-value is added first."""
+
+ERROR_BUDGET = shared_among(TERMS)
+"""Of all terms that are looked for."""
 
 MAX_TERMS = 8
 """More terms than this in one table are not looked for."""

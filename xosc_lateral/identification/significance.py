@@ -4,11 +4,34 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from enum import IntEnum
 
 import numpy as np
 from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]
+
+
+class LoopSeed(IntEnum):
+    """Key of a source of chance."""
+
+    COLUMNS = 0
+    """Rotations that candidates of a column are compared with."""
+    REGIMES = 3
+    """Simulated loudness that regimes are compared with."""
+    LOW_FREQUENCY = 4
+    """Simulated rows and drawn signs that drifts and steps are compared with."""
+    BETWEEN = 5
+    """Places dealt anew to drives."""
+    FOLDS = 5
+    """Runs before and after on held-out folds. The key of `BETWEEN`, too: that draws nothing but an order of drives."""
+    SPECTRUM = 7
+    """Runs whose spectrum is compared with the drives'."""
+    BLOCKS = 9
+    """Blocks drawn for the floor, and for the error before and after."""
+    LACK_OF_FIT = 11
+    """Halves of blocks that tell the floor."""
+
 
 LEAST = 1e-300
 """p-values stay above: their logarithm is taken. [-]"""

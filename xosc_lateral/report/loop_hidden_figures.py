@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from xosc_lateral.driver.effects import Cycle, Regimes, Step, TimeSmooth
 from xosc_lateral.identification.close import LoopResult
 from xosc_lateral.identification.findings import Finding
-from xosc_lateral.identification.moving_statistics import (
+from xosc_lateral.report.figures import MUTED, ORANGE, figure_style, new_figure
+from xosc_lateral.report.loop_courses import (
     MovingStatistic,
     by_drive,
     hidden_mean,
@@ -20,7 +21,6 @@ from xosc_lateral.identification.moving_statistics import (
     moving_spread,
     regime_probability,
 )
-from xosc_lateral.report.figures import MUTED, ORANGE, figure_style, new_figure
 from xosc_lateral.report.loop_figures import AFTER, BEFORE, DRIVES, TWO_ERRORS, draw_spectra
 from xosc_lateral.report.loop_words import SPREAD
 

@@ -12,7 +12,7 @@ from tests.identification.made_coarse import coarse_of, movement
 from xosc_lateral.driver.effects import Step, TimeSmooth
 from xosc_lateral.identification.regression import Coarse, Fitted, fit_model
 from xosc_lateral.identification.search import Search
-from xosc_lateral.identification.stages import ERROR_BUDGET
+from xosc_lateral.identification.selection import ERROR_BUDGET
 from xosc_lateral.identification.terms.base import Removal
 from xosc_lateral.identification.terms.time import (
     SHORTEST_S,

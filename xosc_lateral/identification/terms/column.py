@@ -11,12 +11,12 @@ from msgspec import structs
 from numpy.typing import NDArray
 
 from xosc_lateral.driver.effects import Acts, ColumnEffect, Effect
-from xosc_lateral.identification.alternatives import Alternatives
 from xosc_lateral.identification.column_search import find_column, probability_of
 from xosc_lateral.identification.problem import Problem
-from xosc_lateral.identification.ranges import span
+from xosc_lateral.identification.refinement import Alternatives
 from xosc_lateral.identification.regression import Coarse, Fitted
 from xosc_lateral.identification.terms.base import Description, Outcome, Removal, Term
+from xosc_lateral.identification.timing import span
 
 if TYPE_CHECKING:
     from xosc_lateral.identification.search import Search

@@ -22,11 +22,10 @@ from numpy.typing import NDArray
 
 from xosc_lateral.driver.effects import Effect, Regimes
 from xosc_lateral.identification.dictionary import in_another_order
-from xosc_lateral.identification.log_scale import squared_innovations
+from xosc_lateral.identification.innovations import squared_innovations
 from xosc_lateral.identification.markov_switching import RegimeFit, fit_regimes
 from xosc_lateral.identification.regression import Coarse, Fitted
-from xosc_lateral.identification.seeds import LoopSeed
-from xosc_lateral.identification.significance import HEAVY_TAIL_SHARE, upper_tail
+from xosc_lateral.identification.significance import HEAVY_TAIL_SHARE, LoopSeed, upper_tail
 from xosc_lateral.identification.squares import SLOW_S, fine_squares, log_sizes, slow_squares
 from xosc_lateral.identification.terms.base import Description, Outcome, Removal, Stage, Term
 from xosc_lateral.identification.terms.spread import known_log_scale, what_a_column_may_do, what_columns_do

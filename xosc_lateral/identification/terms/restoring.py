@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 
 from xosc_lateral.driver.effects import Acts, Effect
 from xosc_lateral.identification.problem import Problem, of_products
-from xosc_lateral.identification.ranges import driving_range
 from xosc_lateral.identification.regression import Fitted
 from xosc_lateral.identification.terms.base import Stage
 from xosc_lateral.identification.terms.column import ColumnTerm, columns_acting, responses
+from xosc_lateral.identification.timing import driving_range
 
 FloatArray = NDArray[np.float64]
 

@@ -24,11 +24,9 @@ from xosc_lateral.driver.effects import Effect, Step, TimeSmooth
 from xosc_lateral.driver.effects.time_smooth import half_cosines
 from xosc_lateral.identification.autocorrelation import Whitener, fit_autoregression
 from xosc_lateral.identification.dictionary import orthonormal
-from xosc_lateral.identification.innovations import LONGEST, ORDER
-from xosc_lateral.identification.log_scale import squared_innovations
+from xosc_lateral.identification.innovations import LONGEST, ORDER, squared_innovations
 from xosc_lateral.identification.regression import MIN_DRIFT_S, Coarse, Fitted
-from xosc_lateral.identification.seeds import LoopSeed
-from xosc_lateral.identification.significance import LEAST, as_one_degree, upper_tail
+from xosc_lateral.identification.significance import LEAST, LoopSeed, as_one_degree, upper_tail
 from xosc_lateral.identification.squares import SLOW_S, fine_squares, log_sizes, slow_squares
 from xosc_lateral.identification.terms.base import Description, Outcome, Removal, Stage, Term, centred
 from xosc_lateral.identification.terms.cycle import latent_path
