@@ -9,6 +9,7 @@ from msgspec.structs import replace
 from tests.driver.models.made_models import STEADY
 from tests.identification.made_coarse import movement, timeline_of
 from xosc_lateral.driver.profile import DriverProfile
+from xosc_lateral.identification import core_model
 from xosc_lateral.identification.core_model import BLOCK, TIMES_S, WORTH_ADDING, SpectrumShape, _shapes
 from xosc_lateral.identification.timeline import Timeline
 
@@ -89,8 +90,6 @@ def test_a_difference_is_sure_and_large_enough_or_none(p_value: float, ratio: fl
 
 def test_the_same_seed_says_the_same(profile: DriverProfile) -> None:
     timeline = driven(STEADY, 26)
-    one, other = (
-        core_model.compare_spectrum_shapes(profile, timeline, np.random.SeedSequence(7)) for _ in range(2)
-    )
+    one, other = (core_model.compare_spectrum_shapes(profile, timeline, np.random.SeedSequence(7)) for _ in range(2))
     assert one.p_value == other.p_value
     np.testing.assert_array_equal(one.ratio, other.ratio)

@@ -18,8 +18,8 @@ References
 ----------
 .. [1] C. W. J. Granger, "Investigating causal relations by econometric models and cross-spectral methods",
    Econometrica 37, 1969.
-.. [2] L. Breiman, J. Friedman, "Estimating optimal transformations for multiple regression and correlation", J. American
-   Statistical Association 80, 1985: the conditional mean is the function that is most correlated.
+.. [2] L. Breiman, J. Friedman, "Estimating optimal transformations for multiple regression and correlation", J.
+   American Statistical Association 80, 1985: the conditional mean is the function that is most correlated.
 """
 
 from __future__ import annotations

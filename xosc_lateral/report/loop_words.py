@@ -183,11 +183,8 @@ def outcome(result: LoopResult) -> str:
         words.append("No significant effect was found, and none was added.")
     if back:
         names = "; ".join(f"{taken_back_words(item)}: {item.why}" for item in back)
-        several = len(back) > 1
-        words.append(
-            f"{len(back)} {'more ' * bool(found)}effect{'s' * several} {'were' if several else 'was'} found and taken back "
-            f"({names})."
-        )
+        number = f"{len(back)} {'more ' * bool(found)}" + ("effects were" if len(back) > 1 else "effect was")
+        words.append(f"{number} found and taken back ({names}).")
         words += [] if found else ["Nothing was added: the base profile is returned."]
     return " ".join(words)
 

@@ -49,7 +49,7 @@ SPREAD_ORDERS = (1, 2, 4)
 """Half cosines tried for the spread: its square scatters more than an offset does."""
 
 EDGE_S, STEP_GRID_S, STEP_SHORTEST_S = 60, 15, 12.0
-"""Least time on either side of a step, between the moments that are tried, and least period that a step is seen at. [s]"""
+"""Least time on either side of a step, between the moments that are tried, and least period that tells a step. [s]"""
 
 STEP_DRAWS = 2000
 """Draws of white rows that the best step is compared with."""
@@ -375,12 +375,10 @@ def explained(rows: FloatArray, columns: FloatArray, slow: int) -> FloatArray:
     """Chi-square of each column alone, shape (k,), where `slow` first frequencies count by what is left there."""
     size = (columns.T @ rows) / np.maximum(np.square(columns).sum(axis=0), 1e-12)
     left = np.square(rows[:, None] - columns * size)
-    level = np.maximum(left[:slow].mean(axis=0), left[slow:].mean(axis=0)), left[slow:].mean(axis=0)
-    moment = sum((columns[part].T @ rows[part]) / one for part, one in zip((slice(slow), slice(slow, None)), level))
-    power = sum(
-        np.square(columns[part]).sum(axis=0) / one for part, one in zip((slice(slow), slice(slow, None)), level)
-    )
-    return np.asarray(np.square(moment) / np.maximum(power, 1e-12))
+    quick = left[slow:].mean(axis=0)
+    level = np.where(np.arange(len(rows))[:, None] < slow, np.maximum(left[:slow].mean(axis=0), quick), quick)
+    moment = (columns * rows[:, None] / level).sum(axis=0)
+    return np.asarray(np.square(moment) / np.maximum((np.square(columns) / level).sum(axis=0), 1e-12))
 
 
 def explained_jointly(rows: FloatArray, columns: FloatArray, slow: int) -> float:
