@@ -26,7 +26,9 @@ def in_stages(kinds: tuple[type[Term], ...]) -> tuple[tuple[type[Term], ...], ..
 
 def shared_among(kinds: tuple[type[Term], ...]) -> Budget:
     """The error budget by the terms' own weights; those of one component compete, and share one part of it."""
-    return Budget({kind.component: kind.weight for kind in kinds})
+    return Budget(
+        {kind.component: kind.weight for kind in kinds}, {kind.component: kind.least_drives for kind in kinds}
+    )
 
 
 STAGES = in_stages(TERMS)

@@ -65,9 +65,12 @@ class Budget:
     weights : mapping of str to float
         Of each component. As shipped: as much for the mean within drives as between them; a quarter for what changes
         the movement's size or its strength; the rest for hidden effects, which are few to choose among. [-]
+    least_drives : mapping of str to int
+        Drives from which a component is asked at all, where that is more than one.
     """
 
     weights: Mapping[str, float]
+    least_drives: Mapping[str, int]
 
     def level_of(self, component: str, drives: int) -> float:
         """Family-wise level that a component may spend.
@@ -79,7 +82,7 @@ class Budget:
             In the table. Where nothing can be asked between them, that share is not spent: a table on which something
             acts is searched again beside it, at the same levels.
         """
-        if drives < MANY_DRIVES and component == "between":
+        if drives < self.least_drives.get(component, 1):
             return 0.0
         return BUDGET * self.weights[component] / sum(self.weights.values())
 

@@ -126,6 +126,8 @@ class Term(ABC):
     """Among those of a stage: smaller ones are asked first, and first where two are equally sure; then by name. [-]"""
     weight: ClassVar[float]
     """Of its component in the error budget; one for each kind of hidden effect. [-]"""
+    least_drives: ClassVar[int] = 1
+    """In a table that it is looked for in."""
     seen_held_out: ClassVar[bool] = True
     """Whether the mean or the innovations' scale follow terms of this class on held-out rows: not the latent path of a
     cycle, nor what changes the slow movement alone."""

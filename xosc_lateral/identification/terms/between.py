@@ -17,7 +17,6 @@ from msgspec import structs
 from numpy.typing import NDArray
 
 from xosc_lateral.driver.effects import Acts, ColumnEffect, Effect, Linear
-from xosc_lateral.identification.problem import Problem
 from xosc_lateral.identification.regression import Fitted
 from xosc_lateral.identification.significance import MANY_DRIVES, LoopSeed
 from xosc_lateral.identification.terms.base import Description, Outcome, Stage
@@ -40,6 +39,10 @@ USUAL_S = 60.0
 MIN_SECONDS = 10
 """Of road-following in a drive that is counted. [s]"""
 
+ROUNDS, SETTLED = 50, 1e-9
+"""Rounds of Newton's method at most, and the share of the variance that the last one may change it by: the sum of
+squares falls and is convex in the variance, so that rounds from zero approach the root from below."""
+
 MIN_SUPPORT = 8.0
 """A quantity that rests on fewer drives than this is not looked at."""
 
@@ -52,15 +55,11 @@ class BetweenTerm(ColumnTerm):
     kind: ClassVar[str] = "location"
     stages: ClassVar[tuple[Stage, ...]] = (Stage.BETWEEN_DRIVES,)
     weight: ClassVar[float] = 5.0
+    least_drives: ClassVar[int] = MANY_DRIVES
     seen_held_out: ClassVar[bool] = False
     acts: ClassVar[Acts] = Acts.LOCATION
     what: ClassVar[str] = "place that a drive keeps"
     group: ClassVar[str] = "mean"
-
-    @classmethod
-    def problem(cls, fitted: Fitted) -> Problem:
-        """Levels of drives are no rows of the grid; see `test`."""
-        raise NotImplementedError
 
     @classmethod
     def test(cls, search: Search, fitted: Fitted) -> Outcome | None:
@@ -146,7 +145,13 @@ class _Places:
 
     @classmethod
     def of(cls, fitted: Fitted) -> _Places:
-        """Weights at which the weighed squares add up to their degrees of freedom (DerSimonian and Laird)."""
+        """Weights at which the weighed squares add up to their degrees of freedom [1]_, by Newton's method.
+
+        References
+        ----------
+        .. [1] R. Paule, J. Mandel, "Consensus values and weighting factors", J. Research of the National Bureau of
+               Standards 87, 1982.
+        """
         coarse, groups = fitted.coarse, fitted.coarse.drives
         seconds = np.bincount(coarse.drive, coarse.valid.astype(float), minlength=groups)
         power = fitted.whitener.power
@@ -155,12 +160,15 @@ class _Places:
         usual = [coarse.by_drive(coarse.response(term.effect)[:, 0]) for term in of_kind(fitted, BetweenTerm)]
         known = np.column_stack([np.ones(groups), *usual])
         scatter = 0.0
-        for _ in range(20):
+        for _ in range(ROUNDS):
             places = cls(fitted.levels, np.where(counted, 1.0 / (scatter + noise), 0.0), known)
-            left = places.left(fitted.levels)
-            excess = float(left @ left) / max(int(counted.sum()) - known.shape[1], 1) - 1.0
-            typical = float(places.weight[counted].mean()) if counted.any() else 1.0
-            scatter = max(scatter + excess / max(typical, 1e-30), 0.0)
+            squares = np.square(places.left(fitted.levels))
+            excess = float(squares.sum()) - max(int(counted.sum()) - known.shape[1], 1)
+            change = excess / max(float(squares @ places.weight), 1e-300)
+            settled = abs(change) <= SETTLED * scatter or (change < 0.0 and scatter == 0.0)
+            scatter = max(scatter + change, 0.0)
+            if settled:
+                break
         return places
 
     def left(self, values: FloatArray) -> FloatArray:

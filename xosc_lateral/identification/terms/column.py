@@ -59,30 +59,6 @@ class ColumnTerm(Term):
         """A term of an effect that may act on something else."""
         return cls(structs.replace(effect, acts=cls.acts), alike)
 
-    @classmethod
-    @abstractmethod
-    def problem(cls, fitted: Fitted) -> Problem:
-        """Regression in which a column of this kind is looked for, with the terms fitted already."""
-
-    @classmethod
-    def reweighted(cls, fitted: Fitted, after: Fitted) -> Problem | None:
-        """The same regression beside `fitted`, weighted by the noise that is left in `after`; None: no other."""
-        return None
-
-    @classmethod
-    def barred(cls, fitted: Fitted) -> frozenset[str]:
-        """Columns that this kind may not take up beside the terms fitted."""
-        return frozenset()
-
-    @classmethod
-    def test(cls, search: Search, fitted: Fitted) -> Outcome | None:
-        """The best candidate of the whole dictionary against rotations."""
-        return find_column(search, cls, fitted)
-
-    def probability_beside(self, search: Search, fitted: Fitted) -> float:
-        """p-value of its columns in whatever shape suits them beside the terms fitted."""
-        return probability_of(search, type(self), fitted, self.columns)
-
     def remove(self, fitted: Fitted, effects: tuple[Effect, ...], removal: Removal) -> None:
         """Evaluate the sized effects."""
         coarse = fitted.coarse
@@ -150,6 +126,34 @@ class ColumnTerm(Term):
             reference=tuple(within.mean(axis=0)),
             response_range=tuple(zip((usual + low).tolist(), (usual + high).tolist(), strict=True)),
         )
+
+
+class SearchedTerm(ColumnTerm):
+    """An effect that the dictionary is searched for, in a regression of its own."""
+
+    @classmethod
+    @abstractmethod
+    def problem(cls, fitted: Fitted) -> Problem:
+        """Regression in which a column of this kind is looked for, with the terms fitted already."""
+
+    @classmethod
+    def reweighted(cls, fitted: Fitted, after: Fitted) -> Problem | None:
+        """The same regression beside `fitted`, weighted by the noise that is left in `after`; None: no other."""
+        return None
+
+    @classmethod
+    def barred(cls, fitted: Fitted) -> frozenset[str]:
+        """Columns that this kind may not take up beside the terms fitted."""
+        return frozenset()
+
+    @classmethod
+    def test(cls, search: Search, fitted: Fitted) -> Outcome | None:
+        """The best candidate of the whole dictionary against rotations."""
+        return find_column(search, cls, fitted)
+
+    def probability_beside(self, search: Search, fitted: Fitted) -> float:
+        """p-value of its columns in whatever shape suits them beside the terms fitted."""
+        return probability_of(search, type(self), fitted, self.columns)
 
 
 def shrunk(sizes: FloatArray, errors: FloatArray) -> FloatArray:

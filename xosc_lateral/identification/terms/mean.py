@@ -15,7 +15,7 @@ from xosc_lateral.identification.problem import Problem
 from xosc_lateral.identification.regression import Coarse, Fitted, ModelTerm
 from xosc_lateral.identification.significance import MANY_DRIVES
 from xosc_lateral.identification.terms.base import Stage, Term
-from xosc_lateral.identification.terms.column import ColumnTerm
+from xosc_lateral.identification.terms.column import SearchedTerm
 from xosc_lateral.identification.timeline import coarse_mean
 from xosc_lateral.identification.timing import widening
 
@@ -57,7 +57,7 @@ def _beyond_chance(weight: FloatArray, off: FloatArray) -> float:
 
 
 @dataclass(frozen=True, eq=False)
-class MeanTerm(ColumnTerm):
+class MeanTerm(SearchedTerm):
     """Mean offset by a column: generalised least squares on whitened offsets."""
 
     component: ClassVar[str] = "mean"

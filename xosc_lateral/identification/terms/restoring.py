@@ -13,7 +13,7 @@ from xosc_lateral.driver.effects import Acts, Effect
 from xosc_lateral.identification.problem import Problem, of_products
 from xosc_lateral.identification.regression import Fitted
 from xosc_lateral.identification.terms.base import Stage
-from xosc_lateral.identification.terms.column import ColumnTerm, columns_acting, responses
+from xosc_lateral.identification.terms.column import SearchedTerm, columns_acting, responses
 from xosc_lateral.identification.timing import driving_range
 
 FloatArray = NDArray[np.float64]
@@ -26,7 +26,7 @@ MAX_FACTOR = 3.0
 
 
 @dataclass(frozen=True, eq=False)
-class RestoringTerm(ColumnTerm):
+class RestoringTerm(SearchedTerm):
     """Innovations by a column times the recent offset."""
 
     component: ClassVar[str] = "restoring"

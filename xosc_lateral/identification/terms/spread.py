@@ -22,7 +22,7 @@ from xosc_lateral.identification.problem import Problem, of_squares
 from xosc_lateral.identification.regression import Coarse, Fitted
 from xosc_lateral.identification.squares import fine_squares, log_sizes
 from xosc_lateral.identification.terms.base import Stage, Term
-from xosc_lateral.identification.terms.column import ColumnTerm, columns_on_size
+from xosc_lateral.identification.terms.column import ColumnTerm, SearchedTerm, columns_on_size
 
 if TYPE_CHECKING:
     from xosc_lateral.identification.search import Search
@@ -44,7 +44,7 @@ FINE_TWIN_Z = 2.0
 
 
 @dataclass(frozen=True, eq=False)
-class SpreadTerm(ColumnTerm):
+class SpreadTerm(SearchedTerm):
     """Log standard deviation of the innovations by a column: regression of their squares."""
 
     component: ClassVar[str] = "spread"
@@ -110,7 +110,7 @@ def what_a_column_may_do(search: Search, fitted: Fitted) -> tuple[FloatArray, fl
 
 
 @dataclass(frozen=True, eq=False)
-class FineNoiseTerm(ColumnTerm):
+class FineNoiseTerm(SearchedTerm):
     """Log standard deviation of the innovations at 5 Hz by a column."""
 
     component: ClassVar[str] = "fine_noise"
@@ -147,7 +147,7 @@ class FineNoiseTerm(ColumnTerm):
 
 
 @dataclass(frozen=True, eq=False)
-class SlowSpreadTerm(ColumnTerm):
+class SlowSpreadTerm(SearchedTerm):
     """Log standard deviation of eight-second sums of the innovations by a column."""
 
     component: ClassVar[str] = "slow_spread"

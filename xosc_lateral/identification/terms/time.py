@@ -51,8 +51,11 @@ SPREAD_ORDERS = (1, 2, 4)
 EDGE_S, STEP_GRID_S, STEP_SHORTEST_S = 60, 15, 12.0
 """Least time on either side of a step, between the moments that are tried, and least period that tells a step. [s]"""
 
+MEAN_SHORTEST_S = 120.0
+"""The same for the mean: people wander within a minute or two, which whitening knows. [s]"""
+
 STEP_DRAWS = 2000
-"""Draws of white rows that the best step is compared with."""
+"""Draws of white rows that the best smooth or step is compared with."""
 
 STEP_COST = 5.0
 """A step has a free moment. [chi-square]"""
@@ -99,11 +102,10 @@ class StepTerm(Term):
         moments = step_moments(coarse)
         jumps = whitener.rows((np.arange(len(coarse))[:, None] >= moments).astype(np.float64))
         waves = whitener.rows(half_cosines_of(coarse, max(ORDERS)))
-        slow = [low_frequencies(one, coarse, coarse.valid, SHORTEST_S) for one in (rows[:, None], waves, jumps)]
+        slow = [low_frequencies(one, coarse, coarse.valid, MEAN_SHORTEST_S) for one in (rows[:, None], waves, jumps)]
         smooth = smooth_probabilities(slow[0][:, 0], slow[1], ORDERS)
         order = min(smooth, key=lambda one: smooth[one])
-        p_step = step_probability(slow[0][:, 0], slow[2], search.rng(LoopSeed.LOW_FREQUENCY))
-        p_value = min(1.0, 2.0 * min(p_step, len(smooth) * smooth[order]))
+        p_value = mean_probability(slow[0][:, 0], slow[1], slow[2], search.rng(LoopSeed.LOW_FREQUENCY))
         # which of the two it is, quicker movement tells as well
         quick = [low_frequencies(one, coarse, coarse.valid, STEP_SHORTEST_S) for one in (rows[:, None], waves, jumps)]
         gains = explained(quick[0][:, 0], quick[2], len(slow[0]))
@@ -356,19 +358,29 @@ def step_moments(coarse: Coarse) -> NDArray[np.intp]:
     return np.flatnonzero(inside)[::STEP_GRID_S] if coarse.drives == 1 else np.zeros(0, dtype=np.intp)
 
 
-def step_probability(rows: FloatArray, jumps: FloatArray, rng: np.random.Generator) -> float:
-    """p-value of the best of all steps, shape (frequencies, moments), at low frequencies alone, against white rows."""
-    if not jumps.shape[1]:
-        return 1.0
+def mean_probability(rows: FloatArray, waves: FloatArray, jumps: FloatArray, rng: np.random.Generator) -> float:
+    """p-value of the best of all smooths and steps at low frequencies: the least p of F tests, against white rows.
+
+    `rows`, shape (frequencies,); `waves` and `jumps`, shape (frequencies, k), may have no columns.
+    """
+    from scipy.stats import f
+
+    bases = [orthonormal(waves[:, :order]) for order in ORDERS if order <= waves.shape[1]]
     unit = jumps / np.maximum(np.linalg.norm(jumps, axis=0), 1e-12)
 
-    def best(drawn: FloatArray) -> FloatArray:
-        explained = np.square(drawn @ unit).max(axis=1)
-        return np.asarray(explained / (np.square(drawn).sum(axis=1) - explained))
+    def surest(drawn: FloatArray) -> FloatArray:
+        """Largest negative logarithm of a p-value, shape (draws,)."""
+        total = np.square(drawn).sum(axis=1)
+        tests = [(np.square(drawn @ basis).sum(axis=1), basis.shape[1]) for basis in bases if basis.shape[1]]
+        tests += [(np.square(drawn @ unit).max(axis=1), 1)] if unit.shape[1] else []
+        found = []
+        for explained, degrees in tests:
+            ratio = explained / degrees / ((total - explained) / (len(rows) - degrees))
+            found.append(-f.logsf(ratio, degrees, len(rows) - degrees))
+        return np.asarray(np.max(found, axis=0))
 
-    null = best(rng.normal(size=(STEP_DRAWS, len(rows))))
-    # a ratio's tail is no exponential: its logarithm's is
-    return upper_tail(float(np.log(best(rows[None])[0])), np.log(null), least_excess=0.0)
+    # of the logarithm of a least p the tail is exponential, whatever the tests have in common
+    return upper_tail(float(surest(rows[None])[0]), surest(rng.normal(size=(STEP_DRAWS, len(rows)))), least_excess=1.0)
 
 
 def explained(rows: FloatArray, columns: FloatArray, slow: int) -> FloatArray:
