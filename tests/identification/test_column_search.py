@@ -68,11 +68,13 @@ def test_what_a_column_may_do_is_told_by_the_best_p_value() -> None:
     coarse = drive(36, log_spread=0.5)
     search = Search.over(coarse, COLUMNS, np.random.SeedSequence(1), ERROR_BUDGET)
     fitted = fit_model(coarse, ())
-    response = likely_response(search, SpreadTerm, fitted, 0.1)
+    response, p_value = likely_response(search, SpreadTerm, fitted, 0.1)
+    assert p_value <= 0.1
     assert response.shape == (len(coarse), 1)
     x = coarse.response(Linear(acts=Acts.LOCATION, column="x"))
     assert abs(np.corrcoef(response[coarse.valid, 0], x[coarse.valid, 0])[0, 1]) > 0.7
-    assert likely_response(search, SpreadTerm, fitted, 0.0).shape == (len(coarse), 0)
+    nothing, unsure = likely_response(search, SpreadTerm, fitted, 0.0)
+    assert (nothing.shape, unsure) == ((len(coarse), 0), 1.0)
 
 
 def test_a_part_of_a_table_is_given_as_many_terms_as_the_table_has_and_no_others() -> None:

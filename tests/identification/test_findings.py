@@ -20,7 +20,7 @@ COMPARED = (REAL, BEFORE, AFTER)
 def test_an_accepted_term_is_told_with_its_errors_on_held_out_rows() -> None:
     accepted = Accepted(StepTerm(at=300), 1e-6)
     effects = (Step(size=0.2, size_error=0.02, at_s=285.0),)
-    found = describe_finding(accepted, "step 0", None, effects, None, COMPARED)  # type: ignore[arg-type]
+    found = describe_finding(accepted, "step 0", None, effects, COMPARED)  # type: ignore[arg-type]
     assert (found.effect, found.kind, found.shape) == ("step", "step", "at 285 s")
     assert (found.size_m, found.size_error, found.p_value) == (0.2, 0.02, 1e-6)
     assert (found.error_before, found.error_after) == pytest.approx((0.1, 0.0))
@@ -28,7 +28,7 @@ def test_an_accepted_term_is_told_with_its_errors_on_held_out_rows() -> None:
 
 
 def test_a_group_that_nobody_described_has_no_error() -> None:
-    found = describe_finding(Accepted(StepTerm(at=300), 1e-6), "step 7", None, (Step(size=0.2),), None, COMPARED)  # type: ignore[arg-type]
+    found = describe_finding(Accepted(StepTerm(at=300), 1e-6), "step 7", None, (Step(size=0.2),), COMPARED)  # type: ignore[arg-type]
     assert (found.error_before, found.error_after) == (0.0, 0.0)
 
 

@@ -24,7 +24,8 @@ def loop(offset: np.ndarray, *terms: Any) -> tuple[Any, list[ColumnEffect]]:
     """What is read of a closed loop, and the sized effects."""
     coarse = coarse_of(offset, {"x": X, "y": Y})
     fitted = fit_model(coarse, terms)
-    result = SimpleNamespace(coarse=coarse, final=fitted, statistics=SimpleNamespace(timeline=coarse.timeline))
+    scored = SimpleNamespace(statistics=SimpleNamespace(timeline=coarse.timeline))
+    result = SimpleNamespace(coarse=coarse, final=fitted, scored=scored)
     return result, [term.estimate(fitted)[0] for term in terms]
 
 

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from xosc_lateral.driver.effects import ColumnEffect, TimeSmooth
+from xosc_lateral.driver.effects import ColumnEffect
 from xosc_lateral.formats.hashes import parsed_hashes
 from xosc_lateral.formats.profiles import profile_hash
 from xosc_lateral.identification.close import LoopResult
@@ -175,7 +175,7 @@ def _pictures(result: LoopResult, finding: Finding) -> list[_Picture]:
         return (
             [_Picture(effect_figure(result, finding), caption, alt)] if finding.statistic in result.scored.real else []
         )
-    draw, caption = DRAWINGS[finding.kind if effect is None or isinstance(effect, TimeSmooth) else effect.kind]
+    draw, caption = DRAWINGS[effect.kind if effect is not None else finding.kind]
     pictures = [_Picture(draw(result, finding), caption, f"{_capital(finding.effect)}: {caption}")]
     if finding.kind in ("regime", "population"):
         caption = "Distribution of the local spread of the movement on held-out blocks."

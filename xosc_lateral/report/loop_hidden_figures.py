@@ -141,6 +141,13 @@ def mean_figure(result: LoopResult, finding: Finding) -> Figure:
     return figure
 
 
+def time_figure(result: LoopResult, finding: Finding) -> Figure:
+    """Mean or spread over time, with the fitted curve."""
+    effect = finding.effects[0]
+    assert isinstance(effect, TimeSmooth)
+    return mean_figure(result, finding) if effect.location else spread_figure(result, finding)
+
+
 @figure_style()
 def drivers_figure(result: LoopResult, finding: Finding) -> Figure:
     """Mean and spread of every drive, as shares of drives below a value."""
@@ -208,13 +215,12 @@ DRAWINGS: Mapping[str, tuple[Callable[[LoopResult, Finding], Figure], str]] = Ma
             cycle_figure,
             "Power spectral density about the fitted oscillation, a peak that the profile before does not have.",
         ),
-        "scale": (spread_figure, "Spread over the drive; orange: the fitted change with time."),
+        TimeSmooth.kind: (time_figure, "What changes with time, over the drive; orange: the fitted curve."),
         Regimes.kind: (
             regime_figure,
             "Local spread over the drive; shaded: the regime of large spread is more likely than not.",
         ),
         Step.kind: (mean_figure, "Mean position over the drive; orange: the fitted step."),
-        "drift": (mean_figure, "Mean position over the drive; orange: the fitted change with time."),
         "memory": (
             memory_figure,
             "Standard deviation of the movement by averaging time, relative to the measured one.",
