@@ -7,7 +7,7 @@ import sys
 import numpy as np
 from scipy.fft import dct
 
-from xosc_lateral.identification.terms.time import SHORTEST_S, SPREAD_ORDERS
+from xosc_lateral.identification.low_frequencies import SHORTEST_S, SPREAD_ORDERS
 from xosc_lateral.report.figures import MUTED, ORANGE, figure_style, new_figure
 
 SECONDS = 3000

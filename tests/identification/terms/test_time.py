@@ -10,22 +10,19 @@ from scipy import stats
 
 from tests.identification.made_coarse import coarse_of, movement
 from xosc_lateral.driver.effects import Step, TimeSmooth
+from xosc_lateral.identification.low_frequencies import (
+    SHORTEST_S,
+    SPREAD_ORDERS,
+    half_cosines_of,
+    low_frequencies,
+    mean_probability,
+    smooth_probabilities,
+)
 from xosc_lateral.identification.regression import Coarse, Fitted, fit_model
 from xosc_lateral.identification.search import Search
 from xosc_lateral.identification.selection import ERROR_BUDGET
 from xosc_lateral.identification.terms.base import Removal
-from xosc_lateral.identification.terms.time import (
-    SHORTEST_S,
-    SPREAD_ORDERS,
-    StepTerm,
-    TimeMeanTerm,
-    TimeSpreadTerm,
-    half_cosines_of,
-    low_frequencies,
-    mean_probability,
-    penalised,
-    smooth_probabilities,
-)
+from xosc_lateral.identification.terms.time import StepTerm, TimeMeanTerm, TimeSpreadTerm, penalised
 
 SECONDS = 2400.0
 N = round(SECONDS / 0.2)

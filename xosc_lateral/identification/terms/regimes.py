@@ -23,13 +23,13 @@ from numpy.typing import NDArray
 from xosc_lateral.driver.effects import Effect, Regimes
 from xosc_lateral.identification.dictionary import in_another_order
 from xosc_lateral.identification.innovations import squared_innovations
+from xosc_lateral.identification.low_frequencies import SPREAD_ORDERS, half_cosines_of
 from xosc_lateral.identification.markov_switching import RegimeFit, fit_regimes
 from xosc_lateral.identification.regression import Coarse, Fitted
 from xosc_lateral.identification.significance import HEAVY_TAIL_SHARE, LoopSeed, upper_tail
 from xosc_lateral.identification.squares import SLOW_S, fine_squares, log_sizes, slow_squares
 from xosc_lateral.identification.terms.base import Description, Outcome, Removal, Stage, Term
 from xosc_lateral.identification.terms.spread import known_log_scale, what_a_column_may_do, what_columns_do
-from xosc_lateral.identification.terms.time import SPREAD_ORDERS, half_cosines_of
 
 if TYPE_CHECKING:
     from xosc_lateral.identification.search import Search
