@@ -17,6 +17,7 @@ from xosc_lateral.api.inputs import (
     naming,
 )
 from xosc_lateral.api.result import Result
+from xosc_lateral.formats.mapping import MappingLike
 from xosc_lateral.formats.output_paths import claim, output_folder
 
 if TYPE_CHECKING:
@@ -36,7 +37,7 @@ def close_loop(
     name: str = "refined",
     leave_out: Collection[str] = (),
     roles: Mapping[str, str] | None = None,
-    columns: Mapping[str, str] | None = None,
+    columns: MappingLike | None = None,
     library: Paths = (),
     progress: Callable[[float, str], None] | None = None,
 ) -> ClosedLoop:
@@ -56,8 +57,8 @@ def close_loop(
         Columns not to look at.
     roles : mapping of str to str, optional
         What columns are: column -> road, weather, traffic, time, own, driver or unknown. Road, weather and traffic are
-        never dismissed as consequences of the car's movement, own movement and time are never causes. Default: by name
-        and values.
+        never dismissed as consequences of the car's movement, own movement and time are never causes. Default: what a
+        mapping file says in `[roles]`, then by name and values.
     library : path or paths
         Folders with further profiles.
     progress : callable, optional
@@ -75,11 +76,15 @@ def close_loop(
     from msgspec.structs import replace as with_fields
 
     from xosc_lateral.driver.provenance import Provenance
+    from xosc_lateral.formats.mapping import as_mapping
     from xosc_lateral.identification import close
     from xosc_lateral.identification.lack_of_fit import lack_of_fit_of
 
     base = None if profile is None else given_profile(profile, library)
     given = given_drives(drives, columns)
+    # a mapping file serves many tables: what it says of columns that these lack is no mistake
+    there = {"lane_width"}.union(*(drive.context for drive in given.drives))
+    of_file = {name: role for name, role in as_mapping(columns).roles.items() if name in there}
     with naming(given):
         result = close.close_loop(
             given.drives,
@@ -88,7 +93,7 @@ def close_loop(
             name=name,
             provenance=Provenance(source=", ".join(given.inputs), inputs=dict(given.inputs)),
             excluded=list(leave_out),
-            roles=dict(roles or {}),
+            roles={**of_file, **(roles or {})},
             progress=progress or (lambda share, what: None),
         )
     if base is not None:

@@ -7,7 +7,20 @@ from typing import Annotated
 
 import typer
 
-from xosc_lateral.cli.words import AsJson, Columns, Force, Library, Quiet, Seed, Tables, examples, pairs, say
+from xosc_lateral.cli.words import (
+    AsJson,
+    Columns,
+    Force,
+    Library,
+    MappingFile,
+    Quiet,
+    Seed,
+    Tables,
+    examples,
+    mapped,
+    pairs,
+    say,
+)
 
 
 def register(app: typer.Typer) -> None:
@@ -39,6 +52,7 @@ def close_loop(
         ),
     ] = None,
     columns: Columns = None,
+    mapping_file: MappingFile = None,
     library: Library = None,
     force: Force = False,
     quiet: Quiet = False,
@@ -61,7 +75,7 @@ def close_loop(
             name=written.stem,
             leave_out=leave_out or (),
             roles=pairs(role, "--role"),
-            columns=pairs(columns, "--map"),
+            columns=mapped(columns, mapping_file),
             library=library or (),
             progress=progress,
         )
