@@ -79,7 +79,7 @@ def test_what_a_column_may_do_is_told_by_the_best_p_value() -> None:
 
 def test_a_part_of_a_table_is_given_as_many_terms_as_the_table_has_and_no_others() -> None:
     """Folds: the best candidate although nothing is significant; and nothing where the table has nothing."""
-    coarse = drive(32)
+    coarse = drive(33)
     search = Search.over(coarse, COLUMNS, np.random.SeedSequence(1), ERROR_BUDGET)
     assert select(search).accepted == ()
     one = select(replace(search, wanted={"mean": 1}))

@@ -26,7 +26,7 @@ def test_the_order_is_the_one_that_p_values_and_reports_of_0_1_came_from() -> No
         ["mean"],
         ["time_spread", "spread", "slow_spread"],
         ["regimes"],
-        ["fine_noise", "restoring"],
+        ["restoring", "fine_noise"],
         ["between"],
     ]
 

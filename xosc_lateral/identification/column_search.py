@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,10 +23,8 @@ from xosc_lateral.identification.refinement import Refined, Refinement
 from xosc_lateral.identification.regression import Fitted, fit_model
 from xosc_lateral.identification.search import Likeliest, Search
 from xosc_lateral.identification.significance import LoopSeed, upper_tail
-from xosc_lateral.identification.terms.base import Outcome, Term
-
-if TYPE_CHECKING:
-    from xosc_lateral.identification.terms.column import SearchedTerm
+from xosc_lateral.identification.terms.base import Outcome
+from xosc_lateral.identification.terms.column import ColumnTerm
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
@@ -51,6 +49,34 @@ factor on the movement that changes faster than the movement does, say, which it
 
 ROUNDS = 2
 """Times that what acts is looked for beside what was found before; the first changes most."""
+
+
+class SearchedTerm(ColumnTerm):
+    """An effect that the dictionary is searched for, in a regression of its own."""
+
+    @classmethod
+    @abstractmethod
+    def problem(cls, fitted: Fitted) -> Problem:
+        """Regression in which a column of this kind is looked for, with the terms fitted already."""
+
+    @classmethod
+    def reweighted(cls, fitted: Fitted, after: Fitted) -> Problem | None:
+        """The same regression beside `fitted`, weighted by the noise that is left in `after`; None: no other."""
+        return None
+
+    @classmethod
+    def barred(cls, fitted: Fitted) -> frozenset[str]:
+        """Columns that this kind may not take up beside the terms fitted."""
+        return frozenset()
+
+    @classmethod
+    def test(cls, search: Search, fitted: Fitted) -> Outcome | None:
+        """The best candidate of the whole dictionary against rotations."""
+        return find_column(search, cls, fitted)
+
+    def probability_beside(self, search: Search, fitted: Fitted) -> float:
+        """p-value of its columns in whatever shape suits them beside the terms fitted."""
+        return probability_of(search, type(self), fitted, self.columns)
 
 
 def find_column(search: Search, kind: type[SearchedTerm], fitted: Fitted) -> Outcome | None:
@@ -78,7 +104,6 @@ def find_column(search: Search, kind: type[SearchedTerm], fitted: Fitted) -> Out
             return Outcome(None, found.effect.columns, p_value)
         term, after = _best(search, kind, fitted, scored, refused)
         if not _grows(fitted, after) and after.log_likelihood >= fitted.log_likelihood - ROUNDING:
-            assert isinstance(term, Term)
             return Outcome(term, term.columns, p_value, after)
         refused.add(term.columns)
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from abc import abstractmethod
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar, Self
 
@@ -11,15 +10,13 @@ from msgspec import structs
 from numpy.typing import NDArray
 
 from xosc_lateral.driver.effects import Acts, ColumnEffect, Effect
-from xosc_lateral.identification.column_search import find_column, probability_of
-from xosc_lateral.identification.problem import Problem
 from xosc_lateral.identification.refinement import Alternatives
 from xosc_lateral.identification.regression import Coarse, Fitted
-from xosc_lateral.identification.terms.base import Description, Outcome, Removal, Term
+from xosc_lateral.identification.terms.base import Description, Removal, Term
 from xosc_lateral.identification.timing import span
 
 if TYPE_CHECKING:
-    from xosc_lateral.identification.search import Search
+    pass
 
 FloatArray = NDArray[np.float64]
 
@@ -126,34 +123,6 @@ class ColumnTerm(Term):
             reference=tuple(within.mean(axis=0)),
             response_range=tuple(zip((usual + low).tolist(), (usual + high).tolist(), strict=True)),
         )
-
-
-class SearchedTerm(ColumnTerm):
-    """An effect that the dictionary is searched for, in a regression of its own."""
-
-    @classmethod
-    @abstractmethod
-    def problem(cls, fitted: Fitted) -> Problem:
-        """Regression in which a column of this kind is looked for, with the terms fitted already."""
-
-    @classmethod
-    def reweighted(cls, fitted: Fitted, after: Fitted) -> Problem | None:
-        """The same regression beside `fitted`, weighted by the noise that is left in `after`; None: no other."""
-        return None
-
-    @classmethod
-    def barred(cls, fitted: Fitted) -> frozenset[str]:
-        """Columns that this kind may not take up beside the terms fitted."""
-        return frozenset()
-
-    @classmethod
-    def test(cls, search: Search, fitted: Fitted) -> Outcome | None:
-        """The best candidate of the whole dictionary against rotations."""
-        return find_column(search, cls, fitted)
-
-    def probability_beside(self, search: Search, fitted: Fitted) -> float:
-        """p-value of its columns in whatever shape suits them beside the terms fitted."""
-        return probability_of(search, type(self), fitted, self.columns)
 
 
 def shrunk(sizes: FloatArray, errors: FloatArray) -> FloatArray:

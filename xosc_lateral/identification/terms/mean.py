@@ -10,12 +10,12 @@ from msgspec import structs
 from numpy.typing import NDArray
 
 from xosc_lateral.driver.effects import Acts, Effect
+from xosc_lateral.identification.column_search import SearchedTerm
 from xosc_lateral.identification.innovations import whitener_as_seen
 from xosc_lateral.identification.problem import Problem
 from xosc_lateral.identification.regression import Coarse, Fitted, ModelTerm
 from xosc_lateral.identification.significance import MANY_DRIVES
 from xosc_lateral.identification.terms.base import Stage, Term
-from xosc_lateral.identification.terms.column import SearchedTerm
 from xosc_lateral.identification.timeline import coarse_mean
 from xosc_lateral.identification.timing import widening
 

@@ -10,10 +10,11 @@ from msgspec import structs
 from numpy.typing import NDArray
 
 from xosc_lateral.driver.effects import Acts, Effect
+from xosc_lateral.identification.column_search import SearchedTerm
 from xosc_lateral.identification.problem import Problem, of_products
 from xosc_lateral.identification.regression import Fitted
 from xosc_lateral.identification.terms.base import Stage
-from xosc_lateral.identification.terms.column import SearchedTerm, columns_acting, responses
+from xosc_lateral.identification.terms.column import columns_acting, responses
 from xosc_lateral.identification.timing import driving_range
 
 FloatArray = NDArray[np.float64]

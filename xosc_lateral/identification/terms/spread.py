@@ -16,13 +16,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.driver.effects import Acts, ColumnEffect, Effect
-from xosc_lateral.identification.column_search import likely_response
+from xosc_lateral.identification.column_search import SearchedTerm, likely_response
 from xosc_lateral.identification.innovations import squared_innovations
 from xosc_lateral.identification.problem import Problem, of_squares
 from xosc_lateral.identification.regression import Coarse, Fitted
 from xosc_lateral.identification.squares import fine_squares, log_sizes
 from xosc_lateral.identification.terms.base import Stage, Term
-from xosc_lateral.identification.terms.column import ColumnTerm, SearchedTerm, columns_on_size
+from xosc_lateral.identification.terms.column import ColumnTerm, columns_on_size
 
 if TYPE_CHECKING:
     from xosc_lateral.identification.search import Search

@@ -104,6 +104,10 @@ class StepTerm(Term):
             return Outcome(cls(moment_of(rows, whitener, int(moments[np.argmax(gains)]))), (), p_value)
         return Outcome(TimeMeanTerm(), (), p_value)
 
+    def probability_beside(self, search: Search, fitted: Fitted) -> float:
+        """p-value of the mean by time, whichever of the two it looks like beside the terms fitted."""
+        return probability_of_mean(search, fitted)
+
     def matches(self, other: Self) -> bool:
         """About the same moment."""
         return isinstance(other, StepTerm) and abs(self.at - other.at) <= SAME_S
@@ -156,6 +160,10 @@ class TimeMeanTerm(Term):
     def test(cls, search: Search, fitted: Fitted) -> Outcome | None:
         """Nothing of its own: a step is looked for at the same time."""
         return None
+
+    def probability_beside(self, search: Search, fitted: Fitted) -> float:
+        """p-value of the mean by time, whichever of the two it looks like beside the terms fitted."""
+        return probability_of_mean(search, fitted)
 
     def estimate(self, fitted: Fitted) -> tuple[Effect, ...]:
         """Penalised sizes."""
@@ -274,6 +282,12 @@ class TimeSpreadTerm(Term):
         statistic = f"spread by effect: {key}"
         factor = float(np.exp(size))
         return Description("spread by time", shape, factor, factor * error, statistic, statistic)
+
+
+def probability_of_mean(search: Search, fitted: Fitted) -> float:
+    """p-value of a smooth or a step of the mean; 1 where none is looked for."""
+    test = StepTerm.test(search, fitted)
+    return 1.0 if test is None else test.p_value
 
 
 def penalised(sizes: FloatArray, covariance: FloatArray) -> tuple[FloatArray, FloatArray]:
