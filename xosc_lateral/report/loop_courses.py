@@ -9,9 +9,8 @@ from numpy.typing import NDArray
 
 from xosc_lateral.identification.close import LoopResult
 from xosc_lateral.identification.terms.cycle import CycleTerm, latent_path
-from xosc_lateral.identification.terms.drift import DriftTerm
 from xosc_lateral.identification.terms.regimes import RegimesTerm
-from xosc_lateral.identification.terms.step import StepTerm
+from xosc_lateral.identification.terms.time import StepTerm, TimeMeanTerm
 from xosc_lateral.identification.timeline import LOCAL_S, coarse_mean, coarse_middle, local_mean
 
 FloatArray = NDArray[np.float64]
@@ -38,7 +37,7 @@ class MovingStatistic:
 
 def moving_mean(result: LoopResult, seconds: float) -> MovingStatistic:
     """Moving mean of the offset over so many `seconds` > 0. [m]"""
-    timeline = result.statistics.timeline
+    timeline = result.scored.statistics.timeline
 
     def mean(offset: FloatArray) -> FloatArray:
         return coarse_mean(local_mean(offset, timeline.valid, seconds, timeline.step))
@@ -48,7 +47,7 @@ def moving_mean(result: LoopResult, seconds: float) -> MovingStatistic:
 
 def moving_spread(result: LoopResult, seconds: float) -> MovingStatistic:
     """Root mean square of the movement faster than 20 s, over so many `seconds` > 0. [m]"""
-    timeline = result.statistics.timeline
+    timeline = result.scored.statistics.timeline
 
     def squares(offset: FloatArray) -> FloatArray:
         fast = offset - local_mean(offset, timeline.valid, LOCAL_S, timeline.step)
@@ -63,7 +62,7 @@ def moving_spread(result: LoopResult, seconds: float) -> MovingStatistic:
 def hidden_mean(result: LoopResult) -> FloatArray:
     """Step, drift and oscillation as fitted, about their mean; 0: none. [m] Shape as a `MovingStatistic`'s times."""
     coarse, fitted = result.coarse, result.final
-    own = [term for term in fitted.terms if isinstance(term, CycleTerm | StepTerm | DriftTerm)]
+    own = [term for term in fitted.terms if isinstance(term, CycleTerm | StepTerm | TimeMeanTerm)]
     hidden = np.sum([np.zeros(len(coarse)), *(latent_path(term, fitted) for term in own)], axis=0)
     return np.asarray((hidden - hidden[coarse.valid].mean())[_longest(result)])
 
@@ -83,17 +82,17 @@ def by_drive(result: LoopResult, least_s: float) -> tuple[dict[str, FloatArray],
     means, spreads : mapping of "measured", "before", "after" to array
         Shape (drives,) or (runs * drives,). [m]
     """
-    timeline = result.statistics.timeline
+    timeline = result.scored.statistics.timeline
     rows = [np.flatnonzero(timeline.valid & (timeline.drive == index)) for index in range(len(timeline.names))]
     rows = [own for own in rows if len(own) * timeline.step >= least_s]
-    series = {"measured": timeline.offset[None], "before": result.runs_before, "after": result.runs_after}
+    series = {"measured": timeline.offset[None], "before": result.scored.runs_before, "after": result.scored.runs_after}
     means = {name: np.concatenate([runs[:, own].mean(axis=1) for own in rows]) for name, runs in series.items()}
     spreads = {name: np.concatenate([runs[:, own].std(axis=1) for own in rows]) for name, runs in series.items()}
     return means, spreads
 
 
 def _runs(result: LoopResult) -> tuple[FloatArray, FloatArray]:
-    return result.runs_before, result.runs_after
+    return result.scored.runs_before, result.scored.runs_after
 
 
 def _longest(result: LoopResult) -> BoolArray:
@@ -106,5 +105,5 @@ def _longest(result: LoopResult) -> BoolArray:
 def _statistic(result: LoopResult, measured: FloatArray, before: FloatArray, after: FloatArray) -> MovingStatistic:
     shown = _longest(result)
     n = len(result.coarse)
-    time = coarse_middle(result.statistics.timeline.time)[:n]
+    time = coarse_middle(result.scored.statistics.timeline.time)[:n]
     return MovingStatistic(time[shown], measured[shown], before[shown], after[shown])

@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.driver.effects import Acts, Angular, ColumnEffect, Product
-from xosc_lateral.identification.blocks import hold_out_blocks
 from xosc_lateral.identification.close import LoopResult
+from xosc_lateral.identification.held_out_gain import hold_out_blocks
 from xosc_lateral.identification.terms.between import is_between
 from xosc_lateral.identification.timeline import LOCAL_S, coarse_mean, coarse_middle, local_mean
 
@@ -59,7 +59,7 @@ def curve_of(result: LoopResult, effect: ColumnEffect) -> Curve:
         return Curve(over, strength, error, nothing, nothing, nothing)
     where, own = _driving(result, effect)
     inside = result.coarse.valid & np.isfinite(where)
-    blocks = coarse_middle(hold_out_blocks(result.statistics.timeline))
+    blocks = coarse_middle(hold_out_blocks(result.scored.statistics.timeline))
     values = _values(result, effect, inside)
     seen, mean, spread, fitted = _binned(where, values, own, blocks, inside)
     if effect.acts is not Acts.LOCATION:
@@ -121,7 +121,7 @@ def _alone(result: LoopResult, effect: ColumnEffect) -> FloatArray:
 
 def _squares(result: LoopResult, acts: Acts) -> FloatArray:
     """Mean square of the movement within 20 s (or, for fine noise, from sample to sample), per second. [m^2]"""
-    timeline = result.statistics.timeline
+    timeline = result.scored.statistics.timeline
     if acts is Acts.FINE:
         return coarse_mean(np.square(np.diff(timeline.offset, prepend=timeline.offset[:1])))
     fast = timeline.offset - local_mean(timeline.offset, timeline.valid, LOCAL_S, timeline.step)

@@ -10,10 +10,10 @@ import pytest
 
 from tests.identification.made_coarse import coarse_of, movement, wander
 from xosc_lateral.driver.effects import Acts, ColumnEffect, Linear
-from xosc_lateral.identification.partial import POINTS, _binned, _ends, curve_of
 from xosc_lateral.identification.regression import fit_model
 from xosc_lateral.identification.terms.mean import MeanTerm
 from xosc_lateral.identification.terms.spread import SpreadTerm
+from xosc_lateral.report.loop_curves import POINTS, _binned, _ends, curve_of
 
 SECONDS = 2400.0
 N = round(SECONDS / 0.2)
@@ -24,7 +24,8 @@ def loop(offset: np.ndarray, *terms: Any) -> tuple[Any, list[ColumnEffect]]:
     """What is read of a closed loop, and the sized effects."""
     coarse = coarse_of(offset, {"x": X, "y": Y})
     fitted = fit_model(coarse, terms)
-    result = SimpleNamespace(coarse=coarse, final=fitted, statistics=SimpleNamespace(timeline=coarse.timeline))
+    scored = SimpleNamespace(statistics=SimpleNamespace(timeline=coarse.timeline))
+    result = SimpleNamespace(coarse=coarse, final=fitted, scored=scored)
     return result, [term.estimate(fitted)[0] for term in terms]
 
 

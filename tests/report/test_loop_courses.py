@@ -10,16 +10,16 @@ import pytest
 
 from tests.identification.made_coarse import coarse_of, movement
 from xosc_lateral.identification.markov_switching import RegimeFit
-from xosc_lateral.identification.moving_statistics import (
+from xosc_lateral.identification.regression import fit_model
+from xosc_lateral.identification.terms.regimes import RegimesTerm
+from xosc_lateral.identification.terms.time import StepTerm
+from xosc_lateral.report.loop_courses import (
     by_drive,
     hidden_mean,
     moving_mean,
     moving_spread,
     regime_probability,
 )
-from xosc_lateral.identification.regression import fit_model
-from xosc_lateral.identification.terms.regimes import RegimesTerm
-from xosc_lateral.identification.terms.step import StepTerm
 
 N = 6000
 
@@ -29,9 +29,9 @@ def result(offset: np.ndarray, before: np.ndarray, after: np.ndarray, *, drives:
     coarse = coarse_of(offset, drives=drives)
     return SimpleNamespace(
         coarse=coarse,
-        statistics=SimpleNamespace(timeline=coarse.timeline),
-        runs_before=before,
-        runs_after=after,
+        scored=SimpleNamespace(
+            statistics=SimpleNamespace(timeline=coarse.timeline), runs_before=before, runs_after=after
+        ),
         final=fit_model(coarse, terms),
     )
 
@@ -46,7 +46,7 @@ def steady() -> Any:
 
 def test_a_moving_mean_is_numpys_average_over_the_window(steady: Any) -> None:
     found = moving_mean(steady, 60.0)
-    timeline, at = steady.statistics.timeline, 300
+    timeline, at = steady.scored.statistics.timeline, 300
     second = int(np.flatnonzero(steady.coarse.valid)[at])
     rows = np.arange(5 * second, 5 * second + 5)
     expected = np.mean([timeline.offset[row - 150 : row + 151].mean() for row in rows])
@@ -94,7 +94,7 @@ def test_the_longest_drive_is_shown() -> None:
     valid[: N // 4] = False  # the first drive loses a half
     made = result(offset, offset[None], offset[None], drives=2)
     made.coarse = coarse_of(offset, drives=2, valid=valid)
-    made.statistics = SimpleNamespace(timeline=made.coarse.timeline)
+    made.scored.statistics = SimpleNamespace(timeline=made.coarse.timeline)
     found = moving_mean(made, 20.0)
     np.testing.assert_allclose(found.measured, 1.0, atol=1e-9)
 
@@ -104,7 +104,7 @@ def test_every_drive_has_a_mean_and_a_spread_of_its_own_rows() -> None:
     offset = np.concatenate([0.1 * rng.normal(size=N // 2), 0.5 + 0.3 * rng.normal(size=N // 2)])
     made = result(offset, np.stack([offset, -offset]), offset[None], drives=2)
     means, spreads = by_drive(made, 60.0)
-    timeline = made.statistics.timeline
+    timeline = made.scored.statistics.timeline
     own = [offset[timeline.valid & (timeline.drive == k)] for k in (0, 1)]
     np.testing.assert_allclose(means["measured"], [part.mean() for part in own])
     np.testing.assert_allclose(spreads["measured"], [part.std() for part in own])
