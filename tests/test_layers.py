@@ -35,6 +35,7 @@ LAYERS = {
     "baselines": 6,
     "templates": 6,
     "board": 7,
+    "live": 8,
     "report": 8,
     "pipeline": 9,
     "api": 10,

@@ -6,12 +6,12 @@ infinite where nobody is within reach, NaN where there is no such lane.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from xosc_lateral.motion.nearby import pairs_within
 from xosc_lateral.motion.nominal import Activity, EntityMotion, NominalMotion
@@ -58,7 +58,7 @@ def entity_context(motion: NominalMotion, network: RoadNetwork, index: int, grid
     entity = motion.entities[index]
     road = _road(entity, network, grid)
     around = _neighbours(motion, network, index, grid)
-    return _own_motion(entity, grid) | road | around | _empty_lanes(road, around) | _weather(motion, entity, grid)
+    return _own_motion(entity, grid) | road | around | empty_lanes(road, around) | _weather(motion, entity, grid)
 
 
 def _own_motion(entity: EntityMotion, grid: IntArray) -> dict[str, FloatArray]:
@@ -77,16 +77,7 @@ def _own_motion(entity: EntityMotion, grid: IntArray) -> dict[str, FloatArray]:
 def _road(entity: EntityMotion, network: RoadNetwork, grid: IntArray) -> dict[str, FloatArray]:
     on = entity.road[grid] >= 0
     rows = grid[on]
-    road, lane, s = entity.road[rows], entity.lane[rows], entity.s[rows]
-    lane_index, lane_count = network.lane_index(road, lane, s)
-    values: dict[str, FloatArray] = {
-        "curvature": network.lane_curvature(road, lane, s, entity.offset[rows]),
-        "lane_width": network.lane_width(road, lane, s),
-        "lane_index": np.where(lane_index >= 0, lane_index, np.nan).astype(np.float64),
-        "lane_count": lane_count.astype(np.float64),
-        "crossfall": network.crossfall(road, lane, s),
-        "grade": network.grade(road, lane, s),
-    }
+    values = road_columns(network, entity.road[rows], entity.lane[rows], entity.s[rows], entity.offset[rows])
     context = {}
     for name, part in values.items():
         context[name] = np.full(len(grid), np.nan)
@@ -94,8 +85,23 @@ def _road(entity: EntityMotion, network: RoadNetwork, grid: IntArray) -> dict[st
     return context
 
 
+def road_columns(
+    network: RoadNetwork, road: ArrayLike, lane: ArrayLike, s: ArrayLike, offset: ArrayLike
+) -> dict[str, FloatArray]:
+    """What the road is like at places on lanes, shape (n,) each, by the names of context columns."""
+    lane_index, lane_count = network.lane_index(road, lane, s)
+    return {
+        "curvature": network.lane_curvature(road, lane, s, offset),
+        "lane_width": network.lane_width(road, lane, s),
+        "lane_index": np.where(lane_index >= 0, lane_index, np.nan).astype(np.float64),
+        "lane_count": lane_count.astype(np.float64),
+        "crossfall": network.crossfall(road, lane, s),
+        "grade": network.grade(road, lane, s),
+    }
+
+
 # ---- other vehicles --------------------------------------------------------------------------------------------------
-class _Reach(NamedTuple):
+class Reach(NamedTuple):
     """A lane section within reach along the own lane: u(s) = at + sign * (s - s_entry) counts along travel. [m]"""
 
     road: int
@@ -107,11 +113,11 @@ class _Reach(NamedTuple):
     sign: int
 
 
-def _lane_path(network: RoadNetwork, road: int, lane: int, s: float) -> list[_Reach]:
+def lane_path(network: RoadNetwork, road: int, lane: int, s: float) -> list[Reach]:
     """Sections along a lane within `REACH` both ways, in a coordinate u that is 0 at `s` and grows along travel."""
     forward = network.travel_direction(road, lane)
     low, high = network.section_at(road, s)
-    path = [_Reach(road, low, high, lane, 0.0, s, forward)]
+    path = [Reach(road, low, high, lane, 0.0, s, forward)]
     for way in (1, -1):
         here, direction, done = (road, lane, s), way * forward, 0.0
         while done < REACH + (high - low):
@@ -124,7 +130,7 @@ def _lane_path(network: RoadNetwork, road: int, lane: int, s: float) -> list[_Re
             here, direction = (step.road, step.lane, step.s), step.direction
             start, end = network.section_at(step.road, step.s)
             s_entry = step.s - direction * _INTO_NEXT
-            path.append(_Reach(step.road, start, end, step.lane, way * done, s_entry, way * direction))
+            path.append(Reach(step.road, start, end, step.lane, way * done, s_entry, way * direction))
     return path
 
 
@@ -132,7 +138,7 @@ _INTO_NEXT = 1e-6
 """Step beyond a section's end that brings one into the next. [m]"""
 
 
-class _Others(NamedTuple):
+class Others(NamedTuple):
     """Where another vehicle is, seen along the own lane: u ahead [m], lane steps to the left, same direction or not."""
 
     ahead: FloatArray
@@ -151,17 +157,17 @@ def _neighbours(motion: NominalMotion, network: RoadNetwork, index: int, grid: I
         if not other.entity.is_vehicle:
             continue
         seen = _see(other, network, grid, groups)
-        gap = _free_space(seen, own.entity.bounding_box, other.entity.bounding_box)
-        for side, there in _sides(seen).items():
+        gap = free_space(seen, own.entity.bounding_box, other.entity.bounding_box)
+        for side, there in sides(seen).items():
             with np.errstate(invalid="ignore"):
                 closer = there & (gap <= REACH) & ~(nearest[side] <= gap)
             nearest[side][closer] = gap[closer]
             if side in truck:
                 truck[side][closer] = float(other.entity.vehicle_category in TRUCKS)
-    return _as_columns(nearest, truck)
+    return as_columns(nearest, truck)
 
 
-def _sides(seen: _Others) -> dict[str, NDArray[np.bool_]]:
+def sides(seen: Others) -> dict[str, NDArray[np.bool_]]:
     """Rows in which the other one is ahead, beside or comes towards us, shape (n,) each."""
     same_way = ~seen.oncoming
     return {
@@ -172,7 +178,7 @@ def _sides(seen: _Others) -> dict[str, NDArray[np.bool_]]:
     }
 
 
-def _as_columns(nearest: Mapping[str, FloatArray], truck: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
+def as_columns(nearest: Mapping[str, FloatArray], truck: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
     """Distances [m] and kinds of what is nearest on every side, shape (n,) each, by the names of context columns."""
     context = {f"{side}_distance": distance for side, distance in nearest.items()}
     context |= {f"{side}_is_truck": flag for side, flag in truck.items()}
@@ -184,7 +190,7 @@ def _as_columns(nearest: Mapping[str, FloatArray], truck: Mapping[str, FloatArra
     return context
 
 
-def _empty_lanes(road: Mapping[str, FloatArray], around: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
+def empty_lanes(road: Mapping[str, FloatArray], around: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
     """Distances that say so where there is a lane but nobody in it."""
     index, count = road["lane_index"], road["lane_count"]
     there = {"lead": index >= 0, "right": index > 0, "left": index < count - 1}
@@ -209,7 +215,7 @@ def _in_sight(motion: NominalMotion) -> tuple[tuple[int, ...], ...]:
 
 def _own_lane_groups(
     own: EntityMotion, network: RoadNetwork, grid: IntArray
-) -> list[tuple[IntArray, FloatArray, list[_Reach]]]:
+) -> list[tuple[IntArray, FloatArray, list[Reach]]]:
     """Rows of the grid that share one lane path: positions in the grid, own u there, and the path."""
     groups: dict[tuple[int, int, float], list[int]] = {}
     present = ((own.activity[grid] & Activity.ACTIVE) != 0) & (own.road[grid] >= 0) & (own.lane[grid] != 0)
@@ -221,33 +227,64 @@ def _own_lane_groups(
     for (road, lane, _), members in groups.items():
         rows = np.array(members)
         along = own.s[grid[rows]]
-        path = _lane_path(network, road, lane, float(along[0]))
+        path = lane_path(network, road, lane, float(along[0]))
         result.append((rows, path[0].sign * (along - along[0]), path))
     return result
 
 
 def _see(
-    other: EntityMotion, network: RoadNetwork, grid: IntArray, groups: list[tuple[IntArray, FloatArray, list[_Reach]]]
-) -> _Others:
+    other: EntityMotion, network: RoadNetwork, grid: IntArray, groups: list[tuple[IntArray, FloatArray, list[Reach]]]
+) -> Others:
     n = len(grid)
-    seen = _Others(np.full(n, np.nan), np.full(n, np.nan), np.zeros(n, dtype=bool))
+    seen = Others(np.full(n, np.nan), np.full(n, np.nan), np.zeros(n, dtype=bool))
     road, lane, s = other.road[grid], other.lane[grid], other.s[grid]
     present = ((other.activity[grid] & Activity.ACTIVE) != 0) & (road >= 0) & (lane != 0)
     direction = _travel(other, network, grid, present)
     for members, own_u, path in groups:
-        for part in path:
-            on = present[members] & (road[members] == part.road)
-            on &= (s[members] >= part.s_low - 1e-9) & (s[members] <= part.s_high + 1e-9)
-            k = members[on]
-            if not len(k):
-                continue
-            ahead = part.at + part.sign * (s[k] - part.s_entry) - own_u[on]
-            # the own lane path may pass a place twice (a ring road): the nearer view counts
-            nearer = ~(np.abs(seen.ahead[k]) <= np.abs(ahead))
-            k, ahead = k[nearer], ahead[nearer]
-            seen.ahead[k] = ahead
-            seen.lanes_left[k] = part.sign * (_rank(lane[k]) - _rank(np.int64(part.lane)))
-            seen.oncoming[k] = direction[k] != part.sign
+        k = members
+        along = see_along(path, own_u, road[k], lane[k], s[k], direction[k], there=present[k])
+        for values, found in zip(seen, along, strict=True):
+            values[members] = found
+    return seen
+
+
+def see_along(
+    path: Sequence[Reach],
+    own_u: FloatArray,
+    road: NDArray[np.integer],
+    lane: NDArray[np.integer],
+    s: FloatArray,
+    direction: IntArray,
+    *,
+    there: NDArray[np.bool_],
+) -> Others:
+    """Where others are along one's lane path, row by row: other moments, or other vehicles. Shape (n,) each.
+
+    Parameters
+    ----------
+    path : sequence of Reach
+        What `lane_path` gives; others elsewhere are not seen (NaN).
+    own_u : array
+        Where one is on it. [m]
+    road, lane, s, direction : array
+        Where the other is, and which way it drives along s. [-], [-], [m], [-]
+    there : array of bool
+        Whether it is anywhere.
+    """
+    n = len(own_u)
+    seen = Others(np.full(n, np.nan), np.full(n, np.nan), np.zeros(n, dtype=bool))
+    for part in path:
+        on = there & (road == part.road) & (s >= part.s_low - 1e-9) & (s <= part.s_high + 1e-9)
+        k = np.flatnonzero(on)
+        if not len(k):
+            continue
+        ahead = part.at + part.sign * (s[k] - part.s_entry) - own_u[k]
+        # the own lane path may pass a place twice (a ring road): the nearer view counts
+        nearer = ~(np.abs(seen.ahead[k]) <= np.abs(ahead))
+        k, ahead = k[nearer], ahead[nearer]
+        seen.ahead[k] = ahead
+        seen.lanes_left[k] = part.sign * (_rank(lane[k]) - _rank(np.int64(part.lane)))
+        seen.oncoming[k] = direction[k] != part.sign
     return seen
 
 
@@ -265,7 +302,14 @@ def _rank(lane: NDArray[np.integer] | np.integer) -> IntArray:
     return np.where(lane > 0, lane - 1, lane).astype(np.int64)
 
 
-def _free_space(seen: _Others, own: BoundingBox, other: BoundingBox) -> FloatArray:
+class Extent(NamedTuple):
+    """How long vehicles are, and how far their middles are ahead of their reference points, shape (n,) each. [m]"""
+
+    length: FloatArray
+    center_x: FloatArray
+
+
+def free_space(seen: Others, own: BoundingBox | Extent, other: BoundingBox | Extent) -> FloatArray:
     """Bumper to bumper, 0 while overlapping lengthwise. [m]"""
     turned = np.where(seen.oncoming, -1.0, 1.0)
     between_centres = seen.ahead + turned * other.center_x - own.center_x
