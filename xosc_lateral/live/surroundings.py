@@ -128,6 +128,7 @@ def look_around(roads: Roads, places: Places, is_truck: BoolArray) -> dict[str, 
             np.fmin.at(nearest[side], i[near], gap[near])
             if side in truck:
                 closest = near[gap[near] == nearest[side][i[near]]]
+                closest = closest[np.argsort(-j[closest], kind="stable")]  # of two as near, the first one counts
                 truck[side][i[closest]] = is_truck[j[closest]]
     around = as_columns(nearest, truck)
     return road | around | empty_lanes(road, around)
