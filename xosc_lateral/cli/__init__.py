@@ -39,6 +39,7 @@ VERBS = (
     "benchmark",
     "profiles",
     "template",
+    "live",
 )
 
 for _verb in VERBS:

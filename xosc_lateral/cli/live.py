@@ -1,0 +1,79 @@
+"""`xosc-lateral live`: drivers in a simulation that runs."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from xosc_lateral.cli.words import AsJson, Force, Library, Quiet, Seed, examples, pairs, say, warn
+
+if TYPE_CHECKING:
+    from xosc_lateral.api.live import LiveRun
+
+Profile = Annotated[str, typer.Option("--profile", "-p", metavar="NAME|PATH", help="Driver profile.")]
+PerVehicle = Annotated[
+    list[str] | None,
+    typer.Option("--vehicle", metavar="NAME=PROFILE", help="Another profile for one vehicle; may be repeated."),
+]
+States = Annotated[
+    str | None, typer.Option("--states", metavar="OUT", help="Table of where everybody was: .csv, .csv.gz, .parquet.")
+]
+
+HELP = {
+    "esmini": (
+        "Play a scenario in esmini, through your library of it.",
+        examples("live esmini cut-in.xosc --player-library libesminiLib.so --ego Ego --states states.csv"),
+    ),
+}
+
+
+def register(app: typer.Typer) -> None:
+    """Add the verb to the command line."""
+    live = typer.Typer(help="Drivers in a simulation that runs.", no_args_is_help=True)
+    for verb in (esmini,):
+        short, epilog = HELP[verb.__name__]
+        live.command(verb.__name__, short_help=short, epilog=epilog)(verb)
+    app.add_typer(live, name="live", short_help="Drivers in a simulation that runs.")
+
+
+def esmini(
+    scenario: Annotated[Path, typer.Argument(help="Scenario (.xosc).", show_default=False)],
+    player_library: Annotated[
+        Path, typer.Option(help="libesminiLib.so or esminiLib.dll of esmini 3.", show_default=False)
+    ],
+    profile: Profile = "motorway",
+    vehicle: PerVehicle = None,
+    ego: Annotated[
+        list[str] | None, typer.Option(metavar="NAME", help="Vehicle under test: not driven; may be repeated.")
+    ] = None,
+    seed: Seed = 0,
+    duration: Annotated[float, typer.Option(help="Ends here, if not before. [s]", min=0.01, max=86_400)] = 3600.0,
+    step: Annotated[float, typer.Option(help="Length of a step. [s]", min=0.001, max=0.2)] = 0.01,
+    window: Annotated[bool, typer.Option("--window", help="Open esmini's window.")] = False,
+    states: States = None,
+    library: Library = None,
+    force: Force = False,
+    quiet: Quiet = False,
+    as_json: AsJson = False,
+) -> None:
+    """Play a scenario in esmini with drivers in its vehicles; its triggers and maneuvers stay as written."""
+    from xosc_lateral.api.live import live_esmini
+    from xosc_lateral.formats.output_paths import claim, output_file
+    from xosc_lateral.formats.tables import TABLE_SUFFIXES
+
+    if states is not None:
+        claim([output_file(states, "states.csv", TABLE_SUFFIXES)], [scenario], force=force)
+    run = live_esmini(
+        scenario, player_library, profile=profile, profiles=pairs(vehicle, "--vehicle"), ego=ego or (), seed=seed,
+        duration=duration, step=step, window=window, folders=library or (),
+    )  # fmt: skip
+    _finish(run, states, force=force, quiet=quiet, as_json=as_json)
+
+
+def _finish(run: LiveRun, states: str | None, *, force: bool, quiet: bool, as_json: bool) -> None:
+    if states is not None:
+        run.write(states, force=force)
+    warn(run.warnings)
+    say(run, as_json=as_json, quiet=quiet)
