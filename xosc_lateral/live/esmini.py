@@ -11,9 +11,10 @@ import ctypes as c
 from collections import Counter
 from collections.abc import Callable, Iterable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.enrich.neighbours import Neighbours
@@ -103,6 +104,7 @@ class Player:
                 raise SimulationError(f"{self.where}: has no function {name}; the library of esmini 3 is needed")
             own = c.CFUNCTYPE(result, *arguments)((name, library)) if isinstance(library, c.CDLL) else None
             setattr(self, name, own or getattr(library, name))
+        self._is_known = False
 
     if TYPE_CHECKING:
 
@@ -116,24 +118,41 @@ class Player:
         SimulationError
             If the library's structure is another than ours.
         """
+        state = ObjectState()
+        if not self._is_known:
+            self._compare(number)
+        return state if self.SE_GetObjectState(number, c.addressof(state)) == 0 else None
+
+    def _compare(self, number: int) -> None:
+        """Refuse another structure than ours: longer, shorter, or with something else first."""
         size, spare = c.sizeof(ObjectState), 256
-        buffer = (c.c_ubyte * (size + spare))(*([_UNTOUCHED] * (size + spare)))
+        buffer = (c.c_ubyte * (size + spare)).from_buffer(bytearray([_UNTOUCHED] * (size + spare)))
         if self.SE_GetObjectState(number, c.addressof(buffer)) != 0:
-            return None
-        state = ObjectState.from_buffer_copy(buffer)
+            return
         end = ObjectState.visibility
-        last = bytes(buffer[end.offset : end.offset + end.size])
-        written = any(value != _UNTOUCHED for value in buffer[size:])
-        if written or last == bytes([_UNTOUCHED] * end.size) or state.id != number:
+        last, beyond = bytes(buffer[end.offset : end.offset + end.size]), bytes(buffer[size:])
+        if last.count(_UNTOUCHED) == len(last) or beyond.count(_UNTOUCHED) < spare or buffer[0] != number & 0xFF:
             raise SimulationError(
                 f"{self.where}: another SE_ScenarioObjectState than the {size} bytes of esmini 3; a library of that "
                 "version is needed"
             )
-        return state
+        self._is_known = True
 
 
 _UNTOUCHED = 0xA5
 """A byte that nobody writes by chance at every place."""
+
+
+class _Lane(NamedTuple):
+    """A lane where a vehicle is: road and id, if there is one and if it is for driving, +1 for travel along s, width
+    [m], heading of travel [rad]."""
+
+    place: tuple[int, int]
+    is_lane: bool
+    is_driving: bool
+    direction: int
+    width: float
+    heading: float
 
 
 class EsminiTraffic:
@@ -180,6 +199,7 @@ class EsminiTraffic:
         self._running: Counter[str] = Counter()
         self._touched: set[str] = set()
         self._base: dict[str, float] = {}
+        self._lane_of: dict[str, _Lane] = {}
         self._also = on_element
         self.warnings: list[str] = []
         path = (self.player.SE_GetODRFilename() or b"").decode()
@@ -210,7 +230,7 @@ class EsminiTraffic:
             If what the simulation says can't be used; nothing was reported then, and the simulation can go on.
         """
         seen = [(name, state) for name, state in self._objects() if self._is_sound(name, state)]
-        moment = self._moment(seen)
+        moment = self._moment(seen, dt)
         moves = self.traffic.step(self.player.SE_GetSimulationTime() + dt, moment)
         for row, (_, state) in enumerate(seen):
             if moves.steered[row]:
@@ -255,7 +275,7 @@ class EsminiTraffic:
     def _road(self, state: ObjectState) -> int:
         return self._roads.get(str(state.road), -1)
 
-    def _moment(self, seen: list[tuple[str, ObjectState]]) -> Moment:
+    def _moment(self, seen: list[tuple[str, ObjectState]], dt: float) -> Moment:
         names = tuple(name for name, _ in seen)
         column = {
             what: np.array([getattr(state, what) for _, state in seen], dtype=np.float64)
@@ -263,19 +283,12 @@ class EsminiTraffic:
         }
         road = np.array([self._road(state) for _, state in seen], dtype=np.int64)
         lane = np.array([state.lane for _, state in seen], dtype=np.int64)
-        network, width, is_lane = self.network, np.ones(len(seen)), np.zeros(len(seen), dtype=np.bool_)
-        direction, heading = np.ones(len(seen)), np.array([state.h for _, state in seen], dtype=np.float64)
-        for row, s in enumerate(column["s"].tolist()):
-            if road[row] < 0 or not network.has_lane_at(int(road[row]), int(lane[row]), s):
-                road[row] = -1
-        on = np.flatnonzero((road >= 0) & (lane != 0))
-        if len(on):
-            places = (road[on], lane[on], column["s"][on])
-            width[on] = np.maximum(network.lane_width(*places), 1e-3)
-            is_lane[on] = network.lane_index(*places)[0] >= 0
-            direction[on] = network.travel_directions(*places[:2])
-            heading[on] = network.lane_to_world(*places).heading
-        offset = direction * column["offset_t"]
+        lanes = self._lanes(seen, road, self.traffic.is_due(self.player.SE_GetSimulationTime() + dt))
+        road = np.where([one.is_lane for one in lanes], road, -1)
+        offset = column["offset_t"] * [one.direction for one in lanes]
+        heading = np.array([one.heading for one in lanes])
+        is_lane = np.array([one.is_driving for one in lanes], dtype=np.bool_)
+        width = np.array([one.width for one in lanes])
         pulled = np.array([state.category in _PULLED for _, state in seen], dtype=np.bool_)
         ours = np.array([state.ctrl_type == 0 and name not in self._ego for name, state in seen], dtype=np.bool_)
         busy = {name for action, count in self._running.items() if count > 0 for name in self._moved_by[action]}
@@ -291,6 +304,25 @@ class EsminiTraffic:
             places=Places(column["x"], column["y"], heading, road, lane, column["s"], column["length"],
                           column["width"], column["center_x"]),
         )  # fmt: skip
+
+    def _lanes(self, seen: list[tuple[str, ObjectState]], road: NDArray[np.int64], anew: bool) -> list[_Lane]:
+        """The lanes that vehicles are on; between steps of the model as they were, if they are the same."""
+        network, found = self.network, []
+        for (name, state), index in zip(seen, road.tolist(), strict=True):
+            known = self._lane_of.get(name)
+            if known is None or anew or known.place != (index, state.lane):
+                place, s = (index, state.lane), state.s
+                known = _Lane(place, False, False, 1, 1.0, state.h)
+                if index >= 0 and state.lane != 0 and network.has_lane_at(index, state.lane, s):
+                    width = float(network.lane_width(index, state.lane, s))
+                    known = _Lane(
+                        place, True, bool(network.lane_index(index, state.lane, s)[0] >= 0) and width > 0.0,
+                        network.travel_direction(index, state.lane), max(width, 1e-3),
+                        network.pose_at(index, state.lane, s).heading,
+                    )  # fmt: skip
+                self._lane_of[name] = known
+            found.append(known)
+        return found
 
     def _on_element(self, name: bytes, kind: int, state: int, path: bytes) -> None:
         """Esmini's callback: a lateral action takes its vehicles, and gives them back."""

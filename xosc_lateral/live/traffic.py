@@ -192,7 +192,7 @@ class Traffic:
             there. Nothing has changed then: the next good moment goes on.
         """
         _check(time, self._time, moment)
-        context = self._context(moment) if self._is_due(time) else None
+        context = self._context(moment) if self.is_due(time) else None
         there = np.flatnonzero(moment.driven)
         who = self._present([moment.names[k] for k in there])
         passed = 0.0 if self._time is None else time - self._time
@@ -238,7 +238,8 @@ class Traffic:
         return name if name in self._profiles else ""
 
     # ---- model steps -------------------------------------------------------------------------------------------------
-    def _is_due(self, time: float) -> bool:
+    def is_due(self, time: float) -> bool:
+        """Whether `step` at `time` [s] will look at the context: lane widths and places matter then only."""
         return time >= self._step * self._knots - 1e-9 or self._time is None
 
     def _context(self, moment: Moment) -> dict[str, FloatArray]:
