@@ -91,6 +91,70 @@ def live_esmini(
     return LiveRun(rows, settings, traffic.warnings, events)
 
 
+def live_sumo(
+    config: PathLike,
+    *,
+    profile: ProfileLike = "motorway",
+    profiles: Mapping[str, ProfileLike] | None = None,
+    ego: Sequence[str] = (),
+    seed: int = 0,
+    duration: float = 86_400.0,
+    lateral_resolution: float | None = None,
+    options: Sequence[str] = (),
+    neighbours: str = Neighbours.BORROW,
+    folders: Paths = (),
+) -> LiveRun:
+    """Run a SUMO simulation with drivers in its vehicles; the extra `sumo`.
+
+    Parameters
+    ----------
+    config : path
+        ``.sumocfg``; SUMO's own random seed is as it says.
+    lateral_resolution : float, optional
+        Switches the sublane model on, if the configuration does not. [m]
+    options : sequence of str
+        Further words of SUMO's command line.
+    profile, profiles, ego, seed, duration, neighbours, folders
+        See `live_esmini`.
+
+    Raises
+    ------
+    SimulationError
+        In one line.
+    """
+    from xosc_lateral.live.sumo import SumoTraffic, start
+
+    chosen = given_profile(profile, folders)
+    others = {name: given_profile(one, folders) for name, one in (profiles or {}).items()}
+    if not Path(config).is_file():
+        raise FileNotFoundError(2, "No such file or directory", str(config))
+    sublane = [] if lateral_resolution is None else ["--lateral-resolution", f"{lateral_resolution:g}"]
+    connection = start(["-c", str(config), *sublane, *options])
+    rows: list[tuple[Any, ...]] = []
+    collisions = teleports = 0
+    try:
+        traffic = SumoTraffic(
+            connection, chosen, ego=ego, seed=seed, profiles=others, neighbours=Neighbours(neighbours)
+        )
+        end = float(connection.simulation.getTime()) + duration
+        while connection.simulation.getMinExpectedNumber() > 0 and connection.simulation.getTime() < end - 1e-9:
+            traffic.steer()
+            connection.simulationStep()
+            time = float(connection.simulation.getTime())
+            collisions += len(connection.simulation.getCollisions())
+            teleports += connection.simulation.getStartingTeleportNumber()
+            for name, x, y, h, speed, lane, s, offset in traffic.states():
+                wanted, steered = traffic.moves.get(name, (float("nan"), False))
+                edge, _, index = lane.rpartition("_")
+                rows.append((time, name, x, y, h, speed, edge, int(index), s, offset, wanted, steered))
+    finally:
+        connection.close()
+    settings = {"scenario": Path(config).name, "profile": chosen.name, "seed": seed}
+    warnings = [f"SUMO reports {count} {what}" for count, what in ((collisions, "collisions"), (teleports, "teleports"))
+                if count]  # fmt: skip
+    return LiveRun(rows, settings, [*traffic.warnings, *warnings])
+
+
 class LiveRun(Result):
     """A run of a simulation with drivers in it."""
 

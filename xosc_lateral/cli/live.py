@@ -17,6 +17,7 @@ PerVehicle = Annotated[
     list[str] | None,
     typer.Option("--vehicle", metavar="NAME=PROFILE", help="Another profile for one vehicle; may be repeated."),
 ]
+Ego = Annotated[list[str] | None, typer.Option(metavar="NAME", help="Vehicle under test: not driven; may be repeated.")]
 States = Annotated[
     str | None, typer.Option("--states", metavar="OUT", help="Table of where everybody was: .csv, .csv.gz, .parquet.")
 ]
@@ -26,13 +27,17 @@ HELP = {
         "Play a scenario in esmini, through your library of it.",
         examples("live esmini cut-in.xosc --player-library libesminiLib.so --ego Ego --states states.csv"),
     ),
+    "sumo": (
+        "Run a SUMO simulation (extra sumo).",
+        examples("live sumo run.sumocfg -p motorway --seed 1 --lateral-resolution 0.25 --states states.parquet"),
+    ),
 }
 
 
 def register(app: typer.Typer) -> None:
     """Add the verb to the command line."""
     live = typer.Typer(help="Drivers in a simulation that runs.", no_args_is_help=True)
-    for verb in (esmini,):
+    for verb in (esmini, sumo):
         short, epilog = HELP[verb.__name__]
         live.command(verb.__name__, short_help=short, epilog=epilog)(verb)
     app.add_typer(live, name="live", short_help="Drivers in a simulation that runs.")
@@ -45,9 +50,7 @@ def esmini(
     ],
     profile: Profile = "motorway",
     vehicle: PerVehicle = None,
-    ego: Annotated[
-        list[str] | None, typer.Option(metavar="NAME", help="Vehicle under test: not driven; may be repeated.")
-    ] = None,
+    ego: Ego = None,
     seed: Seed = 0,
     duration: Annotated[float, typer.Option(help="Ends here, if not before. [s]", min=0.01, max=86_400)] = 3600.0,
     step: Annotated[float, typer.Option(help="Length of a step. [s]", min=0.001, max=0.2)] = 0.01,
@@ -60,16 +63,53 @@ def esmini(
 ) -> None:
     """Play a scenario in esmini with drivers in its vehicles; its triggers and maneuvers stay as written."""
     from xosc_lateral.api.live import live_esmini
-    from xosc_lateral.formats.output_paths import claim, output_file
-    from xosc_lateral.formats.tables import TABLE_SUFFIXES
 
-    if states is not None:
-        claim([output_file(states, "states.csv", TABLE_SUFFIXES)], [scenario], force=force)
+    _claim(states, [scenario], force=force)
     run = live_esmini(
         scenario, player_library, profile=profile, profiles=pairs(vehicle, "--vehicle"), ego=ego or (), seed=seed,
         duration=duration, step=step, window=window, folders=library or (),
     )  # fmt: skip
     _finish(run, states, force=force, quiet=quiet, as_json=as_json)
+
+
+def sumo(
+    config: Annotated[Path, typer.Argument(help="Configuration (.sumocfg).", show_default=False)],
+    profile: Profile = "motorway",
+    vehicle: PerVehicle = None,
+    ego: Ego = None,
+    seed: Seed = 0,
+    duration: Annotated[float, typer.Option(help="Ends here, if not before. [s]", min=0.01, max=1e7)] = 86_400.0,
+    lateral_resolution: Annotated[
+        float | None,
+        typer.Option(help="Switch the sublane model on [m]; default: as configured.", min=0.01, max=5.0),
+    ] = None,
+    fcd_output: Annotated[
+        Path | None, typer.Option(metavar="FCD.xml", help="SUMO's own output of where everybody was.")
+    ] = None,
+    states: States = None,
+    library: Library = None,
+    force: Force = False,
+    quiet: Quiet = False,
+    as_json: AsJson = False,
+) -> None:
+    """Run a SUMO simulation with the sublane model and drivers in its vehicles; lane changes stay SUMO's."""
+    from xosc_lateral.api.live import live_sumo
+
+    _claim(states, [config], force=force)
+    run = live_sumo(
+        config, profile=profile, profiles=pairs(vehicle, "--vehicle"), ego=ego or (), seed=seed, duration=duration,
+        lateral_resolution=lateral_resolution, folders=library or (),
+        options=() if fcd_output is None else ("--fcd-output", str(fcd_output)),
+    )  # fmt: skip
+    _finish(run, states, force=force, quiet=quiet, as_json=as_json)
+
+
+def _claim(states: str | None, inputs: list[Path], *, force: bool) -> None:
+    from xosc_lateral.formats.output_paths import claim, output_file
+    from xosc_lateral.formats.tables import TABLE_SUFFIXES
+
+    if states is not None:
+        claim([output_file(states, "states.csv", TABLE_SUFFIXES)], inputs, force=force)
 
 
 def _finish(run: LiveRun, states: str | None, *, force: bool, quiet: bool, as_json: bool) -> None:
