@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -31,16 +32,24 @@ HELP = {
         "Run a SUMO simulation (extra sumo).",
         examples("live sumo run.sumocfg -p motorway --seed 1 --lateral-resolution 0.25 --states states.parquet"),
     ),
+    "stdio": (
+        "Answer over a pipe: one line of JSON in, one out.",
+        examples("live stdio -p motorway --seed 1 --road motorway.xodr"),
+    ),
 }
 
 
 def register(app: typer.Typer) -> None:
     """Add the verb to the command line."""
     live = typer.Typer(help="Drivers in a simulation that runs.", no_args_is_help=True)
-    for verb in (esmini, sumo):
+    for verb in (esmini, sumo, stdio):
         short, epilog = HELP[verb.__name__]
         live.command(verb.__name__, short_help=short, epilog=epilog)(verb)
     app.add_typer(live, name="live", short_help="Drivers in a simulation that runs.")
+    export = typer.Typer(help="Drivers as parts for other tools.", no_args_is_help=True)
+    lines = examples("export fmu -p motorway -o driver.fmu", "export fmu -p motorway --fmi 3.0 -o driver.fmu")
+    export.command("fmu", short_help="A functional mock-up unit (extra fmu).", epilog=lines)(fmu)
+    app.add_typer(export, name="export", short_help="Drivers as parts for other tools.")
 
 
 def esmini(
@@ -102,6 +111,49 @@ def sumo(
         options=() if fcd_output is None else ("--fcd-output", str(fcd_output)),
     )  # fmt: skip
     _finish(run, states, force=force, quiet=quiet, as_json=as_json)
+
+
+def stdio(
+    profile: Profile = "motorway",
+    seed: Seed = 0,
+    road: Annotated[Path | None, typer.Option(help="OpenDRIVE file that vehicles' places are on.")] = None,
+    library: Library = None,
+) -> None:
+    """Answer lines of standard input on standard output, as docs/schemas/live.json has them, until there are no more."""
+    import sys
+
+    from xosc_lateral.api.inputs import given_profile
+    from xosc_lateral.live.stdio import Pipe
+
+    for line in Pipe(given_profile(profile, library or ()), seed=seed, road=road).answers(sys.stdin):
+        print(line, flush=True)
+
+
+class Fmi(StrEnum):
+    """Versions of the standard."""
+
+    TWO = "2.0"
+    THREE = "3.0"
+
+
+def fmu(
+    output: Annotated[Path, typer.Option("--output", "-o", metavar="OUT.fmu", help="The unit.")],
+    profile: Profile = "motorway",
+    fmi: Annotated[Fmi, typer.Option(help="Version of FMI.")] = Fmi.TWO,
+    library: Library = None,
+    force: Force = False,
+    quiet: Quiet = False,
+) -> None:
+    """Write a driver as a functional mock-up unit for co-simulation; it needs this package where it is simulated."""
+    from xosc_lateral.api.inputs import given_profile
+    from xosc_lateral.formats.output_paths import claim
+    from xosc_lateral.live.fmu import export_fmu
+
+    claim([output], force=force)
+    chosen = given_profile(profile, library or ())
+    export_fmu(chosen, output, fmi=fmi)
+    if not quiet:
+        typer.echo(f"{chosen.name} as FMI {fmi} in {output}", err=True)
 
 
 def _claim(states: str | None, inputs: list[Path], *, force: bool) -> None:
