@@ -119,14 +119,19 @@ def stdio(
     road: Annotated[Path | None, typer.Option(help="OpenDRIVE file that vehicles' places are on.")] = None,
     library: Library = None,
 ) -> None:
-    """Answer lines of standard input on standard output, as docs/schemas/live.json has them, until there are no more."""
+    """Answer lines on standard input, as docs/schemas/live.json has them, until there are no more."""
+    import os
     import sys
 
     from xosc_lateral.api.inputs import given_profile
     from xosc_lateral.live.stdio import Pipe
 
-    for line in Pipe(given_profile(profile, library or ()), seed=seed, road=road).answers(sys.stdin):
-        print(line, flush=True)
+    pipe = Pipe(given_profile(profile, library or ()), seed=seed, road=road)
+    try:
+        for line in pipe.answers(sys.stdin):
+            print(line, flush=True)
+    except BrokenPipeError:  # nobody listens any more; nor is there anybody to flush to at the end
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 class Fmi(StrEnum):

@@ -9,6 +9,7 @@ from __future__ import annotations
 import sys
 import tempfile
 from collections.abc import Mapping
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -37,19 +38,26 @@ OUTPUTS = {"offset": "m", "rate": "m/s", "heading": "rad"}
 """What the driver says; positive to the LEFT of travel."""
 
 SCRIPT = '''"""A driver of xosc-lateral."""
+from {package} import {base}
+
 try:
-    from xosc_lateral.live.fmu import unit_class
+    from xosc_lateral.live.fmu import unit_methods
 except ImportError as error:
     raise ImportError(
         "this FMU needs the package xosc-lateral {version} beside it, in the Python that loads it: "
         f"pip install 'xosc-lateral[fmu]' ({{error}})"
     ) from None
 
-{base} = unit_class("{fmi}", __file__)
-
 
 class LateralDriver({base}):
     """One driver: inputs are what he sees, outputs where he is in his lane."""
+
+    def do_step(self, current_time, step_size):
+        return self.go_on(current_time, step_size)
+
+
+for name, method in unit_methods("{fmi}", __file__).items():
+    setattr(LateralDriver, name, method)
 '''
 
 
@@ -77,16 +85,15 @@ def export_fmu(profile: DriverProfile, path: Path, *, fmi: str = "2.0") -> None:
         Without the extra `fmu`.
     """
     try:
-        if fmi == "3.0":
-            from pythonfmu3.builder import FmuBuilder
-        else:
-            from pythonfmu.builder import FmuBuilder
+        package = "pythonfmu3" if fmi == "3.0" else "pythonfmu"
+        builder = import_module(f"{package}.builder").FmuBuilder
     except ImportError as error:
         raise SimulationError("writing an FMU needs pythonfmu: pip install 'xosc-lateral[fmu]'") from error
     with tempfile.TemporaryDirectory() as folder:
         # units in one process share Python's modules: each has a name of its own
         script = Path(folder) / f"lateral_driver_fmi{fmi[0]}_{profile_hash(profile)[:12]}.py"
-        script.write_text(SCRIPT.format(version=__version__, fmi=fmi, base=f"Fmi{fmi[0]}Slave"), encoding="utf-8")
+        filled = SCRIPT.format(version=__version__, fmi=fmi, base=f"Fmi{fmi[0]}Slave", package=package)
+        script.write_text(filled, encoding="utf-8")
         write_profile(profile, Path(folder) / "profile.json")
         built = Path(folder) / "built"
         built.mkdir()
@@ -94,7 +101,7 @@ def export_fmu(profile: DriverProfile, path: Path, *, fmi: str = "2.0") -> None:
         try:
             state = "canGetAndSetFMUState" if fmi == "3.0" else "canGetAndSetFMUstate"
             serial = "canSerializeFMUState" if fmi == "3.0" else "canSerializeFMUstate"
-            FmuBuilder.build_FMU(
+            builder.build_FMU(
                 script, dest=built, project_files={Path(folder) / "profile.json"},
                 **{state: "true", serial: "true", "needsExecutionTool": "true"},
             )  # fmt: skip
@@ -104,8 +111,12 @@ def export_fmu(profile: DriverProfile, path: Path, *, fmi: str = "2.0") -> None:
         write_atomically(path, next(built.glob("*.fmu")).read_bytes())
 
 
-def unit_class(fmi: str, script: str) -> type:
-    """The class that the script of a unit has, for that version of FMI."""
+def unit_methods(fmi: str, script: str) -> dict[str, Any]:
+    """What the class in a unit's script does, by name, for that version of FMI.
+
+    The class itself has to be in the script, made from the base class that is imported there: the loaders of pythonfmu
+    look for it so.
+    """
     if fmi == "3.0":
         from pythonfmu3 import (
             Boolean,
@@ -132,99 +143,101 @@ def unit_class(fmi: str, script: str) -> type:
     own = read_profile(Path(script).with_name("profile.json"))
     columns = ("speed", "lane_width", *sorted(set(own.columns_of_any_drive) - {"speed", "lane_width"}))
 
-    class LateralDriver(base):  # type: ignore[misc, valid-type]
-        """One driver: inputs are what he sees, outputs where he is in his lane."""
+    description = f"Driver {own.name} of xosc-lateral {__version__}: lateral offset in the lane, positive left"
 
-        description = f"Driver {own.name} of xosc-lateral {__version__}: lateral offset in the lane, positive left"
-        author = "xosc-lateral"
+    def begin(self: Any, **settings: Any) -> None:
+        base.__init__(self, **settings)
+        # the next unit's loader looks for its own files: those of this one may be gone by then
+        sys.modules.pop(type(self).__module__, None)
+        self.description, self.author = description, "xosc-lateral"
+        self.profile, self.seed = "", 0
+        self.following, self.position = True, 0.0
+        self.offset = self.rate = self.heading = 0.0
+        self._traffic = None
+        for name in columns:
+            setattr(self, name, _start(name, own))
+        fixed = {"causality": causality.parameter, "variability": variability.fixed}
+        self.register_variable(integer("seed", **fixed, description="Same seed, same driver: as of `sample`."))
+        self.register_variable(
+            String("profile", **fixed, description="Path or name of another profile; empty: the one within.")
+        )
+        given = {"causality": causality.input, "variability": variability.continuous}
+        if Unit is not None:
+            self.register_units([Unit(name, **base_units) for name, base_units in UNITS.items()])
+            self.time = 0.0
+            clock = {"causality": causality.independent, "variability": variability.continuous}
+            self.register_variable(real("time", **clock))
+        self._units = {name: CONTEXT_UNITS.get(name, "-") for name in columns} | {"position": "m"} | OUTPUTS
+        for name in (*columns, "position"):
+            self.register_variable(number(name, self, **given, description=_WORDS.get(name, name)))
+        self.register_variable(
+            Boolean("following", causality=causality.input, variability=variability.discrete,
+                    description="It follows the road; while not, `position` is where it is.")
+        )  # fmt: skip
+        for name in OUTPUTS:
+            shown = {"causality": causality.output, "variability": variability.continuous}
+            self.register_variable(number(name, self, **shown, description=_WORDS[name]))
 
-        def __init__(self, **settings: Any) -> None:
-            super().__init__(**settings)
-            self.profile, self.seed = "", 0
-            self.following, self.position = True, 0.0
-            self.offset = self.rate = self.heading = 0.0
-            self._traffic: Traffic | None = None
-            for name in columns:
-                setattr(self, name, _start(name, own))
-            fixed = {"causality": causality.parameter, "variability": variability.fixed}
-            self.register_variable(integer("seed", **fixed, description="Same seed, same driver: as of `sample`."))
-            self.register_variable(
-                String("profile", **fixed, description="Path or name of another profile; empty: the one within.")
-            )
-            given = {"causality": causality.input, "variability": variability.continuous}
-            if Unit is not None:
-                self.register_units([Unit(name, **base_units) for name, base_units in UNITS.items()])
-                self.time = 0.0
-                clock = {"causality": causality.independent, "variability": variability.continuous}
-                self.register_variable(real("time", **clock))
-            self._units = {name: CONTEXT_UNITS.get(name, "-") for name in columns} | {"position": "m"} | OUTPUTS
-            for name in (*columns, "position"):
-                self.register_variable(self._real(name, **given, description=_WORDS.get(name, name)))
-            self.register_variable(
-                Boolean("following", causality=causality.input, variability=variability.discrete,
-                        description="It follows the road; while not, `position` is where it is.")
-            )  # fmt: skip
-            for name in OUTPUTS:
-                shown = {"causality": causality.output, "variability": variability.continuous}
-                self.register_variable(self._real(name, **shown, description=_WORDS[name]))
+    def number(name: str, self: Any, **how: Any) -> Any:
+        return real(name, unit=self._units[name], **how) if Unit is not None else real(name, **how)
 
-        def _real(self, name: str, **how: Any) -> Any:
-            return real(name, unit=self._units[name], **how) if Unit is not None else real(name, **how)
+    def to_xml(self: Any, *words: Any, **options: Any) -> Any:
+        """The model description; FMI 2's with units and initial unknowns, which pythonfmu leaves out."""
+        root = base.to_xml(self, *words, **options)
+        if Unit is None:
+            _complete(root, self._units)
+        return root
 
-        def to_xml(self, *words: Any, **options: Any) -> Any:
-            """The model description; FMI 2's with units and initial unknowns, which pythonfmu leaves out."""
-            root = super().to_xml(*words, **options)
-            if Unit is None:
-                _complete(root, self._units)
-            return root
+    def exit_initialization_mode(self: Any) -> None:
+        self.start_at(0.0)
 
-        def exit_initialization_mode(self) -> None:
-            self._begin(0.0)
+    def start_at(self: Any, time: float) -> None:
+        chosen = read_profile(self.profile) if self.profile else own
+        self._traffic = _OneDriver(chosen, seed=int(self.seed))
+        self.look(time)
 
-        def _begin(self, time: float) -> None:
-            chosen = read_profile(self.profile) if self.profile else own
-            self._traffic = _OneDriver(chosen, seed=int(self.seed))
-            self._go_on(time)
+    def look(self: Any, time: float) -> None:
+        assert self._traffic is not None
+        context = {
+            name: np.array([_seen(name, getattr(self, name))]) for name in columns if name not in _APART
+        }  # fmt: skip
+        where = self.position if not self.following else self.offset
+        truck = np.array([bool(getattr(self, "is_truck", 0.0))])
+        moment = Moment(
+            ("vehicle",), np.array([self.speed]), np.array([self.lane_width]), np.array([where]),
+            np.array([bool(self.following)]), np.ones(1, dtype=np.bool_), truck, context=context,
+        )  # fmt: skip
+        moves = self._traffic.step(time, moment)
+        self.offset, self.rate, self.heading = (float(values[0]) for values in moves[:3])
 
-        def _go_on(self, time: float) -> None:
-            assert self._traffic is not None
-            context = {
-                name: np.array([_seen(name, getattr(self, name))]) for name in columns if name not in _APART
-            }  # fmt: skip
-            where = self.position if not self.following else self.offset
-            truck = np.array([bool(getattr(self, "is_truck", 0.0))])
-            moment = Moment(
-                ("vehicle",), np.array([self.speed]), np.array([self.lane_width]), np.array([where]),
-                np.array([bool(self.following)]), np.ones(1, dtype=np.bool_), truck, context=context,
-            )  # fmt: skip
-            moves = self._traffic.step(time, moment)
-            self.offset, self.rate, self.heading = (float(values[0]) for values in moves[:3])
+    def go_on(self: Any, current_time: float, step_size: float) -> Any:
+        """Where the driver is at the end of the step."""
+        if self._traffic is None:
+            self.start_at(current_time)
+        try:
+            self.look(current_time + step_size)
+        except SimulationError as error:
+            self.log(str(error), refused)
+            return result(status=refused) if Unit is not None else False
+        return result(status=done) if Unit is not None else True
 
-        def do_step(self, current_time: float, step_size: float) -> Any:
-            """Where the driver is at the end of the step."""
-            if self._traffic is None:
-                self._begin(current_time)
-            try:
-                self._go_on(current_time + step_size)
-            except SimulationError as error:
-                self.log(str(error), refused)
-                return result(status=refused) if Unit is not None else False
-            return result(status=done) if Unit is not None else True
+    def _get_fmu_state(self: Any) -> dict[str, Any]:
+        names = (*columns, "position", "following", *OUTPUTS, "seed", "profile")
+        traffic = None if self._traffic is None else self._traffic.to_dict()
+        return {"values": {name: getattr(self, name) for name in names}, "traffic": traffic}
 
-        def _get_fmu_state(self) -> dict[str, Any]:
-            names = (*columns, "position", "following", *OUTPUTS, "seed", "profile")
-            traffic = None if self._traffic is None else self._traffic.to_dict()
-            return {"values": {name: getattr(self, name) for name in names}, "traffic": traffic}
+    def _set_fmu_state(self: Any, state: Mapping[str, Any]) -> None:
+        for name, value in state["values"].items():
+            setattr(self, name, value)
+        self._traffic = None
+        if state["traffic"] is not None:
+            self._traffic = _OneDriver(read_profile(self.profile) if self.profile else own)
+            self._traffic.restore(state["traffic"])
 
-        def _set_fmu_state(self, state: Mapping[str, Any]) -> None:
-            for name, value in state["values"].items():
-                setattr(self, name, value)
-            self._traffic = None
-            if state["traffic"] is not None:
-                self._traffic = _OneDriver(read_profile(self.profile) if self.profile else own)
-                self._traffic.restore(state["traffic"])
-
-    return LateralDriver
+    return {
+        "__init__": begin, "to_xml": to_xml, "exit_initialization_mode": exit_initialization_mode, "go_on": go_on,
+        "start_at": start_at, "look": look, "_get_fmu_state": _get_fmu_state, "_set_fmu_state": _set_fmu_state,
+    }  # fmt: skip
 
 
 _APART = ("speed", "lane_width", "is_truck")

@@ -125,8 +125,8 @@ class Pipe:
             poses = self.network.lane_to_world(road[on], lane[on], s[on], offset[on])
             centre = self.network.lane_to_world(road[on], lane[on], s[on])
             pose[:, on] = poses.x, poses.y, centre.heading
-        size = (np.array([_number(one, key, who, usual) for who, one in seen]) for key, usual in SIZE.items())
-        return Places(*pose, road, lane, s, *size)
+        size = [np.array([_number(one, key, who, usual) for who, one in seen]) for key, usual in SIZE.items()]
+        return Places(pose[0], pose[1], pose[2], road, lane, s, size[0], size[1], size[2])
 
 
 def _number(one: Mapping[str, Any], name: str, who: str, missing: float | None = None) -> float:
