@@ -1,7 +1,7 @@
 """Which settings of the fit does the recording ask for? The memory's length by prediction, the rest by held-out drives.
 
     xosc-lateral import dlr-ht tasi-0.15.4-py3-none-any.whl -o dlr.parquet
-    python -m benchmarks.fit_ablation dlr.parquet [--halves 4] [--write docs/validation/driver_model.md]
+    python -m benchmarks.fit_ablation dlr.parquet [--halves 4] [--write PAGE.md]
 
 The sensor's part is taken out first, as `fit` does. Order: mean squared error of the coarse movement one second ahead,
 five folds over drives, beside the best order, with its standard error over drives. Settings of the rounds: drives are
@@ -23,7 +23,7 @@ from benchmarks.markers import show
 from benchmarks.model_choice import LENGTHS, snippets
 from xosc_lateral.driver.models.autoregressive.filters import COARSE_EVERY, split_bands
 from xosc_lateral.driver.models.autoregressive.fit import fit_autoregressive
-from xosc_lateral.driver.models.autoregressive.fit_autoregression import fit_autoregression
+from xosc_lateral.driver.models.autoregressive.fit_coarse import fit_autoregression
 from xosc_lateral.driver.models.autoregressive.fit_matching import simulate
 from xosc_lateral.driver.models.autoregressive.fit_settings import DEFAULT_SETTINGS
 from xosc_lateral.driver.sensor.runs import driver_runs

@@ -83,7 +83,7 @@ def test_on_a_road_vehicles_see_each_other(tmp_path: Path) -> None:
         "me": {**place, "lane": -2, "s": 100.0},
         "other": {**place, "lane": -1, "s": 100.0, "driven": False, "offset": -0.9},
     }
-    far = {**near, "other": {**other, "s": 400.0}}
+    far = {**near, "other": {**near["other"], "s": 400.0}}
     ends = []
     for vehicles in (near, far):
         pipe = Pipe(read_profile("motorway"), seed=1, road=network.path)

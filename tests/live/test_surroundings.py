@@ -42,27 +42,32 @@ def places_of(motion: NominalMotion, row: int) -> Places:
 @pytest.mark.parametrize("seed", [1, 2, 3])
 def test_everybody_sees_what_he_sees_in_a_conversion(tmp_path: Path, rule: str, seed: int) -> None:
     network = two_roads(tmp_path, rule=rule)
-    motion = traffic(network, seed)
+    motion = traffic(network, seed, offset=float(seed) / 4.0)
+    offset = np.array([one.offset[2] for one in motion.entities])
     trucks = np.array([one.entity.vehicle_category is VehicleCategory.TRUCK for one in motion.entities])
-    found = look_around(OpenDriveRoads(network), places_of(motion, 2), trucks)
+    found = look_around(OpenDriveRoads(network), places_of(motion, 2), offset, trucks)
     for index in range(len(motion.entities)):
         wanted = entity_context(motion, network, index, np.array([2]))
-        assert set(found) == set(wanted) - {"speed", "acceleration", "is_truck"}
-        for name, values in found.items():
-            np.testing.assert_allclose(values[index], wanted[name][0], atol=1e-9, err_msg=f"{name} of {index}")
+        assert set(found) >= set(wanted) - {"speed", "acceleration", "is_truck"}
+        for name in found.keys() & wanted.keys():
+            values = found[name]
+            near = 5e-3 if name == "curvature" else 1e-9  # of the lane's centre line, there of the nominal path
+            np.testing.assert_allclose(values[index], wanted[name][0], rtol=near, atol=1e-9, err_msg=f"{name} {index}")
 
 
 def test_nobody_and_vehicles_off_the_road_have_no_surroundings(tmp_path: Path) -> None:
     roads = OpenDriveRoads(two_roads(tmp_path))
     none = np.empty(0)
     ids = np.empty(0, dtype=np.int64)
-    found = look_around(roads, Places(none, none, none, ids, ids, none, none, none, none), np.empty(0, dtype=bool))
+    found = look_around(
+        roads, Places(none, none, none, ids, ids, none, none, none, none), none, np.empty(0, dtype=bool)
+    )
     assert {"curvature", "left_distance", "lead_is_truck"} <= found.keys()
     places = places_of(traffic(roads.network, 1, n=3), 0)
     off = Places(places.x, places.y, places.heading, np.array([0, -1, 0]), places.lane, *(
         getattr(places, name) for name in ("s", "length", "width", "center_x")
     ))  # fmt: skip
-    found = look_around(roads, off, np.zeros(3, dtype=bool))
+    found = look_around(roads, off, np.zeros(3), np.zeros(3, dtype=bool))
     assert np.isnan(found["curvature"][1]) and np.isnan(found["left_distance"][1])
     assert np.isfinite(found["curvature"][[0, 2]]).all()
 

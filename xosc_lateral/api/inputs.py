@@ -11,19 +11,21 @@ from typing import TYPE_CHECKING, TypeAlias
 
 from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.drives.drive import Drive
-from xosc_lateral.errors import FormatError, NotEnoughDataError
+from xosc_lateral.errors import NotEnoughDataError
 from xosc_lateral.formats.hashes import parsed_hashes
 from xosc_lateral.formats.openscenario.read import RoadSearch
+from xosc_lateral.pipeline.options import PathLike, Paths, ProfileLike
+from xosc_lateral.pipeline.options import paths as as_paths
+
+__all__ = ["DrivesLike", "PathLike", "Paths", "ProfileLike", "as_paths", "given_drives", "given_profile", "road_search"]
 
 if TYPE_CHECKING:
     import pandas as pd
 
-PathLike: TypeAlias = str | Path
+    from xosc_lateral.formats.mapping import MappingLike
+
 DrivesLike: TypeAlias = "PathLike | pd.DataFrame | Drive | Sequence[PathLike | pd.DataFrame | Drive]"
 """A table's path, a frame, a `Drive`, or several of them."""
-ProfileLike: TypeAlias = PathLike | DriverProfile
-"""A profile, its path, or its name in the library."""
-Paths: TypeAlias = "PathLike | Sequence[PathLike]"
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -63,24 +65,25 @@ def naming(given: GivenDrives) -> Iterator[None]:
         raise NotEnoughDataError(f"{', '.join(names[:3])}{more}: {error}") from error
 
 
-def given_drives(drives: DrivesLike, columns: Mapping[str, str] | None = None) -> GivenDrives:
+def given_drives(drives: DrivesLike, columns: MappingLike | None = None) -> GivenDrives:
     """Read whatever stands for measured drives.
 
     Parameters
     ----------
     drives : path, DataFrame, Drive, or sequence of them
-    columns : mapping of str to str, optional
-        Standard name -> foreign header, with a unit if need be: ``{"speed": "v_kmh:km/h"}``.
+    columns : mapping of str to str, TableMapping, or path, optional
+        Standard name -> foreign header, with a unit if need be: ``{"speed": "v_kmh:km/h"}``; or a saved mapping.
 
     Raises
     ------
     FormatError, NotEnoughDataError
         See `formats.drives.read_drives`.
     """
-    from xosc_lateral.formats.drives import drives_of_table, parse_map, read_drives, with_distinct_names
+    from xosc_lateral.formats.drives import drives_of_table, read_drives, with_distinct_names
+    from xosc_lateral.formats.mapping import as_mapping
 
     items = _listed(drives)
-    mapping = parse_map(f"{name}={column}" for name, column in (columns or {}).items())
+    mapping = as_mapping(columns)
     files = [Path(item) for item in items if isinstance(item, str | Path)]
     if len(files) == len(items):
         return GivenDrives(read_drives(files, mapping), parsed_hashes(files), tuple(files))
@@ -114,11 +117,6 @@ def given_profile(profile: ProfileLike, library: Paths = ()) -> DriverProfile:
     return profile if isinstance(profile, DriverProfile) else read_profile(profile, as_paths(library))
 
 
-def as_paths(paths: Paths) -> tuple[Path, ...]:
-    """One path or several, as a tuple."""
-    return (Path(paths),) if isinstance(paths, str | Path) else tuple(Path(path) for path in paths)
-
-
 def _listed(drives: DrivesLike) -> list[PathLike | pd.DataFrame | Drive]:
     if isinstance(drives, str | Path | Drive) or not isinstance(drives, Sequence):
         return [drives]
@@ -133,10 +131,4 @@ def road_search(road: PathLike | None, folders: Paths) -> RoadSearch:
     FormatError
         No such file, no such folder.
     """
-    searched = as_paths(folders)
-    for folder in searched:
-        if not folder.is_dir():
-            raise FormatError("no such folder to look for roads in", path=folder)
-    if road is not None and not Path(road).is_file():
-        raise FormatError("no such road", path=road)
-    return RoadSearch(None if road is None else Path(road), searched)
+    return RoadSearch(None if road is None else Path(road), as_paths(folders))

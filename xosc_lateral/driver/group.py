@@ -19,6 +19,7 @@ from xosc_lateral.driver.process import DriveProcess, Movement, combine, offsets
 from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.driver.records import plain, read_as
 from xosc_lateral.driver.upsampling import extrapolate, piece
+from xosc_lateral.segment import FADES
 
 FloatArray = NDArray[np.float64]
 
@@ -147,7 +148,8 @@ class OffsetGroup:
         """What the effects of columns do to each driver at the sample that is next, shape (n,) each."""
         found = []
         for effect, response, slopes in zip(self._effects, self._responses, self._slopes, strict=True):
-            values = effect.known({column: context[column] for column in effect.columns})
+            names = (*effect.columns, *(f"{column}{FADES}" for column in effect.columns))
+            values = effect.known({name: context[name] for name in names if name in context})
             state, known = response.state, self._known(response, values.shape[1])
             row = values.ravel()
             if state.held is not None and known < len(values):  # to who has come, it has always been as it is now

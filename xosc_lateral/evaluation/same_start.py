@@ -1,9 +1,9 @@
-"""The fair floor: real windows of other drivers that begin where the real ones begin.
+"""A fair comparison: real windows of other drivers that begin where the real ones begin.
 
 A sampled window that starts where its real one starts knows something that a random real window does not: comparing
-both with the real windows would let every model with a good start look better than real driving. So the floor for such
-windows is made of real windows of *other* drivers whose start is the same; where sampled windows know no start, the
-floor is made of any windows of other drivers.
+both with the real windows would let every model with a good start look better than real driving. So such windows stand
+beside real windows of *other* drivers whose start is the same, and windows that know no start beside any windows of
+other drivers.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ NEAREST = 20
 """A stand-in is drawn among so many windows of other drivers whose starts are nearest."""
 
 FLOOR_DRAWS = 4
-"""Sets of stand-ins with the same start that a floor is averaged over."""
+"""Sets of stand-ins with the same start that are averaged over."""
 
 
 def windows_with_the_same_start(
@@ -36,6 +36,8 @@ def windows_with_the_same_start(
     nearest: int = NEAREST,
 ) -> IntArray:
     """For each window `count` others by other drivers that start at nearly the same offset.
+
+    Raises `NotEnoughDataError` when other drivers have fewer than `count` windows.
 
     Parameters
     ----------
@@ -54,11 +56,6 @@ def windows_with_the_same_start(
     -------
     array of int, shape (n, count)
         Rows of the donors. The donor should then be shifted by the few millimetres that its start differs, or not.
-
-    Raises
-    ------
-    NotEnoughDataError
-        When other drivers have fewer than `count` windows.
     """
     chosen = np.empty((len(starts), count), dtype=np.int64)
     for row, (start, driver) in enumerate(zip(starts.tolist(), drivers.tolist(), strict=True)):
@@ -74,7 +71,7 @@ def windows_with_the_same_start(
 def real_against_real(
     real: Features, donors: Features, rows: IntArray, donor_rows: IntArray, stand_ins: IntArray | None
 ) -> dict[str, float]:
-    """The floor of `differences`: what other drivers' windows get.
+    """`differences` of real windows of other drivers.
 
     Parameters
     ----------

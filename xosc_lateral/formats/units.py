@@ -70,8 +70,8 @@ _TABLE_UNITS = MappingProxyType({"time": "s", "offset": "m", "distance_left": "m
 
 def spelled(unit: str) -> str | None:
     """The unit in the spelling of `UNITS`; empty where none is given, None where it is not known."""
-    bare = "".join(unit.split()).strip("[]()").lower()
-    known = _SPELLINGS.get(bare, bare)
+    plain = "".join(unit.split()).strip("[]()").lower()
+    known = _SPELLINGS.get(plain, plain)
     return known if not known or known in UNITS else None
 
 
@@ -85,10 +85,7 @@ def factor(column: str, unit: str) -> float:
 
     A unit with a leading minus turns the sign: ``-m`` for offsets counted to the right.
 
-    Raises
-    ------
-    ValueError
-        For an unknown unit, or one that measures something else.
+    Raises `ValueError` for an unknown unit, or one that measures something else.
     """
     sign, name = (-1.0, unit[1:]) if unit.startswith("-") and unit != "-" else (1.0, unit)
     if name not in UNITS:

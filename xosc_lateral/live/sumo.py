@@ -95,6 +95,10 @@ class SumoRoads:
         self._count = dict.fromkeys(numbers.values(), 0)
         for edge, _ in self._name:
             self._count[edge] += 1
+        self._middle = {
+            (edge, lane): sum(self.width[edge, k] for k in range(1, lane)) + 0.5 * self.width[edge, lane]
+            for edge, lane in self._name
+        }
         self._courses: dict[tuple[int, int], tuple[FloatArray, FloatArray]] = {}
 
     @cached_property
@@ -164,6 +168,15 @@ class SumoRoads:
     def directions(self, road: IntArray, lane: IntArray) -> IntArray:
         """See `Roads`: every lane is driven along its own direction."""
         return np.ones(len(road), dtype=np.int64)
+
+    def across(self, road: IntArray, lane: IntArray, s: FloatArray, offset: FloatArray) -> FloatArray:
+        """See `Roads`: from the edge's right border."""
+        places = zip(road.tolist(), lane.tolist(), strict=True)
+        return np.array([self._middle[place] for place in places], dtype=np.float64) + offset
+
+    def centre(self, road: int, lane: int, s: FloatArray) -> FloatArray:
+        """See `Roads`."""
+        return np.full(len(s), self._middle[road, lane])
 
 
 class SumoTraffic:

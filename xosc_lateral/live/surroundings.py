@@ -16,16 +16,14 @@ from numpy.typing import NDArray
 from xosc_lateral.enrich.give_way import FADES, Frame, part_of, widened
 from xosc_lateral.motion.context import (
     IN_SIGHT,
-    REACH,
+    Around,
     Extent,
     Reach,
-    as_columns,
-    empty_lanes,
     free_space,
     lane_path,
+    lanes_beside,
     road_columns,
     see_along,
-    sides,
 )  # fmt: skip
 from xosc_lateral.motion.nearby import pairs_now
 from xosc_lateral.road.network import RoadNetwork
@@ -54,6 +52,14 @@ class Roads(Protocol):
         """+1 where a lane is driven along s, -1 against it, shape (n,). [-]"""
         ...
 
+    def across(self, road: IntArray, lane: IntArray, s: FloatArray, offset: FloatArray) -> FloatArray:
+        """Lateral coordinate t on the road of places so far from their lanes' centres, shape (n,). [m]"""
+        ...
+
+    def centre(self, road: int, lane: int, s: FloatArray) -> FloatArray:
+        """The same of one lane's centre, shape (n,). [m]"""
+        ...
+
 
 @dataclass(frozen=True, slots=True)
 class OpenDriveRoads:
@@ -63,7 +69,7 @@ class OpenDriveRoads:
 
     def columns(self, road: IntArray, lane: IntArray, s: FloatArray) -> dict[str, FloatArray]:
         """See `Roads`."""
-        return road_columns(self.network, road, lane, s, np.zeros(len(s)))
+        return road_columns(self.network, road, lane, s, np.zeros(len(s)), np.ones(len(s)))
 
     def section(self, road: int, lane: int, s: float) -> float:
         """See `Roads`."""
@@ -71,11 +77,19 @@ class OpenDriveRoads:
 
     def path(self, road: int, lane: int, s: float) -> list[Reach]:
         """See `Roads`."""
-        return lane_path(self.network, road, lane, s)
+        return lane_path(self.network, road, lane, s, self.network.travel_direction(road, lane))
 
     def directions(self, road: IntArray, lane: IntArray) -> IntArray:
         """See `Roads`."""
         return np.asarray(self.network.travel_directions(road, lane), dtype=np.int64)
+
+    def across(self, road: IntArray, lane: IntArray, s: FloatArray, offset: FloatArray) -> FloatArray:
+        """See `Roads`."""
+        return self.network.offset_to_t(road, lane, s, offset)
+
+    def centre(self, road: int, lane: int, s: FloatArray) -> FloatArray:
+        """See `Roads`."""
+        return self.network.lane_centre_t(road, lane, s)
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -105,33 +119,31 @@ class Places:
     center_x: FloatArray
 
 
-def look_around(roads: Roads, places: Places, is_truck: BoolArray) -> dict[str, FloatArray]:
-    """Context columns of the road and of the vehicles around, shape (n,) each; NaN off the road."""
+def look_around(roads: Roads, places: Places, offset: FloatArray, is_truck: BoolArray) -> dict[str, FloatArray]:
+    """Context columns of the road and of the vehicles around, shape (n,) each; NaN off the road.
+
+    A conversion knows what comes, and has the road's columns as means over the way around; here they are as they are.
+    """
     n = len(places.x)
     on = np.flatnonzero((places.road >= 0) & (places.lane != 0))
     road: dict[str, FloatArray] = {}
     for name, values in roads.columns(places.road[on], places.lane[on], places.s[on]).items():
         road[name] = np.full(n, np.nan)
         road[name][on] = values
-    nearest = {side: np.full(n, np.nan) for side in ("lead", "left", "right", "oncoming")}
-    truck = {side: np.zeros(n) for side in ("lead", "left", "right")}
-    direction = np.ones(n, dtype=np.int64)
+    direction, t = np.ones(n, dtype=np.int64), np.full(n, np.nan)
     direction[on] = roads.directions(places.road[on], places.lane[on])
+    t[on] = roads.across(places.road[on], places.lane[on], places.s[on], offset[on])
+    width = np.maximum(np.fmax(road["lane_width"], places.width), 0.1)
+    around = Around.nobody(n)
     for path, u, i, j in _along_paths(roads, places, on):
         there = np.ones(len(i), dtype=np.bool_)
-        seen = see_along(path, u[i], places.road[j], places.lane[j], places.s[j], direction[j], there=there)
+        seen = see_along(
+            path, u[i], offset[i], places.road[j], places.lane[j], places.s[j], t[j], direction[j], there, roads.centre
+        )
         extents = (Extent(places.length[k], places.center_x[k]) for k in (i, j))
-        gap = free_space(seen, *extents)
-        for side, which in sides(seen).items():
-            with np.errstate(invalid="ignore"):
-                near = np.flatnonzero(which & (gap <= REACH))
-            np.fmin.at(nearest[side], i[near], gap[near])
-            if side in truck:
-                closest = near[gap[near] == nearest[side][i[near]]]
-                closest = closest[np.argsort(-j[closest], kind="stable")]  # of two as near, the first one counts
-                truck[side][i[closest]] = is_truck[j[closest]]
-    around = as_columns(nearest, truck)
-    return road | around | empty_lanes(road, around)
+        around.add(i, seen, free_space(seen, *extents), width[i], places.width[j], is_truck[j])
+    lanes = {side: one.astype(np.float64) for side, one in lanes_beside(road).items()}
+    return road | around.columns(lanes, always_fade=True)
 
 
 def _along_paths(

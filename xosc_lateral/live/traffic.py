@@ -21,11 +21,11 @@ from xosc_lateral.driver.group import OffsetGroup
 from xosc_lateral.driver.plausibility import first_implausible, implausible
 from xosc_lateral.driver.profile import DriverProfile, sampling_hash
 from xosc_lateral.enrich.enrich import sides_known
-from xosc_lateral.enrich.give_way import RESPONSE
 from xosc_lateral.enrich.neighbours import Neighbours
 from xosc_lateral.enrich.other_hand import mirrored_context
 from xosc_lateral.errors import SimulationError
 from xosc_lateral.live.surroundings import Places, Roads, give_way_now, look_around
+from xosc_lateral.motion.context import STEERING
 from xosc_lateral.motion.deviation import SETTLING_TIME, settle
 from xosc_lateral.motion.segments import MINIMUM_SPEED
 
@@ -55,14 +55,14 @@ _NOTHING = 1e-12
 _DRIVER = np.dtype(
     [("curve", float, 6), ("begun", bool), ("following", bool), ("place", float), ("own", float),
      ("rest", float), ("from", float), ("from_rate", float), ("share", float), ("over", float), ("slip", float),
-     ("aside", float), ("aside_rate", float), ("wanted", float), ("speeds", float, _SPEEDS)]
+     ("aside", float), ("aside_rate", float), ("wanted", float), ("speeds", float, _SPEEDS), ("width", float)]
 )  # fmt: skip
 """A driver beside his random numbers.
 
 His curve until the next model step and whether it has begun; whether the vehicle followed the road a step ago, where it
 was, and the driver's own offset there [m]; what leads over to his path: `rest` [m], from `from` [m] at `from_rate`
 [m/s], done to `share` [-] of `over` [s], plus what slow driving left out (`slip` [m]); how far he has moved aside, how
-fast, and how far he wants to; speeds of the last second.
+fast, and how far he wants to; speeds of the last second; width of the lane as he has it [m].
 """
 
 
@@ -252,7 +252,7 @@ class Traffic:
                 acceleration[row] = (moment.speed[row] - self._state["speeds"][k, 0]) / (_SPEEDS - 1) / self._step
         found["acceleration"] = acceleration
         if moment.places is not None and self._roads is not None:
-            found |= look_around(self._roads, moment.places, moment.is_truck)
+            found |= look_around(self._roads, moment.places, moment.offset, moment.is_truck)
         found |= {name: np.asarray(values, dtype=np.float64) for name, values in moment.context.items()}
         found["lane_width"] = moment.lane_width
         if self._columns is not None and (missing := set(self._columns) - found.keys()):
@@ -276,7 +276,7 @@ class Traffic:
             self._knots = max(self._knots, int(np.floor(time / self._step + 1e-9)))
         due = int(np.floor(time / self._step + 1e-9)) + 1 - self._knots
         self._knots += due
-        row = {moment.names[k]: k for k in there.tolist()}
+        row, width = {moment.names[k]: k for k in there.tolist()}, context["lane_width"]
         for name in row:
             key = self._profile_key(name)
             if key not in self._groups:
@@ -288,12 +288,13 @@ class Traffic:
         for key, (group, members) in self._groups.items():
             if not members:
                 continue
-            rows = np.array([row[name] for name in members])
+            rows, drivers = np.array([row[name] for name in members]), [self._index[name] for name in members]
             other_hand = self._profiles[key].left_hand != self._left_hand
             seen = mirrored_context(context) if other_hand else context
             for _ in range(due):
-                curve = group.advance({name: seen[name][rows] for name in self._columns}, context["lane_width"][rows])
-            drivers = [self._index[name] for name in members]
+                curve = group.advance(
+                    {name: seen[name][rows] for name in self._columns}, self._width(drivers, width[rows])
+                )
             self._state["curve"][drivers] = -curve if other_hand else curve
         state = self._state
         new = who[~state["begun"][who]]
@@ -301,6 +302,12 @@ class Traffic:
         state["begun"][who] = True
         state["speeds"][who] = np.column_stack([state["speeds"][who, 1:], moment.speed[there]])
         state["wanted"][who] = self._aside(moment, there, who)[there]
+
+    def _width(self, drivers: list[int], width: FloatArray) -> FloatArray:
+        """The lane's, a first-order lag behind what it is: a border of two widths is no jump of the path. [m]"""
+        before = np.where(self._state["width"][drivers] > 0.0, self._state["width"][drivers], width)
+        self._state["width"][drivers] = width + (before - width) * np.exp(-self._step / STEERING)
+        return np.asarray(self._state["width"][drivers])
 
     def _aside(self, moment: Moment, there: NDArray[np.int64], who: NDArray[np.int64]) -> FloatArray:
         """How far everybody wants to move aside, shape (n,). [m]"""
@@ -440,12 +447,12 @@ def _pace(speed: FloatArray) -> FloatArray:
 
 
 def _move_aside(state: NDArray[Any], passed: FloatArray) -> None:
-    """Two equal first-order lags towards what is wanted, solved exactly; drivers respond within `RESPONSE`."""
-    keep = np.exp(-passed / RESPONSE)
+    """Two equal first-order lags towards what is wanted, solved exactly; drivers respond within `STEERING`."""
+    keep = np.exp(-passed / STEERING)
     gap = state["aside"] - state["wanted"]
-    drift = state["aside_rate"] + gap / RESPONSE
+    drift = state["aside_rate"] + gap / STEERING
     state["aside"] = state["wanted"] + (gap + drift * passed) * keep
-    state["aside_rate"] = (drift - (gap + drift * passed) / RESPONSE) * keep
+    state["aside_rate"] = (drift - (gap + drift * passed) / STEERING) * keep
 
 
 def _lead_over(state: NDArray[Any], which: BoolArray, gap: FloatArray, rate: FloatArray, speed: FloatArray) -> None:

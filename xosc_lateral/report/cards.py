@@ -11,10 +11,10 @@ from xosc_lateral.driver.beside import SIDES
 from xosc_lateral.driver.effects import Acts, ColumnEffect, Effect
 from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.driver.provenance import Provenance
+from xosc_lateral.evaluation.lane_keeping import LaneKeeping, keeping_of
 from xosc_lateral.evaluation.movement_summary import DURATION, MovementSummary, summary_of
 from xosc_lateral.formats.library import FIELDS, Entry, facts_of
 from xosc_lateral.formats.profiles import profile_hash
-from xosc_lateral.report.render import render_text
 from xosc_lateral.report.values import format_value
 
 CHANGED: Mapping[Acts, str] = {
@@ -95,13 +95,14 @@ def card(profile: DriverProfile) -> dict[str, Any]:
         "neighbours": {side: basis_of(profile, side).value for side in SIDES},
         "lane_width": profile.lane_width,
         "summary": {name: round(value, 4) for name, value in asdict(summary_of(profile)).items()},
+        "lane_keeping": keeping_record(keeping_of(profile)),
         "provenance": known.to_dict(),
     }
 
 
 def card_text(profile: DriverProfile) -> str:
     """The card for the terminal."""
-    known = profile.provenance
+    known, keeping = profile.provenance, keeping_of(profile)
     lines = [
         profile.name,
         *_indented("", known.notes),
@@ -109,6 +110,8 @@ def card_text(profile: DriverProfile) -> str:
         *(f"  effect     {effect_line(effect)}" for effect in profile.effects),
         f"  neighbours {'; '.join(beside_line(profile, side) for side in SIDES)}",
         *_summary_lines(profile, summary_of(profile)),
+        *_indented("lane", keeping.words),
+        *_indented("sure", sureness(profile, keeping)),
         f"  fitted on  {amount(profile)}",
         *_indented("source", known.source),
         *_indented("licence", known.licence),
@@ -117,34 +120,6 @@ def card_text(profile: DriverProfile) -> str:
         f"  sha256     {profile_hash(profile)}",
     ]
     return "\n".join(lines)
-
-
-def card_markdown(profile: DriverProfile) -> str:
-    """The card for a document."""
-    known, summary = profile.provenance, summary_of(profile)
-    side = "left" if summary.mean_offset > 0 else "right"
-    rows = [
-        f"### `{profile.name}`",
-        "",
-        known.notes,
-        "",
-        "| | |",
-        "|---|---|",
-        f"| model | {profile.model.kind}, {_effects(profile)} |",
-        f"| fitted on | {amount(profile)} |",
-        f"| mean offset | {abs(summary.mean_offset):.2f} m to the {side} |",
-        f"| spread | {_spread(profile, summary)} |",
-        f"| 5 % to 95 % | {summary.low:+.2f} m to {summary.high:+.2f} m |",
-        f"| lateral speed | {summary.lateral_speed:.3f} m/s rms |",
-    ]
-    rows += [f"| {name} | {value} |" for name, value in provenance_items(known)]
-    return "\n".join([*rows, ""])
-
-
-def library_page(profiles: Sequence[DriverProfile]) -> str:
-    """Markdown page of a library: which profile is for what, and a card of each."""
-    refined = [profile for profile in profiles if profile.provenance.fit.get("closed_loop")]
-    return render_text("library.md", refined=refined, cards=[card_markdown(profile) for profile in profiles])
 
 
 def provenance_items(known: Provenance) -> list[tuple[str, str]]:
@@ -174,8 +149,8 @@ def _evaluation_items(evaluation: Mapping[str, Any]) -> list[tuple[str, str]]:
 
 def _scores(short: Mapping[str, Any]) -> str:
     return (
-        f"distance {short['mean_distance']:.3f}, floor {short['mean_floor']:.3f}, ratio {short['mean_ratio']:.2f}, "
-        f"worst {short['worst_metric']} {short['worst_ratio']:.2f}"
+        f"distance {short['mean_distance']:.3f}, between real drivers {short['mean_floor']:.3f}, "
+        f"ratio {short['mean_ratio']:.2f}, worst {short['worst_metric']} {short['worst_ratio']:.2f}"
     )
 
 
@@ -183,7 +158,7 @@ def _summary_lines(profile: DriverProfile, summary: MovementSummary) -> list[str
     side = "left" if summary.mean_offset > 0 else "right"
     return [
         f"  mean       {abs(summary.mean_offset):.2f} m to the {side} of the lane centre",
-        f"  spread     {_spread(profile, summary)}; 90 % within {summary.low:+.2f} to {summary.high:+.2f} m",
+        f"  spread     {spread_text(profile, summary)}; 90 % within {summary.low:+.2f} to {summary.high:+.2f} m",
         f"  speed      {summary.lateral_speed:.3f} m/s lateral (rms)",
     ]
 
@@ -199,7 +174,33 @@ def amount(profile: DriverProfile) -> str:
     )
 
 
-def _spread(profile: DriverProfile, summary: MovementSummary) -> str:
+def keeping_record(keeping: LaneKeeping) -> dict[str, Any]:
+    """The figures of lane keeping and their standard errors, as plain values."""
+    values = asdict(keeping)
+    errors = {name: round(value, 4) for name, value in values.pop("errors").items()}
+    return {name: round(value, 4) for name, value in values.items()} | {"errors": errors}
+
+
+def sureness(profile: DriverProfile, keeping: LaneKeeping) -> str:
+    """How well one driver's mean and spread are known from so much driving; empty where it is of many or unknown."""
+    known = profile.provenance
+    independent = 3600.0 * known.hours / (2.0 * keeping.memory) if keeping.memory else 0.0
+    if "derived_from" in known.fit or not 0.0 < known.drives < FEW or independent < 1.0:
+        return ""
+    mean = 1.96 * keeping.sdlp / independent**0.5
+    spread = 1.96 * keeping.sdlp / (2.0 * independent) ** 0.5
+    return (
+        f"from {60 * known.hours:.3g} min his mean is known to +- {mean:.2f} m, his SDLP to +- {spread:.2f} m (95 %), "
+        "other days apart"
+    )
+
+
+FEW = 10
+"""Drives below which a profile is taken to be of one driver."""
+
+
+def spread_text(profile: DriverProfile, summary: MovementSummary) -> str:
+    """Standard deviation of the offset: of one driver, or of all and within one."""
     if profile.provenance.drives == 1:
         return f"{summary.spread:.2f} m"
     within = f"{summary.spread_within:.2f} m within one driver over {DURATION / 60:g} min"

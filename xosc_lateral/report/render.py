@@ -43,7 +43,7 @@ class KeyFigure(NamedTuple):
     """One number that a reader takes home."""
 
     value: object
-    """Shown large, with its unit; a bare number is formatted like in tables."""
+    """Shown large, with its unit; a number alone is formatted like in tables."""
     label: str
     note: str = ""
     """A small line below, such as what to compare the number with."""
@@ -98,11 +98,6 @@ def _with_policy(page: str) -> str:
     )
     meta = f'<meta charset="utf-8">\n<meta http-equiv="Content-Security-Policy" content="{policy}">'
     return page.replace('<meta charset="utf-8">', meta, 1)
-
-
-def render_text(template: str, **values: Any) -> str:
-    """Render a text that is no page: Markdown in ``pages/``, nothing escaped."""
-    return f"{environment().overlay(autoescape=False).get_template(template).render(**values).rstrip()}\n"
 
 
 class Parts:

@@ -27,6 +27,7 @@ from xosc_lateral.driver.effects.base import Effect, EffectTerms, step_of
 from xosc_lateral.driver.effects.response import Response, ResponseState, respond
 from xosc_lateral.driver.records import plain, set_once
 from xosc_lateral.errors import DriverProfileError
+from xosc_lateral.segment import FADES
 
 FloatArray = NDArray[np.float64]
 
@@ -51,7 +52,7 @@ class ColumnEffect(Effect, frozen=True, kw_only=True):
     lag_s, response_s : float
         Delay (negative: looks ahead) and first-order lag of the response. [s]
     response_order : int
-        Count of such lags one after the other: after one, a jump of the quantity is a kink of the path, after two a
+        Count of such lags one after the other: after one, a jump of the quantity is a corner of the path, after two a
         bend.
     reference : tuple of float
         Value of the quantity at which nothing changes: its mean over the drives it was fitted on.
@@ -139,7 +140,7 @@ class ColumnEffect(Effect, frozen=True, kw_only=True):
         Returns
         -------
         array, shape (n, k)
-            In the unit that the coefficients are per; NaN where "there is none" and that is neutral.
+            In the unit that the coefficients are per; NaN where "there is none", which has no effect.
         """
 
     @classmethod
@@ -151,16 +152,29 @@ class ColumnEffect(Effect, frozen=True, kw_only=True):
         return ()
 
     def seen(self, context: Mapping[str, FloatArray]) -> FloatArray:
-        """The quantity of columns that may be infinite, shape (n, k); NaN where neutral. [unit of the quantity]"""
+        """The quantity of columns that may be infinite, shape (n, k); NaN: no effect. [unit of the quantity]"""
         return self.quantity(context if self.levels_off else _finite(context, self.columns))
 
     def known(self, context: Mapping[str, FloatArray]) -> FloatArray:
-        """The quantity with what is neutral in place of NaN, shape (n, k). [unit of the quantity]"""
+        """The quantity with what has no effect in place of NaN, shape (n, k). [unit of the quantity]
+
+        Where a column fades (`segment.FADES`), so does the quantity, to what it is where there is none.
+        """
         values = self.seen(context)
+        fading = [name for name in self.columns if name + FADES in context]
+        if not fading:
+            return self._filled(values, values)
+        gone = {name: np.full(len(values), np.nan) for name in fading}
+        without = self._filled(self.seen({**{name: context[name] for name in self.columns}, **gone}), values)
+        share = np.prod([context[name + FADES] for name in fading], axis=0)[:, None]
+        return np.asarray(without + share * (self._filled(values, values) - without))
+
+    def _filled(self, values: FloatArray, like: FloatArray) -> FloatArray:
+        """With the reference in place of NaN; without one, the mean of what is known of others like these."""
         missing = np.isnan(values)
         if not missing.any():
             return values
-        stand_in = self.reference if self.reference else tuple(_finite_mean(column) for column in values.T)
+        stand_in = self.reference if self.reference else tuple(_finite_mean(column) for column in like.T)
         return np.where(missing, np.asarray(stand_in), values)
 
     @property

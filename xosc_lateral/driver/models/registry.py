@@ -25,7 +25,7 @@ ENTRY_POINTS = "xosc_lateral.models"
 """Group of entry points under which other packages offer core models: each names a `KnownModel`."""
 
 ALIASES = {"best": "autoregressive"}
-"""Names that models had in older versions."""
+"""Other names of models, on the command line."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,10 +55,7 @@ CORE_MODELS = (
 def known_models() -> dict[str, KnownModel]:
     """Every model that a profile may hold, by its kind: those here, then those of installed plug-ins.
 
-    Raises
-    ------
-    DriverProfileError
-        If a plug-in offers something else than a core model, or one of a kind that is taken.
+    Raises `DriverProfileError` if a plug-in offers something else than a core model, or one of a kind that is taken.
     """
     known = {entry.model.kind: entry for entry in CORE_MODELS}
     for plugin in entry_points(group=ENTRY_POINTS):
@@ -75,10 +72,7 @@ def known_models() -> dict[str, KnownModel]:
 def model_named(name: str) -> KnownModel:
     """The model of a kind, by its name or an older one.
 
-    Raises
-    ------
-    DriverProfileError
-        If there is none; lists those that there are.
+    Raises `DriverProfileError` if there is none; lists those that there are.
     """
     name = ALIASES.get(str(name), str(name))
     here = {entry.model.kind: entry for entry in CORE_MODELS}
@@ -91,7 +85,7 @@ def model_named(name: str) -> KnownModel:
 def any_model(kind: str | None = None) -> Any:
     """The union of all core models: what a profile file's model is read as.
 
-    Plug-ins are looked for when the kind is not among the models here, or none is given.
+    Plug-ins are searched when the kind is not among the models here, or none is given.
     """
     here = [entry.model for entry in CORE_MODELS]
     if kind in {model.kind for model in here}:

@@ -7,7 +7,7 @@ and the standard error is computed from whole passages (sandwich estimator), whi
 
 A camera that looks along the road sees tall vehicles displaced (parallax), by an amount that varies with the place: a
 second line, the tilt, per metre of height above the lane's mean. Its own mean along the road is not taken out: it can't
-be told from trucks that really keep to another side than cars.
+be separated from trucks that really keep to another side than cars.
 
 References
 ----------
@@ -91,6 +91,8 @@ def fit_lane_centre(
 ) -> LaneCentreLine:
     """Fit one lane's centre.
 
+    Raises `NotEnoughDataError` if fewer than `MIN_PASSAGES` share any 100 m.
+
     Parameters
     ----------
     s, d : array, shape (n,)
@@ -102,11 +104,6 @@ def fit_lane_centre(
     knot_spacing : float
         Between the splines' knots. Longer: blind to the bends that camera calibration puts into the tracks; shorter:
         follows single drivers. [m]
-
-    Raises
-    ------
-    NotEnoughDataError
-        If fewer than `MIN_PASSAGES` share any 100 m.
     """
     start, end = _covered(s, passage)
     keep = (s >= start) & (s <= end)

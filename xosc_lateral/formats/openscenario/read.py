@@ -38,6 +38,8 @@ LEFT_HANDED = "written for CARLA: its left-handed coordinates are mirrored, its 
 class RoadSearch:
     """Where a road may lie besides where the scenario says: what the user names is allowed.
 
+    Raises `FormatError`: No such file, no such folder.
+
     Parameters
     ----------
     file : Path or None
@@ -48,6 +50,13 @@ class RoadSearch:
 
     file: Path | None = None
     folders: tuple[Path, ...] = ()
+
+    def __post_init__(self) -> None:
+        for folder in self.folders:
+            if not folder.is_dir():
+                raise FormatError("no such folder to look for roads in", path=folder)
+        if self.file is not None and not self.file.is_file():
+            raise FormatError("no such road", path=self.file)
 
 
 NO_ROADS = RoadSearch()
@@ -62,6 +71,9 @@ def read_scenario(
     roads: RoadSearch = NO_ROADS,
 ) -> Scenario:
     """Read a scenario with all that it takes from catalogs.
+
+    Raises `FormatError`: File, line, element and what is wrong: no XML, no scenario, a missing or malformed value, an
+    unknown entity, catalog or parameter, a reference that leads outside, a missing road file.
 
     Parameters
     ----------
@@ -79,12 +91,6 @@ def read_scenario(
     Returns
     -------
     Scenario
-
-    Raises
-    ------
-    FormatError
-        File, line, element and what is wrong: no XML, no scenario, a missing or malformed value, an unknown entity,
-        catalog or parameter, a reference that leads outside, a missing road file.
     """
     path = Path(path)
     document = read_document(path)

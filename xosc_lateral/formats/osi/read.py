@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from array import array
 from collections import Counter
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -61,23 +61,20 @@ class Recorded:
     hosts: tuple[str, ...]
     numbers: dict[str, str]
     notes: list[str]
+    opendrive: bytes | None = None
 
 
 def read_osi(path: Path, channel: str | None = None) -> Recorded:
     """Read a trace, message by message.
 
-    Raises
-    ------
-    FormatError
-        No trace; a vehicle without a position; times that are none.
-    NotEnoughDataError
-        No vehicle in two messages.
+    Raises `FormatError`: No trace; a vehicle without a position; times that are none; `NotEnoughDataError`: No vehicle
+    in two messages.
     """
     with Trace(path, channel) as trace:
         collected = _Collected(path)
         for number, message in enumerate(trace, 1):
             collected.take(message, number)
-        return collected.recorded(trace.notes)
+        return replace(collected.recorded(trace.notes), opendrive=trace.opendrive)
 
 
 @dataclass
