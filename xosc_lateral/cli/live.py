@@ -19,6 +19,9 @@ PerVehicle = Annotated[
     typer.Option("--vehicle", metavar="NAME=PROFILE", help="Another profile for one vehicle; may be repeated."),
 ]
 Ego = Annotated[list[str] | None, typer.Option(metavar="NAME", help="Vehicle under test: not driven; may be repeated.")]
+FCD = "x,y,angle,type,speed,pos,posLat,lane"
+"""What `import fcd` reads; SUMO leaves `posLat` out unless told."""
+
 States = Annotated[
     str | None, typer.Option("--states", metavar="OUT", help="Table of where everybody was: .csv, .csv.gz, .parquet.")
 ]
@@ -108,7 +111,7 @@ def sumo(
     run = live_sumo(
         config, profile=profile, profiles=pairs(vehicle, "--vehicle"), ego=ego or (), seed=seed, duration=duration,
         lateral_resolution=lateral_resolution, folders=library or (),
-        options=() if fcd_output is None else ("--fcd-output", str(fcd_output)),
+        options=() if fcd_output is None else ("--fcd-output", str(fcd_output), "--fcd-output.attributes", FCD),
     )  # fmt: skip
     _finish(run, states, force=force, quiet=quiet, as_json=as_json)
 
