@@ -16,24 +16,17 @@ CONFIG = """<configuration><input><net-file value="run.net.xml"/><route-files va
 <processing><lateral-resolution value="{sublane}"/><collision.action value="warn"/></processing></configuration>"""
 
 
-def write_run(
-    folder: Path,
-    *,
-    end: float = 60.0,
-    cars: int = 1200,
-    trucks: int = 240,
-    sublane: float = 0.25,
-    length: float = 3000.0,
-) -> Path:
+def write_run(folder: Path, *, end: float = 40.0, cars: int = 1200, trucks: int = 240, sublane: float = 0.25) -> Path:
     """Its configuration."""
     import sumo
 
-    nodes = f'<nodes><node id="a" x="0" y="0"/><node id="b" x="{length}" y="0"/><node id="c" x="{2 * length}" y="{0.2 * length}"/></nodes>'
+    places = {"a": (0, 0), "b": (3000, 0), "c": (6000, 600)}
+    nodes = "".join(f'<node id="{name}" x="{x}" y="{y}"/>' for name, (x, y) in places.items())
     edges = "".join(
         f'<edge id="e{k}" from="{here}" to="{there}" numLanes="2" speed="36" width="3.75"/>'
         for k, (here, there) in enumerate(("ab", "bc"))
     )
-    (folder / "run.nod.xml").write_text(nodes)
+    (folder / "run.nod.xml").write_text(f"<nodes>{nodes}</nodes>")
     (folder / "run.edg.xml").write_text(f"<edges>{edges}</edges>")
     (folder / "run.rou.xml").write_text(ROUTES.format(end=end, cars=cars, trucks=trucks))
     (folder / "run.sumocfg").write_text(CONFIG.format(end=end, sublane=sublane))

@@ -68,7 +68,7 @@ class _OneDriver(Traffic):
         return child(np.random.SeedSequence(self.seed), 0)
 
 
-def export_fmu(profile: DriverProfile, path: Path, *, fmi: str = "2.0") -> None:
+def export_fmu(profile: DriverProfile, path: str | Path, *, fmi: str = "2.0") -> None:
     """Write a unit.
 
     Parameters

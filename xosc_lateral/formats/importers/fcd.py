@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -127,7 +127,8 @@ def _elements(path: Path, tags: tuple[str, ...]) -> Iterator[tuple[str, etree._E
 
 
 def _line(element: etree._Element) -> int | None:
-    return element.sourceline if isinstance(element.sourceline, int) else None
+    line: Any = element.sourceline  # int or None; its stubs say otherwise
+    return None if line is None else int(line)
 
 
 def _number(element: etree._Element, name: str, path: Path) -> float:
