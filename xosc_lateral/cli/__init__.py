@@ -41,6 +41,7 @@ VERBS = (
     "close_loop",
     "profiles",
     "template",
+    "live",
 )
 
 for _verb in VERBS:
