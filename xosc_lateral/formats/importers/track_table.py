@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from xosc_lateral.errors import FormatError, NotEnoughDataError
 from xosc_lateral.formats.drives import parse_map
 from xosc_lateral.formats.importers.placed import PlacedTracks, ground_speed, travel_heading
+from xosc_lateral.formats.states import COLUMNS
 from xosc_lateral.formats.tables import read_table
 from xosc_lateral.formats.text_columns import comma_numbers, seconds_of_text
 
@@ -23,13 +24,14 @@ FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
 HEADERS: Mapping[str, tuple[str, ...]] = {
-    "vehicle": ("vehicle", "id", "track_id", "trackid", "vehicle_id", "object_id", "track", "drive"),
+    "vehicle": ("vehicle", "id", "track_id", "trackid", "vehicle_id", "object_id", "track", "drive", "name"),
     "time": ("time", "timestamp", "t"),
     "x": ("x", "x_center", "center_x", "xcenter", "easting", "center_easting", "pos_x"),
     "y": ("y", "y_center", "center_y", "ycenter", "northing", "center_northing", "pos_y"),
-    "heading": ("heading", "yaw", "psi", "psi_rad", "orientation"),
+    "heading": ("heading", "yaw", "psi", "psi_rad", "orientation", "h"),
     "speed": ("speed", "velocity", "v"),
     "length": ("length", "vehicle_length", "dimension_length"),
+    "width": ("width", "vehicle_width", "dimension_width"),
     "vehicle_class": ("vehicle_class", "class", "type", "agent_type", "object_type"),
 }
 """Name -> headers that are understood, in lower case, the first that is there; others by the map."""
@@ -52,6 +54,9 @@ class Tracks:
     speed: FloatArray
     length: FloatArray
     kind: NDArray[np.str_]
+    width: FloatArray | None = None
+    is_reference: bool = False
+    """Positions are those of the reference point, as in a table of states that `play` writes, not of the middle."""
 
     def placed(
         self,
@@ -108,6 +113,8 @@ def read_tracks(path: Path, columns: Sequence[str] = ()) -> Tracks:
         np.abs(_given(order, "speed", ground_speed(x, y, vehicle, step))),
         _given(order, "length", usual),
         kinds,
+        order["width"].to_numpy(dtype=np.float64) if "width" in order else None,
+        is_reference=set(COLUMNS) <= set(map(str, table.columns)),
     )
 
 

@@ -1,0 +1,230 @@
+"""A reconstructed scenario as OpenSCENARIO 1.0 to 1.3: entities, init, one maneuver per vehicle, declared parameters."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+from lxml import etree
+
+from xosc_lateral.formats.openscenario.write import build
+from xosc_lateral.formats.openscenario.write.build import Version, decimal, sub
+from xosc_lateral.formats.own_files import template_mark
+from xosc_lateral.reconstruction.lateral import Transition, peak_acceleration
+from xosc_lateral.reconstruction.plan import VehiclePlan
+from xosc_lateral.road.network import RoadNetwork
+from xosc_lateral.scenario.enums import Priority
+
+DATE = "2024-01-01T00:00:00"
+"""The format asks for a date: the same recording gives the same bytes."""
+
+MODELS = {"car": "car", "van": "van", "truck": "truck", "bus": "bus", "trailer": "trailer"}
+MODELS |= {"motorcycle": "motorbike", "motorbike": "motorbike", "bicycle": "bicycle"}
+"""Recorded class -> vehicle category, the same in all versions; others are cars."""
+
+LIMITS = {"maxSpeed": "80", "maxAcceleration": "12", "maxDeceleration": "12"}
+"""Above what is recorded: the speed profile alone says how it drives. [m/s], [m/s2]"""
+
+
+@dataclass(slots=True)
+class _Declared:
+    """Parameters that are used by name, with their values."""
+
+    version: Version
+    values: dict[str, str] = field(default_factory=dict)
+
+    def value(self, name: str, value: float, digits: int) -> str:
+        """A number of its own."""
+        self.values[name] = decimal(value, digits)
+        return f"${name}"
+
+    def added(self, name: str, to: float, digits: int) -> str:
+        """A number plus a parameter; version 1.0 has no expressions."""
+        if self.version < (1, 1):
+            return decimal(to, digits)
+        self.values.setdefault(name, "0")
+        return f"${{{decimal(to, digits)} + ${name}}}"
+
+
+def reconstructed_scenario(
+    plans: Sequence[VehiclePlan],
+    network: RoadNetwork,
+    *,
+    road_file: str,
+    duration: float,
+    version: Version,
+    host: str | None,
+    description: str,
+) -> str:
+    """The document, the same bytes each time.
+
+    Parameters
+    ----------
+    plans : sequence of VehiclePlan
+    network : RoadNetwork
+    road_file : str
+        As seen from the scenario.
+    duration : float
+        The scenario ends then. [s]
+    version : (int, int)
+        Of the standard.
+    host : str, optional
+        Entity that is the vehicle under test.
+    description : str
+        For the header.
+    """
+    declared = _Declared(version)
+    entities, actions = etree.Element("Entities"), etree.Element("Actions")
+    story = build.story("Recorded")
+    act = sub(story, "Act", name="Traffic")
+    for plan in plans:
+        _entity(entities, plan, is_host=plan.name == host)
+        if plan.appears is None:
+            _init(actions, plan, network, declared)
+        maneuver = build.maneuver(act, f"{plan.name}_maneuver", plan.name)
+        _events(maneuver, plan, network, declared)
+    build.time_trigger(act, "StartTrigger", 0.0, version)
+
+    root = etree.Element("OpenSCENARIO")
+    major, minor = map(str, version)
+    sub(root, "FileHeader", revMajor=major, revMinor=minor, date=DATE, description=description, author="xosc-lateral")
+    parameters = sub(root, "ParameterDeclarations")
+    for name, value in declared.values.items():
+        sub(parameters, "ParameterDeclaration", name=name, parameterType="double", value=value)
+    sub(root, "CatalogLocations")
+    sub(sub(root, "RoadNetwork"), "LogicFile", filepath=road_file)
+    root.append(entities)
+    storyboard = sub(root, "Storyboard")
+    sub(storyboard, "Init").append(actions)
+    storyboard.append(story)
+    build.time_trigger(storyboard, "StopTrigger", duration, version)
+    etree.indent(root, "  ")
+    text = f"<?xml version='1.0' encoding='UTF-8'?>\n{etree.tostring(root, encoding='unicode')}\n"
+    return text + template_mark(text)
+
+
+def _entity(entities: etree._Element, plan: VehiclePlan, *, is_host: bool) -> None:
+    one = plan.vehicle
+    kind = MODELS.get(one.kind, "car")
+    vehicle = sub(sub(entities, "ScenarioObject", name=plan.name), "Vehicle", name=kind, vehicleCategory=kind)
+    box = sub(vehicle, "BoundingBox")
+    sub(box, "Center", x=decimal(one.centre, 3), y="0", z=decimal(0.5 * one.height, 3))
+    sub(box, "Dimensions", width=decimal(one.width, 3), length=decimal(one.length, 3), height=decimal(one.height, 3))
+    sub(vehicle, "Performance", **LIMITS)
+    axles = sub(vehicle, "Axles")
+    track, front = decimal(0.85 * one.width, 3), decimal(2.0 * one.centre, 3)
+    for tag, steering, x in (("FrontAxle", "0.5", front), ("RearAxle", "0", "0")):
+        sub(axles, tag, maxSteering=steering, wheelDiameter="0.7", trackWidth=track, positionX=x, positionZ="0.35")
+    properties = sub(vehicle, "Properties")
+    sub(properties, "Property", name="recorded_as", value=one.name)
+    if is_host:  # CARLA's ScenarioRunner hands the vehicle of this type to the system under test
+        sub(properties, "Property", name="type", value="ego_vehicle")
+
+
+def _place(owner: etree._Element, plan: VehiclePlan, network: RoadNetwork, declared: _Declared) -> None:
+    """Where it starts; a gap is varied by moving it ahead."""
+    way = network.travel_direction(plan.road, plan.lane)
+    s = declared.added(f"{plan.name}_ahead", plan.s, 3) if way > 0 else _back(declared, plan)
+    offset = decimal(network.offset_from_offset_t(plan.road, plan.lane, plan.offset), 4)
+    road = network.road_ids[plan.road]
+    place = sub(sub(owner, "Position"), "LanePosition", roadId=road, laneId=str(plan.lane), s=s, offset=offset)
+    if way < 0 and declared.version < (1, 1):
+        sub(place, "Orientation", h="3.14159265", type="relative")
+
+
+def _back(declared: _Declared, plan: VehiclePlan) -> str:
+    """Ahead is towards smaller s."""
+    return declared.added(f"{plan.name}_ahead", plan.s, 3).replace(" + ", " - ")
+
+
+def _init(actions: etree._Element, plan: VehiclePlan, network: RoadNetwork, declared: _Declared) -> None:
+    private = sub(actions, "Private", entityRef=plan.name)
+    _place(sub(sub(private, "PrivateAction"), "TeleportAction"), plan, network, declared)
+    target = _speed_action(sub(private, "PrivateAction"), "step", 0.0)
+    target.set("value", declared.added(f"{plan.name}_faster", float(plan.speed.speed[0]), 4))
+
+
+def _events(maneuver: etree._Element, plan: VehiclePlan, network: RoadNetwork, declared: _Declared) -> None:
+    begin = 0.0 if plan.appears is None else plan.appears
+    event = build.event(maneuver, f"{plan.name}_drive", Priority.PARALLEL, declared.version)
+    if plan.appears is not None:
+        action = sub(sub(event, "Action", name=f"{plan.name}_appear"), "GlobalAction")
+        add = sub(sub(action, "EntityAction", entityRef=plan.name), "AddEntityAction")
+        _place(add, plan, network, declared)
+    if declared.version >= (1, 2):
+        _speed_profile(build.private_action(event, f"{plan.name}_speed"), plan, declared)
+        build.time_trigger(event, "StartTrigger", begin, declared.version)
+    else:
+        _speed_actions(maneuver, event, plan, declared, begin)
+    for number, (one, target) in enumerate(zip(plan.lateral.transitions, plan.targets, strict=True), 1):
+        _transition(maneuver, plan, one, target, number, network, declared)
+    if plan.leaves is not None:
+        event = build.event(maneuver, f"{plan.name}_leave", Priority.PARALLEL, declared.version)
+        action = sub(sub(event, "Action", name=f"{plan.name}_delete"), "GlobalAction")
+        sub(sub(action, "EntityAction", entityRef=plan.name), "DeleteEntityAction")
+        build.time_trigger(event, "StartTrigger", plan.leaves, declared.version)
+
+
+def _speed_profile(private: etree._Element, plan: VehiclePlan, declared: _Declared) -> None:
+    """One action for the whole drive: the first entry holds at once, times count from the entry before."""
+    profile = sub(sub(private, "LongitudinalAction"), "SpeedProfileAction", followingMode="position")
+    before = plan.speed.time[0]
+    for time, speed in zip(plan.speed.time, plan.speed.speed, strict=True):
+        value = declared.added(f"{plan.name}_faster", float(speed), 4)
+        sub(profile, "SpeedProfileEntry", speed=value, time=decimal(float(time - before), 4))
+        before = time
+
+
+def _speed_actions(
+    maneuver: etree._Element, event: etree._Element, plan: VehiclePlan, declared: _Declared, begin: float
+) -> None:
+    """One linear speed action per piece, for versions without profiles."""
+    target = _speed_action(build.private_action(event, f"{plan.name}_speed"), "step", 0.0)
+    target.set("value", declared.added(f"{plan.name}_faster", float(plan.speed.speed[0]), 4))
+    build.time_trigger(event, "StartTrigger", begin, declared.version)
+    for k in range(1, len(plan.speed.time)):
+        piece = build.event(maneuver, f"{plan.name}_speed{k}", Priority.PARALLEL, declared.version)
+        start, end = float(plan.speed.time[k - 1]), float(plan.speed.time[k])
+        target = _speed_action(build.private_action(piece, f"{plan.name}_speed{k}_action"), "linear", end - start)
+        target.set("value", declared.added(f"{plan.name}_faster", float(plan.speed.speed[k]), 4))
+        build.time_trigger(piece, "StartTrigger", start, declared.version)
+
+
+def _speed_action(private: etree._Element, shape: str, duration: float) -> etree._Element:
+    """A speed action whose target speed is still to be set."""
+    action = sub(sub(private, "LongitudinalAction"), "SpeedAction")
+    sub(action, "SpeedActionDynamics", dynamicsShape=shape, dynamicsDimension="time", value=decimal(duration, 4))
+    return sub(sub(action, "SpeedActionTarget"), "AbsoluteTargetSpeed")
+
+
+def _transition(
+    maneuver: etree._Element,
+    plan: VehiclePlan,
+    one: Transition,
+    target: int,
+    number: int,
+    network: RoadNetwork,
+    declared: _Declared,
+) -> None:
+    word = "change" if one.lanes else "aborted" if one.aborted else "offset"
+    name = f"{plan.name}_{word}{number}"
+    event = build.event(maneuver, name, Priority.PARALLEL, declared.version)
+    lateral = sub(build.private_action(event, f"{name}_action"), "LateralAction")
+    offset_t = network.travel_direction(plan.road, plan.lane) * one.offset
+    if one.lanes:
+        aside = {"targetLaneOffset": decimal(offset_t, 4)} if abs(offset_t) > 1e-3 else {}
+        action = sub(lateral, "LaneChangeAction", **aside)
+        duration = declared.value(f"{name}_duration", one.duration, 3)
+        dynamics = {"dynamicsShape": one.shape.value, "dynamicsDimension": "time", "value": duration}
+        sub(action, "LaneChangeActionDynamics", **dynamics)
+        sub(sub(action, "LaneChangeTarget"), "AbsoluteTargetLane", value=str(target))
+    else:
+        action = sub(lateral, "LaneOffsetAction", continuous="false")
+        limit = peak_acceleration(one.shape, one.change, one.duration)
+        sub(action, "LaneOffsetActionDynamics", dynamicsShape=one.shape.value, maxLateralAcc=decimal(limit, 6))
+        wanted = declared.value(f"{name}_offset", offset_t, 4)
+        sub(sub(action, "LaneOffsetTarget"), "AbsoluteTargetLaneOffset", value=wanted)
+    trigger = build.time_trigger(event, "StartTrigger", one.start, declared.version)
+    condition = trigger.find(".//SimulationTimeCondition")
+    assert condition is not None
+    condition.set("value", declared.value(f"{name}_start", one.start, 3))
