@@ -2,22 +2,31 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
-from dataclasses import dataclass
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
 
-from xosc_lateral.errors import FormatError
+from xosc_lateral.driver.profile import DriverProfile
+from xosc_lateral.errors import FormatError, XoscLateralError
 from xosc_lateral.formats.openscenario.write.build import Version
-from xosc_lateral.formats.openscenario.write.reconstructed import reconstructed_scenario
+from xosc_lateral.formats.openscenario.write.reconstructed import Triggers, reconstructed_scenario
+from xosc_lateral.formats.profile_folders import find_profile, list_profiles
+from xosc_lateral.formats.profiles import profile_bytes, read_profile
 from xosc_lateral.formats.recordings import RecordedTraffic
+from xosc_lateral.pipeline.drivers import AUTO_PROFILE
+from xosc_lateral.reconstruction.drivers import ChosenDriver, WindowModel, choose_driver, drive_of, in_lane_offsets
+from xosc_lateral.reconstruction.encounters import Encounter, encounters, relative_triggers
 from xosc_lateral.reconstruction.plan import VehiclePlan, plan_vehicles
 from xosc_lateral.reconstruction.recorded import Recording, Track, place_tracks
 from xosc_lateral.reconstruction.residuals import Residuals, residuals_of
 
 VERSIONS: tuple[Version, ...] = ((1, 0), (1, 1), (1, 2), (1, 3))
 """Of the standard that can be written."""
+LONG_DRIVE = 100.0
+"""Of road-following, for a profile of one vehicle: ten windows that the evaluation compares drivers by. [s]"""
 AROUND = 100.0
 """Who comes as near as this to the vehicle in question, along or across, belongs to its surroundings. [m]"""
 
@@ -41,6 +50,14 @@ class ReconstructSettings:
     error : float
         Bound of positions along the road. [m]
     version : (int, int)
+    relative : bool
+        Lane changes and braking begin by distances, where the recording bears it out.
+    exact : bool
+        Recorded paths as trajectories, instead of maneuvers.
+    fit : bool
+        A profile of its own for every vehicle that drove long enough.
+    libraries : tuple of Path
+        Folders with further profiles.
     """
 
     begin: float | None = None
@@ -51,6 +68,10 @@ class ReconstructSettings:
     host: str | None = None
     error: float = 0.5
     version: Version = (1, 2)
+    relative: bool = False
+    exact: bool = False
+    fit: bool = False
+    libraries: tuple[Path, ...] = ()
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -67,6 +88,13 @@ class Reconstructed:
     scenario : str
     residuals : tuple of Residuals
         In the order of `plans`.
+    encounters : tuple of Encounter
+    relative : mapping
+        Entity -> triggers that are distances.
+    drivers : tuple of ChosenDriver
+        In the order of `plans`.
+    fitted : mapping of str to DriverProfile
+        Profiles of single vehicles, by name.
     settings : ReconstructSettings
     """
 
@@ -76,6 +104,10 @@ class Reconstructed:
     plans: tuple[VehiclePlan, ...]
     scenario: str
     residuals: tuple[Residuals, ...]
+    encounters: tuple[Encounter, ...]
+    relative: Mapping[str, Triggers]
+    drivers: tuple[ChosenDriver, ...]
+    fitted: Mapping[str, DriverProfile]
     settings: ReconstructSettings
 
 
@@ -95,6 +127,9 @@ def reconstruct_recording(traffic: RecordedTraffic, settings: ReconstructSetting
     by_name = {plan.vehicle.name: plan.name for plan in plans}
     if settings.host is not None and settings.host not in by_name:
         raise FormatError(f"host {settings.host!r} is not among the reconstructed vehicles", path=traffic.sources[0])
+    relative = {}
+    if settings.relative and not settings.exact:
+        relative = {plan.name: relative_triggers(plan, plans, traffic.network) for plan in plans}
     scenario = reconstructed_scenario(
         plans,
         traffic.network,
@@ -103,9 +138,64 @@ def reconstruct_recording(traffic: RecordedTraffic, settings: ReconstructSetting
         version=settings.version,
         host=None if settings.host is None else by_name[settings.host],
         description=f"{name}: reconstructed from {traffic.sources[0].name}, {begin:g} to {end:g} s",
+        relative=relative,
+        exact=settings.exact,
     )
     residuals = tuple(map(residuals_of, plans))
-    return Reconstructed(name, traffic, recording, plans, scenario, residuals, settings)
+    met = encounters(plans, traffic.network)
+    drivers, fitted = _drivers(plans, residuals, settings)
+    parts = name, traffic, recording, plans, scenario, residuals, met, relative, drivers, fitted
+    return Reconstructed(*parts, settings)
+
+
+def _drivers(
+    plans: Sequence[VehiclePlan], residuals: Sequence[Residuals], settings: ReconstructSettings
+) -> tuple[tuple[ChosenDriver, ...], dict[str, DriverProfile]]:
+    """A profile for each vehicle: its own, the likeliest of the library, or the population's."""
+    from xosc_lateral.driver.fitting import fit_profile
+
+    population = find_profile(AUTO_PROFILE, settings.libraries)
+    paths = {path.stem: path for path in reversed(list_profiles(settings.libraries))}
+    models = {name: _window_model(path, path.stat().st_mtime_ns) for name, path in paths.items()}
+    chosen, fitted = list[ChosenDriver](), dict[str, DriverProfile]()
+    for plan, residual in zip(plans, residuals, strict=True):
+        if plan.lateral.is_played:
+            chosen.append(ChosenDriver("", 0.0, 0.0, "stands still in its lane: no person drove it"))
+            continue
+        stretches = in_lane_offsets(plan, residual)
+        one = choose_driver([offset for _, offset, _ in stretches], models, population.stem)
+        if settings.fit and one.seconds >= LONG_DRIVE:
+            drive = drive_of(plan, residual)
+            assert drive is not None
+            try:
+                fitted[plan.name] = fit_profile([drive], name=plan.name)
+                one = replace(one, profile=f"drivers/{plan.name}.json", why="fitted to its own drive")
+            except XoscLateralError as error:
+                one = replace(one, why=f"{one.why}; can't be fitted: {error}")
+        chosen.append(one)
+    return tuple(chosen), fitted
+
+
+@lru_cache(maxsize=64)
+def _window_model(path: Path, _changed: int) -> WindowModel:
+    return WindowModel.of(read_profile(path))
+
+
+def drivers_table(made: Reconstructed) -> str:
+    """A table of one row that `convert` takes: the scenario, who is under test, and everybody's profile."""
+    cells = {"scenario": f"{made.name}.xosc"}
+    host = next((plan.name for plan in made.plans if plan.vehicle.name == made.settings.host), None)
+    if host is not None:
+        cells["ego"] = host
+    for plan, driver in zip(made.plans, made.drivers, strict=True):
+        if driver.profile:
+            cells[f"profile:{plan.name}"] = driver.profile
+    return f"{','.join(cells)}\n{','.join(cells.values())}\n"
+
+
+def report_profiles(made: Reconstructed) -> dict[str, bytes]:
+    """Files of the profiles that were fitted, by their paths below the folder."""
+    return {f"drivers/{name}.json": profile_bytes(profile) for name, profile in made.fitted.items()}
 
 
 def chosen(traffic: RecordedTraffic, settings: ReconstructSettings) -> tuple[list[Track], float, float]:

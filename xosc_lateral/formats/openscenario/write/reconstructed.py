@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
+import numpy as np
 from lxml import etree
 
 from xosc_lateral.formats.openscenario.write import build
 from xosc_lateral.formats.openscenario.write.build import Version, decimal, sub
 from xosc_lateral.formats.own_files import template_mark
+from xosc_lateral.reconstruction.encounters import RelativeTrigger
 from xosc_lateral.reconstruction.lateral import Transition, peak_acceleration
 from xosc_lateral.reconstruction.plan import VehiclePlan
 from xosc_lateral.road.network import RoadNetwork
@@ -24,6 +26,13 @@ MODELS |= {"motorcycle": "motorbike", "motorbike": "motorbike", "bicycle": "bicy
 
 LIMITS = {"maxSpeed": "80", "maxAcceleration": "12", "maxDeceleration": "12"}
 """Above what is recorded: the speed profile alone says how it drives. [m/s], [m/s2]"""
+
+
+Triggers = tuple[Mapping[int, RelativeTrigger], Mapping[int, RelativeTrigger]]
+"""Of transitions by their number, of brakings by the number of their corner in the speed profile."""
+
+VERTICES = 0.2
+"""Between the vertices of a recorded path. [s]"""
 
 
 @dataclass(slots=True)
@@ -55,6 +64,8 @@ def reconstructed_scenario(
     version: Version,
     host: str | None,
     description: str,
+    relative: Mapping[str, Triggers] | None = None,
+    exact: bool = False,
 ) -> str:
     """The document, the same bytes each time.
 
@@ -72,6 +83,10 @@ def reconstructed_scenario(
         Entity that is the vehicle under test.
     description : str
         For the header.
+    relative : mapping of str to triggers, optional
+        Entity -> what of it begins by a distance instead of the clock.
+    exact : bool
+        Recorded paths as trajectories, instead of maneuvers.
     """
     declared = _Declared(version)
     entities, actions = etree.Element("Entities"), etree.Element("Actions")
@@ -82,7 +97,10 @@ def reconstructed_scenario(
         if plan.appears is None:
             _init(actions, plan, network, declared)
         maneuver = build.maneuver(act, f"{plan.name}_maneuver", plan.name)
-        _events(maneuver, plan, network, declared)
+        if exact:
+            _recorded_path(maneuver, plan, network, declared)
+        else:
+            _events(maneuver, plan, network, declared, (relative or {}).get(plan.name, ({}, {})))
     build.time_trigger(act, "StartTrigger", 0.0, version)
 
     root = etree.Element("OpenSCENARIO")
@@ -144,20 +162,17 @@ def _init(actions: etree._Element, plan: VehiclePlan, network: RoadNetwork, decl
     target.set("value", declared.added(f"{plan.name}_faster", float(plan.speed.speed[0]), 4))
 
 
-def _events(maneuver: etree._Element, plan: VehiclePlan, network: RoadNetwork, declared: _Declared) -> None:
-    begin = 0.0 if plan.appears is None else plan.appears
+def _drive(maneuver: etree._Element, plan: VehiclePlan, network: RoadNetwork, declared: _Declared) -> etree._Element:
+    """The event in which a vehicle sets off; one that was not there yet appears."""
     event = build.event(maneuver, f"{plan.name}_drive", Priority.PARALLEL, declared.version)
     if plan.appears is not None:
         action = sub(sub(event, "Action", name=f"{plan.name}_appear"), "GlobalAction")
         add = sub(sub(action, "EntityAction", entityRef=plan.name), "AddEntityAction")
         _place(add, plan, network, declared)
-    if declared.version >= (1, 2):
-        _speed_profile(build.private_action(event, f"{plan.name}_speed"), plan, declared)
-        build.time_trigger(event, "StartTrigger", begin, declared.version)
-    else:
-        _speed_actions(maneuver, event, plan, declared, begin)
-    for number, (one, target) in enumerate(zip(plan.lateral.transitions, plan.targets, strict=True), 1):
-        _transition(maneuver, plan, one, target, number, network, declared)
+    return event
+
+
+def _leave(maneuver: etree._Element, plan: VehiclePlan, declared: _Declared) -> None:
     if plan.leaves is not None:
         event = build.event(maneuver, f"{plan.name}_leave", Priority.PARALLEL, declared.version)
         action = sub(sub(event, "Action", name=f"{plan.name}_delete"), "GlobalAction")
@@ -165,29 +180,100 @@ def _events(maneuver: etree._Element, plan: VehiclePlan, network: RoadNetwork, d
         build.time_trigger(event, "StartTrigger", plan.leaves, declared.version)
 
 
-def _speed_profile(private: etree._Element, plan: VehiclePlan, declared: _Declared) -> None:
-    """One action for the whole drive: the first entry holds at once, times count from the entry before."""
-    profile = sub(sub(private, "LongitudinalAction"), "SpeedProfileAction", followingMode="position")
-    before = plan.speed.time[0]
-    for time, speed in zip(plan.speed.time, plan.speed.speed, strict=True):
-        value = declared.added(f"{plan.name}_faster", float(speed), 4)
-        sub(profile, "SpeedProfileEntry", speed=value, time=decimal(float(time - before), 4))
-        before = time
-
-
-def _speed_actions(
-    maneuver: etree._Element, event: etree._Element, plan: VehiclePlan, declared: _Declared, begin: float
+def _events(
+    maneuver: etree._Element, plan: VehiclePlan, network: RoadNetwork, declared: _Declared, relative: Triggers
 ) -> None:
-    """One linear speed action per piece, for versions without profiles."""
-    target = _speed_action(build.private_action(event, f"{plan.name}_speed"), "step", 0.0)
-    target.set("value", declared.added(f"{plan.name}_faster", float(plan.speed.speed[0]), 4))
+    changes, braking = relative
+    event = _drive(maneuver, plan, network, declared)
+    edges = [0, *sorted(braking), len(plan.speed.time) - 1]
+    for first, last in zip(edges[:-1], edges[1:], strict=True):
+        if first:
+            event = build.event(maneuver, f"{plan.name}_brake{first}", Priority.PARALLEL, declared.version)
+        _speeds(maneuver, event, plan, declared, first, last)
+        if first:
+            _distance_trigger(event, plan.name, f"{plan.name}_brake{first}_distance", braking[first], declared)
+    for number, (one, target) in enumerate(zip(plan.lateral.transitions, plan.targets, strict=True)):
+        _transition(maneuver, plan, one, target, number, network, declared, changes.get(number))
+    _leave(maneuver, plan, declared)
+
+
+def _speeds(
+    maneuver: etree._Element, event: etree._Element, plan: VehiclePlan, declared: _Declared, first: int, last: int
+) -> None:
+    """Corners `first` to `last` of the speed profile: one action, or, in versions without profiles, one per piece."""
+    time, speed = plan.speed.time, plan.speed.speed
+    name, faster = event.get("name"), f"{plan.name}_faster"
+    if declared.version >= (1, 2):
+        action = sub(build.private_action(event, f"{name}_speed"), "LongitudinalAction")
+        profile = sub(action, "SpeedProfileAction", followingMode="position")
+        for k in range(first + (first > 0), last + 1):  # what holds from the start is an entry of time 0
+            after = decimal(float(time[k] - time[k - 1]), 4) if k > first else "0"
+            sub(profile, "SpeedProfileEntry", speed=declared.added(faster, float(speed[k]), 4), time=after)
+        if not first:
+            build.time_trigger(event, "StartTrigger", float(time[0]), declared.version)
+        return
+    if not first:
+        target = _speed_action(build.private_action(event, f"{name}_speed"), "step", 0.0)
+        target.set("value", declared.added(faster, float(speed[0]), 4))
+        build.time_trigger(event, "StartTrigger", float(time[0]), declared.version)
+    for k in range(first + 1, last + 1):
+        piece = event
+        if not first or k > first + 1:
+            piece = build.event(maneuver, f"{plan.name}_speed{k}", Priority.PARALLEL, declared.version)
+        target = _speed_action(
+            build.private_action(piece, f"{plan.name}_speed{k}_action"), "linear", float(time[k] - time[k - 1])
+        )
+        target.set("value", declared.added(faster, float(speed[k]), 4))
+        if piece is not event:
+            build.time_trigger(piece, "StartTrigger", float(time[k - 1]), declared.version)
+
+
+def _distance_trigger(
+    event: etree._Element, name: str, parameter: str, trigger: RelativeTrigger, declared: _Declared
+) -> None:
+    """Once a distance along the road passes a declared value, and not before a time."""
+    owner = build.time_trigger(event, "StartTrigger", trigger.not_before, declared.version)
+    group = owner[0]
+    condition = sub(group, "Condition", name=f"distance to {trigger.other}", delay="0", conditionEdge="none")
+    entity = sub(condition, "ByEntityCondition")
+    sub(
+        sub(entity, "TriggeringEntities", triggeringEntitiesRule="any"),
+        "EntityRef",
+        entityRef=name,
+    )
+    system = {"coordinateSystem": "road"} if declared.version >= (1, 1) else {}
+    sub(
+        sub(entity, "EntityCondition"),
+        "RelativeDistanceCondition",
+        entityRef=trigger.other,
+        relativeDistanceType="longitudinal",
+        freespace="false",
+        rule="greaterThan" if trigger.grows else "lessThan",
+        value=declared.value(parameter, trigger.distance, 3),
+        **system,
+    )
+
+
+def _recorded_path(maneuver: etree._Element, plan: VehiclePlan, network: RoadNetwork, declared: _Declared) -> None:
+    """The recorded places themselves, at their times."""
+    vehicle = plan.vehicle
+    event = _drive(maneuver, plan, network, declared)
+    begin = plan.present[0]
+    time = np.append(np.arange(begin, vehicle.time[-1] - 0.5 * VERTICES, VERTICES), vehicle.time[-1])
+    x, y = (np.interp(time, vehicle.time, values) for values in (vehicle.x, vehicle.y))
+    heading = np.unwrap(np.arctan2(np.gradient(y), np.gradient(x)))
+    follow = sub(sub(build.private_action(event, f"{plan.name}_path"), "RoutingAction"), "FollowTrajectoryAction")
+    holder = follow if declared.version < (1, 1) else sub(follow, "TrajectoryRef")
+    trajectory = sub(holder, "Trajectory", name=f"{plan.name}_recorded", closed="false")
+    sub(trajectory, "ParameterDeclarations")
+    line = sub(sub(trajectory, "Shape"), "Polyline")
+    for k, moment in enumerate(time):
+        vertex = sub(line, "Vertex", time=decimal(float(moment - begin), 3))
+        build.world_position(vertex, (float(x[k]), float(y[k]), 0.0, float(heading[k]), 0.0, 0.0))
+    sub(sub(follow, "TimeReference"), "Timing", domainAbsoluteRelative="relative", scale="1", offset="0")
+    sub(follow, "TrajectoryFollowingMode", followingMode="position")
     build.time_trigger(event, "StartTrigger", begin, declared.version)
-    for k in range(1, len(plan.speed.time)):
-        piece = build.event(maneuver, f"{plan.name}_speed{k}", Priority.PARALLEL, declared.version)
-        start, end = float(plan.speed.time[k - 1]), float(plan.speed.time[k])
-        target = _speed_action(build.private_action(piece, f"{plan.name}_speed{k}_action"), "linear", end - start)
-        target.set("value", declared.added(f"{plan.name}_faster", float(plan.speed.speed[k]), 4))
-        build.time_trigger(piece, "StartTrigger", start, declared.version)
+    _leave(maneuver, plan, declared)
 
 
 def _speed_action(private: etree._Element, shape: str, duration: float) -> etree._Element:
@@ -205,9 +291,10 @@ def _transition(
     number: int,
     network: RoadNetwork,
     declared: _Declared,
+    relative: RelativeTrigger | None,
 ) -> None:
     word = "change" if one.lanes else "aborted" if one.aborted else "offset"
-    name = f"{plan.name}_{word}{number}"
+    name = f"{plan.name}_{word}{number + 1}"
     event = build.event(maneuver, name, Priority.PARALLEL, declared.version)
     lateral = sub(build.private_action(event, f"{name}_action"), "LateralAction")
     offset_t = network.travel_direction(plan.road, plan.lane) * one.offset
@@ -224,6 +311,9 @@ def _transition(
         sub(action, "LaneOffsetActionDynamics", dynamicsShape=one.shape.value, maxLateralAcc=decimal(limit, 6))
         wanted = declared.value(f"{name}_offset", offset_t, 4)
         sub(sub(action, "LaneOffsetTarget"), "AbsoluteTargetLaneOffset", value=wanted)
+    if relative is not None:
+        _distance_trigger(event, plan.name, f"{name}_distance", relative, declared)
+        return
     trigger = build.time_trigger(event, "StartTrigger", one.start, declared.version)
     condition = trigger.find(".//SimulationTimeCondition")
     assert condition is not None
