@@ -13,6 +13,7 @@ _HOME = {
     "convert": "api.convert",
     "convert_many": "api.batch",
     "variant_set": "api.variants",
+    "reconstruct": "api.reconstruct",
     "play": "api.play",
     "segments": "api.play",
     "fit": "api.fit",
@@ -32,6 +33,7 @@ _HOME = {
     "DriverProfile": "driver.profile",
     "Drive": "drives.drive",
     "Conversion": "api.convert",
+    "Reconstruction": "api.reconstruct",
     "BatchResult": "api.batch",
     "Playback": "api.play",
     "Segments": "api.play",
@@ -51,6 +53,7 @@ __all__ = [  # noqa: RUF022 (the order of the documentation)
     "convert",
     "convert_many",
     "variant_set",
+    "reconstruct",
     "play",
     "segments",
     "fit",
@@ -70,6 +73,7 @@ __all__ = [  # noqa: RUF022 (the order of the documentation)
     "DriverProfile",
     "Drive",
     "Conversion",
+    "Reconstruction",
     "BatchResult",
     "Playback",
     "Segments",
@@ -95,6 +99,7 @@ if TYPE_CHECKING:
     from xosc_lateral.api.loop import ClosedLoop, close_loop
     from xosc_lateral.api.play import Playback, Segments, play, segments
     from xosc_lateral.api.profiles import compare_profiles, list_profiles, read_profile, write_profile
+    from xosc_lateral.api.reconstruct import Reconstruction, reconstruct
     from xosc_lateral.api.sample import Offsets, sample
     from xosc_lateral.api.templates import list_templates, write_template
     from xosc_lateral.api.variants import variant_set

@@ -36,6 +36,8 @@ class RecordedTraffic:
 
     Parameters
     ----------
+    name : str
+        Of what is made from it.
     tracks : tuple of Track
     network : RoadNetwork
     road : bytes
@@ -47,6 +49,7 @@ class RecordedTraffic:
     notes : tuple of str
     """
 
+    name: str
     tracks: tuple[Track, ...]
     network: RoadNetwork
     road: bytes
@@ -149,7 +152,7 @@ def _on_road(tracks: Tracks, source: Path, road: Path | None, *, centre: float) 
                 heading[rows],
             )
         )
-    return RecordedTraffic(tuple(found), network, road.read_bytes(), road.name, (source, road))
+    return RecordedTraffic(source.name.split(".")[0], tuple(found), network, road.read_bytes(), road.name, (source, road))
 
 
 def _rows_of(vehicle: NDArray[np.int64]) -> list[NDArray[np.int64]]:
@@ -174,13 +177,14 @@ def _made(road: WrittenRoad, tracks: Sequence[Track], sources: Sequence[Path], n
         path = Path(folder) / f"{road.name}.xodr"
         path.write_text(text, encoding="utf-8")
         network = read_opendrive(path)
-    return RecordedTraffic(tuple(tracks), network, text.encode(), f"{road.name}.xodr", tuple(sources), tuple(notes))
+    road_file = text.encode(), f"{road.name}.xodr"
+    return RecordedTraffic(road.name, tuple(tracks), network, *road_file, tuple(sources), tuple(notes))
 
 
 def _dlr(source: Path, road: Path | None, columns: Sequence[str]) -> RecordedTraffic:
     table = dlr_ht.read_tracks(source)
     lanes = dlr_ht.find_lanes(table)
-    made = dlr_road(lanes, source)
+    made = dlr_road(lanes)
     kinds = dlr_ht.vehicle_classes(table)
     x = table["center_easting"].to_numpy() - made.origin[0]
     y = table["center_northing"].to_numpy() - made.origin[1]
@@ -222,7 +226,7 @@ def _short(names: NDArray[np.str_]) -> dict[str, str]:
     return {name: name[common:] for name in every}
 
 
-def dlr_road(found: dlr_ht.Carriageways, source: Path) -> WrittenRoad:
+def dlr_road(found: dlr_ht.Carriageways) -> WrittenRoad:
     """Both carriageways along one reference line; lanes where their traffic drives.
 
     A lane's width is the distance of the two centres of its direction; what is left to the reference line is the
@@ -249,7 +253,7 @@ def dlr_road(found: dlr_ht.Carriageways, source: Path) -> WrittenRoad:
                 WrittenLane.even("shoulder", SHOULDER),
             ]
         )
-    return WrittenRoad(source.name.split(".")[0], curved_plan(line, origin), sides[0], sides[1], origin)
+    return WrittenRoad("dlr-ht", curved_plan(line, origin), sides[0], sides[1], origin)
 
 
 Reader = Callable[[Path, "Path | None", Sequence[str]], RecordedTraffic]

@@ -11,8 +11,10 @@ import numpy as np
 
 from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.errors import FormatError, XoscLateralError
-from xosc_lateral.formats.openscenario.write.build import Version
+from xosc_lateral.formats.openscenario.write.build import Version, named
 from xosc_lateral.formats.openscenario.write.reconstructed import Triggers, reconstructed_scenario
+from xosc_lateral.formats.hashes import parsed_hashes
+from xosc_lateral.formats.output_tables import write_frame
 from xosc_lateral.formats.profile_folders import find_profile, list_profiles
 from xosc_lateral.formats.profiles import profile_bytes, read_profile
 from xosc_lateral.formats.recordings import RecordedTraffic
@@ -80,8 +82,6 @@ class Reconstructed:
 
     Parameters
     ----------
-    name : str
-        Of the files, without suffix.
     traffic : RecordedTraffic
     recording : Recording
     plans : tuple of VehiclePlan
@@ -98,7 +98,6 @@ class Reconstructed:
     settings : ReconstructSettings
     """
 
-    name: str
     traffic: RecordedTraffic
     recording: Recording
     plans: tuple[VehiclePlan, ...]
@@ -110,8 +109,19 @@ class Reconstructed:
     fitted: Mapping[str, DriverProfile]
     settings: ReconstructSettings
 
+    @property
+    def host(self) -> str | None:
+        """Entity that is the vehicle under test."""
+        wanted = self.settings.host
+        return next((plan.name for plan in self.plans if plan.vehicle.name == wanted), None)
 
-def reconstruct_recording(traffic: RecordedTraffic, settings: ReconstructSettings, name: str) -> Reconstructed:
+    @property
+    def files(self) -> tuple[Path, ...]:
+        """Inputs that are files."""
+        return tuple(path for path in self.traffic.sources if path.is_file())
+
+
+def reconstruct_recording(traffic: RecordedTraffic, settings: ReconstructSettings) -> Reconstructed:
     """Choose vehicles, plan their maneuvers, write the scenario in memory and play it.
 
     Raises
@@ -137,14 +147,14 @@ def reconstruct_recording(traffic: RecordedTraffic, settings: ReconstructSetting
         duration=end - begin,
         version=settings.version,
         host=None if settings.host is None else by_name[settings.host],
-        description=f"{name}: reconstructed from {traffic.sources[0].name}, {begin:g} to {end:g} s",
+        description=f"{traffic.name}: reconstructed from {traffic.sources[0].name}, {begin:g} to {end:g} s",
         relative=relative,
         exact=settings.exact,
     )
     residuals = tuple(map(residuals_of, plans))
     met = encounters(plans, traffic.network)
     drivers, fitted = _drivers(plans, residuals, settings)
-    parts = name, traffic, recording, plans, scenario, residuals, met, relative, drivers, fitted
+    parts = traffic, recording, plans, scenario, residuals, met, relative, drivers, fitted
     return Reconstructed(*parts, settings)
 
 
@@ -181,21 +191,32 @@ def _window_model(path: Path, _changed: int) -> WindowModel:
     return WindowModel.of(read_profile(path))
 
 
-def drivers_table(made: Reconstructed) -> str:
-    """A table of one row that `convert` takes: the scenario, who is under test, and everybody's profile."""
-    cells = {"scenario": f"{made.name}.xosc"}
-    host = next((plan.name for plan in made.plans if plan.vehicle.name == made.settings.host), None)
-    if host is not None:
-        cells["ego"] = host
+def drivers_table(made: Reconstructed, path: Path) -> None:
+    """Write the table of one row that `convert` takes: the scenario, who is under test, and everybody's profile."""
+    import pandas as pd
+
+    cells = {"scenario": f"{made.traffic.name}.xosc"}
+    if made.host is not None:
+        cells["ego"] = made.host
     for plan, driver in zip(made.plans, made.drivers, strict=True):
         if driver.profile:
             cells[f"profile:{plan.name}"] = driver.profile
-    return f"{','.join(cells)}\n{','.join(cells.values())}\n"
+    only = [plan.name for plan, driver in zip(made.plans, made.drivers, strict=True) if driver.profile]
+    cells["only"] = ";".join(only)
+    write_frame(pd.DataFrame([cells]), path, {"inputs": parsed_hashes(made.files)})
 
 
-def report_profiles(made: Reconstructed) -> dict[str, bytes]:
+def fitted_profiles(made: Reconstructed) -> dict[str, bytes]:
     """Files of the profiles that were fitted, by their paths below the folder."""
     return {f"drivers/{name}.json": profile_bytes(profile) for name, profile in made.fitted.items()}
+
+
+def version_named(text: str) -> Version:
+    """A version that can be written, by its name; `ValueError` for another."""
+    found = {named(version): version for version in VERSIONS}
+    if text not in found:
+        raise ValueError(f"version {text!r}, expected {', '.join(found)}")
+    return found[text]
 
 
 def chosen(traffic: RecordedTraffic, settings: ReconstructSettings) -> tuple[list[Track], float, float]:

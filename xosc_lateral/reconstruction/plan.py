@@ -15,6 +15,9 @@ from xosc_lateral.reconstruction.recorded import RecordedVehicle, Recording
 from xosc_lateral.reconstruction.speed import SpeedProfile, fit_speed
 from xosc_lateral.road.network import RoadNetwork
 from xosc_lateral.scenario import Entity
+from xosc_lateral.scenario.enums import EntityCategory
+from xosc_lateral.scenario.place import Place
+from xosc_lateral.scenario.vehicle import BoundingBox
 
 FloatArray = NDArray[np.float64]
 
@@ -117,7 +120,7 @@ def maneuver_poses(vehicle: RecordedVehicle, lateral: LateralPlan, network: Road
     return poses.x, poses.y, poses.heading
 
 
-def planned_motion(plan: VehiclePlan, entity: Entity, time: FloatArray, network: RoadNetwork) -> EntityMotion:
+def planned_motion(plan: VehiclePlan, time: FloatArray, network: RoadNetwork) -> EntityMotion:
     """Where the plan has the vehicle: what any player makes of it, but for its frames.
 
     Parameters
@@ -142,6 +145,8 @@ def planned_motion(plan: VehiclePlan, entity: Entity, time: FloatArray, network:
     activity = np.where(active, np.uint8(Activity.ACTIVE), np.uint8(0)).astype(np.uint8)
     zero = np.zeros(len(time))
     turned = poses.x, poses.y, poses.z, poses.heading, poses.pitch, poses.roll
+    box = BoundingBox(vehicle.centre, 0.0, 0.5 * vehicle.height, vehicle.length, vehicle.width, vehicle.height)
+    entity = Entity(plan.name, EntityCategory.VEHICLE, Place("", 0, ""), box)
     return EntityMotion(entity, time, *turned, speed, road, lane, s, offset, zero, activity)
 
 
