@@ -45,11 +45,10 @@ def reconstruct(
         str | None, typer.Option(metavar="ID", help="This vehicle and those who come near it.", show_default=False)
     ] = None,
     window: Annotated[float, typer.Option(help="Length of the part that --around takes [s].", min=1, max=3600)] = 60.0,
-    host: Annotated[
-        str | None, typer.Option(metavar="ID", help="The vehicle under test.", show_default=False)
-    ] = None,
+    host: Annotated[str | None, typer.Option(metavar="ID", help="The vehicle under test.", show_default=False)] = None,
     error: Annotated[
-        float, typer.Option(help="Positions along the road are within this [m]: the smaller, the more corners.", min=0.01)
+        float,
+        typer.Option(help="Positions along the road are within this [m]: the smaller, the more corners.", min=0.01),
     ] = 0.5,
     version: Annotated[str, typer.Option(metavar="1.0..1.3", help="Version of OpenSCENARIO to write.")] = "1.2",
     relative: Annotated[

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from xosc_lateral.errors import FormatError
 from xosc_lateral.formats.importers import dlr_ht
-from xosc_lateral.formats.importers.track_table import USUAL_LENGTH, Tracks, read_tracks
+from xosc_lateral.formats.importers.track_table import Tracks, read_tracks
 from xosc_lateral.formats.opendrive import read_opendrive
 from xosc_lateral.formats.opendrive.write import SHOULDER, WIDTH_PIECE, WrittenLane, WrittenRoad, curved_plan
 from xosc_lateral.formats.tables import foreign_errors
@@ -121,7 +121,9 @@ def _osi(source: Path, road: Path | None, columns: Sequence[str]) -> RecordedTra
     traffic = _on_road(recorded.tracks, source, road, centre=0.0 if known.any() else REAR_AXLE)
     tracks = traffic.tracks
     if known.any():
-        rear = {recorded.tracks.names[k]: float(recorded.rear[recorded.tracks.vehicle == k][0]) for k in range(len(tracks))}
+        rear = {
+            recorded.tracks.names[k]: float(recorded.rear[recorded.tracks.vehicle == k][0]) for k in range(len(tracks))
+        }
         tracks = tuple(replace(track, middle=rear[track.name]) for track in tracks)
     return replace(traffic, tracks=tracks, notes=tuple(recorded.notes))
 
@@ -152,7 +154,9 @@ def _on_road(tracks: Tracks, source: Path, road: Path | None, *, centre: float) 
                 heading[rows],
             )
         )
-    return RecordedTraffic(source.name.split(".")[0], tuple(found), network, road.read_bytes(), road.name, (source, road))
+    return RecordedTraffic(
+        source.name.split(".")[0], tuple(found), network, road.read_bytes(), road.name, (source, road)
+    )
 
 
 def _rows_of(vehicle: NDArray[np.int64]) -> list[NDArray[np.int64]]:
@@ -165,7 +169,7 @@ def _thinned(time: FloatArray) -> NDArray[np.bool_]:
     number = np.floor((time - time[0]) / STEP + 1e-6)
     kept = np.r_[True, np.diff(number) > 0]
     kept[-1] = True
-    return kept
+    return np.asarray(kept, dtype=np.bool_)
 
 
 # ---- recordings whose road is made -----------------------------------------------------------------------------------
@@ -189,22 +193,24 @@ def _dlr(source: Path, road: Path | None, columns: Sequence[str]) -> RecordedTra
     x = table["center_easting"].to_numpy() - made.origin[0]
     y = table["center_northing"].to_numpy() - made.origin[1]
     time, vehicle = table["time"].to_numpy(), table["vehicle"].to_numpy()
-    width = table[dlr_ht.WIDTH] if dlr_ht.WIDTH in table else table["id"].map(dict(zip(table["id"], (USUAL_WIDTH.get(kind, 1.8) for kind in kinds), strict=True)))
-    sizes = [each.to_numpy() for each in (table["dimension_length"], width, table["dimension_height"])]
-    names = table["id"].astype(str).to_numpy()
+    usual = np.array([USUAL_WIDTH.get(str(kind), 1.8) for kind in kinds])
+    width = table[dlr_ht.WIDTH].to_numpy() if dlr_ht.WIDTH in table else usual
+    sizes = table["dimension_length"].to_numpy(), width, table["dimension_height"].to_numpy()
+    names = table["id"].astype(str).to_numpy(dtype=str)
     short = _short(names)
     tracks = []
     for rows in _rows_of(vehicle):
         rows = rows[_thinned(time[rows])]
-        first, length, width, height = rows[0], *(float(size[rows[0]]) for size in sizes)
+        first = rows[0]
+        length, wide, high = (float(size[first]) for size in sizes)
         heading = np.arctan2(np.gradient(y[rows]), np.gradient(x[rows])) if len(rows) > 1 else np.zeros(1)
         tracks.append(
             Track(
                 short[names[first]],
                 str(kinds[first]),
                 length,
-                width,
-                height,
+                wide,
+                high,
                 REAR_AXLE * length,
                 REAR_AXLE * length,
                 time[rows],
@@ -240,9 +246,7 @@ def dlr_road(found: dlr_ht.Carriageways) -> WrittenRoad:
     for name in ("southbound", "northbound"):
         outer, inner = found.lanes[name]
         along = s if name == "northbound" else line.length - s
-        distance = [
-            -one.at(np.clip(along, one.start, one.end), np.full(len(s), one.height)) for one in (inner, outer)
-        ]
+        distance = [-one.at(np.clip(along, one.start, one.end), np.full(len(s), one.height)) for one in (inner, outer)]
         width = distance[1] - distance[0]
         median = distance[0] - 0.5 * width
         sides.append(

@@ -11,9 +11,9 @@ import numpy as np
 
 from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.errors import FormatError, XoscLateralError
+from xosc_lateral.formats.hashes import parsed_hashes
 from xosc_lateral.formats.openscenario.write.build import Version, named
 from xosc_lateral.formats.openscenario.write.reconstructed import Triggers, reconstructed_scenario
-from xosc_lateral.formats.hashes import parsed_hashes
 from xosc_lateral.formats.output_tables import write_frame
 from xosc_lateral.formats.profile_folders import find_profile, list_profiles
 from xosc_lateral.formats.profiles import profile_bytes, read_profile
@@ -198,11 +198,10 @@ def drivers_table(made: Reconstructed, path: Path) -> None:
     cells = {"scenario": f"{made.traffic.name}.xosc"}
     if made.host is not None:
         cells["ego"] = made.host
-    for plan, driver in zip(made.plans, made.drivers, strict=True):
-        if driver.profile:
-            cells[f"profile:{plan.name}"] = driver.profile
-    only = [plan.name for plan, driver in zip(made.plans, made.drivers, strict=True) if driver.profile]
-    cells["only"] = ";".join(only)
+    drivers = {plan.name: driver.profile for plan, driver in zip(made.plans, made.drivers, strict=True)}
+    driven = {name: profile for name, profile in drivers.items() if profile and name != made.host}
+    cells |= {f"profile:{name}": profile for name, profile in driven.items()}
+    cells["only"] = ";".join(driven)
     write_frame(pd.DataFrame([cells]), path, {"inputs": parsed_hashes(made.files)})
 
 
@@ -229,7 +228,11 @@ def chosen(traffic: RecordedTraffic, settings: ReconstructSettings) -> tuple[lis
     """
     by_name = {track.name: track for track in traffic.tracks}
     source = traffic.sources[0]
-    for word, names in (("vehicles", settings.vehicles or ()), ("around", [settings.around]), ("host", [settings.host])):
+    for word, names in (
+        ("vehicles", settings.vehicles or ()),
+        ("around", [settings.around]),
+        ("host", [settings.host]),
+    ):
         for name in names:
             if name is not None and name not in by_name:
                 some = ", ".join(list(by_name)[:8])
@@ -247,7 +250,9 @@ def chosen(traffic: RecordedTraffic, settings: ReconstructSettings) -> tuple[lis
         tracks = [track for track in tracks if track.name in set(settings.vehicles)]
     begin, end = max(begin, first), min(end, last)
     if end - begin < 1.0:
-        raise FormatError(f"from {begin:g} to {end:g} s is no second; it lasts from {first:g} to {last:g} s", path=source)
+        raise FormatError(
+            f"from {begin:g} to {end:g} s is no second; it lasts from {first:g} to {last:g} s", path=source
+        )
     return tracks, begin, end
 
 
@@ -256,5 +261,8 @@ def _comes_near(track: Track, centre: Track, begin: float, end: float) -> bool:
     time = time[(time >= centre.time[0]) & (time <= centre.time[-1])]
     if not len(time):
         return False
-    away = [np.interp(time, track.time, getattr(track, axis)) - np.interp(time, centre.time, getattr(centre, axis)) for axis in "xy"]
+    away = [
+        np.interp(time, track.time, getattr(track, axis)) - np.interp(time, centre.time, getattr(centre, axis))
+        for axis in "xy"
+    ]
     return bool((np.hypot(*away) <= AROUND).any())

@@ -27,7 +27,7 @@ from xosc_lateral.reconstruction.residuals import Residuals
 FloatArray = NDArray[np.float64]
 
 WINDOW, STEP = 10.0, 0.2
-"""Of movement that is summed up, as long as the snippets of the evaluation [s]; rows within one, as profiles have [s]."""
+"""Of movement that is summed up, as long as the evaluation's snippets; between rows, as profiles have it. [s]"""
 SURELY = 2.0
 """Another profile than the population's has to be likelier by this: weights of 7 to 1. [nat]"""
 FREE_RUNS = 40
@@ -67,21 +67,22 @@ def in_lane_offsets(plan: VehiclePlan, residuals: Residuals) -> list[tuple[Float
     for part in true_slices(following):
         even = np.arange(time[part.start], time[part.stop - 1] + 1e-9, STEP)
         if len(even) * STEP > WINDOW:
-            values = residuals.across[part], width[part]
-            parts.append((even, *(np.interp(even, time[part], each) for each in values)))
+            across, wide = (np.interp(even, time[part], each[part]) for each in (residuals.across, width))
+            parts.append((even, across, wide))
     return parts
 
 
-def choose_driver(
-    stretches: Sequence[FloatArray], models: Mapping[str, WindowModel], population: str
-) -> ChosenDriver:
+def choose_driver(stretches: Sequence[FloatArray], models: Mapping[str, WindowModel], population: str) -> ChosenDriver:
     """The likeliest profile of offsets in lane [m], every `STEP`."""
     seen = [_summaries(_windows(offset)) for offset in stretches]
     seconds = STEP * sum(map(len, stretches))
     if not seen:
         return ChosenDriver("", seconds, 0.0, f"no {WINDOW:g} s of road-following in one piece")
     windows = np.concatenate(seen)
-    gains = {name: model.log_likelihood(windows) - models[population].log_likelihood(windows) for name, model in models.items()}
+    gains = {
+        name: model.log_likelihood(windows) - models[population].log_likelihood(windows)
+        for name, model in models.items()
+    }
     best = max(gains, key=lambda name: gains[name])
     if best != population and gains[best] > SURELY:
         return ChosenDriver(best, seconds, gains[best], "likeliest of the library")

@@ -19,7 +19,7 @@ BRAKING = 1.0
 """Deceleration from which a piece of the speed profile is braking: coasting in gear gives less (about 0.5 at 100 km/h).
 [m/s2]"""
 SURE_RATE = 1.0
-"""A distance that passes its value more slowly than this is no trigger: 0.1 m of error would be more than 0.1 s. [m/s]"""
+"""A distance that passes its value more slowly is no trigger: 0.1 m of error would be more than 0.1 s. [m/s]"""
 WATCHED = 5.0
 """So long before, a relative trigger is not armed: the same distance may come about earlier, behind the other. [s]"""
 BORNE_OUT = 0.2
@@ -96,7 +96,9 @@ def encounters(plans: Sequence[VehiclePlan], network: RoadNetwork) -> tuple[Enco
             if one.lanes:
                 time = one.start + 0.5 * one.duration
                 ahead, behind = _beside(plan, plans, time, network, lane)
-                found.append(Encounter("lane change", plan.name, time, "left" if one.lanes > 0 else "right", ahead, behind))
+                found.append(
+                    Encounter("lane change", plan.name, time, "left" if one.lanes > 0 else "right", ahead, behind)
+                )
         for k in brakings(plan):
             time = float(plan.speed.time[k])
             ahead, behind = _beside(plan, plans, time, network, None)
@@ -121,7 +123,7 @@ def _place(plan: VehiclePlan, time: float, network: RoadNetwork) -> _Place | Non
         return None
     row = min(int(np.searchsorted(vehicle.time, time)), len(vehicle.time) - 1)
     road, lane = int(vehicle.road[row]), int(vehicle.lane[row])
-    way = network.travel_direction(road, lane)
+    way = network.travel_direction(road, lane) * int(vehicle.way[row])
     speed = float(np.interp(time, plan.speed.time, plan.speed.speed))
     return _Place(road, lane, way, way * _along(plan, np.array([time]))[0], speed)
 

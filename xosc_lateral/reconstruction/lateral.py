@@ -201,9 +201,7 @@ def _between_levels(
         if abs(y[-1] - before) > LEVEL:
             change = int(lanes[-1] - lanes[first])
             after = float(y[-1])
-            rough.append(
-                _Rough(first, len(y) - 1, before, after, change, float(after - base[-1]), held=True, cut=True)
-            )
+            rough.append(_Rough(first, len(y) - 1, before, after, change, float(after - base[-1]), held=True, cut=True))
     return rough
 
 
@@ -328,9 +326,7 @@ def _open_start(
     return [_Rough(0, int(done[0]) if len(done) else _nearest(y[part] - level), begin, level, 0, cut=True)]
 
 
-def _open_end(
-    vehicle: RecordedVehicle, y: FloatArray, base: FloatArray, rate: FloatArray, part: slice
-) -> list[_Rough]:
+def _open_end(vehicle: RecordedVehicle, y: FloatArray, base: FloatArray, rate: FloatArray, part: slice) -> list[_Rough]:
     """A track that ends far from its lane's centre, moving away: within a lane change, or on its way to a ramp."""
     level, end = float(base[-1]), float(y[-1])
     away = np.sign(end - level)
@@ -377,9 +373,7 @@ def _apart(rough: list[_Rough]) -> list[_Rough]:
     """Without movement within a lane that is part of a lane change."""
     changes = [(one.first, one.last) for one in rough if one.lanes]
     return [
-        one
-        for one in rough
-        if one.lanes or not any(first < one.last and one.first < last for first, last in changes)
+        one for one in rough if one.lanes or not any(first < one.last and one.first < last for first, last in changes)
     ]
 
 
@@ -396,7 +390,10 @@ def _fit(time: FloatArray, y: FloatArray, rough: _Rough, free: float) -> Transit
     if len(t) < 4:
         t, rows = time[rough.first : rough.last + 1], y[rough.first : rough.last + 1]
     begin, end = max(time[rough.first], free), max(time[rough.last], free + 0.1)
-    middle, duration = 0.5 * (begin + end), float(np.clip(end - begin, 0.1 if rough.held else DURATIONS[0], DURATIONS[1]))
+    middle, duration = (
+        0.5 * (begin + end),
+        float(np.clip(end - begin, 0.1 if rough.held else DURATIONS[0], DURATIONS[1])),
+    )
     best: tuple[float, float, float, DynamicsShape] = (np.inf, begin, duration, DynamicsShape.SINUSOIDAL)
     for shape in SHAPES if rough.held else (DynamicsShape.SINUSOIDAL, DynamicsShape.CUBIC):
         found = _search(t, rows, rough, shape, middle, duration, free)

@@ -26,6 +26,10 @@ FRAME = 0.1
 a frame's way off. [s]"""
 
 
+PLAYED = 0.2
+"""Share of the error's bound that holds for a track that was played: nothing in it is a driver's or a sensor's. [-]"""
+
+
 @dataclass(frozen=True, eq=False, slots=True)
 class VehiclePlan:
     """One vehicle's part in the scenario.
@@ -42,8 +46,9 @@ class VehiclePlan:
         From where it appears to where it leaves.
     appears, leaves : float or None
         None: it is there from the beginning, to the end. [s]
-    road, lane, s, offset
-        Where it starts: index of the road, OpenDRIVE lane, [m], and [m] from the lane's centre, positive left.
+    road, lane, s, direction, offset
+        Where it starts: index of the road, OpenDRIVE lane, [m], +1 along s or -1 against it, and [m] from the lane's
+        centre, positive to the left of its travel.
     targets : tuple of int
         OpenDRIVE lane that each transition leads to.
     """
@@ -58,6 +63,7 @@ class VehiclePlan:
     road: int
     lane: int
     s: float
+    direction: int
     offset: float
     targets: tuple[int, ...]
 
@@ -100,24 +106,18 @@ def _plan(name: str, vehicle: RecordedVehicle, network: RoadNetwork, length: flo
     leaves = None if time[-1] > length - 1.5 * FRAME else float(np.floor(time[-1] / FRAME + 1e-6) * FRAME)
     begin = 0.0 if appears is None else appears
     lateral = lateral_plan(vehicle, begin if appears is None else begin + FRAME)
-    poses = maneuver_poses(vehicle, lateral, network)
-    way = np.r_[0.0, np.cumsum(np.hypot(np.diff(poses[0]), np.diff(poses[1])))]
-    speed = fit_speed(time, way, error=error)
+    poses = vehicle.poses(network, lateral.at(time) - vehicle.levels[0])
+    way = np.r_[0.0, np.cumsum(np.hypot(np.diff(poses.x), np.diff(poses.y)))]
+    speed = fit_speed(time, way, error=PLAYED * error if lateral.is_played else error)
     ahead = float(speed.way(np.array([begin]))[0])
     road, lane, s = int(vehicle.road[0]), int(vehicle.lane[0]), float(vehicle.s[0])
-    moved = network.advance(road, lane, s, ahead)
+    forward = int(vehicle.way[0]) * network.travel_direction(road, lane)
+    moved = network.advance(road, lane, s, ahead, direction=forward)
     base, _ = vehicle.levels
     offset = float(lateral.at(np.array([begin]))[0] - base[0])
     targets = tuple(_target(vehicle, network, one) for one in lateral.transitions)
-    start = moved.road, moved.lane, moved.s, offset
+    start = moved.road, moved.lane, moved.s, moved.direction if ahead >= 0.0 else -moved.direction, offset
     return VehiclePlan(name, vehicle, lateral, way, _from(speed, begin), appears, leaves, *start, targets)
-
-
-def maneuver_poses(vehicle: RecordedVehicle, lateral: LateralPlan, network: RoadNetwork) -> tuple[FloatArray, ...]:
-    """World x, y, heading at each recorded row, were it driven by the lateral maneuvers alone. [m], [rad]"""
-    offset = lateral.at(vehicle.time) - vehicle.levels[0]
-    poses = network.lane_to_world(vehicle.road, vehicle.lane, vehicle.s, offset)
-    return poses.x, poses.y, poses.heading
 
 
 def planned_motion(plan: VehiclePlan, time: FloatArray, network: RoadNetwork) -> EntityMotion:
@@ -135,16 +135,18 @@ def planned_motion(plan: VehiclePlan, time: FloatArray, network: RoadNetwork) ->
     recorded = np.interp(way, plan.way, vehicle.time)  # when the recorded vehicle was as far
     row = np.clip(np.searchsorted(vehicle.time, recorded, side="right") - 1, 0, len(vehicle.time) - 2)
     share = (recorded - vehicle.time[row]) / (vehicle.time[row + 1] - vehicle.time[row])
-    same = vehicle.road[row] == vehicle.road[row + 1]
+    same = (vehicle.road[row] == vehicle.road[row + 1]) & (vehicle.lane[row] == vehicle.lane[row + 1])
     s = vehicle.s[row] + np.where(same, share * (vehicle.s[row + 1] - vehicle.s[row]), 0.0)
     road, lane = vehicle.road[row].astype(np.int32), vehicle.lane[row].astype(np.int32)
     offset = plan.lateral.at(held) - vehicle.levels[0][row]
-    poses = network.lane_to_world(road, lane, s, offset)
+    way_on_lane = vehicle.way[row]
+    poses = network.lane_to_world(road, lane, s, way_on_lane * offset)
     speed = np.interp(held, plan.speed.time, plan.speed.speed)
     active = (time >= begin - 1e-9) & (time <= end + FRAME)
     activity = np.where(active, np.uint8(Activity.ACTIVE), np.uint8(0)).astype(np.uint8)
     zero = np.zeros(len(time))
-    turned = poses.x, poses.y, poses.z, poses.heading, poses.pitch, poses.roll
+    heading = poses.heading + np.where(way_on_lane < 0, np.pi, 0.0)
+    turned = poses.x, poses.y, poses.z, heading, poses.pitch, poses.roll
     box = BoundingBox(vehicle.centre, 0.0, 0.5 * vehicle.height, vehicle.length, vehicle.width, vehicle.height)
     entity = Entity(plan.name, EntityCategory.VEHICLE, Place("", 0, ""), box)
     return EntityMotion(entity, time, *turned, speed, road, lane, s, offset, zero, activity)
@@ -170,7 +172,7 @@ def _target(vehicle: RecordedVehicle, network: RoadNetwork, one: Transition) -> 
     if not steps:
         return lane
     target = lane
-    side = (1 if steps > 0 else -1) * network.travel_direction(road, lane)
+    side = (1 if steps > 0 else -1) * network.travel_direction(road, lane) * int(vehicle.way[row])
     for _ in range(abs(steps)):
         target = target + side or target + 2 * side
     return target

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +12,7 @@ from numpy.typing import NDArray
 from xosc_lateral.errors import NotEnoughDataError
 from xosc_lateral.mask import true_slices
 from xosc_lateral.road.network import RoadNetwork
+from xosc_lateral.road.positions import Poses
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -46,7 +48,9 @@ class RecordedVehicle:
     road, lane : array of int
         Index of the road in the network, OpenDRIVE lane.
     s, offset, lane_width : array
-        Offset from the lane's centre, positive to the LEFT of travel. [m]
+        Offset from the lane's centre, positive to the LEFT of the vehicle's travel. [m]
+    way : array of int
+        +1: it drives as its lane is driven, -1: against it, as who overtakes on a road with one lane each way.
     """
 
     name: str
@@ -63,15 +67,16 @@ class RecordedVehicle:
     s: FloatArray
     offset: FloatArray
     lane_width: FloatArray
+    way: IntArray
 
-    def rows(self, part: slice | NDArray[np.bool_]) -> RecordedVehicle:
-        """Some of its rows."""
-        names = ("time", "x", "y", "road", "lane", "s", "offset", "lane_width")
-        return replace(self, **{name: getattr(self, name)[part] for name in names})
+    def poses(self, network: RoadNetwork, offset: FloatArray) -> Poses:
+        """World poses at each row's place along the road, `offset` [m] to the left of its lane's centre; shape (n,)."""
+        poses = network.lane_to_world(self.road, self.lane, self.s, self.way * offset)
+        return poses._replace(heading=poses.heading + np.where(self.way < 0, np.pi, 0.0))
 
     @property
     def levels(self) -> tuple[FloatArray, IntArray]:
-        """Lateral position of each row's lane centre from that of the first row's lane [m], and lanes to the left of it.
+        """Lateral position of each row's lane centre from the first row's [m], and how many lanes to its left it is.
 
         A step of the offset by more than half a lane is a new lane; one lane that goes over into another one ahead
         has none. Shape (n,) each.
@@ -168,7 +173,7 @@ def _place(
     lane_heading[there] = network.lane_to_world(*place).heading
     width = np.full(len(x), np.nan)
     width[there] = network.lane_width(*place)
-    on_lane &= np.cos(heading - lane_heading) > 0.0
+    way = np.where(np.cos(heading - lane_heading) < 0.0, -1, 1)
     passages = _passages(time, x, y, on_lane)
     if not passages:
         left_out.append(f"{track.name}: no {SHORTEST:g} s along a driving lane without a gap")
@@ -178,8 +183,11 @@ def _place(
     if lost:
         left_out.append(f"{track.name}: {lost} of {len(time)} rows (off the lanes, or beyond a gap or a leap)")
     size = track.length, track.width, track.height, track.middle
-    values = time, x, y, found.road.astype(np.int64), found.lane.astype(np.int64), found.s, found.offset, width
-    return RecordedVehicle(track.name, track.kind, *size, *(each[best] for each in values))
+    road, lane = (each.astype(np.int64)[best] for each in (found.road, found.lane))
+    where = road, lane, found.s[best], (way * found.offset)[best]
+    return RecordedVehicle(
+        track.name, track.kind, *size, time[best], x[best], y[best], *where, width[best], way[best].astype(np.int64)
+    )
 
 
 def _held(time: FloatArray, x: FloatArray, y: FloatArray, heading: FloatArray) -> FloatArray:
@@ -202,6 +210,5 @@ def _passages(time: FloatArray, x: FloatArray, y: FloatArray, on_lane: NDArray[n
     for part in true_slices(on_lane):
         cuts = part.start + 1 + np.flatnonzero(broken[part.start : part.stop - 1])
         edges = [part.start, *cuts.tolist(), part.stop]
-        parts += [slice(a, b) for a, b in zip(edges[:-1], edges[1:], strict=True)]
+        parts += [slice(a, b) for a, b in pairwise(edges)]
     return [part for part in parts if time[part.stop - 1] - time[part.start] >= SHORTEST and part.stop - part.start > 3]
-

@@ -181,7 +181,9 @@ def page_of(made: Reconstructed, facts: dict[str, Any]) -> str:
         span = SegmentSpan(SegmentKind.ROAD_FOLLOWING, 0, len(time) - 1, 0.0, float(time[-1]))
         shown, path = SampledSegment(span, time, deviation), recorded_path(plan, time, motion)
         pairs.append((motion, EntityResult(motion, (), None, "", (shown,), deviation, path)))
-    motions = NominalMotion(FRAME, tuple(motion for motion, _ in pairs), (), float(time[-1]), "end of the recording", ())
+    motions = NominalMotion(
+        FRAME, tuple(motion for motion, _ in pairs), (), float(time[-1]), "end of the recording", ()
+    )
     return render_page(
         "reconstruction.html",
         title=f"{facts['name']}: from the recording to maneuvers",
@@ -191,7 +193,9 @@ def page_of(made: Reconstructed, facts: dict[str, Any]) -> str:
             KeyFigure(f"{numbers['vehicles']}", "vehicles", f"{numbers['duration']:g} s"),
             KeyFigure(f"{numbers['lane_changes']}", "lane changes"),
             KeyFigure(f"{numbers['along_p95']:.2f} m", "along the road, 95 % within", "recorded less maneuvers"),
-            KeyFigure(f"{numbers['across_rms']:.2f} m", "across, rms", f"in lane {numbers['across_in_lane_rms']:.2f} m"),
+            KeyFigure(
+                f"{numbers['across_rms']:.2f} m", "across, rms", f"in lane {numbers['across_in_lane_rms']:.2f} m"
+            ),
         ],
         scene=paths_scene(motions, network, [result for _, result in pairs]),
         spread=_spread(residuals),
@@ -232,4 +236,3 @@ def as_text(facts: dict[str, Any]) -> str:
         *(f"  {path}" for path in files),
     ]
     return "\n".join(line for line in lines if line)
-

@@ -148,6 +148,4 @@ def curved_plan(line: ReferenceLine, origin: tuple[float, float]) -> FloatArray:
     # Hermite's cubic over the length: at 0 the place 0 and the direction (1, 0), at the end (u, v) and (du, dv)
     c_u, d_u = (3 * u / length - 2 - du) / length, (1 + du - 2 * u / length) / length**2
     c_v, d_v = (3 * v / length - dv) / length, (dv - 2 * v / length) / length**2
-    return np.column_stack(
-        [edges[:-1], place[:-1], heading, length, np.ones(len(length)), c_u, d_u, c_v, d_v]
-    )
+    return np.column_stack([edges[:-1], place[:-1], heading, length, np.ones(len(length)), c_u, d_u, c_v, d_v])

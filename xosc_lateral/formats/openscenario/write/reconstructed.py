@@ -1,9 +1,10 @@
-"""A reconstructed scenario as OpenSCENARIO 1.0 to 1.3: entities, init, one maneuver per vehicle, declared parameters."""
+"""A reconstructed scenario as OpenSCENARIO: entities, init, one maneuver per vehicle, declared parameters."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise
 
 import numpy as np
 from lxml import etree
@@ -30,6 +31,11 @@ LIMITS = {"maxSpeed": "80", "maxAcceleration": "12", "maxDeceleration": "12"}
 
 Triggers = tuple[Mapping[int, RelativeTrigger], Mapping[int, RelativeTrigger]]
 """Of transitions by their number, of brakings by the number of their corner in the speed profile."""
+
+HALF_FRAME = 0.01
+"""Players set the speed of a frame's end and drive the whole frame with it: they are half a frame ahead of a profile,
+which is therefore written as much later; for frames of 0.02 s, those of `play`. Else braking from 30 m/s to a stop ends
+0.3 m short. [s]"""
 
 VERTICES = 0.2
 """Between the vertices of a recorded path. [s]"""
@@ -141,18 +147,12 @@ def _entity(entities: etree._Element, plan: VehiclePlan, *, is_host: bool) -> No
 
 def _place(owner: etree._Element, plan: VehiclePlan, network: RoadNetwork, declared: _Declared) -> None:
     """Where it starts; a gap is varied by moving it ahead."""
-    way = network.travel_direction(plan.road, plan.lane)
-    s = declared.added(f"{plan.name}_ahead", plan.s, 3) if way > 0 else _back(declared, plan)
-    offset = decimal(network.offset_from_offset_t(plan.road, plan.lane, plan.offset), 4)
-    road = network.road_ids[plan.road]
+    s = declared.added(f"{plan.name}_ahead", plan.s, 3)
+    s = s if plan.direction > 0 else s.replace(" + ", " - ")
+    road, offset = network.road_ids[plan.road], decimal(plan.direction * plan.offset, 4)
     place = sub(sub(owner, "Position"), "LanePosition", roadId=road, laneId=str(plan.lane), s=s, offset=offset)
-    if way < 0 and declared.version < (1, 1):
-        sub(place, "Orientation", h="3.14159265", type="relative")
-
-
-def _back(declared: _Declared, plan: VehiclePlan) -> str:
-    """Ahead is towards smaller s."""
-    return declared.added(f"{plan.name}_ahead", plan.s, 3).replace(" + ", " - ")
+    if plan.direction != network.travel_direction(plan.road, plan.lane):
+        sub(place, "Orientation", h=decimal(np.pi, 6), type="relative")
 
 
 def _init(actions: etree._Element, plan: VehiclePlan, network: RoadNetwork, declared: _Declared) -> None:
@@ -186,14 +186,14 @@ def _events(
     changes, braking = relative
     event = _drive(maneuver, plan, network, declared)
     edges = [0, *sorted(braking), len(plan.speed.time) - 1]
-    for first, last in zip(edges[:-1], edges[1:], strict=True):
+    for first, last in pairwise(edges):
         if first:
             event = build.event(maneuver, f"{plan.name}_brake{first}", Priority.PARALLEL, declared.version)
         _speeds(maneuver, event, plan, declared, first, last)
         if first:
             _distance_trigger(event, plan.name, f"{plan.name}_brake{first}_distance", braking[first], declared)
     for number, (one, target) in enumerate(zip(plan.lateral.transitions, plan.targets, strict=True)):
-        _transition(maneuver, plan, one, target, number, network, declared, changes.get(number))
+        _transition(maneuver, plan, one, target, number, declared, changes.get(number))
     _leave(maneuver, plan, declared)
 
 
@@ -206,9 +206,13 @@ def _speeds(
     if declared.version >= (1, 2):
         action = sub(build.private_action(event, f"{name}_speed"), "LongitudinalAction")
         profile = sub(action, "SpeedProfileAction", followingMode="position")
-        for k in range(first + (first > 0), last + 1):  # what holds from the start is an entry of time 0
-            after = decimal(float(time[k] - time[k - 1]), 4) if k > first else "0"
-            sub(profile, "SpeedProfileEntry", speed=declared.added(faster, float(speed[k]), 4), time=after)
+        for k in range(first + (first > 0), last + 1):
+            value, after = float(speed[k]), float(time[k] - time[k - 1]) if k > first else 0.0
+            if k == 0:  # an entry of time 0 holds from the start
+                value = max(value - HALF_FRAME * float((speed[1] - speed[0]) / (time[1] - time[0])), 0.0)
+            elif k == first + 1:
+                after += HALF_FRAME
+            sub(profile, "SpeedProfileEntry", speed=declared.added(faster, value, 4), time=decimal(after, 4))
         if not first:
             build.time_trigger(event, "StartTrigger", float(time[0]), declared.version)
         return
@@ -289,7 +293,6 @@ def _transition(
     one: Transition,
     target: int,
     number: int,
-    network: RoadNetwork,
     declared: _Declared,
     relative: RelativeTrigger | None,
 ) -> None:
@@ -297,7 +300,7 @@ def _transition(
     name = f"{plan.name}_{word}{number + 1}"
     event = build.event(maneuver, name, Priority.PARALLEL, declared.version)
     lateral = sub(build.private_action(event, f"{name}_action"), "LateralAction")
-    offset_t = network.travel_direction(plan.road, plan.lane) * one.offset
+    offset_t = plan.direction * one.offset
     if one.lanes:
         aside = {"targetLaneOffset": decimal(offset_t, 4)} if abs(offset_t) > 1e-3 else {}
         action = sub(lateral, "LaneChangeAction", **aside)
