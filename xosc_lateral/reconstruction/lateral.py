@@ -192,10 +192,11 @@ def _between_levels(
     for one, other in pairwise([slice(0, 1), *parts] if not still[0] else parts):
         before, after = float(np.median(y[one])), float(np.median(y[other]))
         there = other.start
-        change = int(lanes[there] - lanes[one.stop - 1])
-        if abs(after - before) > LEVEL:
-            first, last = _reach(y, one.stop - 1, there, before, after)
-            rough.append(_Rough(first, last, before, after, change, float(after - base[there]), held=True))
+        for first, last, low, high in _turned(y, one.stop - 1, there, before, after):
+            if abs(high - low) > LEVEL:
+                change = int(lanes[last] - lanes[first])
+                rows = _reach(y, first, last, low, high)
+                rough.append(_Rough(*rows, low, high, change, float(high - base[last]), held=True))
     if not still[-1] and parts:
         first, before = parts[-1].stop - 1, float(np.median(y[parts[-1]]))
         if abs(y[-1] - before) > LEVEL:
@@ -203,6 +204,19 @@ def _between_levels(
             after = float(y[-1])
             rough.append(_Rough(first, len(y) - 1, before, after, change, float(after - base[-1]), held=True, cut=True))
     return rough
+
+
+def _turned(
+    y: FloatArray, first: int, last: int, before: float, after: float
+) -> list[tuple[int, int, float, float]]:
+    """Movements to one side between two rows: where it turns back beyond both levels, there are two of them."""
+    part = y[first : last + 1]
+    beyond = np.maximum(part - max(before, after), min(before, after) - part)
+    if beyond.max() <= LEVEL:
+        return [(first, last, before, after)]
+    top = float(part[int(beyond.argmax())])
+    rest = first + np.flatnonzero(np.abs(part - top) < LEVEL)
+    return [(first, int(rest[0]), before, top), (int(rest[-1]), last, top, after)]
 
 
 def _reach(y: FloatArray, first: int, last: int, before: float, after: float) -> tuple[int, int]:

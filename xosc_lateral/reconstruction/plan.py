@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from xosc_lateral.motion.nominal import Activity, EntityMotion
 from xosc_lateral.reconstruction.lateral import LateralPlan, Transition, lateral_plan
 from xosc_lateral.reconstruction.recorded import RecordedVehicle, Recording
-from xosc_lateral.reconstruction.speed import SpeedProfile, fit_speed
+from xosc_lateral.reconstruction.speed import APART, SpeedProfile, fit_speed
 from xosc_lateral.road.network import RoadNetwork
 from xosc_lateral.scenario import Entity
 from xosc_lateral.scenario.enums import EntityCategory
@@ -27,7 +27,8 @@ a frame's way off. [s]"""
 
 
 PLAYED = 0.2
-"""Share of the error's bound that holds for a track that was played: nothing in it is a driver's or a sensor's. [-]"""
+"""Share of the error's bound, and of the time between corners, for a track that was played: nothing in it is a driver's
+or a sensor's. [-]"""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -108,7 +109,8 @@ def _plan(name: str, vehicle: RecordedVehicle, network: RoadNetwork, length: flo
     lateral = lateral_plan(vehicle, begin if appears is None else begin + FRAME)
     poses = vehicle.poses(network, lateral.at(time) - vehicle.levels[0])
     way = np.r_[0.0, np.cumsum(np.hypot(np.diff(poses.x), np.diff(poses.y)))]
-    speed = fit_speed(time, way, error=PLAYED * error if lateral.is_played else error)
+    share = PLAYED if lateral.is_played else 1.0
+    speed = fit_speed(time, way, error=share * error, apart=share * APART)
     ahead = float(speed.way(np.array([begin]))[0])
     road, lane, s = int(vehicle.road[0]), int(vehicle.lane[0]), float(vehicle.s[0])
     forward = int(vehicle.way[0]) * network.travel_direction(road, lane)

@@ -50,27 +50,29 @@ class SpeedProfile:
         return np.asarray(ways[k] + u * (self.speed[k] + 0.5 * u * change[k] / step[k]))
 
 
-def fit_speed(time: FloatArray, way: FloatArray, *, error: float) -> SpeedProfile:
+def fit_speed(time: FloatArray, way: FloatArray, *, error: float, apart: float = APART) -> SpeedProfile:
     """Speed with the fewest corners that a search finds for positions within `error` [m].
 
     Parameters
     ----------
     time, way : array, shape (n,), n >= 2
         Increasing times [s], distance driven by then [m].
+    apart : float
+        Between two corners, at least. [s]
 
     Notes
     -----
     Greedy: corners are added where the error is largest, taken out while the bound still holds, moved to where the
-    squared error is least, and taken out once more. Where corners would have to be closer than `APART` the bound is
+    squared error is least, and taken out once more. Where corners would have to be closer than `apart` the bound is
     given up.
     """
-    kept = np.unique(np.r_[np.searchsorted(time, np.arange(time[0], time[-1], SPACING)), len(time) - 1])
+    kept = np.unique(np.r_[np.searchsorted(time, np.arange(time[0], time[-1], min(SPACING, 0.5 * apart))), len(time) - 1])
     t, w = time[kept], way[kept]
     if len(t) < 4:
         speed = max((w[-1] - w[0]) / (t[-1] - t[0]), 0.0)
         return SpeedProfile(t[[0, -1]], np.array([speed, speed]), float(w[0]))
-    knots = _moved(t, w, _thinned(t, w, _enough(t, w, error), error))
-    knots = _moved(t, w, _thinned(t, w, knots, error))
+    knots = _moved(t, w, _thinned(t, w, _enough(t, w, error, apart), error), apart)
+    knots = _moved(t, w, _thinned(t, w, knots, error), apart)
     spline = _spline(t, w, knots)
     corners = np.r_[t[0], knots, t[-1]]
     return SpeedProfile(corners, np.maximum(spline(corners, 1), 0.0), float(spline(t[0])))
@@ -82,14 +84,14 @@ def _spline(t: FloatArray, w: FloatArray, knots: FloatArray) -> BSpline[np.float
     return make_lsq_spline(t, w, np.r_[[t[0]] * 3, knots, [t[-1]] * 3], 2)
 
 
-def _enough(t: FloatArray, w: FloatArray, error: float) -> FloatArray:
+def _enough(t: FloatArray, w: FloatArray, error: float, apart: float) -> FloatArray:
     """Corners added in the middle of the worst piece until the bound holds."""
     knots = np.empty(0)
     while True:
         residual = np.abs(w - _spline(t, w, knots)(t))
         edges = np.r_[t[0], knots, t[-1]]
         piece = np.clip(np.searchsorted(edges, t, side="right") - 1, 0, len(edges) - 2)
-        residual[np.diff(edges)[piece] < 2.0 * APART] = 0.0  # can't be parted
+        residual[np.diff(edges)[piece] < 2.0 * apart] = 0.0  # can't be parted
         worst = int(residual.argmax())
         if residual[worst] <= error:
             return knots
@@ -112,8 +114,8 @@ def _thinned(t: FloatArray, w: FloatArray, knots: FloatArray, error: float) -> F
     return knots
 
 
-def _moved(t: FloatArray, w: FloatArray, knots: FloatArray) -> FloatArray:
-    """Corners where the squared error is least (Gauss-Newton with halved steps), in order and `APART`."""
+def _moved(t: FloatArray, w: FloatArray, knots: FloatArray, apart: float) -> FloatArray:
+    """Corners where the squared error is least (Gauss-Newton with halved steps), in order and apart."""
     if not len(knots):
         return knots
     from scipy.interpolate import BSpline
@@ -128,7 +130,7 @@ def _moved(t: FloatArray, w: FloatArray, knots: FloatArray) -> FloatArray:
         step = np.linalg.lstsq(np.hstack([basis, moved]), residual, rcond=1e-10)[0][basis.shape[1] :]
         for _ in range(6):
             tried = np.clip(knots + step, knots - 2.0, knots + 2.0)
-            if (np.diff(np.r_[t[0], tried, t[-1]]) >= 0.5 * APART).all():
+            if (np.diff(np.r_[t[0], tried, t[-1]]) >= 0.5 * apart).all():
                 again = _spline(t, w, tried)
                 left = w - again(t)
                 if left @ left < residual @ residual:
