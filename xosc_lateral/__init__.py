@@ -12,7 +12,6 @@ TYPE_CHECKING = False  # importing `typing` for it would take longer than all th
 _HOME = {
     "convert": "api.convert",
     "convert_many": "api.batch",
-    "variant_set": "api.variants",
     "reconstruct": "api.reconstruct",
     "play": "api.play",
     "segments": "api.play",
@@ -20,7 +19,6 @@ _HOME = {
     "sample": "api.sample",
     "evaluate": "api.evaluate",
     "close_loop": "api.loop",
-    "benchmark_realism": "api.benchmark",
     "read_drives": "api.fit",
     "import_drives": "api.importing",
     "read_profile": "api.profiles",
@@ -34,6 +32,7 @@ _HOME = {
     "Drive": "drives.drive",
     "Conversion": "api.convert",
     "Reconstruction": "api.reconstruct",
+    "ConvertOptions": "pipeline.settings",
     "BatchResult": "api.batch",
     "Playback": "api.play",
     "Segments": "api.play",
@@ -52,7 +51,6 @@ _HOME = {
 __all__ = [  # noqa: RUF022 (the order of the documentation)
     "convert",
     "convert_many",
-    "variant_set",
     "reconstruct",
     "play",
     "segments",
@@ -60,7 +58,6 @@ __all__ = [  # noqa: RUF022 (the order of the documentation)
     "sample",
     "evaluate",
     "close_loop",
-    "benchmark_realism",
     "read_drives",
     "import_drives",
     "read_profile",
@@ -74,6 +71,7 @@ __all__ = [  # noqa: RUF022 (the order of the documentation)
     "Drive",
     "Conversion",
     "Reconstruction",
+    "ConvertOptions",
     "BatchResult",
     "Playback",
     "Segments",
@@ -91,7 +89,6 @@ __all__ = [  # noqa: RUF022 (the order of the documentation)
 
 if TYPE_CHECKING:
     from xosc_lateral.api.batch import BatchResult, convert_many
-    from xosc_lateral.api.benchmark import benchmark_realism
     from xosc_lateral.api.convert import Conversion, convert
     from xosc_lateral.api.evaluate import Evaluation, evaluate
     from xosc_lateral.api.fit import fit, read_drives
@@ -102,7 +99,6 @@ if TYPE_CHECKING:
     from xosc_lateral.api.reconstruct import Reconstruction, reconstruct
     from xosc_lateral.api.sample import Offsets, sample
     from xosc_lateral.api.templates import list_templates, write_template
-    from xosc_lateral.api.variants import variant_set
     from xosc_lateral.driver.profile import DriverProfile
     from xosc_lateral.driver.stream import OffsetStream
     from xosc_lateral.drives.drive import Drive
@@ -113,6 +109,7 @@ if TYPE_CHECKING:
         PlaybackError,
         XoscLateralError,
     )
+    from xosc_lateral.pipeline.settings import ConvertOptions
 
 
 def __getattr__(name: str) -> object:

@@ -37,7 +37,6 @@ VERBS = (
     "sample",
     "evaluate",
     "close_loop",
-    "benchmark",
     "profiles",
     "template",
 )

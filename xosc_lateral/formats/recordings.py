@@ -110,25 +110,19 @@ def format_of(source: Path) -> str:
 # ---- tracks on a known road ------------------------------------------------------------------------------------------
 def _tracks(source: Path, road: Path | None, columns: Sequence[str]) -> RecordedTraffic:
     tracks = read_tracks(source, columns)
-    return _on_road(tracks, source, road, centre=REAR_AXLE)
+    return _on_road(tracks, source, road)
 
 
 def _osi(source: Path, road: Path | None, columns: Sequence[str]) -> RecordedTraffic:
     from xosc_lateral.formats.osi.read import read_osi
 
     recorded = read_osi(source)
-    known = recorded.rear > 0.0  # where the trace says it, positions are the rear axle's already
-    traffic = _on_road(recorded.tracks, source, road, centre=0.0 if known.any() else REAR_AXLE)
-    tracks = traffic.tracks
-    if known.any():
-        rear = {
-            recorded.tracks.names[k]: float(recorded.rear[recorded.tracks.vehicle == k][0]) for k in range(len(tracks))
-        }
-        tracks = tuple(replace(track, middle=rear[track.name]) for track in tracks)
-    return replace(traffic, tracks=tracks, notes=tuple(recorded.notes))
+    known = bool((recorded.rear > 0.0).any())  # where the trace says it, positions are the rear axle's already
+    tracks = replace(recorded.tracks, rear=recorded.rear) if known else recorded.tracks
+    return replace(_on_road(tracks, source, road), notes=tuple(recorded.notes))
 
 
-def _on_road(tracks: Tracks, source: Path, road: Path | None, *, centre: float) -> RecordedTraffic:
+def _on_road(tracks: Tracks, source: Path, road: Path | None) -> RecordedTraffic:
     if road is None:
         raise FormatError("comes without a road: give it with --road FILE.xodr", path=source)
     network = read_opendrive(road)
@@ -138,6 +132,7 @@ def _on_road(tracks: Tracks, source: Path, road: Path | None, *, centre: float) 
     for k, rows in enumerate(_rows_of(tracks.vehicle)):
         rows = rows[_thinned(tracks.time[rows])]
         kind, length = str(tracks.kind[rows[0]]), float(tracks.length[rows[0]])
+        middle = REAR_AXLE * length if tracks.rear is None else float(tracks.rear[rows[0]])
         width = USUAL_WIDTH.get(kind, 1.8) if tracks.width is None else float(tracks.width[rows[0]])
         found.append(
             Track(
@@ -146,8 +141,8 @@ def _on_road(tracks: Tracks, source: Path, road: Path | None, *, centre: float) 
                 length,
                 width,
                 USUAL_HEIGHT.get(kind, 1.5),
-                0.0 if tracks.is_reference else centre * length,
-                REAR_AXLE * length,
+                0.0 if tracks.is_reference or tracks.rear is not None else middle,
+                middle,
                 tracks.time[rows],
                 x[rows],
                 y[rows],

@@ -66,7 +66,8 @@ def fit_speed(time: FloatArray, way: FloatArray, *, error: float, apart: float =
     squared error is least, and taken out once more. Where corners would have to be closer than `apart` the bound is
     given up.
     """
-    kept = np.unique(np.r_[np.searchsorted(time, np.arange(time[0], time[-1], min(SPACING, 0.5 * apart))), len(time) - 1])
+    grid = np.arange(time[0], time[-1], min(SPACING, 0.5 * apart))
+    kept = np.unique(np.r_[np.searchsorted(time, grid), len(time) - 1])
     t, w = time[kept], way[kept]
     if len(t) < 4:
         speed = max((w[-1] - w[0]) / (t[-1] - t[0]), 0.0)
