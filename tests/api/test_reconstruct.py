@@ -232,6 +232,15 @@ def test_the_verb_refuses_in_one_line_and_writes_nothing(tracks, tmp_path, capsy
     assert "Traceback" not in capsys.readouterr().err
 
 
+def test_json_is_what_its_schema_says(tracks, road, tmp_path, capsys):
+    from jsonschema import Draft202012Validator
+
+    words = ["--road", str(road), "--map", COLUMNS[0], "--to", "20", "-o", str(tmp_path), "--json"]
+    assert main(["reconstruct", str(tracks), *words]) == 0
+    schema = json.loads((XSD.parents[3] / "docs/schemas/reconstruct.json").read_text())
+    Draft202012Validator(schema).validate(json.loads(capsys.readouterr().out))
+
+
 def test_names_become_names_of_entities_and_parameters():
     from xosc_lateral.reconstruction.plan import entity_names
 
