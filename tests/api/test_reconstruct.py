@@ -245,3 +245,17 @@ def test_names_become_names_of_entities_and_parameters():
     from xosc_lateral.reconstruction.plan import entity_names
 
     assert entity_names(["17", "a b", "a.b", "ä"]) == ["V17", "a_b", "a_b_2", "_"]
+
+
+def test_highd_gets_its_road_from_its_markings(tmp_path):
+    from tests.formats.test_importers import _highd
+
+    _highd(tmp_path, lower_offset=0.4, upper_offset=-0.3)
+    made = xl.reconstruct(tmp_path, tmp_path / "out")
+    assert len(made.to_frame()) == 3
+    rows = placed(tmp_path / "out/highd-01.xosc")
+    assert {name: int(one["lane"].iloc[0]) for name, one in rows.items()} == {"V1": -3, "V2": -3, "V3": 3}
+    one, other = rows["V1"], rows["V3"]
+    assert one["y"].to_numpy() == pytest.approx(-25.6, abs=1e-3)  # 0.4 m to the left of y = 26, which points down
+    assert other["y"].to_numpy() == pytest.approx(-9.7, abs=1e-3)  # 0.3 m to the right, driving towards -x
+    assert (one["x"].iloc[-1] - one["x"].iloc[0]) > 500 > 0 > (other["x"].iloc[-1] - other["x"].iloc[0])

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.errors import FormatError
-from xosc_lateral.formats.importers import dlr_ht
-from xosc_lateral.formats.importers.track_table import Tracks, read_tracks
+from xosc_lateral.formats.importers import dlr_ht, levelx
+from xosc_lateral.formats.importers.track_table import Tracks, read_tracks, tracks_of
 from xosc_lateral.formats.opendrive import read_opendrive
 from xosc_lateral.formats.opendrive.write import SHOULDER, WIDTH_PIECE, WrittenLane, WrittenRoad, curved_plan
 from xosc_lateral.formats.tables import foreign_errors
@@ -24,6 +24,8 @@ STEP = 0.1
 """Rows are thinned to this: lane changes and braking last seconds. [s]"""
 REAR_AXLE = 0.3
 """Middle of a vehicle ahead of its rear axle, as a share of its length: 1.4 m of a car of 4.6 m. [-]"""
+AROUND = 50.0
+"""A made road goes on so far beyond its traffic. [m]"""
 USUAL_WIDTH = {"truck": 2.5, "bus": 2.5, "trailer": 2.5, "van": 2.0, "motorcycle": 0.8, "motorbike": 0.8}
 """Where no width is given; 1.8 m for the rest (2.55 m is the EU's limit, directive 96/53/EC). [m]"""
 USUAL_HEIGHT = {"truck": 3.6, "bus": 3.2, "trailer": 3.6, "van": 2.3}
@@ -218,6 +220,44 @@ def _dlr(source: Path, road: Path | None, columns: Sequence[str]) -> RecordedTra
     return _made(made, tracks, [source], [note])
 
 
+def _levelx(source: Path, road: Path | None, columns: Sequence[str]) -> RecordedTraffic:
+    """One recording of highD, whose road is straight and has its markings in the meta file; exiD comes with a road."""
+    files = sorted(source.glob("*_tracks.csv")) if source.is_dir() else [source]
+    if len(files) != 1:
+        raise FormatError(f"{len(files)} recordings (XX_tracks.csv); name one", path=source)
+    table, meta, about = levelx.read_recording_files(files[0])
+    rate = float(levelx.cell(about, "frameRate", files[0]))
+    if "latLaneCenterOffset" in table.columns:
+        kinds = meta.set_index("trackId").reindex(table["trackId"])["class"].astype(str).to_numpy()
+        named = table.assign(time=table["frame"] / rate, heading=np.radians(table["heading"]), vehicle_class=kinds)
+        return _on_road(tracks_of(named, files[0], columns), files[0], road)
+    levelx.require(table, levelx.HIGHD_COLUMNS, files[0])
+    lower, upper = (np.sort(levelx.markings(about, side, files[0])) for side in ("lower", "upper"))
+    middle = 0.5 * (upper[-1] + lower[0])
+    ways = meta.set_index("id")["drivingDirection"]
+    classes = meta.set_index("id")["class"].astype(str).str.lower()
+    x0 = float(np.floor(table["x"].min() - AROUND))
+    length = float(np.ceil(table["x"].max() + table["width"].max() + AROUND)) - x0
+    tracks = []
+    for name, rows in table.sort_values(["id", "frame"]).groupby("id"):
+        time = rows["frame"].to_numpy(dtype=np.float64) / rate
+        rows, time = rows[_thinned(time)], time[_thinned(time)]
+        size, wide, kind = float(rows["width"].iloc[0]), float(rows["height"].iloc[0]), str(classes[name])
+        x, y = (rows["x"] + 0.5 * rows["width"]).to_numpy(), -(rows["y"] + 0.5 * rows["height"]).to_numpy()
+        heading = np.full(len(time), 0.0 if ways[name] == 2 else np.pi)
+        box = size, wide, USUAL_HEIGHT.get(kind, 1.5), REAR_AXLE * size, REAR_AXLE * size
+        tracks.append(Track(str(name), kind, *box, time, x, y, heading))
+    sides = [
+        [WrittenLane.even("median", inner), *(WrittenLane.even("driving", float(one)) for one in widths)]
+        for inner, widths in (
+            (middle - float(upper[-1]), np.diff(upper)[::-1]),
+            (float(lower[0]) - middle, np.diff(lower)),
+        )
+    ]
+    plan = np.array([[0.0, x0, -middle, 0.0, length]])  # y points down in the recording
+    return _made(WrittenRoad(f"highd-{files[0].name.split('_')[0]}", plan, *sides), tracks, [files[0]], [])
+
+
 def _short(names: NDArray[np.str_]) -> dict[str, str]:
     """Names without the beginning that all have in common, as long as a digit is left."""
     every = sorted(set(names.tolist()))
@@ -256,5 +296,5 @@ def dlr_road(found: dlr_ht.Carriageways) -> WrittenRoad:
 
 
 Reader = Callable[[Path, "Path | None", Sequence[str]], RecordedTraffic]
-READERS: dict[str, Reader] = {"dlr-ht": _dlr, "tracks": _tracks, "osi": _osi}
+READERS: dict[str, Reader] = {"dlr-ht": _dlr, "levelx": _levelx, "tracks": _tracks, "osi": _osi}
 """Format -> its reader."""

@@ -206,9 +206,7 @@ def _between_levels(
     return rough
 
 
-def _turned(
-    y: FloatArray, first: int, last: int, before: float, after: float
-) -> list[tuple[int, int, float, float]]:
+def _turned(y: FloatArray, first: int, last: int, before: float, after: float) -> list[tuple[int, int, float, float]]:
     """Movements to one side between two rows: where it turns back beyond both levels, there are two of them."""
     part = y[first : last + 1]
     beyond = np.maximum(part - max(before, after), min(before, after) - part)

@@ -67,7 +67,7 @@ def fit_speed(time: FloatArray, way: FloatArray, *, error: float, apart: float =
     given up.
     """
     grid = np.arange(time[0], time[-1], min(SPACING, 0.5 * apart))
-    kept = np.unique(np.r_[np.searchsorted(time, grid), len(time) - 1])
+    kept = np.unique(np.r_[np.minimum(np.searchsorted(time, grid), len(time) - 1), len(time) - 1])
     t, w = time[kept], way[kept]
     if len(t) < 4:
         speed = max((w[-1] - w[0]) / (t[-1] - t[0]), 0.0)

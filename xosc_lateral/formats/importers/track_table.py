@@ -92,7 +92,11 @@ def read_tracks(path: Path, columns: Sequence[str] = ()) -> Tracks:
     NotEnoughDataError
         No vehicle with two rows.
     """
-    table = read_esmini_log(path) if is_esmini_log(path) else read_table(path)[0]
+    return tracks_of(read_esmini_log(path) if is_esmini_log(path) else read_table(path)[0], path, columns)
+
+
+def tracks_of(table: pd.DataFrame, path: Path, columns: Sequence[str] = ()) -> Tracks:
+    """Tracks of a table that is read; see `read_tracks`."""
     found = _columns(table, path, columns)
     order = found.sort_values(["vehicle", "time"], kind="stable", ignore_index=True)
     order = order.drop_duplicates(["vehicle", "time"], ignore_index=True)
