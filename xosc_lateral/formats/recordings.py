@@ -247,15 +247,15 @@ def _levelx(source: Path, road: Path | None, columns: Sequence[str]) -> Recorded
         heading = np.full(len(time), 0.0 if ways[name] == 2 else np.pi)
         box = size, wide, USUAL_HEIGHT.get(kind, 1.5), REAR_AXLE * size, REAR_AXLE * size
         tracks.append(Track(str(name), kind, *box, time, x, y, heading))
-    sides = [
+    left, right = (
         [WrittenLane.even("median", inner), *(WrittenLane.even("driving", float(one)) for one in widths)]
         for inner, widths in (
             (middle - float(upper[-1]), np.diff(upper)[::-1]),
             (float(lower[0]) - middle, np.diff(lower)),
         )
-    ]
+    )
     plan = np.array([[0.0, x0, -middle, 0.0, length]])  # y points down in the recording
-    return _made(WrittenRoad(f"highd-{files[0].name.split('_')[0]}", plan, *sides), tracks, [files[0]], [])
+    return _made(WrittenRoad(f"highd-{files[0].name.split('_')[0]}", plan, left, right), tracks, [files[0]], [])
 
 
 def _short(names: NDArray[np.str_]) -> dict[str, str]:

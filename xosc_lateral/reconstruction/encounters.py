@@ -106,26 +106,23 @@ def encounters(plans: Sequence[VehiclePlan], network: RoadNetwork) -> tuple[Enco
     return tuple(sorted(found, key=lambda one: (one.time, one.vehicle)))
 
 
-@dataclass(frozen=True, slots=True)
-class _Place:
-    """Along the road in the direction of travel, whichever lane. [m], [m/s]"""
-
-    road: int
-    lane: int
-    way: int
-    along: float
-    speed: float
-
-
-def _place(plan: VehiclePlan, time: float, network: RoadNetwork) -> _Place | None:
+def _row(plan: VehiclePlan, time: float) -> int | None:
+    """Recorded row at a moment; None: it is not there."""
     vehicle = plan.vehicle
     if not plan.present[0] - 1e-9 <= time <= vehicle.time[-1]:
         return None
-    row = min(int(np.searchsorted(vehicle.time, time)), len(vehicle.time) - 1)
+    return min(int(np.searchsorted(vehicle.time, time)), len(vehicle.time) - 1)
+
+
+def _lane(plan: VehiclePlan, row: int, network: RoadNetwork) -> tuple[int, int, int]:
+    """Road, lane, and direction along s (+1 or -1) of a recorded row."""
+    vehicle = plan.vehicle
     road, lane = int(vehicle.road[row]), int(vehicle.lane[row])
-    way = network.travel_direction(road, lane) * int(vehicle.way[row])
-    speed = float(np.interp(time, plan.speed.time, plan.speed.speed))
-    return _Place(road, lane, way, way * _along(plan, np.array([time]))[0], speed)
+    return road, lane, network.travel_direction(road, lane) * int(vehicle.way[row])
+
+
+def _speed(plan: VehiclePlan, time: float) -> float:
+    return float(np.interp(time, plan.speed.time, plan.speed.speed))
 
 
 def _along(plan: VehiclePlan, time: FloatArray) -> FloatArray:
@@ -138,19 +135,22 @@ def _beside(
     plan: VehiclePlan, plans: Sequence[VehiclePlan], time: float, network: RoadNetwork, lane: int | None
 ) -> tuple[Beside | None, Beside | None]:
     """Nearest vehicle ahead and behind in a lane of the same road; None: the lane that it is in."""
-    here = _place(plan, time, network)
-    if here is None:
+    row = _row(plan, time)
+    if row is None:
         return None, None
-    lane = here.lane if lane is None else lane
+    road, own, way = _lane(plan, row, network)
+    wanted = road, own if lane is None else lane, way
+    at = np.array([time])
+    here, speed = way * float(_along(plan, at)[0]) + plan.vehicle.centre, _speed(plan, time)
     best: list[Beside | None] = [None, None]
     for other in plans:
-        there = None if other is plan else _place(other, time, network)
-        if there is None or there.road != here.road or there.lane != lane or there.way != here.way:
+        row = None if other is plan else _row(other, time)
+        if row is None or _lane(other, row, network) != wanted:
             continue
-        middle = there.along + other.vehicle.centre - here.along - plan.vehicle.centre
+        middle = way * float(_along(other, at)[0]) + other.vehicle.centre - here
         gap = max(abs(middle) - 0.5 * (other.vehicle.length + plan.vehicle.length), 0.0)
         k = 0 if middle > 0.0 else 1
-        closing = (here.speed - there.speed) * (1.0 if middle > 0.0 else -1.0)
+        closing = (speed - _speed(other, time)) * (1.0 if middle > 0.0 else -1.0)
         known = best[k]
         if gap <= REACH and (known is None or gap < known.gap):
             best[k] = Beside(other.name, gap, gap / closing if closing > 1e-3 else np.inf)
