@@ -13,6 +13,8 @@ _HOME = {
     "convert": "api.convert",
     "convert_many": "api.batch",
     "reconstruct": "api.reconstruct",
+    "verify": "api.verify",
+    "reproduce": "api.verify",
     "play": "api.play",
     "segments": "api.play",
     "fit": "api.fit",
@@ -34,6 +36,7 @@ _HOME = {
     "Reconstruction": "api.reconstruct",
     "ConvertOptions": "pipeline.settings",
     "BatchResult": "api.batch",
+    "Verification": "api.verify",
     "Playback": "api.play",
     "Segments": "api.play",
     "Offsets": "api.sample",
@@ -52,6 +55,8 @@ __all__ = [  # noqa: RUF022 (the order of the documentation)
     "convert",
     "convert_many",
     "reconstruct",
+    "verify",
+    "reproduce",
     "play",
     "segments",
     "fit",
@@ -73,6 +78,7 @@ __all__ = [  # noqa: RUF022 (the order of the documentation)
     "Reconstruction",
     "ConvertOptions",
     "BatchResult",
+    "Verification",
     "Playback",
     "Segments",
     "Offsets",
@@ -99,6 +105,7 @@ if TYPE_CHECKING:
     from xosc_lateral.api.reconstruct import Reconstruction, reconstruct
     from xosc_lateral.api.sample import Offsets, sample
     from xosc_lateral.api.templates import list_templates, write_template
+    from xosc_lateral.api.verify import Verification, reproduce, verify
     from xosc_lateral.driver.profile import DriverProfile
     from xosc_lateral.driver.stream import OffsetStream
     from xosc_lateral.drives.drive import Drive
