@@ -124,6 +124,12 @@ def _osi(source: Path, road: Path | None, columns: Sequence[str]) -> RecordedTra
     return replace(_on_road(tracks, source, road), notes=tuple(recorded.notes))
 
 
+def _commonroad(source: Path, road: Path | None, columns: Sequence[str]) -> RecordedTraffic:
+    from xosc_lateral.formats.importers.commonroad import read_obstacles
+
+    return _on_road(read_obstacles(source), source, road)
+
+
 def _on_road(tracks: Tracks, source: Path, road: Path | None) -> RecordedTraffic:
     if road is None:
         raise FormatError("comes without a road: give it with --road FILE.xodr", path=source)
@@ -296,5 +302,11 @@ def dlr_road(found: dlr_ht.Carriageways) -> WrittenRoad:
 
 
 Reader = Callable[[Path, "Path | None", Sequence[str]], RecordedTraffic]
-READERS: dict[str, Reader] = {"dlr-ht": _dlr, "levelx": _levelx, "tracks": _tracks, "osi": _osi}
+READERS: dict[str, Reader] = {
+    "dlr-ht": _dlr,
+    "levelx": _levelx,
+    "tracks": _tracks,
+    "osi": _osi,
+    "commonroad": _commonroad,
+}
 """Format -> its reader."""
