@@ -31,6 +31,7 @@ LAYERS = {
     "enrich": 4,
     "evaluation": 4,
     "identification": 5,
+    "reconstruction": 5,
     "formats": 6,
     "templates": 6,
     "live": 7,

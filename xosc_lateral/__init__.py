@@ -12,6 +12,7 @@ TYPE_CHECKING = False  # importing `typing` for it would take longer than all th
 _HOME = {
     "convert": "api.convert",
     "convert_many": "api.batch",
+    "reconstruct": "api.reconstruct",
     "verify": "api.verify",
     "reproduce": "api.verify",
     "play": "api.play",
@@ -40,6 +41,7 @@ _HOME = {
     "DriverProfile": "driver.profile",
     "Drive": "drives.drive",
     "Conversion": "api.convert",
+    "Reconstruction": "api.reconstruct",
     "ConvertOptions": "pipeline.settings",
     "BatchResult": "api.batch",
     "Verification": "api.verify",
@@ -61,6 +63,7 @@ _HOME = {
 __all__ = [  # noqa: RUF022 (the order of the documentation)
     "convert",
     "convert_many",
+    "reconstruct",
     "verify",
     "reproduce",
     "play",
@@ -89,6 +92,7 @@ __all__ = [  # noqa: RUF022 (the order of the documentation)
     "DriverProfile",
     "Drive",
     "Conversion",
+    "Reconstruction",
     "ConvertOptions",
     "BatchResult",
     "Verification",
@@ -117,6 +121,7 @@ if TYPE_CHECKING:
     from xosc_lateral.api.loop import ClosedLoop, close_loop
     from xosc_lateral.api.play import Playback, Segments, play, segments
     from xosc_lateral.api.profiles import compare_profiles, list_profiles, read_profile, write_profile
+    from xosc_lateral.api.reconstruct import Reconstruction, reconstruct
     from xosc_lateral.api.sample import Offsets, sample
     from xosc_lateral.api.templates import list_templates, write_template
     from xosc_lateral.api.verify import Verification, reproduce, verify

@@ -29,6 +29,7 @@ app = typer.Typer(
 # One module per verb, named like it; each has `register(app)`. They import nothing heavy at the top.
 VERBS = (
     "convert",
+    "reconstruct",
     "verify",
     "reproduce",
     "view",
