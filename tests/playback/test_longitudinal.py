@@ -147,7 +147,7 @@ def test_a_limit_that_is_missing_is_the_players_and_is_said(tmp_path: Path) -> N
     assert (performance.max_acceleration, performance.max_deceleration) == (4.0, 10.0)
     assert [note.what for note in played.motion.notes] == ["maxDeceleration is missing: 10 m/s2 is taken"]
     backwards = car("Ego").replace('maxDeceleration="10.0"', 'maxDeceleration="-1e308"')
-    with pytest.raises(FormatError, match=r"Performance of Vehicle 'car': maxDeceleration -1e\+308, expected 0 or more"):
+    with pytest.raises(FormatError, match=r"Performance of Vehicle 'car': maxDeceleration -1e\+308, expected"):
         Stage(tmp_path).play(entities=(backwards,), last=1.0)
 
 
