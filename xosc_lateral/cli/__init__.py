@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
+import time
 from collections.abc import Sequence
 from importlib import import_module
 from typing import Annotated, Any, cast
@@ -28,6 +29,8 @@ app = typer.Typer(
 # One module per verb, named like it; each has `register(app)`. They import nothing heavy at the top.
 VERBS = (
     "convert",
+    "verify",
+    "reproduce",
     "view",
     "play",
     "segments",
@@ -88,7 +91,10 @@ def main(argv: Sequence[str] | None = None) -> int:
             sys.stderr.close()
             code = 0
         else:
-            print(f"xosc-lateral: {' '.join(_in_words(error).split())}", file=sys.stderr)
+            line = f"xosc-lateral: {' '.join(_in_words(error).split())}"
+            if "--log-json" in words:
+                line = json.dumps({"event": "error", "time": round(time.time(), 3), **_as_dict(error)})
+            print(line, file=sys.stderr)
             if "--json" in words:
                 print(json.dumps(_as_dict(error), ensure_ascii=False))
             code = 1
@@ -99,7 +105,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         )
         code = 130
     except Exception as error:
-        # Typer's usage errors come from a click that is vendored in some of its releases: told by their duck shape.
+        # Typer's usage errors come from a click that is vendored in some of its releases: known by attributes.
         if not hasattr(error, "exit_code") or not hasattr(error, "format_message"):
             raise
         usage = cast(Any, error)

@@ -66,7 +66,7 @@ class EntityResult:
     trajectory : WorldTrajectory
         The enriched path (the nominal one if not enriched).
     neutral : tuple of str
-        Context columns that the profile's effects ask for and that were not known: taken as neutral.
+        Context columns that the profile's effects ask for and that were not known: without effect.
     bound : Bound or None
         That sampled movement was smoothed since nobody could have driven it: the worst segment's.
     """
@@ -179,7 +179,7 @@ class Enriched:
         ]
         lines += [line for entity in self.entities for line in _jumps(entity)]
         lines += [
-            f"{entity.name}: {', '.join(entity.neutral)} not known in the scenario, taken as neutral"
+            f"{entity.name}: {', '.join(entity.neutral)} not known in the scenario: no effect of theirs"
             for entity in self.entities
             if entity.neutral
         ]

@@ -2,11 +2,16 @@
 
 Distances between vehicles are free space: from bumper to bumper along the lane, 0 while they overlap lengthwise,
 infinite where nobody is within reach, NaN where there is no such lane.
+
+Everything is continuous in time. Others belong to a lane as far as their bodies lie in it, seen from where the vehicle
+itself is, so that they come and go as a lane change does, anybody's. What a road changes at once, lanes and widths at a
+border of sections, is what the vehicle has around it: the mean over the way that it drives within a second or two.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from functools import lru_cache
 from typing import NamedTuple
 
@@ -20,6 +25,7 @@ from xosc_lateral.scenario import BoundingBox
 from xosc_lateral.scenario.actions.environment import EnvironmentAction
 from xosc_lateral.scenario.enums import VehicleCategory
 from xosc_lateral.scenario.environment import Environment, Weather
+from xosc_lateral.segment import FADES
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -32,7 +38,15 @@ IN_SIGHT = 2.0 * REACH + 100.0
 reference line, which on the tightest ramp is half as long as its outer lane; the rest is for two road trains. [m]"""
 
 ALONGSIDE = 10.0
-"""A vehicle in the next lane counts as alongside within this free space lengthwise. [m]"""
+"""A vehicle in the next lane counts half as alongside at this free space lengthwise, wholly at half of it. [m]"""
+
+NEAR = 40.0
+"""Free space over which the influence of others fades to 37 %, as in `driver.neighbours`: with so much more free space
+for each factor e that less of a body lies in the lane, its influence is the product of both. [m]"""
+
+STEERING = 1.0
+"""Standard deviation of the kernel over which roads are seen and by which drivers respond: steering takes a second or
+two. [s]"""
 
 TRUCKS = frozenset({VehicleCategory.TRUCK, VehicleCategory.SEMITRAILER, VehicleCategory.TRAILER, VehicleCategory.BUS})
 
@@ -57,8 +71,10 @@ def entity_context(motion: NominalMotion, network: RoadNetwork, index: int, grid
     """
     entity = motion.entities[index]
     road = _road(entity, network, grid)
-    around = _neighbours(motion, network, index, grid)
-    return _own_motion(entity, grid) | road | around | _empty_lanes(road, around) | _weather(motion, entity, grid)
+    step = float(entity.time[grid[1]] - entity.time[grid[0]]) if len(grid) > 1 else STEERING
+    beside = _neighbours(motion, network, index, grid, _lanes_there(road, step))
+    road = {name: _around(values, step) for name, values in road.items()}
+    return _own_motion(entity, grid) | road | beside | _weather(motion, entity, grid)
 
 
 def _own_motion(entity: EntityMotion, grid: IntArray) -> dict[str, FloatArray]:
@@ -95,6 +111,18 @@ def _road(entity: EntityMotion, network: RoadNetwork, grid: IntArray) -> dict[st
         context[name] = np.full(len(grid), np.nan)
         context[name][on] = part
     return context
+
+
+def _around(values: FloatArray, step: float) -> FloatArray:
+    """Mean of a road's column over the way around each row, where the column is known, shape (n,); `step` in [s]."""
+    known = np.isfinite(values)
+    if not known.any() or np.ptp(values[known]) == 0.0:
+        return values
+    half = round(4.0 * STEERING / step)
+    kernel = np.exp(-0.5 * (np.arange(-half, half + 1) * step / STEERING) ** 2)
+    parts = (np.pad(part, half) for part in (np.where(known, values, 0.0), known * 1.0))
+    total, weight = (np.convolve(part, kernel, "valid") for part in parts)
+    return np.where(known, total / np.where(known, weight, 1.0), np.nan)
 
 
 # ---- other vehicles --------------------------------------------------------------------------------------------------
@@ -135,63 +163,119 @@ _INTO_NEXT = 1e-6
 
 
 class _Others(NamedTuple):
-    """Where another vehicle is, seen along the own lane: u ahead [m], lane steps to the left, same direction or not."""
+    """Where another vehicle is, seen along the own lane: u ahead [m], from the own path to the left [m], which way."""
 
     ahead: FloatArray
-    lanes_left: FloatArray
+    left: FloatArray
     oncoming: NDArray[np.bool_]
 
 
-def _neighbours(motion: NominalMotion, network: RoadNetwork, index: int, grid: IntArray) -> dict[str, FloatArray]:
+ZONES = {"lead": 0.0, "left": 1.0, "right": -1.0}
+"""Middle of the lane on each side, from the own path to the left. [own lane widths]"""
+
+
+def _neighbours(
+    motion: NominalMotion, network: RoadNetwork, index: int, grid: IntArray, lanes: Mapping[str, FloatArray]
+) -> dict[str, FloatArray]:
     own = motion.entities[index]
-    n = len(grid)
-    nearest = {side: np.full(n, np.nan) for side in ("lead", "left", "right", "oncoming")}
-    truck = {side: np.zeros(n) for side in ("lead", "left", "right")}
+    sides = {side: _Side.nobody(len(grid)) for side in ZONES}
+    oncoming = np.full(len(grid), np.nan)
     groups = _own_lane_groups(own, network, grid)
+    width = _own_lane_width(own, network, grid)
     for number in _in_sight(motion)[index]:
         other = motion.entities[number]
         if not other.entity.is_vehicle:
             continue
-        seen = _see(other, network, grid, groups)
+        seen = _see(own, other, network, grid, groups)
         gap = _free_space(seen, own.entity.bounding_box, other.entity.bounding_box)
-        for side, there in _sides(seen).items():
-            with np.errstate(invalid="ignore"):
-                closer = there & (gap <= REACH) & ~(nearest[side] <= gap)
-            nearest[side][closer] = gap[closer]
-            if side in truck:
-                truck[side][closer] = float(other.entity.vehicle_category in TRUCKS)
-    return _as_columns(nearest, truck)
+        with np.errstate(invalid="ignore"):
+            there = (gap <= REACH) & ~np.isnan(seen.left)
+            oncoming = np.where(there & seen.oncoming & (seen.ahead > 0), np.fmin(oncoming, gap), oncoming)
+            there &= ~seen.oncoming
+        is_truck = other.entity.vehicle_category in TRUCKS
+        for side, middle in ZONES.items():
+            share = _share_inside(seen.left / width - middle, other.entity.bounding_box.width / width)
+            share = np.where(there & ((side != "lead") | (seen.ahead > 0)), share, 0.0)
+            if share.any():
+                sides[side].add(gap, share, is_truck=is_truck)
+    columns = {"oncoming_distance": oncoming}
+    for side, found in sides.items():
+        columns |= {f"{side}_is_truck": found.is_truck}
+        lane = np.maximum(lanes[side], np.minimum(found.influence, 1.0))
+        columns[f"{side}_distance"] = np.where((lane > 0) & np.isnan(found.distance), np.inf, found.distance)
+        if lane.max(initial=0.0) > 0.0 and lane.min(initial=1.0) < 1.0:
+            columns[f"{side}_distance{FADES}"] = lane
+        if side != "lead":  # the same as measured drives often have it: a flag for what drives beside
+            columns |= {f"truck_{side}": found.truck_alongside, f"car_{side}": found.car_alongside}
+    return columns
 
 
-def _sides(seen: _Others) -> dict[str, NDArray[np.bool_]]:
-    """Rows in which the other one is ahead, beside or comes towards us, shape (n,) each."""
-    same_way = ~seen.oncoming
-    return {
-        "lead": same_way & (seen.lanes_left == 0) & (seen.ahead > 0),
-        "left": same_way & (seen.lanes_left == 1),
-        "right": same_way & (seen.lanes_left == -1),
-        "oncoming": seen.oncoming & (seen.ahead > 0),
-    }
+@dataclass(eq=False, slots=True)
+class _Side:
+    """What is on one side, shape (n,) each: distance [m]; influence of all and of trucks, kinds alongside. [-]"""
+
+    distance: FloatArray
+    influence: FloatArray
+    of_trucks: FloatArray
+    truck_alongside: FloatArray
+    car_alongside: FloatArray
+
+    @classmethod
+    def nobody(cls, n: int) -> _Side:
+        return cls(np.full(n, np.nan), *np.zeros((4, n)))
+
+    def add(self, gap: FloatArray, share: FloatArray, *, is_truck: bool) -> None:
+        """One more vehicle with free space `gap` [m], of which so much lies in the lane [-]."""
+        there = share > 0
+        self.distance[there] = np.fmin(self.distance[there], gap[there] - NEAR * np.log(share[there]))
+        influence = np.zeros(len(gap))
+        influence[there] = share[there] * np.exp(-gap[there] / NEAR)
+        self.influence += influence
+        alongside = np.zeros(len(gap))
+        alongside[there] = share[there] * (1.0 - smooth_step(gap[there] / ALONGSIDE - 0.5))
+        if is_truck:  # comes into sight in the last quarter of the reach
+            self.of_trucks[there] += (influence * (1.0 - smooth_step(4.0 * gap / REACH - 3.0)))[there]
+            self.truck_alongside = np.maximum(self.truck_alongside, alongside)
+        else:
+            self.car_alongside = np.maximum(self.car_alongside, alongside)
+
+    @property
+    def is_truck(self) -> FloatArray:
+        """How far who is there is a truck, others weighed by their influence."""
+        return self.of_trucks / np.where(self.influence > 0, self.influence, 1.0)
 
 
-def _as_columns(nearest: Mapping[str, FloatArray], truck: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
-    """Distances [m] and kinds of what is nearest on every side, shape (n,) each, by the names of context columns."""
-    context = {f"{side}_distance": distance for side, distance in nearest.items()}
-    context |= {f"{side}_is_truck": flag for side, flag in truck.items()}
-    for side in ("left", "right"):
-        alongside = np.nan_to_num(nearest[side], nan=np.inf) <= ALONGSIDE
-        # the same as measured drives often have it: a flag for what drives beside
-        context[f"truck_{side}"] = (alongside & (truck[side] > 0)).astype(np.float64)
-        context[f"car_{side}"] = (alongside & (truck[side] == 0)).astype(np.float64)
-    return context
+def _share_inside(middle: FloatArray, width: FloatArray) -> FloatArray:
+    """Share of a body that lies in a lane one wide, of what fits in; `middle` from the lane's, all in lane widths."""
+    inside = np.minimum(middle + 0.5 * width, 0.5) - np.maximum(middle - 0.5 * width, -0.5)
+    return np.clip(inside / np.minimum(width, 1.0), 0.0, 1.0)
 
 
-def _empty_lanes(road: Mapping[str, FloatArray], around: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
-    """Distances that say so where there is a lane but nobody in it."""
+def smooth_step(u: FloatArray) -> FloatArray:
+    """0 at 0 and below, 1 at 1 and above, smooth between."""
+    u = np.clip(u, 0.0, 1.0)
+    return np.asarray(u**2 * (3.0 - 2.0 * u))
+
+
+def _own_lane_width(own: EntityMotion, network: RoadNetwork, grid: IntArray) -> FloatArray:
+    """Of the lane, at least the vehicle's own, shape (n,). [m]"""
+    width = np.full(len(grid), own.entity.bounding_box.width)
+    on = (own.road[grid] >= 0) & (own.lane[grid] != 0)
+    rows = grid[on]
+    width[on] = np.maximum(width[on], network.lane_width(own.road[rows], own.lane[rows], own.s[rows]))
+    return np.asarray(np.maximum(width, 0.1))
+
+
+def _lanes_there(road: Mapping[str, FloatArray], step: float) -> dict[str, FloatArray]:
+    """How far there is a lane on each side of the way around, shape (n,) each. [-]"""
     index, count = road["lane_index"], road["lane_count"]
     there = {"lead": index >= 0, "right": index > 0, "left": index < count - 1}
-    names = {side: f"{side}_distance" for side in there}
-    return {name: np.where(there[side] & np.isnan(around[name]), np.inf, around[name]) for side, name in names.items()}
+    shares = {side: _around(one.astype(np.float64), step) for side, one in there.items()}
+    return {side: np.clip((share - _NONE) / (1.0 - 2.0 * _NONE), 0.0, 1.0) for side, share in shares.items()}
+
+
+_NONE = 1e-3
+"""A share of a lane that is none. [-]"""
 
 
 @lru_cache(maxsize=1)  # asked for every entity of one motion after another
@@ -230,13 +314,19 @@ def _own_lane_groups(
 
 
 def _see(
-    other: EntityMotion, network: RoadNetwork, grid: IntArray, groups: list[tuple[IntArray, FloatArray, list[_Reach]]]
+    own: EntityMotion,
+    other: EntityMotion,
+    network: RoadNetwork,
+    grid: IntArray,
+    groups: list[tuple[IntArray, FloatArray, list[_Reach]]],
 ) -> _Others:
     n = len(grid)
     seen = _Others(np.full(n, np.nan), np.full(n, np.nan), np.zeros(n, dtype=bool))
     road, lane, s = other.road[grid], other.lane[grid], other.s[grid]
     present = ((other.activity[grid] & Activity.ACTIVE) != 0) & (road >= 0) & (lane != 0)
     direction = _travel(other, network, grid, present)
+    t = np.full(n, np.nan)
+    t[present] = network.offset_to_t(road[present], lane[present], s[present], other.offset[grid[present]])
     for members, own_u, path in groups:
         for part in path:
             on = present[members] & (road[members] == part.road)
@@ -249,7 +339,8 @@ def _see(
             nearer = ~(np.abs(seen.ahead[k]) <= np.abs(ahead))
             k, ahead = k[nearer], ahead[nearer]
             seen.ahead[k] = ahead
-            seen.lanes_left[k] = part.sign * (_rank(lane[k]) - _rank(np.int64(part.lane)))
+            centre = network.lane_centre_t(part.road, part.lane, s[k])
+            seen.left[k] = part.sign * (t[k] - centre) - own.offset[grid[k]]
             seen.oncoming[k] = direction[k] != part.sign
     return seen
 
@@ -261,11 +352,6 @@ def _travel(other: EntityMotion, network: RoadNetwork, grid: IntArray, present: 
     direction[present] = network.travel_directions(road[present], lane[present])
     direction = np.where(np.cos(other.heading_relative[grid]) < 0.0, -direction, direction)
     return np.asarray(direction)
-
-
-def _rank(lane: NDArray[np.integer] | np.integer) -> IntArray:
-    """Lane ids without the gap at the centre lane 0: differences count lanes along +t."""
-    return np.where(lane > 0, lane - 1, lane).astype(np.int64)
 
 
 def _free_space(seen: _Others, own: BoundingBox, other: BoundingBox) -> FloatArray:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import os
 from collections.abc import Collection, Mapping
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
@@ -17,6 +16,7 @@ from xosc_lateral.enrich.result import Enriched
 from xosc_lateral.errors import FormatError
 from xosc_lateral.formats.atomic import refuse_outputs
 from xosc_lateral.formats.context_table import read_context
+from xosc_lateral.formats.openscenario.provenance import PENDING
 from xosc_lateral.formats.openscenario.write import (
     Player,
     WrittenScenario,
@@ -34,7 +34,7 @@ from xosc_lateral.pipeline.drivers import choose_drivers
 from xosc_lateral.pipeline.load import Played, input_hashes, play_scenario, play_until
 from xosc_lateral.pipeline.meaning import keep_meaning, meaning_of
 from xosc_lateral.pipeline.modes import WritingPlan, chosen_egos, is_replay, writing_plan
-from xosc_lateral.pipeline.settings import ConvertSettings, OutputMode
+from xosc_lateral.pipeline.settings import ConvertSettings, OutputMode, relative
 from xosc_lateral.pipeline.shifted import Shift
 from xosc_lateral.scenario import Scenario
 from xosc_lateral.scenario.dependence import Dependence, dependence
@@ -171,11 +171,13 @@ class _Making:
         self, enriched: Enriched, plan: WritingPlan, replayed: frozenset[str] | None = None
     ) -> tuple[ConversionProvenance, WrittenScenario]:
         """Write it with these offsets."""
-        provenance = _provenance(self.played, enriched, self.settings, self.variant, self.inputs, self.egos, plan)
+        provenance = _provenance(
+            self.played, enriched, self.settings, self.variant, self.inputs, self.egos, plan, self.output
+        )
         written = _write(
             self.lasting, enriched, self.output, provenance, self.settings, plan, replayed, self.depends, save=self.save
         )
-        return provenance, written
+        return replace(provenance, content_sha256=written.content_sha256), written
 
     def write_reactive(
         self, enriched: Enriched, plan: WritingPlan
@@ -260,28 +262,25 @@ def _provenance(
     inputs: Mapping[Path, str],
     egos: Collection[str],
     plan: WritingPlan,
+    output: Path,
 ) -> ConversionProvenance:
     scenario = played.scenario
     return ConversionProvenance(
         package_version=__version__,
-        inputs={_relative(path, scenario.path): sha256 for path, sha256 in inputs.items()},
+        behaviour=BEHAVIOUR,
+        scenario=f"{relative(scenario.path.parent, output.parent)}/{scenario.path.name}",
+        inputs={relative(path, scenario.path.parent): sha256 for path, sha256 in inputs.items()},
         profiles={
             entity.name: (entity.profile.name, profile_hash(entity.profile))
             for entity in enriched.entities
             if entity.profile is not None
         },
-        seed=settings.seed,
-        variant=variant,
-        parameters=dict(sorted(settings.parameters.items())),
-        with_sensor=settings.with_sensor,
-        player=settings.target.player.value,
+        options=settings.record(scenario.path.parent),
+        variant=variant + 1,
         version=named(settings.target.version_for(scenario)),
         ego=tuple(egos),
         modes={name: mode for name, mode in plan.modes().items() if enriched.entity(name).is_enriched},
-        only=None if settings.only is None else tuple(sorted(settings.only)),
-        attempts=settings.attempts,
-        neighbours=settings.neighbours.value,
-        behaviour=BEHAVIOUR,
+        content_sha256=PENDING,
     )
 
 
@@ -301,11 +300,6 @@ def _refuse_lanes_without_width(played: Played, enriched: Enriched) -> None:
                 )
 
 
-def _relative(path: Path, scenario: Path) -> str:
-    """Path as seen from the scenario: the same on every machine."""
-    return Path(os.path.relpath(path.resolve(), scenario.resolve().parent)).as_posix()
-
-
 def _write(
     played: Played,
     enriched: Enriched,
@@ -319,8 +313,8 @@ def _write(
     save: bool,
 ) -> WrittenScenario:
     profiles = sorted({name for name, _ in provenance.profiles.values()})
-    summary = f"seed {provenance.seed}, variant {provenance.variant}, {', '.join(profiles) or 'no profile'}"
-    summary += ", with sensor" if provenance.with_sensor else ""
+    summary = f"seed {settings.seed}, variant {provenance.variant}, {', '.join(profiles) or 'no profile'}"
+    summary += ", with sensor" if settings.with_sensor else ""
     facts = asdict(provenance)
     if not plan.is_replay:
         lateral = lateral_actions(played.scenario)

@@ -11,7 +11,6 @@ an act, too.
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from itertools import product
@@ -22,9 +21,8 @@ from typing import Any
 import numpy as np
 from lxml import etree
 
-from xosc_lateral.formats.atomic import write_pieces_atomically
 from xosc_lateral.formats.openscenario.element import local_name
-from xosc_lateral.formats.openscenario.provenance import mark
+from xosc_lateral.formats.openscenario.provenance import mark, write_sealed
 from xosc_lateral.formats.openscenario.write import build
 from xosc_lateral.formats.openscenario.write.checks import check_convertible
 from xosc_lateral.formats.openscenario.write.fit import fit
@@ -137,10 +135,9 @@ def write_lane_offset_scenario(
     rewrite_paths(root, scenario, output, scope)
     mark(root, provenance, summary)
     pieces = vertices.document(root) if moving else [build.document(root)]
-    data = b"" if save else b"".join(pieces)
-    sha256 = write_pieces_atomically(output, pieces) if save else hashlib.sha256(data).hexdigest()
+    sha256, content, data = write_sealed(output, pieces, save=save)
     names = tuple(dict.fromkeys([*moving, *(chain.entity for chain in chains)]))
-    return WrittenScenario(output, sha256, names, tuple(removed), data, notes)
+    return WrittenScenario(output, sha256, content, names, tuple(removed), data, notes)
 
 
 def _put_into(root: etree._Element, story: etree._Element, scenario: Scenario, chains: Sequence[OffsetChain]) -> None:
@@ -159,7 +156,7 @@ def _place_aside(storyboard: etree._Element, scenario: Scenario, chains: Sequenc
         for chain in chains
         if chain.is_placed
     }
-    owners = list(storyboard.iter("{*}Private"))
+    owners = storyboard.findall("{*}Init/{*}Actions/{*}Private")
     # The reader's order is the file's: names need no parameters filled in again.
     last = {
         private.entity_ref: owner
