@@ -43,7 +43,7 @@ from xosc_lateral.version import BEHAVIOUR, __version__
 CHANGES = "with offsets, what happens would happen otherwise"
 LEAST_LONGER, LONGER = 1.3, 2.0
 """A vehicle under test may be later at what ends the run, or never come to it: others follow trajectories for so
-many times the nominal run. A fifth slower takes a quarter longer; a file of trajectories grows as their time does. [-]"""
+many times the nominal run. A fifth slower takes a quarter longer; a file of trajectories grows with their time. [-]"""
 SUPPLY = 10.0
 """For so long at least, where it may last longer in another run, a stretch has movement of its own. What comes after it
 is the same again; some of the slow movement of a driver is seen in that time. [s]"""
