@@ -34,6 +34,7 @@ LAYERS = {
     "reconstruction": 5,
     "formats": 6,
     "templates": 6,
+    "live": 7,
     "report": 8,
     "pipeline": 9,
     "api": 10,

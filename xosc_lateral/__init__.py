@@ -29,6 +29,14 @@ _HOME = {
     "compare_profiles": "api.profiles",
     "list_templates": "api.templates",
     "write_template": "api.templates",
+    "live_esmini": "api.live",
+    "live_sumo": "api.live",
+    "Traffic": "live.traffic",
+    "Moment": "live.traffic",
+    "EsminiTraffic": "live.esmini",
+    "SumoTraffic": "live.sumo",
+    "export_fmu": "live.fmu",
+    "LiveRun": "api.live",
     "OffsetStream": "driver.stream",
     "DriverProfile": "driver.profile",
     "Drive": "drives.drive",
@@ -48,6 +56,7 @@ _HOME = {
     "PlaybackError": "errors",
     "DriverProfileError": "errors",
     "NotEnoughDataError": "errors",
+    "SimulationError": "errors",
 }
 """Public name -> module that has it."""
 
@@ -71,6 +80,14 @@ __all__ = [  # noqa: RUF022 (the order of the documentation)
     "compare_profiles",
     "list_templates",
     "write_template",
+    "live_esmini",
+    "live_sumo",
+    "Traffic",
+    "Moment",
+    "EsminiTraffic",
+    "SumoTraffic",
+    "export_fmu",
+    "LiveRun",
     "OffsetStream",
     "DriverProfile",
     "Drive",
@@ -90,6 +107,7 @@ __all__ = [  # noqa: RUF022 (the order of the documentation)
     "PlaybackError",
     "DriverProfileError",
     "NotEnoughDataError",
+    "SimulationError",
     "__version__",
 ]
 
@@ -99,6 +117,7 @@ if TYPE_CHECKING:
     from xosc_lateral.api.evaluate import Evaluation, evaluate
     from xosc_lateral.api.fit import fit, read_drives
     from xosc_lateral.api.importing import ImportedDrives, import_drives
+    from xosc_lateral.api.live import LiveRun, live_esmini, live_sumo
     from xosc_lateral.api.loop import ClosedLoop, close_loop
     from xosc_lateral.api.play import Playback, Segments, play, segments
     from xosc_lateral.api.profiles import compare_profiles, list_profiles, read_profile, write_profile
@@ -114,8 +133,13 @@ if TYPE_CHECKING:
         FormatError,
         NotEnoughDataError,
         PlaybackError,
+        SimulationError,
         XoscLateralError,
     )
+    from xosc_lateral.live.esmini import EsminiTraffic
+    from xosc_lateral.live.fmu import export_fmu
+    from xosc_lateral.live.sumo import SumoTraffic
+    from xosc_lateral.live.traffic import Moment, Traffic
     from xosc_lateral.pipeline.settings import ConvertOptions
 
 

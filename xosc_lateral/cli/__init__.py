@@ -42,6 +42,7 @@ VERBS = (
     "close_loop",
     "profiles",
     "template",
+    "live",
 )
 
 for _verb in VERBS:
