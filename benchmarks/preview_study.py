@@ -39,7 +39,7 @@ def verdict(accepted: Sequence[Accepted], act: preview_driver.Act) -> tuple[str,
         named = planted and (columns == set(act.columns) if act.columns else one.term.component.startswith("time_"))
         hit |= named
         wrong += not named and not columns <= BENDS
-        sign = "" if named or columns <= BENDS and columns else "!"
+        sign = "" if named or (columns <= BENDS and columns) else "!"
         words.append(f"{sign}{one.term.component} {'*'.join(one.term.columns)} {one.p_value:.0e}")
     return "; ".join(words) or "nothing", hit, wrong
 
