@@ -29,6 +29,7 @@ app = typer.Typer(
 # One module per verb, named like it; each has `register(app)`. They import nothing heavy at the top.
 VERBS = (
     "convert",
+    "reconstruct",
     "verify",
     "reproduce",
     "view",
@@ -41,6 +42,7 @@ VERBS = (
     "close_loop",
     "profiles",
     "template",
+    "live",
 )
 
 for _verb in VERBS:
