@@ -40,7 +40,7 @@ SHORTEST_S = 240.0
 """Half cosines whose period is down to this say how much the slower ones are by chance; four times as long as what a
 regime lasts, so that regimes count as chance. [s]"""
 
-MEAN_SHORTEST_S = 150.0
+MEAN_SHORTEST_S = 120.0
 """The same for the mean: people wander within a minute or two, which whitening knows. [s]"""
 
 UNSEEN_S = 750.0
