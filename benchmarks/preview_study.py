@@ -1,7 +1,7 @@
 """What the loop names on drives of `simulated.preview_driver`.
 
-`python -m benchmarks.preview_study design|validation|test [--whole] [KIND ...]`: one line per drive with everything that
-is selected, "!" where it is not what was planted. With `--whole` the loop is closed: folds and held-out blocks judge,
+`python -m benchmarks.preview_study design|validation|test [--whole] [KIND ...]`: one line per drive with everything
+that is selected, "!" where it is not what was planted. With `--whole` folds and held-out blocks judge as well,
 and for a spread that changes with time the ratio of the loudest sixth of the drive to the quietest is shown, measured
 and sampled.
 """
@@ -38,8 +38,9 @@ def verdict(accepted: Sequence[Accepted], act: preview_driver.Act) -> tuple[str,
         columns = set(one.term.columns)
         named = planted and (columns == set(act.columns) if act.columns else one.term.component.startswith("time_"))
         hit |= named
-        wrong += not named and not columns <= BENDS
-        sign = "" if named or (columns <= BENDS and columns) else "!"
+        of_bends = bool(columns) and columns <= BENDS
+        wrong += not named and not of_bends
+        sign = "" if named or of_bends else "!"
         words.append(f"{sign}{one.term.component} {'*'.join(one.term.columns)} {one.p_value:.0e}")
     return "; ".join(words) or "nothing", hit, wrong
 

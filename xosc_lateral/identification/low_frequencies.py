@@ -40,8 +40,11 @@ SHORTEST_S = 240.0
 """Half cosines whose period is down to this say how much the slower ones are by chance; four times as long as what a
 regime lasts, so that regimes count as chance. [s]"""
 
-MEAN_SHORTEST_S = 150.0
+MEAN_SHORTEST_S = 120.0
 """The same for the mean: people wander within a minute or two, which whitening knows. [s]"""
+
+UNSEEN_S = 750.0
+"""Half cosines of longer periods are hidden from the autoregression: eight times as long as it sees. [s]"""
 
 STEP_DRAWS = 2000
 """Draws of white rows that the best smooth or step is compared with."""
@@ -57,7 +60,9 @@ def slow_rows(fitted: Fitted) -> tuple[FloatArray, Whitener]:
     """White rows, shape (n,), by an autoregression that has not seen what changes over the whole drive."""
     coarse = fitted.coarse
     left = np.where(coarse.valid, fitted.movement * fitted.scale, 0.0)
-    slow = np.column_stack([np.ones(len(left)), half_cosines_of(coarse, max(ORDERS))]) * coarse.valid[:, None]
+    # of a short drive all of them would take ordinary wander along, and the rest would look whiter than it is
+    number = int(np.clip(2.0 * coarse.valid.sum() / coarse.drives / UNSEEN_S, 1, max(ORDERS)))
+    slow = np.column_stack([np.ones(len(left)), half_cosines_of(coarse, number)]) * coarse.valid[:, None]
     basis = np.linalg.qr(slow)[0]
     movement = np.where(coarse.valid, (left - basis @ (basis.T @ left)) / fitted.scale, 0.0)
     process = fit_autoregression(movement, coarse.valid, ORDER, longest=LONGEST)
