@@ -6,7 +6,7 @@ infinite where nobody is within reach, NaN where there is no such lane.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import lru_cache
 from typing import NamedTuple
 
@@ -33,6 +33,9 @@ reference line, which on the tightest ramp is half as long as its outer lane; th
 
 ALONGSIDE = 10.0
 """A vehicle in the next lane counts as alongside within this free space lengthwise. [m]"""
+
+CELLS = 100_000
+"""Rows of all others that are looked at together: as many as stay in a processor's cache. [-]"""
 
 TRUCKS = frozenset({VehicleCategory.TRUCK, VehicleCategory.SEMITRAILER, VehicleCategory.TRAILER, VehicleCategory.BUS})
 
@@ -143,26 +146,32 @@ class _Others(NamedTuple):
 def _neighbours(motion: NominalMotion, network: RoadNetwork, index: int, grid: IntArray) -> dict[str, FloatArray]:
     own = motion.entities[index]
     n = len(grid)
-    nearest = {side: np.full(n, np.nan) for side in ("lead", "left", "right", "oncoming")}
+    nearest = {side: np.full(n, np.inf) for side in ("lead", "left", "right", "oncoming")}
     truck = {side: np.zeros(n) for side in ("lead", "left", "right")}
     groups = _own_lane_groups(own, network, grid)
-    for number in _in_sight(motion)[index]:
-        other = motion.entities[number]
-        if not other.entity.is_vehicle:
-            continue
-        seen = _see(other, network, grid, groups)
-        gap = _free_space(seen, own.entity.bounding_box, other.entity.bounding_box)
+    directions = _travel(motion, network)
+    numbers = [k for k in _in_sight(motion)[index] if motion.entities[k].entity.is_vehicle]
+    together = max(1, CELLS // n)
+    for begin in range(0, len(numbers), together):
+        part = numbers[begin : begin + together]
+        others = [motion.entities[k] for k in part]
+        seen = _see(others, np.stack([directions[k][grid] for k in part]), grid, groups)
+        gap = _free_space(seen, own.entity.bounding_box, [other.entity.bounding_box for other in others])
+        is_truck = np.array([float(other.entity.vehicle_category in TRUCKS) for other in others])
         for side, there in _sides(seen).items():
             with np.errstate(invalid="ignore"):
-                closer = there & (gap <= REACH) & ~(nearest[side] <= gap)
-            nearest[side][closer] = gap[closer]
+                gaps = np.where(there & (gap <= REACH), gap, np.inf)
+            first = gaps.argmin(axis=0)
+            smallest = gaps[first, np.arange(n)]
+            closer = smallest < nearest[side]
+            nearest[side][closer] = smallest[closer]
             if side in truck:
-                truck[side][closer] = float(other.entity.vehicle_category in TRUCKS)
-    return _as_columns(nearest, truck)
+                truck[side][closer] = is_truck[first[closer]]
+    return _as_columns({side: np.where(np.isinf(gap), np.nan, gap) for side, gap in nearest.items()}, truck)
 
 
 def _sides(seen: _Others) -> dict[str, NDArray[np.bool_]]:
-    """Rows in which the other one is ahead, beside or comes towards us, shape (n,) each."""
+    """Rows in which the other one is ahead, beside or comes towards us, shape (others, n) each."""
     same_way = ~seen.oncoming
     return {
         "lead": same_way & (seen.lanes_left == 0) & (seen.ahead > 0),
@@ -227,37 +236,43 @@ def _own_lane_groups(
 
 
 def _see(
-    other: EntityMotion, network: RoadNetwork, grid: IntArray, groups: list[tuple[IntArray, FloatArray, list[_Reach]]]
+    others: Sequence[EntityMotion],
+    direction: NDArray[np.int8],
+    grid: IntArray,
+    groups: list[tuple[IntArray, FloatArray, list[_Reach]]],
 ) -> _Others:
-    n = len(grid)
-    seen = _Others(np.full(n, np.nan), np.full(n, np.nan), np.zeros(n, dtype=bool))
-    road, lane, s = other.road[grid], other.lane[grid], other.s[grid]
-    present = ((other.activity[grid] & Activity.ACTIVE) != 0) & (road >= 0) & (lane != 0)
-    direction = _travel(other, network, grid, present)
+    """Others along the own lane, shape (others, n); `direction` is which way they drive, 0: on no lane."""
+    shape = direction.shape
+    seen = _Others(np.full(shape, np.nan), np.full(shape, np.nan), np.zeros(shape, dtype=bool))
+    road, lane, s = (np.stack([getattr(one, name)[grid] for one in others]) for name in ("road", "lane", "s"))
     for members, own_u, path in groups:
         for part in path:
-            on = present[members] & (road[members] == part.road)
-            on &= (s[members] >= part.s_low - 1e-9) & (s[members] <= part.s_high + 1e-9)
-            k = members[on]
-            if not len(k):
+            on = (direction[:, members] != 0) & (road[:, members] == part.road)
+            on &= (s[:, members] >= part.s_low - 1e-9) & (s[:, members] <= part.s_high + 1e-9)
+            who, at = np.nonzero(on)
+            if not len(who):
                 continue
-            ahead = part.at + part.sign * (s[k] - part.s_entry) - own_u[on]
+            k = members[at]
+            ahead = part.at + part.sign * (s[who, k] - part.s_entry) - own_u[at]
             # the own lane path may pass a place twice (a ring road): the nearer view counts
-            nearer = ~(np.abs(seen.ahead[k]) <= np.abs(ahead))
-            k, ahead = k[nearer], ahead[nearer]
-            seen.ahead[k] = ahead
-            seen.lanes_left[k] = part.sign * (_rank(lane[k]) - _rank(np.int64(part.lane)))
-            seen.oncoming[k] = direction[k] != part.sign
+            nearer = ~(np.abs(seen.ahead[who, k]) <= np.abs(ahead))
+            who, k, ahead = who[nearer], k[nearer], ahead[nearer]
+            seen.ahead[who, k] = ahead
+            seen.lanes_left[who, k] = part.sign * (_rank(lane[who, k]) - _rank(np.int64(part.lane)))
+            seen.oncoming[who, k] = direction[who, k] != part.sign
     return seen
 
 
-def _travel(other: EntityMotion, network: RoadNetwork, grid: IntArray, present: NDArray[np.bool_]) -> NDArray[np.int64]:
-    """Which way the other one drives along s, +1 or -1, shape (n,); 0 where it is on no lane."""
-    road, lane = other.road[grid], other.lane[grid]
-    direction = np.zeros(len(grid), dtype=np.int64)
-    direction[present] = network.travel_directions(road[present], lane[present])
-    direction = np.where(np.cos(other.heading_relative[grid]) < 0.0, -direction, direction)
-    return np.asarray(direction)
+@lru_cache(maxsize=1)  # asked for every entity of one motion after another
+def _travel(motion: NominalMotion, network: RoadNetwork) -> tuple[NDArray[np.int8], ...]:
+    """For every entity which way it drives along s, +1 or -1, shape (rows,); 0 where it is on no lane."""
+    directions = []
+    for entity in motion.entities:
+        present = ((entity.activity & Activity.ACTIVE) != 0) & (entity.road >= 0) & (entity.lane != 0)
+        direction = np.zeros(len(present), dtype=np.int8)
+        direction[present] = network.travel_directions(entity.road[present], entity.lane[present])
+        directions.append(np.where(np.cos(entity.heading_relative) < 0.0, -direction, direction))
+    return tuple(directions)
 
 
 def _rank(lane: NDArray[np.integer] | np.integer) -> IntArray:
@@ -265,11 +280,12 @@ def _rank(lane: NDArray[np.integer] | np.integer) -> IntArray:
     return np.where(lane > 0, lane - 1, lane).astype(np.int64)
 
 
-def _free_space(seen: _Others, own: BoundingBox, other: BoundingBox) -> FloatArray:
-    """Bumper to bumper, 0 while overlapping lengthwise. [m]"""
+def _free_space(seen: _Others, own: BoundingBox, others: Sequence[BoundingBox]) -> FloatArray:
+    """Bumper to bumper, shape (others, n); 0 while overlapping lengthwise. [m]"""
+    centre, length = (np.array([[getattr(box, name)] for box in others]) for name in ("center_x", "length"))
     turned = np.where(seen.oncoming, -1.0, 1.0)
-    between_centres = seen.ahead + turned * other.center_x - own.center_x
-    return np.maximum(np.abs(between_centres) - 0.5 * (own.length + other.length), 0.0)
+    between_centres = seen.ahead + turned * centre - own.center_x
+    return np.asarray(np.maximum(np.abs(between_centres) - 0.5 * (own.length + length), 0.0))
 
 
 # ---- weather and time of day -----------------------------------------------------------------------------------------

@@ -22,6 +22,10 @@ REACH = 30.0
 """Boxes farther apart than this at all times are no pair worth naming. [m]"""
 
 
+TOGETHER = 256
+"""Pairs whose boxes are compared at once: a numpy call costs as much as some hundred boxes. [-]"""
+
+
 @dataclass(frozen=True, eq=False, slots=True)
 class BoxPath:
     """A vehicle's bounding box along its path.
@@ -90,7 +94,7 @@ def smallest_gaps(time: FloatArray, paths: Sequence[BoxPath], *, reach: float = 
     reach : float
         [m]
     """
-    gaps = []
+    near_pairs: list[tuple[BoxPath, BoxPath, NDArray[np.bool_]]] = []
     extent = max((np.hypot(path.length, path.width) / 2 + abs(path.centre) for path in paths), default=0.0)
     for first, second in pairs_within([path.x for path in paths], [path.y for path in paths], reach + 2 * extent):
         a, b = paths[first], paths[second]
@@ -101,11 +105,16 @@ def smallest_gaps(time: FloatArray, paths: Sequence[BoxPath], *, reach: float = 
             continue
         # the exact distance is only needed where a lower bound of it undercuts the best upper bound
         upper = np.min(np.hypot(a.x - b.x, a.y - b.y)[near] + abs(a.centre) + abs(b.centre))
-        near &= apart <= upper
-        distance = box_distance(a.corners(near), b.corners(near))
-        best = int(np.argmin(distance))
-        if distance[best] <= reach:
-            gaps.append(Gap((a.name, b.name), float(distance[best]), float(time[near][best])))
+        near_pairs.append((a, b, near & (apart <= upper)))
+    gaps = []
+    for begin in range(0, len(near_pairs), TOGETHER):
+        part = near_pairs[begin : begin + TOGETHER]
+        corners = [np.concatenate([pair[k].corners(pair[2]) for pair in part]) for k in (0, 1)]
+        ends = np.cumsum([np.count_nonzero(near) for _, _, near in part])
+        for (a, b, near), distance in zip(part, np.split(box_distance(*corners), ends[:-1]), strict=True):
+            best = int(np.argmin(distance))
+            if distance[best] <= reach:
+                gaps.append(Gap((a.name, b.name), float(distance[best]), float(time[near][best])))
     return tuple(gaps)
 
 

@@ -32,6 +32,9 @@ FARTHEST_IN_A_FRAME = 1000.0
 """No entity gets further within a frame, unless it is placed anew. [m]"""
 
 
+_TELEPORTED, _ROAD_END = int(Activity.TELEPORTED), int(Activity.ROAD_END)  # plain: flags take ten times as long
+
+
 class Rows:
     """Rows of one entity."""
 
@@ -52,7 +55,7 @@ class Rows:
         state = self.state
         free = state._free_pose
         x, y = (state.s, state.offset_t) if free is None else (free.x, free.y)
-        speed = 0.0 if state.activity & Activity.TELEPORTED else state.speed  # that of a leap is none
+        speed = 0.0 if state.activity & _TELEPORTED else state.speed  # that of a leap is none
         if state.active and not (abs(x) <= FARTHEST and abs(y) <= FARTHEST and abs(speed) <= FASTEST):
             words = ("s", "offset") if free is None else ("x", "y")
             raise self._implausible(time, f"{words[0]} = {x:g} m, {words[1]} = {y:g} m, speed = {state.speed:g} m/s")
@@ -65,7 +68,7 @@ class Rows:
         self._offset_t.append(state.offset_t)
         self._relative_heading.append(state.relative_heading)
         self._speed.append(state.speed)
-        self._activity.append(state.activity | Activity.ROAD_END if state.at_road_end else state.activity)
+        self._activity.append(state.activity | _ROAD_END if state.at_road_end else state.activity)
 
     def _implausible(self, time: float, what: str) -> PlaybackError:
         place = self.state.entity.place

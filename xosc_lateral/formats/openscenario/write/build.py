@@ -6,6 +6,8 @@ it writes whole documents of one version where we change a few elements of someb
 
 from __future__ import annotations
 
+import re
+
 from lxml import etree
 
 from xosc_lateral.scenario.enums import Priority
@@ -24,6 +26,14 @@ def decimal(value: float, digits: int) -> str:
     if "." in text:
         text = text.rstrip("0").rstrip(".")
     return "0" if text in ("-0", "") else text
+
+
+def shortened(text: str) -> str:
+    """Attributes that are fixed-point numbers all of them, as `decimal` writes each."""
+    return _TRAILING_ZEROS.sub("", text).replace('="-0"', '="0"')
+
+
+_TRAILING_ZEROS = re.compile(r'\.?0+(?=")')
 
 
 def sub(parent: etree._Element, tag: str, **attributes: str) -> etree._Element:
