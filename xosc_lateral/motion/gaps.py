@@ -109,7 +109,10 @@ def smallest_gaps(time: FloatArray, paths: Sequence[BoxPath], *, reach: float = 
     gaps = []
     for begin in range(0, len(near_pairs), TOGETHER):
         part = near_pairs[begin : begin + TOGETHER]
-        corners = [np.concatenate([pair[k].corners(pair[2]) for pair in part]) for k in (0, 1)]
+        corners = [
+            np.concatenate([path.corners(near) for path, near in side])
+            for side in ([(a, near) for a, _, near in part], [(b, near) for _, b, near in part])
+        ]
         ends = np.cumsum([np.count_nonzero(near) for _, _, near in part])
         for (a, b, near), distance in zip(part, np.split(box_distance(*corners), ends[:-1]), strict=True):
             best = int(np.argmin(distance))
