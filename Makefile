@@ -6,7 +6,7 @@ STAMP := $(VENV)/.installed
 DEV_STAMP := $(VENV)/.installed-dev
 DOCS_STAMP := $(VENV)/.installed-docs
 
-.PHONY: fuzz lock install-locked sbom licences test-matrix demo test fast style lint format docs schema profiles refined templates loop-dlr picture clean
+.PHONY: fuzz lock install-locked sbom licences test-matrix demo test fast style lint format docs schema profiles refined templates loop-dlr picture map clean
 
 # Python compiles what it imports when it does: a fifth of what is installed.
 QUICK := --disable-pip-version-check --progress-bar on --no-compile
@@ -77,20 +77,23 @@ schema: $(STAMP)
 # the closed loop made stays as it is; `make refined` makes it anew.
 WHEEL := out/data/tasi-0.15.4-py3-none-any.whl
 profiles: $(STAMP) $(WHEEL)
-	$(BIN)/python -m benchmarks.build_library $(WHEEL) -o driver_profiles --cards docs/profiles.md --keep-refined
+	$(BIN)/python -m benchmarks.build_library $(WHEEL) -o driver_profiles --keep-refined
 
 refined: $(STAMP) $(WHEEL)
-	$(BIN)/python -m benchmarks.build_library $(WHEEL) -o driver_profiles --cards docs/profiles.md
+	$(BIN)/python -m benchmarks.build_library $(WHEEL) -o driver_profiles
 
-# The README's picture.
+# The README's picture, and CONTRIBUTING's map of the imports.
 picture: $(STAMP)
 	$(BIN)/python docs/figures/lifelike.py
+
+map: $(DEV_STAMP)
+	PYTHONPATH=. $(BIN)/python docs/figures/map.py
 
 # The shipped templates as plain files: what their builders make of the defaults.
 templates: $(STAMP)
 	for name in $$(ls templates/*.xosc | xargs -n 1 basename -s .xosc); do $(BIN)/xosc-lateral template write $$name -o templates; done
 
-# The loop over real motorway traffic: from the paper's model to what these drivers do; docs/closing_the_loop.md, section 5.
+# The loop over real motorway traffic: from the paper's model to what these drivers do; docs/closing_the_loop.md.
 loop-dlr: $(STAMP) $(WHEEL)
 	@mkdir -p out/loop-dlr
 	$(BIN)/xosc-lateral import dlr-ht $(WHEEL) -o out/loop-dlr/drives.parquet

@@ -1,6 +1,6 @@
 """Does the loop name a lane-keeping assist as the cause? Made drives in OpenLKA's layout, with known truth.
 
-    python -m benchmarks.assist [--drives 4] [--seconds 1800] [--write docs/board.md]
+    python -m benchmarks.assist [--drives 4] [--seconds 1800] [--write PAGE.md]
 
 Three kinds: an assist with a place of its own that is tighter than the driver, one that is only tighter, and a flag
 that does nothing. Beside it the spread of either's own profile within runs, sampled over measured.
@@ -15,7 +15,7 @@ import numpy as np
 import pandas as pd
 
 from benchmarks.markers import write_between_markers
-from xosc_lateral.datasets.assist import FLAG, OPENLKA_MAP, LaneKeepingAssist, openlka_layout
+from benchmarks.simulated.assist import FLAG, OPENLKA_MAP, LaneKeepingAssist, openlka_layout
 from xosc_lateral.datasets.driver_simulator import simulate_drive
 from xosc_lateral.driver.fitting import fit_profile
 from xosc_lateral.drives.cuts import all_runs

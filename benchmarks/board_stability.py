@@ -2,7 +2,7 @@
 
     xosc-lateral import dlr-ht tasi-0.15.4-py3-none-any.whl -o dlr.parquet
     python -m benchmarks.board_stability dlr.parquet [--seeds 0 1 2 ...] [--model NAME ...] [--cache FOLDER]
-        [--write docs/board.md]
+        [--write PAGE.md]
 
 Seed 0 is the split of the published board. Every split fits every model twice, which takes a quarter of an hour of
 processor time; with `--cache`, what is there is not done again.
@@ -18,11 +18,11 @@ from pathlib import Path
 
 import numpy as np
 
+from benchmarks.board.benchmark import fit_and_sample, split_in_halves
+from benchmarks.board.contestants import contestants
+from benchmarks.board.models.catalogue import MODELS
+from benchmarks.board.ranking import half_score, kendall_tau
 from benchmarks.markers import show
-from xosc_lateral.baselines.catalogue import MODELS
-from xosc_lateral.board.benchmark import fit_and_sample, split_in_halves
-from xosc_lateral.board.contestants import contestants
-from xosc_lateral.board.ranking import half_score, kendall_tau
 from xosc_lateral.drives.cuts import all_runs
 from xosc_lateral.drives.drive import Run
 from xosc_lateral.formats.drives import read_drives

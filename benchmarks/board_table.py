@@ -1,7 +1,7 @@
-"""The board's table in docs/board.md, from the board that was written.
+"""The board's table, from the board that was written.
 
-xosc-lateral benchmark realism dlr.parquet -o board/
-python -m benchmarks.board_table board/board.json --write docs/board.md
+python -m benchmarks.board dlr.parquet -o board/
+python -m benchmarks.board_table board/board.json --write PAGE.md
 """
 
 from __future__ import annotations

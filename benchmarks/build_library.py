@@ -1,6 +1,6 @@
 """Build the shipped driver profiles from the public recording: what `make profiles` runs.
 
-python -m benchmarks.build_library tasi-0.15.4-py3-none-any.whl -o FOLDER [--cards docs/profiles.md] [--keep-refined]
+python -m benchmarks.build_library tasi-0.15.4-py3-none-any.whl -o FOLDER [--keep-refined]
 """
 
 from __future__ import annotations
@@ -9,19 +9,15 @@ import argparse
 from collections.abc import Sequence
 from pathlib import Path
 
-from xosc_lateral.formats.atomic import write_atomically
-from xosc_lateral.formats.profiles import read_profile, write_profile
-from xosc_lateral.pipeline.library import build_library
-from xosc_lateral.pipeline.refined import NAME
-from xosc_lateral.report.cards import library_page
+from benchmarks.library import build_library
+from xosc_lateral.formats.profiles import write_profile
 
 
 def main(argv: Sequence[str] | None = None) -> None:
-    """Build the library and write it, with its cards."""
+    """Build the library and write it."""
     parser = argparse.ArgumentParser(description="Build the shipped driver profiles from the public recording.")
     parser.add_argument("source", type=Path)
     parser.add_argument("-o", "--output", type=Path, required=True, metavar="FOLDER")
-    parser.add_argument("--cards", type=Path, metavar="PAGE.md")
     parser.add_argument("--model", default="best")
     parser.add_argument(
         "--keep-refined", action="store_true", help="leave what the closed loop made as it is in FOLDER"
@@ -30,10 +26,6 @@ def main(argv: Sequence[str] | None = None) -> None:
     profiles = build_library(args.source, model=args.model, refine=not args.keep_refined)
     for profile in profiles:
         write_profile(profile, args.output / f"{profile.name}.json")
-    if args.keep_refined:
-        profiles.insert(1, read_profile(args.output / f"{NAME}.json"))
-    if args.cards is not None:
-        write_atomically(args.cards, library_page(profiles))
 
 
 if __name__ == "__main__":

@@ -1,6 +1,6 @@
 """Where a recording's fast lateral movement belongs to the place and not to the drivers: zones of camera noise.
 
-    python -m benchmarks.camera_noise tasi-0.15.4-py3-none-any.whl [--write docs/real_data.md]
+    python -m benchmarks.camera_noise tasi-0.15.4-py3-none-any.whl [--write PAGE.md]
 
 The offsets' movement between 0.3 and 1 Hz, root mean square over all vehicles in every 100 m of the road, beside the
 median of all such pieces of the carriageway. Drivers don't steer faster at one place than everywhere else on a straight

@@ -1,7 +1,7 @@
 """Contacts that lifelike movement brings into the dense template: conversions without resampling.
 
     python -m benchmarks.contacts [--profile auto motorway-refined] [--count 1000]
-        [--write docs/validation/pairs.md]
+        [--write PAGE.md]
 
 A contact counts if the nominal scenario lacks it, a departure if a reference point leaves the lane that it keeps
 nominally.

@@ -1,7 +1,7 @@
 """What a classifier gains from the context: by which columns, with and without neighbours' effects and zones.
 
     xosc-lateral import dlr-ht tasi-0.15.4-py3-none-any.whl -o dlr.parquet
-    python -m benchmarks.context_seen dlr.parquet [--seeds 30 31 32 33] [--write docs/validation/realism.md]
+    python -m benchmarks.context_seen dlr.parquet [--seeds 30 31 32 33] [--write PAGE.md]
 
 Free runs of the driver alone beside recorded ones, as in `fair_measure`; mean over several random halvings of the
 vehicles, each half in its turn held out, with the standard error over halvings. Some columns say where a vehicle is:

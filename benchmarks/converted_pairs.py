@@ -2,7 +2,7 @@
 
     xosc-lateral import dlr-ht tasi-0.15.4-py3-none-any.whl -o dlr.parquet
     python -m benchmarks.converted_pairs dlr.parquet [--profile motorway motorway-refined] [--seeds 20] [--scene pairs]
-        [--write docs/validation/pairs.md]
+        [--write PAGE.md]
 
 A car overtakes a truck and a car, then two cars drive at the same speed; in right-hand and left-hand traffic, on lanes
 along the road's s and against it. Every scenario is converted with both vehicles and with one of them alone, with the

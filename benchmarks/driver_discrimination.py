@@ -1,6 +1,6 @@
 """Is a profile of one vehicle told from another's? All pairs of vehicles with long drives.
 
-    python -m benchmarks.driver_discrimination dlr.parquet [--seconds 140] [--model best] [--write docs/real_data.md]
+    python -m benchmarks.driver_discrimination dlr.parquet [--seconds 140] [--model best] [--write PAGE.md]
 
 Each vehicle's profile is fitted to the first 60 % of its drive. Snippets sampled from it freely (no start given) are
 compared with the held-out last 40 % of its own drive and of every other vehicle's.
@@ -13,6 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
+from benchmarks.library import sliding_snippets, split_in_time
 from benchmarks.markers import show
 from xosc_lateral.driver.fitting import fit_runs
 from xosc_lateral.drives.cuts import all_runs
@@ -20,7 +21,6 @@ from xosc_lateral.drives.drive import Run
 from xosc_lateral.drives.resampling import STEP
 from xosc_lateral.evaluation.comparison import driver_distances
 from xosc_lateral.formats.drives import read_drives
-from xosc_lateral.pipeline.library import sliding_snippets, split_in_time
 
 
 def main() -> None:

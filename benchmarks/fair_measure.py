@@ -1,8 +1,8 @@
 """How near are free runs to real ones, beside other real drivers? The fair measure on held-out vehicles.
 
     xosc-lateral import dlr-ht tasi-0.15.4-py3-none-any.whl -o dlr.parquet
-    python -m benchmarks.fair_measure dlr.parquet [--seed 0] [--no-classify] [--rocket]
-        [--write docs/validation/realism.md]
+    python -m benchmarks.fair_measure dlr.parquet [--seed 0] [--no-classify]
+        [--write PAGE.md]
 
 A profile is fitted to a random half of the vehicles and measured on the other half, and the other way round; numbers
 are means of both.
@@ -32,12 +32,12 @@ def halves(drives: Sequence[Drive], seed: int) -> tuple[list[Drive], list[Drive]
     return [one for one in drives if one.name in chosen], [one for one in drives if one.name not in chosen]
 
 
-def measure(drives: Sequence[Drive], seed: int, model: str, *, classify: bool, rocket: bool) -> list[Realism]:
+def measure(drives: Sequence[Drive], seed: int, model: str, *, classify: bool) -> list[Realism]:
     one, other = halves(drives, seed)
     found = []
     for fitted, held_out in ((one, other), (other, one)):
         profile = fit_profile(fitted, name="half", model=model)
-        found.append(score_realism(profile, all_runs(held_out), seed=seed, classify=classify, rocket=rocket))
+        found.append(score_realism(profile, all_runs(held_out), seed=seed, classify=classify))
     return found
 
 
@@ -58,7 +58,7 @@ def _line(parts: Sequence[ConditionScores]) -> str:
         found = [one.families[family] for one in parts if family in one.families]
         ratio = np.exp(np.mean([np.log(one.ratio) for one in found])) if found else np.nan
         cells.append(f"{ratio:.2f}" if found else "")
-    for which in ("alone", "jointly", "floor", "convolved"):
+    for which in ("alone", "jointly", "floor"):
         areas = [area for one in parts if (area := getattr(one, which)) is not None]
         cells.append(" / ".join(f"{area.auc:.3f}" for area in areas))
     what = "driver and sensor" if parts[0].with_sensor else "driver"
@@ -71,10 +71,9 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--model", default=ModelKind.AUTOREGRESSIVE)
     parser.add_argument("--no-classify", action="store_true")
-    parser.add_argument("--rocket", action="store_true", help="also a classifier on random convolutions")
     parser.add_argument("--write", type=Path, help="page with the markers")
     args = parser.parse_args()
-    parts = measure(read_drives(args.table), args.seed, args.model, classify=not args.no_classify, rocket=args.rocket)
+    parts = measure(read_drives(args.table), args.seed, args.model, classify=not args.no_classify)
     show("\n".join(table(parts)), args.write, "fair-measure")
 
 

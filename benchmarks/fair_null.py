@@ -2,7 +2,7 @@
 
     xosc-lateral import dlr-ht tasi-0.15.4-py3-none-any.whl -o dlr.parquet
     python -m benchmarks.fair_null dlr.parquet [--repeats 12] [--no-neighbours]
-        [--write docs/validation/realism.md]
+        [--write PAGE.md]
 
 A profile is fitted to all vehicles, and stands for the truth: each recorded run is replaced by one that it sampled
 under the same context. These drives are halved, fitted and judged as the recording is (free runs below 0.5 Hz, both

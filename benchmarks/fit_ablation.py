@@ -1,7 +1,7 @@
 """Which settings of the fit does the recording ask for? The memory's length by prediction, the rest by held-out drives.
 
     xosc-lateral import dlr-ht tasi-0.15.4-py3-none-any.whl -o dlr.parquet
-    python -m benchmarks.fit_ablation dlr.parquet [--halves 4] [--write docs/validation/driver_model.md]
+    python -m benchmarks.fit_ablation dlr.parquet [--halves 4] [--write PAGE.md]
 
 The sensor's part is taken out first, as `fit` does. Order: mean squared error of the coarse movement one second ahead,
 five folds over drives, beside the best order, with its standard error over drives. Settings of the rounds: drives are

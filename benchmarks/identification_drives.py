@@ -13,8 +13,7 @@ import pandas as pd
 from scipy.ndimage import gaussian_filter1d
 from scipy.signal import lfilter
 
-from xosc_lateral.datasets import simulate_drive
-from xosc_lateral.datasets.movements import (
+from benchmarks.simulated.movements import (
     bursts,
     clustered,
     delayed_control,
@@ -31,6 +30,7 @@ from xosc_lateral.datasets.movements import (
     sawtooth,
     zigzag,
 )
+from xosc_lateral.datasets import simulate_drive
 
 Values = np.ndarray
 MOVEMENTS = {

@@ -1,6 +1,6 @@
 """Why lane centres are estimated as they are: error on vehicles that were not used, and what bridging a gap costs.
 
-python -m benchmarks.lane_centres tasi-0.15.4-py3-none-any.whl [--write docs/real_data.md]
+python -m benchmarks.lane_centres tasi-0.15.4-py3-none-any.whl [--write PAGE.md]
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
-"""The closed loop over real motorway traffic: figures and tables of docs/closing_the_loop.md, section 5.
+"""The closed loop over real motorway traffic: figures and tables of docs/closing_the_loop.md.
 
     xosc-lateral import dlr-ht tasi-0.15.4-py3-none-any.whl -o dlr.parquet
-    python -m benchmarks.loop_dlr dlr.parquet [--seed 20241007] [--write docs/closing_the_loop.md]
+    python -m benchmarks.loop_dlr dlr.parquet [--seed 20241007] [--write PAGE.md]
         [--figures docs/figures]
 
 Starts from a two-level model of the same drives, and from the seed of the library's `motorway-refined`, as
@@ -15,12 +15,12 @@ import time
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from benchmarks.library import SEED
 from benchmarks.markers import show
+from benchmarks.refined import refine_population
 from xosc_lateral.formats.drives import read_drives
 from xosc_lateral.identification.close import LoopResult
 from xosc_lateral.identification.lack_of_fit import LackOfFit, lack_of_fit_of
-from xosc_lateral.pipeline.library import SEED
-from xosc_lateral.pipeline.refined import refine_population
 from xosc_lateral.report.figures import PAPER
 from xosc_lateral.report.loop import loop_text
 from xosc_lateral.report.loop_figures import effect_figure, residual_figure, spectrum_figure

@@ -1,7 +1,7 @@
 """What each part of our model is worth: it left out, the rest fitted anew, on held-out drives.
 
     xosc-lateral import dlr-ht tasi-0.15.4-py3-none-any.whl -o dlr.parquet
-    python -m benchmarks.model_choice dlr.parquet [--splits 8] [--classifier] [--write docs/validation/driver_model.md]
+    python -m benchmarks.model_choice dlr.parquet [--splits 8] [--classifier] [--write PAGE.md]
 
 Half of the drives is fitted, snippets of the other half are sampled from their starts; a ratio is the mean (or worst)
 over the ten metrics of the Wasserstein distance, divided by that between the two real halves.

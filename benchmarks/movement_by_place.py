@@ -1,6 +1,6 @@
 """How much of a recording's movement belongs to the place? One half of the vehicles tells for the other, band by band.
 
-    python -m benchmarks.movement_by_place tasi-0.15.4-py3-none-any.whl [--write docs/real_data.md]
+    python -m benchmarks.movement_by_place tasi-0.15.4-py3-none-any.whl [--write PAGE.md]
 
 "The same path": mean of the offset's movement over one half of the vehicles in every 10 m of a lane, and how much of
 the other half's variance it tells. "The same level": mean log power in every 100 m of a carriageway, likewise. Speed

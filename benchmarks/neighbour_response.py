@@ -1,7 +1,7 @@
 """In what form do neighbours act on the offset? What each form leaves of its variance within drivers.
 
     xosc-lateral import dlr-ht tasi-0.15.4-py3-none-any.whl -o dlr.parquet
-    python -m benchmarks.neighbour_response dlr.parquet [--write docs/model.md]
+    python -m benchmarks.neighbour_response dlr.parquet [--write PAGE.md]
 
 exp(-free space / scale) to the left and to the right, delayed (negative: drivers look ahead) and with a first-order
 lag; least squares once a second, beside class, lane and speed.

@@ -1,7 +1,7 @@
 """Does the measure below 0.5 Hz see anything of what is faster? The recording beside itself without it.
 
     xosc-lateral import dlr-ht tasi-0.15.4-py3-none-any.whl -o dlr.parquet
-    python -m benchmarks.nothing_faster dlr.parquet [--write docs/validation/realism.md]
+    python -m benchmarks.nothing_faster dlr.parquet [--write PAGE.md]
 
 What is above 0.5 Hz is taken out of the recorded runs by a filter of its own, ten times as sharp as the measure's. The
 classifier is then asked to tell these runs from the recorded ones: 0.5 is blind, anything else is an error of the

@@ -1,6 +1,6 @@
 """Do vehicles beside each other move together? Cross-coherence of pairs, beside that of swapped pairs.
 
-    python -m benchmarks.pair_coherence tasi-0.15.4-py3-none-any.whl [--write docs/validation/pairs.md]
+    python -m benchmarks.pair_coherence tasi-0.15.4-py3-none-any.whl [--write PAGE.md]
 
 Pairs on neighbouring lanes of one carriageway, less than 20 m apart lengthwise. In a swapped pair the vehicle on the
 left is another one of that lane, at the same place at another time: what both share then is the place, not each other.

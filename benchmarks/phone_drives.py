@@ -1,7 +1,7 @@
 """Real drives of a phone's camera: what the camera misjudged, what is written, drowsy against normal, the loop.
 
-    python -m benchmarks.phone_drives UAH-DRIVESET-v1 --drivers D4 D5 D6 --loop [--write docs/validation/phone.md]
-    python -m benchmarks.phone_drives UAH-DRIVESET-v1 --drivers D1 D2 D3 --sensitivity [--write docs/design/markings.md]
+    python -m benchmarks.phone_drives UAH-DRIVESET-v1 --drivers D4 D5 D6 --loop [--write PAGE.md]
+    python -m benchmarks.phone_drives UAH-DRIVESET-v1 --drivers D1 D2 D3 --sensitivity [--write PAGE.md]
 
 The UAH-DriveSet [1]_ (not redistributed; for non-commercial use): six drivers and cars on a motorway and a secondary
 road, as they usually drive, as if aggressive and as if drowsy. Its accelerometer is no input of a fit: it is the

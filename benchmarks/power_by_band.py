@@ -1,7 +1,7 @@
 """Does a fitted profile move as much as the drivers it was fitted to, frequency by frequency?
 
     xosc-lateral import dlr-ht tasi-0.15.4-py3-none-any.whl -o dlr.parquet
-    python -m benchmarks.power_by_band dlr.parquet [--seed 0] [--draws 4] [--write docs/validation/realism.md]
+    python -m benchmarks.power_by_band dlr.parquet [--seed 0] [--draws 4] [--write PAGE.md]
 
 A profile is fitted to a random half of the vehicles, as in `fair_measure`, and the driver alone is sampled under the
 context of the same half, and of the other one. Power in windows of 30 s below 0.5 Hz, sampled over recorded [dB].

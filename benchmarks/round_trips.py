@@ -1,6 +1,6 @@
 """Sample a population, fit it, sample the fit: what comes back? Long runs and short ones.
 
-    python -m benchmarks.round_trips [--seeds 10] [--profile motorway] [--write docs/validation/driver_model.md]
+    python -m benchmarks.round_trips [--seeds 10] [--profile motorway] [--write PAGE.md]
 
 Logarithms of standard deviations of the fit less those of its own sample, which takes the sample's luck out; the spread
 less the profile's own, with the sample's drivers in place of all; mean over the seeds, with the standard error.

@@ -1,6 +1,6 @@
 """How well could a driver's lateral acceleration be known beside noise, if nothing were expected of him?
 
-    python -m benchmarks.sensor_bound --set report DRIVE... [--write docs/design/sensor.md]
+    python -m benchmarks.sensor_bound --set report DRIVE... [--write PAGE.md]
 
 The drives and noises of `sensor_split`. Whoever knows the noise's power density E exactly, and expects nothing of the
 driver's, D, can subtract: the power of the acceleration is then off by a standard error of sqrt(int H^2 (D + E)^2 df /

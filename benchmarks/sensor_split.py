@@ -1,6 +1,6 @@
 """How well `fit` tells driver and sensor apart: known noise on known paths.
 
-    python -m benchmarks.sensor_split --set design [DRIVE...] [--write docs/design/sensor.md]
+    python -m benchmarks.sensor_split --set design [DRIVE...] [--write PAGE.md]
 
 Paths are those of the driver simulator, each with its gusts (which shake the car up to 2.5 Hz, and which nobody steers)
 and without, and those of drive tables, low-passed at 1 Hz to stand for a truth. Noise of eight kinds is added to the

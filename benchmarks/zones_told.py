@@ -1,7 +1,7 @@
 """What do the zones of a recording tell? Loudness that lasts, recorded and sampled, and what a fit takes drivers for.
 
     xosc-lateral import dlr-ht tasi-0.15.4-py3-none-any.whl -o dlr.parquet
-    python -m benchmarks.zones_told dlr.parquet [--draws 4] [--write docs/design/sensor.md]
+    python -m benchmarks.zones_told dlr.parquet [--draws 4] [--write PAGE.md]
 
 One profile is fitted to all drives with their zones, and one without. First table: covariance of the log power of two
 bands, 10 to 20 s apart in a run, recorded (with a standard error over drives) and sampled under the same context: what
@@ -103,11 +103,11 @@ def held(profiles: Sequence[DriverProfile]) -> list[str]:
         for part in ("coarse", "fine"):
             for kept, words in (("between", "variance between drivers"), ("within", "variance within drivers")):
                 rows.setdefault(f"{part} movement, {words}", []).append(model[f"{part}_volatility"][kept])
-        kinks = None if sensor is None else sensor.kinks
-        if kinks is not None:
-            level = kinks if kinks.by_zone is None else kinks.by_zone
-            rows.setdefault("kinks, variance within tracks", []).append(0.25 * level.level_variance)
-            rows.setdefault("kinks, variance between tracks", []).append(0.25 * level.track_variance)
+        slope_jumps = None if sensor is None else sensor.slope_jumps
+        if slope_jumps is not None:
+            level = slope_jumps if slope_jumps.by_zone is None else slope_jumps.by_zone
+            rows.setdefault("slope jumps, variance within tracks", []).append(0.25 * level.level_variance)
+            rows.setdefault("slope jumps, variance between tracks", []).append(0.25 * level.track_variance)
     return lines + [f"| {name} | {' | '.join(f'{value:.3f}' for value in values)} |" for name, values in rows.items()]
 
 

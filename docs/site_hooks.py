@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import csv
 import importlib
 import os
 import posixpath
@@ -24,6 +25,8 @@ def on_files(files: Any, config: Any) -> Any:
     generated = {
         "reference/cli.md": command_line(),
         "reference/api.md": python(),
+        "reference/limits.md": limits(),
+        "reference/elements.md": elements(),
         "changelog.md": (ROOT / "CHANGELOG.md").read_text(encoding="utf-8"),
     }
     for name, text in generated.items():
@@ -41,6 +44,23 @@ def on_page_markdown(markdown: str, page: Any, **_: Any) -> str:
         return match[0] if is_page else f"{match[1]} (`{target}`)"
 
     return LINK.sub(outside, markdown)
+
+
+def limits() -> str:
+    """Every limit of input files, as the code has it."""
+    from xosc_lateral.limits import limits_table
+
+    intro = "Beyond one of these, one line says so. Only `--job-timeout` and `--job-memory` can be changed."
+    return f"# Limits of input files\n\n{intro}\n\n{limits_table()}\n"
+
+
+def elements() -> str:
+    """Every element of OpenSCENARIO 1.3, and what playing does with it."""
+    with (ROOT / "docs" / "elements.csv").open(encoding="utf-8", newline="") as lines:
+        head, *rows = csv.reader(lines)
+    table = [head, ["---"] * len(head), *([f"`{name}`", *rest] for name, *rest in rows)]
+    text = "\n".join(f"| {' | '.join(row)} |" for row in table)
+    return f"# Every element of OpenSCENARIO 1.3\n\n*Differs*: from the reference player.\n\n{text}\n"
 
 
 def command_line() -> str:

@@ -12,14 +12,12 @@ TYPE_CHECKING = False  # importing `typing` for it would take longer than all th
 _HOME = {
     "convert": "api.convert",
     "convert_many": "api.batch",
-    "variant_set": "api.variants",
     "play": "api.play",
     "segments": "api.play",
     "fit": "api.fit",
     "sample": "api.sample",
     "evaluate": "api.evaluate",
     "close_loop": "api.loop",
-    "benchmark_realism": "api.benchmark",
     "read_drives": "api.fit",
     "import_drives": "api.importing",
     "read_profile": "api.profiles",
@@ -32,6 +30,7 @@ _HOME = {
     "DriverProfile": "driver.profile",
     "Drive": "drives.drive",
     "Conversion": "api.convert",
+    "ConvertOptions": "pipeline.settings",
     "BatchResult": "api.batch",
     "Playback": "api.play",
     "Segments": "api.play",
@@ -50,14 +49,12 @@ _HOME = {
 __all__ = [  # noqa: RUF022 (the order of the documentation)
     "convert",
     "convert_many",
-    "variant_set",
     "play",
     "segments",
     "fit",
     "sample",
     "evaluate",
     "close_loop",
-    "benchmark_realism",
     "read_drives",
     "import_drives",
     "read_profile",
@@ -70,6 +67,7 @@ __all__ = [  # noqa: RUF022 (the order of the documentation)
     "DriverProfile",
     "Drive",
     "Conversion",
+    "ConvertOptions",
     "BatchResult",
     "Playback",
     "Segments",
@@ -87,7 +85,6 @@ __all__ = [  # noqa: RUF022 (the order of the documentation)
 
 if TYPE_CHECKING:
     from xosc_lateral.api.batch import BatchResult, convert_many
-    from xosc_lateral.api.benchmark import benchmark_realism
     from xosc_lateral.api.convert import Conversion, convert
     from xosc_lateral.api.evaluate import Evaluation, evaluate
     from xosc_lateral.api.fit import fit, read_drives
@@ -97,7 +94,6 @@ if TYPE_CHECKING:
     from xosc_lateral.api.profiles import compare_profiles, list_profiles, read_profile, write_profile
     from xosc_lateral.api.sample import Offsets, sample
     from xosc_lateral.api.templates import list_templates, write_template
-    from xosc_lateral.api.variants import variant_set
     from xosc_lateral.driver.profile import DriverProfile
     from xosc_lateral.driver.stream import OffsetStream
     from xosc_lateral.drives.drive import Drive
@@ -108,6 +104,7 @@ if TYPE_CHECKING:
         PlaybackError,
         XoscLateralError,
     )
+    from xosc_lateral.pipeline.settings import ConvertOptions
 
 
 def __getattr__(name: str) -> object:

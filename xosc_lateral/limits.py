@@ -1,6 +1,6 @@
 """Every limit on what comes in, with its reason: the one place for these numbers.
 
-``python -m xosc_lateral.limits`` prints them as the table of docs/limits.md. A message that refuses something names
+``python -m xosc_lateral.limits`` prints them as a table. A message that refuses something names
 limit and value (`Limit.refusal`). Nothing here is a tuning constant of a model.
 """
 

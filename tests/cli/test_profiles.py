@@ -46,7 +46,7 @@ def test_a_listing_survives_broken_files(team, capsys):
         "newer",
         "settings",
     ]
-    assert "newer version" in broken[1]
+    assert "update the package" in broken[1]
     assert len(out.splitlines()) == 40 + 3 + len(xl.list_profiles())
 
 

@@ -1,8 +1,8 @@
 """The documentation is true: pages run as shown from an empty folder, commands exist, links lead somewhere.
 
 Blocks marked ``sh`` and ``python`` of the pages in `RUN` are run in order, as a new user would from the page alone.
-Blocks marked ``text`` are for other programs, or take too long: commands of this project in them, and in the running
-text, are run up to where the work would begin.
+What they print is what a block ``output`` after them shows. Blocks marked ``text`` are for other programs, or take too
+long: commands of this project in them, and in the running text, are run up to where the work would begin.
 """
 
 from __future__ import annotations
@@ -18,11 +18,15 @@ from urllib.parse import unquote
 
 import pytest
 
+from tests.docs.printed import difference
 from xosc_lateral.cli import main, verb
 
 ROOT = Path(__file__).resolve().parents[2]
 DOCS = ROOT / "docs"
-PAGES = sorted(path.relative_to(ROOT).as_posix() for path in [*DOCS.rglob("*.md"), *ROOT.glob("*.md")])
+PAGES = sorted(
+    path.relative_to(ROOT).as_posix()
+    for path in [*DOCS.rglob("*.md"), *ROOT.glob("*.md"), *ROOT.glob("benchmarks/**/README.md")]
+)
 RUN = (
     "quickstart.md",
     "tutorials/scenario_engineer.md",
@@ -34,7 +38,6 @@ RUN = (
     "how_to/carla.md",
     "how_to/esmini.md",
     "how_to/osi.md",
-    "how_to/variants.md",
     "pipeline.md",
     "api.md",
 )
@@ -53,14 +56,20 @@ def run_line(line: str) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("page", RUN)
-def test_page_runs_as_shown(page, tmp_path, monkeypatch):
+def test_page_runs_and_prints_as_shown(page, tmp_path, monkeypatch, capsys):
     if page == "how_to/osi.md":
         pytest.importorskip("osi_utilities", reason="extra `osi` is not installed")
     monkeypatch.chdir(tmp_path)
     names: dict[str, object] = {"__name__": page}
-    shown = [(kind, text) for kind, text in blocks(f"docs/{page}") if kind in ("sh", "python")]
+    shown = [(kind, text) for kind, text in blocks(f"docs/{page}") if kind in ("sh", "python", "output")]
     assert shown
+    capsys.readouterr()
     for kind, text in shown:
+        if kind == "output":
+            printed = capsys.readouterr().out
+            assert difference(text, printed) is None, printed
+            continue
+        capsys.readouterr()
         if kind == "python":
             exec(compile(text, page, "exec"), names)
         else:
@@ -141,12 +150,28 @@ def parse_verb(words: list[str]) -> None:
     command.make_context(command.name, words)
 
 
+def test_a_difference_is_the_line_that_is_not_printed():
+    assert difference("a 1.0 m\n...\nc (p = 1e-9)", "a 1.1 m\nb\nb\nc (p = 2e-3)") is None
+    assert difference("a 1.0 m", "a 1.5 m") == "a 1.0 m"
+    assert difference("a\n...\nc", "a\nb") == "c"
+    assert difference("lane -1", "lane 1") == "lane -1"
+    assert difference("a", "a\nb") == "more is printed: b"
+
+
 @pytest.mark.parametrize("page", PAGES)
 def test_links_lead_somewhere(page):
     path = ROOT / page
     text = BLOCK.sub("", path.read_text(encoding="utf-8"))
     for target in re.findall(r"\]\((?!https?:|mailto:)([^)#\s]+)", text):
         assert (path.parent / unquote(target)).exists(), f"{page}: {target}"
+
+
+def test_files_that_contributing_names_are_there():
+    text = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
+    named = [name for name in re.findall(r"`([\w./]+(?:\.py|\.md|\.json|/))`", text) if "NAME" not in name]
+    found = [ROOT / name if (ROOT / name).exists() else ROOT / "xosc_lateral" / name for name in named]
+    assert len(named) > 40
+    assert [path for path in found if not path.exists()] == []
 
 
 def test_every_page_is_in_the_menu():

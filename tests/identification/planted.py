@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from xosc_lateral.datasets.movements import ornstein_uhlenbeck, record_movement
+from benchmarks.simulated.movements import ornstein_uhlenbeck, record_movement
 from xosc_lateral.drives.filters import first_order
 from xosc_lateral.formats.drives import drives_of_table
 from xosc_lateral.identification.regression import Coarse

@@ -9,8 +9,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from benchmarks.simulated.assist import FLAG, OPENLKA_MAP, LaneKeepingAssist, openlka_layout
 from xosc_lateral.cli import main
-from xosc_lateral.datasets.assist import FLAG, OPENLKA_MAP, LaneKeepingAssist, openlka_layout
 from xosc_lateral.datasets.driver_simulator import simulate_drive
 from xosc_lateral.drives.cuts import all_runs
 from xosc_lateral.evaluation.sampled_snippets import sample_runs

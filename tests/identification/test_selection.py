@@ -11,10 +11,10 @@ from pathlib import Path
 
 import pytest
 
+from benchmarks import simulated as plants
+from benchmarks.simulated.movements import held, in_regimes, record_movement
 from tests.identification.selected import named, selected
-from xosc_lateral import datasets as plants
 from xosc_lateral.datasets.driver_simulator import Driver, simulate_drive
-from xosc_lateral.datasets.movements import held, in_regimes, record_movement
 from xosc_lateral.driver.effects import ColumnEffect, Levels, Product, Saturating, Threshold
 from xosc_lateral.drives.drive import Drive
 from xosc_lateral.formats.drives import read_drives

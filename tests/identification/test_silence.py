@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
+from benchmarks.simulated import movements
 from tests.identification.selected import selected
-from xosc_lateral.datasets import movements
 from xosc_lateral.drives.drive import Drive
 from xosc_lateral.formats.drives import read_drives
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from msgspec import structs
 
-from xosc_lateral.datasets.movements import ornstein_uhlenbeck, record_movement
+from benchmarks.simulated.movements import ornstein_uhlenbeck, record_movement
 from xosc_lateral.driver.effects import Acts, Linear, Product, Proximity, Saturating, Threshold
 from xosc_lateral.driver.effects.product import Factor
 from xosc_lateral.driver.effects.response import respond

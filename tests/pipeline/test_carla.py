@@ -116,7 +116,7 @@ def test_without_the_mark_positions_are_the_standards(tmp_path: Path, maps: Road
 
 def test_a_conversion_is_left_handed_too_and_keeps_the_town(tmp_path: Path, maps: RoadSearch) -> None:
     source = _scenario(tmp_path, WORLD.format(y=17.5, h=0.3))
-    settings = ConvertSettings(profile=simulated_profile(), seed=3, roads=maps, ego=frozenset())
+    settings = ConvertSettings(profile=simulated_profile(), seed=3, road_path=maps.folders, ego=frozenset())
     out = tmp_path / "out"
     out.mkdir()
     conversion = convert_scenario(source, out / "carla.xosc", settings)
@@ -143,7 +143,7 @@ def test_a_town_that_is_not_there_costs_one_line(tmp_path: Path, maps: RoadSearc
 
 def test_lane_offset_mode_is_refused(tmp_path: Path, maps: RoadSearch) -> None:
     source = _scenario(tmp_path, WORLD.format(y=18.0, h=0.3))
-    settings = ConvertSettings(profile=simulated_profile(), mode=OutputMode.LANE_OFFSET, roads=maps)
+    settings = ConvertSettings(profile=simulated_profile(), mode=OutputMode.LANE_OFFSET, road_path=maps.folders)
     with pytest.raises(FormatError, match="CARLA"):
         convert_scenario(source, tmp_path / "out.xosc", settings)
     assert not (tmp_path / "out.xosc").exists()

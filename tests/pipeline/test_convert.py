@@ -77,7 +77,7 @@ def test_a_converted_file_is_not_converted_again(tmp_path: Path, profile: str) -
 def test_entities_are_chosen_and_driven_as_the_user_says(tmp_path: Path, profile: str) -> None:
     source = _template(tmp_path, "cut-in")
     names = [entity.name for entity in play_scenario(source).scenario.entities]
-    settings = ConvertSettings(entity_profiles={names[0]: profile}, only=frozenset({names[0]}), ego=frozenset())
+    settings = ConvertSettings(entity={names[0]: profile}, only=frozenset({names[0]}), ego=frozenset())
     conversion = convert_scenario(source, tmp_path / "out.xosc", settings)
     enriched = {entity.name: entity.is_enriched for entity in conversion.enriched.entities}
     assert enriched == {name: name == names[0] for name in names}

@@ -10,7 +10,7 @@ import pandas as pd
 import pytest
 
 from xosc_lateral.errors import DriverProfileError, FormatError
-from xosc_lateral.formats.openscenario.write import target
+from xosc_lateral.formats.openscenario.write import Player
 from xosc_lateral.formats.profile_folders import SHIPPED
 from xosc_lateral.pipeline.document_kind import DocumentKind, document_kind
 from xosc_lateral.pipeline.jobs import Batch, plan_batch
@@ -153,7 +153,7 @@ def test_a_table_gives_each_scenario_its_settings(database: Path, tmp_path: Path
     assert (first.profile, first.seed, first.only) == (str(database / "mine.json"), 5, None)
     assert first.parameters == {"Gap": "2", "Name": "x"}
     assert (last.profile, last.seed, last.only) == ("auto", 7, {"Ego", "Truck"})
-    assert last.entity_profiles == {"Ego": str(database / "mine.json")}
+    assert last.entity == {"Ego": str(database / "mine.json")}
     assert last.parameters == {"Speed": "33.5"}
 
 
@@ -188,10 +188,8 @@ def test_the_fingerprint_follows_a_profiles_bytes_not_its_place(database: Path, 
     assert fingerprint(here) == fingerprint(there)
     assert fingerprint(here) != fingerprint(here, seed=1)
     assert fingerprint(here) != fingerprint(here, parameters={"Speed": "1"})
-    assert (
-        len({fingerprint(here, target=target(*words)) for words in (("esmini",), ("carla",), ("esmini", "1.2"))}) == 3
-    )
-    assert fingerprint(here) == fingerprint(here, target=target("standard"))
+    targets = ((Player.ESMINI, None), (Player.CARLA, None), (Player.ESMINI, "1.2"))
+    assert len({fingerprint(here, player=player, version=version) for player, version in targets}) == 3
     before = fingerprint(here)
     here.write_text('{"changed": true}')
     assert fingerprint(here) != before
@@ -215,7 +213,7 @@ def test_kinds_of_documents_are_told_by_their_elements(tmp_path: Path) -> None:
 def test_a_profile_that_hides_a_shipped_one_is_said_and_makes_other_outputs(database: Path, tmp_path: Path) -> None:
     team = tmp_path / "team"
     team.mkdir()
-    settings = ConvertSettings(libraries=(team,))
+    settings = ConvertSettings(library=(team,))
     before = plan_batch([database], tmp_path / "out", settings)
     assert before.notes == ()
     shutil.copy(SHIPPED / "motorway-vehicle-1.json", team)  # auto does not choose this one

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, Unpack
 
-from xosc_lateral.api.convert import convert_settings
-from xosc_lateral.api.inputs import PathLike, Paths, ProfileLike
+from xosc_lateral.api.inputs import PathLike
 from xosc_lateral.api.result import Result
 from xosc_lateral.errors import FormatError
 from xosc_lateral.formats.output_paths import claim, output_folder
@@ -21,7 +20,7 @@ from xosc_lateral.pipeline.manifest import MANIFEST, ManifestRow, read_manifest
 from xosc_lateral.pipeline.progress import Display, Summary, follow
 from xosc_lateral.pipeline.reports import write_batch_index
 from xosc_lateral.pipeline.request import frame_requests
-from xosc_lateral.pipeline.settings import AUTO
+from xosc_lateral.pipeline.settings import ConvertOptions, ConvertSettings, spelled_out
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -29,31 +28,13 @@ if TYPE_CHECKING:
     ScenariosLike = PathLike | pd.DataFrame | Sequence[PathLike]
 
 
+@spelled_out
 def convert_many(
     scenarios: ScenariosLike,
     output: PathLike,
     *,
-    profile: ProfileLike = AUTO,
-    entity: Mapping[str, ProfileLike] | None = None,
-    only: Collection[str] | None = None,
-    seed: int = 0,
     variants: int = 1,
     report: PathLike | None = None,
-    context: PathLike | None = None,
-    parameters: Mapping[str, object] | None = None,
-    mode: Literal["auto", "trajectory", "lane-offset"] = "auto",
-    ego: Collection[str] | None = None,
-    neighbours: Literal["profile", "borrow", "none"] | None = None,
-    player: Literal["standard", "esmini", "carla"] = "standard",
-    version: str | None = None,
-    library: Paths = (),
-    allow: Paths = (),
-    road: PathLike | None = None,
-    road_path: Paths = (),
-    attempts: int = 1,
-    time_limit: float | None = None,
-    with_sensor: bool = False,
-    strict: bool = False,
     workers: int = 1,
     cluster: str | None = None,
     job_timeout: float = JOB_TIMEOUT.value,
@@ -61,6 +42,7 @@ def convert_many(
     force: bool = False,
     show: Literal["auto", "quiet", "json", "nothing"] = "nothing",
     on_outcome: Callable[[Mapping[str, Any]], None] | None = None,
+    **options: Unpack[ConvertOptions],
 ) -> BatchResult:
     """Convert many scenarios into a folder; what is up to date there already is left alone.
 
@@ -68,16 +50,9 @@ def convert_many(
     ----------
     scenarios : str, Path, DataFrame, or sequence of paths
         A file, a folder (searched to the bottom), a glob, a table (CSV, Parquet) or frame with a column `scenario` and
-        if wanted `profile`, `profile:ENTITY`, `seed`, `variants`, `only`, `neighbours`, `parameter:NAME`; or several of
-        them.
+        if wanted `variants`, `profile:ENTITY`, `parameter:NAME` and names of options; or several of them.
     output : str or Path
         Folder; it mirrors the inputs, and holds `manifest.parquet` at the end.
-    profile, entity, only, seed, context, parameters, mode, ego, neighbours, player, version
-        See `convert`.
-    library, allow, road, road_path, attempts, time_limit, with_sensor
-        See `convert`.
-    strict : bool
-        A missing vehicle catalog fails a scenario, instead of a note and a usual car.
     variants : int
         Outputs per scenario, each with offsets of its own.
     report : str or Path, optional
@@ -94,34 +69,15 @@ def convert_many(
         What is said on standard error meanwhile.
     on_outcome : callable, optional
         Told each output's row of the manifest as it comes, with `state` and `seconds`.
+    options
+        `ConvertOptions`, for all of them.
 
     Raises
     ------
     FormatError
         An input that is not there or holds no scenario; two inputs with one output.
     """
-    settings = convert_settings(
-        profile=profile,
-        entity=entity,
-        only=only,
-        seed=seed,
-        context=context,
-        parameters=parameters,
-        mode=mode,
-        ego=ego,
-        neighbours=neighbours,
-        player=player,
-        version=version,
-        library=library,
-        allow=allow,
-        road=road,
-        road_path=road_path,
-        attempts=attempts,
-        time_limit=time_limit,
-        with_sensor=with_sensor,
-        strict=strict,
-    )
-    settings = replace(settings, names_may_lack=True)
+    settings = replace(ConvertSettings.of(**options), names_may_lack=True)
     if isinstance(scenarios, str | Path):
         inputs: list[Any] = [scenarios]
     elif isinstance(scenarios, Sequence):
@@ -148,7 +104,7 @@ def _refuse_unknown_names(batch: Batch) -> None:
     texts = dict[Path, str]()
     for job in batch.jobs:
         given = job.settings
-        for option, names in (("--entity", given.entity_profiles), ("--only", given.only), ("--ego", given.ego)):
+        for option, names in (("--entity", given.entity), ("--only", given.only), ("--ego", given.ego)):
             for name in names or ():
                 if not asked.get((option, name)):
                     text = texts.setdefault(job.source, job.source.read_text("utf-8", errors="replace"))

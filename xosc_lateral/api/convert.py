@@ -2,57 +2,35 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Unpack
 
-from xosc_lateral.api.inputs import PathLike, Paths, ProfileLike, as_paths, road_search
+from xosc_lateral.api.inputs import PathLike
 from xosc_lateral.api.result import Result
-from xosc_lateral.enrich.neighbours import Neighbours
 from xosc_lateral.errors import FormatError
-from xosc_lateral.formats.configuration import configured_egos, configured_neighbours
-from xosc_lateral.formats.openscenario.write.target import target
 from xosc_lateral.formats.output_paths import claim, output_file
 from xosc_lateral.pipeline.convert import convert_scenario
-from xosc_lateral.pipeline.settings import AUTO, ConvertSettings, OutputMode, egos_named
+from xosc_lateral.pipeline.settings import ConvertOptions, ConvertSettings, spelled_out
 
 if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import Figure
 
-    from xosc_lateral.driver.profile import DriverProfile
     from xosc_lateral.enrich.conversion import ConvertedScenario
 
 SCENARIO_SUFFIXES = (".xosc",)
 REPORT_SUFFIXES = (".html", ".htm")
 
 
+@spelled_out
 def convert(
     scenario: PathLike,
     output: PathLike | None = None,
     *,
-    profile: ProfileLike = AUTO,
-    entity: Mapping[str, ProfileLike] | None = None,
-    only: Collection[str] | None = None,
-    seed: int = 0,
     variant: int = 0,
     report: PathLike | None = None,
-    context: PathLike | None = None,
-    parameters: Mapping[str, object] | None = None,
-    mode: Literal["auto", "trajectory", "lane-offset"] = "auto",
-    ego: Collection[str] | None = None,
-    neighbours: Literal["profile", "borrow", "none"] | None = None,
-    player: Literal["standard", "esmini", "carla"] = "standard",
-    version: str | None = None,
-    library: Paths = (),
-    allow: Paths = (),
-    road: PathLike | None = None,
-    road_path: Paths = (),
-    attempts: int = 1,
-    time_limit: float | None = None,
-    with_sensor: bool = False,
-    strict: bool = False,
     force: bool = False,
+    **options: Unpack[ConvertOptions],
 ) -> Conversion:
     """Give every car in a scenario the lateral movement of a real driver.
 
@@ -63,76 +41,21 @@ def convert(
     output : str or Path, optional
         File, or folder, to write to. Without it nothing is written; `Conversion.data` holds what would be, with file
         references as seen from the scenario's folder.
-    profile : DriverProfile, path or name
-        Of every vehicle; "auto": the shipped population's, `motorway`.
-    entity : mapping of str to DriverProfile, path or name, optional
-        Entity -> profile, before `profile`.
-    only : collection of str, optional
-        Enrich these alone; the others stay as they are.
-    seed, variant : int
-        Same inputs, seed and variant: same bytes.
+    variant : int
+        Another one, other offsets.
     report : str or Path, optional
         HTML page to write about what was changed.
-    context : str or Path, optional
-        Table of context over time that the scenario doesn't state: `time` [s], and a column each.
-    parameters : mapping, optional
-        Scenario parameters that replace those declared.
-    mode : {"auto", "trajectory", "lane-offset"}
-        Play maneuvers out, or keep them and add lane offsets between them; "auto" decides by vehicle: lane offsets for
-        those whose motion depends on a vehicle under test.
-    ego : collection of str, optional
-        Vehicles under test, which are left as they are, beside those that the scenario leaves to somebody else (an
-        external controller, CARLA's `ego_vehicle`); ("none",): there is none.
-    neighbours : {"profile", "borrow", "none"}, optional
-        How drivers answer to vehicles beside them: as the profile alone says; by a population's law, too, where the
-        profile's answer is not known; not at all. None: as configured, else "borrow".
-    player : {"standard", "esmini", "carla"}
-        Who is to play it: nobody in particular, or a player with ways of its own.
-    version : str, optional
-        Of the standard, "1.0" to "1.4"; without it the input's (1.0 for CARLA). What an older version lacks is sampled,
-        or left out and named in `Conversion.warnings`.
-    library, allow : path or paths
-        Folders with further profiles; folders that roads and catalogs may lie in.
-    road, road_path : path; path or paths
-        The road, whatever the scenario says; folders to look for it by its name ("Town04").
-    attempts : int
-        Sample anew up to so many times while cars touch or leave their lane.
-    time_limit : float, optional
-        Where a run is cut off; without it a scenario that never ends after 60 s, one with an end after an hour. [s]
-    with_sensor : bool
-        Add the sensor error of the drives that profiles were fitted on, for tests of a perception chain; without, the
-        driver alone is written.
-    strict : bool
-        A missing vehicle catalog is an error, instead of a note and a usual car.
     force : bool
         Replace an output that this package did not write.
+    options
+        `ConvertOptions`.
 
     Raises
     ------
     FormatError, PlaybackError, DriverProfileError
         With file, line and element; nothing is written then.
     """
-    settings = convert_settings(
-        profile=profile,
-        entity=entity,
-        only=only,
-        seed=seed,
-        context=context,
-        parameters=parameters,
-        mode=mode,
-        ego=ego,
-        neighbours=neighbours,
-        player=player,
-        version=version,
-        library=library,
-        allow=allow,
-        road=road,
-        road_path=road_path,
-        attempts=attempts,
-        time_limit=time_limit,
-        with_sensor=with_sensor,
-        strict=strict,
-    )
+    settings = ConvertSettings.of(**options)
     source = Path(scenario)
     written = source if output is None else output_scenario(output, source)
     page = None if report is None else output_file(report, f"{written.stem}.html", REPORT_SUFFIXES)
@@ -156,62 +79,6 @@ def output_scenario(output: PathLike, source: Path) -> Path:
 def lifelike(source: Path) -> Path:
     """Where a converted scenario goes unless told otherwise: beside its source."""
     return source.with_name(f"{source.stem}_lifelike{source.suffix or '.xosc'}")
-
-
-def convert_settings(
-    *,
-    profile: ProfileLike = AUTO,
-    entity: Mapping[str, ProfileLike] | None = None,
-    only: Collection[str] | None = None,
-    seed: int = 0,
-    context: PathLike | None = None,
-    parameters: Mapping[str, object] | None = None,
-    mode: str = "auto",
-    ego: Collection[str] | None = None,
-    neighbours: str | None = None,
-    player: str = "standard",
-    version: str | None = None,
-    library: Paths = (),
-    allow: Paths = (),
-    road: PathLike | None = None,
-    road_path: Paths = (),
-    attempts: int = 1,
-    time_limit: float | None = None,
-    with_sensor: bool = False,
-    strict: bool = False,
-) -> ConvertSettings:
-    """Settings of a conversion from what a user says; see `convert`."""
-    if seed < 0:
-        raise ValueError(f"seed {seed}, expected 0 or more")
-    return ConvertSettings(
-        profile=_named(profile),
-        entity_profiles={name: _named(value) for name, value in (entity or {}).items()},
-        only=None if only is None else frozenset(only),
-        seed=seed,
-        context=None if context is None else Path(context),
-        parameters={name: str(value) for name, value in (parameters or {}).items()},
-        attempts=attempts,
-        mode=OutputMode(mode),
-        ego=_egos(ego),
-        neighbours=Neighbours(neighbours or configured_neighbours() or Neighbours.BORROW),
-        target=target(player, version),
-        libraries=as_paths(library),
-        allowed=as_paths(allow),
-        roads=road_search(road, road_path),
-        time_limit=time_limit,
-        with_sensor=with_sensor,
-        strict=strict,
-    )
-
-
-def _egos(ego: Collection[str] | None) -> frozenset[str] | None:
-    """As said, else as configured."""
-    names = configured_egos() if ego is None else (ego,) if isinstance(ego, str) else ego
-    return egos_named(names)
-
-
-def _named(profile: ProfileLike) -> str | DriverProfile:
-    return str(profile) if isinstance(profile, Path) else profile
 
 
 def osi_files(output: PathLike, source: Path) -> tuple[Path, Path]:

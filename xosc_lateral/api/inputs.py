@@ -11,19 +11,19 @@ from typing import TYPE_CHECKING, TypeAlias
 
 from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.drives.drive import Drive
-from xosc_lateral.errors import FormatError, NotEnoughDataError
+from xosc_lateral.errors import NotEnoughDataError
 from xosc_lateral.formats.hashes import parsed_hashes
 from xosc_lateral.formats.openscenario.read import RoadSearch
+from xosc_lateral.pipeline.options import PathLike, Paths, ProfileLike
+from xosc_lateral.pipeline.options import paths as as_paths
+
+__all__ = ["DrivesLike", "PathLike", "Paths", "ProfileLike", "as_paths", "given_drives", "given_profile", "road_search"]
 
 if TYPE_CHECKING:
     import pandas as pd
 
-PathLike: TypeAlias = str | Path
 DrivesLike: TypeAlias = "PathLike | pd.DataFrame | Drive | Sequence[PathLike | pd.DataFrame | Drive]"
 """A table's path, a frame, a `Drive`, or several of them."""
-ProfileLike: TypeAlias = PathLike | DriverProfile
-"""A profile, its path, or its name in the library."""
-Paths: TypeAlias = "PathLike | Sequence[PathLike]"
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -114,11 +114,6 @@ def given_profile(profile: ProfileLike, library: Paths = ()) -> DriverProfile:
     return profile if isinstance(profile, DriverProfile) else read_profile(profile, as_paths(library))
 
 
-def as_paths(paths: Paths) -> tuple[Path, ...]:
-    """One path or several, as a tuple."""
-    return (Path(paths),) if isinstance(paths, str | Path) else tuple(Path(path) for path in paths)
-
-
 def _listed(drives: DrivesLike) -> list[PathLike | pd.DataFrame | Drive]:
     if isinstance(drives, str | Path | Drive) or not isinstance(drives, Sequence):
         return [drives]
@@ -133,10 +128,4 @@ def road_search(road: PathLike | None, folders: Paths) -> RoadSearch:
     FormatError
         No such file, no such folder.
     """
-    searched = as_paths(folders)
-    for folder in searched:
-        if not folder.is_dir():
-            raise FormatError("no such folder to look for roads in", path=folder)
-    if road is not None and not Path(road).is_file():
-        raise FormatError("no such road", path=road)
-    return RoadSearch(None if road is None else Path(road), searched)
+    return RoadSearch(None if road is None else Path(road), as_paths(folders))

@@ -25,7 +25,6 @@ VERBS = {
     "evaluate": "Score a profile on measured drives.",
     "close-loop": "Find and add what a profile lacks.",
     "import": "Convert recordings into drive tables.",
-    "benchmark": "Compare lateral models from the literature.",
     "profiles": "The library of driver profiles.",
     "template": "Scenarios to start from.",
 }

@@ -2,37 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import fields
+from inspect import Parameter, Signature, signature
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, get_args
 
 import typer
+from typer.core import TyperCommand
 
-from xosc_lateral.cli.words import (
-    Allow,
-    AsJson,
-    Force,
-    Library,
-    Osi,
-    Parameters,
-    Quiet,
-    Road,
-    RoadPath,
-    Seed,
-    TimeLimit,
-    With,
-    examples,
-    pairs,
-    say,
-    warn,
-    write_stdout,
-)
-from xosc_lateral.enrich.neighbours import Neighbours
+from xosc_lateral.cli.words import SHARED, AsJson, Force, Osi, Quiet, examples, say, warn, write_stdout
 from xosc_lateral.formats.openscenario.write.target import Player
 from xosc_lateral.limits import JOB_MEMORY, JOB_TIMEOUT
-from xosc_lateral.pipeline.settings import OutputMode
+from xosc_lateral.pipeline.settings import OPTIONS, ConvertSettings, OutputMode
 
 if TYPE_CHECKING:
     from xosc_lateral.api.convert import Conversion
+
+BATCH = "Batches"
 
 EXAMPLES = examples(
     "convert cut-in.xosc -o lifelike.xosc --seed 1 --report report.html",
@@ -43,7 +30,24 @@ EXAMPLES = examples(
 
 def register(app: typer.Typer) -> None:
     """Add the verb to the command line."""
-    app.command("convert", short_help="Make scenarios lifelike: one, several, a folder.", epilog=EXAMPLES)(convert)
+    convert.__signature__ = _spelled_out()  # type: ignore[attr-defined]
+    short = "Make scenarios lifelike: one, several, a folder."
+    app.command("convert", cls=_WithPanels, short_help=short, epilog=EXAMPLES)(convert)
+
+
+class _WithPanels(TyperCommand):
+    """Options of a batch under a heading of their own, which Typer has only where rich formats."""
+
+    def format_options(self, ctx: Any, formatter: Any) -> None:
+        panels: dict[str, list[tuple[str, str]]] = {}
+        for param in self.get_params(ctx):
+            usual = "Arguments" if param.param_type_name == "argument" else "Options"
+            record = param.get_help_record(ctx)
+            if record is not None:
+                panels.setdefault(getattr(param, "rich_help_panel", None) or usual, []).append(record)
+        for title, records in panels.items():
+            with formatter.section(title):
+                formatter.write_dl(records)
 
 
 def convert(
@@ -60,110 +64,35 @@ def convert(
             "-o", "--output", help="File, folder/, or - for stdout; default NAME_lifelike.xosc. Batch: a folder."
         ),
     ] = None,
-    profile: Annotated[
-        str, typer.Option("--profile", "-p", help="Name or path of a driver profile; auto: motorway, the population.")
-    ] = "auto",
-    seed: Seed = 0,
-    entity: Annotated[
-        list[str] | None, typer.Option(metavar="NAME=PROFILE", help="Profile of one entity; may be repeated.")
-    ] = None,
-    only: Annotated[
-        list[str] | None, typer.Option(metavar="NAME", help="Enrich only this entity; may be repeated.")
-    ] = None,
-    ego: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="NAME",
-            help="Vehicle under test: left as it is; may be repeated. Those with an external controller are found "
-            "by themselves. none: there is none.",
-        ),
-    ] = None,
-    neighbours: Annotated[
-        Neighbours | None,
-        typer.Option(
-            help="How drivers answer to vehicles beside them: as their profile alone says; borrow: by a population's "
-            "law where that is not known (default); none: not at all.",
-            show_default=False,
-        ),
-    ] = None,
     variants: Annotated[int, typer.Option(help="Number of outputs, each with different offsets.", min=1)] = 1,
     report: Annotated[
         str | None,
         typer.Option(metavar="PAGE.html", help="Page that shows what was added; for a batch, a folder of pages."),
     ] = None,
     osi: Osi = None,
-    context: Annotated[
-        Path | None, typer.Option(help="Table of context over time (columns time, wind_speed, ...).")
-    ] = None,
-    parameter: Parameters = None,
-    library: Library = None,
-    mode: Annotated[
-        OutputMode,
-        typer.Option(
-            help="trajectory: play the maneuvers out; lane-offset: keep them reactive; auto: by vehicle, as it depends "
-            "on a vehicle under test."
-        ),
-    ] = OutputMode.AUTO,
-    player: Annotated[
-        Player, typer.Option("--for", help="Who plays it: standard, or made for esmini or CARLA's ScenarioRunner.")
-    ] = Player.STANDARD,
-    version: Annotated[
-        str | None,
-        typer.Option(
-            metavar="1.0..1.4", help="Version of OpenSCENARIO to write; default: the input's.", show_default=False
-        ),
-    ] = None,
-    allow: Allow = None,
-    road: Road = None,
-    road_path: RoadPath = None,
-    resample: Annotated[
-        int, typer.Option(help="Attempts at most, while vehicles collide or leave their lane.", min=1)
-    ] = 1,
-    time_limit: TimeLimit = None,
-    with_: With = None,
-    jobs: Annotated[int, typer.Option(help="Batch: number of processes; -1: one per core.")] = 1,
+    jobs: Annotated[int, typer.Option(help="Number of processes; -1: one per core.", rich_help_panel=BATCH)] = 1,
     job_timeout: Annotated[
-        float, typer.Option(help="Batch: time limit per scenario [s].", min=1, max=86_400)
+        float, typer.Option(help="Time limit per scenario [s].", min=1, max=86_400, rich_help_panel=BATCH)
     ] = JOB_TIMEOUT.value,
     job_memory: Annotated[
-        float, typer.Option(help="Batch: memory limit per scenario [MB].", min=100, max=1e6)
+        float, typer.Option(help="Memory limit per scenario [MB].", min=100, max=1e6, rich_help_panel=BATCH)
     ] = JOB_MEMORY.value,
-    cluster: Annotated[str | None, typer.Option(metavar="ADDRESS", help="Batch: address of a dask scheduler.")] = None,
-    strict: Annotated[
-        bool,
-        typer.Option("--strict", help="Exit with 1 on warnings, a missing vehicle catalog, or no entity enriched."),
+    cluster: Annotated[
+        str | None, typer.Option(metavar="ADDRESS", help="Address of a dask scheduler.", rich_help_panel=BATCH)
+    ] = None,
+    log_json: Annotated[
+        bool, typer.Option("--log-json", help="Progress as JSON lines on stderr.", rich_help_panel=BATCH)
     ] = False,
-    log_json: Annotated[bool, typer.Option("--log-json", help="Batch: progress as JSON lines on stderr.")] = False,
     force: Force = False,
     quiet: Quiet = False,
     as_json: AsJson = False,
+    **said: Any,
 ) -> None:
     """Give every car in a scenario the lateral movement of a real driver."""
     from xosc_lateral.cli.batches import convert_batch, is_batch
 
-    _check_target(player, version, mode)
-    settings: dict[str, Any] = {
-        "profile": profile,
-        "entity": pairs(entity, "--entity"),
-        "only": only or None,
-        "ego": _egos(ego),
-        "neighbours": None if neighbours is None else neighbours.value,
-        "seed": seed,
-        "context": context,
-        "parameters": pairs(parameter, "--set"),
-        "attempts": resample,
-        "mode": mode.value,
-        "player": player.value,
-        "version": version,
-        "library": library or (),
-        "allow": allow or (),
-        "road": road,
-        "road_path": road_path or (),
-        "time_limit": time_limit,
-        "with_sensor": bool(with_),
-        "strict": strict,
-        "force": force,
-    }
+    options = {**_options(said), "force": force}
+    strict = said["strict"]
     if is_batch(scenario):
         if osi is not None:
             raise typer.BadParameter("traces are written for a single scenario", param_hint="--osi")
@@ -176,7 +105,7 @@ def convert(
             scenario,
             output,
             {
-                **settings,
+                **options,
                 "variants": variants,
                 "report": report,
                 "workers": jobs,
@@ -190,7 +119,7 @@ def convert(
             as_json=as_json,
         )
     else:
-        _convert_one(Path(scenario[0]), output, settings, variants, report, osi, strict, quiet, as_json)
+        _convert_one(Path(scenario[0]), output, options, variants, report, osi, strict, quiet, as_json)
 
 
 def _warn_if_cut_off(result: Conversion, unsaid: bool) -> None:
@@ -199,31 +128,44 @@ def _warn_if_cut_off(result: Conversion, unsaid: bool) -> None:
         warn([result.cut_off])
 
 
-def _egos(names: list[str] | None) -> list[str] | None:
-    from xosc_lateral.pipeline.settings import egos_named
-
+def _options(said: Mapping[str, Any]) -> dict[str, Any]:
+    """What was said of the settings; wrong usage, with the option's name, if it can't be."""
+    given = {name: value for name, value in said.items() if value not in (None, [])}
+    for name, value in given.items():
+        try:
+            OPTIONS[name].read(value)
+        except ValueError as error:
+            raise typer.BadParameter(str(error), param_hint=_flags(name)[0]) from error
     try:
-        egos_named(names or None)
-    except ValueError as error:
-        raise typer.BadParameter(str(error), param_hint="--ego") from error
-    return names or None
-
-
-def _check_target(player: Player, version: str | None, mode: OutputMode) -> None:
-    from xosc_lateral.formats.openscenario.write.target import target
-
-    try:
-        target(player.value, version)
+        ConvertSettings(player=given["player"], version=given.get("version"))
     except ValueError as error:
         raise typer.BadParameter(str(error), param_hint="--version") from error
-    if player is Player.CARLA and mode is OutputMode.LANE_OFFSET:
+    if given["player"] is Player.CARLA and given["mode"] is OutputMode.LANE_OFFSET:
         raise typer.BadParameter("CARLA's lane offsets have no shape; use --mode trajectory", param_hint="--for")
+    return given
+
+
+def _flags(name: str) -> tuple[str, ...]:
+    return OPTIONS[name].flags or (f"--{name.replace('_', '-')}",)
+
+
+def _spelled_out() -> Signature:
+    """The verb's signature, with an option for each setting in place of `**said`."""
+    own = [one.replace(kind=one.KEYWORD_ONLY) for one in signature(convert, eval_str=True).parameters.values()]
+    settings = []
+    for item in fields(ConvertSettings):
+        if item.name in OPTIONS:
+            option = OPTIONS[item.name]
+            kind = SHARED.get(item.name) or Annotated[option.kind, typer.Option(*_flags(item.name), **option.words)]
+            default = None if type(None) in get_args(get_args(kind)[0]) else item.default
+            settings.append(Parameter(item.name, Parameter.KEYWORD_ONLY, default=default, annotation=kind))
+    return Signature([*own[:2], *settings, *own[2:-1]])
 
 
 def _convert_one(
     source: Path,
     output: str | None,
-    settings: dict[str, Any],
+    options: dict[str, Any],
     variants: int,
     report: str | None,
     osi: str | None,
@@ -232,7 +174,6 @@ def _convert_one(
     as_json: bool,
 ) -> None:
     from xosc_lateral.api.convert import REPORT_SUFFIXES, convert, lifelike, osi_files, output_scenario
-    from xosc_lateral.api.variants import variant_files, variant_set
     from xosc_lateral.formats.osi.extra import osi_wanted
     from xosc_lateral.formats.output_paths import STDOUT, claim, output_file
     from xosc_lateral.pipeline.convert import numbered
@@ -240,7 +181,7 @@ def _convert_one(
     if output == STDOUT:
         if variants > 1 or as_json or osi is not None:
             raise typer.BadParameter("standard output takes a single scenario and no other output", param_hint="-o -")
-        result = convert(source, None, report=report, **settings)
+        result = convert(source, None, report=report, **options)
         write_stdout(result.data)
         say(result, as_json=False, quiet=quiet, aside=True)
         _warn_if_cut_off(result, quiet)
@@ -250,26 +191,18 @@ def _convert_one(
         page = None if report is None else output_file(report, f"{written.stem}.html", REPORT_SUFFIXES)
         outputs = [numbered(written, variant, variants) for variant in range(variants)]
         pages = [None if page is None else numbered(page, variant, variants) for variant in range(variants)]
-        files = variant_files(written, variants, settings["mode"], settings["player"])
         trace = None if osi is None else osi_files(osi, source)[0]
         traces = [None if trace is None else numbered(trace, variant, variants) for variant in range(variants)]
         both = [path for one in traces if one is not None for path in osi_files(one, source)]
         osi_wanted(trace)
-        claim([*outputs, *pages, *both, *(files.all(variants) if files else ())], [source], force=settings["force"])
-        unclean, replayed = False, True
+        claim([*outputs, *pages, *both], [source], force=options["force"])
+        unclean = False
         for variant, (path, its_page, trace) in enumerate(zip(outputs, pages, traces, strict=True)):
-            result = convert(source, path, variant=variant, report=its_page, **settings)
+            result = convert(source, path, variant=variant, report=its_page, **options)
             if trace is not None:
                 result.write_osi(trace, force=True)
             say(result, as_json=as_json, quiet=quiet)
             _warn_if_cut_off(result, quiet or as_json)
-            replayed &= result.is_replay
             unclean |= bool(result.warnings) or not result.enriched
-        if files is not None and replayed:
-            found = variant_set(outputs, written, source=source, force=True)
-            if not (quiet or as_json):
-                typer.echo(str(found))
-        elif files is not None and not quiet:
-            typer.echo("no set of the variants: it holds trajectories alone (--ego none writes them)", err=True)
     if strict and unclean:
         raise typer.Exit(1)

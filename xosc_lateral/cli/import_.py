@@ -167,11 +167,11 @@ def _import(
 ) -> None:
     from xosc_lateral import import_drives
     from xosc_lateral.formats.output_paths import STDOUT, claim, output_file
-    from xosc_lateral.formats.tables import TABLE_SUFFIXES
+    from xosc_lateral.formats.output_tables import output_suffixes
 
     if output != STDOUT:
         files = [source for source in sources if source.is_file()]
-        claim([output_file(output, "drives.parquet", TABLE_SUFFIXES)], files, force=force)
+        claim([output_file(output, "drives.parquet", output_suffixes())], files, force=force)
     imported = import_drives(name, sources[0] if len(sources) == 1 else sources, **options)
     written = None
     if output == STDOUT:

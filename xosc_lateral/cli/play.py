@@ -61,12 +61,12 @@ def play(
     from xosc_lateral import play
     from xosc_lateral.formats.osi.extra import SUFFIXES, osi_wanted
     from xosc_lateral.formats.output_paths import STDOUT, claim, output_file
-    from xosc_lateral.formats.tables import TABLE_SUFFIXES
+    from xosc_lateral.formats.output_tables import output_suffixes
 
     if output is None and osi is None:
         raise typer.BadParameter("a table or, with --osi, a trace has to be named", param_hint="--output")
     is_file = output is not None and output != STDOUT
-    table = output_file(output, f"{scenario.stem}.csv", TABLE_SUFFIXES) if output is not None and is_file else None
+    table = output_file(output, f"{scenario.stem}.csv", output_suffixes()) if output is not None and is_file else None
     trace = None if osi is None else output_file(osi, f"{scenario.stem}_gt.mcap", SUFFIXES)
     claim([table, trace], [scenario], force=force)
     osi_wanted(trace)

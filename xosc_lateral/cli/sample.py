@@ -62,12 +62,12 @@ def sample(
     """Sample offsets from a profile (one of --like, --context, --duration)."""
     from xosc_lateral import sample
     from xosc_lateral.formats.output_paths import STDOUT, claim, output_file
-    from xosc_lateral.formats.tables import TABLE_SUFFIXES
+    from xosc_lateral.formats.output_tables import output_suffixes
 
     if sum(choice is not None for choice in (like, context, duration)) != 1:
         raise typer.BadParameter("give one of --like, --context, --duration")
     if output != STDOUT:
-        claim([output_file(output, "offsets.csv", TABLE_SUFFIXES)], [*(like or []), *(context or [])], force=force)
+        claim([output_file(output, "offsets.csv", output_suffixes())], [*(like or []), *(context or [])], force=force)
     how: dict[str, Any] = {"snippet": snippet, "speed": speed, "lane_width": lane_width, "with_sensor": bool(with_)}
     mapping = pairs(columns, "--map")
     made = sample(

@@ -75,6 +75,19 @@ def examples(*lines: str) -> str:
     return "\b\nExamples:\n" + "\n".join(f"  xosc-lateral {line}" for line in lines)
 
 
+SHARED = {
+    "seed": Seed,
+    "parameters": Parameters,
+    "library": Library,
+    "allow": Allow,
+    "road": Road,
+    "road_path": RoadPath,
+    "time_limit": TimeLimit,
+    "with_sensor": With,
+}
+"""Options of `convert` that other verbs have as well."""
+
+
 def pairs(words: Iterable[str] | None, option: str) -> dict[str, str]:
     """Read ``NAME=VALUE`` words; wrong usage when there is no ``=`` or a name comes twice."""
     found: dict[str, str] = {}

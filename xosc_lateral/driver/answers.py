@@ -32,7 +32,7 @@ LEAST_SECONDS = 60.0
 
 AMONG_DRIVERS = {"left": (-0.0917, 0.1), "right": (0.2551, 0.1)}
 """Shift alongside, positive left: mean (of the shipped `motorway`: DLR Highway Traffic v1.1.0), and how far single
-drivers are from it, which no recording that we have can tell: assumed, so that errors of 0.05 m weigh a fifth. [m]"""
+drivers are from it, which no recording that we have shows: assumed, so that errors of 0.05 m weigh a fifth. [m]"""
 
 SIGNIFICANT = 2.6
 """Standard errors from which a shift becomes an effect: one of a hundred by chance. [-]"""
@@ -61,7 +61,7 @@ def basis_of(profile: DriverProfile, side: str) -> Basis:
 
 
 def borrows(profile: DriverProfile, side: str) -> bool:
-    """Whether a conversion borrows the population's answer on a side unless told otherwise."""
+    """Whether a conversion borrows the population's answer on a side unless asked otherwise."""
     return basis_of(profile, side) is Basis.UNKNOWN
 
 
@@ -152,9 +152,9 @@ def _within_drives(runs: Sequence[Run], near: Mapping[str, Sequence[FloatArray]]
     blocks, free = len(by_block), max(len(observed) - len(numbers) - design.shape[1], 1)
     covariance = inverse @ (by_block.T @ by_block) @ inverse
     covariance *= blocks / max(blocks - 1, 1) * len(observed) / free
-    told = np.diag(design.T @ design)[:sides] > 1e-6
-    errors = np.where(told & (blocks > 2), CLUSTERED * np.sqrt(np.maximum(np.diag(covariance)[:sides], 0.0)), np.inf)
-    return np.where(told, slopes[:sides], 0.0), errors
+    known = np.diag(design.T @ design)[:sides] > 1e-6
+    errors = np.where(known & (blocks > 2), CLUSTERED * np.sqrt(np.maximum(np.diag(covariance)[:sides], 0.0)), np.inf)
+    return np.where(known, slopes[:sides], 0.0), errors
 
 
 def _others(run: Run) -> list[FloatArray]:

@@ -167,7 +167,7 @@ def _beside_given(profile: DriverProfile, given: float | None) -> list[str]:
     if given is None:
         return []
     if sensor is None:
-        return [f"runs are too short to tell a driver from a sensor: the error of {given:g} m is not used"]
+        return [f"runs are too short to separate driver and sensor: the error of {given:g} m is not used"]
     least = float(np.sqrt(uniform_variance(sensor.rounding)))
     if given < least / AS_GIVEN:
         return [
@@ -187,7 +187,7 @@ def _coarse_steps(profile: DriverProfile) -> list[str]:
     if sensor.rounding <= WIDE * np.sqrt(sensor.driver_variance):  # little data, not its steps
         return []
     return [
-        f"the offsets are rounded to {sensor.rounding:.3g} m, too coarse to tell how far the driver of {profile.name} "
+        f"the offsets are rounded to {sensor.rounding:.3g} m, too coarse to show how far the driver of {profile.name} "
         "moves between steps"
     ]
 

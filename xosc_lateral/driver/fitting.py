@@ -38,7 +38,7 @@ def fit_profile(
     sensor_noise: float | None = None,
     neighbours: bool | None = None,
 ) -> DriverProfile:
-    """Cut drives into runs, tell driver and sensor apart, and fit a profile.
+    """Cut drives into runs, separate driver and sensor, and fit a profile.
 
     Of a population it holds what class, lane and speed do to level, spread and fine movement, and neighbours to the
     level, as far as they are known (`place`); of few drives, and of the two-level model, nothing of that.

@@ -3,7 +3,7 @@
 Cameras beside the road, and how well a road's centre is known, differ from place to place, and a place is the same for
 all who pass it. Looked at is the jerk, whose power is nearly even from 0.1 to 0.5 Hz: its mean square in a passage of
 some seconds is better known than that of the offset, or of the acceleration, which hangs on its slowest part. What
-class, lane and speed do to it, and each driver, is told apart from the zones (`zone_levels`).
+class, lane and speed do to it, and each driver, is separated from the zones (`zone_levels`).
 """
 
 from __future__ import annotations

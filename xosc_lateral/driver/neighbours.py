@@ -3,7 +3,7 @@
 The effect fades exponentially with the free space lengthwise, and is none where there is nobody. How strong it is on
 either side is found in the fit (`place`); its form was found in DLR Highway Traffic v1.1.0
 (benchmarks/neighbour_response.py): of those within 0.5 % of the variance of the best, one that is not too quick, and
-without kinks.
+without a corner.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ SCALE = 40.0
 
 LAG, RESPONSE, ORDER = -1.0, 1.0, 2
 """Delay, and two first-order lags: drivers see neighbours coming, and nobody moves at once. After a single lag of 2 s
-somebody who comes into the lane would be a kink in the path, which no car can drive. [s], [s], [-]"""
+somebody who comes into the lane would be a corner in the path, which no car can drive. [s], [s], [-]"""
 
 
 def neighbour_shapes(runs: Sequence[Run], least: int) -> list[Proximity]:

@@ -29,7 +29,7 @@ from xosc_lateral.errors import NotEnoughDataError
 FloatArray = NDArray[np.float64]
 
 COLUMNS = ("is_truck", "lane_index", "speed")
-"""What a population's drivers are told apart by: class, lane and speed."""
+"""What a population's drivers are distinguished by: class, lane and speed."""
 
 PIECE = 10.0
 """Snippets whose mean and spread are explained, the paper's. [s]"""

@@ -18,8 +18,12 @@ from xosc_lateral.driver.models.registry import CORE_MODELS, any_model
 from xosc_lateral.driver.provenance import Metadata, Provenance
 from xosc_lateral.driver.records import Record, plain, read_as, schema_hook, set_once
 from xosc_lateral.driver.sensor.model import SensorModel
-from xosc_lateral.driver.versions import FORMAT, VERSION, upgraded
 from xosc_lateral.errors import DriverProfileError
+
+FORMAT = "xosc-lateral driver profile"
+
+VERSION = 2
+"""Of the file format."""
 
 MAX_LANE_WIDTH = 10.0
 """Lanes that wide are none: 2 to 6 m is what measured ones have. [m]"""
@@ -108,14 +112,14 @@ class DriverProfile(Record, frozen=True):
 
     @classmethod
     def from_dict(cls, values: Mapping[str, Any]) -> DriverProfile:
-        """Back from `to_dict`, of this version or an older one.
+        """Back from `to_dict`.
 
         Raises
         ------
         DriverProfileError
-            If it is no profile, of a newer version, or contradicts itself; names the field and where it stands.
+            If it is no profile, of another version, or contradicts itself; names the field and where it stands.
         """
-        present = upgraded(values)
+        present = _checked(values)
         effects = present.get("effects")
         effects = effects if isinstance(effects, list) else ()
         kinds = [effect.get("kind") for effect in effects if isinstance(effect, Mapping)]
@@ -123,6 +127,18 @@ class DriverProfile(Record, frozen=True):
         kind = model.get("kind") if isinstance(model, Mapping) else None
         read = read_as(file_type(str(kind), frozenset(map(str, kinds))), present)
         return cls(**{name: getattr(read, name) for name in cls.__struct_fields__})
+
+
+def _checked(values: object) -> dict[str, Any]:
+    """A profile file's values without format and version; refused if it is none of ours, or of another version."""
+    if not isinstance(values, Mapping) or values.get("format") != FORMAT:
+        raise DriverProfileError(f'not a driver profile: "format" is not "{FORMAT}"')
+    version = values.get("version")
+    if version != VERSION or isinstance(version, bool):
+        newer = isinstance(version, int) and version > VERSION
+        cure = ": update the package" if newer else ""
+        raise DriverProfileError(f"file format {version!r}; this version of xosc-lateral reads {VERSION}{cure}")
+    return {name: value for name, value in values.items() if name not in ("format", "version")}
 
 
 def _columns(effects: Iterable[Effect]) -> tuple[str, ...]:
@@ -137,7 +153,7 @@ def file_type(model: str, effects: frozenset[str]) -> type[DriverProfile]:
     ----------
     model : str
     effects : frozenset of str
-        Kinds in the file; plug-ins are looked for when one is not of this package.
+        Kinds in the file; plug-ins are searched when one is not of this package.
     """
     known: Any = tuple[any_effect(effects), ...]  # type: ignore[misc]  # known only now
     fields: list[Any] = [("model", any_model(model)), ("effects", known, ())]
@@ -158,7 +174,7 @@ def profile_schema() -> dict[str, Any]:
 
 
 def sampling_hash(profile: DriverProfile) -> str:
-    """SHA-256 of what a profile's offsets depend on; what is only told about it may change."""
+    """SHA-256 of what a profile's offsets depend on; what only describes it may change."""
     values = profile.to_dict()
     parts = {name: values[name] for name in ("lane_width", "model", "effects")}
     return hashlib.sha256(json.dumps(parts, sort_keys=True).encode()).hexdigest()

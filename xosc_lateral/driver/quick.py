@@ -1,6 +1,6 @@
 """Quick movement: what of a path is faster than drivers wander.
 
-A place can make quick movement larger, and leaves wandering of decimetres as it is, so that both must be told apart
+A place can make quick movement larger, and leaves wandering of decimetres as it is, so that both must be separated
 sharply: a filter without delay looks as far ahead as back.
 
 References

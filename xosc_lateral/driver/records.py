@@ -1,6 +1,6 @@
 """Parameters and states as msgspec structs: strict when read, plain JSON values when written.
 
-Unknown fields are refused by name, kinds are told apart by their `kind`; arrays and random generators, which JSON has
+Unknown fields are refused by name, `kind` names the type; arrays and random generators, which JSON has
 none of, are lists and the generator's own state there.
 """
 

@@ -19,7 +19,7 @@ from xosc_lateral.driver.process import DriveProcess, combine
 from xosc_lateral.driver.profile import DriverProfile, sampling_hash
 from xosc_lateral.driver.records import plain, read_as
 from xosc_lateral.driver.response_stream import ResponseStream
-from xosc_lateral.driver.stream_state import SeedState, StreamState, sealed, upgraded
+from xosc_lateral.driver.stream_state import SeedState, StreamState, sealed, unsealed
 from xosc_lateral.driver.upsampling import extrapolate, piece
 from xosc_lateral.errors import DriverProfileError
 
@@ -271,7 +271,7 @@ class OffsetStream:
 
     @classmethod
     def _restored(cls, profile: DriverProfile, state: Mapping[str, Any]) -> Self:
-        saved = read_as(StreamState, upgraded(state, profile), "state")
+        saved = read_as(StreamState, unsealed(state), "state")
         if saved.profile != sampling_hash(profile):
             raise DriverProfileError(f"the state belongs to another profile than {profile.name}")
         seed = np.random.SeedSequence(saved.seed.entropy, spawn_key=saved.seed.spawn_key)

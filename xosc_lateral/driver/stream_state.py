@@ -1,4 +1,4 @@
-"""The state of an offset stream as plain values, and older states as the present version has them."""
+"""The state of an offset stream as plain values."""
 
 from __future__ import annotations
 
@@ -10,14 +10,13 @@ from typing import Any
 import msgspec
 
 from xosc_lateral.driver.effects.response import ResponseState
-from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.driver.records import Record
 from xosc_lateral.errors import DriverProfileError
 
 FORMAT = "xosc-lateral offset stream"
 
 VERSION = 2
-"""Of the state's format: 1 had no number, it is that of package version 0.1."""
+"""Of the state's format."""
 
 
 class SeedState(Record, frozen=True):
@@ -90,36 +89,21 @@ def _hash(state: Mapping[str, Any]) -> str:
     return hashlib.sha256(json.dumps(state, sort_keys=True).encode()).hexdigest()
 
 
-def upgraded(state: Mapping[str, Any], profile: DriverProfile) -> dict[str, Any]:
-    """A state's values as the present version writes them, without format and version.
+def unsealed(state: Mapping[str, Any]) -> dict[str, Any]:
+    """A state's values without format and version.
 
     Raises
     ------
     DriverProfileError
-        If it is no state of a stream, of a newer version, or not what was written: nobody edits a generator's state.
+        If it is no state of a stream, of another version, or not what was written: nobody edits a generator's state.
     """
     if not isinstance(state, Mapping) or state.get("format") != FORMAT:
         raise DriverProfileError(f'not a state of an offset stream: "format" is not "{FORMAT}"')
-    version = _version_of(state)
-    if version == 1:
-        from xosc_lateral.driver.stream_state_1 import from_version_1
-
-        return from_version_1(state, profile)
-    return _unsealed(state)
-
-
-def _version_of(state: Mapping[str, Any]) -> int:
-    """Of its format, if this package reads it."""
-    version = state.get("version", 1)
-    if version not in (1, VERSION):
+    if state.get("version") != VERSION:
         raise DriverProfileError(
-            f"a state written by a newer version of xosc-lateral (format {version!r}; this one reads up to {VERSION})"
+            f"a state written by another version of xosc-lateral (format {state.get('version')!r}; this one reads "
+            f"{VERSION})"
         )
-    return int(version)
-
-
-def _unsealed(state: Mapping[str, Any]) -> dict[str, Any]:
-    """Without format and version, if nobody has changed it."""
     written = {name: value for name, value in state.items() if name != "sha256"}
     if state.get("sha256") != _hash(written):
         raise DriverProfileError("the state of an offset stream is damaged: its sha256 is another")

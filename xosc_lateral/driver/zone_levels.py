@@ -2,7 +2,7 @@
 
 One observation for each passage: y = fixed effects + zone + driver + rest. Variances by the fitting of constants, zones
 by best linear unbiased prediction, so that few passages move a zone little and what chance makes stays 0. Of zones that
-no driver has in common, as both carriageways of a road, nothing but how much drivers differ tells whether it is the
+no driver has in common, as both carriageways of a road, nothing but how much drivers differ says whether it is the
 zones or those who pass them: such parts of a recording have a level of their own, shrunk by that.
 
 References
@@ -26,8 +26,8 @@ FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
 LEAST_DRIVES = 30
-"""Fewer are no population: whose zone or lane it was, and who he is, can't be told apart. As many are to have had a
-neighbour: errors clustered by drive are too small where few tell of it (where nothing acts, 90, 8 and 7 % of the
+"""Fewer are no population: whose zone or lane it was, and who he is, can't be separated. As many are to have had a
+neighbour: errors clustered by drive are too small where few have one (where nothing acts, 90, 8 and 7 % of the
 effects are beyond two of their errors if 1, 5 and 20 of 60 drives do). [-]"""
 
 RANK = 1e-10
@@ -158,17 +158,17 @@ class _Crossed:
         rows = self._n - self._drives - rank
         if freedom < 1 or rows < 1 or left <= 0.0:
             return None
-        rest, told = left / rows, explained - by_fixed
-        if f_distribution.sf(told / freedom / rest, freedom, rows) > SIGNIFICANCE:
+        rest, explained_by = left / rows, explained - by_fixed
+        if f_distribution.sf(explained_by / freedom / rest, freedom, rows) > SIGNIFICANCE:
             return None
         cross = gram[first, self._fixed :]
         amount = float(np.trace(gram[self._fixed :, self._fixed :]) - (cross * (inverse @ cross)).sum())
-        zones = max(told - rest * freedom, 0.0) / max(amount, 1e-12)
+        zones = max(explained_by - rest * freedom, 0.0) / max(amount, 1e-12)
 
         explained, rank_zones, inverse = _solved(self._gram, self._moment, self._n)
-        told = self._square - explained - left
+        remaining = self._square - explained - left
         amount = self._n - float((inverse * _dense(self._sums.T @ self._sums)).sum())
-        drives = max(told - rest * (self._drives + rank - rank_zones), 0.0) / max(amount, 1e-12)
+        drives = max(remaining - rest * (self._drives + rank - rank_zones), 0.0) / max(amount, 1e-12)
         return zones, drives, rest
 
     def predicted(

@@ -1,4 +1,4 @@
-"""Columns that wrap around, such as directions: told by how they jump, never by their name or unit."""
+"""Columns that wrap around, such as directions: recognised by how they jump, never by their name or unit."""
 
 from __future__ import annotations
 

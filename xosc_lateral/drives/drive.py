@@ -52,7 +52,7 @@ class Drive:
         Where it was read. For messages.
     run : array of int, shape (n,), optional
         Number of the road-following stretch of each row, where an import has cut the drive already: lane changes and
-        their margins are gone, and none are looked for again. None: nothing has been cut.
+        their margins are gone, and none are searched again. None: nothing has been cut.
     mended : MarkingShares, optional
         Rows in which a camera had misjudged a marking, see `markings`.
     empty : frozenset of str

@@ -3,7 +3,7 @@
 A lane tracker's offset is half the difference of its distances to the two markings, its lane width their sum. When it
 takes a kerb, a crack or the next lane's line for a marking, that distance jumps or creeps away by up to a metre, the
 offset by half of it, and the lane seems to widen; the other marking goes on as before. A lane hardly changes its width
-within seconds and a vehicle can't jump, so the two are told apart: offset y and lane width w are smoothed together,
+within seconds and a vehicle can't jump, so the two are separable: offset y and lane width w are smoothed together,
 
     left = w / 2 - y + error,    right = w / 2 + y + error,
 

@@ -114,7 +114,7 @@ def column_on_grid(time: FloatArray, values: FloatArray, grid: FloatArray, *, he
 
 
 def in_digits(values: FloatArray) -> FloatArray:
-    """Twelve digits of the largest: averages of equal numbers are equal, and no threshold tells their errors apart."""
+    """Twelve digits of the largest: averages of equal numbers are equal, whatever their errors."""
     largest = float(np.max(np.abs(values), initial=0.0, where=np.isfinite(values)))
     return np.round(values, 12 - int(np.ceil(np.log10(largest)))) if largest > 0.0 else values
 

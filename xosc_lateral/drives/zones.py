@@ -1,7 +1,7 @@
 """Zones: the stretches of road or fields of view that a recording is made of, by the names that its table gives them.
 
 A sensor beside the road is not equally good everywhere, and a place is the same for all who pass it. So a zone is no
-quantity that a driver responds to: it tells whose rows were recorded under the same conditions.
+quantity that a driver responds to: it says whose rows were recorded under the same conditions.
 """
 
 from __future__ import annotations

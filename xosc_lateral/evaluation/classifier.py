@@ -1,4 +1,4 @@
-"""Can a classifier tell sampled snippets from real ones? The strictest of the scores, since it looks at everything.
+"""Does a classifier separate sampled snippets from real ones? The strictest score, since it looks at everything.
 
 References
 ----------
@@ -10,14 +10,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.drives.periodogram import tapered_powers, without_line
 from xosc_lateral.evaluation.metrics import DIFFERENCE_SCALE, snippet_metrics
-from xosc_lateral.evaluation.rocket import rocket_features
 from xosc_lateral.evaluation.shape import shape_features, turns
 from xosc_lateral.evaluation.snippets import Snippets
 
@@ -30,7 +28,7 @@ BANDS = 16
 EVEN_BANDS = 25
 """Of the log spectrum once more, evenly: what is smoothed piece by piece has its lines and holes at fast movement."""
 VALUES = 20
-"""Values of a snippet, and differences over as much, that are shown: more slow a tree down and tell it nothing. [-]"""
+"""Values of a snippet, and differences over as much, that are shown: more slow a tree down and add nothing. [-]"""
 MOST = 1500
 """Snippets of either kind that a classifier sees, spread evenly: an error of 0.01 in the area. [-]"""
 RESAMPLES = 200
@@ -39,12 +37,12 @@ RESAMPLES = 200
 
 @dataclass(frozen=True)
 class TwoSampleResult:
-    """How well two sets of snippets are told apart.
+    """How well two sets of snippets are separated.
 
     Parameters
     ----------
     auc : float
-        Area under the ROC curve, cross-validated: 0.5 can't tell, 1 always can. [-]
+        Area under the ROC curve, cross-validated: 0.5 by chance, 1 always. [-]
     low, high : float
         95 % interval, drives resampled. [-]
     """
@@ -160,10 +158,9 @@ def classifier_two_sample_test(
     *,
     context: Sequence[FloatArray] | None = None,
     fast: bool = False,
-    rocket: bool = False,
     seed: int = 0,
 ) -> TwoSampleResult | None:
-    """Train a gradient-boosted classifier to tell two sets of snippets apart, and judge it on drives it has not seen.
+    """Train a gradient-boosted classifier to separate two sets of snippets, and judge it on drives it has not seen.
 
     Parameters
     ----------
@@ -174,8 +171,6 @@ def classifier_two_sample_test(
         Features of the context of either: then context and movement are judged jointly.
     fast : bool
         Look at fast movement closely, see `snippet_features`.
-    rocket : bool
-        Random convolutions (`rocket`) and a ridge classifier instead, as their authors have it.
 
     Returns
     -------
@@ -183,6 +178,7 @@ def classifier_two_sample_test(
         None without scikit-learn (extra `classifier`) or with fewer than five drives.
     """
     try:
+        from sklearn.ensemble import HistGradientBoostingClassifier
         from sklearn.model_selection import GroupKFold, cross_val_predict
         from threadpoolctl import threadpool_limits
     except ImportError:
@@ -191,36 +187,17 @@ def classifier_two_sample_test(
     groups = np.concatenate([groups_real[rows], groups_other[others]])
     if len(np.unique(groups)) < FOLDS:
         return None
-    if rocket:
-        features, model, method = _by_convolutions(real[rows], other[others], seed)
-    else:
-        features, model, method = _by_features(real[rows], other[others], seed, fast=fast)
+    features = np.vstack([snippet_features(snippets, fast=fast) for snippets in (real[rows], other[others])])
     if context is not None:
         features = np.hstack([features, np.vstack([context[0][rows], context[1][others]])])
     label = np.r_[np.zeros(len(rows)), np.ones(len(others))]
+    model = HistGradientBoostingClassifier(max_iter=100, max_bins=63, random_state=seed)
     # One thread: on a machine that is busy otherwise, its threads waiting for one another take twenty times as long.
     with threadpool_limits(1):
-        found = cross_val_predict(model, features, label, groups=groups, cv=GroupKFold(FOLDS), method=method, n_jobs=1)
-    score = found[:, 1] if found.ndim > 1 else found
-    return _judged(score, label.astype(bool), groups, seed)
-
-
-def _by_features(real: FloatArray, other: FloatArray, seed: int, *, fast: bool) -> tuple[FloatArray, Any, str]:
-    from sklearn.ensemble import HistGradientBoostingClassifier
-
-    model = HistGradientBoostingClassifier(max_iter=100, max_bins=63, random_state=seed)
-    both = [snippet_features(snippets, fast=fast) for snippets in (real, other)]
-    return np.vstack(both), model, "predict_proba"
-
-
-def _by_convolutions(real: FloatArray, other: FloatArray, seed: int) -> tuple[FloatArray, Any, str]:
-    from sklearn.linear_model import RidgeClassifierCV
-    from sklearn.pipeline import make_pipeline
-    from sklearn.preprocessing import StandardScaler
-
-    both = np.vstack([real, other])
-    model = make_pipeline(StandardScaler(), RidgeClassifierCV(alphas=np.logspace(-3.0, 5.0, 9)))
-    return rocket_features(both, both, seed), model, "decision_function"
+        chance = cross_val_predict(
+            model, features, label, groups=groups, cv=GroupKFold(FOLDS), method="predict_proba", n_jobs=1
+        )
+    return _judged(chance[:, 1], label.astype(bool), groups, seed)
 
 
 def spread_out(count: int) -> NDArray[np.int64]:

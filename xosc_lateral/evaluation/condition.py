@@ -17,7 +17,7 @@ class SnippetCondition:
     seconds : float
         Their length. [s]
     same_start : bool
-        A sampled snippet starts where its real one starts, and the floor is made of other drivers' snippets that start
+        A sampled snippet starts where its real one starts, and stands beside other drivers' snippets that start
         there too. Else neither knows the start: sampled ones are cut from free runs.
     slow : bool
         Movement below 0.5 Hz alone, see `filters`; else everything that was recorded.

@@ -13,7 +13,7 @@ PROPER = {"energy_score": "m", "variogram_score": "m"}
 """Proper scores and their units."""
 
 ORDER = 0.5
-"""Of the variogram score: the power that its authors found to tell dependence best. [-]"""
+"""Of the variogram score: the power that its authors found most sensitive to dependence. [-]"""
 
 
 def energy_score(real: FloatArray, ensemble: FloatArray) -> FloatArray:

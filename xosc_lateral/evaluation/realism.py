@@ -1,9 +1,9 @@
 """How near sampled driving is to real driving, beside how near other real drivers are: the fair measure.
 
 Snippets of 10, 30 and 60 s are compared under three conditions: sampled from where the real ones start; cut from free
-runs that know no start; and free runs again, movement below 0.5 Hz alone. Every number has a floor of other drivers'
-real snippets that know as much about the start. What was recorded is the driver and the sensor, so a profile that knows
-its sensor is compared with it; below 0.5 Hz the driver is compared alone, as `convert` writes him.
+runs that know no start; and free runs again, movement below 0.5 Hz alone. Every number stands beside that of real
+snippets of other drivers that know as much about the start. What was recorded is the driver and the sensor, so a
+profile that knows its sensor is compared with it; below 0.5 Hz the driver is compared alone, as `convert` writes him.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
 SPLITS = 8
-"""Random halves of the drives that distances and floors are averaged over."""
+"""Random halves of the drives that both are averaged over."""
 
 LEAST = 20
 """Fewer snippets of a length: it is left out."""
@@ -44,7 +44,7 @@ ENSEMBLE, SCORED = 8, 200
 
 @dataclass(frozen=True)
 class Beside:
-    """A number and its floor: what real driving of other drivers gets. Unit in its name's table."""
+    """A number, and what real driving of other drivers gets (the floor). Unit in its name's table."""
 
     value: float
     floor: float
@@ -52,7 +52,7 @@ class Beside:
 
     @property
     def ratio(self) -> float:
-        """Value over floor; 1: as near as other real drivers. [-]"""
+        """Value over that of real drivers; 1: as near as other real drivers. [-]"""
         return self.value / self.floor if self.floor > 0.0 else float("nan")
 
 
@@ -77,10 +77,8 @@ class ConditionScores:
     alone, jointly : TwoSampleResult or None
         Classifier on movement, and on context and movement jointly (below 0.5 Hz). None: not trained.
     floor : TwoSampleResult or None
-        Half of the real drivers told from the others, by movement. Jointly it is 0.5: both kinds have the same
+        A classifier between two halves of the real drivers, by movement. Jointly it is 0.5: both kinds have the same
         context. With the same start it is as with any: both halves start alike.
-    convolved : TwoSampleResult or None
-        Classifier on random convolutions of the movement. None: not asked for.
     """
 
     condition: SnippetCondition
@@ -92,7 +90,6 @@ class ConditionScores:
     alone: TwoSampleResult | None
     jointly: TwoSampleResult | None
     floor: TwoSampleResult | None
-    convolved: TwoSampleResult | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,9 +113,7 @@ class Realism:
         return next((one for one in self.conditions if one.condition == condition), None)
 
 
-def score_realism(
-    profile: DriverProfile, runs: Sequence[Run], *, seed: int, classify: bool = True, rocket: bool = False
-) -> Realism:
+def score_realism(profile: DriverProfile, runs: Sequence[Run], *, seed: int, classify: bool = True) -> Realism:
     """Compare a profile's snippets with real ones under every condition that has enough of them.
 
     Parameters
@@ -127,8 +122,6 @@ def score_realism(
         Measured, at the profile's step.
     classify : bool
         Train classifiers too: most of the work.
-    rocket : bool
-        And one on random convolutions (`rocket`).
     """
     step = profile.model.step
     driver = sample_runs(profile, runs, seed, same_start=False)
@@ -149,7 +142,7 @@ def score_realism(
             (SnippetCondition(seconds, False, slow=True), *slow),
         ):
             with_sensor = profile.sensor is not None and not condition.slow
-            asked = _Asked(seed, classify, rocket, with_sensor)
+            asked = _Asked(seed, classify, with_sensor)
             found.append(_under(condition, cut, real, sampled, step, asked))
     short = snippets_of(runs, LENGTHS[0], step)
     whose = np.array([str(number) for number, _ in short.place])
@@ -162,7 +155,6 @@ def score_realism(
 class _Asked:
     seed: int
     classify: bool
-    rocket: bool
     with_sensor: bool
 
 
@@ -174,10 +166,8 @@ def _under(
     own = features_of(real, cut.lane_width, step, highest=highest)
     made = features_of(sampled, cut.lane_width, step, highest=highest)
     families, named = _distances(condition, own, made, real, cut.group, seed)
-    alone = jointly = floor = convolved = None
+    alone = jointly = floor = None
     shown = (thinned(real, step), thinned(sampled, step)) if condition.slow else (real, sampled)
-    if asked.rocket:
-        convolved = classifier_two_sample_test(*shown, cut.group, cut.group, rocket=True, seed=seed)
     if asked.classify:
         fast = not condition.slow
         alone = classifier_two_sample_test(*shown, cut.group, cut.group, fast=fast, seed=seed)
@@ -187,9 +177,7 @@ def _under(
             context = context_features(cut, real), context_features(cut, sampled)
             jointly = classifier_two_sample_test(*shown, cut.group, cut.group, context=context, seed=seed)
     means = named_means(own, made)
-    return ConditionScores(
-        condition, asked.with_sensor, len(cut), families, named, means, alone, jointly, floor, convolved
-    )
+    return ConditionScores(condition, asked.with_sensor, len(cut), families, named, means, alone, jointly, floor)
 
 
 def _distances(
@@ -231,7 +219,7 @@ def _stand_ins(
 
 
 def _separated_drivers(real: FloatArray, group: NDArray[np.str_], seed: int, *, fast: bool) -> TwoSampleResult | None:
-    """One random half of the drivers told from the other."""
+    """A classifier between one random half of the drivers and the other."""
     half = split_groups(group, np.random.default_rng(seed))
     return classifier_two_sample_test(real[half], real[~half], group[half], group[~half], fast=fast, seed=seed)
 

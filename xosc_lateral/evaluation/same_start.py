@@ -1,9 +1,9 @@
-"""The fair floor: real windows of other drivers that begin where the real ones begin.
+"""A fair comparison: real windows of other drivers that begin where the real ones begin.
 
 A sampled window that starts where its real one starts knows something that a random real window does not: comparing
-both with the real windows would let every model with a good start look better than real driving. So the floor for such
-windows is made of real windows of *other* drivers whose start is the same; where sampled windows know no start, the
-floor is made of any windows of other drivers.
+both with the real windows would let every model with a good start look better than real driving. So such windows stand
+beside real windows of *other* drivers whose start is the same, and windows that know no start beside any windows of
+other drivers.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ NEAREST = 20
 """A stand-in is drawn among so many windows of other drivers whose starts are nearest."""
 
 FLOOR_DRAWS = 4
-"""Sets of stand-ins with the same start that a floor is averaged over."""
+"""Sets of stand-ins with the same start that are averaged over."""
 
 
 def windows_with_the_same_start(
@@ -74,7 +74,7 @@ def windows_with_the_same_start(
 def real_against_real(
     real: Features, donors: Features, rows: IntArray, donor_rows: IntArray, stand_ins: IntArray | None
 ) -> dict[str, float]:
-    """The floor of `differences`: what other drivers' windows get.
+    """`differences` of real windows of other drivers.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""How true a profile is to measured drives: distances with their floors, the paper's four evaluations, and beyond.
+"""How true a profile is to measured drives: distances, the paper's four evaluations, and beyond.
 
 The paper (arXiv:2405.17080, section IV) compares ten metrics of 10 s snippets in four evaluations. Before them comes
 the fair measure (`realism`), and beside them what the paper does not look at: spectrum, autocorrelation, the lane's

@@ -1,4 +1,4 @@
-"""Distances of sampled snippets from measured ones, and the floor that measured ones have."""
+"""Distances of sampled snippets from measured ones, and of measured ones from each other (the floor)."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ SNIPPET = 10.0
 """The paper's. [s]"""
 
 SPLITS = 8
-"""Random halves of the drives that distances and floors are averaged over."""
+"""Random halves of the drives that both are averaged over."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,7 +39,7 @@ class SnippetScores:
 
     @property
     def ratio(self) -> float:
-        """Mean distance over mean floor. 1: as close as real data is to itself. [-]"""
+        """Mean distance over that between measured drives. 1: as close as real data is to itself. [-]"""
         return self.distances.mean / self.floor.mean
 
     @property
@@ -53,7 +53,7 @@ class SnippetScores:
 def score_snippets(
     real: FloatArray, sampled: FloatArray, group: NDArray[np.str_], *, seed: int, seconds: float = SNIPPET
 ) -> SnippetScores:
-    """Distances of sampled snippets, and the floor, over random halves of the groups.
+    """Distances of sampled snippets, and between measured ones, over random halves of the groups.
 
     A half of real snippets is compared with its own sampled ones, and with the other real half: both distances rest on
     as many snippets, so that their ratio is fair.

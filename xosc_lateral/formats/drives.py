@@ -75,7 +75,7 @@ def read_drives(
     Parameters
     ----------
     paths : path or sequence of paths
-        Tables; the suffix tells the format.
+        Tables; the suffix gives the format.
     mapping : mapping of str to ColumnSource, optional
         Standard name -> foreign column; see `parse_map`.
 

@@ -36,7 +36,7 @@ def parsed_hash(path: Path) -> str:
 
 
 def parsed_hashes(paths: Iterable[Path]) -> dict[str, str]:
-    """`parsed_hash` of each file by its name; files of one name by as much of their paths as tells them apart."""
+    """`parsed_hash` of each file by its name; files of one name by as much of their paths as differs."""
     names = {path: path.name for path in paths}
     for depth in range(2, max((len(path.parts) for path in names), default=0) + 1):
         given = list(names.values())

@@ -77,7 +77,7 @@ def _entry(path: Path, hidden_by: Path | None) -> Entry:
 
 
 def matching(entries: Iterable[Entry], tags: Collection[str], where: Mapping[str, str]) -> list[Entry]:
-    """Entries that carry all the tags and whose metadata (or `id`, or `model`) are as told, letters big or small.
+    """Entries that carry all the tags and whose metadata (or `id`, or `model`) are as given, letters big or small.
 
     Raises
     ------

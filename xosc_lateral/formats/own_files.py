@@ -31,7 +31,7 @@ def is_own(path: Path) -> bool:
 
 
 def template_mark(text: str) -> str:
-    """Comment at the end of a template's file that tells whether it was edited since. `text` has none yet."""
+    """Comment at the end of a template's file that says whether it was edited since. `text` has none yet."""
     return f"<!-- xosc-lateral template, sha256 {_sha256(text.rstrip().encode())} -->\n"
 
 

@@ -70,8 +70,8 @@ _TABLE_UNITS = MappingProxyType({"time": "s", "offset": "m", "distance_left": "m
 
 def spelled(unit: str) -> str | None:
     """The unit in the spelling of `UNITS`; empty where none is given, None where it is not known."""
-    bare = "".join(unit.split()).strip("[]()").lower()
-    known = _SPELLINGS.get(bare, bare)
+    plain = "".join(unit.split()).strip("[]()").lower()
+    known = _SPELLINGS.get(plain, plain)
     return known if not known or known in UNITS else None
 
 

@@ -1,4 +1,4 @@
-"""The scenarios that a file of a batch stands for: itself, those of its distribution, the variants of a set of ours."""
+"""The scenarios that a file of a batch stands for: itself, or those of its distribution."""
 
 from __future__ import annotations
 
@@ -9,14 +9,11 @@ from pathlib import Path
 
 from xosc_lateral.errors import FormatError, XoscLateralError
 from xosc_lateral.formats.openscenario.distribution import read_distribution
-from xosc_lateral.formats.openscenario.references import Boundary, allowed_roots
-from xosc_lateral.formats.openscenario.write import source_of_set, variant_index
 from xosc_lateral.limits import PARAMETER_SETS
 from xosc_lateral.pipeline.document_kind import DISTRIBUTIONS, DocumentKind
 from xosc_lateral.pipeline.request import Request
 from xosc_lateral.pipeline.settings import ConvertSettings
 from xosc_lateral.scenario.deterministic import ParameterSet
-from xosc_lateral.scenario.place import Place
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,15 +28,12 @@ class Concrete:
     settings : ConvertSettings
     error : str
         Why it can't be; empty normally.
-    variant : int or None
-        Which one it is, if the file says so.
     """
 
     source: Path
     suffix: str
     settings: ConvertSettings
     error: str = ""
-    variant: int | None = None
 
 
 def concrete(request: Request, kind: DocumentKind) -> Iterator[Concrete]:
@@ -63,7 +57,7 @@ def _refused(request: Request, why: str) -> Concrete:
 
 def _sets(request: Request) -> tuple[Path, list[ParameterSet]]:
     """The logical scenario's file, and every set of its parameters."""
-    logical = read_distribution(request.scenario, allowed=request.settings.allowed)
+    logical = read_distribution(request.scenario, allowed=request.settings.allow)
     sets = list(islice(logical.parameter_sets(request.settings.seed), int(PARAMETER_SETS.value) + 1))
     if len(sets) > PARAMETER_SETS.value:
         raise FormatError(f"{PARAMETER_SETS.refusal(logical.count)}", path=request.scenario)
@@ -73,19 +67,6 @@ def _sets(request: Request) -> tuple[Path, list[ParameterSet]]:
 
 
 def _one(request: Request, scenario: Path, index: int, values: ParameterSet) -> Concrete:
-    """A set of parameters; of a set of ours, the variant of the scenario that it was made from."""
-    suffix = f"_p{index:05d}"
-    found = source_of_set(scenario)
-    if found is None:
-        parameters = {**values, **request.settings.parameters}
-        return Concrete(scenario, suffix, replace(request.settings, parameters=parameters))
-    source, parameter = found
-    name = values.get(parameter, "")
-    variant = variant_index(name)
-    if variant is None:
-        raise FormatError(f"{parameter} '{name[:20]}' names no variant ('variant_1' would)", path=request.scenario)
-    boundary = Boundary(scenario.parent, allowed_roots(scenario, request.settings.allowed))
-    path = boundary.inside(source, Place(str(scenario), None, "provenance"))
-    if not path.is_file():
-        raise FormatError(f"its scenario '{source}' is not there", path=scenario)
-    return Concrete(path, suffix, request.settings, variant=variant)
+    """A set of parameters; those that the request has itself go before."""
+    parameters = {**values, **request.settings.parameters}
+    return Concrete(scenario, f"_p{index:05d}", replace(request.settings, parameters=parameters))

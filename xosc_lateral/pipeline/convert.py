@@ -90,7 +90,7 @@ def _convert(
         parameters=settings.parameters,
         step=settings.step,
         time_limit=settings.time_limit,
-        allowed=settings.allowed,
+        allowed=settings.allow,
         roads=settings.roads,
         strict=settings.strict,
     )
@@ -195,7 +195,7 @@ class _Making:
 
 
 def _played_again(played: Played, output: Path, settings: ConvertSettings) -> Played:
-    allowed = (*settings.allowed, *(path.parent for path in played.scenario.input_files))
+    allowed = (*settings.allow, *(path.parent for path in played.scenario.input_files))
     if played.scenario.road_file is not None:
         allowed = (*allowed, played.scenario.road_file.parent)
     again = play_scenario(

@@ -40,7 +40,7 @@ def choose_drivers(scenario: Scenario, settings: ConvertSettings, egos: Mapping[
         If a profile is not known.
     """
     known = {entity.name for entity in scenario.entities}
-    asked = (("--entity", settings.entity_profiles), ("--only", settings.only or ()), ("--ego", settings.ego or ()))
+    asked = (("--entity", settings.entity), ("--only", settings.only or ()), ("--ego", settings.ego or ()))
     for option, names in () if settings.names_may_lack else asked:
         for name in sorted(names):
             if name not in known:
@@ -57,13 +57,13 @@ def _driver(entity: Entity, settings: ConvertSettings) -> DriverProfile | str:
         return f"a {entity.category.value}, no vehicle"
     if settings.only is not None and entity.name not in settings.only:
         return "not chosen (--only)"
-    named = settings.entity_profiles.get(entity.name, settings.profile)
+    named = settings.entity.get(entity.name, settings.profile)
     if named == AUTO:
         category = entity.vehicle_category or VehicleCategory.CAR
         if category in NO_DRIVER:
             return NO_DRIVER[category]
         named = AUTO_PROFILE
-    return named if isinstance(named, DriverProfile) else load_profile(named, settings.libraries)
+    return named if isinstance(named, DriverProfile) else load_profile(named, settings.library)
 
 
 def auto_profile(libraries: tuple[Path, ...]) -> Path:
@@ -79,7 +79,7 @@ def auto_profile(libraries: tuple[Path, ...]) -> Path:
 
 def uses_auto(settings: ConvertSettings) -> bool:
     """Whether "auto" chooses for any entity."""
-    return AUTO in (settings.profile, *settings.entity_profiles.values())
+    return AUTO in (settings.profile, *settings.entity.values())
 
 
 def hidden_by_libraries(libraries: tuple[Path, ...]) -> tuple[str, ...]:

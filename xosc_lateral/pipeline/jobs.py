@@ -13,7 +13,6 @@ from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.errors import FormatError, XoscLateralError
 from xosc_lateral.formats.hashes import file_hash
 from xosc_lateral.formats.openscenario.references import require_folders
-from xosc_lateral.formats.openscenario.write.target import STANDARD
 from xosc_lateral.formats.profile_folders import find_profile
 from xosc_lateral.formats.profiles import profile_hash
 from xosc_lateral.limits import BATCH_JOBS, VARIANTS
@@ -80,7 +79,7 @@ class Job:
             package_version=self.package_version,
             behaviour=BEHAVIOUR,
             with_sensor=self.settings.with_sensor,
-            player=self.settings.target.player.value,
+            player=self.settings.player.value,
             error=error,
         )
 
@@ -159,12 +158,10 @@ def plan_batch(
         A profile that is unknown.
     """
     settings = settings or ConvertSettings()
-    require_folders(settings.allowed)
-    for name in (settings.profile, *settings.entity_profiles.values()):
+    require_folders(settings.allow)
+    for name in (settings.profile, *settings.entity.values()):
         if isinstance(name, str) and name != AUTO:
-            file_hash(
-                find_profile(name, settings.libraries)
-            )  # wrong for all is said once, wrong in a table's row there
+            file_hash(find_profile(name, settings.library))  # wrong for all is said once, wrong in a table's row there
     root = _normal(Path(folder))
     requests = [_absolute(request) for request in _all_requests(inputs, settings, variants, root)]
     base = _common_folder(requests)
@@ -196,7 +193,7 @@ def plan_batch(
     _refuse_overwriting(jobs.values())
     pages = None if report is None else _normal(Path(report))
     planned = (jobs[name] if pages is None else _with_page(jobs[name], pages) for name in sorted(jobs))
-    libraries = dict.fromkeys(request.settings.libraries for request in requests if uses_auto(request.settings))
+    libraries = dict.fromkeys(request.settings.library for request in requests if uses_auto(request.settings))
     notes = dict.fromkeys(note for folders in libraries for note in hidden_by_libraries(folders))
     return Batch(root, base, tuple(planned), tuple(left_out), tuple(notes))
 
@@ -242,10 +239,9 @@ def _jobs(
     relative = request.scenario.relative_to(base)
     for one in concrete(request, kind):
         source, settings, error = one.source, one.settings, one.error
-        for number in range(request.variants):
-            variant = number if one.variant is None else one.variant
+        for variant in range(request.variants):
             named = relative.with_name(f"{relative.stem}{repeat}{one.suffix}{relative.suffix}")
-            output = numbered(named, number, request.variants)
+            output = numbered(named, variant, request.variants)
             name = printable(output.as_posix())
             if name != output.as_posix():
                 error = error or f"{printable(str(source))}: the file's name is not valid UTF-8; rename it"
@@ -282,21 +278,11 @@ class _Fingerprints:
     _profiles: dict[tuple[str, tuple[Path, ...]], str] = field(default_factory=dict)
 
     def of(self, settings: ConvertSettings, variant: int) -> str:
-        values = {item.name: getattr(settings, item.name) for item in fields(settings)}
-        del values["libraries"], values["allowed"], values["roads"]  # where files are looked for, not what is in them
-        del values["names_may_lack"]  # refuses less
-        if not settings.strict:  # refuses more, and changes no output; what was made without it is not trusted with it
-            del values["strict"]
-        if not settings.with_sensor:  # as it always was
-            del values["with_sensor"]
-        player, version = settings.target.player.value, settings.target.version
-        values["target"] = [player, None if version is None else list(version)]
-        if settings.target == STANDARD:  # what was made before there were others is trusted
-            del values["target"]
-        values["profile"] = self._profile(settings.profile, settings.libraries)
-        values["entity_profiles"] = {
-            entity: self._profile(name, settings.libraries) for entity, name in settings.entity_profiles.items()
-        }
+        # Where files are looked for does not count, but what is in them; nor what refuses less.
+        aside = {"library", "allow", "road", "road_path", "names_may_lack"}
+        values = {item.name: getattr(settings, item.name) for item in fields(settings) if item.name not in aside}
+        values["profile"] = self._profile(settings.profile, settings.library)
+        values["entity"] = {name: self._profile(one, settings.library) for name, one in settings.entity.items()}
         values["context"] = None if settings.context is None else _hash_or_missing(settings.context)
         values["only"] = None if settings.only is None else sorted(settings.only)
         values["ego"] = None if settings.ego is None else sorted(settings.ego)

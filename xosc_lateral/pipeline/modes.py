@@ -28,7 +28,7 @@ def chosen_egos(scenario: Scenario, settings: ConvertSettings) -> dict[str, str]
     found = vehicles_under_test(scenario)
     names = {entity.name for entity in scenario.entities}
     found |= {name: "named by --ego" for name in sorted(settings.ego or ()) if name in names}
-    for option, wanted in (("--entity", settings.entity_profiles), ("--only", settings.only or ())):
+    for option, wanted in (("--entity", settings.entity), ("--only", settings.only or ())):
         for name in wanted:
             if name in found:
                 raise FormatError(

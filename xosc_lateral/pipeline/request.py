@@ -2,28 +2,29 @@
 
 from __future__ import annotations
 
-import json
 import os
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from xosc_lateral.enrich.neighbours import Neighbours
 from xosc_lateral.errors import FormatError
 from xosc_lateral.formats.tables import TABLE_SUFFIXES, as_text, read_text_table
 from xosc_lateral.pipeline.document_kind import DISTRIBUTIONS, document_kind
 from xosc_lateral.pipeline.manifest import MANIFEST
-from xosc_lateral.pipeline.settings import ConvertSettings, egos_named
+from xosc_lateral.pipeline.options import Option, as_it_is, whole
+from xosc_lateral.pipeline.settings import OPTIONS, ConvertSettings
 
 if TYPE_CHECKING:
     import pandas as pd
 
 SCENARIO_SUFFIX = ".xosc"
 
-COLUMNS = ("scenario", "profile", "seed", "variants", "only", "ego", "neighbours", "parameters")
-PREFIXES = ("profile:", "parameter:", "user:")
+COLUMNS = ("scenario", *(name for name, option in OPTIONS.items() if option.cell is not None), "variants")
+PREFIXES = (*(option.prefix for option in OPTIONS.values() if option.prefix), "user:")
 """What a table of scenarios may hold."""
+
+_VARIANTS = Option(whole(1), cell=as_it_is)
 
 _GLOB_CHARACTERS = frozenset("*?[")
 
@@ -94,9 +95,9 @@ def find_requests(
 def read_request_table(path: Path, settings: ConvertSettings, *, variants: int = 1) -> Iterator[Request]:
     """Scenarios of a table, one a row.
 
-    Columns: ``scenario`` (path, from the table's folder), and if wanted ``profile``, ``profile:ENTITY``, ``seed``,
-    ``variants``, ``only`` and ``ego`` (entities, separated by semicolons; ego ``none``: there is none), ``neighbours``,
-    ``parameter:NAME`` and ``parameters`` (JSON object). An empty cell leaves what `settings` says. Columns
+    Columns: ``scenario`` (path, from the table's folder), and if wanted ``variants`` and those of `COLUMNS` and
+    `PREFIXES`: ``profile:ENTITY``, ``only`` and ``ego`` with entities separated by semicolons (ego ``none``: there is
+    none), ``parameter:NAME``, ``parameters`` as a JSON object. An empty cell leaves what `settings` says. Columns
     ``user:NAME`` are for the user: tags, owners.
 
     Raises
@@ -124,8 +125,8 @@ def _table_requests(
         cells = {str(name): text for name, value in row.items() if (text := str(value).strip())}
         try:
             scenario = _scenario(cells)
-            rows_variants = _whole_number(cells, "variants", variants, smallest=1)
-            row_settings = _row_settings(cells, settings, folder)
+            rows_variants = _VARIANTS.of_row("variants", variants, cells, folder)
+            row_settings = settings.of_row(cells, folder)
         except ValueError as error:
             raise FormatError(str(error), path=path, line=number) from error
         yield Request(folder / scenario, row_settings, rows_variants, base)
@@ -190,63 +191,3 @@ def _matches(pattern: str, settings: ConvertSettings, variants: int, leave_out: 
 
 def _is_hidden(path: Path) -> bool:
     return any(part.startswith(".") for part in path.parts)
-
-
-def _row_settings(cells: Mapping[str, str], settings: ConvertSettings, folder: Path) -> ConvertSettings:
-    profiles, parameters = dict(settings.entity_profiles), dict(settings.parameters)
-    parameters.update(_json_object(cells.get("parameters", "{}")))
-    for name, text in cells.items():
-        kind, colon, rest = name.partition(":")
-        if colon and kind == "profile":
-            profiles[rest] = _profile(text, folder)
-        elif colon and kind == "parameter":
-            parameters[rest] = text
-    only, ego = cells.get("only"), cells.get("ego")
-    return replace(
-        settings,
-        profile=_profile(cells["profile"], folder) if "profile" in cells else settings.profile,
-        entity_profiles=profiles,
-        parameters=parameters,
-        seed=_whole_number(cells, "seed", settings.seed, smallest=0),
-        only=settings.only if only is None else _names(only),
-        ego=settings.ego if ego is None else egos_named(_names(ego)),
-        neighbours=_neighbours(cells.get("neighbours"), settings.neighbours),
-    )
-
-
-def _neighbours(text: str | None, otherwise: Neighbours) -> Neighbours:
-    try:
-        return otherwise if text is None else Neighbours(text)
-    except ValueError as error:
-        raise ValueError(f"neighbours {text!r}, expected one of {', '.join(Neighbours)}") from error
-
-
-def _names(text: str) -> frozenset[str]:
-    return frozenset(name.strip() for name in text.split(";") if name.strip())
-
-
-def _profile(text: str, folder: Path) -> str:
-    """A profile's name as it is; a path from the table's folder."""
-    return str(folder / text) if text.endswith(".json") or "/" in text or "\\" in text else text
-
-
-def _whole_number(cells: Mapping[str, str], name: str, otherwise: int, *, smallest: int) -> int:
-    if name not in cells:
-        return otherwise
-    try:
-        number = int(cells[name].removesuffix(".0"))  # whole numbers with a missing one are often written as floats
-    except ValueError as error:
-        raise ValueError(f"{name} {cells[name]!r} is not a whole number") from error
-    if number < smallest:
-        raise ValueError(f"{name} {number}, at least {smallest}")
-    return number
-
-
-def _json_object(text: str) -> dict[str, str]:
-    try:
-        values: Any = json.loads(text)
-    except (ValueError, RecursionError) as error:
-        raise ValueError(f"parameters {text[:80]!r} is not a JSON object: {error}") from error
-    if not isinstance(values, dict):
-        raise ValueError(f"parameters {text!r} is not a JSON object")
-    return {str(name): value if isinstance(value, str) else json.dumps(value) for name, value in values.items()}

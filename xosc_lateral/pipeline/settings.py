@@ -1,19 +1,31 @@
-"""What a user can choose for a conversion; plain values, so that a batch can send and hash them."""
+"""What a user can choose for a conversion, declared once.
+
+Python's keywords, the options of the command line, the columns of a table of scenarios and the keys of the
+configuration file that decide a conversion are all made from the fields of `ConvertSettings`.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
-from dataclasses import dataclass, field
+import inspect
+from collections.abc import Callable, Collection, Mapping
+from dataclasses import dataclass, fields, replace
 from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, Literal, TypedDict, TypeVar, Unpack
 
 from xosc_lateral.enrich.neighbours import Neighbours
-from xosc_lateral.formats.openscenario.read import NO_ROADS, RoadSearch
-from xosc_lateral.formats.openscenario.write.target import STANDARD, TargetPlayer
+from xosc_lateral.errors import FormatError
+from xosc_lateral.formats.configuration import SETTINGS, configuration
+from xosc_lateral.formats.openscenario.read import RoadSearch
+from xosc_lateral.formats.openscenario.write.target import Player, TargetPlayer, target
+from xosc_lateral.pipeline import options as say
+from xosc_lateral.pipeline.options import Option, option
 
 if TYPE_CHECKING:
     from xosc_lateral.driver.profile import DriverProfile
+    from xosc_lateral.pipeline.options import PathLike, Paths, ProfileLike
+
+Verb = TypeVar("Verb", bound=Callable[..., Any])
 
 STEP = 0.02
 """Of playback, as in the reference logs. [s]"""
@@ -30,84 +42,221 @@ class OutputMode(StrEnum):
     LANE_OFFSET = "lane-offset"
 
 
-NO_EGO = "none"
-"""In place of a vehicle under test: there is none."""
+class ConvertOptions(TypedDict, total=False):
+    """What a user may say of a conversion.
 
-
-def egos_named(names: Collection[str] | None) -> frozenset[str] | None:
-    """Vehicles under test as a user names them: None where nobody said anything, empty for "none".
-
-    Raises
-    ------
-    ValueError
-        For "none" beside a name.
+    Parameters
+    ----------
+    profile : DriverProfile, path or name
+        Of every vehicle; "auto": the shipped population's, `motorway`.
+    seed : int
+        Same inputs, seed and variant: same bytes.
+    entity : mapping of str to DriverProfile, path or name
+        Entity -> profile, before `profile`.
+    only : collection of str
+        Enrich these alone; the others stay as they are.
+    ego : collection of str
+        Vehicles under test, which are left as they are, beside those that the scenario leaves to somebody else (an
+        external controller, CARLA's `ego_vehicle`); ("none",): there is none.
+    neighbours : {"profile", "borrow", "none"}
+        How drivers answer to vehicles beside them: as the profile alone says; by a population's law, too, where the
+        profile's answer is not known; not at all. Without: as configured, else "borrow".
+    context : str or Path
+        Table of context over time that the scenario doesn't state: `time` [s], and a column each.
+    parameters : mapping
+        Scenario parameters that replace those declared.
+    library : path or paths
+        Folders with further profiles.
+    mode : {"auto", "trajectory", "lane-offset"}
+        Play maneuvers out, or keep them and add lane offsets between them; "auto" decides by vehicle: lane offsets for
+        those whose motion depends on a vehicle under test.
+    player : {"standard", "esmini", "carla"}
+        Who is to play it: nobody in particular, or a player with ways of its own.
+    version : str
+        Of the standard, "1.0" to "1.4"; without it the input's (1.0 for CARLA). What an older version lacks is sampled,
+        or left out and named in `Conversion.warnings`.
+    allow : path or paths
+        Folders, besides those around the scenario, that its road and catalogs may lie in.
+    road : str or Path
+        OpenDRIVE file, whatever the scenario says.
+    road_path : path or paths
+        Folders with roads that a scenario knows by name ("Town04").
+    attempts : int
+        Sample anew up to so many times while vehicles touch or leave their lane that nominally don't.
+    time_limit : float
+        Where a run is cut off; without it a scenario that never ends after 60 s, one with an end after an hour. [s]
+    with_sensor : bool
+        Add the sensor error of the drives that profiles were fitted on, for tests of a perception chain; without, the
+        driver alone is written.
+    strict : bool
+        A missing vehicle catalog is an error, instead of a note and a usual car.
     """
-    if names is None:
-        return None
-    if NO_EGO in names and len(names) > 1:
-        raise ValueError(f"ego {', '.join(sorted(names))}: {NO_EGO!r} stands alone")
-    return frozenset(names) - {NO_EGO}
+
+    profile: ProfileLike
+    seed: int
+    entity: Mapping[str, ProfileLike] | None
+    only: Collection[str] | None
+    ego: Collection[str] | None
+    neighbours: Literal["profile", "borrow", "none"] | None
+    context: PathLike | None
+    parameters: Mapping[str, object] | None
+    library: Paths
+    mode: Literal["auto", "trajectory", "lane-offset"]
+    player: Literal["standard", "esmini", "carla"]
+    version: str | None
+    allow: Paths
+    road: PathLike | None
+    road_path: Paths
+    attempts: int
+    time_limit: float | None
+    with_sensor: bool
+    strict: bool
 
 
 @dataclass(frozen=True, slots=True)
 class ConvertSettings:
-    """Settings of one conversion.
+    """Settings of one conversion: `ConvertOptions` as plain values that a batch can send and hash.
 
     Parameters
     ----------
-    profile : str or DriverProfile
-        Profile of every vehicle, or its name or path; "auto": the shipped population's, `motorway`.
-    entity_profiles : mapping of str to str or DriverProfile
-        Entity name -> profile, its name or path, before `profile`.
-    only : frozenset of str or None
-        Enrich these entities alone.
-    seed : int
-    context : Path or None
-        Table of context over time that the scenario doesn't state.
-    parameters : mapping of str to str
-        Scenario parameters that replace those declared.
-    attempts : int
-        Sample anew up to so many times while vehicles touch or leave their lane that nominally don't.
-    mode : OutputMode
-    ego : frozenset of str or None
-        Vehicles under test, beside those that the scenario leaves to somebody else; None: those alone; empty: none.
     names_may_lack : bool
-        `entity_profiles`, `only` and `ego` apply where an entity of that name exists: one of many scenarios.
-    target : TargetPlayer
-        Player and version of the standard to write for.
-    libraries : tuple of Path
-        Folders with further profiles.
-    allowed : tuple of Path
-        Folders, besides those around the scenario, that its road and catalogs may lie in.
-    roads : RoadSearch
-        Where else its road may lie.
-    strict : bool
-        Refuse a missing vehicle catalog, instead of playing a usual car.
+        `entity`, `only` and `ego` apply where an entity of that name exists: one of many scenarios.
     step : float
-    time_limit : float or None
-        Of playback; None: see `playback.player.play`. [s]
-    with_sensor : bool
-        Add the sensor error of the drives that profiles were fitted on.
-    neighbours : Neighbours
-        Whose answer to vehicles beside them drivers have.
+        Of playback. [s]
+
+    Raises
+    ------
+    ValueError
+        A version of the standard that can't be written, or that the player does not read.
     """
 
-    profile: str | DriverProfile = AUTO
-    entity_profiles: Mapping[str, str | DriverProfile] = field(default_factory=dict)
-    only: frozenset[str] | None = None
-    seed: int = 0
-    context: Path | None = None
-    parameters: Mapping[str, str] = field(default_factory=dict)
-    attempts: int = 1
-    mode: OutputMode = OutputMode.AUTO
-    ego: frozenset[str] | None = None
+    # What is said of one option stays together.
+    # fmt: off
+    profile: str | DriverProfile = option(
+        AUTO, say.profile, "--profile", "-p", kind=str, cell=say.profile_cell,
+        help="Name or path of a driver profile; auto: motorway, the population.",
+    )
+    seed: int = option(0, say.whole(0), cell=say.as_it_is)
+    entity: Mapping[str, str | DriverProfile] = option(
+        {}, say.profiles, kind=list[str] | None, metavar="NAME=PROFILE", prefix="profile:", entry=say.profile_cell,
+        help="Profile of one entity; may be repeated.",
+    )
+    only: frozenset[str] | None = option(
+        None, say.names, kind=list[str] | None, metavar="NAME", cell=say.as_it_is,
+        help="Enrich only this entity; may be repeated.",
+    )
+    ego: frozenset[str] | None = option(
+        None, say.egos, kind=list[str] | None, metavar="NAME", cell=say.as_it_is,
+        help="Vehicle under test: left as it is; may be repeated. Those with an external controller are found by "
+        "themselves. none: there is none.",
+    )
+    neighbours: Neighbours = option(
+        Neighbours.BORROW, say.one_of(Neighbours), kind=Neighbours | None, cell=say.as_it_is, show_default=False,
+        help="How drivers answer to vehicles beside them: as their profile alone says; borrow: by a population's law "
+        "where that is not known (default); none: not at all.",
+    )
+    context: Path | None = option(
+        None, Path, kind=Path | None, cell=say.beside,
+        help="Table of context over time (columns time, wind_speed, ...).",
+    )
+    parameters: Mapping[str, str] = option(
+        {}, say.texts, "--set", cell=say.json_object, prefix="parameter:", entry=say.as_it_is
+    )
+    library: tuple[Path, ...] = option((), say.paths)
+    mode: OutputMode = option(
+        OutputMode.AUTO, say.one_of(OutputMode), kind=OutputMode, cell=say.as_it_is,
+        help="trajectory: play the maneuvers out; lane-offset: keep them reactive; auto: by vehicle, as it depends on "
+        "a vehicle under test.",
+    )
+    player: Player = option(
+        Player.STANDARD, say.one_of(Player), "--for", kind=Player, cell=say.as_it_is,
+        help="Who plays it: standard, or made for esmini or CARLA's ScenarioRunner.",
+    )
+    version: str | None = option(
+        None, str, kind=str | None, metavar="1.0..1.4", cell=say.as_it_is, show_default=False,
+        help="Version of OpenSCENARIO to write; default: the input's.",
+    )
+    allow: tuple[Path, ...] = option((), say.paths)
+    road: Path | None = option(None, Path, cell=say.beside)
+    road_path: tuple[Path, ...] = option((), say.paths)
+    attempts: int = option(
+        1, say.whole(1), "--resample", kind=int, cell=say.as_it_is, min=1,
+        help="Attempts at most, while vehicles collide or leave their lane.",
+    )
+    time_limit: float | None = option(None, say.seconds, cell=say.as_it_is)
+    with_sensor: bool = option(False, bool)
+    strict: bool = option(
+        False, bool, "--strict", kind=bool,
+        help="Exit with 1 on warnings, a missing vehicle catalog, or no entity enriched.",
+    )
+    # fmt: on
     names_may_lack: bool = False
-    target: TargetPlayer = STANDARD
-    libraries: tuple[Path, ...] = ()
-    allowed: tuple[Path, ...] = ()
-    roads: RoadSearch = NO_ROADS
-    strict: bool = False
     step: float = STEP
-    time_limit: float | None = None
-    with_sensor: bool = False
-    neighbours: Neighbours = Neighbours.BORROW
+
+    def __post_init__(self) -> None:
+        _ = self.target
+
+    @classmethod
+    def of(cls, **options: Unpack[ConvertOptions]) -> ConvertSettings:
+        """Settings from what a user says, else as configured; None: nothing is said.
+
+        Raises
+        ------
+        TypeError
+            There is no such option.
+        ValueError
+            It can't have that value.
+        FormatError
+            It is the configuration that says so; there is no such road, or folder of roads.
+        """
+        unknown = options.keys() - OPTIONS.keys()
+        if unknown:
+            raise TypeError(f"no option {min(unknown)!r}; there are {', '.join(OPTIONS)}")
+        path, configured = configuration()
+        values = {}
+        for name, said in options.items():
+            if said is not None:
+                values[name] = OPTIONS[name].value(name, said)
+        for name in (SETTINGS - values.keys()) & configured.keys():
+            try:
+                values[name] = OPTIONS[name].value(name, configured[name])
+            except ValueError as error:
+                raise FormatError(str(error), path=path) from error
+        made = cls(**values)
+        _ = made.roads
+        return made
+
+    def of_row(self, cells: Mapping[str, str], folder: Path) -> ConvertSettings:
+        """What a row of a table says comes before; paths in it are as seen from the table's folder."""
+        return replace(
+            self, **{name: one.of_row(name, getattr(self, name), cells, folder) for name, one in OPTIONS.items()}
+        )
+
+    @property
+    def target(self) -> TargetPlayer:
+        """Player and version of the standard to write for."""
+        return target(self.player.value, self.version)
+
+    @property
+    def roads(self) -> RoadSearch:
+        """Where the road may lie besides where the scenario says."""
+        return RoadSearch(self.road, self.road_path)
+
+
+OPTIONS: Mapping[str, Option] = {
+    item.name: item.metadata["option"] for item in fields(ConvertSettings) if "option" in item.metadata
+}
+"""What users can set, by name."""
+
+
+def spelled_out(verb: Verb) -> Verb:
+    """Name the options of a verb that takes `ConvertOptions` in its signature, for help and completion."""
+    signature = inspect.signature(verb)
+    own = [one for one in signature.parameters.values() if one.kind is not one.VAR_KEYWORD]
+    defaults = ConvertSettings()
+    named = [
+        inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=getattr(defaults, name), annotation=hint)
+        for name, hint in inspect.get_annotations(ConvertOptions).items()
+    ]
+    verb.__signature__ = signature.replace(parameters=[*own, *named])  # type: ignore[attr-defined]
+    return verb

@@ -14,7 +14,6 @@ from xosc_lateral.driver.provenance import Provenance
 from xosc_lateral.evaluation.movement_summary import DURATION, MovementSummary, summary_of
 from xosc_lateral.formats.library import FIELDS, Entry, facts_of
 from xosc_lateral.formats.profiles import profile_hash
-from xosc_lateral.report.render import render_text
 from xosc_lateral.report.values import format_value
 
 CHANGED: Mapping[Acts, str] = {
@@ -119,34 +118,6 @@ def card_text(profile: DriverProfile) -> str:
     return "\n".join(lines)
 
 
-def card_markdown(profile: DriverProfile) -> str:
-    """The card for a document."""
-    known, summary = profile.provenance, summary_of(profile)
-    side = "left" if summary.mean_offset > 0 else "right"
-    rows = [
-        f"### `{profile.name}`",
-        "",
-        known.notes,
-        "",
-        "| | |",
-        "|---|---|",
-        f"| model | {profile.model.kind}, {_effects(profile)} |",
-        f"| fitted on | {amount(profile)} |",
-        f"| mean offset | {abs(summary.mean_offset):.2f} m to the {side} |",
-        f"| spread | {_spread(profile, summary)} |",
-        f"| 5 % to 95 % | {summary.low:+.2f} m to {summary.high:+.2f} m |",
-        f"| lateral speed | {summary.lateral_speed:.3f} m/s rms |",
-    ]
-    rows += [f"| {name} | {value} |" for name, value in provenance_items(known)]
-    return "\n".join([*rows, ""])
-
-
-def library_page(profiles: Sequence[DriverProfile]) -> str:
-    """Markdown page of a library: which profile is for what, and a card of each."""
-    refined = [profile for profile in profiles if profile.provenance.fit.get("closed_loop")]
-    return render_text("library.md", refined=refined, cards=[card_markdown(profile) for profile in profiles])
-
-
 def provenance_items(known: Provenance) -> list[tuple[str, str]]:
     """How a closed loop came to the profile, if one did, and its evaluation on held-out drives."""
     items = _evaluation_items(known.evaluation)
@@ -174,8 +145,8 @@ def _evaluation_items(evaluation: Mapping[str, Any]) -> list[tuple[str, str]]:
 
 def _scores(short: Mapping[str, Any]) -> str:
     return (
-        f"distance {short['mean_distance']:.3f}, floor {short['mean_floor']:.3f}, ratio {short['mean_ratio']:.2f}, "
-        f"worst {short['worst_metric']} {short['worst_ratio']:.2f}"
+        f"distance {short['mean_distance']:.3f}, between real drivers {short['mean_floor']:.3f}, "
+        f"ratio {short['mean_ratio']:.2f}, worst {short['worst_metric']} {short['worst_ratio']:.2f}"
     )
 
 
@@ -183,7 +154,7 @@ def _summary_lines(profile: DriverProfile, summary: MovementSummary) -> list[str
     side = "left" if summary.mean_offset > 0 else "right"
     return [
         f"  mean       {abs(summary.mean_offset):.2f} m to the {side} of the lane centre",
-        f"  spread     {_spread(profile, summary)}; 90 % within {summary.low:+.2f} to {summary.high:+.2f} m",
+        f"  spread     {spread_text(profile, summary)}; 90 % within {summary.low:+.2f} to {summary.high:+.2f} m",
         f"  speed      {summary.lateral_speed:.3f} m/s lateral (rms)",
     ]
 
@@ -199,7 +170,8 @@ def amount(profile: DriverProfile) -> str:
     )
 
 
-def _spread(profile: DriverProfile, summary: MovementSummary) -> str:
+def spread_text(profile: DriverProfile, summary: MovementSummary) -> str:
+    """Standard deviation of the offset: of one driver, or of all and within one."""
     if profile.provenance.drives == 1:
         return f"{summary.spread:.2f} m"
     within = f"{summary.spread_within:.2f} m within one driver over {DURATION / 60:g} min"

@@ -80,7 +80,7 @@ class Compared:
 
     @property
     def groups(self) -> tuple[tuple[str, ...], ...]:
-        """Profiles that are alike: no further apart (average linkage) than their floor."""
+        """Profiles that are alike: no further apart (average linkage) than halves of their own drivers."""
         from scipy.cluster.hierarchy import fcluster, linkage
         from scipy.spatial.distance import squareform
 
@@ -153,7 +153,7 @@ def comparison_text(compared: Compared) -> str:
     width = max(map(len, names))
     for number, name in enumerate(names):
         lines.append(f"  {name:<{width}}  " + " ".join(f"{value:5.2f}" for value in distance[number]))
-    lines.append("floor of two profiles: root mean square of their diagonals; further apart, they differ")
+    lines.append("two profiles differ where their distance is above the root mean square of their diagonals")
     lines += [f"alike: {', '.join(group)}" for group in compared.groups if len(group) > 1]
     return "\n".join(line.rstrip() for line in lines)
 

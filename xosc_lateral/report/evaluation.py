@@ -29,7 +29,7 @@ from xosc_lateral.report.violins import LABELS, violin_figure
 from xosc_lateral.version import __version__
 
 CLOSE, FAR = 1.2, 2.0
-"""Ratios to the floor up to which a metric is marked good, and from which it is marked bad."""
+"""Ratios to the distance between real drivers up to which a metric is marked good, and from which it is marked bad."""
 
 
 def evaluation_text(scores: ProfileScores, profile: DriverProfile, inputs: Mapping[str, str]) -> str:
@@ -39,7 +39,7 @@ def evaluation_text(scores: ProfileScores, profile: DriverProfile, inputs: Mappi
         *([FITTED] if _fitted_on(profile, inputs) else []),
         _worst_line(scores),
         *realism_lines(scores.realism),
-        "as in the paper: from the same start, without the sensor; the floor has no common start",
+        "as in the paper: from the same start, without the sensor; real drivers are compared without a common start",
         *_snippet_lines(scores.snippets),
     ]
     if note := start_fade_note(profile):
@@ -72,7 +72,7 @@ def evaluation_record(scores: ProfileScores, profile: DriverProfile, inputs: Map
 
 
 def evaluation_page(scores: ProfileScores, profile: DriverProfile, inputs: Mapping[str, str]) -> str:
-    """HTML page: scores with their floors, violins, spectra, and traces; same scores, same bytes."""
+    """HTML page: scores beside those of real drivers, violins, spectra, and traces; same scores, same bytes."""
     worst, ratio = worst_block(scores)
     return render_page(
         "evaluation.html",
@@ -118,12 +118,12 @@ def _metric_table(scores: SnippetScores) -> dict[str, Any]:
     tones: dict[int, Tone] = {}
     for number, name in enumerate(METRICS):
         distance, floor = scores.distances.by_metric[name], scores.floor.by_metric[name]
-        rows.append({"metric": LABELS[name], "distance": distance, "floor": floor, "ratio": distance / floor})
+        rows.append({"metric": LABELS[name], "distance": distance, "real drivers": floor, "ratio": distance / floor})
         tones[number] = _tone(distance / floor)
     rows.append(
-        {"metric": "mean", "distance": scores.distances.mean, "floor": scores.floor.mean, "ratio": scores.ratio}
+        {"metric": "mean", "distance": scores.distances.mean, "real drivers": scores.floor.mean, "ratio": scores.ratio}
     )
-    return {"rows": rows, "tones": tones, "formats": {"distance": ".3f", "floor": ".3f", "ratio": ".2f"}}
+    return {"rows": rows, "tones": tones, "formats": {"distance": ".3f", "real drivers": ".3f", "ratio": ".2f"}}
 
 
 def _margin_row(name: str, one: Margins) -> dict[str, object]:
@@ -136,22 +136,22 @@ def _margin_row(name: str, one: Margins) -> dict[str, object]:
 
 
 def _snippet_lines(scores: SnippetScores) -> list[str]:
-    lines = [f"{scores.count} snippets of {scores.seconds:g} s      distance  floor  ratio"]
+    lines = [f"{scores.count} snippets of {scores.seconds:g} s      distance  real drivers  ratio"]
     for name in METRICS:
         distance, floor = scores.distances.by_metric[name], scores.floor.by_metric[name]
-        lines.append(f"  {LABELS[name]:24s}  {distance:8.3f}  {floor:5.3f}  {distance / floor:5.2f}")
-    lines.append(f"  {'mean':24s}  {scores.distances.mean:8.3f}  {scores.floor.mean:5.3f}  {scores.ratio:5.2f}")
+        lines.append(f"  {LABELS[name]:24s}  {distance:8.3f}  {floor:12.3f}  {distance / floor:5.2f}")
+    lines.append(f"  {'mean':24s}  {scores.distances.mean:8.3f}  {scores.floor.mean:12.3f}  {scores.ratio:5.2f}")
     return lines
 
 
 def _key_figures(realism: Realism) -> list[KeyFigure]:
-    """Of the shortest free runs: how near, how well told apart."""
+    """Of the shortest free runs: how near, how well separated."""
     figures = []
     slow = next((one for one in realism.conditions if one.condition.slow), None)
     free = next((one for one in realism.conditions if not one.condition.slow and not one.condition.same_start), None)
     if slow is not None:
         ratio = slow.families["metrics"].ratio
-        figures.append(KeyFigure(f"{ratio:.2f}", "ten metrics / floor", slow.condition.name, _tone(ratio)))
+        figures.append(KeyFigure(f"{ratio:.2f}", "ten metrics / real drivers", slow.condition.name, _tone(ratio)))
     for one in (slow, free):
         if one is not None and one.alone is not None:
             what = ", with the sensor" if one.with_sensor else ""
@@ -162,7 +162,7 @@ def _key_figures(realism: Realism) -> list[KeyFigure]:
 def blocks_of(scores: ProfileScores) -> dict[str, float]:
     """Every block of the fair measure as a ratio to what other real drivers get: 1 is as good as it gets. [-]
 
-    Families of differences by condition; the classifiers: 1 where they can't tell (AUC 0.5), 2 where they always can.
+    Families of differences by condition; the classifiers: 1 at AUC 0.5, 2 at AUC 1.
     """
     blocks = {}
     for one in scores.realism.conditions:
@@ -184,7 +184,7 @@ def worst_block(scores: ProfileScores) -> tuple[str, float]:
 
 def _worst_line(scores: ProfileScores) -> str:
     block, ratio = worst_block(scores)
-    return f"worst comparison: {block}, {ratio:.2f} times the floor"
+    return f"worst comparison: {block}, {ratio:.2f} times that between real drivers"
 
 
 def _tone(ratio: float) -> Tone:

@@ -51,7 +51,7 @@ QUANTILES = (0.1, 0.3, 0.5, 0.7, 0.9)
 
 @figure_style()
 def cycle_figure(result: LoopResult, finding: Finding) -> Figure:
-    """Spectrum about the weave's frequency, the line marked."""
+    """Spectrum about the cycle's frequency, the line marked."""
     effect = finding.effects[0]
     assert isinstance(effect, Cycle)
     figure, axes = new_figure(height=3.3)

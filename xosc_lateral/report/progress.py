@@ -9,7 +9,7 @@ from contextlib import contextmanager
 
 @contextmanager
 def shown_progress(title: str) -> Iterator[Callable[[float, str], None]]:
-    """Give a function that is told the share done (0..1) and what is being done; silent when stderr is no terminal."""
+    """Give a function that takes the share done (0..1) and what is being done; silent when stderr is no terminal."""
     if not sys.stderr.isatty():
         yield lambda share, what: None
         return

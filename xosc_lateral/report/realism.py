@@ -65,16 +65,16 @@ def ratio_rows(group: list[ConditionScores]) -> list[dict[str, object]]:
     for family, label in FAMILIES.items():
         if any(family in one.families for one in group):
             cells = {_length(one): _ratio(one, family) for one in group}
-            rows.append({"ratio to the floor": label, **cells})
+            rows.append({"ratio to real drivers": label, **cells})
     for key, label in AREAS.items():
         areas = {_length(one): getattr(one, key) for one in group}
         if any(area is not None for area in areas.values()):
-            rows.append({"ratio to the floor": label, **{length: _area(area) for length, area in areas.items()}})
+            rows.append({"ratio to real drivers": label, **{length: _area(area) for length, area in areas.items()}})
     return rows
 
 
 def indicator_rows(scores: ConditionScores) -> list[dict[str, object]]:
-    """A row for each lane-keeping indicator: means, distance, floor."""
+    """A row for each lane-keeping indicator: means, distance, that between real drivers."""
     rows: list[dict[str, object]] = []
     for name, unit in zip(INDICATORS, UNITS, strict=True):
         real, sampled = scores.means[name]
@@ -85,7 +85,7 @@ def indicator_rows(scores: ConditionScores) -> list[dict[str, object]]:
                 "measured": real,
                 "sampled": sampled,
                 "distance [sd]": beside.value,
-                "floor [sd]": beside.floor,
+                "real drivers [sd]": beside.floor,
             }
         )
     return rows
@@ -93,7 +93,7 @@ def indicator_rows(scores: ConditionScores) -> list[dict[str, object]]:
 
 def realism_lines(realism: Realism) -> list[str]:
     """For the terminal."""
-    lines = ["compared with other real drivers (1: as close as they are; AUC 0.5: cannot be told apart)"]
+    lines = ["compared with other real drivers (1: as close as they are; AUC 0.5: not distinguishable)"]
     for heading, group in condition_groups(realism).items():
         lines.append(f"  {heading:46s}" + "".join(f"{_length(one):>18s}" for one in group))
         for row in ratio_rows(group):
@@ -116,10 +116,10 @@ def _indicator_lines(realism: Realism) -> list[str]:
     lines = []
     shown = next((one for one in realism.conditions if not one.condition.same_start), None)
     if shown is not None:
-        lines.append(f"lane keeping, {shown.condition.name:24s} measured    sampled   distance  floor [sd]")
+        lines.append(f"lane keeping, {shown.condition.name:24s} measured    sampled   distance  real drivers [sd]")
         for row in indicator_rows(shown):
             label, real, sampled, distance, floor = row.values()
-            lines.append(f"  {label!s:40s}{real:8.4f}  {sampled:9.4f}  {distance:9.3f}  {floor:6.3f}")
+            lines.append(f"  {label!s:40s}{real:8.4f}  {sampled:9.4f}  {distance:9.3f}  {floor:12.3f}")
     return lines
 
 

@@ -43,7 +43,7 @@ class KeyFigure(NamedTuple):
     """One number that a reader takes home."""
 
     value: object
-    """Shown large, with its unit; a bare number is formatted like in tables."""
+    """Shown large, with its unit; a number alone is formatted like in tables."""
     label: str
     note: str = ""
     """A small line below, such as what to compare the number with."""

@@ -13,7 +13,7 @@ import numpy as np
 from xosc_lateral.road.positions import FloatArray
 
 PIECES = 32
-"""Pieces of p(ds) per element. Field junctions: ds is then true to 1e-6 m, and p(ds) has no kink."""
+"""Pieces of p(ds) per element. Field junctions: ds is then true to 1e-6 m, and p(ds) has no corner."""
 
 # Gauss-Legendre nodes and weights on [0, 1], 5 points: exact for polynomials of degree 9.
 _NODES, _WEIGHTS = (part * 0.5 for part in np.polynomial.legendre.leggauss(5))

@@ -17,7 +17,7 @@ WRONG_WAY = 2.0
 """A lane driven the opposite way counts as this much further off when the heading is known. [m]"""
 
 SAME_LEVEL = 1.0
-"""Height differences below this tell nothing when z is known. [m]"""
+"""Height differences below this mean nothing when z is known. [m]"""
 
 TOUCHING = 1e-6
 """A point no further off than this is on the lane that it was expected on. [m]"""

@@ -63,7 +63,7 @@ class Links:
                     yield self._enter(other, target, contact)
 
     def _against_traffic(self, here: Road, lane: Lane, link: RoadLink, direction: int) -> Iterator[LaneLink]:
-        """Into a junction on a lane that leads out of it: connections tell the other way, lanes name their links."""
+        """Into a junction on a lane that leads out of it: connections hold the other way, lanes name their links."""
         touches = "end" if direction > 0 else "start"
         for index, other in enumerate(self.roads):
             if other.junction != link.element_id:

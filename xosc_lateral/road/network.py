@@ -149,8 +149,8 @@ class RoadNetwork:
     ) -> LanePositions:
         """Nearest lane of the given types (None: any) under each point.
 
-        `z` tells roads on top of each other apart; `heading` prefers lanes driven that way; `near` limits the search to
-        those roads. Everything is found, however far off: look at `distance`.
+        `z` distinguishes roads on top of each other; `heading` prefers lanes driven that way; `near` limits the search
+        to those roads. Everything is found, however far off: look at `distance`.
         """
         return self._index.world_to_lane(x, y, z, heading, near=near, lane_types=lane_types)
 
@@ -268,7 +268,7 @@ class RoadNetwork:
     ) -> LaneCoordinates:
         """`world_to_lane` of one point [m], [rad].
 
-        `near` = (road, s) where it was a moment ago makes it cheap, and tells roads that lie on each other apart.
+        `near` = (road, s) where it was a moment ago makes it cheap, and distinguishes roads that lie on each other.
         """
         found = self._index.world_to_lane_at(x, y, z, heading, near=near, lane_types=lane_types)
         if near is None or near[0] < 0:

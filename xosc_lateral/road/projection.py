@@ -18,7 +18,7 @@ from xosc_lateral.road.road import Road
 from xosc_lateral.road.tables import NetworkTables
 
 ITERATIONS = 40
-"""Newton takes 3-6; bisection, where the reference line has a kink, 40 for 1e-11 m."""
+"""Newton takes 3-6; bisection, where the reference line has a corner, 40 for 1e-11 m."""
 
 MAX_STEP = 25.0
 """Longest step: a guess is never much further off. [m]"""
@@ -30,7 +30,7 @@ DONE = 1e-11
 class Feet(NamedTuple):
     """Feet of perpendiculars: s, t in the leaning surface, how far the point lies ahead of the foot, heading.
 
-    `ahead` differs from 0 beyond the ends of a road and in the outside of kinks. [m], [rad]
+    `ahead` differs from 0 beyond the ends of a road and in the outside of corners. [m], [rad]
     """
 
     s: FloatArray

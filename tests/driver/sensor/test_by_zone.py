@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 from msgspec.structs import replace
 
-from tests.driver.sensor.test_kinks import JUMP, RATE, WHITE, seen, track
+from tests.driver.sensor.test_slope_jumps import JUMP, RATE, WHITE, seen, track
 from xosc_lateral.driver.records import read_as
 from xosc_lateral.driver.sensor.by_zone import ByZone, ZonedRows, levels_by_zone
-from xosc_lateral.driver.sensor.kinks import Kinks
-from xosc_lateral.driver.sensor.kinks_fit import find_kinks
 from xosc_lateral.driver.sensor.model import SensorModel
 from xosc_lateral.driver.sensor.separation import separate
+from xosc_lateral.driver.sensor.slope_jumps import SlopeJumps
+from xosc_lateral.driver.sensor.slope_jumps_fit import find_slope_jumps
 from xosc_lateral.drives.resampling import STEP
 from xosc_lateral.drives.zones import zone_codes
 from xosc_lateral.errors import DriverProfileError
@@ -41,7 +41,7 @@ def test_levels_of_unknown_zones_are_none():
     assert levels_by_zone([], [], []) is None
 
 
-def test_kinks_are_larger_in_some_zones_and_hardly_vary_besides():
+def test_slope_jumps_are_larger_in_some_zones_and_hardly_vary_besides():
     rng = np.random.default_rng(3)
     size = np.exp(np.array([-0.6, 0.6, -0.6, 0.6, -0.6, 0.6]))
     rows = [_jumping(rng, size) for _ in range(60)]
@@ -49,22 +49,22 @@ def test_kinks_are_larger_in_some_zones_and_hardly_vary_besides():
     zoned = ZonedRows(
         [zones_of(len(one), 1.0 / RATE) for one in rows], [zones_of(len(run), STEP) for run in runs], _names(60)
     )
-    kinks, _ = find_kinks(rows, RATE, runs, zoned)
-    by_zone = kinks.by_zone
+    slope_jumps, _ = find_slope_jumps(rows, RATE, runs, zoned)
+    by_zone = slope_jumps.by_zone
     assert by_zone is not None and len(by_zone.zones) == 6
     assert np.diff(by_zone.levels)[::2] == pytest.approx([2.4] * 3, abs=0.6)
-    assert kinks.level_variance > 1.0
+    assert slope_jumps.level_variance > 1.0
     assert by_zone.level_variance + by_zone.track_variance < 0.3
-    without, _ = find_kinks(rows, RATE, runs)
-    assert replace(kinks, by_zone=None) == without
+    without, _ = find_slope_jumps(rows, RATE, runs)
+    assert replace(slope_jumps, by_zone=None) == without
 
 
-def test_kinks_are_sampled_as_large_as_the_zone_is():
+def test_slope_jumps_are_sampled_as_large_as_the_zone_is():
     by_zone = ByZone(("loud", "quiet"), (1.0, -1.0), 0.0, 1.0)
-    kinks = Kinks(1.0, (WHITE,) * 5, (0.0,) * 5, 0.5, 5.0, by_zone=by_zone)
+    slope_jumps = SlopeJumps(1.0, (WHITE,) * 5, (0.0,) * 5, 0.5, 5.0, by_zone=by_zone)
     rng, n = np.random.default_rng(1), 4000
     codes = zone_codes(["loud"] * n + ["quiet"] * n + ["elsewhere"] * n)
-    made = [_fast(kinks.sample(np.zeros(3 * n), STEP, rng, codes)) for _ in range(20)]
+    made = [_fast(slope_jumps.sample(np.zeros(3 * n), STEP, rng, codes)) for _ in range(20)]
     loud, quiet, elsewhere = (
         np.mean([(one[part] ** 2).mean() for one in made])
         for part in (slice(50, n - 50), slice(n + 50, 2 * n - 50), slice(2 * n + 50, None))
@@ -101,10 +101,10 @@ def test_zones_are_kept_in_files_and_checked():
     assert read_as(SensorModel, sensor.to_dict()) == sensor
     assert "by_zone" not in SensorModel(1e-5).to_dict()
     assert sensor.in_words().endswith("in 2 zones the error is 0.8 to 1.3 times as large as on the whole (90 %)")
-    kinks = Kinks(1.0, (WHITE,) * 5, (0.0,) * 5, 0.5, 5.0)
-    held = SensorModel(1e-5, kinks=replace(kinks, by_zone=by_zone))
+    slope_jumps = SlopeJumps(1.0, (WHITE,) * 5, (0.0,) * 5, 0.5, 5.0)
+    held = SensorModel(1e-5, slope_jumps=replace(slope_jumps, by_zone=by_zone))
     assert read_as(SensorModel, held.to_dict()) == held
-    assert "by_zone" not in SensorModel(1e-5, kinks=kinks).to_dict()["kinks"]
+    assert "by_zone" not in SensorModel(1e-5, slope_jumps=slope_jumps).to_dict()["kinks"]
     for wrong in (
         {"levels": (0.5,)},
         {"zones": (), "levels": ()},
@@ -121,9 +121,9 @@ def _names(count: int) -> list[str]:
 
 
 def _jumping(rng: np.random.Generator, size: np.ndarray) -> np.ndarray:
-    """A track whose kinks are as large as the zone has it, shape (1200,). [m]"""
-    smooth, kinked = track(rng, 0.0), track(rng, JUMP) - track(rng, 0.0)
-    steps = np.diff(kinked, 2)
+    """A track whose slope jumps are as large as the zone has it, shape (1200,). [m]"""
+    smooth, jumping = track(rng, 0.0), track(rng, JUMP) - track(rng, 0.0)
+    steps = np.diff(jumping, 2)
     factor = size[(np.arange(len(steps)) / RATE // LONG).astype(int)]
     bent = np.concatenate([np.zeros(2), np.cumsum(np.cumsum(steps * factor))])
     return smooth + bent

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tests.baselines.made_runs import made_run
+from tests.benchmarks.models.made_runs import made_run
 from tests.driver.models.made_models import POPULATION
 from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.driver.sensor.error import known_sensor, sensor_error

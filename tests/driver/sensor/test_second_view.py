@@ -9,7 +9,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy.signal import butter, lfilter, sosfilt
 
-from tests.baselines.made_runs import made_run
+from tests.benchmarks.models.made_runs import made_run
 from xosc_lateral.driver.sensor.model import SensorModel
 from xosc_lateral.driver.sensor.runs import driver_runs, half_widths_of
 from xosc_lateral.driver.sensor.second_view import KNOTS, SecondView, second_view
@@ -131,11 +131,11 @@ def test_runs_take_the_width_of_their_own_rows(seen: tuple[Drive, list[Run]]) ->
     assert half_widths_of(runs, []) is None
 
 
-def test_a_profile_says_by_what_the_error_was_told(seen: tuple[Drive, list[Run]]) -> None:
+def test_a_profile_says_by_what_the_error_was_estimated(seen: tuple[Drive, list[Run]]) -> None:
     drive, runs = seen
     _, sensor = driver_runs(runs, [drive])
     assert sensor is not None and sensor.second_view == pytest.approx(1.0, abs=0.1)
-    assert "told by the lane width" in sensor.in_words()
+    assert "estimated by the lane width" in sensor.in_words()
     _, alone = driver_runs(runs, [replace(drive, half_width=None)])
     assert alone is not None and "lane width" not in alone.in_words()
 

@@ -1,4 +1,4 @@
-"""Driver and sensor, told apart where the truth is known."""
+"""Driver and sensor, separated where the truth is known."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from msgspec.structs import replace
 
-from tests.baselines.made_runs import made_run
+from tests.benchmarks.models.made_runs import made_run
 from xosc_lateral.datasets.driver_simulator import simulate_drive
 from xosc_lateral.driver.drivability import fit_warnings
 from xosc_lateral.driver.fitting import fit_runs

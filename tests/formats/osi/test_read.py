@@ -7,17 +7,22 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
 import pytest
 
 from tests.formats.osi.test_write import messages
 from tests.motion.made_motion import RADIUS, drive, entity, together, two_roads
 from xosc_lateral.api.importing import import_drives
 from xosc_lateral.cli import main
+from xosc_lateral.errors import FormatError
+from xosc_lateral.formats.osi.omega_prime import NANOSECONDS, PLACES
 from xosc_lateral.formats.osi.write import write_osi
 from xosc_lateral.scenario.enums import VehicleCategory
 
 osi_utilities = pytest.importorskip("osi_utilities")
 osi3 = pytest.importorskip("osi3.osi_sensorview_pb2")
+MessageToJson = pytest.importorskip("google.protobuf.json_format").MessageToJson
 
 WIDTH = 3.5
 SPEED = 25.0
@@ -311,3 +316,50 @@ def test_a_trace_that_was_cut_off_is_refused(trace: Path, capsys, tmp_path: Path
     error = capsys.readouterr().err
     assert "trace.mcap" in error
     assert error.count("\n") == 1
+
+
+# ---- omega-prime's Parquet -------------------------------------------------------------------------------------------
+def omega_prime(trace: Path, path: Path, *, road: Path | None = None, leave_out: str = "") -> Path:
+    """What omega-prime's `to_parquet` makes of a trace: rows, and the lanes or the road in the metadata."""
+    read, rows = messages(trace), []
+    for message in read:
+        for thing in message.moving_object:
+            row = {"total_nanos": message.timestamp.seconds * NANOSECONDS + message.timestamp.nanos}
+            row |= {"idx": thing.id.value, "type": thing.type, "role": -1, "subtype": thing.vehicle_classification.type}
+            for part, names in PLACES.items():
+                vector = getattr(thing.base, part)
+                fields = names if part in ("orientation", "dimension") else ("x", "y", "z")
+                row |= {name: getattr(vector, one) for name, one in zip(names, fields, strict=True)}
+            rows.append({name: value for name, value in row.items() if name != leave_out})
+    about = {b"host_vehicle_idx": b"1"}
+    if road is None:
+        about[b"osi"] = MessageToJson(read[0]).encode()
+    else:
+        about |= {b"xodr": road.read_bytes(), b"xodr_name": b"road"}
+    table = pa.Table.from_pylist(rows)
+    pq.write_table(table.replace_schema_metadata(about), path)
+    return path
+
+
+@pytest.mark.parametrize("as_opendrive", [False, True])
+def test_a_recording_of_omega_prime_gives_what_the_trace_gives(trace: Path, tmp_path: Path, as_opendrive: bool) -> None:
+    road = trace.with_name("two_roads_RHT.xodr") if as_opendrive else None
+    path = omega_prime(trace, tmp_path / "recording.parquet", road=road)
+    found = import_drives("osi", path, host="host").to_frame()
+    whole = import_drives("osi", trace, host="Ego").to_frame()
+    rows = found.merge(whole, on="time", suffixes=("", "_trace"))
+    assert len(rows) > 0.99 * len(whole)
+    # its rows don't say where the rear axle is: the offset is that of the middle, 1.4 m ahead, 1.4^2 / (2 R) outside
+    assert rows["offset"].to_numpy() == pytest.approx(sway(rows["time"].to_numpy()), abs=3e-3)
+    for name in ("lane_width", "lane_index", "lane_count", "lead_is_truck"):
+        assert rows[name].to_numpy() == pytest.approx(rows[f"{name}_trace"].to_numpy(), abs=1e-3)
+    # by the road, gaps in the arc count along its reference line, 1.75 m inside: 50 m are 0.2 m less
+    assert rows["lead_distance"].to_numpy() == pytest.approx(rows["lead_distance_trace"].to_numpy(), abs=0.25)
+
+
+def test_parquet_that_is_no_recording_is_refused(trace: Path, tmp_path: Path) -> None:
+    with pytest.raises(FormatError, match=r"a\.parquet: no column 'yaw': not a recording of omega-prime"):
+        import_drives("osi", omega_prime(trace, tmp_path / "a.parquet", leave_out="yaw"))
+    (tmp_path / "b.parquet").write_bytes(b"PAR1 and then nothing")
+    with pytest.raises(FormatError, match=r"b\.parquet: can't be read as Parquet"):
+        import_drives("osi", tmp_path / "b.parquet")

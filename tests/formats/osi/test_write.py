@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -11,9 +12,11 @@ import pytest
 from tests.motion.made_motion import STEP, drive, entity, together, two_roads
 from xosc_lateral.cli import main
 from xosc_lateral.formats.osi.write import write_osi
-from xosc_lateral.motion.nominal import Activity, NominalMotion
+from xosc_lateral.motion.nominal import Activity, NominalMotion, PlayedAction
 from xosc_lateral.motion.trajectory import displace
 from xosc_lateral.road.network import RoadNetwork
+from xosc_lateral.scenario.actions.appearance import LightStateAction
+from xosc_lateral.scenario.place import Place
 
 osi_utilities = pytest.importorskip("osi_utilities")
 pytest.importorskip("osi3")
@@ -157,3 +160,27 @@ def test_a_missing_extra_is_named(tmp_path, network, motion, monkeypatch, capsys
     assert main(["play", scenario, "--osi", str(tmp_path / "trace.mcap")]) == 1
     assert "pip install 'xosc-lateral[osi]'" in capsys.readouterr().err
     assert not (tmp_path / "trace.mcap").exists()
+
+
+def test_lights_are_on_from_when_the_scenario_switches_them_until_it_does_again(tmp_path, network, motion) -> None:
+    def switch(light: str, mode: str, start: float, actor: str = "Ego") -> PlayedAction:
+        action = LightStateAction(light, mode, Place("a.xosc", 1, "LightStateAction"))
+        return PlayedAction(action, actor, ("story",), start, start)
+
+    switched = (
+        switch("indicatorLeft", "flashing", 2.0),
+        switch("brakeLights", "on", 1.0, "late"),
+        switch("fogLights", "on", 3.0),
+        switch("indicatorLeft", "off", 5.0),
+        switch("daytimeRunningLights", "on", 6.0),
+    )
+    read = messages(write_osi(tmp_path / "trace.mcap", replace(motion, actions=switched), network))
+    state = [message.moving_object[0].vehicle_classification for message in read]
+    of = type(state[0].light_state)
+    assert not state[99].HasField("light_state")
+    indicator = np.array([one.light_state.indicator_state for one in state])
+    assert set(indicator[100:250]) == {of.INDICATOR_STATE_LEFT} and set(indicator[250:]) == {of.INDICATOR_STATE_OFF}
+    assert state[-1].light_state.front_fog_light == state[-1].light_state.rear_fog_light == of.GENERIC_LIGHT_STATE_ON
+    assert state[-1].light_state.brake_light_state == of.BRAKE_LIGHT_STATE_UNKNOWN
+    other = [message.moving_object[1].vehicle_classification.light_state for message in read[50:]]
+    assert {one.brake_light_state for one in other} == {of.BRAKE_LIGHT_STATE_NORMAL}

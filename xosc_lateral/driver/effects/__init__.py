@@ -63,7 +63,7 @@ def known_effects() -> tuple[type[Effect], ...]:
 def any_effect(kinds: Iterable[str] | None = None) -> Any:
     """The union of all effects: what an effect of a profile file is read as.
 
-    Plug-ins are looked for when a kind is not among the effects here, or no kinds are given.
+    Plug-ins are searched when a kind is not among the effects here, or no kinds are given.
     """
     here = {effect.kind for effect in EFFECTS}
     return reduce(or_, EFFECTS if kinds is not None and here.issuperset(kinds) else known_effects())
@@ -82,7 +82,7 @@ def effect_from_dict(values: Mapping[str, Any]) -> Effect:
 
 
 def missing_columns(effects: Iterable[Effect], context: Mapping[str, object]) -> tuple[str, ...]:
-    """Columns that the effects read and the context lacks: those effects stay neutral."""
+    """Columns that the effects read and the context lacks: those effects do nothing."""
     return tuple(sorted({column for effect in effects for column in effect.columns if column not in context}))
 
 

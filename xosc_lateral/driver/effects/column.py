@@ -51,7 +51,7 @@ class ColumnEffect(Effect, frozen=True, kw_only=True):
     lag_s, response_s : float
         Delay (negative: looks ahead) and first-order lag of the response. [s]
     response_order : int
-        Count of such lags one after the other: after one, a jump of the quantity is a kink of the path, after two a
+        Count of such lags one after the other: after one, a jump of the quantity is a corner of the path, after two a
         bend.
     reference : tuple of float
         Value of the quantity at which nothing changes: its mean over the drives it was fitted on.
@@ -139,7 +139,7 @@ class ColumnEffect(Effect, frozen=True, kw_only=True):
         Returns
         -------
         array, shape (n, k)
-            In the unit that the coefficients are per; NaN where "there is none" and that is neutral.
+            In the unit that the coefficients are per; NaN where "there is none", which has no effect.
         """
 
     @classmethod
@@ -151,11 +151,11 @@ class ColumnEffect(Effect, frozen=True, kw_only=True):
         return ()
 
     def seen(self, context: Mapping[str, FloatArray]) -> FloatArray:
-        """The quantity of columns that may be infinite, shape (n, k); NaN where neutral. [unit of the quantity]"""
+        """The quantity of columns that may be infinite, shape (n, k); NaN: no effect. [unit of the quantity]"""
         return self.quantity(context if self.levels_off else _finite(context, self.columns))
 
     def known(self, context: Mapping[str, FloatArray]) -> FloatArray:
-        """The quantity with what is neutral in place of NaN, shape (n, k). [unit of the quantity]"""
+        """The quantity with what has no effect in place of NaN, shape (n, k). [unit of the quantity]"""
         values = self.seen(context)
         missing = np.isnan(values)
         if not missing.any():

@@ -54,7 +54,7 @@ class Response:
     state : ResponseState, optional
         To go on from.
     order : int
-        Count of first-order lags: after two, a jump is a bend without a kink.
+        Count of first-order lags: after two, a jump is a bend without a corner.
     """
 
     def __init__(

@@ -25,7 +25,7 @@ ENTRY_POINTS = "xosc_lateral.models"
 """Group of entry points under which other packages offer core models: each names a `KnownModel`."""
 
 ALIASES = {"best": "autoregressive"}
-"""Names that models had in older versions."""
+"""Other names of models, on the command line."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,7 +91,7 @@ def model_named(name: str) -> KnownModel:
 def any_model(kind: str | None = None) -> Any:
     """The union of all core models: what a profile file's model is read as.
 
-    Plug-ins are looked for when the kind is not among the models here, or none is given.
+    Plug-ins are searched when the kind is not among the models here, or none is given.
     """
     here = [entry.model for entry in CORE_MODELS]
     if kind in {model.kind for model in here}:

@@ -1,1 +1,1 @@
-"""What the driver does and what the sensor adds: told apart in measured offsets, kept apart in a profile."""
+"""What the driver does and what the sensor adds: separated in measured offsets, kept apart in a profile."""

@@ -37,7 +37,7 @@ class ByZone(Record, frozen=True):
     levels : tuple of float
         Logarithm of the error's power in each, above that of all. [-]
     level_variance, level_duration, track_variance : float
-        Of what varies besides, as of all (`SensorModel`, `Kinks`). [-], [s], [-]
+        Of what varies besides, as of all (`SensorModel`, `SlopeJumps`). [-], [s], [-]
 
     Raises
     ------

@@ -39,7 +39,7 @@ def sensor_error(
 ) -> FloatArray:
     """Error on a drive's sampled path, shape (n,), from random numbers of its own; zeros without a sensor. [m]
 
-    `part` tells the pieces of one drive apart: a sensor knows nothing of what it measured minutes ago. `zone` has the
+    `part` numbers the pieces of one drive: a sensor knows nothing of what it measured minutes ago. `zone` has the
     codes of the zones of its rows, where they are known.
     """
     if sensor is None:
@@ -59,15 +59,15 @@ def recorded(
 ) -> FloatArray:
     """A sampled path of n offsets with the sensor's error on it, the sum of which begins at `start`. [m]
 
-    `draw` samples the path from where it is told to begin [m]; `zone` as in `sensor_error`.
+    `draw` samples the path from a given start [m]; `zone` as in `sensor_error`.
     """
     if sensor is None:
         return draw(start)
     rng = generator(seed, DriveSeed.SENSOR, 0)
     noise = sensor.sample(n, step, rng, zone)
     path = draw(start - float(noise[0]))
-    if sensor.kinks is None:
+    if sensor.slope_jumps is None:
         return path + noise
-    kinked = sensor.kinks.sample(path, step, rng, zone)
+    jumping = sensor.slope_jumps.sample(path, step, rng, zone)
     # They hang on the path, so they come after it; where they begin is a matter of millimetres.
-    return np.asarray(path + noise + (kinked - kinked[0]))
+    return np.asarray(path + noise + (jumping - jumping[0]))

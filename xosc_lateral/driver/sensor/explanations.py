@@ -27,10 +27,10 @@ FloatArray = NDArray[np.float64]
 ORDERS = (1, 2, 4)
 SLOWEST, FASTEST, GRID = 0.05, 1.4, 1.3
 """Corners of the sensor's low-passed part from which the climb begins [Hz], and the factor from one to the next [-].
-Slower ones lie where a driver's spectrum is free: nothing would tell them from him."""
+Slower ones lie where a driver's spectrum is free: nothing would separate them from him."""
 
 LEAST_CORNER = {1: 0.0, 2: 0.38, 4: 0.38}
-"""By order. A steep fall from a lower corner can't be told from a driver's own. [Hz]"""
+"""By order. A steep fall from a lower corner looks like a driver's own. [Hz]"""
 
 CLIMB = 10
 """Steps of the climb between the best corner's neighbours: a hundredth of the corner. [-]"""
@@ -103,7 +103,7 @@ def _of_family(
 
 
 def _in_digits(corner: float) -> float:
-    """To the digits that the climb can tell: the same on any machine. [Hz]"""
+    """To the digits that the climb resolves: the same on any machine. [Hz]"""
     return significant(corner, 3)
 
 

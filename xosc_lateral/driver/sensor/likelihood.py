@@ -20,7 +20,7 @@ from xosc_lateral.driver.sensor.vehicle_bound import KNOTS, N_KNOTS, N_STATE, in
 FloatArray = NDArray[np.float64]
 
 ABOVE = 1.0
-"""No driver is seen above this in a sensor worth splitting: where the white floor is looked for at first. [Hz]"""
+"""No driver is seen above this in a sensor worth splitting: where white noise is estimated at first. [Hz]"""
 
 FLOOR_SD = 3.0
 COLOUR_SD = 4.0

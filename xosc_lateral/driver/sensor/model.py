@@ -1,4 +1,4 @@
-"""What a sensor adds to the offset: white noise, low-passed noise, rounding, kinks, as a profile keeps it.
+"""What a sensor adds to the offset: white noise, low-passed noise, rounding, slope jumps, as a profile keeps it.
 
 References
 ----------
@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 
 from xosc_lateral.driver.records import Record, plain
 from xosc_lateral.driver.sensor.by_zone import ByZone
-from xosc_lateral.driver.sensor.kinks import CROSSING, Kinks
 from xosc_lateral.driver.sensor.likelihood import Colour
+from xosc_lateral.driver.sensor.slope_jumps import CROSSING, SlopeJumps
 from xosc_lateral.driver.sensor.texture import amplitude_factor, smooth_level
 from xosc_lateral.drives.filters import scale_frequencies
 from xosc_lateral.drives.resampling import passed
@@ -61,15 +61,15 @@ class SensorModel(Record, frozen=True):
 
     frequencies, densities : tuple of float
         Density of the error as it was measured in runs, see `texture`; empty: as the parts above have it, as it is
-        beside kinks. [Hz], [m2/Hz]
+        beside slope jumps. [Hz], [m2/Hz]
     level_variance, level_duration : float
         Variance of the log of the density over time [-], and how long a level lasts [s]; in files `wanders`, `lasts`.
-    kinks : Kinks or None
-        Of tracks that were smoothed piece by piece.
+    slope_jumps : SlopeJumps or None
+        Of tracks that were smoothed piece by piece; in files `kinks`.
     by_zone : ByZone or None
-        Level of the noise in each zone, where the recording has zones and there are no kinks, which have their own.
+        Level of the noise in each zone, where the recording has zones and no slope jumps, which have their own.
     second_view : float
-        Power of the error over that of half the lane width, beside the white part, where that is how it was told
+        Power of the error over that of half the lane width, beside the white part, where it was estimated so
         (`second_view`); else 0. [-]
 
     Raises
@@ -90,7 +90,7 @@ class SensorModel(Record, frozen=True):
     densities: tuple[float, ...] = ()
     level_variance: float = msgspec.field(default=0.0, name="wanders")
     level_duration: float = msgspec.field(default=60.0, name="lasts")
-    kinks: Kinks | None = None
+    slope_jumps: SlopeJumps | None = msgspec.field(default=None, name="kinks")
     second_view: float = 0.0
     by_zone: ByZone | None = None
 
@@ -118,7 +118,7 @@ class SensorModel(Record, frozen=True):
             del values["second_view"]  # as files had it before there were second views
         if self.by_zone is None:
             del values["by_zone"]
-        if self.kinks is not None and self.kinks.by_zone is None:
+        if self.slope_jumps is not None and self.slope_jumps.by_zone is None:
             del values["kinks"]["by_zone"]
         return values
 
@@ -130,23 +130,23 @@ class SensorModel(Record, frozen=True):
             f"{100 * high:.1f} %), the rest is sensor error ({np.sqrt(self.sensor_variance):.3f} m rms)"
         )
         if self.second_view:
-            words = f"{words}, told by the lane width, which the same camera measured"
-        if self.kinks is not None:
-            fastest = CROSSING[1] * self.kinks.highest
+            words = f"{words}, estimated by the lane width, which the same camera measured"
+        if self.slope_jumps is not None:
+            fastest = CROSSING[1] * self.slope_jumps.highest
             words = (
-                f"{words}; tracks are made of pieces of {self.kinks.every:g} s, whose kinks are all that they show "
-                f"above {fastest:.2g} Hz"
+                f"{words}; tracks are made of pieces of {self.slope_jumps.every:g} s, and jumps of the slope between "
+                f"them are all that they show above {fastest:.2g} Hz"
             )
-        zones = self.by_zone if self.kinks is None else self.kinks.by_zone
+        zones = self.by_zone if self.slope_jumps is None else self.slope_jumps.by_zone
         return words if zones is None else f"{words}; {zones.in_words()}"
 
     def density(self, frequency: FloatArray) -> FloatArray:
-        """One-sided power density of noise and kinks, without rounding. [m2/Hz] Shape as `frequency` [Hz]."""
+        """One-sided power density of noise and slope jumps, without rounding. [m2/Hz] Shape as `frequency` [Hz]."""
         noise = self.noise_density(frequency)
-        return noise if self.kinks is None else noise + self.kinks.density(frequency)
+        return noise if self.slope_jumps is None else noise + self.slope_jumps.density(frequency)
 
     def noise_density(self, frequency: FloatArray) -> FloatArray:
-        """The same without kinks. [m2/Hz] Shape as `frequency` [Hz]."""
+        """The same without slope jumps. [m2/Hz] Shape as `frequency` [Hz]."""
         total: FloatArray = np.full(np.shape(frequency), self.white)
         if self.order:
             total = total + self.coloured * Colour(self.order, self.corner).shape(frequency)
@@ -157,10 +157,14 @@ class SensorModel(Record, frozen=True):
     ) -> FloatArray:
         """What the sensor adds to a sampled path, shape (n,) [m]; `zone` has the codes of its zones, if known."""
         noise = self.sample(len(path), step, rng, zone)
-        return noise if self.kinks is None or not len(path) else noise + self.kinks.sample(path, step, rng, zone)
+        return (
+            noise
+            if self.slope_jumps is None or not len(path)
+            else noise + self.slope_jumps.sample(path, step, rng, zone)
+        )
 
     def sample(self, n: int, step: float, rng: np.random.Generator, zone: FloatArray | None = None) -> FloatArray:
-        """Noise as it is in measured runs at this step, without kinks, shape (n,). [m]
+        """Noise as it is in measured runs at this step, without slope jumps, shape (n,). [m]
 
         Without a measured density, what rounding adds is left out: runs are low-passed, and lie on its lattice no more.
         """
@@ -180,7 +184,7 @@ class SensorModel(Record, frozen=True):
 
     def in_runs(self, frequency: FloatArray) -> FloatArray:
         """One-sided power density of the noise in runs at 5 Hz. [m2/Hz] Shape as `frequency` [Hz]."""
-        if self.kinks is not None:
+        if self.slope_jumps is not None:
             return np.asarray(self.noise_density(frequency) * passed(frequency) ** 2)
         if not self.frequencies:
             return np.asarray(self.noise_density(frequency) * (frequency <= HIGHEST))

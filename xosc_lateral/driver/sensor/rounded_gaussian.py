@@ -77,7 +77,7 @@ class RoundedGaussian:
 
     @cached_property
     def variance_per_kurtosis(self) -> float:
-        """By how much the logarithm of the variance changes that the rounded values' variance tells, if the variable
+        """By how much the logarithm of the variance that follows from the rounded values' changes, if the variable
         has excess kurtosis, per unit of it (first term of Edgeworth's series [3]_). [-]
         """
         z = self._thresholds

@@ -3,10 +3,10 @@
 An offset is half the difference of the distances to two lane markings, half the lane width is half their sum. Where the
 errors of the two markings are independent, those of offset and half width have one and the same power density: with
 e_l and e_r, that of (e_r - e_l) / 2 and that of (e_r + e_l) / 2. The width holds no driving beside them. So its density
-says what the offset's error looks like, down to frequencies where nothing else tells it from a driver.
+says what the offset's error looks like, down to frequencies where nothing else separates it from a driver.
 
 Errors of both markings alike are not in the width, a camera that pitches scales the width and hardly the offset, and
-where one marking was misjudged the offset has been mended (`drives.markings`), as far as that can be told: the level is
+where one marking was misjudged the offset has been corrected (`drives.markings`), as far as that is seen: the level is
 a number of its own, about 1 (`LEVEL_SD`). Slower than `SLOWEST`, lanes themselves widen, and the density is taken to go
 on as it is there; that it is the camera's all the way down is the other end of the interval.
 

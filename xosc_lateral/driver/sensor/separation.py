@@ -1,4 +1,4 @@
-"""Driver and sensor, told apart in measured runs.
+"""Driver and sensor, separated in measured runs.
 
 References
 ----------
@@ -20,13 +20,13 @@ from xosc_lateral.digits import all_significant
 from xosc_lateral.driver.sensor.by_zone import ZonedRows
 from xosc_lateral.driver.sensor.explanations import Explanation, explanations
 from xosc_lateral.driver.sensor.hidden_path import HiddenPath
-from xosc_lateral.driver.sensor.kinks import Kinks
-from xosc_lateral.driver.sensor.kinks_fit import find_kinks
 from xosc_lateral.driver.sensor.likelihood import Colour, Known, Solution, solve
 from xosc_lateral.driver.sensor.model import SensorModel
 from xosc_lateral.driver.sensor.periodogram import Periodogram, periodogram, windows_of
 from xosc_lateral.driver.sensor.quantisation import quantisation_step, rounding_density, uniform_variance
 from xosc_lateral.driver.sensor.second_view import LEVEL_SD, SecondView, second_view
+from xosc_lateral.driver.sensor.slope_jumps import SlopeJumps
+from xosc_lateral.driver.sensor.slope_jumps_fit import find_slope_jumps
 from xosc_lateral.driver.sensor.texture import (
     FAST,
     LEAST_SHARE,
@@ -101,7 +101,7 @@ class Separation:
         driver = density(self.knots, frequency)
         share = driver / (driver + self.sensor.density(frequency) + self.beside(frequency))
         share[0] = 1.0
-        return share if self.sensor.kinks is None else share * self.sensor.kinks.left_to_driver(frequency)
+        return share if self.sensor.slope_jumps is None else share * self.sensor.slope_jumps.left_to_driver(frequency)
 
 
 def separate(
@@ -116,7 +116,7 @@ def separate(
     one_camera: bool = False,
     zoned: ZonedRows | None = None,
 ) -> Separation:
-    """Tell driver and sensor apart.
+    """Separate driver and sensor.
 
     Parameters
     ----------
@@ -125,7 +125,7 @@ def separate(
     step : float
         [s]
     rows : sequence of array, optional
-        The offsets of the same runs as recorded; variances are counted, and rounding is looked for, in these. [m]
+        The offsets of the same runs as recorded; variances are counted, and rounding is detected, in these. [m]
     durations : sequence of array, optional
         How long each row stands for, where rows are not even in time. [s]
     rate : float, optional
@@ -164,9 +164,9 @@ def separate(
         wide = split_wide_steps(data, windows, measured, grain, per_second, sensor_noise)
         if wide is not None:
             return _textured(_seen_through(wide, per_second), runs, frequency, windows, step, zoned)
-    pieces = None if rows is None or rate is None else find_kinks(rows, rate, runs, zoned)
-    kinks, noise = pieces or (None, 0.0)
-    about_pieces = kinks is not None and known is None
+    pieces = None if rows is None or rate is None else find_slope_jumps(rows, rate, runs, zoned)
+    slope_jumps, noise = pieces or (None, 0.0)
+    about_pieces = slope_jumps is not None and known is None
     if about_pieces:  # where nothing slower than a piece is left
         known = Known(noise, per_second)
     rounding: Callable[[FloatArray], FloatArray] = _no_density
@@ -174,16 +174,16 @@ def separate(
         rounding = _rounding(data, grain, variance, per_second)
         known = known and replaced(known, rounding=uniform_variance(grain))
     base = rounding(data.frequency)
-    if kinks is not None:
-        base = base + kinks.density(data.frequency)
+    if slope_jumps is not None:
+        base = base + slope_jumps.density(data.frequency)
     view = second_view(half_widths, step) if half_widths else None
     found = explanations(data, base, known, view, only_view=one_camera, only_white=about_pieces)
     least = _taken(found)
     best, colour = least.solution, least.colour
     beside = _with_view(rounding, best, colour)
-    result = Separation(best.knots, replace(_sensor(best, colour, grain), kinks=kinks), beside)
+    result = Separation(best.knots, replace(_sensor(best, colour, grain), slope_jumps=slope_jumps), beside)
     driver = float(np.concatenate([result.driver_part(run, step) for run in runs]).var())
-    error = _in_band(best, colour, data, kinks)
+    error = _in_band(best, colour, data, slope_jumps)
     share = min(driver, max(variance - error, 0.0)) / variance if variance > 0.0 else 1.0
     plausible = [(one.solution, one.colour) for one in found if one.criterion < least.criterion + PLAUSIBLE]
     if colour.view is not None:
@@ -192,12 +192,12 @@ def separate(
         (0.0, 1.0) if two_levels else _interval(frequency, windows, best, colour, base, known, plausible, share, data)
     )
     sensor = _sensor(best, colour, grain, share * variance, (1.0 - share) * variance, interval)
-    sensor = replace(sensor, kinks=kinks)
+    sensor = replace(sensor, slope_jumps=slope_jumps)
     return _textured(Separation(best.knots, sensor, beside, two_levels), runs, frequency, windows, step, zoned)
 
 
 def _taken(found: Sequence[Explanation]) -> Explanation:
-    """The best by its criterion, or that of the plausible ones which another measurement tells."""
+    """The best by its criterion, or that of the plausible ones which another measurement supports."""
     least = min(found, key=lambda one: one.criterion)
     seen = [one for one in found if one.colour.view is not None and one.criterion < least.criterion + PLAUSIBLE]
     return min(seen, key=lambda one: one.criterion, default=least)
@@ -229,7 +229,7 @@ def _other_views(colour: Colour, view: SecondView) -> list[Colour]:
 
 
 def _seen_through(wide: WideSteps, rate: float) -> Separation:
-    """What was told through steps, as a split."""
+    """What was estimated through steps, as a split."""
     numbers = (2.0 * wide.noise / rate, wide.path.grain, *wide.variances(), *wide.interval())
     white, grain, driver, rest, low, high = rounded(numbers)
     sensor = SensorModel(white, rounding=grain, driver_variance=driver, sensor_variance=rest, driver_share=(low, high))
@@ -245,7 +245,9 @@ def _textured(
     zoned: ZonedRows | None,
 ) -> Separation:
     """With the error's density as measured, and how its level varies where the sensor outweighs the driver."""
-    if split.sensor.kinks is not None:  # what varies in level is theirs, and what they leave is as the parts have it
+    if (
+        split.sensor.slope_jumps is not None
+    ):  # what varies in level is theirs, and what they leave is as the parts have it
         return split
     share = 1.0 - split.driver_share_of(frequency)
     frequencies, densities = measured_density(frequency, windows, share)
@@ -310,7 +312,7 @@ def _chance(found: Solution, colour: Colour, data: Periodogram) -> float:
     return float(np.sqrt((2.0 * power**2 / data.weight).sum()))
 
 
-def _in_band(found: Solution, colour: Colour, data: Periodogram, kinks: Kinks | None = None) -> float:
+def _in_band(found: Solution, colour: Colour, data: Periodogram, slope_jumps: SlopeJumps | None = None) -> float:
     """Sensor's power among what was seen. [m2]"""
     from scipy.integrate import trapezoid
 
@@ -318,8 +320,8 @@ def _in_band(found: Solution, colour: Colour, data: Periodogram, kinks: Kinks | 
     total = np.full(len(frequency), np.exp(found.white))
     if colour.is_there:
         total += found.coloured(colour, frequency)
-    if kinks is not None:
-        total += kinks.density(frequency)
+    if slope_jumps is not None:
+        total += slope_jumps.density(frequency)
     return float(trapezoid(total, frequency))
 
 

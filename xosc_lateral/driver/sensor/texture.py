@@ -41,7 +41,7 @@ PIECE = 2.4
 """Pieces whose log power is compared: several periods, and shorter than a vehicle takes through a noisy zone. [s]"""
 
 LAG_PIECES = 4
-"""Pieces between those whose covariance tells how long a level lasts: the high-pass is shorter than that. [-]"""
+"""Pieces between those whose covariance gives how long a level lasts: the high-pass is shorter than that. [-]"""
 
 LONGEST = 60.0
 """Levels that last longer are taken to last so long: runs are hardly longer. [s]"""

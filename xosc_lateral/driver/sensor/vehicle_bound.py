@@ -14,7 +14,7 @@ The logarithm of the driver's power density is a polygon over the logarithm of f
 
 How brisk corrections are differs from driver to driver, so that the corner is fitted with the rest: at `BRISKEST` or
 below. Where noise hides the driver, his spectrum goes on as the part of it that is seen lets expect. A corner that were
-as free upwards would make a driver of every low-passed error; and beside such an error, whose own corner is looked for,
+as free upwards would make a driver of every low-passed error; and beside such an error, whose own corner is estimated,
 it is `BRISKEST`: a slower driver and a slower error are one spectrum.
 
 The prior is a normal one, of standard deviation `SLOPE_SD` on each slope and `BEND_SD` on the change from one to the

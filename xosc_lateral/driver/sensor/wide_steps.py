@@ -1,4 +1,4 @@
-"""Driver and rounding, told apart where steps are wide: the driver's spectrum seen through the staircase.
+"""Driver and rounding, separated where steps are wide: the driver's spectrum seen through the staircase.
 
 Where a step is about as wide as the driver's own movement, what rounding adds hangs on the driver, and the rounded path
 stands still between steps. So nothing is taken off: the power density of the rounded rows is computed from the driver's
@@ -40,7 +40,7 @@ variance: how seldom a step is crossed counts, not that the driver himself chang
 
 KURTOSIS = 0.5
 """Excess kurtosis that a driver may have: of eleven simulated drives, half have less than 0.24 and nine less than 0.73.
-What is beyond the outermost step crossed is told by the distribution's shape alone. [-]"""
+What is beyond the outermost step crossed follows from the distribution's shape alone. [-]"""
 
 UNSURE = 0.2
 """Standard error of the logarithm of the driver's variance beyond which it counts as unknown. [-]"""
@@ -68,7 +68,7 @@ class WideSteps:
     noise : float
         Variance of the noise before rounding, on the rows. [m2]
     unsure : float
-        Standard error of the logarithm of the variance; infinite where nothing tells it. [-]
+        Standard error of the logarithm of the variance; infinite where nothing determines it. [-]
     frequency, rest : array, shape (m,)
         What rounding adds to the density of driver and noise, where it does. [Hz], [m2/Hz]
     path : HiddenPath
@@ -221,7 +221,7 @@ class _Problem:
         variance = float(covariance[0]) + self.noise
         correlation = covariance / variance
         correlation[0] = 1.0
-        # the levels tell the variance; the spectrum has to say how it is spread, so the staircase stays as it is
+        # the levels give the variance; the spectrum has to say how it is spread, so the staircase stays as it is
         rounded = np.fft.rfft(self.gaussian.covariance(correlation)).real * 2.0 * self.step
         return np.maximum(rounded, 1e-12), variance
 

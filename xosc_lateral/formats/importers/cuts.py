@@ -1,4 +1,4 @@
-"""Which rows of a recording are road-following: lane changes, gaps and crumbs are told apart."""
+"""Which rows of a recording are road-following: apart from lane changes, gaps and short rests."""
 
 from __future__ import annotations
 

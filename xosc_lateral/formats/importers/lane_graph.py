@@ -1,4 +1,4 @@
-"""Lanes laid out side by side and end to end, so that who is ahead and beside can be told by numbers alone."""
+"""Lanes laid out side by side and end to end, so that who is ahead and beside follows from numbers alone."""
 
 from __future__ import annotations
 

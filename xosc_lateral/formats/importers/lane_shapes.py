@@ -25,7 +25,7 @@ class LaneShape(Protocol):
     """A lane of some form."""
 
     def may_hold(self, x: FloatArray, y: FloatArray) -> NDArray[np.bool_]:
-        """Points that may lie in it, quickly told; shape as the arguments."""
+        """Points that may lie in it, quickly; shape as the arguments."""
 
     def place(self, x: FloatArray, y: FloatArray) -> tuple[FloatArray, ...]:
         """Way along it (NaN beyond its ends), offset, width, direction and curvature there; shape as the arguments."""

@@ -7,7 +7,7 @@ and the standard error is computed from whole passages (sandwich estimator), whi
 
 A camera that looks along the road sees tall vehicles displaced (parallax), by an amount that varies with the place: a
 second line, the tilt, per metre of height above the lane's mean. Its own mean along the road is not taken out: it can't
-be told from trucks that really keep to another side than cars.
+be separated from trucks that really keep to another side than cars.
 
 References
 ----------

@@ -55,12 +55,12 @@ VEHICLES = ("car", "van", "truck", "bus", "motorcycle", "trailer")
 
 @guarded
 def import_levelx(source: Path, settings: CutSettings = DEFAULT_CUTS, *, keep_cut: bool = False) -> Imported:
-    """Read one recording (its ``XX_tracks.csv``) or a folder of them; highD and exiD are told apart by their columns.
+    """Read one recording (its ``XX_tracks.csv``) or a folder of them; highD and exiD are recognised by their columns.
 
     Raises
     ------
     FormatError
-        If a file or a column is missing, or the exiD sign can't be told.
+        If a file or a column is missing, or the exiD sign is undecided.
     """
     import pandas as pd
 
@@ -247,7 +247,7 @@ def _left_sign(lateral: FloatArray, tracks: pd.DataFrame, vehicle: IntArray, ste
     agreement = _agreement(lateral, tracks, vehicle, step, path)
     if not abs(agreement) > 0.1:
         raise FormatError(
-            f"can't tell which side of the lane is positive: correlation of heading and offset rate is {agreement:.2f}",
+            f"the lane's positive side is undecided: correlation of heading and offset rate is {agreement:.2f}",
             path=path,
             element="latLaneCenterOffset",
         )
@@ -261,7 +261,7 @@ def _agreement(lateral: FloatArray, tracks: pd.DataFrame, vehicle: IntArray, ste
     inside = np.arange(half, max(half, len(vehicle) - half))
     inside = inside[vehicle[inside + half] == vehicle[inside - half]]
     if len(inside) < 100:
-        raise NotEnoughDataError(f"{path}: no track of 4 s; they are needed to tell left from right")
+        raise NotEnoughDataError(f"{path}: no track of 4 s; they are needed to find which side is left")
     towards_left = tracks["lonVelocity"].to_numpy()[inside] * _about_mean(heading, inside, half)
     rate = _about_mean(np.gradient(lateral), inside, half)
     agreement = float(np.corrcoef(towards_left, rate)[0, 1])

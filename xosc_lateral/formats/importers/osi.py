@@ -13,6 +13,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 from xosc_lateral.errors import FormatError
 from xosc_lateral.formats.importers.cuts import DEFAULT_CUTS, CutSettings
@@ -106,11 +107,20 @@ def _placed(recorded: Recorded, path: Path, road: Path | None) -> tuple[PlacedTr
     tracks = recorded.tracks
     if road is not None:
         network = read_opendrive(road)
+        files, where = [path, road], road.name
+    elif recorded.opendrive is not None:
+        with TemporaryDirectory() as folder:
+            inside = Path(folder, f"{path.stem}.xodr")
+            inside.write_bytes(recorded.opendrive)
+            network = read_opendrive(inside)
+        files, where = [path], "the road in it"
+    else:
+        network = None
+    if network is not None:
         pieces, graph = lane_graph(network)
         x, y = network.header_offset.undo(tracks.x, tracks.y)
         heading = tracks.heading - network.header_offset.heading
         placed = place(replace(tracks, x=x, y=y, heading=heading), network, pieces)
-        files, where = [path, road], road.name
     else:
         lanes = lanes_of(recorded)
         if lanes is None:

@@ -77,7 +77,7 @@ def fit_reference_line(xy: FloatArray, forward: NDArray[np.bool_]) -> tuple[Refe
 
     middle = xy.mean(axis=0)
     axis = np.linalg.svd(xy[:: max(1, len(xy) // 20_000)] - middle, full_matrices=False)[2][0]
-    # Most rows follow one of the same vehicle, so the median step tells the direction of travel.
+    # Most rows follow one of the same vehicle, so the median step gives the direction of travel.
     if forward.any() and np.median(np.diff(xy[forward] @ axis)) < 0.0:
         axis = -axis
     along, across = (xy - middle) @ axis, (xy - middle) @ np.array([-axis[1], axis[0]])

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from xosc_lateral.errors import FormatError, NotEnoughDataError
 from xosc_lateral.formats.drives import parse_map
+from xosc_lateral.formats.importers.esmini_log import is_esmini_log, read_esmini_log
 from xosc_lateral.formats.importers.placed import PlacedTracks, ground_speed, travel_heading
 from xosc_lateral.formats.tables import read_table
 from xosc_lateral.formats.text_columns import comma_numbers, seconds_of_text
@@ -30,6 +31,7 @@ HEADERS: Mapping[str, tuple[str, ...]] = {
     "heading": ("heading", "yaw", "psi", "psi_rad", "orientation"),
     "speed": ("speed", "velocity", "v"),
     "length": ("length", "vehicle_length", "dimension_length"),
+    "rear": ("rear",),
     "vehicle_class": ("vehicle_class", "class", "type", "agent_type", "object_type"),
 }
 """Name -> headers that are understood, in lower case, the first that is there; others by the map."""
@@ -52,6 +54,8 @@ class Tracks:
     speed: FloatArray
     length: FloatArray
     kind: NDArray[np.str_]
+    rear: FloatArray | None = None
+    """How far x and y lie behind the vehicle's middle; None: they are the middle. [m]"""
 
     def placed(
         self,
@@ -64,7 +68,8 @@ class Tracks:
     ) -> PlacedTracks:
         """These tracks with where each row lies; see `PlacedTracks`."""
         who = self.names, self.vehicle, self.time, self.step
-        return PlacedTracks(*who, piece, along, offset, lane_width, self.speed, self.length, self.kind, road, zone)
+        middle = along if self.rear is None else along + self.rear  # gaps count from there
+        return PlacedTracks(*who, piece, middle, offset, lane_width, self.speed, self.length, self.kind, road, zone)
 
 
 def read_tracks(path: Path, columns: Sequence[str] = ()) -> Tracks:
@@ -82,7 +87,7 @@ def read_tracks(path: Path, columns: Sequence[str] = ()) -> Tracks:
     NotEnoughDataError
         No vehicle with two rows.
     """
-    table, _ = read_table(path)
+    table = read_esmini_log(path) if is_esmini_log(path) else read_table(path)[0]
     found = _columns(table, path, columns)
     order = found.sort_values(["vehicle", "time"], kind="stable", ignore_index=True)
     order = order.drop_duplicates(["vehicle", "time"], ignore_index=True)
@@ -108,6 +113,7 @@ def read_tracks(path: Path, columns: Sequence[str] = ()) -> Tracks:
         np.abs(_given(order, "speed", ground_speed(x, y, vehicle, step))),
         _given(order, "length", usual),
         kinds,
+        rear=_given(order, "rear", np.zeros(len(order))) if "rear" in order else None,
     )
 
 

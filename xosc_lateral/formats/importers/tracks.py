@@ -48,12 +48,13 @@ def import_tracks(
     Parameters
     ----------
     source : path
-        CSV or Parquet table, one row per vehicle and instant; x and y are the vehicle's middle, in the road's
-        coordinates.
+        CSV or Parquet table, one row per vehicle and instant; x and y are the vehicle's middle (or lie `rear` behind
+        it, where there is that column), in the road's coordinates. Or a log that esmini wrote (``--csv_logger``).
     road : path
         OpenDRIVE file.
     columns : sequence of str
-        ``NAME=COLUMN[:UNIT]`` for `vehicle`, `time`, `x`, `y`, `heading`, `speed`, `length`, `vehicle_class`.
+        ``NAME=COLUMN[:UNIT]`` for `vehicle`, `time`, `x`, `y`, `heading`, `speed`, `length`,
+        `rear`, `vehicle_class`.
 
     Raises
     ------

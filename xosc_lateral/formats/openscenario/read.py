@@ -44,10 +44,22 @@ class RoadSearch:
         The road, whatever the scenario says.
     folders : tuple of Path
         Looked through for a file of the road's name.
+
+    Raises
+    ------
+    FormatError
+        No such file, no such folder.
     """
 
     file: Path | None = None
     folders: tuple[Path, ...] = ()
+
+    def __post_init__(self) -> None:
+        for folder in self.folders:
+            if not folder.is_dir():
+                raise FormatError("no such folder to look for roads in", path=folder)
+        if self.file is not None and not self.file.is_file():
+            raise FormatError("no such road", path=self.file)
 
 
 NO_ROADS = RoadSearch()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from array import array
 from collections import Counter
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -61,6 +61,7 @@ class Recorded:
     hosts: tuple[str, ...]
     numbers: dict[str, str]
     notes: list[str]
+    opendrive: bytes | None = None
 
 
 def read_osi(path: Path, channel: str | None = None) -> Recorded:
@@ -77,7 +78,7 @@ def read_osi(path: Path, channel: str | None = None) -> Recorded:
         collected = _Collected(path)
         for number, message in enumerate(trace, 1):
             collected.take(message, number)
-        return collected.recorded(trace.notes)
+        return replace(collected.recorded(trace.notes), opendrive=trace.opendrive)
 
 
 @dataclass

@@ -1,4 +1,4 @@
-"""Messages of an OSI trace, one after the other: the ground truth of `.mcap` and `.osi` files."""
+"""Messages of an OSI trace, one after the other: the ground truth of `.mcap`, `.osi` and `.parquet` files."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from typing import Any
 
 from xosc_lateral.errors import FormatError
 from xosc_lateral.formats.osi.extra import SUFFIXES, osi
+from xosc_lateral.formats.osi.omega_prime import OmegaPrimeReader
 from xosc_lateral.formats.source import check_regular
 
 TRUTHS = ("GROUND_TRUTH", "SENSOR_VIEW")
@@ -27,6 +28,8 @@ class Trace:
     ----------
     notes : list of str
         Channels that are not read.
+    opendrive : bytes or None
+        The road, where the file has it as OpenDRIVE.
 
     Raises
     ------
@@ -37,14 +40,17 @@ class Trace:
     """
 
     def __init__(self, path: Path, channel: str | None = None) -> None:
-        if path.suffix.lower() not in SUFFIXES:
-            raise FormatError(f"an OSI trace ends in {' or '.join(SUFFIXES)}", path=path)
+        if path.suffix.lower() not in READ:
+            raise FormatError(
+                f"an OSI trace ends in {', '.join(SUFFIXES)}, one of omega-prime in .parquet too", path=path
+            )
         check_regular(path)
         if path.stat().st_size == 0:
             raise FormatError("is empty", path=path)
         self.path = path
         self.notes: list[str] = []
-        self._reader = self._of_mcap(channel) if path.suffix.lower() == ".mcap" else self._of_messages(channel)
+        self.opendrive: bytes | None = None
+        self._reader = READ[path.suffix.lower()](self, channel)
 
     def __enter__(self) -> Trace:
         return self
@@ -81,9 +87,14 @@ class Trace:
         reader.set_topics([chosen])
         return reader
 
+    def _of_rows(self, channel: str | None) -> Any:
+        _refuse_channel(self.path, channel)
+        reader = OmegaPrimeReader(self.path)
+        self.opendrive = reader.opendrive
+        return reader
+
     def _of_messages(self, channel: str | None) -> Any:
-        if channel is not None:
-            raise FormatError(f"has no channels, so no channel {channel!r}", path=self.path)
+        _refuse_channel(self.path, channel)
         utilities = osi("osi_utilities")
         kinds = utilities.MessageType
         named = utilities.infer_message_type_from_filename(self.path.name)
@@ -104,6 +115,15 @@ class Trace:
         if not reader.open(self.path):
             raise FormatError("not an OSI trace", path=self.path)
         return reader
+
+
+READ = {".mcap": Trace._of_mcap, ".osi": Trace._of_messages, ".parquet": Trace._of_rows}
+"""By suffix: how a trace is opened."""
+
+
+def _refuse_channel(path: Path, channel: str | None) -> None:
+    if channel is not None:
+        raise FormatError(f"has no channels, so no channel {channel!r}", path=path)
 
 
 def _chosen(kinds: dict[str, str], channel: str | None) -> str | None:

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from bisect import bisect_right
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from operator import itemgetter
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +21,7 @@ from xosc_lateral.motion.axes import axes
 from xosc_lateral.motion.nominal import Activity, EntityMotion, NominalMotion
 from xosc_lateral.motion.trajectory import WorldTrajectory
 from xosc_lateral.road.network import RoadNetwork
+from xosc_lateral.scenario.actions.appearance import LightStateAction
 from xosc_lateral.scenario.entity import Entity
 from xosc_lateral.scenario.enums import EntityCategory, VehicleCategory
 from xosc_lateral.version import __version__
@@ -44,6 +47,24 @@ KINDS: Mapping[VehicleCategory, str] = {
     VehicleCategory.VAN: "DELIVERY_VAN",
 }
 """Category of OpenSCENARIO -> `VehicleClassification.Type`."""
+
+
+LIGHTS: Mapping[str, tuple[tuple[str, str], ...]] = {
+    "brakeLights": (("brake_light_state", "BRAKE_LIGHT_STATE_NORMAL"),),
+    "fogLights": (("front_fog_light", "GENERIC_LIGHT_STATE_ON"), ("rear_fog_light", "GENERIC_LIGHT_STATE_ON")),
+    "fogLightsFront": (("front_fog_light", "GENERIC_LIGHT_STATE_ON"),),
+    "fogLightsRear": (("rear_fog_light", "GENERIC_LIGHT_STATE_ON"),),
+    "highBeam": (("high_beam", "GENERIC_LIGHT_STATE_ON"),),
+    "indicatorLeft": (("indicator_state", "INDICATOR_STATE_LEFT"),),
+    "indicatorRight": (("indicator_state", "INDICATOR_STATE_RIGHT"),),
+    "licensePlateIllumination": (("license_plate_illumination_rear", "GENERIC_LIGHT_STATE_ON"),),
+    "lowBeam": (("head_light", "GENERIC_LIGHT_STATE_ON"),),
+    "reversingLights": (("reversing_light", "GENERIC_LIGHT_STATE_ON"),),
+    "specialPurposeLights": (("emergency_vehicle_illumination", "GENERIC_LIGHT_STATE_ON"),),
+    "warningLights": (("indicator_state", "INDICATOR_STATE_WARNING"),),
+}
+"""`vehicleLightType` of OpenSCENARIO -> fields of OSI's light state, and what they are when lit. OSI has no daytime
+running lights, and no words for a light of the user's own."""
 
 
 def write_osi(
@@ -146,7 +167,7 @@ def ground_truths(
     ids = RoadIds(network, len(motion.entities) + 1)
     paths: Sequence[WorldTrajectory | None] = [None] * len(motion.entities) if trajectories is None else trajectories
     objects = [
-        _Object(entity, _kinematics(entity, path, network), _template(entity.entity, number))
+        _Object(entity, _kinematics(entity, path, network), _template(entity.entity, number), _lights(motion, entity))
         for number, (entity, path) in enumerate(zip(motion.entities, paths, strict=True), 1)
     ]
     frame = ground_truth()
@@ -172,11 +193,12 @@ def ground_truths(
 
 @dataclass(frozen=True, eq=False)
 class _Object:
-    """An entity, the columns of `_kinematics`, and what stays the same."""
+    """An entity, the columns of `_kinematics`, what stays the same, and its lights: from when on, which state."""
 
     motion: EntityMotion
     columns: FloatArray
     template: Any
+    lights: Sequence[tuple[float, Any]]
 
     def add(self, message: Any, row: int, ids: RoadIds) -> None:
         """Where it is in this row, if it exists then."""
@@ -184,6 +206,9 @@ class _Object:
             return
         written = message.moving_object.add()
         written.CopyFrom(self.template)
+        lit = bisect_right(self.lights, self.motion.time[row], key=itemgetter(0))
+        if lit:
+            written.vehicle_classification.light_state.CopyFrom(self.lights[lit - 1][1])
         base = written.base
         x, y, z, vx, vy, vz, ax, ay, az, yaw, pitch, roll, rate, road, lane, s = self.columns[row].tolist()
         base.position.x, base.position.y, base.position.z = x, y, z
@@ -228,6 +253,27 @@ def _rate(values: FloatArray, motion: EntityMotion) -> FloatArray:
     for first, last in pairwise(borders):
         if last - first > 1:
             found[first:last] = np.gradient(values[first:last], motion.time[first:last], axis=0)
+    return found
+
+
+def _lights(motion: NominalMotion, entity: EntityMotion) -> list[tuple[float, Any]]:
+    """States of a vehicle's lights, in the order of time; what the scenario says nothing of stays unset."""
+    kinds = osi("osi3.osi_object_pb2").MovingObject.VehicleClassification
+    state, found = kinds.LightState(), []
+    played = [one for one in motion.actions if one.actor == entity.name and isinstance(one.action, LightStateAction)]
+    for one in sorted(played, key=lambda one: one.start):
+        for name, lit in LIGHTS.get(one.action.light, ()):
+            off = f"{lit.partition('_STATE_')[0]}_STATE_OFF"
+            setattr(
+                state,
+                name,
+                kinds.LightState.DESCRIPTOR.fields_by_name[name]
+                .enum_type.values_by_name[off if one.action.mode == "off" else lit]
+                .number,
+            )
+        kept = kinds.LightState()
+        kept.CopyFrom(state)
+        found.append((one.start, kept))
     return found
 
 

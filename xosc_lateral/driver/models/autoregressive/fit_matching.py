@@ -160,7 +160,7 @@ def _coarse_gain(lacks: FloatArray, settings: FitSettings) -> FloatArray:
     """Factor on the coarse movement's amplitude at `FREQUENCIES`, likewise.
 
     Where the fine noise could be and is not: from its slowest on up to the border, and a knot beyond. What is slower,
-    the covariances of whole runs tell: typical windows of a driver who drifts calmly and returns briskly lack it.
+    the covariances of whole runs have: typical windows of a driver who drifts calmly and returns briskly lack it.
     """
     at = FREQUENCIES / COARSE_EVERY
     hertz, between = at / settings.step, 0.5 / settings.step / (settings.n_knots - 1)

@@ -1,6 +1,6 @@
 """How volatile drivers are, from the power of their movement window by window.
 
-One drive alone can't tell what its driver keeps from what varies slowly: all that lasts longer than the lags looked at
+One drive alone does not separate what its driver keeps from what varies slowly: all that lasts longer than the lags
 counts as slow variation there, and as a difference between drivers where there are several.
 
 References

@@ -1,0 +1,95 @@
+"""Draw the map of CONTRIBUTING from the imports: a part per box, data flows down, imports point up (`make map`)."""
+
+from __future__ import annotations
+
+import sys
+from collections import defaultdict
+from html import escape
+from pathlib import Path
+
+from tests.test_layers import LAYERS, PACKAGE, imports_of
+
+TEXT = {
+    "road": "lanes and geometry",
+    "scenario": "storyboard model",
+    "motion": "nominal motion, segments",
+    "drives": "measured drives, runs",
+    "playback": "the player",
+    "driver": "models, effects, sampling",
+    "enrich": "offsets for played segments",
+    "evaluation": "metrics, classifiers",
+    "identification": "what a profile lacks",
+    "formats": "every file in and out",
+    "templates": "builders of scenarios",
+    "report": "text, JSON, HTML",
+    "pipeline": "from files to files, batches",
+    "api": "a verb per file",
+    "cli": "argument names",
+    "datasets": "simulated drives",
+}
+WIDTH, HEIGHT, GAP_X, GAP_Y, MARGIN = 190, 44, 24, 40, 16  # [px]
+FONT = "font-family='sans-serif'"
+
+
+def parts() -> dict[str, set[str]]:
+    """Every folder of the package, and the folders that it imports."""
+    folders = [path.name for path in PACKAGE.iterdir() if (path / "__init__.py").exists() and path.name in TEXT]
+    return {
+        name: {found for path in (PACKAGE / name).rglob("*.py") for found in imports_of(path)} & set(folders) - {name}
+        for name in folders
+    }
+
+
+def shown_edges(graph: dict[str, set[str]]) -> list[tuple[str, str]]:
+    """Imports that no longer way of imports gives as well: fewer lines, the same order."""
+
+    def reached(name: str) -> set[str]:
+        return {far for near in graph[name] for far in {near, *reached(near)}}
+
+    return [
+        (name, near)
+        for name, wanted in sorted(graph.items())
+        for near in sorted(wanted)
+        if not any(near in reached(other) for other in wanted - {near})
+    ]
+
+
+def drawing(graph: dict[str, set[str]]) -> str:
+    """The map as SVG."""
+    rows: dict[int, list[str]] = defaultdict(list)
+    for name in sorted(graph):
+        rows[LAYERS[name]].append(name)
+    layers = sorted(rows)
+    across = max(len(row) for row in rows.values())
+    total = 2 * MARGIN + across * WIDTH + (across - 1) * GAP_X, 2 * MARGIN + len(layers) * (HEIGHT + GAP_Y) - GAP_Y
+    corner = {}
+    for k, layer in enumerate(layers):
+        left = (total[0] - len(rows[layer]) * WIDTH - (len(rows[layer]) - 1) * GAP_X) / 2
+        for i, name in enumerate(rows[layer]):
+            corner[name] = left + i * (WIDTH + GAP_X), MARGIN + k * (HEIGHT + GAP_Y)
+    lines = [
+        f"<svg xmlns='http://www.w3.org/2000/svg' viewBox='0 0 {total[0]:g} {total[1]:g}' width='{total[0]:g}'>",
+        "<defs><marker id='tip' viewBox='0 0 8 8' refX='7' refY='4' markerWidth='7' markerHeight='7' orient='auto'>"
+        "<path d='M0,0 L8,4 L0,8 z' fill='#68708a'/></marker></defs>",
+        f"<rect width='{total[0]:g}' height='{total[1]:g}' fill='white'/>",
+    ]
+    for name, near in shown_edges(graph):
+        (x1, y1), (x2, y2) = corner[name], corner[near]
+        lines.append(
+            f"<line x1='{x1 + WIDTH / 2:g}' y1='{y1:g}' x2='{x2 + WIDTH / 2:g}' y2='{y2 + HEIGHT:g}' "
+            "stroke='#68708a' stroke-width='1.2' marker-end='url(#tip)'/>"
+        )
+    for name, (x, y) in sorted(corner.items()):
+        lines += [
+            f"<rect x='{x:g}' y='{y:g}' width='{WIDTH}' height='{HEIGHT}' rx='6' fill='#eef3fa' stroke='#0072b2'/>",
+            f"<text x='{x + WIDTH / 2:g}' y='{y + 18:g}' {FONT} font-size='14' font-weight='bold' text-anchor='middle'>"
+            f"{escape(name)}</text>",
+            f"<text x='{x + WIDTH / 2:g}' y='{y + 35:g}' {FONT} font-size='12' text-anchor='middle'>"
+            f"{escape(TEXT[name])}</text>",
+        ]
+    return "\n".join([*lines, "</svg>", ""])
+
+
+if __name__ == "__main__":
+    target = Path(sys.argv[1]) if len(sys.argv) > 1 else Path(__file__).with_suffix(".svg")
+    target.write_text(drawing(parts()), encoding="utf-8")
