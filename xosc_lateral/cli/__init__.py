@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import sys
 from collections.abc import Sequence
+from functools import cache
 from importlib import import_module
 from typing import Annotated, Any, cast
 
@@ -38,6 +39,7 @@ LOOKS: dict[str, Any] = {
 }
 
 
+@cache
 def verb(name: str) -> Any:
     """The command of a verb, its module loaded."""
     module = name.replace("-", "_")
