@@ -148,13 +148,14 @@ def _outcomes(
         with Journal(batch.folder, state / "journal.jsonl", notify) as journal:
             todo = []
             for job in batch.jobs:
-                row = None if again else _current_row(job, journal)
-                if row is None:
+                row = None if again or job.error or job.name not in journal else journal.row(job.name)
+                if row is None or not _is_current(row, job):
                     todo.append(job)
-                else:
-                    if journal.row(job.name).stale:
-                        journal.add(row, journal.seconds(job.name))
-                    yield JobOutcome(JobState.UP_TO_DATE, row, 0.0)
+                    continue
+                if row.stale:
+                    row = replace(row, error="", stale=False)
+                    journal.add(row, journal.seconds(job.name))
+                yield JobOutcome(JobState.UP_TO_DATE, row, 0.0)
             if todo:
                 with open_pool(min(workers, len(todo)), cluster) as pool:
                     for job, reply in run_tasks(pool, work, todo):
@@ -217,22 +218,18 @@ def _kept(job: Job, former: ManifestRow, failed: ManifestRow) -> ManifestRow:
     return replace(former, error=failed.error, stale=True) if there else failed
 
 
-def _current_row(job: Job, journal: Journal) -> ManifestRow | None:
-    """The journal's row if its output is still what a conversion would write."""
-    if job.error or job.name not in journal:
-        return None
+def _is_current(row: ManifestRow, job: Job) -> bool:
+    """Whether the output that a row is about is still what a conversion would write."""
     if job.page is not None and not job.page.is_file():
-        return None
-    row = journal.row(job.name)
+        return False
     if (row.error and not row.stale) or row.settings != job.fingerprint or row.scenario != job.scenario:
-        return None
+        return False
     expected = {job.output: row.output_sha256}
     expected |= {Path(os.path.normpath(job.base / name)): value for name, value in row.inputs.items()}
     try:
-        current = all(file_hash(path) == value for path, value in expected.items())
+        return all(file_hash(path) == value for path, value in expected.items())
     except (OSError, FormatError):
-        return None
-    return replace(row, error="", stale=False) if current else None
+        return False
 
 
 def _forget_missing(batch: Batch, journal: Journal) -> None:
