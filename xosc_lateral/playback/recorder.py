@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.errors import PlaybackError
+from xosc_lateral.mask import true_blocks
 from xosc_lateral.motion.nominal import Activity, EntityMotion, FloatArray, IntArray
 from xosc_lateral.playback.placement import NOWHERE
 from xosc_lateral.playback.state import EntityState
@@ -91,18 +92,18 @@ class Rows:
 
     def motion(self, network: RoadNetwork, time: FloatArray) -> EntityMotion:
         """All rows, with world poses and directions of travel."""
-        road: IntArray = np.frombuffer(self._road, dtype=np.int32).copy()
-        lane: IntArray = np.frombuffer(self._lane, dtype=np.int32).copy()
-        s, offset_t, along, speed = (
-            np.frombuffer(column, dtype=np.float64).copy()
+        # The rows themselves, not copies: nobody writes on.
+        road: IntArray = np.frombuffer(self._road, dtype=np.int32)
+        lane: IntArray = np.frombuffer(self._lane, dtype=np.int32)
+        s, offset, along, speed = (
+            np.frombuffer(column, dtype=np.float64)
             for column in (self._s, self._offset_t, self._relative_heading, self._speed)
         )
-        activity = np.frombuffer(self._activity, dtype=np.uint8).copy()
+        activity = np.frombuffer(self._activity, dtype=np.uint8)
         free_rows = np.frombuffer(self._free_rows, dtype=np.int64)
         free = np.frombuffer(self._free, dtype=np.float64).reshape(-1, 6)
 
         direction = np.ones(len(road))
-        offset = offset_t.copy()
         looked_up = free_rows[road[free_rows] == _UNKNOWN]
         known = road >= 0
         if known.any():
@@ -122,12 +123,12 @@ class Rows:
         return EntityMotion(
             entity=self.state.entity,
             time=time,
-            x=pose[:, 0].copy(),
-            y=pose[:, 1].copy(),
-            z=pose[:, 2].copy(),
-            heading=pose[:, 3] % (2.0 * pi),
-            pitch=pose[:, 4].copy(),
-            roll=pose[:, 5].copy(),
+            x=pose[:, 0],
+            y=pose[:, 1],
+            z=pose[:, 2],
+            heading=np.mod(pose[:, 3], 2.0 * pi, out=pose[:, 3]),
+            pitch=pose[:, 4],
+            roll=pose[:, 5],
             speed=speed,
             road=road,
             lane=lane,
@@ -143,11 +144,9 @@ def _poses(
 ) -> FloatArray:
     """World poses of the rows that are on a road, shape (n, 6), turned by `to_lane` [rad] against their lanes."""
     on_road = road >= 0
-    pose = np.zeros((len(road), 6))
-    if on_road.any():
-        pose[on_road] = np.column_stack(
-            network.lane_to_world(road[on_road], lane[on_road], s[on_road], offset[on_road])
-        )
+    pose = np.zeros((len(road), 6), order="F")  # each column is then an array of its own
+    for rows in true_blocks(on_road):
+        pose[rows] = np.column_stack(network.lane_to_world(road[rows], lane[rows], s[rows], offset[rows]))
     _turn(pose, to_lane, on_road)
 
     return pose
