@@ -227,10 +227,11 @@ def _suspects(
     network: RoadNetwork, road: IntArray, lane: IntArray, s: FloatArray, offset: FloatArray, on_road: NDArray[np.bool_]
 ) -> NDArray[np.int64]:
     """Rows that lie beyond their own lane."""
-    suspects = np.flatnonzero(on_road)
-    half = 0.5 * network.lane_width(road[suspects], lane[suspects], s[suspects])
-    suspects = suspects[np.abs(offset[suspects]) > half + _TOUCH]
-    return suspects
+    suspects = [np.empty(0, dtype=np.int64)]
+    for rows in true_blocks(on_road):
+        half = 0.5 * network.lane_width(road[rows], lane[rows], s[rows])
+        suspects.append(rows[np.abs(offset[rows]) > half + _TOUCH])
+    return np.concatenate(suspects)
 
 
 _TOUCH = 1e-3
