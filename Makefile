@@ -6,7 +6,7 @@ STAMP := $(VENV)/.installed
 DEV_STAMP := $(VENV)/.installed-dev
 DOCS_STAMP := $(VENV)/.installed-docs
 
-.PHONY: fuzz lock install-locked sbom licences test-matrix demo test fast style lint format docs schema profiles refined templates loop-dlr picture map clean
+.PHONY: fuzz lock install-locked sbom reproducible licences test-matrix demo test fast style lint format docs schema profiles refined templates loop-dlr picture map clean
 
 # Python compiles what it imports when it does: a fifth of what is installed.
 QUICK := --disable-pip-version-check --progress-bar on --no-compile
@@ -123,6 +123,14 @@ sbom: $(DEV_STAMP)
 	@mkdir -p out
 	$(UV) tool run --from 'cyclonedx-bom>=7,<8' cyclonedx-py requirements $(LOCK) --pyproject pyproject.toml \
 		--output-reproducible -o out/sbom.json
+
+# Wheel and source distribution twice, from two clones: the same bytes.
+reproducible: $(DEV_STAMP)
+	rm -rf out/twice && mkdir -p out/twice
+	for one in a b; do \
+		git clone -q . out/twice/$$one && $(UV) build -q --out-dir out/twice/dist-$$one out/twice/$$one || exit 1; \
+	done
+	diff -r out/twice/dist-a out/twice/dist-b && sha256sum out/twice/dist-a/*
 
 licences: $(DEV_STAMP)
 	$(UV) tool run --from 'pip-licenses>=5,<6' pip-licenses --python $(BIN)/python --order=license

@@ -20,6 +20,7 @@ import numpy as np
 from msgspec.structs import replace
 from numpy.typing import NDArray
 
+from benchmarks.comparison import driver_distances
 from benchmarks.refined import NOTES, refine_population, refined_profile
 from xosc_lateral.driver.beside import POPULATION as ANSWERS
 from xosc_lateral.driver.fitting import fit_population, fit_runs
@@ -31,7 +32,6 @@ from xosc_lateral.drives.cuts import all_runs
 from xosc_lateral.drives.drive import Drive, Run
 from xosc_lateral.drives.resampling import STEP
 from xosc_lateral.errors import NotEnoughDataError
-from xosc_lateral.evaluation.comparison import driver_distances
 from xosc_lateral.evaluation.metrics import snippet_metrics
 from xosc_lateral.evaluation.movement_summary import summary_of
 from xosc_lateral.evaluation.record import scores_to_dict

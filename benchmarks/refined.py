@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from msgspec.structs import replace
 
-from xosc_lateral.driver.effects.rounding import rounded_effect, rounded_number
+from benchmarks.rounding import rounded_effect, rounded_number
 from xosc_lateral.driver.fitting import fit_profile
 from xosc_lateral.driver.models.kinds import ModelKind
 from xosc_lateral.driver.profile import DriverProfile

@@ -161,7 +161,7 @@ def test_sampling_says_which_columns_it_takes_as_neutral():
     made = xl.sample(xl.read_profile("motorway-vehicle-1").with_effects(fast), duration=10.0)
     assert made.warnings == ()  # a free run has a speed
     made = xl.sample(xl.read_profile("motorway-vehicle-1").with_effects(windy), duration=10.0)
-    assert made.warnings == ("a free run: wind_speed not known, taken as neutral",)
+    assert made.warnings == ("a free run: wind_speed not known, left without effect",)
 
 
 def test_a_column_that_tables_lack_is_said_once_and_one_that_a_drive_never_met_is_known(tmp_path):
@@ -177,13 +177,13 @@ def test_a_column_that_tables_lack_is_said_once_and_one_that_a_drive_never_met_i
     ]
     table = pd.concat(drives)
     made, alike = (xl.sample(one, context=table, seed=1) for one in (bare.with_effects(*effects), bare))
-    assert made.warnings == ("3 of 3 drives: wind_speed not known, taken as neutral",)
+    assert made.warnings == ("3 of 3 drives: wind_speed not known, left without effect",)
     shift = (made.to_frame()["offset"] - alike.to_frame()["offset"]).groupby(table["drive"].to_numpy()).mean()
     np.testing.assert_allclose(shift, -0.3 * (np.array([0.0, 0.0, np.exp(-12.0 / 20.0)]) - 0.2), atol=1e-9)
     both = xl.sample(bare.with_effects(*effects), context=[drives[2].drop(columns="left_distance"), table], seed=1)
     assert both.warnings == (
-        "drive DataFrame 1:2: left_distance not known, taken as neutral",
-        "4 of 4 drives: wind_speed not known, taken as neutral",
+        "drive DataFrame 1:2: left_distance not known, left without effect",
+        "4 of 4 drives: wind_speed not known, left without effect",
     )
 
 
@@ -195,12 +195,12 @@ def test_zones_of_a_profile_that_a_table_lacks_or_that_are_others_are_said(tmp_p
     profile, time = bare.with_effects(zones), 0.2 * np.arange(200.0)
     table = pd.DataFrame({"drive": "d", "time": time, "offset": 0.1 * np.sin(time), "lane_width": 3.5})
     made = xl.sample(profile, context=table, seed=1)
-    assert made.warnings == ("drive d: zone not known, taken as neutral",)
+    assert made.warnings == ("drive d: zone not known, left without effect",)
     pd.testing.assert_frame_equal(made.to_frame(), xl.sample(bare, context=table, seed=1).to_frame())
     assert xl.sample(profile, duration=10.0).warnings == ()  # a free run is in no zone
     known = xl.sample(profile, context=table.assign(zone=np.where(time < 20.0, "a", "b")), seed=1)
     assert known.warnings == ()
     assert not known.to_frame().equals(made.to_frame())
     half = xl.sample(profile, context=table.assign(zone=np.where(time < 20.0, "a", "elsewhere")), seed=1)
-    assert half.warnings == ("1 of 2 zones are not the profile's (elsewhere, say), taken as neutral",)
+    assert half.warnings == ("1 of 2 zones are not the profile's (elsewhere, say), taken as the mean of all",)
     assert xl.sample(bare, context=table.assign(zone="a"), seed=1).warnings == ()

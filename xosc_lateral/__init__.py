@@ -12,6 +12,8 @@ TYPE_CHECKING = False  # importing `typing` for it would take longer than all th
 _HOME = {
     "convert": "api.convert",
     "convert_many": "api.batch",
+    "verify": "api.verify",
+    "reproduce": "api.verify",
     "play": "api.play",
     "segments": "api.play",
     "fit": "api.fit",
@@ -32,6 +34,7 @@ _HOME = {
     "Conversion": "api.convert",
     "ConvertOptions": "pipeline.settings",
     "BatchResult": "api.batch",
+    "Verification": "api.verify",
     "Playback": "api.play",
     "Segments": "api.play",
     "Offsets": "api.sample",
@@ -49,6 +52,8 @@ _HOME = {
 __all__ = [  # noqa: RUF022 (the order of the documentation)
     "convert",
     "convert_many",
+    "verify",
+    "reproduce",
     "play",
     "segments",
     "fit",
@@ -69,6 +74,7 @@ __all__ = [  # noqa: RUF022 (the order of the documentation)
     "Conversion",
     "ConvertOptions",
     "BatchResult",
+    "Verification",
     "Playback",
     "Segments",
     "Offsets",
@@ -94,6 +100,7 @@ if TYPE_CHECKING:
     from xosc_lateral.api.profiles import compare_profiles, list_profiles, read_profile, write_profile
     from xosc_lateral.api.sample import Offsets, sample
     from xosc_lateral.api.templates import list_templates, write_template
+    from xosc_lateral.api.verify import Verification, reproduce, verify
     from xosc_lateral.driver.profile import DriverProfile
     from xosc_lateral.driver.stream import OffsetStream
     from xosc_lateral.drives.drive import Drive

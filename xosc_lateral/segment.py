@@ -41,6 +41,11 @@ CONTEXT_UNITS: Mapping[str, str] = MappingProxyType(
 )
 
 
+FADES = "_fades"
+"""Ends the name of a column that says how far another column's is there, 0 to 1, where it comes and goes, as a lane
+that opens does: `left_distance_fades` is of `left_distance`. [-]"""
+
+
 @dataclass(frozen=True, eq=False, slots=True)
 class Segment:
     """A road-following segment: a part of one vehicle's motion with no lateral action running, on a uniform time grid.
@@ -55,7 +60,7 @@ class Segment:
         [m/s]
     context : mapping of str to array, shape (n,)
         What the driver may react to, under DESIGN's names or any other; NaN where there is nothing (no leader).
-        A name that is absent is neutral.
+        A name that is absent has no effect.
     before, after : int
         Rows at the start and at the end of the arrays that lie outside the segment: context only, no offsets are
         sampled there. Effects that look ahead or respond slowly need what comes after and what went before.

@@ -19,8 +19,9 @@ from benchmarks.board.record import board_record
 from benchmarks.board.text import board_markdown, board_text
 from xosc_lateral.drives.cuts import all_runs
 from xosc_lateral.formats.atomic import write_atomically
-from xosc_lateral.formats.drives import parse_map, read_drives
+from xosc_lateral.formats.drives import read_drives
 from xosc_lateral.formats.hashes import parsed_hashes
+from xosc_lateral.formats.mapping import parse_map
 from xosc_lateral.formats.profiles import read_profile
 
 

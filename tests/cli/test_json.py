@@ -53,6 +53,8 @@ def test_every_schema_is_one_and_is_listed():
             "convert",
             "convert in/cut-in.xosc -o two.xosc --ego none --only Ego --profile motorway-refined --time-limit 5",
         ),
+        ("verify", "verify one.xosc"),
+        ("verify", "reproduce one.xosc -o again.xosc"),
         ("play", "play in/cut-in.xosc -o states.csv --time-limit 1"),
         ("segments", "segments in/cut-in.xosc"),
         ("sample", "sample -p motorway --duration 20 -o offsets.csv"),

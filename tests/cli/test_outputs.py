@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from xosc_lateral.cli import main
+from xosc_lateral.shipped import shipped_folder
 
 
 @pytest.fixture
@@ -228,7 +229,7 @@ def test_a_target_is_in_the_json_and_in_the_file(
     output = tmp_path / "out.xosc"
     assert main(["convert", str(scenario), "-o", str(output), "--for", "carla", "--json", "--time-limit", "3"]) == 0
     provenance = json.loads(capsys.readouterr().out)["provenance"]
-    assert (provenance["player"], provenance["version"]) == ("carla", "1.0")
+    assert (provenance["options"]["player"], provenance["version"]) == ("carla", "1.0")
     assert 'revMinor="0"' in output.read_text(encoding="utf-8")
 
 
@@ -240,3 +241,9 @@ def test_a_profiles_id_stays_inside_its_library(
     assert main(["profiles", "add", "motorway", "--library", "inner/lib", "--name", name]) == 1
     assert "without a folder" in capsys.readouterr().err
     assert not list(tmp_path.rglob("*.json"))
+    values = json.loads((shipped_folder("driver_profiles") / "motorway.json").read_text(encoding="utf-8"))
+    (tmp_path / "hostile.json").write_text(json.dumps(values | {"id": name}))
+    assert main(["profiles", "add", "hostile.json", "--library", "inner/lib"]) == 1
+    assert "without a folder" in capsys.readouterr().err
+    assert main(["profiles", "export", "hostile.json", "-o", "inner/"]) == (name != "..")  # a file "...json" is one
+    assert {path.parent.name for path in tmp_path.rglob("*.json")} <= {tmp_path.name, "inner"}

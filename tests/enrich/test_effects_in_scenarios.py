@@ -12,6 +12,7 @@ from tests.profiles import simulated_profile
 from xosc_lateral.driver.effects import Acts, Effect, Factor, Form, Linear, Product
 from xosc_lateral.enrich.enrich import enrich
 from xosc_lateral.enrich.neighbours import Neighbours
+from xosc_lateral.motion.context import STEERING
 from xosc_lateral.motion.nominal import NominalMotion, PlayedAction
 from xosc_lateral.road.network import RoadNetwork
 from xosc_lateral.scenario import Action, Place
@@ -54,7 +55,11 @@ def test_a_curve_cutter_moves_to_the_inside_ahead_of_the_curve(tmp_path: Path) -
     )
     motion = together(drive(network, entity(), start=260.0, speed=30.0, duration=20.0))
     time, moved = _effect_alone(motion, network, effect)
-    expected = SIZE * _risen(time, 8.0 - LOOK_AHEAD)
+    # the curve begins at once, and is seen over a second or two: a response to a normal distribution of beginnings
+    share = np.linspace(-4.0, 4.0, 401)
+    seen = np.exp(-0.5 * share**2) / np.exp(-0.5 * share**2).sum()
+    risen = sum(part * _risen(time, 8.0 - LOOK_AHEAD + STEERING * when) for part, when in zip(seen, share, strict=True))
+    expected = SIZE * risen
     np.testing.assert_allclose(moved, expected, atol=0.06 * SIZE)  # 5 Hz: the step is known to a sample
 
 

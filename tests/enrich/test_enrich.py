@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
+from math import erf, sqrt
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +17,7 @@ from xosc_lateral.driver.effects import Acts, ColumnEffect
 from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.enrich.enrich import enrich
 from xosc_lateral.enrich.neighbours import Neighbours
+from xosc_lateral.motion.context import STEERING
 from xosc_lateral.motion.nominal import Activity
 from xosc_lateral.motion.trajectory import distance_driven
 
@@ -113,9 +115,12 @@ def test_an_effect_sees_the_context_around_its_segment_and_acts_in_it(tmp_path: 
     plain = enrich(motion, network, {"car": base}, seed=1).entity("car")
     shifted = enrich(motion, network, {"car": _with(base, effect)}, seed=1).entity("car")
     for with_effect, without in zip(shifted.segments, plain.segments, strict=True):
-        in_curve = 200.0 + 30.0 * (with_effect.time + 1.0) > 500.0  # looked ahead by a second, beyond the segment too
-        expected = np.where(in_curve, 1.0 / (400.0 + 5.25), 0.0)
-        np.testing.assert_allclose(with_effect.offset - without.offset, expected, atol=1e-9)
+        # looked ahead by a second, beyond the segment too; the curve begins at once, and is seen over a second or two
+        since = with_effect.time + 1.0 - 10.0
+        expected = np.array([0.5 + 0.5 * erf(one / STEERING / sqrt(2.0)) for one in since]) / (400.0 + 5.25)
+        np.testing.assert_allclose(
+            with_effect.offset - without.offset, expected, atol=0.05 / 400.0
+        )  # 5 Hz: half a step
 
 
 def test_a_context_that_nobody_supplies_is_named_and_a_given_one_is_used(tmp_path: Path) -> None:

@@ -48,8 +48,8 @@ def test_the_driver_stays_and_the_error_is_added(scenario: Path, profile: Driver
     errors = [_offsets(both)[name] - offset for name, offset in _offsets(alone).items()]
     assert np.concatenate(errors).std() == pytest.approx(np.sqrt(NOISE.white * 1.5), rel=0.2)
     assert len({float(error[0]) for error in errors}) == len(errors)  # everybody's own
-    assert not alone.to_dict()["provenance"]["with_sensor"]
-    assert both.to_dict()["provenance"]["with_sensor"]
+    assert not alone.to_dict()["provenance"]["options"]["with_sensor"]
+    assert both.to_dict()["provenance"]["options"]["with_sensor"]
     assert b'"with_sensor": true' in both.data and b"with sensor]" in both.data and MARK.encode() in both.data
 
 

@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from xosc_lateral.evaluation.lane_keeping import INDICATORS, lane_keeping_indicators
+from xosc_lateral.evaluation.lane_keeping import INDICATORS, lane_keeping, lane_keeping_indicators
 from xosc_lateral.evaluation.line_crossing import LONGEST_TLC, time_to_line_crossing
 from xosc_lateral.evaluation.variance import variance_parts
 
@@ -55,3 +55,29 @@ def test_variance_parts_are_recovered_from_planted_ones() -> None:
     assert found.between == pytest.approx(0.25**2, rel=0.2)  # standard error of a variance of 400: 7 %
     assert found.within == pytest.approx(0.15**2 + 0.1**2 / 51, rel=0.1)
     assert found.inside == pytest.approx(0.1**2 * 50 / 51, rel=0.02)
+
+
+def test_figures_of_an_hour_are_those_of_a_known_process() -> None:
+    """An autoregression of order one: variance, squared difference and correlation are known."""
+    rng, step, memory, size = np.random.default_rng(3), 0.2, 5.0, 0.2
+    keep = np.exp(-step / memory)
+    drives = np.empty((20, 18_000))
+    drives[:, 0] = size * rng.standard_normal(20)
+    for k in range(1, drives.shape[1]):
+        drives[:, k] = keep * drives[:, k - 1] + np.sqrt(1 - keep**2) * size * rng.standard_normal(20)
+    found = lane_keeping(0.3 + drives, 3.5, step)
+    assert abs(found.sdlp - size) < 4.0 * found.errors["sdlp"] < 0.006
+    assert found.mean == pytest.approx(0.3, abs=4.0 * found.errors["mean"])
+    assert found.restlessness == pytest.approx(size * np.sqrt(2.0 * (1.0 - keep)) / step, rel=0.01)
+    assert found.memory == pytest.approx(memory, rel=0.05)
+    assert found.limit_near_line == pytest.approx(1.75 - 0.9 - 0.2)
+    assert found.near_line == pytest.approx(0.0401, rel=0.1)  # normal: above 0.65 m at 0.3 +- 0.2 m
+    assert found.drifts == 0.0
+
+
+def test_a_lane_drift_is_a_metre_for_eight_seconds_on_one_side() -> None:
+    drive = np.zeros((1, 18_000))
+    drive[0, 1000:1040] = 1.2  # 8 s
+    drive[0, 3000:3030] = 1.2  # 6 s
+    drive[0, 5000:5025], drive[0, 5025:5050] = 1.2, -1.2
+    assert lane_keeping(drive, 3.5, 0.2).drifts == pytest.approx(1.0)

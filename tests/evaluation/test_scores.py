@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 from scipy.stats import wasserstein_distance
 
+from benchmarks.comparison import compare_profiles, driver_distances
 from xosc_lateral.driver.fitting import fit_runs
 from xosc_lateral.driver.models.two_level.fit import split_levels
 from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.drives.drive import Run
 from xosc_lateral.drives.resampling import STEP
 from xosc_lateral.errors import NotEnoughDataError
-from xosc_lateral.evaluation.comparison import compare_profiles, driver_distances
 from xosc_lateral.evaluation.distances import (
     metric_distances,
     snippet_distances,

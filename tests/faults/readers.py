@@ -10,6 +10,7 @@ import math
 import shutil
 from collections.abc import Iterable
 from pathlib import Path
+from unittest import mock
 
 import numpy as np
 import pandas as pd
@@ -18,7 +19,7 @@ from tests.faults.reader import NonsenseError, Reader, sane
 from tests.faults.recordings import RECORDINGS
 from tests.formats.made_scenario import ROAD, declarations, entity, parameter, scenario_text, vehicle
 from tests.profiles import simulated_profile
-from xosc_lateral.api.inputs import given_drives, naming
+from xosc_lateral.api.inputs import given_drives, given_profile, naming
 from xosc_lateral.datasets import simulate_drive
 from xosc_lateral.driver.sampled_offsets import sample_free
 from xosc_lateral.driver.stream import OffsetStream
@@ -27,6 +28,7 @@ from xosc_lateral.errors import DriverProfileError
 from xosc_lateral.formats.context_table import read_context
 from xosc_lateral.formats.openscenario import read_scenario
 from xosc_lateral.formats.openscenario.distribution import read_distribution
+from xosc_lateral.formats.openscenario.provenance import facts_in
 from xosc_lateral.formats.profile_folders import list_profiles
 from xosc_lateral.formats.profiles import profile_bytes, read_profile
 from xosc_lateral.limits import context_range
@@ -34,7 +36,10 @@ from xosc_lateral.pipeline.convert import convert_scenario
 from xosc_lateral.pipeline.jobs import plan_batch
 from xosc_lateral.pipeline.journal import Journal
 from xosc_lateral.pipeline.manifest import MANIFEST, ManifestRow, read_manifest, write_manifest
-from xosc_lateral.pipeline.settings import ConvertSettings
+from xosc_lateral.pipeline.settings import ConvertSettings, OutputMode
+from xosc_lateral.pipeline.verify import reproduce, verify
+from xosc_lateral.report.cards import card_text
+from xosc_lateral.report.conversion import facts
 
 
 # ---- tables ----------------------------------------------------------------------------------------------------------
@@ -107,6 +112,19 @@ def _use_profile(path: Path) -> None:
         sane(sampled.offset, -15.0, 15.0, "offset")
 
 
+def _driver_files(folder: Path) -> Iterable[Path]:
+    _scenario(folder)
+    return list(_profile_files(folder))
+
+
+def _use_driver(path: Path) -> None:
+    """What sampling alone does not reach: words about the profile, context and neighbours of a scenario."""
+    settings = ConvertSettings(profile=str(path), time_limit=3.0, step=0.05, ego=frozenset())
+    made = convert_scenario(path.with_name("a.xosc"), path.with_name("out.xosc"), settings)
+    json.dumps(facts(made), allow_nan=False)
+    card_text(given_profile(path))
+
+
 def _stream_files(folder: Path) -> Iterable[Path]:
     for number, name in enumerate(("motorway", "motorway-refined")):
         stream = OffsetStream(read_profile(name), 3)
@@ -156,8 +174,11 @@ def _distribution_files(folder: Path) -> Iterable[Path]:
         'Stochastic numberOfTestRuns="9" randomSeed="3"': '<StochasticDistribution parameterName="Speed">'
         f'<NormalDistribution expectedValue="25" variance="4">{bounds}</NormalDistribution></StochasticDistribution>',
     }
-    for name, content in parts.items():
-        path = folder / f"{name[:3]}.xosc"
+    one = '<ParameterValueSet><ParameterAssignment parameterRef="Speed" value="{}"/></ParameterValueSet>'
+    sets = f"<ValueSetDistribution>{one.format(20)}{one.format(30)}</ValueSetDistribution>"
+    many = f"<DeterministicMultiParameterDistribution>{sets}</DeterministicMultiParameterDistribution>"
+    for name, content in {**parts, "Deterministic ": 9 * many}.items():
+        path = folder / f"{name[:3]}{len(name)}.xosc"
         path.write_text(
             '<?xml version="1.0"?><OpenSCENARIO><FileHeader revMajor="1" revMinor="1" date="2024-01-01T00:00:00" '
             'author="a" description="d"/><ParameterValueDistribution><ScenarioFile filepath="a.xosc"/>'
@@ -170,6 +191,36 @@ def _use_distribution(path: Path) -> None:
     count = sum(1 for _ in read_distribution(path).parameter_sets(1))
     if count > 1_000_000:
         raise NonsenseError(f"{count} parameter sets")
+
+
+# ---- outputs and configuration ---------------------------------------------------------------------------------------
+def _output_files(folder: Path) -> Iterable[Path]:
+    for number, mode in enumerate((OutputMode.AUTO, OutputMode.LANE_OFFSET)):
+        settings = ConvertSettings(profile="motorway", time_limit=3.0, step=0.05, mode=mode)
+        convert_scenario(_scenario(folder), folder / f"o{number}.xosc", settings)
+        yield folder / f"o{number}.xosc"
+
+
+def _use_output(path: Path) -> None:
+    (found,) = verify([path], ConvertSettings())
+    if not found.problems:
+        return  # a change that the provenance can't show, as of the seed in it
+    for again in reproduce(path, path.with_name("again.xosc"), ConvertSettings()):
+        if not again.problems and facts_in(path.read_bytes()) is None:
+            raise NonsenseError("made again from nothing")
+
+
+def _configuration_files(folder: Path) -> Iterable[Path]:
+    text = 'library = ["team"]\nego = ["Ego", "Other"]\nneighbours = "profile"  # or none\n'
+    (folder / "config.toml").write_text(text)
+    (folder / "team").mkdir()
+    yield folder / "config.toml"
+
+
+def _use_configuration(path: Path) -> None:
+    with mock.patch("xosc_lateral.formats.configuration.configuration_file", return_value=path):
+        ConvertSettings.of()
+        list_profiles()
 
 
 # ---- what a batch leaves ---------------------------------------------------------------------------------------------
@@ -201,8 +252,11 @@ READERS = (
     Reader("requests", _request_files, _use_requests),
     *RECORDINGS,
     Reader("profile", _profile_files, _use_profile),
+    Reader("driver", _driver_files, _use_driver, share=0.2),
     Reader("stream", _stream_files, _use_stream),
     Reader("scenario", _scenario_files, _use_scenario),
     Reader("distribution", _distribution_files, _use_distribution),
+    Reader("output", _output_files, _use_output, share=0.5),
+    Reader("configuration", _configuration_files, _use_configuration),
     Reader("state", _state_files, _use_state),
 )

@@ -11,7 +11,8 @@ import pytest
 
 from xosc_lateral.drives.cuts import all_runs
 from xosc_lateral.errors import FormatError, NotEnoughDataError
-from xosc_lateral.formats.drives import parse_map, read_drives
+from xosc_lateral.formats.drives import read_drives
+from xosc_lateral.formats.mapping import parse_map
 
 
 def table(seconds: float = 30.0, rate: float = 20.0) -> pd.DataFrame:

@@ -532,7 +532,7 @@ def test_exid_without_lateral_movement_is_refused_rather_than_guessed(tmp_path):
     rng = np.random.default_rng(0)
     tracks["heading"] = rng.normal(0, 1e-3, len(tracks))
     tracks.to_csv(tmp_path / "07_tracks.csv", index=False)
-    with pytest.raises(FormatError, match="which side of the lane is positive"):
+    with pytest.raises(FormatError, match="the lane's positive side"):
         import_levelx(tmp_path)
 
 

@@ -354,7 +354,7 @@ def test_transitions_follow_the_chain_within_the_tolerance_and_turn_gently() -> 
 
 def test_a_stretch_too_short_to_get_anywhere_is_left_alone() -> None:
     time = np.arange(0.0, 0.5, STEP)
-    assert ramps(OffsetChain("Ego", time, np.full(len(time), 0.4))) == []
+    assert ramps(OffsetChain("Ego", time, np.full(len(time), 0.4))) == ()
 
 
 def test_no_transition_begins_where_the_t_axis_flips() -> None:
@@ -414,7 +414,7 @@ LANE_CHANGE = (
 def test_a_lateral_action_without_a_name_is_referred_to_by_its_event(tmp_path: Path) -> None:
     text = scenario_text(stories=story(event("change", action("", LANE_CHANGE), time=8.0)), stop=time_condition(25))
     found = lateral_actions(read_scenario(write_scenario(tmp_path, text)))
-    assert [(one.kind, one.reference) for one in found.by_entity["Ego"]] == [("event", "change")]
+    assert [(one.kind, one.reference) for one in found["Ego"]] == [("event", "change")]
 
 
 def test_a_lane_change_overrules_the_offsets_whenever_it_comes(tmp_path: Path) -> None:

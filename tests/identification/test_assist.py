@@ -14,7 +14,8 @@ from xosc_lateral.cli import main
 from xosc_lateral.datasets.driver_simulator import simulate_drive
 from xosc_lateral.drives.cuts import all_runs
 from xosc_lateral.evaluation.sampled_snippets import sample_runs
-from xosc_lateral.formats.drives import parse_map, read_drives
+from xosc_lateral.formats.drives import read_drives
+from xosc_lateral.formats.mapping import parse_map
 from xosc_lateral.formats.profiles import read_profile
 
 WORDS = [word for one in OPENLKA_MAP for word in ("--map", one)]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from datetime import datetime
 from pathlib import Path
 
@@ -9,9 +10,10 @@ import numpy as np
 import pytest
 
 from tests.motion.made_motion import LANE_WIDTH, RADIUS, drive, entity, together, two_roads
-from xosc_lateral.motion.context import entity_context
-from xosc_lateral.motion.nominal import PlayedAction
-from xosc_lateral.scenario import Action, Place
+from xosc_lateral.motion.context import NEAR, STEERING, entity_context
+from xosc_lateral.motion.nominal import EntityMotion, PlayedAction
+from xosc_lateral.road.network import RoadNetwork
+from xosc_lateral.scenario import Action, Entity, Place
 from xosc_lateral.scenario.actions.environment import EnvironmentAction
 from xosc_lateral.scenario.enums import VehicleCategory
 from xosc_lateral.scenario.environment import Environment, TimeOfDay, Weather
@@ -66,7 +68,10 @@ def test_neighbours_are_found_on_their_side_and_flagged_while_alongside(
     np.testing.assert_allclose(context["right_distance"], 25.0, atol=1e-6)
     assert set(context["right_is_truck"]) == {1.0}
     assert not context["truck_right"].any()
-    np.testing.assert_array_equal(context["car_left"], (np.abs(-60 + 10 * time) <= 15.0 + 1e-9).astype(float))
+    free = np.maximum(np.abs(-60 + 10 * time) - 5.0, 0.0)
+    np.testing.assert_array_equal(context["car_left"][free <= 5.0], 1.0)
+    np.testing.assert_array_equal(context["car_left"][free >= 15.0], 0.0)
+    np.testing.assert_allclose(context["car_left"], np.interp(free, [5.0, 15.0], [1.0, 0.0]), atol=0.1)
     assert np.isposinf(context["lead_distance"]).all()
 
 
@@ -90,6 +95,24 @@ def test_oncoming_traffic_is_seen_ahead_only(tmp_path: Path) -> None:
     ahead = 200.0 - 60.0 * own.time[GRID] > 0
     np.testing.assert_allclose(context["oncoming_distance"][ahead], np.maximum(between[ahead], 0.0), atol=1e-6)
     assert np.isnan(context["oncoming_distance"][~ahead]).all()
+
+
+def test_against_the_lanes_traffic_everything_is_seen_the_other_way_round(tmp_path: Path) -> None:
+    network = two_roads(tmp_path)
+    own = drive(network, entity("own"), lane=-3, start=550.0)
+    others = [
+        drive(network, entity("inner"), lane=-2, start=550.0),
+        drive(network, entity("behind"), lane=-3, start=600.0),
+        drive(network, entity("same way"), lane=-3, start=500.0),
+    ]
+    for one in (own, others[0], others[2]):
+        one.heading_relative[:] = np.pi
+    context = entity_context(together(own, *others), network, 0, GRID)
+    assert set(context["right_distance"]) == {0.0} and set(context["lane_index"]) == {2.0}
+    assert np.isnan(context["left_distance"]).all()
+    np.testing.assert_allclose(context["lead_distance"], 45.0, atol=1e-6)
+    assert np.isnan(context["oncoming_distance"]).all()  # it has passed
+    np.testing.assert_allclose(context["curvature"], -1.0 / (RADIUS + 2.5 * LANE_WIDTH), rtol=1e-9)
 
 
 def test_weather_holds_from_the_time_of_its_action_and_wind_is_relative_to_travel(tmp_path: Path) -> None:
@@ -123,3 +146,49 @@ def test_weather_holds_from_the_time_of_its_action_and_wind_is_relative_to_trave
 def test_a_scenario_without_weather_supplies_none(tmp_path: Path) -> None:
     network = two_roads(tmp_path)
     assert "rain" not in entity_context(together(drive(network, entity())), network, 0, GRID)
+
+
+def _changing(network: RoadNetwork, who: Entity, lane: int, to_left: float, start: float) -> EntityMotion:
+    """A change to the next lane of travel on the left (1) or right (-1), a second and a half long, from 4 s on."""
+    time = drive(network, who, lane=lane, start=start).time
+    u = np.clip((time - 4.0) / 1.5, 0.0, 1.0)
+    across = to_left * LANE_WIDTH * u**3 * (10.0 - 15.0 * u + 6.0 * u**2)
+    inward = 1 if lane < 0 else -1  # the next lane to the left of travel has an id nearer to 0
+    beyond = np.abs(across) > 0.5 * LANE_WIDTH
+    motion = drive(network, who, lane=lane, start=start, offset=across)
+    lanes = np.where(beyond, lane + inward * int(to_left), lane).astype(np.int32)
+    return replace(motion, lane=lanes, offset=np.where(beyond, across - to_left * LANE_WIDTH, across))
+
+
+@pytest.mark.parametrize("lane", [-2, 2])
+@pytest.mark.parametrize("who", ["other", "own"])
+@pytest.mark.parametrize("to_left", [1.0, -1.0])
+def test_neighbours_come_and_go_as_the_lane_change_does(tmp_path: Path, lane: int, who: str, to_left: float) -> None:
+    network = two_roads(tmp_path)
+    still = drive(network, entity("still"), lane=lane, start=120.0)
+    moving = _changing(network, entity("moving", TRUCK), lane, to_left, 100.0)
+    motion = together(*((still, moving) if who == "other" else (moving, still)))
+    context = entity_context(motion, network, 0, GRID)
+    near = {
+        side: np.exp(-np.nan_to_num(context[f"{side}_distance"], nan=np.inf) / NEAR)
+        for side in ("lead", "left", "right")
+    }
+    # who goes to the left has the other on the right afterwards
+    side = "left" if (to_left > 0) == (who == "other") else "right"
+    other = {"left": "right", "right": "left"}[side]
+    np.testing.assert_allclose(near[side][[0, -1]], [0.0, np.exp(-15.0 / NEAR)], atol=1e-9)
+    assert not near[other].any()
+    assert (np.diff(near[side]) >= -1e-12).all()
+    rate = np.abs(np.diff([near["lead"], near[side]], axis=1)).max()
+    assert rate < 0.35, "a lane change of 1.5 s crosses in several steps of 0.2 s"
+    assert context["lane_index"][0] == pytest.approx(1.0, abs=1e-3)
+    assert np.abs(np.diff(context["lane_index"])).max() < 0.1
+
+
+def test_a_step_of_the_road_is_seen_over_the_way_around_it(tmp_path: Path) -> None:
+    network = two_roads(tmp_path)
+    context = entity_context(together(drive(network, entity(), start=380.0)), network, 0, GRID)
+    curve = context["curvature"] * (RADIUS + 1.5 * LANE_WIDTH)
+    middle = float(np.interp(0.5, curve, 0.2 * np.arange(len(GRID))))
+    assert middle == pytest.approx(4.0, abs=0.11)
+    assert np.diff(curve).max() < 0.2 / np.sqrt(2.0 * np.pi) / STEERING * 1.01

@@ -51,14 +51,16 @@ def test_exactly_40_km_h_counts_as_road_following_and_a_hair_less_does_not(tmp_p
     assert cut_segments(drive(network, entity(), speed=11.1), network)[0].kind is SegmentKind.SLOW
 
 
-def test_a_teleport_cuts_and_wrong_way_driving_is_no_segment(tmp_path: Path) -> None:
+def test_a_teleport_cuts_and_only_who_drives_across_the_lane_follows_none(tmp_path: Path) -> None:
     network = two_roads(tmp_path)
     activity = np.full(501, ACTIVE, dtype=np.uint8)
     activity[250] |= int(Activity.TELEPORTED)
     motion = drive(network, entity(), activity=activity)
     assert [span.first for span in cut_segments(motion, network)] == [0, 250]
-    motion.heading_relative[:] = np.pi
-    assert {span.kind for span in cut_segments(motion, network)} == {SegmentKind.AGAINST_LANE}
+    motion.heading_relative[:] = np.pi  # overtaking on the lane of those who come towards it
+    assert all(span.is_road_following for span in cut_segments(motion, network))
+    motion.heading_relative[:] = np.pi / 2
+    assert {span.kind for span in cut_segments(motion, network)} == {SegmentKind.ACROSS_LANE}
 
 
 def test_a_trailer_has_no_driver(tmp_path: Path) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import hashlib
 import os
 import random
@@ -15,11 +16,13 @@ from pathlib import Path
 import pytest
 
 from tests.pipeline.fake_converter import convert, convert_and_log
+from xosc_lateral.errors import FormatError
+from xosc_lateral.formats.hashes import file_hash
 from xosc_lateral.pipeline.batch import STATE, BatchStoppedError, JobOutcome, JobState, convert_many
 from xosc_lateral.pipeline.guard import JobLimits
-from xosc_lateral.pipeline.jobs import plan_batch
+from xosc_lateral.pipeline.jobs import Job, plan_batch
 from xosc_lateral.pipeline.lock import FolderInUseError, folder_lock
-from xosc_lateral.pipeline.manifest import MANIFEST, TIMINGS, read_manifest
+from xosc_lateral.pipeline.manifest import MANIFEST, TIMINGS, ManifestRow, read_manifest
 from xosc_lateral.pipeline.settings import ConvertSettings
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -365,3 +368,28 @@ def test_workers_end_with_a_killed_run(tmp_path: Path) -> None:
     while any(map(alive, workers)) and time.monotonic() < deadline:
         time.sleep(0.05)
     assert not [pid for pid in workers if alive(pid)]
+
+
+def test_a_run_that_makes_nothing_leaves_no_folder(tmp_path: Path) -> None:
+    inputs = tmp_path / "in"
+    for name in ("good/a.xosc", "bad/deep/b.xosc"):
+        (inputs / name).parent.mkdir(parents=True)
+        (inputs / name).write_text("broken" if "b." in name else "fine")
+    batch = plan_batch([inputs], tmp_path / "new" / "out")
+
+    def stopped(job: Job) -> ManifestRow:
+        raise OSError(errno.ENOSPC, "No space left on device", str(job.output))
+
+    with pytest.raises(BatchStoppedError):
+        list(convert_many(batch, workers=0, converter=stopped))
+    assert not (tmp_path / "new").exists()
+
+    def half(job: Job) -> ManifestRow:
+        job.output.parent.mkdir(parents=True, exist_ok=True)
+        if "bad" in job.name:
+            raise FormatError("broken", path=job.source)
+        job.output.write_text("made")
+        return replace(job.row(), output_sha256=file_hash(job.output))
+
+    assert len(list(convert_many(batch, workers=0, converter=half))) == 2
+    assert sorted(path.name for path in (tmp_path / "new" / "out").iterdir()) == ["good", MANIFEST, TIMINGS]

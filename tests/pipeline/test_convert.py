@@ -90,7 +90,7 @@ def test_provenance_names_seed_profile_version_and_the_hash_of_every_input(tmp_p
     text = conversion.output.read_text(encoding="utf-8")
     for path in tmp_path.glob("*.xodr"):
         assert hashlib.sha256(path.read_bytes()).hexdigest() in text
-    assert conversion.provenance.seed == 7
+    assert conversion.provenance.options["seed"] == 7
     assert all(digest in text for _, digest in conversion.provenance.profiles.values())
 
 

@@ -69,7 +69,7 @@ def test_a_folder_becomes_a_folder_with_a_manifest(database: Path, tmp_path: Pat
     assert row.scenario_sha256 == file_hash(database / "cut-in" / "cut-in.xosc")
     assert row.road_sha256 == file_hash(database / row.road)
     assert json.loads(row.inputs)["cut-in/cut-in.xosc"] == row.scenario_sha256
-    assert (row.seed, row.variant) == (3, 1)
+    assert (row.seed, row.variant) == (3, 2)
     assert set(json.loads(row.profiles).values()) == set(json.loads(row.profile_sha256)) == {simulated_profile().name}
     assert len(row.enriched) > 0
     assert row.segment_seconds > 5.0

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shutil
 from dataclasses import replace
 from pathlib import Path
@@ -108,9 +109,32 @@ def test_variants_are_numbered_and_their_fingerprints_differ(database: Path, tmp
 
 def test_what_is_named_twice_is_converted_once_unless_settings_differ(database: Path, tmp_path: Path) -> None:
     assert len(plan_batch([database, database / "a" / "x.xosc"], tmp_path / "out").jobs) == 3
-    requests = [Request(database / "z.XOSC", ConvertSettings(seed=seed)) for seed in (1, 2, 1)]
+    requests = [Request(database / "z.XOSC", ConvertSettings(seed=seed), label=f"_{seed}") for seed in (1, 2, 1)]
     batch = plan_batch(requests, tmp_path / "out")
-    assert [(job.name, job.settings.seed) for job in batch.jobs] == [("z.XOSC", 1), ("z_r001.XOSC", 2)]
+    assert [(job.name, job.settings.seed) for job in batch.jobs] == [("z_1.XOSC", 1), ("z_2.XOSC", 2)]
+    unnamed = [Request(database / "z.XOSC", ConvertSettings(seed=seed)) for seed in (1, 2)]
+    with pytest.raises(FormatError, match=r"written twice: .* with other settings; a column `name` tells them apart"):
+        plan_batch(unnamed, tmp_path / "out")
+
+
+def test_one_more_row_renames_no_other_output_and_a_name_is_taken_as_it_is(database: Path, tmp_path: Path) -> None:
+    table = database / "t.csv"
+    rows = ["z.XOSC,,,", "z.XOSC,motorway-vehicle-1,,", "z.XOSC,motorway-vehicle-1,2,", "z.XOSC,,3,own"]
+
+    def outputs(*lines: str) -> dict[tuple[str, int], str]:
+        table.write_text("\n".join(["scenario,profile,seed,name", *lines]) + "\n")
+        jobs = plan_batch([table], tmp_path / "out").jobs
+        return {(str(job.settings.profile), job.settings.seed): job.name for job in jobs}
+
+    named = outputs(*rows)
+    assert named["auto", 0] == "z.XOSC" and named["motorway-vehicle-1", 0] == "z_motorway-vehicle-1.XOSC"
+    assert named["auto", 3] == "own.XOSC"
+    assert re.fullmatch(r"z_motorway-vehicle-1_[0-9a-f]{8}\.XOSC", named["motorway-vehicle-1", 2])
+    assert outputs("z.XOSC,,9,", *reversed(rows)).items() > named.items()
+    for row in rows:
+        assert outputs(row).items() <= named.items()
+    with pytest.raises(FormatError, match=r"t\.csv:2: name '\.\./evil': expected the name of a file"):
+        outputs("z.XOSC,,1,../evil")
 
 
 def test_a_distribution_stands_for_its_scenarios(tmp_path: Path) -> None:
@@ -148,7 +172,11 @@ def test_a_table_gives_each_scenario_its_settings(database: Path, tmp_path: Path
     path = database / f"table{suffix}"
     table.to_csv(path, index=False) if suffix == ".csv" else table.to_parquet(path)
     jobs = plan_batch([path], tmp_path / "out", ConvertSettings(seed=5)).jobs
-    assert [job.name for job in jobs] == ["a/x_01.xosc", "a/x_02.xosc", "z.XOSC"]
+    assert [re.sub("_[0-9a-f]{8}", "_#", job.name) for job in jobs] == [
+        "a/x_mine_#_01.xosc",
+        "a/x_mine_#_02.xosc",
+        "z_#.XOSC",
+    ]
     first, last = jobs[0].settings, jobs[2].settings
     assert (first.profile, first.seed, first.only) == (str(database / "mine.json"), 5, None)
     assert first.parameters == {"Gap": "2", "Name": "x"}
@@ -232,4 +260,4 @@ def test_cells_that_name_no_file_are_refused_in_a_line(database: Path, tmp_path:
     with pytest.raises(FormatError, match=r"rows\.csv:3: .*zero byte"):
         plan_batch([table], tmp_path / "out")
     table.write_text(f"scenario,profile\ndb/a/x.xosc,{'p' * 5000}\n")
-    assert names(plan_batch([table], tmp_path / "out")) == ["db/a/x.xosc"]  # the conversion says what is wrong
+    assert len(names(plan_batch([table], tmp_path / "out"))[0]) < 30  # the conversion says what is wrong

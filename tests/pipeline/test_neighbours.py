@@ -29,7 +29,7 @@ def test_an_argument_comes_before_the_configuration_and_both_are_said(tmp_path: 
 
     def neighbours(**given: str) -> tuple[str, str]:
         made = xl.convert(scenario, seed=1, time_limit=6.0, profile="motorway-vehicle-1", ego="none", **given)
-        return made.to_dict()["provenance"]["neighbours"], str(made)
+        return made.to_dict()["provenance"]["options"]["neighbours"], str(made)
 
     used, said = neighbours()
     assert used == "borrow" and "left unknown: borrowed from the population" in said

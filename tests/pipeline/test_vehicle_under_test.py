@@ -22,6 +22,7 @@ from tests.formats.made_scenario import (
 )
 from tests.scenario.test_under_test import at, controller, event, headway, state, stories
 from xosc_lateral.cli import main
+from xosc_lateral.motion.nominal import NominalMotion
 from xosc_lateral.pipeline.load import play_scenario
 from xosc_lateral.pipeline.manifest import read_manifest
 from xosc_lateral.pipeline.meaning import with_speeds
@@ -169,7 +170,8 @@ def test_a_longer_run_is_not_one_that_was_cut_off_and_a_replay_ends_when_it_did(
         )
         assert [float(end) for end in ends] == [pytest.approx(nominal.end_time, abs=0.02)]
     else:
-        assert made.end_time == pytest.approx(1.3 * nominal.end_time, abs=0.02)
+        # 1 s and 2 s of braking at 3 m/s2 from 30 m/s to 24 m/s, and the rest of the 250 m
+        assert made.end_time == pytest.approx(3.0 + (250.0 - 30.0 - 54.0) / 24.0, abs=0.1)
 
 
 def test_offsets_that_change_what_happens_are_left_out_by_name(tmp_path: Path) -> None:
@@ -187,6 +189,59 @@ def test_offsets_that_change_what_happens_are_left_out_by_name(tmp_path: Path) -
     assert made.modes == {}
     assert [line for line in made.warnings if line.startswith("'A' stays as it is")]
     assert _of(tmp_path / "out.xosc", "A") == _of(path, "A")
+    # Also where nothing is written.
+    assert xl.convert(path, mode="lane-offset", profile="motorway", seed=5).modes == {}
+
+
+def _near(tmp_path: Path, speed: str, *events: str) -> Path:
+    """A changes to the right when Ego comes near it from behind."""
+    text = scenario_text(
+        entities=entity("Ego", controller=EXTERNAL) + entity("A"),
+        init=private("Ego", teleport("50"), speed_action(speed)) + private("A", teleport("110"), speed_action("27")),
+        stories=stories(("A", event("change", headway("Ego", "A"), CHANGE) + "".join(events))),
+        stop=time_condition(25),
+    )
+    return write_scenario(tmp_path, text)
+
+
+def _driven(source: Path, output: Path, factor: float) -> NominalMotion:
+    played = play_scenario(output)
+    faster = with_speeds(played.scenario, play_scenario(source).motion, ["Ego"], factor)
+    return play(faster, played.network, step=0.01)
+
+
+def test_a_lane_change_that_the_nominal_run_does_not_come_to_turns_nobody_at_once_and_movement_follows_it(
+    tmp_path: Path,
+) -> None:
+    path = _near(tmp_path, "25")
+    assert not [one for one in play_scenario(path).motion.actions if one.path[-2:-1] == ("change",)]
+    assert xl.convert(path, tmp_path / "out.xosc", seed=1).modes == {"A": "lane-offset"}
+    motion = _driven(path, tmp_path / "out.xosc", 1.2)
+    (change,) = [one for one in motion.actions if one.path[-2:-1] == ("change",)]
+    own = next(one for one in motion.entities if one.name == "A")
+    before, after = own.time < change.start - 0.005, own.time > change.end + 0.2
+    assert 1e-4 < np.abs(own.heading_relative[before]).max() < 1e-3
+    assert np.ptp(own.offset[before]) > 0.01
+    for start in (change.end + 0.2, change.end + 6.0):
+        assert np.ptp(own.offset[after & (own.time > start) & (own.time < start + 5.0)]) > 0.005
+    assert set(own.lane[after].tolist()) == {-2}
+
+
+def test_a_lane_change_that_is_given_up_for_another_leaves_that_to_its_end(tmp_path: Path) -> None:
+    back = event("back", state("change", "startTransition"), CHANGE.replace('value="-2"', 'value="-1"'))
+    path = _near(tmp_path, "30", back.replace('name="back when" delay="0"', 'name="back when" delay="1.5"'))
+    made = xl.convert(path, tmp_path / "out.xosc", seed=1)
+    assert made.modes == {"A": "lane-offset"} and not [line for line in made.warnings if "offsets" in line]
+    for factor in (1.0, 1.2):
+        runs = [_driven(path, one, factor) for one in (path, tmp_path / "out.xosc")]
+        spans = [
+            {one.path[-2]: (one.start, one.end) for one in run.actions if one.path[-2:-1] in (("change",), ("back",))}
+            for run in runs
+        ]
+        assert spans[0].keys() == spans[1].keys() == {"change", "back"}
+        for name, span in spans[0].items():
+            assert spans[1][name] == pytest.approx(span, abs=0.05), (factor, name)
+        assert [run.entities[1].lane[-1] for run in runs] == [-1, -1]
 
 
 def test_a_name_that_some_scenarios_of_a_folder_lack_applies_where_it_exists(

@@ -39,6 +39,7 @@ def convert_many(
     cluster: str | None = None,
     job_timeout: float = JOB_TIMEOUT.value,
     job_memory: float = JOB_MEMORY.value,
+    keep_old: bool = False,
     force: bool = False,
     show: Literal["auto", "quiet", "json", "nothing"] = "nothing",
     on_outcome: Callable[[Mapping[str, Any]], None] | None = None,
@@ -63,12 +64,14 @@ def convert_many(
         Address of a dask.distributed scheduler to work on.
     job_timeout, job_memory : float
         What one scenario may take; one that takes more fails. [s], [MB]
+    keep_old : bool
+        Leave outputs as they are whose inputs, settings or program have changed since; they count as stale.
     force : bool
         Replace files that this package did not write.
     show : {"auto", "quiet", "json", "nothing"}
         What is said on standard error meanwhile.
     on_outcome : callable, optional
-        Told each output's row of the manifest as it comes, with `state` and `seconds`.
+        Called with each output's row of the manifest as it comes, with `state` and `seconds`.
     options
         `ConvertOptions`, for all of them.
 
@@ -91,7 +94,9 @@ def convert_many(
     # A folder in an output's place is that output's failure alone.
     claim((job.output for job in batch.jobs if not job.output.is_dir()), force=force)
     limits = JobLimits(job_timeout, job_memory)
-    outcomes = outcomes_of(batch, workers=workers, cluster=cluster, limits=limits, notify=_notifier(show))
+    outcomes = outcomes_of(
+        batch, workers=workers, cluster=cluster, keep_old=keep_old, limits=limits, notify=_notifier(show)
+    )
     became: dict[str, tuple[JobState, float]] = {}
     summary = follow(_noted(outcomes, became, on_outcome), len(batch), Display(show))
     index = None if report is None else write_batch_index(batch, Path(report))
@@ -118,12 +123,12 @@ def _refuse_unknown_names(batch: Batch) -> None:
 def _noted(
     outcomes: Iterator[JobOutcome],
     became: dict[str, tuple[JobState, float]],
-    tell: Callable[[Mapping[str, Any]], None] | None,
+    report_row: Callable[[Mapping[str, Any]], None] | None,
 ) -> Iterator[JobOutcome]:
     for outcome in outcomes:
         became[outcome.row.output] = outcome.state, outcome.seconds
-        if tell is not None:
-            tell(_row(outcome.state, outcome.seconds, outcome.row))
+        if report_row is not None:
+            report_row(_row(outcome.state, outcome.seconds, outcome.row))
         yield outcome
 
 

@@ -27,7 +27,7 @@ def convert(
     scenario: PathLike,
     output: PathLike | None = None,
     *,
-    variant: int = 0,
+    variant: int = 1,
     report: PathLike | None = None,
     force: bool = False,
     **options: Unpack[ConvertOptions],
@@ -42,7 +42,7 @@ def convert(
         File, or folder, to write to. Without it nothing is written; `Conversion.data` holds what would be, with file
         references as seen from the scenario's folder.
     variant : int
-        Another one, other offsets.
+        From 1: another one, other offsets.
     report : str or Path, optional
         HTML page to write about what was changed.
     force : bool
@@ -55,12 +55,14 @@ def convert(
     FormatError, PlaybackError, DriverProfileError
         With file, line and element; nothing is written then.
     """
+    if variant < 1:
+        raise ValueError(f"variant {variant}, they count from 1")
     settings = ConvertSettings.of(**options)
     source = Path(scenario)
     written = source if output is None else output_scenario(output, source)
     page = None if report is None else output_file(report, f"{written.stem}.html", REPORT_SUFFIXES)
     claim([None if output is None else written, page], [source], force=force)
-    made = convert_scenario(source, written, settings, variant=variant, report=page, save=output is not None)
+    made = convert_scenario(source, written, settings, variant=variant - 1, report=page, save=output is not None)
     result = Conversion(made)
     if page is not None:
         result.write_report(page, force=force)
@@ -215,7 +217,7 @@ class Conversion(Result):
         claim(outputs, [self.source], force=force)
         made = self._made.enriched
         host = host_of(made.motion, self.ego)
-        said = f"{self.source.name}, enriched by xosc-lateral, seed {made.seed}, variant {made.variant}"
+        said = f"{self.source.name}, enriched by xosc-lateral, seed {made.seed}, variant {made.variant + 1}"
         paths = [entity.trajectory for entity in made.entities]
         write_osi(enriched, made.motion, made.network, paths, host=host, description=said)
         said = f"{self.source.name}, as its maneuvers say"

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -18,6 +17,7 @@ from xosc_lateral.api.inputs import (
     naming,
 )
 from xosc_lateral.api.result import Result
+from xosc_lateral.formats.mapping import MappingLike
 from xosc_lateral.formats.output_paths import claim, output_file
 
 if TYPE_CHECKING:
@@ -35,7 +35,7 @@ def evaluate(
     *,
     seed: int = 0,
     classify: bool = True,
-    columns: Mapping[str, str] | None = None,
+    columns: MappingLike | None = None,
     library: Paths = (),
 ) -> Evaluation:
     """Score a profile beside other real drivers, and by the paper's four evaluations.
@@ -48,7 +48,7 @@ def evaluate(
     seed : int
         Same inputs and seed: same numbers.
     classify : bool
-        Train classifiers to tell sampled from measured (extra `classifier`; a minute or two for some hours).
+        Train classifiers to separate sampled and measured (extra `classifier`; a minute or two for some hours).
     library : path or paths
         Folders with further profiles.
 
@@ -78,17 +78,17 @@ class Evaluation(Result):
 
     @property
     def ratio(self) -> float:
-        """Mean distance of the ten metrics over the mean floor; 1: as close as real data is to itself. [-]"""
+        """Mean distance of the ten metrics over that between real drivers; 1: as close as these. [-]"""
         return self._scores.snippets.ratio
 
     @property
     def realism(self) -> Realism:
-        """The fair measure: every condition's distances, floors and classifiers."""
+        """The fair measure: every condition's distances, those between real drivers (`floor`), and classifiers."""
         return self._scores.realism
 
     @property
     def worst(self) -> tuple[str, float]:
-        """The block that does worst, and its ratio to the floor; see `to_frame`. [-]"""
+        """The block that does worst, and its ratio to real drivers; see `to_frame`. [-]"""
         from xosc_lateral.report.evaluation import worst_block
 
         return worst_block(self._scores)
@@ -97,7 +97,7 @@ class Evaluation(Result):
         """One line."""
         block, ratio = self.worst
         hours = f"{self._scores.hours:.2f} h of {self._scores.drives} drives"
-        return f"{self.profile.name} on {hours}: worst {block}, {ratio:.2f} times the floor"
+        return f"{self.profile.name} on {hours}: worst {block}, {ratio:.2f} times that between real drivers"
 
     def __str__(self) -> str:
         from xosc_lateral.report.evaluation import evaluation_text

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 from xosc_lateral.api.inputs import DrivesLike, given_drives, naming
@@ -10,9 +9,10 @@ from xosc_lateral.api.inputs import DrivesLike, given_drives, naming
 if TYPE_CHECKING:
     from xosc_lateral.driver.profile import DriverProfile
     from xosc_lateral.drives.drive import Drive
+    from xosc_lateral.formats.mapping import MappingLike
 
 
-def read_drives(drives: DrivesLike, columns: Mapping[str, str] | None = None) -> list[Drive]:
+def read_drives(drives: DrivesLike, columns: MappingLike | None = None) -> list[Drive]:
     """Read and clean drive tables.
 
     Parameters
@@ -20,7 +20,7 @@ def read_drives(drives: DrivesLike, columns: Mapping[str, str] | None = None) ->
     drives : path, DataFrame, Drive, or sequence of them
         `time` [s]; `distance_left` and `distance_right` [m], or `offset` and `lane_width` [m]; `speed` [m/s] if known;
         `drive` when there are several; every other numeric column is context.
-    columns : mapping of str to str, optional
+    columns : mapping of str to str, TableMapping, or path, optional
         Standard name -> foreign header, with a unit if need be: ``{"speed": "v_kmh:km/h"}``.
 
     Raises
@@ -38,7 +38,7 @@ def fit(
     *,
     name: str,
     model: str = "autoregressive",
-    columns: Mapping[str, str] | None = None,
+    columns: MappingLike | None = None,
     source: str = "",
     licence: str = "",
     sensor_noise: float | None = None,

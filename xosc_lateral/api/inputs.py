@@ -22,6 +22,8 @@ __all__ = ["DrivesLike", "PathLike", "Paths", "ProfileLike", "as_paths", "given_
 if TYPE_CHECKING:
     import pandas as pd
 
+    from xosc_lateral.formats.mapping import MappingLike
+
 DrivesLike: TypeAlias = "PathLike | pd.DataFrame | Drive | Sequence[PathLike | pd.DataFrame | Drive]"
 """A table's path, a frame, a `Drive`, or several of them."""
 
@@ -63,24 +65,25 @@ def naming(given: GivenDrives) -> Iterator[None]:
         raise NotEnoughDataError(f"{', '.join(names[:3])}{more}: {error}") from error
 
 
-def given_drives(drives: DrivesLike, columns: Mapping[str, str] | None = None) -> GivenDrives:
+def given_drives(drives: DrivesLike, columns: MappingLike | None = None) -> GivenDrives:
     """Read whatever stands for measured drives.
 
     Parameters
     ----------
     drives : path, DataFrame, Drive, or sequence of them
-    columns : mapping of str to str, optional
-        Standard name -> foreign header, with a unit if need be: ``{"speed": "v_kmh:km/h"}``.
+    columns : mapping of str to str, TableMapping, or path, optional
+        Standard name -> foreign header, with a unit if need be: ``{"speed": "v_kmh:km/h"}``; or a saved mapping.
 
     Raises
     ------
     FormatError, NotEnoughDataError
         See `formats.drives.read_drives`.
     """
-    from xosc_lateral.formats.drives import drives_of_table, parse_map, read_drives, with_distinct_names
+    from xosc_lateral.formats.drives import drives_of_table, read_drives, with_distinct_names
+    from xosc_lateral.formats.mapping import as_mapping
 
     items = _listed(drives)
-    mapping = parse_map(f"{name}={column}" for name, column in (columns or {}).items())
+    mapping = as_mapping(columns)
     files = [Path(item) for item in items if isinstance(item, str | Path)]
     if len(files) == len(items):
         return GivenDrives(read_drives(files, mapping), parsed_hashes(files), tuple(files))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -17,6 +17,7 @@ from xosc_lateral.api.inputs import (
     naming,
 )
 from xosc_lateral.api.result import Result
+from xosc_lateral.formats.mapping import MappingLike
 from xosc_lateral.formats.output_paths import claim, output_folder
 
 if TYPE_CHECKING:
@@ -35,7 +36,7 @@ def close_loop(
     seed: int = 0,
     name: str = "refined",
     leave_out: Collection[str] = (),
-    columns: Mapping[str, str] | None = None,
+    columns: MappingLike | None = None,
     library: Paths = (),
     progress: Callable[[float, str], None] | None = None,
 ) -> ClosedLoop:

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
     from xosc_lateral.driver.profile import DriverProfile
     from xosc_lateral.formats.library import Entry
+    from xosc_lateral.pipeline.derive import Derived
     from xosc_lateral.report.comparison import Compared
 
 PROFILE_SUFFIXES = (".json",)
@@ -67,6 +68,45 @@ def write_card(profile: DriverProfile, path: PathLike, *, force: bool = False) -
     output = output_file(path, f"{profile.name}.html", (".html", ".htm"))
     claim([output], force=force)
     return write_atomically(output, card_page(profile))
+
+
+def derive_profile(
+    base: ProfileLike = "motorway",
+    *,
+    name: str = "",
+    preset: str | None = None,
+    library: Paths = (),
+    **asked: float | str | None,
+) -> Derived:
+    """A driver from stated figures: what a profile does, made larger, slower or elsewhere until it has them.
+
+    Parameters
+    ----------
+    base : DriverProfile, path or name
+        Gives what is not stated; of a population its typical driver.
+    name : str
+        Id of the new profile; else the preset's or the base's name with ``-derived``.
+    preset : str, optional
+        One of `pipeline.derive.PRESETS`: figures with a source.
+    library : path or paths
+        Folders with further profiles.
+    **asked
+        Fields of `pipeline.derive.Asked`: ``sdlp=0.25``.
+
+    Raises
+    ------
+    DriverProfileError
+        If figures contradict each other, are too far from the base's, or no car could drive them.
+    """
+    from dataclasses import replace
+
+    from xosc_lateral.pipeline.derive import Asked, derive, preset_called
+
+    known = given_profile(base, library)
+    chosen = None if preset is None else preset_called(preset)
+    stated = {key: value for key, value in asked.items() if value is not None}
+    figures = Asked(**stated) if chosen is None else replace(chosen.asked, **stated)  # type: ignore[arg-type]
+    return derive(known, figures, name or preset or f"{known.name}-derived", preset=chosen)
 
 
 def list_profiles(

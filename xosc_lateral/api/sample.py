@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -18,6 +18,7 @@ from xosc_lateral.api.inputs import (
 )
 from xosc_lateral.api.result import Result
 from xosc_lateral.drives.zones import ZONE
+from xosc_lateral.formats.mapping import MappingLike
 from xosc_lateral.formats.output_paths import claim, output_file
 
 if TYPE_CHECKING:
@@ -40,7 +41,7 @@ def sample(
     speed: float = 30.0,
     lane_width: float | None = None,
     with_sensor: bool = False,
-    columns: Mapping[str, str] | None = None,
+    columns: MappingLike | None = None,
     library: Paths = (),
 ) -> Offsets:
     """Sample offsets; one of `like`, `context` and `duration` says for what.
@@ -58,7 +59,7 @@ def sample(
         Add what the sensor added to the drives that the profile was fitted on, for tests of a perception chain.
     seed : int
         Same inputs and seed: same offsets.
-    columns : mapping of str to str, optional
+    columns : mapping of str to str, TableMapping, or path, optional
         See `read_drives`.
     library : path or paths
         Folders with further profiles.
@@ -110,7 +111,7 @@ def _unknown_zones(profile: DriverProfile, drives: Sequence[Drive]) -> list[str]
     strange = sorted(there - known)
     if not known or not strange:
         return []
-    return [f"{len(strange)} of {len(there)} zones are not the profile's ({strange[0]}, say), taken as neutral"]
+    return [f"{len(strange)} of {len(there)} zones are not the profile's ({strange[0]}, say), taken as the mean of all"]
 
 
 def _known(drive: Drive) -> set[str]:
@@ -118,7 +119,7 @@ def _known(drive: Drive) -> set[str]:
 
 
 def _neutral(where: str, columns: Sequence[str]) -> str:
-    return f"{where}: {', '.join(columns)} not known, taken as neutral"
+    return f"{where}: {', '.join(columns)} not known, left without effect"
 
 
 class Offsets(Result):

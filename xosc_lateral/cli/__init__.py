@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
+import time
 from collections.abc import Sequence
 from functools import cache
 from importlib import import_module
@@ -18,6 +19,8 @@ from xosc_lateral.version import __version__
 
 VERBS = {
     "convert": "Make scenarios lifelike: one, several, a folder.",
+    "verify": "Whether outputs are what would be made today.",
+    "reproduce": "Make an output again from what it carries.",
     "view": "Play a scenario in the browser.",
     "play": "Write the nominal motion as a table.",
     "segments": "Where offsets are sampled, and why not elsewhere.",
@@ -108,7 +111,10 @@ def main(argv: Sequence[str] | None = None) -> int:
             sys.stderr.close()
             code = 0
         else:
-            print(f"xosc-lateral: {' '.join(_in_words(error).split())}", file=sys.stderr)
+            line = f"xosc-lateral: {' '.join(_in_words(error).split())}"
+            if "--log-json" in words:
+                line = json.dumps({"event": "error", "time": round(time.time(), 3), **_as_dict(error)})
+            print(line, file=sys.stderr)
             if "--json" in words:
                 print(json.dumps(_as_dict(error), ensure_ascii=False))
             code = 1
@@ -119,7 +125,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         )
         code = 130
     except Exception as error:
-        # Typer's usage errors come from a click that is vendored in some of its releases: told by their duck shape.
+        # Typer's usage errors come from a click that is vendored in some of its releases: known by attributes.
         if not hasattr(error, "exit_code") or not hasattr(error, "format_message"):
             raise
         usage = cast(Any, error)

@@ -33,14 +33,14 @@ def convert_batch(
         raise typer.BadParameter("several scenarios need a folder for their outputs: -o FOLDER", param_hint="-o")
     finished = 0
 
-    def tell(row: Mapping[str, Any]) -> None:
+    def show(row: Mapping[str, Any]) -> None:
         nonlocal finished
         finished += row["state"] != "failed"
         if as_json:
             say_json({"kind": "output", **row})
 
     try:
-        result = convert_many(list(inputs), output, on_outcome=tell, **settings)
+        result = convert_many(list(inputs), output, on_outcome=show, **settings)
     except KeyboardInterrupt:
         typer.echo(
             f"\nxosc-lateral: interrupted; {finished} outputs in {output} are finished, and the same command continues",

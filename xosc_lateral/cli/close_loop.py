@@ -7,7 +7,19 @@ from typing import Annotated
 
 import typer
 
-from xosc_lateral.cli.words import AsJson, Columns, Force, Library, Quiet, Seed, Tables, examples, pairs, say
+from xosc_lateral.cli.words import (
+    AsJson,
+    Columns,
+    Force,
+    Library,
+    MappingFile,
+    Quiet,
+    Seed,
+    Tables,
+    examples,
+    mapped,
+    say,
+)
 
 
 def register(app: typer.Typer) -> None:
@@ -32,6 +44,7 @@ def close_loop(
         list[str] | None, typer.Option(metavar="COLUMN", help="Context column to ignore; may be repeated.")
     ] = None,
     columns: Columns = None,
+    mapping_file: MappingFile = None,
     library: Library = None,
     force: Force = False,
     quiet: Quiet = False,
@@ -53,7 +66,7 @@ def close_loop(
             seed=seed,
             name=written.stem,
             leave_out=leave_out or (),
-            columns=pairs(columns, "--map"),
+            columns=mapped(columns, mapping_file),
             library=library or (),
             progress=progress,
         )

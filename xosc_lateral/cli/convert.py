@@ -80,6 +80,9 @@ def convert(
     cluster: Annotated[
         str | None, typer.Option(metavar="ADDRESS", help="Address of a dask scheduler.", rich_help_panel=BATCH)
     ] = None,
+    keep_old: Annotated[
+        bool, typer.Option("--keep-old", help="Leave outputs of older inputs or versions alone.", rich_help_panel=BATCH)
+    ] = False,
     log_json: Annotated[
         bool, typer.Option("--log-json", help="Progress as JSON lines on stderr.", rich_help_panel=BATCH)
     ] = False,
@@ -110,6 +113,7 @@ def convert(
                 "report": report,
                 "workers": jobs,
                 "cluster": cluster,
+                "keep_old": keep_old,
                 "show": show,
                 "job_timeout": job_timeout,
                 "job_memory": job_memory,
@@ -198,7 +202,7 @@ def _convert_one(
         claim([*outputs, *pages, *both], [source], force=options["force"])
         unclean = False
         for variant, (path, its_page, trace) in enumerate(zip(outputs, pages, traces, strict=True)):
-            result = convert(source, path, variant=variant, report=its_page, **options)
+            result = convert(source, path, variant=variant + 1, report=its_page, **options)
             if trace is not None:
                 result.write_osi(trace, force=True)
             say(result, as_json=as_json, quiet=quiet)

@@ -6,7 +6,20 @@ from typing import Annotated
 
 import typer
 
-from xosc_lateral.cli.words import AsJson, Columns, Force, Library, Profile, Quiet, Seed, Tables, examples, pairs, say
+from xosc_lateral.cli.words import (
+    AsJson,
+    Columns,
+    Force,
+    Library,
+    MappingFile,
+    Profile,
+    Quiet,
+    Seed,
+    Tables,
+    examples,
+    mapped,
+    say,
+)
 
 
 def register(app: typer.Typer) -> None:
@@ -22,19 +35,20 @@ def evaluate(
     seed: Seed = 0,
     classify: Annotated[bool, typer.Option(help="Also train classifiers (extra `classifier`).")] = True,
     columns: Columns = None,
+    mapping_file: MappingFile = None,
     library: Library = None,
     force: Force = False,
     quiet: Quiet = False,
     as_json: AsJson = False,
 ) -> None:
-    """Score a profile on measured drives and on a floor of other real drivers: metrics, spectrum, classifiers."""
+    """Score a profile on measured drives, beside other real drivers: metrics, spectrum, classifiers."""
     from xosc_lateral import evaluate
     from xosc_lateral.api.convert import REPORT_SUFFIXES
     from xosc_lateral.formats.output_paths import claim, output_file
 
     page = None if report is None else output_file(report, "evaluation.html", REPORT_SUFFIXES)
     claim([page], tables, force=force)
-    mapping = pairs(columns, "--map")
+    mapping = mapped(columns, mapping_file)
     result = evaluate(profile, tables, seed=seed, classify=classify, columns=mapping, library=library or ())
     if page is not None:
         result.write_report(page, force=force)

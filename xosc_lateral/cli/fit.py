@@ -6,7 +6,18 @@ from typing import Annotated
 
 import typer
 
-from xosc_lateral.cli.words import AsJson, Columns, Force, Quiet, Tables, examples, pairs, say_json, write_stdout
+from xosc_lateral.cli.words import (
+    AsJson,
+    Columns,
+    Force,
+    MappingFile,
+    Quiet,
+    Tables,
+    examples,
+    mapped,
+    say_json,
+    write_stdout,
+)
 
 
 def register(app: typer.Typer) -> None:
@@ -42,6 +53,7 @@ def fit(
         ),
     ] = "autoregressive",
     columns: Columns = None,
+    mapping_file: MappingFile = None,
     name: Annotated[str, typer.Option(help="Name of the profile; default: the file's name.")] = "",
     source: Annotated[str, typer.Option(help="Description of the drives, for the provenance.")] = "",
     licence: Annotated[str, typer.Option(help="Licence of the drives, for the provenance.")] = "",
@@ -74,7 +86,7 @@ def fit(
     written = None if output == STDOUT else output_file(output, f"{usual}.json", PROFILE_SUFFIXES)
     claim([written], tables, force=force)
     called = name or (usual if written is None else written.stem)
-    mapping = pairs(columns, "--map")
+    mapping = mapped(columns, mapping_file)
     profile = fit(
         tables,
         name=called,

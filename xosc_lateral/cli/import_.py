@@ -9,7 +9,18 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperGroup
 
-from xosc_lateral.cli.words import AsJson, Force, Quiet, examples, pairs, say_json, write_stdout
+from xosc_lateral.cli.words import (
+    AsJson,
+    Columns,
+    Force,
+    MappingFile,
+    Quiet,
+    examples,
+    mapped,
+    pairs,
+    say_json,
+    write_stdout,
+)
 
 Source = Annotated[Path, typer.Argument(metavar="SOURCE", help="File or folder to read.", show_default=False)]
 Output = Annotated[
@@ -38,6 +49,10 @@ def register(app: typer.Typer) -> None:
         "import osi cut-in_gt.mcap -o drives.parquet", "import osi a.mcap b.mcap --host host -o ego.csv"
     )
     formats.command("osi", short_help="ASAM OSI traces.", epilog=osi_example)(osi)
+    table_example = examples("import table --propose monday.csv > company.toml") + examples(
+        "import table *.csv --mapping company.toml -o drives.parquet"
+    )
+    formats.command("table", short_help="Tables of drives under other names.", epilog=table_example)(table)
     app.add_typer(formats, name="import", short_help="Convert recordings into drive tables.", no_args_is_help=True)
 
 
@@ -71,6 +86,35 @@ def levelx(
     _import("levelx", [source], output, {"keep_cut": keep_cut}, force, quiet, as_json)
 
 
+def table(
+    sources: Annotated[list[Path], typer.Argument(metavar="TABLE...", help="Tables of drives.", show_default=False)],
+    output: Annotated[str, typer.Option("--output", "-o", metavar="TABLE", help="Drive table, or - .")] = "-",
+    mapping_file: MappingFile = None,
+    columns: Columns = None,
+    propose: Annotated[
+        bool, typer.Option("--propose", help="Write the first version of a mapping of these tables, with comments.")
+    ] = False,
+    force: Force = False,
+    quiet: Quiet = False,
+    as_json: AsJson = False,
+) -> None:
+    """Tables of drives under a company's own names, units and words, by a saved mapping."""
+    if not propose:
+        _import("table", sources, output, {"mapping": mapped(columns, mapping_file)}, force, quiet, as_json)
+        return
+    from xosc_lateral.formats.atomic import write_atomically
+    from xosc_lateral.formats.importers.foreign_table import propose_mapping
+    from xosc_lateral.formats.output_paths import STDOUT, claim, output_file
+
+    text = propose_mapping(sources)
+    if output == STDOUT:
+        write_stdout(text)
+        return
+    path = output_file(output, "mapping.toml", (".toml",))
+    claim([path], sources, force=force)
+    write_atomically(path, text)
+
+
 def mf4(
     sources: Annotated[
         list[Path], typer.Argument(metavar="SOURCE...", help="Logs; each is a drive of its own.", show_default=False)
@@ -84,6 +128,7 @@ def mf4(
             help="Channel of a column, e.g. speed=v_veh:km/h; default unit: the file's.",
         ),
     ] = None,
+    mapping_file: MappingFile = None,
     step: Annotated[
         float, typer.Option(help="Time step of the table, to which channels are interpolated [s].", min=0.001, max=1)
     ] = 0.04,
@@ -94,9 +139,17 @@ def mf4(
     """ASAM MDF bus logs (extra `mdf`). They need a channel map, since signal names differ from car to car."""
     from xosc_lateral.formats.importers.mf4 import channels_wanted
 
-    if not channels:
+    if not channels and mapping_file is None:
         raise typer.BadParameter(channels_wanted(sources[0]), param_hint="--map")
-    _import("mf4", sources, output, {"channels": channels, "step": step}, force, quiet, as_json)
+    _import(
+        "mf4",
+        sources,
+        output,
+        {"channels": channels or (), "step": step, "mapping": mapping_file},
+        force,
+        quiet,
+        as_json,
+    )
 
 
 def tracks(
@@ -111,13 +164,14 @@ def tracks(
             help="vehicle, time, x, y, heading, speed, length, vehicle_class, e.g. heading=psi:deg.",
         ),
     ] = None,
+    mapping_file: MappingFile = None,
     keep_cut: KeepCut = False,
     force: Force = False,
     quiet: Quiet = False,
     as_json: AsJson = False,
 ) -> None:
     """A table of tracks (x, y and heading of any recording) on a known road: lanes, offsets, neighbours."""
-    options = {"road": road, "columns": columns or (), "keep_cut": keep_cut}
+    options = {"road": road, "columns": columns or (), "mapping": mapping_file, "keep_cut": keep_cut}
     _import("tracks", [source], output, options, force, quiet, as_json)
 
 
@@ -167,7 +221,7 @@ def _import(
 ) -> None:
     from xosc_lateral import import_drives
     from xosc_lateral.formats.output_paths import STDOUT, claim, output_file
-    from xosc_lateral.formats.output_tables import output_suffixes
+    from xosc_lateral.formats.output_tables import harmless_frame, output_suffixes
 
     if output != STDOUT:
         files = [source for source in sources if source.is_file()]
@@ -175,7 +229,7 @@ def _import(
     imported = import_drives(name, sources[0] if len(sources) == 1 else sources, **options)
     written = None
     if output == STDOUT:
-        write_stdout(imported.to_frame().to_csv(index=False, lineterminator="\n"))
+        write_stdout(harmless_frame(imported.to_frame()).to_csv(index=False, lineterminator="\n"))
     else:
         written = imported.write(output, force=force)
     if as_json and written is not None:

@@ -27,6 +27,13 @@ HELP = {
         "Compare several profiles.",
         examples("profiles compare motorway motorway-vehicle-1 --report compared.html"),
     ),
+    "derive": (
+        "Make a driver from stated figures.",
+        examples(
+            "profiles derive --preset drowsy -o drowsy.json",
+            "profiles derive motorway --sdlp 0.25 --mean 0.1 -o calm.json",
+        ),
+    ),
     "add": (
         "Add a profile to a library.",
         examples("profiles add mine.json --library team/ --tag truck --set country=DE"),
@@ -43,7 +50,7 @@ HELP = {
 def register(app: typer.Typer) -> None:
     """Add the verb to the command line."""
     profiles = typer.Typer(help="Driver profiles: those shipped, and your own.", no_args_is_help=True)
-    for verb in (list_, show, compare, add, tag, export, check):
+    for verb in (list_, show, compare, derive, add, tag, export, check):
         name = verb.__name__.rstrip("_")
         short, epilog = HELP[name]
         profiles.command(name, short_help=short, epilog=epilog)(verb)
@@ -100,7 +107,7 @@ def compare(
     quiet: Quiet = False,
     as_json: AsJson = False,
 ) -> None:
-    """Compare profiles, and show which cannot be told apart."""
+    """Compare profiles, and show which are not distinguishable."""
     from xosc_lateral import compare_profiles
 
     if len(names) < 2:
@@ -109,6 +116,52 @@ def compare(
     if report is not None:
         compared.write_report(report, force=force)
     say(compared, as_json=as_json, quiet=quiet)
+
+
+def derive(
+    base: Annotated[str, typer.Argument(metavar="[BASE]", help="Profile that gives what is not stated.")] = "motorway",
+    output: Annotated[str, typer.Option("--output", "-o", help="File, folder/ or -.")] = "-",
+    preset: Annotated[
+        str | None, typer.Option(help="alcohol-0.5, drowsy or truck: figures with a source, as changes of the base's.")
+    ] = None,
+    sdlp: Annotated[float | None, typer.Option(help="Standard deviation of lateral position. [m]")] = None,
+    mean: Annotated[float | None, typer.Option(help="Mean offset, positive left. [m]")] = None,
+    restlessness: Annotated[float | None, typer.Option(help="Standard deviation of lateral speed. [m/s]")] = None,
+    memory: Annotated[float | None, typer.Option(help="After which the autocorrelation is 1/e. [s]")] = None,
+    near_line: Annotated[
+        float | None, typer.Option(help="Share of time with a side within 0.2 m of a marking. [0 to 1]")
+    ] = None,
+    speed: Annotated[float | None, typer.Option(help="At which the figures hold; default 26.4. [m/s]")] = None,
+    vehicle: Annotated[
+        str | None, typer.Option("--class", metavar="truck", help="What the base knows of trucks.")
+    ] = None,
+    called: Annotated[str, typer.Option("--name", help="Id of the new profile.")] = "",
+    library: Library = None,
+    force: Force = False,
+    quiet: Quiet = False,
+    as_json: AsJson = False,
+) -> None:
+    """A driver from stated figures, sampled until he has them within 2 %; what can't be had together is refused.
+
+    The base gives what is not stated. Of a population the typical driver is taken.
+    """
+    from xosc_lateral import write_profile
+    from xosc_lateral.api.profiles import derive_profile
+    from xosc_lateral.formats.output_paths import STDOUT, output_file
+    from xosc_lateral.formats.profiles import profile_bytes
+
+    figures: dict[str, float | str | None] = {"sdlp": sdlp, "mean": mean, "restlessness": restlessness}
+    figures |= {"memory": memory, "near_line": near_line, "speed": speed, "vehicle": vehicle}
+    name = called or (output_file(output, "", (".json",)).stem if output.endswith(".json") else "")
+    made = derive_profile(base, name=name, preset=preset, library=library or (), **figures)
+    if output == STDOUT:
+        write_stdout(profile_bytes(made.profile))
+        return
+    path = write_profile(made.profile, output, force=force)
+    if as_json:
+        say_json({"output": str(path), **made.profile.provenance.fit})
+    elif not quiet:
+        typer.echo(str(made))
 
 
 def add(

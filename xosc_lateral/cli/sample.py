@@ -12,12 +12,13 @@ from xosc_lateral.cli.words import (
     Columns,
     Force,
     Library,
+    MappingFile,
     Profile,
     Quiet,
     Seed,
     With,
     examples,
-    pairs,
+    mapped,
     say_json,
     write_stdout,
 )
@@ -54,6 +55,7 @@ def sample(
     ] = None,
     with_: With = None,
     columns: Columns = None,
+    mapping_file: MappingFile = None,
     library: Library = None,
     force: Force = False,
     quiet: Quiet = False,
@@ -69,7 +71,7 @@ def sample(
     if output != STDOUT:
         claim([output_file(output, "offsets.csv", output_suffixes())], [*(like or []), *(context or [])], force=force)
     how: dict[str, Any] = {"snippet": snippet, "speed": speed, "lane_width": lane_width, "with_sensor": bool(with_)}
-    mapping = pairs(columns, "--map")
+    mapping = mapped(columns, mapping_file)
     made = sample(
         profile, like=like, context=context, duration=duration, seed=seed, columns=mapping, library=library or (), **how
     )

@@ -13,6 +13,7 @@ import typer
 
 if TYPE_CHECKING:
     from xosc_lateral.api.result import Result
+    from xosc_lateral.formats.mapping import TableMapping
 
 AsJson = Annotated[bool, typer.Option("--json", help="Machine-readable: JSON on standard output, errors included.")]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print errors only.")]
@@ -34,6 +35,10 @@ Columns = Annotated[
         metavar="NAME=COLUMN[:UNIT]",
         help="Column under another name or unit, e.g. speed=v_kmh:km/h; may be repeated.",
     ),
+]
+MappingFile = Annotated[
+    Path | None,
+    typer.Option("--mapping", metavar="FILE.toml", help="Saved mapping of columns (import table --propose FILE...)."),
 ]
 Parameters = Annotated[
     list[str] | None, typer.Option("--set", metavar="NAME=VALUE", help="Set a scenario parameter; may be repeated.")
@@ -99,6 +104,13 @@ def pairs(words: Iterable[str] | None, option: str) -> dict[str, str]:
             raise typer.BadParameter(f"{name!r} is given twice", param_hint=option)
         found[name] = value
     return found
+
+
+def mapped(columns: Iterable[str] | None, file: Path | None) -> TableMapping:
+    """What `--mapping` and `--map` say of tables; a column of the latter stands in for one of the former."""
+    from xosc_lateral.formats.mapping import as_mapping
+
+    return as_mapping(file).with_words(pairs(columns, "--map"))
 
 
 def warn(lines: Iterable[str]) -> None:

@@ -105,7 +105,7 @@ class Driver:
 
 @dataclass(frozen=True, eq=False)
 class Truth:
-    """What lies behind a simulated drive; nobody tells it to the code under test."""
+    """What lies behind a simulated drive; the code under test never sees it."""
 
     driver: Driver
     effects: tuple[Plant, ...]
@@ -196,7 +196,7 @@ def simulate_drive(
 
 
 def simulate_population(n_drivers: int, duration: float = 1200.0, seed: int = 0, spread: float = 0.25) -> pd.DataFrame:
-    """Drives of several people in one table; column `drive` tells them apart."""
+    """Drives of several people in one table; column `drive` names them."""
     tables = []
     for number in range(n_drivers):
         person = draw_driver(np.random.default_rng([20261, seed, number]), spread)

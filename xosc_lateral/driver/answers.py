@@ -41,7 +41,10 @@ CLUSTERED = 1.2
 """By which errors clustered by `BLOCK` are too small, found with simulated drivers whose memory is 10 s (60 seeds: 1.15
 to 1.2 with 12 to 30 minutes). [-]"""
 
-PIECE, BLOCK = 10.0, 60.0
+KEEP = 0.95
+"""Most that one piece may say of the next: beyond, next to nothing of a level is left after differencing. [-]"""
+
+PIECE, BLOCK = 4.0, 60.0
 """Driving whose mean is one observation, and that is one cluster of the errors: several memories of a driver. [s]"""
 
 
@@ -126,7 +129,15 @@ def _near(run: Run, shape: ColumnEffect) -> FloatArray:
 
 
 def _within_drives(runs: Sequence[Run], near: Mapping[str, Sequence[FloatArray]]) -> tuple[FloatArray, FloatArray]:
-    """Slopes of the offset by each side's nearness and their errors, shape (sides,) each. [m]"""
+    """Slopes of the offset by each side's nearness and their errors, shape (sides,) each. [m]
+
+    Generalised least squares of an autoregression from piece to piece [1]_, errors clustered.
+
+    References
+    ----------
+    .. [1] D. Cochrane, G. H. Orcutt, "Application of least squares regression to relationships containing
+       auto-correlated error terms", J. American Statistical Association 44, 1949.
+    """
     size, per_block = round(PIECE / STEP), round(BLOCK / PIECE)
     rows, drive, block = [], [], []
     numbers = {name: k for k, name in enumerate(dict.fromkeys(run.drive for run in runs))}
@@ -139,14 +150,19 @@ def _within_drives(runs: Sequence[Run], near: Mapping[str, Sequence[FloatArray]]
     sides = len(near)
     if len(rows) < len(numbers) + sides + 2:
         return np.zeros(sides), np.full(sides, np.inf)
-    table, groups = np.array(rows), np.array(drive)
-    counts = np.maximum(np.bincount(groups, minlength=len(numbers)), 1)
-    for column in table.T:
-        column -= (np.bincount(groups, column, minlength=len(numbers)) / counts)[groups]
+    table, groups, number = np.array(rows), np.array(drive), np.array(block)
+    follows = np.flatnonzero(number[1:, 0] == number[:-1, 0]) + 1  # the piece before is of the same run
+    plain = _centred(table, groups)
+    rest = plain[:, 0] - plain[:, 1:] @ (np.linalg.pinv(plain[:, 1:]) @ plain[:, 0])
+    power = float(rest[follows - 1] @ rest[follows - 1])
+    keep = min(max(float(rest[follows] @ rest[follows - 1]) / max(power, 1e-12), 0.0), KEEP)
+    # a driver's slow drift is told from what he does beside somebody
+    table, groups, number = table[follows] - keep * table[follows - 1], groups[follows], number[follows]
+    table = _centred(table, groups)
     observed, design = table[:, 0], table[:, 1:]
     inverse = np.linalg.pinv(design.T @ design)
     slopes = inverse @ design.T @ observed
-    _, cluster = np.unique(np.array(block), axis=0, return_inverse=True)
+    _, cluster = np.unique(number, axis=0, return_inverse=True)
     scores = design * (observed - design @ slopes)[:, None]
     by_block = np.column_stack([np.bincount(cluster.ravel(), column) for column in scores.T])
     blocks, free = len(by_block), max(len(observed) - len(numbers) - design.shape[1], 1)
@@ -155,6 +171,12 @@ def _within_drives(runs: Sequence[Run], near: Mapping[str, Sequence[FloatArray]]
     known = np.diag(design.T @ design)[:sides] > 1e-6
     errors = np.where(known & (blocks > 2), CLUSTERED * np.sqrt(np.maximum(np.diag(covariance)[:sides], 0.0)), np.inf)
     return np.where(known, slopes[:sides], 0.0), errors
+
+
+def _centred(table: FloatArray, groups: NDArray[np.int64]) -> FloatArray:
+    """Columns without their mean within each group."""
+    counts = np.maximum(np.bincount(groups), 1)
+    return np.stack([column - (np.bincount(groups, column) / counts)[groups] for column in table.T], axis=1)
 
 
 def _others(run: Run) -> list[FloatArray]:

@@ -43,6 +43,10 @@ def fit_profile(
     Of a population it holds what class, lane and speed do to level, spread and fine movement, and neighbours to the
     level, as far as they are known (`place`); of few drives, and of the two-level model, nothing of that.
 
+    Raises `NotEnoughDataError` when too little is left after cutting, or neighbours are asked for (True) and not known;
+    `DriverProfileError` when neighbours are asked for (True) of the two-level model, which is the paper's to the
+    letter.
+
     Parameters
     ----------
     drives : sequence of Drive
@@ -58,13 +62,6 @@ def fit_profile(
     neighbours : bool, optional
         Whether a population's profile holds how its drivers keep away from vehicles beside them. None: where they are
         known.
-
-    Raises
-    ------
-    NotEnoughDataError
-        When too little is left after cutting, or neighbours are asked for (True) and not known.
-    DriverProfileError
-        When neighbours are asked for (True) of the two-level model, which is the paper's to the letter.
     """
     runs = all_runs(drives, rules)
     if (

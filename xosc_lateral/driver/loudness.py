@@ -13,8 +13,8 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from benchmarks.rounding import rounded_number
 from xosc_lateral.driver.effects import Acts, Zones
-from xosc_lateral.driver.effects.rounding import rounded_number
 from xosc_lateral.driver.quick import BORDER, quick_part
 from xosc_lateral.driver.zone_levels import Passages, zone_levels
 from xosc_lateral.drives.drive import Run

@@ -14,9 +14,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from benchmarks.rounding import rounded_number
 from xosc_lateral.digits import all_significant
 from xosc_lateral.driver.effects import Acts, ColumnEffect, Levels, Linear, Piecewise, Proximity
-from xosc_lateral.driver.effects.rounding import rounded_number
 from xosc_lateral.driver.loudness import quick_by_zone
 from xosc_lateral.driver.models.autoregressive.filters import split_bands
 from xosc_lateral.driver.neighbours import NEIGHBOURS, SCALE, most_beside, neighbour_shapes
@@ -70,17 +70,14 @@ def fit_place(runs: Sequence[Run], *, neighbours: bool | None = None) -> tuple[C
     share [1]_. The slopes of all columns are shrunk together, by the share of their size that chance would not make
     (`_shrunk`): dropping the uncertain ones predicts other vehicles worse. Nothing is left where chance makes all.
 
+    Raises `NotEnoughDataError`: Neighbours are asked for (True), and there are too few drives, or too few that had any.
+
     Parameters
     ----------
     runs : sequence of Run
     neighbours : bool, optional
         Whether also of the distances to vehicles in the neighbouring lanes, on the level (`neighbours`). None: of each
         side on which `LEAST_DRIVES` drives had somebody; with fewer, chance would pass for an effect.
-
-    Raises
-    ------
-    NotEnoughDataError
-        Neighbours are asked for (True), and there are too few drives, or too few that had any.
 
     References
     ----------

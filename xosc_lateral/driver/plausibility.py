@@ -30,6 +30,8 @@ TRIAL_SPEED = 30.0
 def check_offsets(offset: FloatArray, lane_width: FloatArray | float, who: str, time: FloatArray | None = None) -> None:
     """Refuse offsets that leave lane and neighbouring lane, or are no numbers.
 
+    Raises `DriverProfileError` with the first such offset.
+
     Parameters
     ----------
     offset : array, shape (n,)
@@ -40,11 +42,6 @@ def check_offsets(offset: FloatArray, lane_width: FloatArray | float, who: str, 
         Begins the message: whose offsets these are.
     time : array, shape (n,), optional
         For the message. [s]
-
-    Raises
-    ------
-    DriverProfileError
-        With the first such offset.
     """
     reach = OFFSET_LANES.value * np.maximum(lane_width, NARROW)
     far = np.flatnonzero(~(np.abs(offset) <= reach))  # also NaN
@@ -65,10 +62,7 @@ def _lanes(offset: FloatArray, lane_width: FloatArray | float, row: int) -> floa
 def check_context(context: Mapping[str, float], who: str) -> None:
     """Refuse one moment's context that no road has. NaN is none, and fine; so is an infinite distance: nobody in sight.
 
-    Raises
-    ------
-    ValueError
-        With name, value and range.
+    Raises `ValueError` with name, value and range.
     """
     for name, value in context.items():
         if nobody(name, np.asarray(value)):
@@ -108,10 +102,7 @@ def nobody(name: str, values: FloatArray) -> NDArray[np.bool_]:
 def check_profile(profile: DriverProfile) -> None:
     """Try a profile in even traffic: its numbers may each be allowed, and together give nonsense.
 
-    Raises
-    ------
-    DriverProfileError
-        If it leaves its lane by more than a lane.
+    Raises `DriverProfileError` if it leaves its lane by more than a lane.
     """
     from xosc_lateral.driver.sampling import sample_offsets
 

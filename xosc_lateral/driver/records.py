@@ -38,6 +38,9 @@ def plain(thing: object) -> Any:
 def read_as(kind: type[T], values: object, where: str = "") -> T:
     """Back from `plain`.
 
+    Raises `DriverProfileError` if a field is missing, unknown, of the wrong kind or out of its range; the message names
+    it and its path.
+
     Parameters
     ----------
     kind : type
@@ -46,11 +49,6 @@ def read_as(kind: type[T], values: object, where: str = "") -> T:
         Plain JSON values.
     where : str
         Path of the values in their file, for messages.
-
-    Raises
-    ------
-    DriverProfileError
-        If a field is missing, unknown, of the wrong kind or out of its range; the message names it and its path.
     """
     try:
         return msgspec.convert(values, kind, dec_hook=_decoded)

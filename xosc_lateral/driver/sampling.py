@@ -44,6 +44,9 @@ class OffsetSampler:
     def sample(self, segment: Segment, *, start: float | None = None) -> FloatArray:
         """Next offsets, one per row inside the segment.
 
+        Raises `ValueError` if the segment has another step or lies before the last one, or `start` is given in the
+        middle of a drive.
+
         Parameters
         ----------
         segment : Segment
@@ -55,11 +58,6 @@ class OffsetSampler:
         -------
         array, shape (n,)
             From the lane centre, positive to the LEFT of travel. [m]
-
-        Raises
-        ------
-        ValueError
-            If the segment has another step or lies before the last one, or `start` is given in the middle of a drive.
         """
         _check_step(segment, self.profile.model.step)
         width = segment.lane_width[segment.inside]

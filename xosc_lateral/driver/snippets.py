@@ -47,10 +47,7 @@ class Snippet:
 def cut_snippets(runs: Sequence[Run], seconds: float, step: float = STEP) -> list[Snippet]:
     """Successive snippets without overlap; each has ``seconds / step + 1`` rows and lies in one run.
 
-    Raises
-    ------
-    NotEnoughDataError
-        When no run is as long.
+    Raises `NotEnoughDataError` when no run is as long.
     """
     length = round(seconds / step) + 1
     if length < 2:

@@ -92,10 +92,8 @@ def _hash(state: Mapping[str, Any]) -> str:
 def unsealed(state: Mapping[str, Any]) -> dict[str, Any]:
     """A state's values without format and version.
 
-    Raises
-    ------
-    DriverProfileError
-        If it is no state of a stream, of another version, or not what was written: nobody edits a generator's state.
+    Raises `DriverProfileError` if it is no state of a stream, of another version, or not what was written: nobody edits
+    a generator's state.
     """
     if not isinstance(state, Mapping) or state.get("format") != FORMAT:
         raise DriverProfileError(f'not a state of an offset stream: "format" is not "{FORMAT}"')

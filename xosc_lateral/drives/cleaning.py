@@ -51,6 +51,8 @@ def clean_drive(
 ) -> Drive | None:
     """Rows of one drive, from whatever source, as a `Drive`.
 
+    Raises `FormatError` if a column can't be in the unit meant, or the rows are too far apart.
+
     Parameters
     ----------
     name : str
@@ -69,11 +71,6 @@ def clean_drive(
     -------
     Drive or None
         Sorted by time, repeated times and rows without a place in the lane left out; None when nothing is left.
-
-    Raises
-    ------
-    FormatError
-        If a column can't be in the unit meant, or the rows are too far apart.
     """
     columns = _in_order(columns, name, path)
     offset, lane_width = _position(columns)

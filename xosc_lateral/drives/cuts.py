@@ -76,10 +76,7 @@ def cut_runs(drive: Drive, rules: CutRules = PAPER_RULES) -> list[Run]:
 def all_runs(drives: Sequence[Drive], rules: CutRules = PAPER_RULES) -> list[Run]:
     """Runs of several drives.
 
-    Raises
-    ------
-    NotEnoughDataError
-        When no run is left in any drive; says what was cut and why.
+    Raises `NotEnoughDataError` when no run is left in any drive; says what was cut and why.
     """
     runs = [run for drive in drives for run in cut_runs(drive, rules)]
     if not runs:

@@ -35,6 +35,8 @@ SHAPE_POWER_FACTOR, SHAPE_POWER, SHAPE_SLOPE = 0.5842, 0.4, 0.07886
 def kaiser_design(attenuation: float, width: float) -> tuple[int, float]:
     """Size and shape of a Kaiser window.
 
+    Raises `ValueError` if the attenuation is outside the range of the formula.
+
     Parameters
     ----------
     attenuation : float
@@ -48,11 +50,6 @@ def kaiser_design(attenuation: float, width: float) -> tuple[int, float]:
         Taps to each side of the middle one.
     beta : float
         Shape of the window. [-]
-
-    Raises
-    ------
-    ValueError
-        If the attenuation is outside the range of the formula.
     """
     if not LEAST_ATTENUATION <= attenuation <= GREAT_ATTENUATION:
         raise ValueError(f"attenuation {attenuation} dB, expected {LEAST_ATTENUATION:g} to {GREAT_ATTENUATION:g}")

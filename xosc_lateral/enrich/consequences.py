@@ -25,7 +25,8 @@ def lane_departures(entity: EntityResult, network: RoadNetwork) -> list[LaneDepa
     for first, last in spans + _lateral_within_a_lane(motion):
         rows = slice(first, last + 1)
         half = 0.5 * network.lane_width(motion.road[rows], motion.lane[rows], motion.s[rows])
-        beyond = np.abs(motion.offset[rows] + entity.deviation[rows]) - half
+        along_lane = np.where(np.cos(motion.heading_relative[rows]) >= 0.0, 1.0, -1.0)
+        beyond = np.abs(motion.offset[rows] + along_lane * entity.deviation[rows]) - half
         left = (beyond > 0.0) & (np.abs(motion.offset[rows]) <= half)
         if left.any():
             worst = int(np.argmax(np.where(left, beyond, -np.inf)))

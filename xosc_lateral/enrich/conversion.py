@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from xosc_lateral.enrich.result import Enriched
 
@@ -16,46 +17,39 @@ class ConversionProvenance:
     Parameters
     ----------
     package_version : str
+    behaviour : int
+        `version.BEHAVIOUR` of the program.
+    scenario : str
+        Where the scenario lies, as seen from the output.
     inputs : mapping of str to str
-        File name -> SHA-256 of every file that was read (scenario, road, catalogs, context table).
+        File name, as seen from the scenario -> SHA-256 of every file that was read (scenario, road, catalogs, context).
     profiles : mapping of str to (str, str)
         Enriched entity -> name and SHA-256 of its profile.
-    seed, variant : int
-    parameters : mapping of str to str
-        Scenario parameters that were replaced.
-    with_sensor : bool
-        Offsets hold the sensor error of the drives that profiles were fitted on; else the driver alone.
-    player, version : str
-        What it was written for; version of the standard.
+    options : mapping
+        What was asked for: `ConvertSettings.record`.
+    variant : int
+        From 1, as in file names.
+    version : str
+        Of the standard that was written.
     ego : tuple of str
         Vehicles under test: left as they are. Empty: there is none, and everything is replayed.
     modes : mapping of str to str
         Vehicle that was enriched -> "trajectory" or "lane-offset".
-    only : tuple of str or None
-        Who alone was to be enriched.
-    attempts : int
-        Samplings at most while vehicles touch or leave their lane.
-    neighbours : str
-        Whose answer to vehicles beside them drivers have: "profile", "borrow" or "none".
-    behaviour : int
-        `version.BEHAVIOUR` of the program.
+    content_sha256 : str
+        Of the output without its provenance.
     """
 
     package_version: str
+    behaviour: int
+    scenario: str
     inputs: Mapping[str, str]
     profiles: Mapping[str, tuple[str, str]]
-    seed: int
+    options: Mapping[str, Any]
     variant: int
-    parameters: Mapping[str, str] = field(default_factory=dict)
-    with_sensor: bool = False
-    player: str = "standard"
-    version: str = ""
-    ego: tuple[str, ...] = ()
-    modes: Mapping[str, str] = field(default_factory=dict)
-    only: tuple[str, ...] | None = None
-    attempts: int = 1
-    neighbours: str = "borrow"
-    behaviour: int = 1
+    version: str
+    ego: tuple[str, ...]
+    modes: Mapping[str, str]
+    content_sha256: str
 
     @property
     def mode(self) -> str:

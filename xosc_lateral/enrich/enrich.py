@@ -59,6 +59,7 @@ def enrich(
     neighbours: Neighbours = Neighbours.BORROW,
     with_sensor: bool = False,
     uncertain: Collection[str] = (),
+    at_least: float = 0.0,
 ) -> Enriched:
     """Enrich a played scenario.
 
@@ -90,6 +91,8 @@ def enrich(
     uncertain : collection of str
         Entities whose motion will be another one, since it depends on a vehicle under test: nobody responds to where
         they nominally are, nor do they to others.
+    at_least : float
+        Time for which each segment is sampled, should it last longer in another run. [s]
 
     Raises
     ------
@@ -117,6 +120,7 @@ def enrich(
                 context or {},
                 with_sensor,
                 neighbours,
+                round(at_least / SAMPLE_STEP),
             )
             for entity in motion.entities
         ]
@@ -149,7 +153,9 @@ def with_offsets(enriched: Enriched, names: Collection[str], factor: float, why:
 def _scaled(entity: EntityResult, network: RoadNetwork, factor: float, why: str) -> EntityResult:
     if factor == 0.0:
         return _untouched(entity.motion, entity.spans, why)
-    segments = tuple(replace(segment, offset=factor * segment.offset) for segment in entity.segments)
+    segments = tuple(
+        replace(segment, offset=factor * segment.offset, beyond=factor * segment.beyond) for segment in entity.segments
+    )
     deviation = factor * entity.deviation
     trajectory = displace(entity.motion, network, deviation)
     return replace(entity, segments=segments, deviation=deviation, trajectory=trajectory)
@@ -171,6 +177,8 @@ class _Drawn:
         It was not sampled.
     errors : tuple of array
         What a sensor adds to each segment's offsets; zeros unless asked for. [m]
+    beyond : tuple of array
+        How each would go on after its end. [m]
     heeds : frozenset of str
         Sides on which the profile responds to neighbours by itself, as its population does.
     alone : frozenset of str
@@ -186,6 +194,7 @@ class _Drawn:
     errors: tuple[FloatArray, ...] = ()
     heeds: frozenset[str] = frozenset()
     alone: frozenset[str] = frozenset()
+    beyond: tuple[FloatArray, ...] = ()
 
     def deviation(self, distance: FloatArray) -> FloatArray:
         """On every row, positive left. [m]"""
@@ -207,6 +216,7 @@ def _draw(
     foreign_context: Mapping[str, tuple[FloatArray, FloatArray]],
     with_sensor: bool,
     neighbours: Neighbours,
+    least: int,
 ) -> _Drawn:
     """Offsets of one entity; `motion` is the run with those alone whose place beside it is certain."""
     index = next(k for k, one in enumerate(motion.entities) if one is entity)
@@ -216,6 +226,7 @@ def _draw(
     every = max(1, round(SAMPLE_STEP / motion.step))
     segments: list[tuple[SegmentSpan, IntArray, FloatArray]] = []
     errors: list[FloatArray] = []
+    beyond: list[FloatArray] = []
     neutral, heeds, alone = set[str](), set[str](), set[str]()
     for span in spans:
         knots = np.arange(span.first, span.last + 1, every)
@@ -228,7 +239,10 @@ def _draw(
         other_hand = _is_left_hand(entity, network, knots) != driver.left_hand
         heeds |= _sides(driver, {Basis.POPULATION}, other_hand=other_hand)
         alone |= _sides(driver, {Basis.MEASURED, Basis.DECLARED}, other_hand=other_hand)
-        wanted = -sampler.sample(mirrored(segment)) if other_hand else sampler.sample(segment)
+        seen, side = (mirrored(segment), -1.0) if other_hand else (segment, 1.0)
+        wanted = side * sampler.sample(seen)
+        later = _going_on(seen, max(least - len(knots), 0))
+        beyond.append(side * sampler.copy().sample(later) if later.time.size > later.before else np.empty(0))
         inside = segment.inside
         who = f"profile {driver.name} for {entity.name!r}"
         check_offsets(wanted, segment.lane_width[inside], who, segment.time[inside])
@@ -238,8 +252,9 @@ def _draw(
         return _Drawn(entity, spans, None, "no road-following segment")
     unknown = tuple(sorted(neutral))
     return _Drawn(
-        entity, spans, driver, "", tuple(segments), unknown, tuple(errors), frozenset(heeds), frozenset(alone)
-    )
+        entity, spans, driver, "", tuple(segments), unknown, tuple(errors), frozenset(heeds), frozenset(alone),
+        tuple(beyond),
+    )  # fmt: skip
 
 
 def _sides(driver: DriverProfile, known: set[Basis], *, other_hand: bool) -> set[str]:
@@ -305,7 +320,10 @@ def _result(drawn: _Drawn, network: RoadNetwork) -> EntityResult:
         drawn.spans,
         drawn.profile,
         "",
-        tuple(SampledSegment(span, entity.time[knots], offset) for span, knots, offset in segments),
+        tuple(
+            SampledSegment(span, entity.time[knots], offset, later)
+            for (span, knots, offset), later in zip(segments, drawn.beyond, strict=True)
+        ),
         deviation,
         displace(entity, network, deviation),
         drawn.neutral,
@@ -369,6 +387,15 @@ def _segment(
         before=before,
         after=after,
     )
+
+
+def _going_on(segment: Segment, rows: int) -> Segment:
+    """What follows a segment where everything stays as at its end."""
+    last = segment.inside.stop
+    kept = np.append(np.arange(last), np.full(rows, last - 1))
+    time = np.append(segment.time[:last], segment.time[last - 1] + SAMPLE_STEP * np.arange(1, rows + 1))
+    context = {name: values[kept] for name, values in segment.context.items()}
+    return Segment(time, segment.lane_width[kept], segment.speed[kept], context, before=last, after=0)
 
 
 def _filled(values: FloatArray, inside: slice) -> FloatArray:

@@ -20,6 +20,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from xosc_lateral.motion.context import STEERING, smooth_step
 from xosc_lateral.motion.nearby import pairs_within
 from xosc_lateral.motion.nominal import Activity, EntityMotion, NominalMotion
 from xosc_lateral.road.network import RoadNetwork
@@ -51,9 +52,6 @@ it at up to 20 m of free space, and nothing farther away (same recording). [m]""
 
 ENTERING = 0.5
 """Nominal lateral gap over which a vehicle that crosses into a lane becomes its neighbour. [m]"""
-
-RESPONSE = 1.0
-"""Standard deviation of the kernel by which drivers respond: steering takes a second or two. [s]"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,7 +114,7 @@ def give_way(
             right[own] = np.maximum(right[own], np.where(is_left, share * aside, 0.0))
             left[own] = np.maximum(left[own], np.where(is_left, 0.0, share * aside))
     every = max(1, int(rows[1] - rows[0])) if n > 1 else 1
-    width = RESPONSE / (motion.step * every)
+    width = STEERING / (motion.step * every)
     all_rows = np.arange(len(motion.entities[0].time)) if count else np.empty(0)
     result: list[FloatArray | None] = []
     for k in range(count):
@@ -181,8 +179,8 @@ def _widening(
     gap = nominal + np.where(is_left, 1.0, -1.0) * (other.deviation - own.deviation)
     free = np.maximum(np.abs(along) - 0.5 * (own.length + other.length), 0.0)
     heeded = np.where(is_left, "left" in heeds, "right" in heeds)
-    weight = _fading(free / np.where(heeded, HEEDED_FADES, FADES))
-    weight *= (1.0 - _fading(nominal / ENTERING)) * (near & same_way)
+    weight = 1.0 - smooth_step(free / np.where(heeded, HEEDED_FADES, FADES))
+    weight *= smooth_step(nominal / ENTERING) * (near & same_way)
     return weight * np.where(heeded, wider(gap, heeded=True), wider(gap, heeded=False)), is_left, heeded
 
 
@@ -203,12 +201,6 @@ def wider(gap: FloatArray, *, heeded: bool) -> FloatArray:
     wanted = np.interp(gap, free, side_by_side)
     wanted = np.where(gap < free[0], side_by_side[0], wanted)
     return np.asarray(np.maximum(wanted - gap, 0.0) * (gap < free[-1]))
-
-
-def _fading(share: FloatArray) -> FloatArray:
-    """1 at 0 and below, 0 at 1 and above, smooth between."""
-    u = np.clip(share, 0.0, 1.0)
-    return np.asarray(1.0 - u**2 * (3.0 - 2.0 * u))
 
 
 def _smoothed(values: FloatArray, width: float) -> FloatArray:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,11 +31,19 @@ class SampledSegment:
         Every 0.2 s from the segment's start. [s]
     offset : array, shape (n,)
         Added to the nominal offset, positive left. [m]
+    beyond : array, shape (k,)
+        How it would go on after the segment's end, should that come later. [m]
     """
 
     span: SegmentSpan
     time: FloatArray
     offset: FloatArray
+    beyond: FloatArray = field(default_factory=lambda: np.empty(0))
+
+    def later(self) -> tuple[FloatArray, FloatArray]:
+        """Times after the segment's end, and offsets there. [s], [m]"""
+        time = self.time[-1] + (self.time[1] - self.time[0]) * np.arange(1, len(self.beyond) + 1)
+        return time[time > self.span.end], self.beyond[time > self.span.end]
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -58,7 +66,7 @@ class EntityResult:
     trajectory : WorldTrajectory
         The enriched path (the nominal one if not enriched).
     neutral : tuple of str
-        Context columns that the profile's effects ask for and that were not known: taken as neutral.
+        Context columns that the profile's effects ask for and that were not known: without effect.
     bound : Bound or None
         That sampled movement was smoothed since nobody could have driven it: the worst segment's.
     """
@@ -171,7 +179,7 @@ class Enriched:
         ]
         lines += [line for entity in self.entities for line in _jumps(entity)]
         lines += [
-            f"{entity.name}: {', '.join(entity.neutral)} not known in the scenario, taken as neutral"
+            f"{entity.name}: {', '.join(entity.neutral)} not known in the scenario: no effect of theirs"
             for entity in self.entities
             if entity.neutral
         ]

@@ -52,15 +52,12 @@ def wasserstein(a: FloatArray, b: FloatArray) -> float:
 def metric_distances(real: FloatArray, other: FloatArray) -> Distances:
     """Distance of two sets of metrics.
 
+    Raises `NotEnoughDataError` if `real` has fewer than two snippets, so no standard deviation.
+
     Parameters
     ----------
     real, other : array, shape (n, 10) and (m, 10)
         Results of `snippet_metrics`; `real` sets the scale.
-
-    Raises
-    ------
-    NotEnoughDataError
-        If `real` has fewer than two snippets, so no standard deviation.
     """
     if len(real) < 2 or len(other) < 1:
         raise NotEnoughDataError(f"{len(real)} real and {len(other)} other snippets; two and one are needed")
@@ -89,10 +86,7 @@ def split_groups(groups: NDArray[np.generic], rng: np.random.Generator) -> NDArr
     Groups (drives, or blocks of one drive) go to one side as a whole: neighbouring snippets of one driver are alike,
     and split apart they would make real data look closer to itself than it is.
 
-    Raises
-    ------
-    NotEnoughDataError
-        If there are fewer than two groups.
+    Raises `NotEnoughDataError` if there are fewer than two groups.
     """
     names = np.unique(groups)
     if len(names) < 2:

@@ -2,12 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
 import numpy as np
 from numpy.typing import NDArray
 
+from xosc_lateral.driver.jit_kernel import prepare
+from xosc_lateral.driver.profile import DriverProfile
+from xosc_lateral.driver.sampling import sample_offsets
+from xosc_lateral.driver.seeds import child
 from xosc_lateral.drives.cuts import HALF_WIDTH
 from xosc_lateral.evaluation.line_crossing import time_to_line_crossing
 from xosc_lateral.evaluation.margins import NEAR_MARKING
+from xosc_lateral.segment import Segment
 
 FloatArray = NDArray[np.float64]
 
@@ -71,3 +79,147 @@ def lane_keeping_indicators(
             np.sqrt((jerk**2).mean(axis=1)),
         ]
     )
+
+
+# ---- the highway driving test ----------------------------------------------------------------------------------------
+HIGHWAY_SPEED, HIGHWAY_DRIVE = 95.0 / 3.6, 3600.0
+"""The test's speed [m/s] and the length of its drive [s]: 100 km at 95 km/h [4]_."""
+
+HIGHWAY_DRIVES = 60
+"""Sampled drives: the standard error of an SDLP is below 0.5 % then."""
+
+SHOWN_DRIVES = 20
+"""For a card: enough for two digits."""
+
+NEAR_LINE = 0.2
+"""A side of the vehicle so near to a marking is near the line. [m]"""
+
+DRIFT, DRIFT_LASTS = 1.0, 8.0
+"""A lane drift is so far from the drive's mean [m] for so long [s] [5]_."""
+
+
+@dataclass(frozen=True, slots=True)
+class LaneKeeping:
+    """How a driver keeps the lane in drives of an hour.
+
+    Parameters
+    ----------
+    sdlp : float
+        Standard deviation of lateral position within a drive, its mean over drives quadratic [4]_. [m]
+    mean : float
+        Mean offset, positive left. [m]
+    restlessness : float
+        Root mean square of lateral speed. [m/s]
+    memory : float
+        After which the autocorrelation within a drive is 1/e. [s]
+    near_line : float
+        Share of time with a side within `NEAR_LINE` of a marking or beyond. [-]
+    drifts : float
+        Lane drifts. [1/h]
+    line_crossing : float
+        Time to line crossing that is undercut in 5 % of the time. [s]
+    errors : mapping of str to float
+        Standard errors, from drive to drive, by field.
+    limit_near_line : float
+        |offset| from which on a side is near the line. [m]
+
+    References
+    ----------
+    .. [4] J. C. Verster, T. Roth, "Standard operation procedures for conducting the on-the-road driving test, and
+       measurement of the standard deviation of lateral position (SDLP)", International J. of General Medicine 4, 2011,
+       pp. 359-371, doi:10.2147/IJGM.S19639.
+    .. [5] "Validating lane drifts as a predictive measure of drug or sleepiness induced driving impairment",
+       Psychopharmacology, 2020: deviations of more than 100 cm from the mean for 8 s.
+    """
+
+    sdlp: float
+    mean: float
+    restlessness: float
+    memory: float
+    near_line: float
+    drifts: float
+    line_crossing: float
+    errors: Mapping[str, float] = field(default_factory=dict)
+    limit_near_line: float = 0.0
+
+    def line(self, name: str, unit: str, digits: int = 3) -> str:
+        """A figure with its 95 % interval."""
+        value, error = getattr(self, name), 1.96 * self.errors.get(name, 0.0)
+        return f"{value:.{digits}f} +- {error:.{digits}f}{unit and ' '}{unit}"
+
+    @property
+    def words(self) -> str:
+        """Figures that traffic psychology asks for, in a line."""
+        return (
+            f"SDLP {self.line('sdlp', 'm')}, lane drifts {self.line('drifts', 'an hour', 1)}, "
+            f"5 % of times to line crossing below {self.line('line_crossing', 's', 1)}, "
+            f"near a line {self.line('near_line', '')} of the time"
+        )
+
+
+def highway_drives(
+    profile: DriverProfile, seed: int, *, speed: float = HIGHWAY_SPEED, drives: int = HIGHWAY_DRIVES
+) -> FloatArray:
+    """Offsets of drives of an hour in even traffic, each a driver of his own, shape (drives, n); `speed` in [m/s]."""
+    segment = Segment.even(HIGHWAY_DRIVE, profile.model.step, profile.lane_width, speed)
+    root = np.random.SeedSequence(seed)
+    prepare(drives * len(segment))
+    return np.array([sample_offsets(profile, segment, child(root, k)) for k in range(drives)])
+
+
+def keeping_of(profile: DriverProfile, seed: int = 0) -> LaneKeeping:
+    """Lane keeping of a profile in even traffic, from `SHOWN_DRIVES` drives: the errors include that they are few."""
+    drives = highway_drives(profile, seed, drives=SHOWN_DRIVES)
+    return lane_keeping(drives, profile.lane_width, profile.model.step)
+
+
+def lane_keeping(drives: FloatArray, lane_width: float, step: float, *, half_width: float | None = None) -> LaneKeeping:
+    """Measure drives, shape (drives, n) [m], in a lane of a width [m], with rows `step` seconds apart."""
+    half_width = HALF_WIDTH if half_width is None else half_width
+    mean = drives.mean(axis=1)
+    within = drives - mean[:, None]
+    variance = (within**2).mean(axis=1)
+    squared_speed = (np.diff(drives, axis=1) ** 2).mean(axis=1) / step**2
+    limit = 0.5 * lane_width - half_width - NEAR_LINE
+    crossing = time_to_line_crossing(drives, np.full_like(drives, lane_width), step, half_width=half_width)
+    single = {
+        "mean": mean,
+        "near_line": (np.abs(drives) > limit).mean(axis=1),
+        "drifts": np.array([_drifts(one, step) for one in within]) / (drives.shape[1] * step / 3600.0),
+        "line_crossing": np.quantile(crossing, 0.05, axis=1),
+    }
+    sdlp, restlessness = float(np.sqrt(variance.mean())), float(np.sqrt(squared_speed.mean()))
+    of_mean = {name: _error(values) for name, values in single.items()}
+    of_roots = {"sdlp": _error(variance) / (2.0 * sdlp or 1.0), "restlessness": _error(squared_speed)}
+    of_roots["restlessness"] /= 2.0 * restlessness or 1.0
+    means = {name: float(values.mean()) for name, values in single.items()}
+    memory = _memory(within, step)
+    return LaneKeeping(
+        sdlp, restlessness=restlessness, memory=memory, errors=of_mean | of_roots, limit_near_line=limit, **means
+    )
+
+
+def _error(values: FloatArray) -> float:
+    return float(values.std(ddof=1) / np.sqrt(len(values))) if len(values) > 1 else 0.0
+
+
+def _drifts(deviation: FloatArray, step: float) -> int:
+    """How often one is `DRIFT` or more from the mean, on one side, for `DRIFT_LASTS` or longer."""
+    count = 0
+    for far in (deviation > DRIFT, deviation < -DRIFT):
+        edges = np.flatnonzero(np.diff(np.concatenate(([0], far.astype(np.int8), [0]))))
+        count += int(((edges[1::2] - edges[::2]) * step >= DRIFT_LASTS).sum())
+    return count
+
+
+def _memory(within: FloatArray, step: float) -> float:
+    """Lag at which the mean autocovariance falls to 1/e of the variance, linear between rows. [s]"""
+    n = within.shape[1]
+    spectrum = np.abs(np.fft.rfft(within, 2 * n, axis=1)) ** 2
+    covariance = np.fft.irfft(spectrum.mean(axis=0))[:n] / np.arange(n, 0, -1)
+    if not covariance[0] > 0.0:
+        return 0.0
+    share = covariance / covariance[0]
+    below = int(np.argmax(share < np.exp(-1.0)))
+    high, low = share[below - 1], share[below]
+    return float(step * (below - 1 + (high - np.exp(-1.0)) / (high - low))) if below else n * step

@@ -23,6 +23,8 @@ DIFFERENCE_SCALE = 10.0
 def snippet_metrics(snippets: FloatArray) -> FloatArray:
     """The ten metrics of each snippet.
 
+    Raises `ValueError` if a snippet has fewer than two values, or one is not finite.
+
     Parameters
     ----------
     snippets : array, shape (n, m)
@@ -34,11 +36,6 @@ def snippet_metrics(snippets: FloatArray) -> FloatArray:
         Columns as in `METRICS`, in the unit of the snippets: largest and smallest value, mean, standard deviation
         (of the population, ddof 0), median, 25 % and 75 % quantile (linear between order statistics), range, and mean
         and standard deviation of the first difference times 10.
-
-    Raises
-    ------
-    ValueError
-        If a snippet has fewer than two values, or one is not finite.
     """
     snippets = np.asarray(snippets, dtype=np.float64)
     if snippets.ndim != 2 or snippets.shape[1] < 2:

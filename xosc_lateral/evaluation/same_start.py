@@ -37,6 +37,8 @@ def windows_with_the_same_start(
 ) -> IntArray:
     """For each window `count` others by other drivers that start at nearly the same offset.
 
+    Raises `NotEnoughDataError` when other drivers have fewer than `count` windows.
+
     Parameters
     ----------
     starts : array, shape (n,)
@@ -54,11 +56,6 @@ def windows_with_the_same_start(
     -------
     array of int, shape (n, count)
         Rows of the donors. The donor should then be shifted by the few millimetres that its start differs, or not.
-
-    Raises
-    ------
-    NotEnoughDataError
-        When other drivers have fewer than `count` windows.
     """
     chosen = np.empty((len(starts), count), dtype=np.int64)
     for row, (start, driver) in enumerate(zip(starts.tolist(), drivers.tolist(), strict=True)):

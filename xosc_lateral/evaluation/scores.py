@@ -120,17 +120,14 @@ class ProfileScores:
 def score_profile(profile: DriverProfile, runs: Sequence[Run], *, seed: int, classify: bool = True) -> ProfileScores:
     """Evaluate a profile on measured runs.
 
+    Raises `NotEnoughDataError` with fewer than `MIN_SNIPPETS` snippets of 10 s.
+
     Parameters
     ----------
     runs : sequence of Run
         At the profile's step.
     classify : bool
         Whether to train the classifiers (a minute or two for some hours of driving).
-
-    Raises
-    ------
-    NotEnoughDataError
-        With fewer than `MIN_SNIPPETS` snippets of 10 s.
     """
     step = profile.model.step
     short = _enough(snippets_of(runs, SNIPPET, step))

@@ -16,6 +16,8 @@ from xosc_lateral.formats.source import refuse_guarded
 def write_atomically(path: Path | str, data: bytes | str, *, durable: bool = False) -> Path:
     """Write bytes or UTF-8 text to a temporary file beside the output, then move it there; missing folders are made.
 
+    Raises `OSError`: Disk full, no permission: the output is as it was, and no temporary file stays behind.
+
     Parameters
     ----------
     path : path
@@ -23,11 +25,6 @@ def write_atomically(path: Path | str, data: bytes | str, *, durable: bool = Fal
     durable : bool
         Return only when the disk has it, so that not even a power cut takes it back. On a busy disk that is a tenth of
         a second: for what ten thousand others depend on, not for each of the ten thousand.
-
-    Raises
-    ------
-    OSError
-        Disk full, no permission: the output is as it was, and no temporary file stays behind.
     """
     content = data.encode() if isinstance(data, str) else data
 
@@ -41,37 +38,11 @@ def write_atomically(path: Path | str, data: bytes | str, *, durable: bool = Fal
     return replace_atomically(path, write)
 
 
-def write_pieces_atomically(path: Path | str, pieces: Iterable[bytes]) -> str:
-    """Write a file piece by piece, as `write_atomically` does, for one that need not be in memory as a whole.
-
-    Returns
-    -------
-    str
-        SHA-256 of what was written, in hexadecimal.
-    """
-    import hashlib
-
-    digest = hashlib.sha256()
-
-    def write(temporary: Path) -> None:
-        with temporary.open("wb") as file:
-            for piece in pieces:
-                digest.update(piece)
-                file.write(piece)
-
-    replace_atomically(path, write)
-    return digest.hexdigest()
-
-
 def replace_atomically(path: Path | str, write: Callable[[Path], object]) -> Path:
     """Let `write` fill a temporary file beside the output, then move it there: for writers that want a path.
 
-    Raises
-    ------
-    FormatError
-        The output is a file that was opened as an input (`source.guarding_inputs`).
-    OSError
-        As for `write_atomically`.
+    Raises `FormatError`: The output is a file that was opened as an input (`source.guarding_inputs`); `OSError`: As for
+    `write_atomically`.
     """
     path = Path(path)
     refuse_guarded(path)
@@ -84,17 +55,15 @@ def replace_atomically(path: Path | str, write: Callable[[Path], object]) -> Pat
 def refuse_outputs(outputs: Iterable[Path | None], inputs: Iterable[Path] = ()) -> None:
     """Refuse outputs that can't be meant, before any work is done and anything is written.
 
+    Raises `FormatError` if an output is a folder, an input (links resolved), or named twice, or its folder can't be
+    made or written to.
+
     Parameters
     ----------
     outputs : iterable of Path or None
         Files to be written; None: not wanted.
     inputs : iterable of Path
         Files that are read.
-
-    Raises
-    ------
-    FormatError
-        If an output is a folder, an input (links resolved), or named twice, or its folder can't be made or written to.
     """
     taken = {path.resolve(): "is an input; choose another output" for path in inputs}
     for output in outputs:

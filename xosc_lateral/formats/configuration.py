@@ -28,10 +28,7 @@ def configuration_file() -> Path | None:
 def configuration() -> tuple[Path | None, Mapping[str, list[str]]]:
     """The file, None where there is none, and what it says, each key's value as a list.
 
-    Raises
-    ------
-    FormatError
-        If it is no TOML, or says something else.
+    Raises `FormatError` if it is no TOML, or says something else.
     """
     path = configuration_file()
     try:
@@ -46,17 +43,18 @@ def configuration() -> tuple[Path | None, Mapping[str, list[str]]]:
 def configured_libraries() -> list[Path]:
     """Folders of profiles that the configuration names.
 
-    Raises
-    ------
-    FormatError
-        See `configuration`.
+    Raises `FormatError`: see `configuration`.
     """
     path, found = configuration()
     library = found.get("library", [])
     try:
-        return [path.parent / Path(name).expanduser() for name in library] if path is not None else []
+        folders = [path.parent / Path(name).expanduser() for name in library] if path is not None else []
     except RuntimeError as error:
         raise FormatError(f"library = {library!r}: there is no home that ~ could stand for", path=path) from error
+    for folder in folders:
+        if not folder.is_dir():
+            raise FormatError(f"library: no such folder {str(folder)!r}", path=path)
+    return folders
 
 
 @lru_cache(maxsize=8)

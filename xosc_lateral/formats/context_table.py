@@ -49,16 +49,13 @@ class ContextTable(Mapping[str, tuple[FloatArray, FloatArray]]):
 def read_context(path: Path) -> ContextTable:
     """Read a table with a `time` column [s from scenario start] and any context columns, all of them numbers.
 
+    Raises `FormatError`: No `time` column, time that does not increase, a value that is infinite, no number or none
+    that a road has (`limits`), or no context column.
+
     Returns
     -------
     ContextTable
         NaN values are left out row by row: between what is stated, values are interpolated.
-
-    Raises
-    ------
-    FormatError
-        No `time` column, time that does not increase, a value that is infinite, no number or none that a road has
-        (`limits`), or no context column.
     """
     table, sha256 = read_table(path)
     time = _time_of(table, path)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -16,9 +15,9 @@ from xosc_lateral.drives.cuts import MIN_RUN
 from xosc_lateral.drives.drive import Drive
 from xosc_lateral.drives.zones import ZONE
 from xosc_lateral.errors import FormatError, NotEnoughDataError
+from xosc_lateral.formats.mapping import MappingLike, TableMapping, as_mapping
 from xosc_lateral.formats.tables import read_table
 from xosc_lateral.formats.text_columns import comma_numbers, indicators, plain_cells, seconds_of_text
-from xosc_lateral.formats.units import factor
 from xosc_lateral.segment import CONTEXT_UNITS
 
 if TYPE_CHECKING:
@@ -30,73 +29,31 @@ MAX_LEVELS = 12
 """A column of whole numbers with at most so many values holds levels, not a quantity."""
 
 
-@dataclass(frozen=True, slots=True)
-class ColumnSource:
-    """Where a column comes from in a foreign table: its header, and the factor to the standard unit."""
-
-    column: str
-    factor: float = 1.0
-    unit: str = ""
-    """As named by the user; empty: none was."""
-
-
-def parse_map(words: Iterable[str]) -> dict[str, ColumnSource]:
-    """Read ``NAME=COLUMN`` or ``NAME=COLUMN:UNIT`` (``speed=v_kmh:km/h``, ``offset=lat:-cm``).
-
-    Raises
-    ------
-    FormatError
-        When a word has no ``=`` or its unit does not fit the column.
-    """
-    mapping: dict[str, ColumnSource] = {}
-    for word in words:
-        name, equals, rest = word.partition("=")
-        if not equals or not name or not rest:
-            raise FormatError(f"--map {word!r}: expected NAME=COLUMN or NAME=COLUMN:UNIT")
-        mapping[name] = _source(word, name, rest)
-    return mapping
-
-
-def _source(word: str, name: str, rest: str) -> ColumnSource:
-    column, colon, unit = rest.rpartition(":")
-    if not colon:
-        return ColumnSource(rest)
-    try:
-        return ColumnSource(column, factor(name, unit), unit)
-    except ValueError as error:
-        raise FormatError(f"--map {word!r}: {error}") from error
-
-
-def read_drives(
-    paths: str | Path | Sequence[str | Path], mapping: Mapping[str, ColumnSource] | None = None
-) -> list[Drive]:
+def read_drives(paths: str | Path | Sequence[str | Path], mapping: MappingLike | None = None) -> list[Drive]:
     """Read the drives of one or several tables.
+
+    Raises `FormatError` when a file can't be read, a column is missing, or its values can't be in the unit meant;
+    `NotEnoughDataError` when a file holds no drive with two rows of time, offset and lane width.
 
     Parameters
     ----------
     paths : path or sequence of paths
         Tables; the suffix gives the format.
-    mapping : mapping of str to ColumnSource, optional
-        Standard name -> foreign column; see `parse_map`.
+    mapping : TableMapping, mapping of str to str, or path, optional
+        What columns are called, and how tables are written; see `formats.mapping`.
 
     Returns
     -------
     list of Drive
         In the order of the files and of first appearance; a drive without a name is called after its file. Rows are
         sorted by time, repeated times dropped, rows with a missing value left out (a gap).
-
-    Raises
-    ------
-    FormatError
-        When a file can't be read, a column is missing, or its values can't be in the unit meant.
-    NotEnoughDataError
-        When a file holds no drive with two rows of time, offset and lane width.
     """
+    known = as_mapping(mapping)
     files = [Path(path) for path in ([paths] if isinstance(paths, str | Path) else paths)]
     if twice := {str(path) for path in files if files.count(path) > 1}:
         raise FormatError("the table is named twice", path=min(twice))
     return with_distinct_names(
-        [drive for path in files for drive in drives_of_table(read_table(path)[0], mapping or {}, path)]
+        [drive for path in files for drive in drives_of_table(read_table(path, known)[0], known, path)]
     )
 
 
@@ -106,12 +63,10 @@ def with_distinct_names(drives: Sequence[Drive]) -> list[Drive]:
     return [drive if names.count(drive.name) == 1 else _named_by_source(drive) for drive in drives]
 
 
-def drives_of_table(
-    table: pd.DataFrame, mapping: Mapping[str, ColumnSource], path: Path | str = "DataFrame"
-) -> list[Drive]:
+def drives_of_table(table: pd.DataFrame, mapping: MappingLike, path: Path | str = "DataFrame") -> list[Drive]:
     """Drives of a table that is in memory; `path` is what messages call it. Else see `read_drives`."""
     path = Path(path)
-    table = _translated(table, mapping, path)
+    table = translated(table, as_mapping(mapping), path)
     if not len(table):
         raise NotEnoughDataError(f"{path}: the table has no rows; {MIN_RUN:g} s of driving are needed")
     columns = _numeric_columns(table, path)
@@ -136,22 +91,24 @@ def _with_rows(drives: Iterable[Drive | None], path: Path) -> list[Drive]:
     return found
 
 
-def _translated(table: pd.DataFrame, mapping: Mapping[str, ColumnSource], path: Path) -> pd.DataFrame:
+def translated(table: pd.DataFrame, mapping: TableMapping, path: Path) -> pd.DataFrame:
+    """The table under standard names and in standard units; what is not mapped stays as it is."""
     import pandas as pd
 
     table = table.rename(columns=lambda name: str(name).strip())
     if not table.columns.is_unique:
         twice = sorted(set(table.columns[table.columns.duplicated()]))
         raise FormatError(f"column {twice[0]!r} appears twice", path=path, line=1)
-    taken = {source.column for source in mapping.values()}
-    for name, source in mapping.items():
+    taken = {source.column for source in mapping.columns.values()}
+    for name, source in mapping.columns.items():
         if source.column not in table.columns:
             raise FormatError(
                 f"no column {source.column!r} for {name}; there are {_listed(table.columns)}", path=path, line=1
             )
-    kept = {name: plain_cells(table[name]) for name in table.columns if name not in taken and name not in mapping}
-    for name, source in mapping.items():
-        column = plain_cells(table[source.column])
+    own = [name for name in table.columns if name not in taken and name not in mapping.columns]
+    kept = {name: mapping.numbers(name, plain_cells(table[name]), path) for name in own}
+    for name, source in mapping.columns.items():
+        column = mapping.numbers(name, plain_cells(table[source.column]), path)
         kept[name] = column if name == "drive" or source.factor == 1.0 else _scaled(column, source.factor, path, name)
     return pd.DataFrame(kept)
 

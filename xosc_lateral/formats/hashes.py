@@ -13,12 +13,7 @@ from xosc_lateral.formats.source import check_regular, last_read
 def file_hash(path: Path) -> str:
     """Hexadecimal SHA-256 of a file's bytes as they are now; read once per process for as long as it stays the same.
 
-    Raises
-    ------
-    OSError
-        When it can't be read.
-    FormatError
-        When it is not there, or no regular file.
+    Raises `OSError` when it can't be read; `FormatError` when it is not there, or no regular file.
     """
     state = check_regular(path)
     return _file_hash(path, state.st_ino, state.st_ctime_ns, state.st_mtime_ns, state.st_size)

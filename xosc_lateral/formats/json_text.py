@@ -20,10 +20,7 @@ _BRACKETS = re.compile(r"[\[\]{}]")
 def parse_json(data: bytes, path: Path) -> Any:
     """JSON of an input file.
 
-    Raises
-    ------
-    FormatError
-        Not UTF-8, no JSON, NaN or infinity in it, or nested deeper than `limits.JSON_DEPTH`.
+    Raises `FormatError`: Not UTF-8, no JSON, NaN or infinity in it, or nested deeper than `limits.JSON_DEPTH`.
     """
     try:
         text = data.decode("utf-8-sig")
@@ -31,11 +28,18 @@ def parse_json(data: bytes, path: Path) -> Any:
         raise FormatError(f"not JSON in UTF-8 ({error}): save it as UTF-8", path=path) from error
     _check_depth(text, path)
     try:
-        return json.loads(text, parse_constant=_refuse_constant)
+        return json.loads(text, parse_constant=_refuse_constant, parse_float=_finite)
     except json.JSONDecodeError as error:
         raise FormatError(f"not JSON: {error.msg}", path=path, line=error.lineno) from error
     except ValueError as error:
         raise FormatError(f"not JSON: {error}", path=path) from error
+
+
+def _finite(text: str) -> float:
+    number = float(text)
+    if not math.isfinite(number):
+        raise ValueError(f"{text[:40]} is no number that a computer holds")
+    return number
 
 
 def _check_depth(text: str, path: Path) -> None:
@@ -50,10 +54,7 @@ def _check_depth(text: str, path: Path) -> None:
 def canonical_json(value: Any, indent: int = 0) -> str:
     """JSON text of plain values: keys as they come, one item a line, lists of numbers on one line.
 
-    Raises
-    ------
-    ValueError
-        For a number that is not finite: JSON has none.
+    Raises `ValueError` for a number that is not finite: JSON has none.
     """
     pad = " " * (indent + 1)
     if isinstance(value, Mapping):

@@ -11,6 +11,7 @@ from msgspec.structs import replace
 from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.driver.provenance import Metadata
 from xosc_lateral.errors import FormatError, XoscLateralError
+from xosc_lateral.formats.output_paths import file_name
 from xosc_lateral.formats.profile_folders import SHIPPED, find_profile, list_profiles
 from xosc_lateral.formats.profiles import read_profile
 
@@ -52,10 +53,7 @@ class Entry:
 def read_library(folders: Iterable[Path] = ()) -> list[Entry]:
     """Every file of the library; a broken or foreign one costs one entry, not the listing.
 
-    Raises
-    ------
-    FormatError
-        If a folder isn't there.
+    Raises `FormatError` if a folder isn't there.
     """
     first: dict[str, Path] = {}
     entries = []
@@ -79,10 +77,7 @@ def _entry(path: Path, hidden_by: Path | None) -> Entry:
 def matching(entries: Iterable[Entry], tags: Collection[str], where: Mapping[str, str]) -> list[Entry]:
     """Entries that carry all the tags and whose metadata (or `id`, or `model`) are as given, letters big or small.
 
-    Raises
-    ------
-    XoscLateralError
-        If `where` names something that profiles don't have.
+    Raises `XoscLateralError` if `where` names something that profiles don't have.
     """
     for field in where:
         if field not in (*FIELDS, "id", "model"):
@@ -113,16 +108,12 @@ def described(
 ) -> DriverProfile:
     """The profile under another id, with other tags and metadata; what is not mentioned stays.
 
-    Raises
-    ------
-    XoscLateralError
-        For a field that there is not; `FIELDS` are known. For an id that names another folder.
+    Raises `XoscLateralError` for a field that there is not (`FIELDS` are known) and for an id that is no file name.
     """
     for field in fields or {}:
         if field not in FIELDS:
             raise XoscLateralError(f"profiles have no field {field!r} to set; there are {', '.join(FIELDS)}")
-    if name is not None and (name != Path(name).name or name in (".", "..") or "\\" in name or "\0" in name):
-        raise XoscLateralError(f"--name {name!r}: an id is the name of a file in the library, without a folder")
+    file_name(profile.name if name is None else name, "profile's id")
     tags = tuple(tag for tag in dict.fromkeys([*profile.metadata.tags, *add_tags]) if tag not in remove_tags)
     metadata = replace(profile.metadata, tags=tags, **(fields or {}))
     return replace(profile, name=name or profile.name, metadata=metadata)
@@ -131,10 +122,7 @@ def described(
 def own_path(name: str, folders: Iterable[Path]) -> Path:
     """Path of a profile that may be changed.
 
-    Raises
-    ------
-    FormatError
-        If it comes with the package.
+    Raises `FormatError` if it comes with the package.
     """
     path = find_profile(name, folders)
     if path.parent == SHIPPED:

@@ -18,8 +18,45 @@ STDOUT = "-"
 """Name of the standard output where an output is asked for."""
 
 
+LONGEST_NAME = 255
+"""Of a file, on all common systems. [byte]"""
+
+
+def file_name(name: str, what: str) -> str:
+    """A name that others gave, as the name of a file: the one gate to paths.
+
+    Parameters
+    ----------
+    name : str
+    what : str
+        Whose name it is, for the message.
+
+    Raises
+    ------
+    FormatError
+        It could lead to another folder, or no file can have it.
+    """
+    wrong = name in ("", ".", "..") or any(sign in "/\\" or sign < " " for sign in name)
+    if wrong or len(name.encode(errors="replace")) > LONGEST_NAME:
+        raise FormatError(f"{what} {name[:60]!r}: expected the name of a file, without a folder")
+    return name
+
+
+def path_below(folder: Path, name: str, what: str) -> Path:
+    """A path below a folder from names that others gave, with forward slashes.
+
+    Raises
+    ------
+    FormatError
+        It leads elsewhere.
+    """
+    return folder.joinpath(*(file_name(part, what) for part in name.split("/")))
+
+
 def output_file(output: str | Path, usual_name: str, suffixes: Sequence[str]) -> Path:
     """Path of an output file.
+
+    Raises `FormatError` for another suffix.
 
     Parameters
     ----------
@@ -29,13 +66,8 @@ def output_file(output: str | Path, usual_name: str, suffixes: Sequence[str]) ->
         File name in a folder.
     suffixes : sequence of str
         Formats that can be written, lower case with their dot.
-
-    Raises
-    ------
-    FormatError
-        For another suffix.
     """
-    path = output_folder(output) / usual_name if is_folder(output) else Path(output)
+    path = output_folder(output) / file_name(usual_name, "name") if is_folder(output) else Path(output)
     if not path.name.lower().endswith(tuple(suffixes)):
         kind = path.suffix or "a file without suffix"
         raise FormatError(f"can't write {kind}: expected a name ending in {' or '.join(suffixes)}", path=path)
@@ -51,10 +83,7 @@ def is_folder(output: str | Path) -> bool:
 def output_folder(output: str | Path) -> Path:
     """Path of an output folder, which need not be there yet.
 
-    Raises
-    ------
-    FormatError
-        If a file is there.
+    Raises `FormatError` if a file is there.
     """
     path = Path(output)
     if path.is_file():
@@ -65,6 +94,8 @@ def output_folder(output: str | Path) -> Path:
 def claim(outputs: Iterable[Path | None], inputs: Iterable[Path] = (), *, force: bool = False) -> None:
     """Refuse outputs that can't be meant, or that would replace somebody else's file, before any work is done.
 
+    Raises `FormatError`: see `refuse_outputs`; or a file is there that this package did not write.
+
     Parameters
     ----------
     outputs : iterable of Path or None
@@ -73,11 +104,6 @@ def claim(outputs: Iterable[Path | None], inputs: Iterable[Path] = (), *, force:
         Files that are read.
     force : bool
         Replace whatever is there, apart from inputs.
-
-    Raises
-    ------
-    FormatError
-        See `refuse_outputs`; or a file is there that this package did not write.
     """
     wanted = [output for output in outputs if output is not None]
     refuse_outputs(wanted, inputs)

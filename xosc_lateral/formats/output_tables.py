@@ -78,16 +78,21 @@ def write_table(
 
 def csv_text(frame: pd.DataFrame, decimals: Mapping[str, int] | int = 6) -> str:
     """The table as CSV; words that look like a formula are made harmless."""
+    frame = harmless_frame(frame)
+    if isinstance(decimals, Mapping):
+        frame = frame.assign(**{name: frame[name].map(f"{{:.{places}f}}".format) for name, places in decimals.items()})
+        return str(frame.to_csv(index=False, lineterminator="\n"))
+    return str(frame.to_csv(index=False, float_format=f"%.{decimals}f", lineterminator="\n"))
+
+
+def harmless_frame(frame: pd.DataFrame) -> pd.DataFrame:
+    """The table with words that no spreadsheet takes for a formula."""
     words = {
         name: frame[name].map(lambda value: harmless(value) if isinstance(value, str) else value)
         for name in frame.columns
         if frame[name].dtype.kind not in "fiubM"
     }
-    frame = frame.assign(**words) if words else frame
-    if isinstance(decimals, Mapping):
-        frame = frame.assign(**{name: frame[name].map(f"{{:.{places}f}}".format) for name, places in decimals.items()})
-        return str(frame.to_csv(index=False, lineterminator="\n"))
-    return str(frame.to_csv(index=False, float_format=f"%.{decimals}f", lineterminator="\n"))
+    return frame.assign(**words) if words else frame
 
 
 def stamped(provenance: Mapping[str, Any]) -> dict[str, Any]:

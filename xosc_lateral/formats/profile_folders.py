@@ -49,10 +49,7 @@ def find_profile(name_or_path: str | Path, folders: Iterable[str | Path] = ()) -
 def list_profiles(folders: Iterable[str | Path] = ()) -> list[Path]:
     """Profile files in the folders (see `library_folders`), among those shipped and of plug-ins, by name within each.
 
-    Raises
-    ------
-    FormatError
-        If a folder isn't one.
+    Raises `FormatError` if a folder isn't one.
     """
     searched = _each_once((*library_folders(folders), SHIPPED))
     found = [path for folder in searched for path in sorted(folder.glob(f"*{SUFFIX}"))]
@@ -65,10 +62,7 @@ def library_folders(folders: Iterable[str | Path] = ()) -> tuple[Path, ...]:
     ``XOSC_LATERAL_LIBRARY`` holds folders, separated as in PATH. The configuration is ``xosc-lateral/config.toml`` in
     ``XDG_CONFIG_HOME`` (else ``~/.config``; on Windows ``APPDATA``) with ``library = ["FOLDER", ...]``.
 
-    Raises
-    ------
-    FormatError
-        If one of them isn't there.
+    Raises `FormatError` if one of them isn't there.
     """
     from_environment = [Path(name) for name in os.environ.get(LIBRARY_VARIABLE, "").split(os.pathsep) if name]
     found = [*map(Path, folders), *from_environment, *configured_libraries()]

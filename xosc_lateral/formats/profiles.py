@@ -27,19 +27,15 @@ SCHEMA = Path(__file__).resolve().parents[1] / "resources" / "driver_profile.sch
 def read_profile(name_or_path: str | Path, folders: Iterable[str | Path] = ()) -> DriverProfile:
     """Read a profile by its path, or by its name in the folders or among those shipped.
 
+    Raises `DriverProfileError` if no profile of that name is known; lists those that are; `FormatError` if the file is
+    not there or no valid profile, or a folder isn't one.
+
     Parameters
     ----------
     name_or_path : str or Path
         ``motorway`` or ``somewhere/mine.json``.
     folders : iterable of path
         Looked through first, in this order.
-
-    Raises
-    ------
-    DriverProfileError
-        If no profile of that name is known; lists those that are.
-    FormatError
-        If the file is not there or no valid profile, or a folder isn't one.
     """
     path = find_profile(name_or_path, folders)
     values = parse_json(read_source(path, PROFILE_SIZE).data, path)
@@ -55,10 +51,7 @@ def read_profile(name_or_path: str | Path, folders: Iterable[str | Path] = ()) -
 def write_profile(profile: DriverProfile, path: str | Path) -> None:
     """Write a profile file, whole or not at all; the same profile gives the same bytes.
 
-    Raises
-    ------
-    OSError
-        When it can't be written.
+    Raises `OSError` when it can't be written.
     """
     write_atomically(Path(path), profile_bytes(profile))
 

@@ -63,10 +63,7 @@ class Source:
     def unpacked(self, size: int) -> None:
         """Refuse what unpacks to more than its size can hold.
 
-        Raises
-        ------
-        FormatError
-            See `check_unpacked`.
+        Raises `FormatError`: see `check_unpacked`.
         """
         check_unpacked(size, self.size, self.path)
 
@@ -82,10 +79,7 @@ class Content:
 def read_source(path: Path | str, limit: Limit = FILE_SIZE) -> Content:
     """Bytes of an input file.
 
-    Raises
-    ------
-    FormatError
-        See `open_source`.
+    Raises `FormatError`: see `open_source`.
     """
     with open_source(path, limit) as source:
         data = source.file.read(limit.bytes + 1)
@@ -98,10 +92,8 @@ def read_source(path: Path | str, limit: Limit = FILE_SIZE) -> Content:
 def open_source(path: Path | str, limit: Limit = FILE_SIZE) -> Iterator[Source]:
     """Open an input file for reading.
 
-    Raises
-    ------
-    FormatError
-        It is not there, can't be read, is no regular file or larger than the limit, or changed while it was being read.
+    Raises `FormatError`: It is not there, can't be read, is no regular file or larger than the limit, or changed while
+    it was being read.
     """
     path = Path(path)
     with _opened(path) as file:
@@ -132,10 +124,7 @@ def last_read(path: Path) -> str:
 def check_regular(path: Path) -> os.stat_result:
     """State of a regular file.
 
-    Raises
-    ------
-    FormatError
-        It is not there, or something else.
+    Raises `FormatError`: It is not there, or something else.
     """
     try:
         state = path.stat()
@@ -150,15 +139,12 @@ def check_regular(path: Path) -> os.stat_result:
 def check_unpacked(unpacked: int, packed: int, path: Path) -> None:
     """Refuse a packed file that would take all memory.
 
+    Raises `FormatError`: Above `limits.UNPACKED_SIZE`, or above `limits.UNPACKED_UNASKED` and `limits.PACKING_RATIO`.
+
     Parameters
     ----------
     unpacked, packed : int
         [byte]
-
-    Raises
-    ------
-    FormatError
-        Above `limits.UNPACKED_SIZE`, or above `limits.UNPACKED_UNASKED` and `limits.PACKING_RATIO`.
     """
     if unpacked > UNPACKED_SIZE.bytes:
         raise FormatError(UNPACKED_SIZE.refusal(unpacked / 1e6), path=path)
@@ -196,10 +182,7 @@ def edit_in_place(path: Path) -> None:
 def refuse_guarded(target: Path) -> None:
     """Refuse to replace an input; links of both kinds are seen through.
 
-    Raises
-    ------
-    FormatError
-        The target is a file that was opened as an input.
+    Raises `FormatError`: The target is a file that was opened as an input.
     """
     guarded = _GUARDED.get()
     if guarded and target.exists():

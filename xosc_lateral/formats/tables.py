@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import codecs
 import gzip
 import io
 from collections.abc import Iterator
@@ -17,6 +18,8 @@ from xosc_lateral.limits import TABLE_CELLS, TABLE_COLUMNS
 if TYPE_CHECKING:
     import pandas as pd
 
+    from xosc_lateral.formats.mapping import TableMapping
+
 TABLE_SUFFIXES = (".csv", ".csv.gz", ".parquet")
 
 LONGEST_MESSAGE = 300
@@ -26,18 +29,15 @@ _CHUNK = 1 << 20
 _DOUBLE = 8
 
 
-def read_table(path: Path) -> tuple[pd.DataFrame, str]:
-    """Read a CSV, CSV.gz or Parquet file as it is.
+def read_table(path: Path, mapping: TableMapping | None = None) -> tuple[pd.DataFrame, str]:
+    """Read a CSV, CSV.gz or Parquet file as it is; a mapping may say how text is written.
+
+    Raises `FormatError` when it isn't one, or is beyond the limits.
 
     Returns
     -------
     DataFrame, str
         The table, and the SHA-256 of the bytes that it was parsed from.
-
-    Raises
-    ------
-    FormatError
-        When it isn't one, or is beyond the limits.
     """
     import pandas as pd
 
@@ -48,26 +48,28 @@ def read_table(path: Path) -> tuple[pd.DataFrame, str]:
         if name.endswith(".parquet"):
             table = _read_parquet(source)
         else:
-            text = unpacked_text(source)
-            separator = _separator(text, path)
-            table = pd.read_csv(text, sep=separator, encoding="utf-8-sig", low_memory=False, index_col=False)
+            encoding, separator, decimal = None, None, "."
+            if mapping is not None:
+                encoding, separator, decimal = mapping.encoding, mapping.separator, mapping.decimal
+            text = _in_utf8(unpacked_text(source), path, encoding)
+            separator = separator or _separator(text, path)
+            table = pd.read_csv(
+                text, sep=separator, decimal=decimal, encoding="utf-8-sig", low_memory=False, index_col=False
+            )
     return table, parsed_hash(path)
 
 
 def read_text_table(path: Path) -> pd.DataFrame:
     """A table with all cells as text, missing ones empty.
 
-    Raises
-    ------
-    FormatError
-        See `read_table`.
+    Raises `FormatError`: see `read_table`.
     """
     import pandas as pd
 
     with open_source(path) as source, foreign_errors(path, "can't be read as a table"):
         if path.name.lower().endswith(".parquet"):
             return as_text(_read_parquet(source))
-        text = unpacked_text(source)
+        text = _in_utf8(unpacked_text(source), path)
         separator = _separator(text, path)
         return pd.read_csv(text, dtype=str, keep_default_na=False, encoding="utf-8-sig", sep=separator, index_col=False)
 
@@ -83,10 +85,7 @@ def as_text(table: pd.DataFrame) -> pd.DataFrame:
 def foreign_errors(path: Path, what: str) -> Iterator[None]:
     """Whatever a library raises about a file becomes one line that names the file.
 
-    Raises
-    ------
-    FormatError
-        In place of anything that is no error of ours.
+    Raises `FormatError` in place of anything that is no error of ours.
     """
     try:
         yield
@@ -102,10 +101,7 @@ def foreign_errors(path: Path, what: str) -> Iterator[None]:
 def unpacked_text(source: Source) -> IO[bytes]:
     """The file, unpacked if it is gzip (by its first bytes, whatever its name).
 
-    Raises
-    ------
-    FormatError
-        It unpacks to more than `limits` allow.
+    Raises `FormatError`: It unpacks to more than `limits` allow.
     """
     packed = source.file.read(2) == b"\x1f\x8b"
     source.file.seek(0)
@@ -118,6 +114,47 @@ def unpacked_text(source: Source) -> IO[bytes]:
             source.unpacked(unpacked.tell())
     unpacked.seek(0)
     return unpacked
+
+
+def text_encoding(path: Path) -> str:
+    """Encoding of a text file: UTF-8, or what `read_table` takes it for."""
+    with open_source(path) as source:
+        return "utf-8" if path.name.lower().endswith(".parquet") else _encoding(unpacked_text(source))
+
+
+def _encoding(text: IO[bytes]) -> str:
+    """UTF-8 where all of it is; else UTF-16 by its first bytes, else Windows' for Western Europe."""
+    utf16 = text.read(2) in (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
+    text.seek(0)
+    decoder = codecs.getincrementaldecoder("utf-8")()
+    try:
+        while not utf16 and (chunk := text.read(_CHUNK)):
+            decoder.decode(chunk)
+        decoder.decode(b"", final=True)
+    except UnicodeDecodeError:
+        return "cp1252"
+    finally:
+        text.seek(0)
+    return "utf-16" if utf16 else "utf-8"
+
+
+def _in_utf8(text: IO[bytes], path: Path, encoding: str | None = None) -> IO[bytes]:
+    """The text in UTF-8.
+
+    Raises
+    ------
+    FormatError
+        It is not in the encoding that is given or found.
+    """
+    given = encoding or _encoding(text)
+    if given.lower().replace("_", "-") in ("utf-8", "utf8", "utf-8-sig"):
+        return text
+    try:
+        return io.BytesIO(text.read().decode(given).encode())
+    except (UnicodeDecodeError, LookupError) as error:
+        raise FormatError(
+            f'not in UTF-8 nor in {given}: {error}; `encoding = "..."` in the file of --mapping names it', path=path
+        ) from error
 
 
 def _read_parquet(source: Source) -> pd.DataFrame:

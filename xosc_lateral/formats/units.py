@@ -85,10 +85,7 @@ def factor(column: str, unit: str) -> float:
 
     A unit with a leading minus turns the sign: ``-m`` for offsets counted to the right.
 
-    Raises
-    ------
-    ValueError
-        For an unknown unit, or one that measures something else.
+    Raises `ValueError` for an unknown unit, or one that measures something else.
     """
     sign, name = (-1.0, unit[1:]) if unit.startswith("-") and unit != "-" else (1.0, unit)
     if name not in UNITS:

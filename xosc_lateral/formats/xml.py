@@ -41,11 +41,8 @@ class XmlDocument:
 def parse_xml(data: bytes, path: object) -> etree._Element:
     """Root element of a document.
 
-    Raises
-    ------
-    FormatError
-        Not XML (with line), empty, too large, or with a document type that declares entities: neither format has one,
-        and both entity expansion and external entities come in this way.
+    Raises `FormatError`: Not XML (with line), empty, too large, or with a document type that declares entities: neither
+    format has one, and both entity expansion and external entities come in this way.
     """
     if not data.strip(b" \t\r\n\xef\xbb\xbf"):
         raise FormatError("the file is empty", path=path)
@@ -94,10 +91,7 @@ def read_xml(path: Path) -> tuple[etree._Element, bytes]:
 def read_document(path: Path) -> XmlDocument:
     """Read a file. The tree is shared between callers: never change it.
 
-    Raises
-    ------
-    FormatError
-        Missing, no regular file, too large, or see `parse_xml`.
+    Raises `FormatError`: Missing, no regular file, too large, or see `parse_xml`.
     """
     state = check_regular(path)
     guard_input(path)

@@ -2,11 +2,16 @@
 
 Distances between vehicles are free space: from bumper to bumper along the lane, 0 while they overlap lengthwise,
 infinite where nobody is within reach, NaN where there is no such lane.
+
+Everything is continuous in time. Others belong to a lane as far as their bodies lie in it, seen from where the vehicle
+itself is, so that they come and go as a lane change does, anybody's. What a road changes at once, lanes and widths at a
+border of sections, is what the vehicle has around it: the mean over the way that it drives within a second or two.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from functools import lru_cache
 from typing import NamedTuple
 
@@ -20,6 +25,7 @@ from xosc_lateral.scenario import BoundingBox
 from xosc_lateral.scenario.actions.environment import EnvironmentAction
 from xosc_lateral.scenario.enums import VehicleCategory
 from xosc_lateral.scenario.environment import Environment, Weather
+from xosc_lateral.segment import FADES
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -32,7 +38,15 @@ IN_SIGHT = 2.0 * REACH + 100.0
 reference line, which on the tightest ramp is half as long as its outer lane; the rest is for two road trains. [m]"""
 
 ALONGSIDE = 10.0
-"""A vehicle in the next lane counts as alongside within this free space lengthwise. [m]"""
+"""A vehicle in the next lane counts half as alongside at this free space lengthwise, wholly at half of it. [m]"""
+
+NEAR = 40.0
+"""Free space over which the influence of others fades to 37 %, as in `driver.neighbours`: with so much more free space
+for each factor e that less of a body lies in the lane, its influence is the product of both. [m]"""
+
+STEERING = 1.0
+"""Standard deviation of the kernel over which roads are seen and by which drivers respond: steering takes a second or
+two. [s]"""
 
 CELLS = 100_000
 """Rows of all others that are looked at together: as many as stay in a processor's cache. [-]"""
@@ -60,8 +74,10 @@ def entity_context(motion: NominalMotion, network: RoadNetwork, index: int, grid
     """
     entity = motion.entities[index]
     road = _road(entity, network, grid)
-    around = _neighbours(motion, network, index, grid)
-    return _own_motion(entity, grid) | road | around | _empty_lanes(road, around) | _weather(motion, entity, grid)
+    step = float(entity.time[grid[1]] - entity.time[grid[0]]) if len(grid) > 1 else STEERING
+    beside = _neighbours(motion, network, index, grid, _lanes_there(road, step))
+    road = {name: _around(values, step) for name, values in road.items()}
+    return _own_motion(entity, grid) | road | beside | _weather(motion, entity, grid)
 
 
 def _own_motion(entity: EntityMotion, grid: IntArray) -> dict[str, FloatArray]:
@@ -82,19 +98,34 @@ def _road(entity: EntityMotion, network: RoadNetwork, grid: IntArray) -> dict[st
     rows = grid[on]
     road, lane, s = entity.road[rows], entity.lane[rows], entity.s[rows]
     lane_index, lane_count = network.lane_index(road, lane, s)
+    # Against the lane's traffic all is seen the other way round.
+    along = np.where(np.cos(entity.heading_relative[rows]) < 0.0, -1.0, 1.0)
+    lane_seen = np.where(along > 0, lane_index, lane_count - 1 - lane_index)
     values: dict[str, FloatArray] = {
-        "curvature": network.lane_curvature(road, lane, s, entity.offset[rows]),
+        "curvature": along * network.lane_curvature(road, lane, s, entity.offset[rows]),
         "lane_width": network.lane_width(road, lane, s),
-        "lane_index": np.where(lane_index >= 0, lane_index, np.nan).astype(np.float64),
+        "lane_index": np.where(lane_index >= 0, lane_seen, np.nan).astype(np.float64),
         "lane_count": lane_count.astype(np.float64),
-        "crossfall": network.crossfall(road, lane, s),
-        "grade": network.grade(road, lane, s),
+        "crossfall": along * network.crossfall(road, lane, s),
+        "grade": along * network.grade(road, lane, s),
     }
     context = {}
     for name, part in values.items():
         context[name] = np.full(len(grid), np.nan)
         context[name][on] = part
     return context
+
+
+def _around(values: FloatArray, step: float) -> FloatArray:
+    """Mean of a road's column over the way around each row, where the column is known, shape (n,); `step` in [s]."""
+    known = np.isfinite(values)
+    if not known.any() or np.ptp(values[known]) == 0.0:
+        return values
+    half = round(4.0 * STEERING / step)
+    kernel = np.exp(-0.5 * (np.arange(-half, half + 1) * step / STEERING) ** 2)
+    parts = (np.pad(part, half) for part in (np.where(known, values, 0.0), known * 1.0))
+    total, weight = (np.convolve(part, kernel, "valid") for part in parts)
+    return np.where(known, total / np.where(known, weight, 1.0), np.nan)
 
 
 # ---- other vehicles --------------------------------------------------------------------------------------------------
@@ -110,9 +141,8 @@ class _Reach(NamedTuple):
     sign: int
 
 
-def _lane_path(network: RoadNetwork, road: int, lane: int, s: float) -> list[_Reach]:
+def _lane_path(network: RoadNetwork, road: int, lane: int, s: float, forward: int) -> list[_Reach]:
     """Sections along a lane within `REACH` both ways, in a coordinate u that is 0 at `s` and grows along travel."""
-    forward = network.travel_direction(road, lane)
     low, high = network.section_at(road, s)
     path = [_Reach(road, low, high, lane, 0.0, s, forward)]
     for way in (1, -1):
@@ -136,69 +166,122 @@ _INTO_NEXT = 1e-6
 
 
 class _Others(NamedTuple):
-    """Where another vehicle is, seen along the own lane: u ahead [m], lane steps to the left, same direction or not."""
+    """Where another vehicle is, seen along the own lane: u ahead [m], from the own path to the left [m], which way."""
 
     ahead: FloatArray
-    lanes_left: FloatArray
+    left: FloatArray
     oncoming: NDArray[np.bool_]
 
 
-def _neighbours(motion: NominalMotion, network: RoadNetwork, index: int, grid: IntArray) -> dict[str, FloatArray]:
+ZONES = {"lead": 0.0, "left": 1.0, "right": -1.0}
+"""Middle of the lane on each side, from the own path to the left. [own lane widths]"""
+
+
+def _neighbours(
+    motion: NominalMotion, network: RoadNetwork, index: int, grid: IntArray, lanes: Mapping[str, FloatArray]
+) -> dict[str, FloatArray]:
     own = motion.entities[index]
-    n = len(grid)
-    nearest = {side: np.full(n, np.inf) for side in ("lead", "left", "right", "oncoming")}
-    truck = {side: np.zeros(n) for side in ("lead", "left", "right")}
+    sides = {side: _Side.nobody(len(grid)) for side in ZONES}
+    oncoming = np.full(len(grid), np.nan)
     groups = _own_lane_groups(own, network, grid)
-    directions = _travel(motion, network)
+    width = _own_lane_width(own, network, grid)
     numbers = [k for k in _in_sight(motion)[index] if motion.entities[k].entity.is_vehicle]
-    together = max(1, CELLS // n)
+    together = max(1, CELLS // len(grid))
     for begin in range(0, len(numbers), together):
-        part = numbers[begin : begin + together]
-        others = [motion.entities[k] for k in part]
-        seen = _see(others, np.stack([directions[k][grid] for k in part]), grid, groups)
-        gap = _free_space(seen, own.entity.bounding_box, [other.entity.bounding_box for other in others])
-        is_truck = np.array([float(other.entity.vehicle_category in TRUCKS) for other in others])
-        for side, there in _sides(seen).items():
-            with np.errstate(invalid="ignore"):
-                gaps = np.where(there & (gap <= REACH), gap, np.inf)
-            first = gaps.argmin(axis=0)
-            smallest = gaps[first, np.arange(n)]
-            closer = smallest < nearest[side]
-            nearest[side][closer] = smallest[closer]
-            if side in truck:
-                truck[side][closer] = is_truck[first[closer]]
-    return _as_columns({side: np.where(np.isinf(gap), np.nan, gap) for side, gap in nearest.items()}, truck)
+        others = [motion.entities[k] for k in numbers[begin : begin + together]]
+        boxes = [other.entity.bounding_box for other in others]
+        seen = _see(own, others, network, grid, groups)
+        gap = _free_space(seen, own.entity.bounding_box, boxes)
+        with np.errstate(invalid="ignore"):
+            there = (gap <= REACH) & ~np.isnan(seen.left)
+            ahead = there & (seen.ahead > 0)
+        oncoming = np.fmin(oncoming, np.fmin.reduce(np.where(ahead & seen.oncoming, gap, np.nan), axis=0))
+        is_truck = np.array([other.entity.vehicle_category in TRUCKS for other in others])
+        widths = np.array([[box.width] for box in boxes]) / width
+        for side, middle in ZONES.items():
+            share = _share_inside(seen.left / width - middle, widths)
+            share = np.where((ahead if side == "lead" else there) & ~seen.oncoming, share, 0.0)
+            sides[side].add(gap, share, is_truck)
+    columns = {"oncoming_distance": oncoming}
+    for side, found in sides.items():
+        columns |= {f"{side}_is_truck": found.is_truck}
+        lane = np.maximum(lanes[side], np.minimum(found.influence, 1.0))
+        columns[f"{side}_distance"] = np.where((lane > 0) & np.isnan(found.distance), np.inf, found.distance)
+        if lane.max(initial=0.0) > 0.0 and lane.min(initial=1.0) < 1.0:
+            columns[f"{side}_distance{FADES}"] = lane
+        if side != "lead":  # the same as measured drives often have it: a flag for what drives beside
+            columns |= {f"truck_{side}": found.truck_alongside, f"car_{side}": found.car_alongside}
+    return columns
 
 
-def _sides(seen: _Others) -> dict[str, NDArray[np.bool_]]:
-    """Rows in which the other one is ahead, beside or comes towards us, shape (others, n) each."""
-    same_way = ~seen.oncoming
-    return {
-        "lead": same_way & (seen.lanes_left == 0) & (seen.ahead > 0),
-        "left": same_way & (seen.lanes_left == 1),
-        "right": same_way & (seen.lanes_left == -1),
-        "oncoming": seen.oncoming & (seen.ahead > 0),
-    }
+@dataclass(eq=False, slots=True)
+class _Side:
+    """What is on one side, shape (n,) each: distance [m]; influence of all and of trucks, kinds alongside. [-]"""
+
+    distance: FloatArray
+    influence: FloatArray
+    of_trucks: FloatArray
+    truck_alongside: FloatArray
+    car_alongside: FloatArray
+
+    @classmethod
+    def nobody(cls, n: int) -> _Side:
+        return cls(np.full(n, np.nan), *np.zeros((4, n)))
+
+    def add(self, gap: FloatArray, share: FloatArray, is_truck: NDArray[np.bool_]) -> None:
+        """More vehicles with free space `gap` [m], of which so much lies in the lane [-], shape (others, n) each."""
+        there = share > 0
+        distance = np.full(gap.shape, np.nan)
+        influence, of_truck, alongside = np.zeros((3, *gap.shape))
+        gap, share = gap[there], share[there]
+        distance[there] = gap - NEAR * np.log(share)
+        influence[there] = share * np.exp(-gap / NEAR)
+        alongside[there] = share * (1.0 - smooth_step(gap / ALONGSIDE - 0.5))
+        # a truck comes into sight in the last quarter of the reach
+        of_truck[there] = influence[there] * (1.0 - smooth_step(4.0 * gap / REACH - 3.0))
+        self.distance = np.fmin(self.distance, np.fmin.reduce(distance, axis=0))
+        self.influence = np.sum([self.influence, *influence], axis=0)
+        self.of_trucks = np.sum([self.of_trucks, *of_truck[is_truck]], axis=0)
+        self.truck_alongside = np.max([self.truck_alongside, *alongside[is_truck]], axis=0)
+        self.car_alongside = np.max([self.car_alongside, *alongside[~is_truck]], axis=0)
+
+    @property
+    def is_truck(self) -> FloatArray:
+        """How far who is there is a truck, others weighed by their influence."""
+        return self.of_trucks / np.where(self.influence > 0, self.influence, 1.0)
 
 
-def _as_columns(nearest: Mapping[str, FloatArray], truck: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
-    """Distances [m] and kinds of what is nearest on every side, shape (n,) each, by the names of context columns."""
-    context = {f"{side}_distance": distance for side, distance in nearest.items()}
-    context |= {f"{side}_is_truck": flag for side, flag in truck.items()}
-    for side in ("left", "right"):
-        alongside = np.nan_to_num(nearest[side], nan=np.inf) <= ALONGSIDE
-        # the same as measured drives often have it: a flag for what drives beside
-        context[f"truck_{side}"] = (alongside & (truck[side] > 0)).astype(np.float64)
-        context[f"car_{side}"] = (alongside & (truck[side] == 0)).astype(np.float64)
-    return context
+def _share_inside(middle: FloatArray, width: FloatArray) -> FloatArray:
+    """Share of a body that lies in a lane one wide, of what fits in; `middle` from the lane's, all in lane widths."""
+    inside = np.minimum(middle + 0.5 * width, 0.5) - np.maximum(middle - 0.5 * width, -0.5)
+    return np.clip(inside / np.minimum(width, 1.0), 0.0, 1.0)
 
 
-def _empty_lanes(road: Mapping[str, FloatArray], around: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
-    """Distances that say so where there is a lane but nobody in it."""
+def smooth_step(u: FloatArray) -> FloatArray:
+    """0 at 0 and below, 1 at 1 and above, smooth between."""
+    u = np.clip(u, 0.0, 1.0)
+    return np.asarray(u**2 * (3.0 - 2.0 * u))
+
+
+def _own_lane_width(own: EntityMotion, network: RoadNetwork, grid: IntArray) -> FloatArray:
+    """Of the lane, at least the vehicle's own, shape (n,). [m]"""
+    width = np.full(len(grid), own.entity.bounding_box.width)
+    on = (own.road[grid] >= 0) & (own.lane[grid] != 0)
+    rows = grid[on]
+    width[on] = np.maximum(width[on], network.lane_width(own.road[rows], own.lane[rows], own.s[rows]))
+    return np.asarray(np.maximum(width, 0.1))
+
+
+def _lanes_there(road: Mapping[str, FloatArray], step: float) -> dict[str, FloatArray]:
+    """How far there is a lane on each side of the way around, shape (n,) each. [-]"""
     index, count = road["lane_index"], road["lane_count"]
     there = {"lead": index >= 0, "right": index > 0, "left": index < count - 1}
-    names = {side: f"{side}_distance" for side in there}
-    return {name: np.where(there[side] & np.isnan(around[name]), np.inf, around[name]) for side, name in names.items()}
+    shares = {side: _around(one.astype(np.float64), step) for side, one in there.items()}
+    return {side: np.clip((share - _NONE) / (1.0 - 2.0 * _NONE), 0.0, 1.0) for side, share in shares.items()}
+
+
+_NONE = 1e-3
+"""A share of a lane that is none. [-]"""
 
 
 @lru_cache(maxsize=1)  # asked for every entity of one motion after another
@@ -220,34 +303,42 @@ def _own_lane_groups(
     own: EntityMotion, network: RoadNetwork, grid: IntArray
 ) -> list[tuple[IntArray, FloatArray, list[_Reach]]]:
     """Rows of the grid that share one lane path: positions in the grid, own u there, and the path."""
-    groups: dict[tuple[int, int, float], list[int]] = {}
+    groups: dict[tuple[int, int, float, int], list[int]] = {}
     present = ((own.activity[grid] & Activity.ACTIVE) != 0) & (own.road[grid] >= 0) & (own.lane[grid] != 0)
+    direction = _travel(network, own.road[grid], own.lane[grid], own.heading_relative[grid], present)
     for k in np.flatnonzero(present):
         row = grid[k]
         road, lane, s = int(own.road[row]), int(own.lane[row]), float(own.s[row])
-        groups.setdefault((road, lane, network.section_at(road, s)[0]), []).append(int(k))
+        groups.setdefault((road, lane, network.section_at(road, s)[0], int(direction[k])), []).append(int(k))
     result = []
-    for (road, lane, _), members in groups.items():
+    for (road, lane, _, forward), members in groups.items():
         rows = np.array(members)
         along = own.s[grid[rows]]
-        path = _lane_path(network, road, lane, float(along[0]))
+        path = _lane_path(network, road, lane, float(along[0]), forward)
         result.append((rows, path[0].sign * (along - along[0]), path))
     return result
 
 
 def _see(
+    own: EntityMotion,
     others: Sequence[EntityMotion],
-    direction: NDArray[np.int8],
+    network: RoadNetwork,
     grid: IntArray,
     groups: list[tuple[IntArray, FloatArray, list[_Reach]]],
 ) -> _Others:
-    """Others along the own lane, shape (others, n); `direction` is which way they drive, 0: on no lane."""
-    shape = direction.shape
-    seen = _Others(np.full(shape, np.nan), np.full(shape, np.nan), np.zeros(shape, dtype=bool))
-    road, lane, s = (np.stack([getattr(one, name)[grid] for one in others]) for name in ("road", "lane", "s"))
+    """Others along the own lane, shape (others, n)."""
+    names = ("road", "lane", "s", "offset", "activity", "heading_relative")
+    road, lane, s, offset, activity, heading = (
+        np.stack([getattr(one, name)[grid] for one in others]) for name in names
+    )
+    present = ((activity & Activity.ACTIVE) != 0) & (road >= 0) & (lane != 0)
+    direction = _travel(network, road, lane, heading, present)
+    t = np.full(s.shape, np.nan)
+    t[present] = network.offset_to_t(road[present], lane[present], s[present], offset[present])
+    seen = _Others(np.full(s.shape, np.nan), np.full(s.shape, np.nan), np.zeros(s.shape, dtype=bool))
     for members, own_u, path in groups:
         for part in path:
-            on = (direction[:, members] != 0) & (road[:, members] == part.road)
+            on = present[:, members] & (road[:, members] == part.road)
             on &= (s[:, members] >= part.s_low - 1e-9) & (s[:, members] <= part.s_high + 1e-9)
             who, at = np.nonzero(on)
             if not len(who):
@@ -258,26 +349,19 @@ def _see(
             nearer = ~(np.abs(seen.ahead[who, k]) <= np.abs(ahead))
             who, k, ahead = who[nearer], k[nearer], ahead[nearer]
             seen.ahead[who, k] = ahead
-            seen.lanes_left[who, k] = part.sign * (_rank(lane[who, k]) - _rank(np.int64(part.lane)))
+            centre = network.lane_centre_t(part.road, part.lane, s[who, k])
+            seen.left[who, k] = part.sign * (t[who, k] - centre) - own.offset[grid[k]]
             seen.oncoming[who, k] = direction[who, k] != part.sign
     return seen
 
 
-@lru_cache(maxsize=1)  # asked for every entity of one motion after another
-def _travel(motion: NominalMotion, network: RoadNetwork) -> tuple[NDArray[np.int8], ...]:
-    """For every entity which way it drives along s, +1 or -1, shape (rows,); 0 where it is on no lane."""
-    directions = []
-    for entity in motion.entities:
-        present = ((entity.activity & Activity.ACTIVE) != 0) & (entity.road >= 0) & (entity.lane != 0)
-        direction = np.zeros(len(present), dtype=np.int8)
-        direction[present] = network.travel_directions(entity.road[present], entity.lane[present])
-        directions.append(np.where(np.cos(entity.heading_relative) < 0.0, -direction, direction))
-    return tuple(directions)
-
-
-def _rank(lane: NDArray[np.integer] | np.integer) -> IntArray:
-    """Lane ids without the gap at the centre lane 0: differences count lanes along +t."""
-    return np.where(lane > 0, lane - 1, lane).astype(np.int64)
+def _travel(
+    network: RoadNetwork, road: IntArray, lane: IntArray, heading: FloatArray, present: NDArray[np.bool_]
+) -> NDArray[np.int64]:
+    """Which way somebody drives along s, +1 or -1, shape as the arguments; 0 where it is on no lane."""
+    direction = np.zeros(present.shape, dtype=np.int64)
+    direction[present] = network.travel_directions(road[present], lane[present])
+    return np.where(np.cos(heading) < 0.0, -direction, direction)
 
 
 def _free_space(seen: _Others, own: BoundingBox, others: Sequence[BoundingBox]) -> FloatArray:

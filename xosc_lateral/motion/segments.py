@@ -14,8 +14,8 @@ from xosc_lateral.road.network import RoadNetwork
 MINIMUM_SPEED = 40.0 / 3.6
 """Below this the model says nothing [m/s] (Neis & Beyerer cut their data at 40 km/h)."""
 
-_AGAINST_LANE = np.pi / 4
-"""Heading relative to the lane beyond which the vehicle does not follow it. [rad]"""
+_ACROSS_LANE = np.pi / 4
+"""Heading relative to the lane, whichever way it is driven, beyond which the vehicle does not follow it. [rad]"""
 
 _SPEED_SLACK = 1e-6
 """40 km/h written as 11.1111 in a scenario is meant as 40 km/h. [m/s, relative]"""
@@ -32,7 +32,7 @@ class SegmentKind(Enum):
     TRAJECTORY = "follows a trajectory"
     LATERAL_ACTION = "lateral action"
     NOT_DRIVING_LANE = "not in a driving lane"
-    AGAINST_LANE = "not heading along its lane"
+    ACROSS_LANE = "not heading along its lane"
     SLOW = "below 40 km/h"
     ROAD_END = "at the end of the road"
 
@@ -143,7 +143,8 @@ def _reasons(motion: EntityMotion, network: RoadNetwork, is_trailer: bool) -> di
         SegmentKind.TRAJECTORY: (activity & Activity.TRAJECTORY) != 0,
         SegmentKind.LATERAL_ACTION: (activity & Activity.LATERAL) != 0,
         SegmentKind.NOT_DRIVING_LANE: on_road & ~in_driving_lane,
-        SegmentKind.AGAINST_LANE: np.abs(motion.heading_relative) > _AGAINST_LANE,
+        # Who overtakes on the lane of those who come towards him follows that lane.
+        SegmentKind.ACROSS_LANE: np.abs(np.sin(motion.heading_relative)) > np.sin(_ACROSS_LANE),
         SegmentKind.SLOW: motion.speed < MINIMUM_SPEED * (1.0 - _SPEED_SLACK),
         SegmentKind.ROAD_END: (activity & Activity.ROAD_END) != 0,
     }

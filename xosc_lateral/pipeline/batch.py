@@ -6,7 +6,7 @@ import errno
 import os
 import re
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from enum import StrEnum
@@ -22,7 +22,7 @@ from xosc_lateral.pipeline.lock import folder_lock
 from xosc_lateral.pipeline.manifest import ManifestRow
 from xosc_lateral.pipeline.tasks import WorkerDiedError, run_tasks
 from xosc_lateral.pipeline.workers import open_pool
-from xosc_lateral.version import __version__
+from xosc_lateral.version import BEHAVIOUR, __version__
 
 Converter = Callable[[Job], ManifestRow]
 """Makes a job's output and describes it; raises an `XoscLateralError` when the input is at fault."""
@@ -46,6 +46,7 @@ class JobState(StrEnum):
 
     WRITTEN = "written"
     UP_TO_DATE = "up to date"
+    KEPT = "kept"
     FAILED = "failed"
 
 
@@ -60,11 +61,19 @@ class JobOutcome:
         As in the manifest.
     seconds : float
         The conversion took. [s]
+    why : str
+        Why an output that was there is made anew, or would be; empty: there was none.
     """
 
     state: JobState
     row: ManifestRow
     seconds: float
+    why: str = ""
+
+
+PROGRAM, SETTINGS, INPUTS = "another version made it", "settings differ", "inputs changed"
+CHANGES = frozenset({PROGRAM, SETTINGS, INPUTS})
+"""Why an output that is as it was written is not what a conversion would write now."""
 
 
 class BatchStoppedError(XoscLateralError):
@@ -77,6 +86,7 @@ def convert_many(
     workers: int = 1,
     cluster: str | None = None,
     again: bool = False,
+    keep_old: bool = False,
     converter: Converter | None = None,
     limits: JobLimits | None = None,
     notify: Callable[[str], None] | None = None,
@@ -96,6 +106,8 @@ def convert_many(
         Address of a dask.distributed scheduler: its workers are used instead.
     again : bool
         Convert also what is up to date.
+    keep_old : bool
+        Leave outputs as they are whose inputs, settings or program have changed since.
     converter : callable, optional
         In place of `convert_job`; has to be picklable.
     limits : JobLimits, optional
@@ -123,7 +135,7 @@ def convert_many(
         converter = convert_job
     try:
         yield from _outcomes(
-            batch, partial(_run, converter, limits or JobLimits()), workers, cluster, again, notify or _silent
+            batch, partial(_run, converter, limits or JobLimits()), workers, cluster, again, keep_old, notify or _silent
         )
     except OSError as error:
         where = error.filename or batch.folder
@@ -140,31 +152,62 @@ def _outcomes(
     workers: int,
     cluster: str | None,
     again: bool,
+    keep_old: bool,
     notify: Callable[[str], None],
 ) -> Iterator[JobOutcome]:
     state = batch.folder / STATE
+    new = [folder for folder in (batch.folder, *batch.folder.parents) if not folder.exists()]
+    try:
+        yield from _locked(batch, work, workers, cluster, again, keep_old, notify, state)
+    finally:
+        _remove_empty([state, *new])
+
+
+def _locked(
+    batch: Batch,
+    work: Callable[[Job], _Reply],
+    workers: int,
+    cluster: str | None,
+    again: bool,
+    keep_old: bool,
+    notify: Callable[[str], None],
+    state: Path,
+) -> Iterator[JobOutcome]:
     with folder_lock(state / "lock"):
         _sweep(batch.folder)
         with Journal(batch.folder, state / "journal.jsonl", notify) as journal:
-            todo = []
+            todo, anew = [], {}
+            failed: set[Path] = set()
             for job in batch.jobs:
-                row = None if again or job.error or job.name not in journal else journal.row(job.name)
-                if row is None or not _is_current(row, job):
+                former = journal.row(job.name) if job.name in journal else None
+                why = _why_anew(job, former)
+                if former is not None and not again and (not why or (keep_old and why in CHANGES)):
+                    row = replace(former, error="", stale=bool(why))
+                    if row != former:
+                        journal.add(row, journal.seconds(job.name))
+                    yield JobOutcome(JobState.KEPT if why else JobState.UP_TO_DATE, row, 0.0, why)
+                else:
                     todo.append(job)
-                    continue
-                if row.stale:
-                    row = replace(row, error="", stale=False)
-                    journal.add(row, journal.seconds(job.name))
-                yield JobOutcome(JobState.UP_TO_DATE, row, 0.0)
+                    anew[job.name] = why
             if todo:
                 with open_pool(min(workers, len(todo)), cluster) as pool:
                     for job, reply in run_tasks(pool, work, todo):
-                        yield _noted(job, reply, journal)
+                        outcome = _noted(job, reply, journal, anew[job.name])
+                        failed |= {job.output.parent} if outcome.row.error else set()
+                        yield outcome
                 _sweep(batch.folder)
             _forget_missing(batch, journal)
             journal.finish()
-    with suppress(OSError):  # the next run has begun already
-        state.rmdir()
+            _remove_empty(
+                place for folder in failed for place in (folder, *folder.parents) if batch.folder in place.parents
+            )
+
+
+def _remove_empty(folders: Iterable[Path]) -> None:
+    """Those with nothing in them, inner ones first; a run that has just begun may have its lock there."""
+    for folder in folders:
+        with suppress(OSError):
+            folder.rmdir()
 
 
 @dataclass(frozen=True, slots=True)
@@ -197,7 +240,7 @@ def _run(converter: Converter, limits: JobLimits, job: Job) -> _Reply:
     return _Reply(row, time.perf_counter() - start)
 
 
-def _noted(job: Job, reply: _Reply | WorkerDiedError, journal: Journal) -> JobOutcome:
+def _noted(job: Job, reply: _Reply | WorkerDiedError, journal: Journal, why: str) -> JobOutcome:
     if isinstance(reply, WorkerDiedError):
         reply = _Reply(job.row(f"{job.source}: {reply}"), 0.0)
     if reply.stop:
@@ -206,28 +249,35 @@ def _noted(job: Job, reply: _Reply | WorkerDiedError, journal: Journal) -> JobOu
     if row.error and job.name in journal:
         row = _kept(job, journal.row(job.name), row)
     journal.add(row, reply.seconds)
-    return JobOutcome(JobState.FAILED if row.error else JobState.WRITTEN, row, reply.seconds)
+    return JobOutcome(JobState.FAILED if row.error else JobState.WRITTEN, row, reply.seconds, why)
 
 
 def _kept(job: Job, former: ManifestRow, failed: ManifestRow) -> ManifestRow:
     """The row of an output of a former run that can't be made anew: what it was made of, and why not now."""
-    try:
-        there = bool(former.output_sha256) and file_hash(job.output) == former.output_sha256
-    except (OSError, FormatError):
-        there = False
+    there = bool(former.output_sha256) and _are({job.output: former.output_sha256})
     return replace(former, error=failed.error, stale=True) if there else failed
 
 
-def _is_current(row: ManifestRow, job: Job) -> bool:
-    """Whether the output that a row is about is still what a conversion would write."""
+def _why_anew(job: Job, row: ManifestRow | None) -> str:
+    """Why an output is not what a conversion would write now; empty if it is, or if there is no output."""
+    if job.error or row is None or not row.output_sha256:
+        return "" if row is None else "could not be made"
+    if not _are({job.output: row.output_sha256}):
+        return "changed or gone"
     if job.page is not None and not job.page.is_file():
-        return False
-    if (row.error and not row.stale) or row.settings != job.fingerprint or row.scenario != job.scenario:
-        return False
-    expected = {job.output: row.output_sha256}
-    expected |= {Path(os.path.normpath(job.base / name)): value for name, value in row.inputs.items()}
+        return "its page is gone"
+    if row.behaviour != BEHAVIOUR:
+        return PROGRAM
+    if row.settings != job.fingerprint or row.scenario != job.scenario:
+        return SETTINGS
+    inputs = {Path(os.path.normpath(job.base / name)): value for name, value in row.inputs.items()}
+    return "" if _are(inputs) else INPUTS
+
+
+def _are(files: Mapping[Path, str]) -> bool:
+    """Whether files are there and have these hashes."""
     try:
-        return all(file_hash(path) == value for path, value in expected.items())
+        return all(file_hash(path) == value for path, value in files.items())
     except (OSError, FormatError):
         return False
 

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import hashlib
-import os
 from collections.abc import Collection, Mapping
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 
@@ -16,6 +16,7 @@ from xosc_lateral.enrich.result import Enriched
 from xosc_lateral.errors import FormatError
 from xosc_lateral.formats.atomic import refuse_outputs
 from xosc_lateral.formats.context_table import read_context
+from xosc_lateral.formats.openscenario.provenance import PENDING
 from xosc_lateral.formats.openscenario.write import (
     Player,
     WrittenScenario,
@@ -25,23 +26,27 @@ from xosc_lateral.formats.openscenario.write import (
     write_lane_offset_scenario,
     write_trajectory_scenario,
 )
+from xosc_lateral.formats.openscenario.write.lateral_actions import awaited, lateral_actions, overruled_until
 from xosc_lateral.formats.profiles import profile_hash
 from xosc_lateral.formats.source import edit_in_place, guarding_inputs
 from xosc_lateral.motion.nominal import Activity
 from xosc_lateral.pipeline.drivers import choose_drivers
-from xosc_lateral.pipeline.load import Played, input_hashes, play_longer, play_scenario
-from xosc_lateral.pipeline.meaning import Meaning, keep_meaning
+from xosc_lateral.pipeline.load import Played, input_hashes, play_scenario, play_until
+from xosc_lateral.pipeline.meaning import keep_meaning, meaning_of
 from xosc_lateral.pipeline.modes import WritingPlan, chosen_egos, is_replay, writing_plan
-from xosc_lateral.pipeline.settings import ConvertSettings, OutputMode
+from xosc_lateral.pipeline.settings import ConvertSettings, OutputMode, relative
 from xosc_lateral.pipeline.shifted import Shift
 from xosc_lateral.scenario import Scenario
-from xosc_lateral.scenario.dependence import dependence
+from xosc_lateral.scenario.dependence import Dependence, dependence
 from xosc_lateral.version import BEHAVIOUR, __version__
 
 CHANGES = "with offsets, what happens would happen otherwise"
-LONGER = 1.3
-"""A vehicle under test may be that much later at what ends the run: the others are played, and move in their lanes,
-for that long. A fifth slower takes a quarter longer. [-]"""
+LONGER = 2.0
+"""A vehicle under test may be later at what ends the run: others follow trajectories for so many times the nominal run
+at most. A file of trajectories grows as their time does. [-]"""
+SUPPLY = 10.0
+"""For so long at least, where it may last longer in another run, a stretch has movement of its own. What comes after it
+is the same again; some of the slow movement of a driver is seen in that time. [s]"""
 NO_WIDTH = 0.01
 """A lane narrower than this is none. [m]"""
 
@@ -106,8 +111,11 @@ def _convert(
     drivers = choose_drivers(played.scenario, settings, egos)
     lasting = played
     reacts = settings.mode is OutputMode.AUTO and not is_replay(settings, depends)
-    if reacts and depends.of_trigger(played.scenario.storyboard.stop_trigger):
-        lasting = play_longer(played, LONGER, step=settings.step, time_limit=settings.time_limit)
+    ends = depends.of_trigger(played.scenario.storyboard.stop_trigger) and played.motion.cut_off is None
+    if reacts and ends:
+        runs = meaning_of(played, tuple(egos), step=settings.step, time_limit=settings.time_limit)
+        end = min(runs.end, LONGER * played.motion.end_time)
+        lasting = play_until(played, end, step=settings.step) if end > played.motion.end_time else played
     enriched = enrich(
         lasting.motion,
         played.network,
@@ -121,11 +129,12 @@ def _convert(
         with_sensor=settings.with_sensor,
         neighbours=settings.neighbours,
         uncertain=depends.entities,
+        at_least=0.0 if is_replay(settings, depends) else SUPPLY,
     )
     _refuse_lanes_without_width(played, enriched)
     names = [entity.name for entity in enriched.entities if entity.is_enriched]
     plan = writing_plan(played.scenario, settings, depends, names, pulled=played.trailers, sampled=sampled)
-    making = _Making(played, lasting, settings, variant, inputs, egos, output, save)
+    making = _Making(played, lasting, settings, variant, inputs, egos, depends, output, save)
     if plan.is_replay:
         replayed = _in_replay(played, settings, egos, sampled)
         provenance, written = making.write(enriched, plan, replayed)
@@ -153,6 +162,7 @@ class _Making:
     variant: int
     inputs: Mapping[Path, str]
     egos: Mapping[str, str]
+    depends: Dependence
     output: Path
     save: bool
 
@@ -160,19 +170,31 @@ class _Making:
         self, enriched: Enriched, plan: WritingPlan, replayed: frozenset[str] | None = None
     ) -> tuple[ConversionProvenance, WrittenScenario]:
         """Write it with these offsets."""
-        provenance = _provenance(self.played, enriched, self.settings, self.variant, self.inputs, self.egos, plan)
-        written = _write(self.lasting, enriched, self.output, provenance, self.settings, plan, replayed, save=self.save)
-        return provenance, written
+        provenance = _provenance(
+            self.played, enriched, self.settings, self.variant, self.inputs, self.egos, plan, self.output
+        )
+        written = _write(
+            self.lasting, enriched, self.output, provenance, self.settings, plan, replayed, self.depends, save=self.save
+        )
+        return replace(provenance, content_sha256=written.content_sha256), written
 
     def write_reactive(
         self, enriched: Enriched, plan: WritingPlan
     ) -> tuple[Enriched, WritingPlan, ConversionProvenance, WrittenScenario, tuple[str, ...]]:
         """Write it with offsets that leave what happens as it was, and what there is to say of them."""
+        if self.save:
+            return self._keeping_meaning(enriched, plan)
+        with TemporaryDirectory() as folder:
+            trial = replace(self, output=Path(folder) / self.output.name, save=True)
+            enriched, plan, _, _, said = trial._keeping_meaning(enriched, plan)
+        return enriched, plan, *self.write(enriched, plan), said
+
+    def _keeping_meaning(
+        self, enriched: Enriched, plan: WritingPlan
+    ) -> tuple[Enriched, WritingPlan, ConversionProvenance, WrittenScenario, tuple[str, ...]]:
         provenance, written = self.write(enriched, plan)
-        if not self.save:
-            return enriched, plan, provenance, written, ()
         settings = self.settings
-        meaning = Meaning(self.played, self.egos, step=settings.step, time_limit=settings.time_limit)
+        meaning = meaning_of(self.played, tuple(self.egos), step=settings.step, time_limit=settings.time_limit)
 
         def changed(names: Collection[str], factor: float) -> tuple[Enriched, WritingPlan]:
             left = with_offsets(enriched, plan.lane_offsets - frozenset(names), 0.0, CHANGES)
@@ -182,7 +204,7 @@ class _Making:
         def attempt(names: Collection[str], factor: float) -> list[Shift]:
             if (names, factor) != (plan.lane_offsets, 1.0):
                 self.write(*changed(names, factor))
-            return meaning.shifts(_played_again(self.played, self.output, settings), plan.trajectories)
+            return meaning.shifts(self._played_again(meaning.limit), plan.trajectories)
 
         names, factor, left = keep_meaning(plan.lane_offsets, attempt)
         said = tuple(f"'{name}' stays as it is: {CHANGES}" for name in sorted(plan.lane_offsets - names))
@@ -193,16 +215,15 @@ class _Making:
             provenance, written = self.write(enriched, plan)
         return enriched, plan, provenance, written, said + tuple(map(str, left))
 
-
-def _played_again(played: Played, output: Path, settings: ConvertSettings) -> Played:
-    allowed = (*settings.allow, *(path.parent for path in played.scenario.input_files))
-    if played.scenario.road_file is not None:
-        allowed = (*allowed, played.scenario.road_file.parent)
-    again = play_scenario(
-        output, step=settings.step, time_limit=settings.time_limit, allowed=allowed, roads=settings.roads
-    )
-    edit_in_place(output)  # ours: it may be written anew
-    return again
+    def _played_again(self, time_limit: float) -> Played:
+        source, settings = self.played.scenario, self.settings
+        roads = () if source.road_file is None else (source.road_file.parent,)
+        allowed = (*settings.allow, *(path.parent for path in source.input_files), *roads)
+        again = play_scenario(
+            self.output, step=settings.step, time_limit=time_limit, allowed=allowed, roads=settings.roads
+        )
+        edit_in_place(self.output)  # ours: it may be written anew
+        return again
 
 
 def _refuse_lane_offsets_for_carla(scenario: Scenario, settings: ConvertSettings) -> None:
@@ -240,28 +261,25 @@ def _provenance(
     inputs: Mapping[Path, str],
     egos: Collection[str],
     plan: WritingPlan,
+    output: Path,
 ) -> ConversionProvenance:
     scenario = played.scenario
     return ConversionProvenance(
         package_version=__version__,
-        inputs={_relative(path, scenario.path): sha256 for path, sha256 in inputs.items()},
+        behaviour=BEHAVIOUR,
+        scenario=f"{relative(scenario.path.parent, output.parent)}/{scenario.path.name}",
+        inputs={relative(path, scenario.path.parent): sha256 for path, sha256 in inputs.items()},
         profiles={
             entity.name: (entity.profile.name, profile_hash(entity.profile))
             for entity in enriched.entities
             if entity.profile is not None
         },
-        seed=settings.seed,
-        variant=variant,
-        parameters=dict(sorted(settings.parameters.items())),
-        with_sensor=settings.with_sensor,
-        player=settings.target.player.value,
+        options=settings.record(scenario.path.parent),
+        variant=variant + 1,
         version=named(settings.target.version_for(scenario)),
         ego=tuple(egos),
         modes={name: mode for name, mode in plan.modes().items() if enriched.entity(name).is_enriched},
-        only=None if settings.only is None else tuple(sorted(settings.only)),
-        attempts=settings.attempts,
-        neighbours=settings.neighbours.value,
-        behaviour=BEHAVIOUR,
+        content_sha256=PENDING,
     )
 
 
@@ -281,11 +299,6 @@ def _refuse_lanes_without_width(played: Played, enriched: Enriched) -> None:
                 )
 
 
-def _relative(path: Path, scenario: Path) -> str:
-    """Path as seen from the scenario: the same on every machine."""
-    return Path(os.path.relpath(path.resolve(), scenario.resolve().parent)).as_posix()
-
-
 def _write(
     played: Played,
     enriched: Enriched,
@@ -294,14 +307,16 @@ def _write(
     settings: ConvertSettings,
     plan: WritingPlan,
     replayed: frozenset[str] | None,
+    depends: Dependence,
     *,
     save: bool,
 ) -> WrittenScenario:
     profiles = sorted({name for name, _ in provenance.profiles.values()})
-    summary = f"seed {provenance.seed}, variant {provenance.variant}, {', '.join(profiles) or 'no profile'}"
-    summary += ", with sensor" if provenance.with_sensor else ""
+    summary = f"seed {settings.seed}, variant {provenance.variant}, {', '.join(profiles) or 'no profile'}"
+    summary += ", with sensor" if settings.with_sensor else ""
     facts = asdict(provenance)
     if not plan.is_replay:
+        lateral = lateral_actions(played.scenario)
         chains = [
             chain
             for entity in enriched.entities
@@ -312,6 +327,8 @@ def _write(
                 entity.deviation,
                 [segment.span for segment in entity.segments],
                 tows=entity.name in played.trailers.values(),
+                beyond=[segment.later() for segment in entity.segments],
+                overruled_until=overruled_until(awaited(lateral.get(entity.name, ()), depends), played.motion),
             )
         ]
         return write_lane_offset_scenario(
@@ -324,6 +341,7 @@ def _write(
             save=save,
             target=settings.target,
             trajectories={name: enriched.entity(name).trajectory for name in sorted(plan.trajectories)},
+            depends=depends,
         )
     trajectories = {
         entity.name: entity.trajectory for entity in enriched.entities if replayed is None or entity.name in replayed

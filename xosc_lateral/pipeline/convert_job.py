@@ -71,8 +71,9 @@ def describe(job: Job, conversion: ConvertedScenario) -> ManifestRow:
         version=provenance.version,
         mode=provenance.mode,
         modes=dict(provenance.modes),
-        only=provenance.only,
         ego=provenance.ego,
+        content_sha256=provenance.content_sha256,
+        cut_off=enriched.motion.cut_off is not None,
     )
 
 

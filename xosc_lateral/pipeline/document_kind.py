@@ -1,4 +1,4 @@
-"""What an OpenSCENARIO file holds, told from its first elements."""
+"""What an OpenSCENARIO file holds, by its first elements."""
 
 from __future__ import annotations
 

@@ -6,7 +6,7 @@ import hashlib
 import json
 import os
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from xosc_lateral.driver.profile import DriverProfile
@@ -43,7 +43,7 @@ class Job:
     settings : ConvertSettings
     variant : int
     fingerprint : str
-        SHA-256 over everything but the input files that decides on the output's bytes.
+        SHA-256 over everything but the input files and the program that decides on the output's bytes.
     error : str
         Why it can't even be tried (a distribution that can't be read); empty normally.
     page : Path or None
@@ -71,7 +71,7 @@ class Job:
             output=self.name,
             scenario=self.scenario,
             scenario_sha256=scenario_sha256,
-            variant=self.variant,
+            variant=self.variant + 1,
             seed=self.settings.seed,
             profile=self.settings.profile if isinstance(self.settings.profile, str) else self.settings.profile.name,
             parameters=dict(sorted(self.settings.parameters.items())),
@@ -80,6 +80,8 @@ class Job:
             behaviour=BEHAVIOUR,
             with_sensor=self.settings.with_sensor,
             player=self.settings.player.value,
+            only=None if self.settings.only is None else tuple(sorted(self.settings.only)),
+            options=self.settings.record(self.source.parent),
             error=error,
         )
 
@@ -137,8 +139,8 @@ def plan_batch(
     folder : str or Path
         Output tree. It mirrors the inputs below their common folder: ``db/a/x.xosc`` of the input ``db`` becomes
         ``folder/a/x.xosc``, its variants ``folder/a/x_01.xosc`` and so on, the scenarios that a parameter value
-        distribution stands for ``folder/a/x_p00000.xosc`` and so on; a scenario named
-        again with other settings becomes ``folder/a/x_r001.xosc``.
+        distribution stands for ``folder/a/x_p00000.xosc`` and so on. A row of a table
+        with settings of its own becomes ``folder/a/x_PROFILE_HASH.xosc``: its profile, and a hash of what else it says.
     settings : ConvertSettings, optional
         For every input that has none of its own.
     variants : int
@@ -168,7 +170,7 @@ def plan_batch(
     fingerprints = _Fingerprints()
     jobs: dict[str, Job] = {}
     left_out: list[tuple[Path, DocumentKind]] = []
-    asked: dict[Path, dict[tuple[str, int], None]] = {}
+    asked: dict[Path, set[tuple[str, int, str]]] = {}
     for request in requests:
         if request.variants > VARIANTS.value:
             raise FormatError(VARIANTS.refusal(request.variants), path=request.scenario)
@@ -177,16 +179,18 @@ def plan_batch(
         if ours_or_catalog and not request.listed:
             left_out.append((request.scenario, kind))
             continue
-        before = asked.setdefault(request.scenario, {})
-        key = (fingerprints.of(request.settings, 0), request.variants)
+        before = asked.setdefault(request.scenario, set())
+        key = (fingerprints.of(request.settings, 0), request.variants, request.name)
         if key in before:
             continue  # named twice, by a folder and by itself, say
-        repeat = f"_r{len(before):03d}" if before else ""
-        before[key] = None
-        for job in _jobs(request, kind, base, root, fingerprints, repeat):
+        before.add(key)
+        for job in _jobs(request, kind, base, root, fingerprints):
             earlier = jobs.setdefault(job.name, job)
             if earlier is not job:
+                if earlier.source == job.source and earlier.fingerprint == job.fingerprint:
+                    continue  # the first variants of more
                 what = f"would be written twice: from {earlier.scenario} and from {job.scenario}"
+                what += " with other settings; a column `name` tells them apart" if earlier.source == job.source else ""
                 raise FormatError(what, path=job.output)
             if len(jobs) > BATCH_JOBS.value:
                 raise FormatError(BATCH_JOBS.refusal(len(jobs)), path=request.scenario)
@@ -233,14 +237,13 @@ def _common_folder(requests: Sequence[Request]) -> Path:
         raise FormatError(f"inputs have no folder in common: {', '.join(sorted(bases)[:3])}") from error
 
 
-def _jobs(
-    request: Request, kind: DocumentKind, base: Path, root: Path, fingerprints: _Fingerprints, repeat: str
-) -> Iterator[Job]:
+def _jobs(request: Request, kind: DocumentKind, base: Path, root: Path, fingerprints: _Fingerprints) -> Iterator[Job]:
     relative = request.scenario.relative_to(base)
+    stem = request.name.removesuffix(relative.suffix) or f"{relative.stem}{request.label}"
     for one in concrete(request, kind):
         source, settings, error = one.source, one.settings, one.error
         for variant in range(request.variants):
-            named = relative.with_name(f"{relative.stem}{repeat}{one.suffix}{relative.suffix}")
+            named = relative.with_name(f"{stem}{one.suffix}{relative.suffix}")
             output = numbered(named, variant, request.variants)
             name = printable(output.as_posix())
             if name != output.as_posix():
@@ -278,16 +281,11 @@ class _Fingerprints:
     _profiles: dict[tuple[str, tuple[Path, ...]], str] = field(default_factory=dict)
 
     def of(self, settings: ConvertSettings, variant: int) -> str:
-        # Where files are looked for does not count, but what is in them; nor what refuses less.
-        aside = {"library", "allow", "road", "road_path", "names_may_lack"}
-        values = {item.name: getattr(settings, item.name) for item in fields(settings) if item.name not in aside}
+        values = settings.record(Path()) | {"road": None, "strict": settings.strict}  # a road counts by its hash
         values["profile"] = self._profile(settings.profile, settings.library)
         values["entity"] = {name: self._profile(one, settings.library) for name, one in settings.entity.items()}
         values["context"] = None if settings.context is None else _hash_or_missing(settings.context)
-        values["only"] = None if settings.only is None else sorted(settings.only)
-        values["ego"] = None if settings.ego is None else sorted(settings.ego)
-        values["parameters"] = dict(settings.parameters)
-        values |= {"behaviour": BEHAVIOUR, "variant": variant}
+        values["variant"] = variant
         return hashlib.sha256(json.dumps(values, sort_keys=True).encode()).hexdigest()
 
     def _profile(self, name: str | DriverProfile, libraries: tuple[Path, ...]) -> str:

@@ -55,6 +55,8 @@ class Journal:
     ) -> None:
         with suppress(OSError):  # every row has been flushed; what a full disk refused was never promised
             self._file.close()
+        if not self._begin and error is not None:  # nothing was done
+            self._path.unlink(missing_ok=True)
 
     def __contains__(self, output: str) -> bool:
         return output in self._begin

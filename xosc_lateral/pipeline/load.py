@@ -73,15 +73,8 @@ def play_scenario(
 
 
 @lru_cache(maxsize=2)  # as `_played`, whose result is the same object for all variants
-def play_longer(played: Played, factor: float, *, step: float, time_limit: float | None) -> Played:
-    """The same run, stopped at `factor` times its end instead, and at the limit at most. [s]
-
-    One that was cut off comes back as it is.
-    """
-    if played.motion.cut_off is not None:
-        return played
-    end = factor * played.motion.end_time
-    end = end if time_limit is None else min(end, time_limit)
+def play_until(played: Played, end: float, *, step: float) -> Played:
+    """The same run, stopped at another time. [s]"""
     storyboard = played.scenario.storyboard
     later = replace(storyboard, stop_trigger=at_time(end, "later", storyboard.place))
     scenario = replace(played.scenario, storyboard=later)

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from io import BytesIO
 from itertools import islice
 from pathlib import Path
@@ -27,6 +27,9 @@ MANIFEST, TIMINGS = "manifest.parquet", "timings.parquet"
 
 ROW_GROUP = 1000
 """Rows held in memory while writing."""
+
+SCHEMA = 2
+"""Version of a manifest's columns."""
 
 _LARGEST = 2**63 - 1
 
@@ -50,12 +53,13 @@ class ManifestRow:
     scenario, scenario_sha256 : str, str
         Path of the input below the inputs' common folder, and SHA-256 of the file.
     variant, seed : int, int
+        The variant from 1, as in file names.
     profile : str
         As asked for (a name, a path, "auto").
     parameters : mapping of str to str
         Scenario parameters that were replaced.
     settings : str
-        SHA-256 over the behaviour version, settings, variant, profile files and context table.
+        SHA-256 over settings, variant, profile files and context table.
     package_version : str
     with_sensor : bool
         Offsets hold the sensor error of the drives that profiles were fitted on; else the driver alone.
@@ -94,10 +98,19 @@ class ManifestRow:
         Vehicles under test: left as they are; empty: there is none.
     behaviour : int
         `version.BEHAVIOUR` of the program that wrote it.
+    options : mapping
+        What was asked for: `ConvertSettings.record`, files as seen from the scenario.
+    content_sha256 : str
+        SHA-256 of the output without its provenance.
+    cut_off : bool
+        The run ends at the time limit, though its scenario goes on.
     error : str
         One line; empty if the output is what the inputs and settings give.
     stale : bool
-        The output is that of a former run, which the other columns describe: it could not be made anew.
+        The output is that of a former run, which the other columns describe: it could not be made anew, or was
+        to be kept.
+    schema : int
+        Version of these columns. Rows without it are of version 1, whose variants count from 0.
     """
 
     output: str
@@ -131,8 +144,12 @@ class ManifestRow:
     only: tuple[str, ...] | None = None
     ego: tuple[str, ...] = ()
     behaviour: int = 1
+    options: Mapping[str, Any] = field(default_factory=dict)
+    content_sha256: str = ""
+    cut_off: bool = False
     error: str = ""
     stale: bool = False
+    schema: int = SCHEMA
 
     def to_dict(self) -> dict[str, Any]:
         """Plain JSON values."""
@@ -156,12 +173,14 @@ class ManifestRow:
         if not isinstance(values, Mapping):
             raise ValueError(f"a row is a {type(values).__name__}")
         named = {_OLD_NAMES.get(name, name): value for name, value in values.items()}
+        if (version := named.setdefault("schema", 1)) not in range(1, SCHEMA + 1):
+            raise ValueError(f"its columns are of version {version}, this program reads up to {SCHEMA}")
         row = msgspec.convert(named, cls)
         if any(isinstance(value, int) and abs(value) > _LARGEST for value in named.values()):
             raise ValueError("a number has more than 64 bits")
         # no text or number that can't be written
         json.dumps(row.to_dict(), ensure_ascii=False, allow_nan=False).encode()
-        return row
+        return row if row.schema == SCHEMA else replace(row, variant=row.variant + 1, schema=SCHEMA)
 
 
 def printable(text: str) -> str:
@@ -176,6 +195,7 @@ _MAPPINGS = (
     "profile_sha256",
     "why_not",
     "modes",
+    "options",
 )  # JSON text in the file: every reader takes it
 
 
@@ -183,8 +203,8 @@ def manifest_schema() -> pa.Schema:
     """Columns of `manifest.parquet`."""
     import pyarrow as pa
 
-    types: dict[str, pa.DataType] = {"stale": pa.bool_(), "with_sensor": pa.bool_()}
-    types |= {"variant": pa.int64(), "seed": pa.int64(), "entities": pa.int64(), "behaviour": pa.int64()}
+    types: dict[str, pa.DataType] = dict.fromkeys(("stale", "with_sensor", "cut_off"), pa.bool_())
+    types |= dict.fromkeys(("variant", "seed", "entities", "behaviour", "schema"), pa.int64())
     types |= dict.fromkeys(("segment_seconds", "offset_spread", "gap_before", "gap_after"), pa.float64())
     types |= dict.fromkeys(("enriched", "warnings", "only", "ego"), pa.list_(pa.string()))
     return pa.schema([(item.name, types.get(item.name, pa.string())) for item in fields(ManifestRow)])

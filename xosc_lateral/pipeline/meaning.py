@@ -8,6 +8,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterator
 from dataclasses import replace
+from functools import lru_cache
+from math import inf
 
 from xosc_lateral.formats.openscenario.write.replaced_maneuvers import replaced_groups
 from xosc_lateral.motion.nominal import NominalMotion
@@ -26,6 +28,13 @@ FACTORS = (0.8, 1.2)
 CHANGE_AT, RATE = 1.0, 3.0
 """When and how fast they change to it. [s], [m/s2]"""
 STORY = "xosc-lateral ego"
+LASTING = 3.0
+"""Times the nominal run, or what happens in one that does not end by itself, each run is played: beyond, all
+movement is again what it was. [-]"""
+LEAST = 20.0
+"""Of that run. [s]"""
+SMALLER = (0.5, 0.2)
+"""Times what was sampled, before vehicles are left out: a fifth still moves by centimetres. [-]"""
 MOST_TRIES = 12
 """Vehicles whose offsets are left out one by one; beyond, all that are left go. [-]"""
 
@@ -37,23 +46,35 @@ class Meaning:
     ----------
     played : Played
         The source and its nominal run.
-    egos : collection of str
+    egos : tuple of str
         Vehicles under test.
     step : float
     time_limit : float or None
         Of playback. [s]
     """
 
-    def __init__(self, played: Played, egos: Collection[str], *, step: float, time_limit: float | None) -> None:
-        self._played, self._egos = played, tuple(egos)
-        self._step, self._time_limit = step, time_limit
+    def __init__(self, played: Played, egos: tuple[str, ...], *, step: float, time_limit: float | None) -> None:
+        self._played, self._egos, self._step = played, egos, step
+        self.limit = inf if time_limit is None else time_limit
+        motion = played.motion
+        last = [one.start if one.end is None else one.end for one in motion.actions]
+        self._is_cut_off = motion.cut_off is not None
+        until = max(last, default=0.0) if self._is_cut_off else motion.end_time
+        self.limit = min(self.limit, LASTING * max(until, LEAST))
         self._before = list(self._runs(played))
 
+    @property
+    def end(self) -> float:
+        """Of the longest run. [s]"""
+        return max(motion.end_time for motion in self._before)
+
     def _runs(self, played: Played) -> Iterator[NominalMotion]:
-        yield played.motion
-        for factor in FACTORS if self._egos else ():
+        for factor in (1.0, *FACTORS) if self._egos else (1.0,):
+            if factor == 1.0 and not self._is_cut_off:
+                yield played.motion
+                continue
             changed = with_speeds(played.scenario, self._played.motion, self._egos, factor)
-            yield play(changed, played.network, step=self._step, time_limit=self._time_limit)
+            yield play(changed, played.network, step=self._step, time_limit=self.limit)
 
     def shifts(self, again: Played, trajectories: Collection[str]) -> list[Shift]:
         """What happens otherwise in an output in which some entities follow trajectories; each event once."""
@@ -64,6 +85,12 @@ class Meaning:
             for shift in shifts(replace(before, actions=tuple(kept)), after, ignored=trajectories):
                 found.setdefault(shift.what, shift)
         return list(found.values())
+
+
+@lru_cache(maxsize=1)  # the same for all variants
+def meaning_of(played: Played, egos: tuple[str, ...], *, step: float, time_limit: float | None) -> Meaning:
+    """See `Meaning`."""
+    return Meaning(played, egos, step=step, time_limit=time_limit)
 
 
 def with_speeds(scenario: Scenario, motion: NominalMotion, egos: Collection[str], factor: float) -> Scenario:
@@ -110,8 +137,9 @@ def keep_meaning(
     found = attempt(kept, 1.0)
     if not found or not kept:
         return kept, 1.0, found
-    if not attempt(kept, 0.5):
-        return kept, 0.5, []
+    for factor in SMALLER:
+        if not attempt(kept, factor):
+            return kept, factor, []
     actors = [shift.actor for shift in found]
     for tries, name in enumerate(sorted(kept, key=lambda one: (one not in actors, one))):
         without = kept - {name} if tries < MOST_TRIES else frozenset()

@@ -5,13 +5,12 @@ from __future__ import annotations
 import json
 import sys
 import time
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field
 from enum import StrEnum
 from typing import TextIO
 
-from xosc_lateral.motion.nominal import CUT_OFF
 from xosc_lateral.pipeline.batch import JobOutcome, JobState
 from xosc_lateral.pipeline.manifest import ManifestRow
 
@@ -40,6 +39,9 @@ class Summary:
     ----------
     total, written, up_to_date, failed : int
         Jobs.
+    anew, kept : mapping of str to int
+        Why outputs that were there were made anew, or are no longer what a conversion would write but were to be kept
+        -> how many.
     seconds : float
         From start to end. [s]
     stale : int
@@ -62,6 +64,8 @@ class Summary:
     seconds: float = 0.0
     failures: list[tuple[str, str]] = field(default_factory=list)
     with_warnings: int = 0
+    anew: dict[str, int] = field(default_factory=dict)
+    kept: dict[str, int] = field(default_factory=dict)
     cut_off: list[str] = field(default_factory=list)
     nobody_enriched: dict[str, int] = field(default_factory=dict)
     _said: set[tuple[str, str]] = field(default_factory=set, repr=False)
@@ -70,6 +74,10 @@ class Summary:
         """Take one more outcome into account."""
         if outcome.state is JobState.WRITTEN:
             self.written += 1
+            if outcome.why:
+                self.anew[outcome.why] = self.anew.get(outcome.why, 0) + 1
+        elif outcome.state is JobState.KEPT:
+            self.kept[outcome.why] = self.kept.get(outcome.why, 0) + 1
         elif outcome.state is JobState.UP_TO_DATE:
             self.up_to_date += 1
         else:
@@ -78,7 +86,7 @@ class Summary:
             self.failures.append((outcome.row.output, outcome.row.error))
             return
         self.with_warnings += bool(outcome.row.warnings)
-        if any(CUT_OFF in line for line in outcome.row.warnings):
+        if outcome.row.cut_off:
             self.cut_off.append(outcome.row.output)
         if not outcome.row.enriched:
             why = _why_nobody(outcome.row)
@@ -94,7 +102,7 @@ class Summary:
     @property
     def finished(self) -> int:
         """Jobs of which the outcome is known."""
-        return self.written + self.up_to_date + self.failed
+        return self.written + self.up_to_date + self.failed + sum(self.kept.values())
 
     @property
     def rate(self) -> float:
@@ -127,8 +135,9 @@ class Summary:
 
     def text(self) -> str:
         """One line."""
-        parts = [f"{self.written} written"]
+        parts = [f"{self.written} written{_counted(self.anew, 'anew')}"]
         parts += [f"{self.up_to_date} up to date"] if self.up_to_date else []
+        parts += [f"{sum(self.kept.values())} old ones kept{_counted(self.kept, '')}"] if self.kept else []
         kept = f" (of {self.stale} the former output is kept, stale)" if self.stale else ""
         parts += [f"{self.failed} failed{kept}"] if self.failed else []
         return f"{', '.join(parts)} of {self.total} in {_clock(self.seconds)} ({self.rate:.1f} per second)"
@@ -159,6 +168,12 @@ def follow(
             show(outcome)
         summary.seconds = time.monotonic() - start
     return summary
+
+
+def _counted(reasons: Mapping[str, int], what: str) -> str:
+    """How many of which reason, in brackets."""
+    listed = ", ".join(f"{count} {why}" for why, count in sorted(reasons.items()))
+    return f" ({what}{': ' if what else ''}{listed})" if listed else ""
 
 
 def _why_nobody(row: ManifestRow) -> str:

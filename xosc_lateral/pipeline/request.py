@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import hashlib
+import json
 import os
-from collections.abc import Iterator, Sequence
+import re
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from xosc_lateral.errors import FormatError
+from xosc_lateral.formats.output_paths import file_name
 from xosc_lateral.formats.tables import TABLE_SUFFIXES, as_text, read_text_table
 from xosc_lateral.pipeline.document_kind import DISTRIBUTIONS, document_kind
 from xosc_lateral.pipeline.manifest import MANIFEST
@@ -20,7 +24,7 @@ if TYPE_CHECKING:
 
 SCENARIO_SUFFIX = ".xosc"
 
-COLUMNS = ("scenario", *(name for name, option in OPTIONS.items() if option.cell is not None), "variants")
+COLUMNS = ("scenario", *(name for name, option in OPTIONS.items() if option.cell is not None), "variants", "name")
 PREFIXES = (*(option.prefix for option in OPTIONS.values() if option.prefix), "user:")
 """What a table of scenarios may hold."""
 
@@ -45,6 +49,10 @@ class Request:
     listed : bool
         Named one by one. What was merely found in a folder is left out if it is a catalog or was
         converted already.
+    label : str
+        Tells outputs of this scenario with these settings from its others: part of their names.
+    name : str
+        In place of the scenario's name and the label.
     """
 
     scenario: Path
@@ -52,6 +60,8 @@ class Request:
     variants: int = 1
     base: Path | None = None
     listed: bool = True
+    label: str = ""
+    name: str = ""
 
 
 def find_requests(
@@ -95,9 +105,10 @@ def find_requests(
 def read_request_table(path: Path, settings: ConvertSettings, *, variants: int = 1) -> Iterator[Request]:
     """Scenarios of a table, one a row.
 
-    Columns: ``scenario`` (path, from the table's folder), and if wanted ``variants`` and those of `COLUMNS` and
-    `PREFIXES`: ``profile:ENTITY``, ``only`` and ``ego`` with entities separated by semicolons (ego ``none``: there is
-    none), ``parameter:NAME``, ``parameters`` as a JSON object. An empty cell leaves what `settings` says. Columns
+    Columns: ``scenario`` (path, from the table's folder), and if wanted those of `COLUMNS` and `PREFIXES`: ``name`` of
+    the output in place of the scenario's, ``variants``, ``profile:ENTITY``, ``only`` and ``ego`` with entities
+    separated by semicolons (ego ``none``: there is none), ``parameter:NAME``, ``parameters`` as a JSON object, and so
+    on. An empty cell leaves what `settings` says. Columns
     ``user:NAME`` are for the user: tags, owners.
 
     Raises
@@ -127,9 +138,22 @@ def _table_requests(
             scenario = _scenario(cells)
             rows_variants = _VARIANTS.of_row("variants", variants, cells, folder)
             row_settings = settings.of_row(cells, folder)
+            name = file_name(cells["name"], "name") if "name" in cells else ""
         except ValueError as error:
             raise FormatError(str(error), path=path, line=number) from error
-        yield Request(folder / scenario, row_settings, rows_variants, base)
+        yield Request(folder / scenario, row_settings, rows_variants, base, label=_label(cells), name=name)
+
+
+def _label(cells: Mapping[str, str]) -> str:
+    """What a row says of the settings, in short: the same in whatever table and at whatever place it stands."""
+    said = {name: text for name, text in cells.items() if name not in ("variants", "name") and name[:5] != "user:"}
+    profile = Path(said.get("profile", "")).stem
+    if not re.fullmatch(r"[\w.-]{1,60}", profile):
+        profile = ""
+    elif said.get("profile") == profile:  # a name says all, a path may be another folder's
+        del said["profile"]
+    listed = json.dumps(said, sort_keys=True).encode()
+    return "".join(f"_{part}" for part in (profile, hashlib.sha256(listed).hexdigest()[:8] if said else "") if part)
 
 
 def _refuse_unknown_columns(table: pd.DataFrame, path: Path) -> None:

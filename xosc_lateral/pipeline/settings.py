@@ -7,6 +7,7 @@ configuration file that decide a conversion are all made from the fields of `Con
 from __future__ import annotations
 
 import inspect
+import os
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, fields, replace
 from enum import StrEnum
@@ -232,6 +233,35 @@ class ConvertSettings:
             self, **{name: one.of_row(name, getattr(self, name), cells, folder) for name, one in OPTIONS.items()}
         )
 
+    def record(self, folder: Path) -> dict[str, Any]:
+        """What decides an output, as plain JSON values; files as seen from a folder.
+
+        Where files are looked for is no part of it, for their hashes are known; nor what refuses more or less.
+        """
+        return {
+            name: _plain(name, getattr(self, name), folder) for name in (*OPTIONS, "step") if name not in NOT_RECORDED
+        }
+
+    @classmethod
+    def of_record(cls, values: Mapping[str, Any], folder: Path) -> ConvertSettings:
+        """Settings from what `record` gave.
+
+        Raises
+        ------
+        ValueError
+            A value that can't be.
+        """
+        found: dict[str, Any] = {"step": float(values.get("step", STEP)), "names_may_lack": True}
+        for name, said in values.items():
+            one = OPTIONS.get(name)
+            if one is not None and said is not None:
+                if one.entry is not None:
+                    said = {key: one.entry(text, folder) for key, text in dict(said).items()}
+                elif one.cell is not None and isinstance(said, str):
+                    said = one.cell(said, folder)
+                found[name] = one.value(name, said)
+        return cls(**found)
+
     @property
     def target(self) -> TargetPlayer:
         """Player and version of the standard to write for."""
@@ -247,6 +277,30 @@ OPTIONS: Mapping[str, Option] = {
     item.name: item.metadata["option"] for item in fields(ConvertSettings) if "option" in item.metadata
 }
 """What users can set, by name."""
+
+
+NOT_RECORDED = frozenset({"library", "allow", "road_path", "strict"})
+
+
+def _plain(name: str, value: Any, folder: Path) -> Any:
+    """A setting as a JSON value."""
+    if isinstance(value, Mapping):
+        return {key: _plain("profile" if name == "entity" else "", one, folder) for key, one in sorted(value.items())}
+    if name == "profile":
+        if not isinstance(value, str):
+            return value.name
+        return relative(Path(value), folder) if value.endswith(".json") or Path(value).name != value else value
+    if isinstance(value, Path):
+        return relative(value, folder)
+    return sorted(value) if isinstance(value, frozenset) else value
+
+
+def relative(path: Path, folder: Path) -> str:
+    """Path as seen from a folder, with forward slashes: the same on every machine."""
+    try:
+        return Path(os.path.relpath(path.resolve(), folder.resolve())).as_posix()
+    except ValueError:  # another drive of a Windows machine
+        return path.resolve().as_posix()
 
 
 def spelled_out(verb: Verb) -> Verb:

@@ -11,6 +11,7 @@ from xosc_lateral.driver.beside import SIDES
 from xosc_lateral.driver.effects import Acts, ColumnEffect, Effect
 from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.driver.provenance import Provenance
+from xosc_lateral.evaluation.lane_keeping import LaneKeeping, keeping_of
 from xosc_lateral.evaluation.movement_summary import DURATION, MovementSummary, summary_of
 from xosc_lateral.formats.library import FIELDS, Entry, facts_of
 from xosc_lateral.formats.profiles import profile_hash
@@ -94,13 +95,14 @@ def card(profile: DriverProfile) -> dict[str, Any]:
         "neighbours": {side: basis_of(profile, side).value for side in SIDES},
         "lane_width": profile.lane_width,
         "summary": {name: round(value, 4) for name, value in asdict(summary_of(profile)).items()},
+        "lane_keeping": keeping_record(keeping_of(profile)),
         "provenance": known.to_dict(),
     }
 
 
 def card_text(profile: DriverProfile) -> str:
     """The card for the terminal."""
-    known = profile.provenance
+    known, keeping = profile.provenance, keeping_of(profile)
     lines = [
         profile.name,
         *_indented("", known.notes),
@@ -108,6 +110,8 @@ def card_text(profile: DriverProfile) -> str:
         *(f"  effect     {effect_line(effect)}" for effect in profile.effects),
         f"  neighbours {'; '.join(beside_line(profile, side) for side in SIDES)}",
         *_summary_lines(profile, summary_of(profile)),
+        *_indented("lane", keeping.words),
+        *_indented("sure", sureness(profile, keeping)),
         f"  fitted on  {amount(profile)}",
         *_indented("source", known.source),
         *_indented("licence", known.licence),
@@ -168,6 +172,31 @@ def amount(profile: DriverProfile) -> str:
         if known.hours < 1
         else (f"{known.hours:.2f} h, {vehicles}, {known.runs} runs")
     )
+
+
+def keeping_record(keeping: LaneKeeping) -> dict[str, Any]:
+    """The figures of lane keeping and their standard errors, as plain values."""
+    values = asdict(keeping)
+    errors = {name: round(value, 4) for name, value in values.pop("errors").items()}
+    return {name: round(value, 4) for name, value in values.items()} | {"errors": errors}
+
+
+def sureness(profile: DriverProfile, keeping: LaneKeeping) -> str:
+    """How well one driver's mean and spread are known from so much driving; empty where it is of many or unknown."""
+    known = profile.provenance
+    independent = 3600.0 * known.hours / (2.0 * keeping.memory) if keeping.memory else 0.0
+    if "derived_from" in known.fit or not 0.0 < known.drives < FEW or independent < 1.0:
+        return ""
+    mean = 1.96 * keeping.sdlp / independent**0.5
+    spread = 1.96 * keeping.sdlp / (2.0 * independent) ** 0.5
+    return (
+        f"from {60 * known.hours:.3g} min his mean is known to +- {mean:.2f} m, his SDLP to +- {spread:.2f} m (95 %), "
+        "other days apart"
+    )
+
+
+FEW = 10
+"""Drives below which a profile is taken to be of one driver."""
 
 
 def spread_text(profile: DriverProfile, summary: MovementSummary) -> str:

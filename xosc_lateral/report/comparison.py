@@ -10,12 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.driver.profile import DriverProfile
-from xosc_lateral.evaluation.comparison import SNIPPET
 from xosc_lateral.evaluation.distances import wasserstein
+from xosc_lateral.evaluation.lane_keeping import LaneKeeping, keeping_of
 from xosc_lateral.evaluation.metrics import METRICS, cut_snippets, snippet_metrics
-from xosc_lateral.evaluation.movement_summary import MovementSummary, free_runs, summarise
+from xosc_lateral.evaluation.movement_summary import DRIVERS, DURATION, MovementSummary, free_runs, summarise
 from xosc_lateral.evaluation.spectra import Spectrum, spectrum
 from xosc_lateral.formats.profiles import profile_hash
+from xosc_lateral.report.cards import keeping_record
 from xosc_lateral.report.figures import PALETTE, figure_style, new_figure
 from xosc_lateral.report.render import render_page
 
@@ -24,6 +25,9 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 FloatArray = NDArray[np.float64]
+
+SNIPPET = 10.0
+"""Length of the snippets that are compared. [s]"""
 
 SHOWN_S = 120.0
 """Length of the sample paths in the figure. [s]"""
@@ -46,18 +50,20 @@ class Compared:
     ----------
     profiles : tuple of DriverProfile
     summaries : tuple of MovementSummary
+    keeping : tuple of LaneKeeping
     runs : tuple of array
         Free runs of each, shape (drivers, n). [m]
     spectra : tuple of Spectrum
     metrics : array, shape (k, k, 10)
         Wasserstein distance per metric, in standard deviations over all profiles' snippets. On the diagonal: of a
-        profile from itself, one half of its drivers from the other, where the mean over the metrics is the 95 %
-        quantile of random halves.
+        profile from itself, as much driving as it was fitted on from as much other driving, half of its drivers at
+        most, where the mean over the metrics is the 95 % quantile of random choices.
     seed : int
     """
 
     profiles: tuple[DriverProfile, ...]
     summaries: tuple[MovementSummary, ...]
+    keeping: tuple[LaneKeeping, ...]
     runs: tuple[FloatArray, ...]
     spectra: tuple[Spectrum, ...]
     metrics: FloatArray
@@ -72,8 +78,8 @@ class Compared:
     def floors(self) -> FloatArray:
         """Up to which distance two profiles are alike, shape (k, k): root mean square of both from themselves. [-]
 
-        Half of the drivers differ by more than all of them would, which leaves room for the chance of a fit to a
-        hundred drives or more. That of fewer is greater, and not known here.
+        From itself is one piece of its free runs from another, each as long as the drives that it was fitted on, at
+        most half of them: so far apart are two profiles of one driver by the chance of what was recorded.
         """
         own = np.diag(self.distance)
         return np.sqrt(0.5 * (own[:, None] ** 2 + own[None, :] ** 2))
@@ -99,10 +105,11 @@ def compare(profiles: Sequence[DriverProfile], seed: int) -> Compared:
         for profile, own in zip(profiles, runs, strict=True)
     ]
     pooled = [np.concatenate(own) for own in snippets]
-    metrics = _gap_matrix(pooled, snippets, seed)
+    metrics = _gap_matrix(pooled, snippets, [_fitted_drivers(profile) for profile in profiles], seed)
     return Compared(
         tuple(profiles),
         tuple(summarise(own, profile.model.step) for profile, own in zip(profiles, runs, strict=True)),
+        tuple(keeping_of(profile, seed) for profile in profiles),
         tuple(runs),
         tuple(spectrum(list(own), profile.model.step) for profile, own in zip(profiles, runs, strict=True)),
         metrics,
@@ -110,25 +117,34 @@ def compare(profiles: Sequence[DriverProfile], seed: int) -> Compared:
     )
 
 
-def _gap_matrix(pooled: Sequence[FloatArray], snippets: Sequence[Sequence[FloatArray]], seed: int) -> FloatArray:
+def _fitted_drivers(profile: DriverProfile) -> int:
+    """Of how many free runs a profile's drives are worth, half of them where that is not known."""
+    known = profile.provenance
+    return round(3600.0 * known.hours / DURATION) if known.hours and "derived_from" not in known.fit else DRIVERS // 2
+
+
+def _gap_matrix(
+    pooled: Sequence[FloatArray], snippets: Sequence[Sequence[FloatArray]], fitted: Sequence[int], seed: int
+) -> FloatArray:
     """Gaps of all metrics in standard deviations, shape (k, k, metrics); the diagonal is between halves. [-]"""
     scale = np.concatenate(pooled).std(axis=0)
     scale = np.where(scale > 0.0, scale, 1.0)
     count = len(pooled)
     metrics = np.empty((count, count, len(METRICS)))
     for one in range(count):
-        metrics[one, one] = _from_itself(snippets[one], scale, np.random.default_rng([seed, one]))
+        metrics[one, one] = _from_itself(snippets[one], fitted[one], scale, np.random.default_rng([seed, one]))
         for other in range(one):
             metrics[one, other] = metrics[other, one] = _gaps(pooled[one], pooled[other]) / scale
     return metrics
 
 
-def _from_itself(drivers: Sequence[FloatArray], scale: FloatArray, rng: np.random.Generator) -> FloatArray:
-    """Distance per metric, shape (10,), between those random halves that are further apart than 95 % of them."""
+def _from_itself(drivers: Sequence[FloatArray], fitted: int, scale: FloatArray, rng: np.random.Generator) -> FloatArray:
+    """Distance per metric, shape (10,), between those random pieces that are further apart than 95 % of them."""
+    count = min(max(fitted, 1), len(drivers) // 2)
     found = []
     for _ in range(HALVINGS):
         order = rng.permutation(len(drivers)).tolist()
-        half, rest = order[: len(order) // 2], order[len(order) // 2 :]
+        half, rest = order[:count], order[-count:]
         found.append(_gaps(*(np.concatenate([drivers[k] for k in part]) for part in (half, rest))) / scale)
     means = [float(gaps.mean()) for gaps in found]
     return found[int(np.argsort(means)[round(SURE * (HALVINGS - 1))])]
@@ -148,7 +164,7 @@ def comparison_text(compared: Compared) -> str:
     distance = compared.distance
     lines.append(
         f"mean distance of ten metrics of {SNIPPET:g} s snippets, in standard deviations "
-        "(diagonal: halves of its drivers, 95 % quantile):"
+        "(diagonal: from itself, by the chance of as much driving as it was fitted on, 95 % quantile):"
     )
     width = max(map(len, names))
     for number, name in enumerate(names):
@@ -168,9 +184,12 @@ def _rows(compared: Compared) -> list[dict[str, str]]:
             "of one driver [m]": f"{one.spread_within:.2f}",
             "5 % to 95 % [m]": f"{one.low:+.2f} to {one.high:+.2f}",
             "lateral speed [m/s]": f"{one.lateral_speed:.3f}",
+            "SDLP [m]": kept.line("sdlp", ""),
+            "lane drifts [1/h]": kept.line("drifts", "", 1),
+            "to the line [s]": kept.line("line_crossing", "", 1),
             "effects": ", ".join(_effect(values) for values in profile.to_dict()["effects"]) or "none",
         }
-        for profile, one in zip(compared.profiles, compared.summaries, strict=True)
+        for profile, one, kept in zip(compared.profiles, compared.summaries, compared.keeping, strict=True)
     ]
 
 
@@ -182,7 +201,10 @@ def _effect(values: dict[str, Any]) -> str:
 def comparison_record(compared: Compared) -> dict[str, Any]:
     """The same as plain values."""
     return {
-        "profiles": [_profile_record(*both) for both in zip(compared.profiles, compared.summaries, strict=True)],
+        "profiles": [
+            _profile_record(*all_of)
+            for all_of in zip(compared.profiles, compared.summaries, compared.keeping, strict=True)
+        ],
         "distance": [[round(float(value), 4) for value in row] for row in compared.distance],
         "metrics": {
             name: [[round(float(value), 4) for value in row] for row in compared.metrics[:, :, k]]
@@ -195,12 +217,13 @@ def comparison_record(compared: Compared) -> dict[str, Any]:
     }
 
 
-def _profile_record(profile: DriverProfile, summary: MovementSummary) -> dict[str, Any]:
+def _profile_record(profile: DriverProfile, summary: MovementSummary, keeping: LaneKeeping) -> dict[str, Any]:
     return {
         "id": profile.name,
         "sha256": profile_hash(profile),
         "model": profile.model.kind,
         "summary": {key: round(value, 4) for key, value in asdict(summary).items()},
+        "lane_keeping": keeping_record(keeping),
         "effects": [_effect(values) for values in profile.to_dict()["effects"]],
     }
 

@@ -28,10 +28,10 @@ def as_text(conversion: ConvertedScenario, report: Path | None = None) -> str:
                 f"offsets {entity.offset_spread:.2f} m (standard deviation), profile {entity.profile.name}, "
                 f"as {WRITTEN_AS.get(mode, mode)}"
             )
-            lines.append(f"    neighbours: {beside_text(entity.profile, conversion.provenance.neighbours)}")
+            lines.append(f"    neighbours: {beside_text(entity.profile, conversion.provenance.options['neighbours'])}")
         else:
             lines.append(f"  {entity.name}: as in the scenario ({entity.why})")
-    if conversion.provenance.with_sensor:
+    if conversion.provenance.options["with_sensor"]:
         lines.append("  offsets include the sensor error of the drives that the profiles were fitted to")
     lines += [f"  note: {note.what}" for note in conversion.enriched.motion.notes]
     lines += [f"  warning: {warning}" for warning in conversion.warnings]

@@ -45,7 +45,7 @@ FAR, CLOSE = 2.0, 1.2
 def loop_text(result: LoopResult, lack_of_fit: LackOfFit | None = None) -> str:
     """The outcome in a few lines; what is left is worked out unless it is given."""
     lines = [f"{finding_sentence(finding)} (p = {finding.p_value:.1e})" for finding in result.findings]
-    lines = lines or ["no significant effect found"]
+    lines = lines or ([] if result.returned_base else ["no significant effect found"])
     for item in result.feedback:
         sure = "possibly a" if item.doubtful else "a"
         lines.append(f"{item.column}: {sure} consequence of the car's movement, not used as a cause")

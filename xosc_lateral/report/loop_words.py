@@ -101,7 +101,21 @@ def product_label(effect: Product) -> str:
 
 
 def size_words(finding: Finding) -> str:
-    """Size with two standard errors and its unit."""
+    """Size with two standard errors and its unit, and in words to which side; where others are, in a driver's words."""
+    effect = finding.effects[0] if finding.effects else None
+    if finding.kind != "location" or not isinstance(effect, ColumnEffect):
+        return _size(finding)
+    side = "left" if finding.size_m > 0 else "right"
+    rises = "as it rises" if len(finding.columns) == 1 else "from the low to the high end"
+    plain = f"{_size(finding).lstrip('+-')} further {side} {rises}"
+    return beside_words(effect, _share_of_error(finding)) or plain
+
+
+def _share_of_error(finding: Finding) -> float:
+    return 2.0 * finding.size_error / abs(finding.size_m) if finding.size_m else 0.0
+
+
+def _size(finding: Finding) -> str:
     size, about = finding.size_m, 2.0 * finding.size_error
     if finding.kind == "memory":
         return f"factor{GAP}{size:.2f}"
@@ -224,9 +238,59 @@ def _hidden_sentence(finding: Finding) -> str:
     return f"{sentence} ({detail[0].upper()}{detail[1:]}.)"
 
 
+OTHERS: Mapping[str, str] = MappingProxyType(
+    {
+        "left_distance": "beside vehicles on his left",
+        "right_distance": "beside vehicles on his right",
+        "car_left": "beside cars on his left",
+        "car_right": "beside cars on his right",
+        "truck_left": "beside trucks on his left",
+        "truck_right": "beside trucks on his right",
+        "left_is_truck": "when the next vehicle on his left is a truck",
+        "right_is_truck": "when the next vehicle on his right is a truck",
+        "lead_distance": "behind a vehicle ahead",
+        "lead_is_truck": "when the vehicle ahead is a truck",
+        "oncoming_distance": "when somebody comes towards him",
+    }
+)
+"""Where a driver is, by the column that says so."""
+
+FAR = 200.0
+"""Free space at which others count as far away. [m]"""
+
+
+def beside_words(effect: ColumnEffect, error: float = 0.0) -> str:
+    """An effect of others on the mean offset in a driver's words, "moves 0.22 m left beside trucks on his right, from
+    40 m on"; empty for another effect. `error`: of the shift, as a share of it.
+
+    By where the effect puts him, whatever the sign of a distance: with somebody alongside, less with nobody near. The
+    range is where 1/e of the shift is left.
+    """
+    if effect.acts is not Acts.LOCATION or len(effect.columns) != 1 or effect.columns[0] not in OTHERS:
+        return ""
+    column = effect.columns[0]
+    if not column.endswith("distance"):
+        off, on = effect.weighed(effect.quantity({column: np.array([0.0, 1.0])}))
+        return _moves(float(on - off), error, OTHERS[column], "")
+    free = np.linspace(0.0, FAR, 2001)
+    place = effect.weighed(effect.quantity({column: free}))
+    shift = place - place[-1]
+    largest = int(np.argmax(np.abs(shift)))
+    near = np.flatnonzero(np.abs(shift) >= np.abs(shift[largest]) * np.exp(-1.0))
+    begins = f", from {free[near[-1]]:.0f}{GAP}m on" if near[-1] > 0 and free[near[-1]] < FAR - 1.0 else ""
+    return _moves(float(shift[largest]), error, OTHERS[column], begins)
+
+
+def _moves(shift: float, error: float, where: str, begins: str) -> str:
+    about = f"{GAP}±{GAP}{abs(shift) * error:.2f}" if error else ""
+    return f"moves {abs(shift):.2f}{about}{GAP}m {'left' if shift > 0 else 'right'} {where}{begins}"
+
+
 def _column_sentence(finding: Finding, effect: ColumnEffect, result: LoopResult) -> str:
+    if words := beside_words(effect, _share_of_error(finding)):
+        return f"The driver {words} (`{effect.columns[0]}`)."
     more = finding.size_m > (0.0 if effect.acts is Acts.LOCATION else 1.0)
-    size = size_words(finding).lstrip("+-")
+    size = _size(finding).lstrip("+-")
     if effect.acts is Acts.LOCATION:
         does = f"drives {size} further {'left' if more else 'right'}"
         subject = "the car"
@@ -266,6 +330,7 @@ def _over_values(effect: ColumnEffect, column: str, seen: NDArray[np.float64]) -
     low, high = np.quantile(seen, [0.05, 0.95])
     unit = CONTEXT_UNITS.get(column, "")
     unit = "" if unit in ("", "-") else f" {unit}"
+    name += f" ({HINTS[column]})" if column in HINTS else ""
     return f"As {name} goes from {low:.3g} to {high:.3g}{unit} (5 % and 95 % quantile of these drives)"
 
 

@@ -84,16 +84,13 @@ SCHEMA = {
 def scene_recording(motion: NominalMotion, network: RoadNetwork) -> bytes:
     """MCAP file; same motion, same bytes.
 
+    Raises `XoscLateralError`: The package `mcap` is not installed.
+
     Parameters
     ----------
     motion : NominalMotion
     network : RoadNetwork
         That it was played on.
-
-    Raises
-    ------
-    XoscLateralError
-        The package `mcap` is not installed.
     """
     try:
         from mcap.writer import Writer

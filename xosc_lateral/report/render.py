@@ -100,11 +100,6 @@ def _with_policy(page: str) -> str:
     return page.replace('<meta charset="utf-8">', meta, 1)
 
 
-def render_text(template: str, **values: Any) -> str:
-    """Render a text that is no page: Markdown in ``pages/``, nothing escaped."""
-    return f"{environment().overlay(autoescape=False).get_template(template).render(**values).rstrip()}\n"
-
-
 class Parts:
     """What a page holds so far: its headings, its figures, the scripts that it needs."""
 

@@ -45,13 +45,13 @@ def conversion_page(conversion: ConvertedScenario) -> str:
             "under test": list(made.ego) or "none",
             "written as": [f"{name}: {WRITTEN_AS[mode]}" for name, mode in made.modes.items()],
             "neighbours": [
-                f"{one.name}: {beside_text(one.profile, made.neighbours)}"
+                f"{one.name}: {beside_text(one.profile, made.options['neighbours'])}"
                 for one in conversion.enriched.entities
                 if one.is_enriched and one.profile is not None
             ],
-            "seed": made.seed,
+            "seed": made.options["seed"],
             "variant": made.variant,
-            "parameters set": [f"{name} = {value}" for name, value in made.parameters.items()],
+            "parameters set": [f"{name} = {value}" for name, value in made.options["parameters"].items()],
             "profiles": [f"{entity}: {name} ({sha[:12]})" for entity, (name, sha) in made.profiles.items()],
             "inputs": [f"{name} ({sha[:12]})" for name, sha in made.inputs.items()],
             "output hash": conversion.output_sha256,

@@ -65,12 +65,21 @@ class Deterministic:
 
 def _product(parts: Sequence[ValueSets | SteppedRange]) -> Iterator[tuple[ParameterSet, ...]]:
     """`itertools.product` without its copies of every part."""
-    if not parts:
-        yield ()
+    if not all(parts):
         return
-    for first in parts[0]:
-        for rest in _product(parts[1:]):
-            yield (first, *rest)
+    rows = [iter(part) for part in parts]
+    chosen = [next(row) for row in rows]
+    while True:
+        yield tuple(chosen)
+        for place in reversed(range(len(parts))):
+            following = next(rows[place], None)
+            if following is not None:
+                chosen[place] = following
+                break
+            rows[place] = iter(parts[place])
+            chosen[place] = next(rows[place])
+        else:
+            return
 
 
 def _merged(sets: Sequence[ParameterSet]) -> ParameterSet:

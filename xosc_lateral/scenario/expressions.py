@@ -67,6 +67,8 @@ class ExpressionError(ValueError):
 def evaluate(expression: str, resolve: Callable[[str], str]) -> str:
     """Value of an expression as attribute text.
 
+    Raises `ExpressionError`: Syntax, domain (``sqrt(-1)``, division by zero) or overflow.
+
     Parameters
     ----------
     expression : str
@@ -78,11 +80,6 @@ def evaluate(expression: str, resolve: Callable[[str], str]) -> str:
     -------
     str
         Numbers with 6 decimals, as the reference player writes them; ``true`` or ``false``; or the joined words.
-
-    Raises
-    ------
-    ExpressionError
-        Syntax, domain (``sqrt(-1)``, division by zero) or overflow.
     """
     if len(expression) > EXPRESSION.value:
         raise ExpressionError(EXPRESSION.refusal(len(expression)))

@@ -11,16 +11,13 @@ from xosc_lateral.templates.parameter import Parameter
 class Settings:
     """Values of a template's parameters: the defaults, and what the user set.
 
+    Raises `XoscLateralError` for an unknown name or a value out of range.
+
     Parameters
     ----------
     parameters : iterable of Parameter
     chosen : mapping of str to str
         What the user set, as text.
-
-    Raises
-    ------
-    XoscLateralError
-        For an unknown name or a value out of range.
     """
 
     __slots__ = ("_values",)

@@ -40,15 +40,12 @@ class Template:
     def files(self, chosen: Mapping[str, str] | None = None) -> dict[str, str]:
         """File name -> text of the scenario and its road; same settings, same bytes.
 
+        Raises `XoscLateralError` for an unknown parameter or a value out of range.
+
         Parameters
         ----------
         chosen : mapping of str to str, optional
             Parameters that differ from their defaults, as text.
-
-        Raises
-        ------
-        XoscLateralError
-            For an unknown parameter or a value out of range.
         """
         settings = Settings(self.parameters, chosen or {})
         plot = self.plot(settings)

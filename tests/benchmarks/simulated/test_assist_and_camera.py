@@ -11,7 +11,8 @@ from benchmarks.simulated.camera_plants import ShakyCamera
 from xosc_lateral.datasets.intent import Context, Intent
 from xosc_lateral.datasets.motorway import STEP
 from xosc_lateral.datasets.response import SimulatedResponse, saturating, threshold
-from xosc_lateral.formats.drives import drives_of_table, parse_map
+from xosc_lateral.formats.drives import drives_of_table
+from xosc_lateral.formats.mapping import parse_map
 
 N = round(2.0 * 3600.0 / STEP)
 

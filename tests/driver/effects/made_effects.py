@@ -8,6 +8,7 @@ import numpy as np
 
 from xosc_lateral.driver.effects import (
     Acts,
+    Adapted,
     Angular,
     ColumnEffect,
     Cycle,
@@ -71,6 +72,7 @@ EXAMPLES: tuple[Effect, ...] = (
     Cycle(amplitude=0.1, period_s=12.0),
     Regimes(factor=2.0, on_s=20.0, off_s=40.0),
     Population(shift=0.1, log_spread=0.2),
+    Adapted(shift=-0.1, spread=1.2, rate=0.8, fine=1.5),
 )
 """One of each kind, of columns `x` and `y`: every test of all effects takes them from here."""
 

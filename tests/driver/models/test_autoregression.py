@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from xosc_lateral.driver.models.autoregressive.autoregression import Autoregression, stabilise
-from xosc_lateral.driver.models.autoregressive.fit_autoregression import fit_autoregression
+from xosc_lateral.driver.models.autoregressive.fit_coarse import fit_autoregression
 from xosc_lateral.driver.recursion import recur
 from xosc_lateral.errors import DriverProfileError
 

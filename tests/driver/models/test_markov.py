@@ -7,9 +7,8 @@ import pytest
 
 from xosc_lateral.driver.models.two_level.alias_table import AliasTable
 from xosc_lateral.driver.models.two_level.fit import fit_markov_chain
-from xosc_lateral.driver.models.two_level.markov import MarkovChain, bin_of
-from xosc_lateral.driver.models.two_level.traps import open_traps
-from xosc_lateral.driver.models.two_level.walk import walk
+from xosc_lateral.driver.models.two_level.markov import MarkovChain, bin_of, open_traps
+from xosc_lateral.driver.models.two_level.stream import walk
 from xosc_lateral.errors import DriverProfileError, NotEnoughDataError
 
 

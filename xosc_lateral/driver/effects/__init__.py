@@ -9,6 +9,7 @@ from typing import Any
 
 from xosc_lateral.discovery import defined_in
 from xosc_lateral.driver.effects.acts import Acts
+from xosc_lateral.driver.effects.adapted import Adapted
 from xosc_lateral.driver.effects.angular import Angular
 from xosc_lateral.driver.effects.base import Effect, EffectTerms
 from xosc_lateral.driver.effects.column import ColumnEffect
@@ -89,6 +90,7 @@ def missing_columns(effects: Iterable[Effect], context: Mapping[str, object]) ->
 __all__ = [
     "EFFECTS",
     "Acts",
+    "Adapted",
     "Angular",
     "ColumnEffect",
     "Cycle",

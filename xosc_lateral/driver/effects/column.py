@@ -27,6 +27,7 @@ from xosc_lateral.driver.effects.base import Effect, EffectTerms, step_of
 from xosc_lateral.driver.effects.response import Response, ResponseState, respond
 from xosc_lateral.driver.records import plain, set_once
 from xosc_lateral.errors import DriverProfileError
+from xosc_lateral.segment import FADES
 
 FloatArray = NDArray[np.float64]
 
@@ -155,12 +156,25 @@ class ColumnEffect(Effect, frozen=True, kw_only=True):
         return self.quantity(context if self.levels_off else _finite(context, self.columns))
 
     def known(self, context: Mapping[str, FloatArray]) -> FloatArray:
-        """The quantity with what has no effect in place of NaN, shape (n, k). [unit of the quantity]"""
+        """The quantity with what has no effect in place of NaN, shape (n, k). [unit of the quantity]
+
+        Where a column fades (`segment.FADES`), so does the quantity, to what it is where there is none.
+        """
         values = self.seen(context)
+        fading = [name for name in self.columns if name + FADES in context]
+        if not fading:
+            return self._filled(values, values)
+        gone = {name: np.full(len(values), np.nan) for name in fading}
+        without = self._filled(self.seen({**{name: context[name] for name in self.columns}, **gone}), values)
+        share = np.prod([context[name + FADES] for name in fading], axis=0)[:, None]
+        return np.asarray(without + share * (self._filled(values, values) - without))
+
+    def _filled(self, values: FloatArray, like: FloatArray) -> FloatArray:
+        """With the reference in place of NaN; without one, the mean of what is known of others like these."""
         missing = np.isnan(values)
         if not missing.any():
             return values
-        stand_in = self.reference if self.reference else tuple(_finite_mean(column) for column in values.T)
+        stand_in = self.reference if self.reference else tuple(_finite_mean(column) for column in like.T)
         return np.where(missing, np.asarray(stand_in), values)
 
     @property

@@ -27,10 +27,7 @@ class HiddenEffect(Effect, frozen=True, kw_only=True):
     A new one says how its state begins and goes on; a plain function of time needs
     nothing but `advance`.
 
-    Raises
-    ------
-    DriverProfileError
-        If a field is not finite, or one in `positive` is not above 0.
+    Raises `DriverProfileError` if a field is not finite, or one in `positive` is not above 0.
     """
 
     positive: ClassVar[tuple[str, ...]] = ()

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.driver.effects.column import ColumnEffect
+from xosc_lateral.driver.effects.levels import level_share
 from xosc_lateral.driver.records import Record
 
 FloatArray = NDArray[np.float64]
@@ -57,7 +58,7 @@ class Factor(Record, frozen=True, kw_only=True):
         if self.form is Form.COSINE:
             return np.asarray(np.cos(2.0 * np.pi / self.at * column))
         if self.form is Form.EQUALS:
-            return np.asarray(np.rint(column) == self.at, dtype=np.float64)
+            return level_share(np.asarray(column, dtype=np.float64), self.at)
         if self.form is Form.PRESENCE:
             return np.asarray(np.isfinite(column), dtype=np.float64)
         if self.form is Form.NEARNESS:

@@ -18,6 +18,9 @@ FloatArray = NDArray[np.float64]
 class Zones(SingleColumnEffect, frozen=True, kw_only=True):
     """Each zone by its name; elsewhere, as in a scenario, nothing changes.
 
+    Raises `DriverProfileError` if the lengths disagree, there are none, a name is empty or there twice, or a value is
+    not finite.
+
     Parameters
     ----------
     zones : tuple of str
@@ -26,11 +29,6 @@ class Zones(SingleColumnEffect, frozen=True, kw_only=True):
         Of each zone, and their standard errors, per unit of the one coefficient, which is 1. [m] or [-]
     column : str
         Where a context has the zones' codes (`zone_codes`).
-
-    Raises
-    ------
-    DriverProfileError
-        If the lengths disagree, there are none, a name is empty or there twice, or a value is not finite.
     """
 
     is_of_recording: ClassVar[bool] = True

@@ -24,10 +24,7 @@ def fit_shaped_noise(
 
     Reference: arXiv:2405.17080, section III.
 
-    Raises
-    ------
-    NotEnoughDataError
-        When no run holds a window of 5 s.
+    Raises `NotEnoughDataError` when no run holds a window of 5 s.
     """
     lengths = [len(part) for part in fine_parts]
     longest = max(lengths, default=0)

@@ -43,6 +43,8 @@ def take_at_rate(state: ClockState, source: Callable[[int], FloatArray], n: int,
     Between the source's values they lie on Catmull-Rom cubics: through the values, with a continuous slope. At rate 1
     from the start on the source's values are handed through, bit by bit.
 
+    Raises `ValueError` if a rate is not above 0 or not finite.
+
     Parameters
     ----------
     state : ClockState
@@ -51,11 +53,6 @@ def take_at_rate(state: ClockState, source: Callable[[int], FloatArray], n: int,
         ``source(n)`` gives the next n values, shape (n, drivers).
     rate : array, shape (n,), optional
         Steps of own time per step, > 0. [-]
-
-    Raises
-    ------
-    ValueError
-        If a rate is not above 0 or not finite.
     """
     if rate is None and state.time == 0.0:
         return source(n)

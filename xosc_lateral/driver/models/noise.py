@@ -28,6 +28,8 @@ KERNEL_TAPS = 51
 class ShapedNoise(Record, frozen=True, eq=False, dict=True):
     """Noise with a damping function.
 
+    Raises `DriverProfileError` if a damping is negative or not finite, or the kernel's length even.
+
     Parameters
     ----------
     damping : array, shape (n_knots,)
@@ -36,11 +38,6 @@ class ShapedNoise(Record, frozen=True, eq=False, dict=True):
         Length of the kernel, odd.
     taper : float
         Shape of the Kaiser window that the kernel is faded out by; 0: cut off, as in the paper. [-]
-
-    Raises
-    ------
-    DriverProfileError
-        If a damping is negative or not finite, or the kernel's length even.
     """
 
     damping: FloatArray

@@ -55,10 +55,7 @@ CORE_MODELS = (
 def known_models() -> dict[str, KnownModel]:
     """Every model that a profile may hold, by its kind: those here, then those of installed plug-ins.
 
-    Raises
-    ------
-    DriverProfileError
-        If a plug-in offers something else than a core model, or one of a kind that is taken.
+    Raises `DriverProfileError` if a plug-in offers something else than a core model, or one of a kind that is taken.
     """
     known = {entry.model.kind: entry for entry in CORE_MODELS}
     for plugin in entry_points(group=ENTRY_POINTS):
@@ -75,10 +72,7 @@ def known_models() -> dict[str, KnownModel]:
 def model_named(name: str) -> KnownModel:
     """The model of a kind, by its name or an older one.
 
-    Raises
-    ------
-    DriverProfileError
-        If there is none; lists those that there are.
+    Raises `DriverProfileError` if there is none; lists those that there are.
     """
     name = ALIASES.get(str(name), str(name))
     here = {entry.model.kind: entry for entry in CORE_MODELS}

@@ -30,6 +30,8 @@ def tidy(values: Sequence[float] | FloatArray) -> tuple[float, ...]:
 class ByZone(Record, frozen=True):
     """Level of a sensor's error in each zone.
 
+    Raises `DriverProfileError` if there is no zone, not as many levels as zones, or a number is out of its range.
+
     Parameters
     ----------
     zones : tuple of str
@@ -38,11 +40,6 @@ class ByZone(Record, frozen=True):
         Logarithm of the error's power in each, above that of all. [-]
     level_variance, level_duration, track_variance : float
         Of what varies besides, as of all (`SensorModel`, `SlopeJumps`). [-], [s], [-]
-
-    Raises
-    ------
-    DriverProfileError
-        If there is no zone, not as many levels as zones, or a number is out of its range.
     """
 
     zones: tuple[str, ...]

@@ -18,10 +18,7 @@ FloatArray = NDArray[np.float64]
 def known_sensor(profile: DriverProfile) -> SensorModel:
     """What the profile's drives were measured by.
 
-    Raises
-    ------
-    DriverProfileError
-        When the profile doesn't know.
+    Raises `DriverProfileError` when the profile doesn't know.
     """
     if profile.sensor is None:
         raise DriverProfileError(f"profile {profile.name} holds no sensor: fit it anew, or sample the driver alone")

@@ -41,6 +41,8 @@ HIGHEST = 1.5
 class SensorModel(Record, frozen=True):
     """The sensor's part of what was measured.
 
+    Raises `DriverProfileError` if a number is negative or no number.
+
     Parameters
     ----------
     white : float
@@ -71,11 +73,6 @@ class SensorModel(Record, frozen=True):
     second_view : float
         Power of the error over that of half the lane width, beside the white part, where it was estimated so
         (`second_view`); else 0. [-]
-
-    Raises
-    ------
-    DriverProfileError
-        If a number is negative or no number.
     """
 
     white: float

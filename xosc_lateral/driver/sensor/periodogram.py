@@ -68,10 +68,7 @@ class Periodogram:
 def windows_of(runs: Sequence[FloatArray], step: float) -> tuple[FloatArray, FloatArray]:
     """Frequencies, shape (m,), and densities of all windows, shape (k, m), of evenly sampled runs.
 
-    Raises
-    ------
-    NotEnoughDataError
-        If no run holds the shortest window.
+    Raises `NotEnoughDataError` if no run holds the shortest window.
     """
     size = 0
     for seconds in WINDOWS:

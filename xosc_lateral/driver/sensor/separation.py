@@ -118,6 +118,9 @@ def separate(
 ) -> Separation:
     """Separate driver and sensor.
 
+    Raises `NotEnoughDataError` if no run lasts 12.8 s; `DriverProfileError` if the error that is known is more than all
+    that was measured.
+
     Parameters
     ----------
     runs : sequence of array
@@ -139,13 +142,6 @@ def separate(
         plausible.
     zoned : ZonedRows, optional
         Where the rows and runs were recorded: what their sensor's level hangs on.
-
-    Raises
-    ------
-    NotEnoughDataError
-        If no run lasts 12.8 s.
-    DriverProfileError
-        If the error that is known is more than all that was measured.
     """
     measured = list(rows) if rows is not None else list(runs)
     variance = _variance(measured, durations)

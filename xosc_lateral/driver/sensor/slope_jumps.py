@@ -49,6 +49,8 @@ FINER = 4
 class SlopeJumps(Record, frozen=True):
     """Jumps of the slope at even times.
 
+    Raises `DriverProfileError` if a number is out of its range.
+
     Parameters
     ----------
     every : float
@@ -70,11 +72,6 @@ class SlopeJumps(Record, frozen=True):
     shape : tuple of float
         Factors on their density above half a jump a period, from there on evenly, `SHAPE` in half a jump a period;
         empty: 1. [-]
-
-    Raises
-    ------
-    DriverProfileError
-        If a number is out of its range.
     """
 
     every: float

@@ -26,6 +26,7 @@ IMPORTERS = {
     "levelx": "xosc_lateral.formats.importers.levelx:import_levelx",
     "mf4": "xosc_lateral.formats.importers.mf4:import_mf4",
     "tracks": "xosc_lateral.formats.importers.tracks:import_tracks",
+    "table": "xosc_lateral.formats.importers.foreign_table:import_table",
     "osi": "xosc_lateral.formats.importers.osi:import_osi",
     "commonroad": "xosc_lateral.formats.importers.commonroad:import_commonroad",
 }
@@ -38,10 +39,7 @@ GROUP = "xosc_lateral.importers"
 def find_importer(name: str) -> Importer:
     """The reader of a format.
 
-    Raises
-    ------
-    FormatError
-        If there is none.
+    Raises `FormatError` if there is none.
     """
     if name in IMPORTERS:
         module, _, function = IMPORTERS[name].partition(":")

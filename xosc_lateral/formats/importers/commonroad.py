@@ -44,12 +44,8 @@ def import_commonroad(
 ) -> Imported:
     """Read one or several scenarios.
 
-    Raises
-    ------
-    FormatError
-        If commonroad-io is not installed, or a file is no CommonRoad scenario.
-    NotEnoughDataError
-        If nothing is left once lane changes are cut.
+    Raises `FormatError` if commonroad-io is not installed, or a file is no CommonRoad scenario; `NotEnoughDataError` if
+    nothing is left once lane changes are cut.
     """
     return import_each(sources, lambda file: _read(file, settings), keep_cut=keep_cut)
 

@@ -91,6 +91,8 @@ def fit_lane_centre(
 ) -> LaneCentreLine:
     """Fit one lane's centre.
 
+    Raises `NotEnoughDataError` if fewer than `MIN_PASSAGES` share any 100 m.
+
     Parameters
     ----------
     s, d : array, shape (n,)
@@ -102,11 +104,6 @@ def fit_lane_centre(
     knot_spacing : float
         Between the splines' knots. Longer: blind to the bends that camera calibration puts into the tracks; shorter:
         follows single drivers. [m]
-
-    Raises
-    ------
-    NotEnoughDataError
-        If fewer than `MIN_PASSAGES` share any 100 m.
     """
     start, end = _covered(s, passage)
     keep = (s >= start) & (s <= end)

@@ -57,10 +57,7 @@ VEHICLES = ("car", "van", "truck", "bus", "motorcycle", "trailer")
 def import_levelx(source: Path, settings: CutSettings = DEFAULT_CUTS, *, keep_cut: bool = False) -> Imported:
     """Read one recording (its ``XX_tracks.csv``) or a folder of them; highD and exiD are recognised by their columns.
 
-    Raises
-    ------
-    FormatError
-        If a file or a column is missing, or the exiD sign is undecided.
+    Raises `FormatError` if a file or a column is missing, or the exiD sign is undecided.
     """
     import pandas as pd
 

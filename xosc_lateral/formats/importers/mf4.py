@@ -26,9 +26,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.errors import FormatError
-from xosc_lateral.formats.drives import ColumnSource, parse_map
 from xosc_lateral.formats.importers.cuts import KEPT
 from xosc_lateral.formats.importers.table import Imported, drop_cut, guarded, make_provenance
+from xosc_lateral.formats.mapping import ColumnSource, MappingLike, as_mapping, parse_map
 from xosc_lateral.formats.source import open_source
 from xosc_lateral.formats.tables import LONGEST_MESSAGE, foreign_errors
 from xosc_lateral.formats.units import factor, is_measured, spelled
@@ -83,8 +83,17 @@ class Channel:
 
 
 @guarded
-def import_mf4(sources: Path | Sequence[Path], channels: Sequence[str], *, step: float = 0.04) -> Imported:
+def import_mf4(
+    sources: Path | Sequence[Path],
+    channels: Sequence[str] = (),
+    *,
+    step: float = 0.04,
+    mapping: MappingLike | None = None,
+) -> Imported:
     """Read mapped channels of bus logs at an even step, over the time that all position channels of a log cover.
+
+    Raises `FormatError` if the map lacks the position, asammdf is not installed, a log can't be read, a channel is not
+    in it, or the unit in the file measures something else.
 
     Parameters
     ----------
@@ -92,22 +101,18 @@ def import_mf4(sources: Path | Sequence[Path], channels: Sequence[str], *, step:
         Each log is a drive of its own, called after its file.
     channels : sequence of str
         Words ``NAME=CHANNEL[:UNIT]``.
+    mapping : TableMapping, mapping of str to str, or path, optional
+        More of them, saved.
     step : float
         Of the table. Messages that stay away for longer than a second leave a gap. [s]
-
-    Raises
-    ------
-    FormatError
-        If the map lacks the position, asammdf is not installed, a log can't be read, a channel is not in it, or the
-        unit in the file measures something else.
     """
     import pandas as pd
 
     files = [sources] if isinstance(sources, Path) else list(sources)
-    mapping = parse_map(channels)
-    if not any(set(pair) <= mapping.keys() for pair in POSITIONS):
-        raise FormatError(f"{channels_wanted(files[0])}; mapped: {', '.join(mapping) or 'nothing'}", path=files[0])
-    read = {file: _read_channels(file, mapping) for file in files}
+    sources_of = {**as_mapping(mapping).columns, **parse_map(channels)}
+    if not any(set(pair) <= sources_of.keys() for pair in POSITIONS):
+        raise FormatError(f"{channels_wanted(files[0])}; mapped: {', '.join(sources_of) or 'nothing'}", path=files[0])
+    read = {file: _read_channels(file, sources_of) for file in files}
     tables = [
         _table(signals, file, name, step)
         for (file, signals), name in zip(read.items(), _drive_names(files), strict=True)
@@ -128,10 +133,7 @@ def import_mf4(sources: Path | Sequence[Path], channels: Sequence[str], *, step:
 def channels_wanted(source: Path) -> str:
     """What the channel map has to name, and the channels that there are to choose from: for who has no map yet.
 
-    Raises
-    ------
-    FormatError
-        When it can't be read as MDF.
+    Raises `FormatError` when it can't be read as MDF.
     """
     with _opened(source) as log:
         names = _names(log)

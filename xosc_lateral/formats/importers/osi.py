@@ -44,6 +44,9 @@ def import_osi(
 ) -> Imported:
     """Read one or several traces of ground truth or sensor views.
 
+    Raises `FormatError`: The extra is missing; no trace; no lanes; no such vehicle; `NotEnoughDataError` if nothing is
+    left once lane changes are cut.
+
     Parameters
     ----------
     host : str, optional
@@ -52,13 +55,6 @@ def import_osi(
         OpenDRIVE file to take lanes from.
     channel : str, optional
         Topic of an MCAP file with several.
-
-    Raises
-    ------
-    FormatError
-        The extra is missing; no trace; no lanes; no such vehicle.
-    NotEnoughDataError
-        If nothing is left once lane changes are cut.
     """
     several = not isinstance(sources, Path) and len(sources) > 1
 

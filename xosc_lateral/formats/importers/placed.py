@@ -93,10 +93,7 @@ def import_placed(
 ) -> Imported:
     """Neighbours, cuts and the record of the import; of the vehicles in `only` alone, if it is given.
 
-    Raises
-    ------
-    NotEnoughDataError
-        If nothing is left.
+    Raises `NotEnoughDataError` if nothing is left.
     """
     table = placed_table(tracks, graph, settings)
     if only is not None:
@@ -120,10 +117,7 @@ def import_placed(
 def import_each(sources: Path | Sequence[Path], read: Callable[[Path], Imported], *, keep_cut: bool) -> Imported:
     """One table and one record of one or several files, each read with what would be cut.
 
-    Raises
-    ------
-    NotEnoughDataError
-        If nothing is left.
+    Raises `NotEnoughDataError` if nothing is left.
     """
     import pandas as pd
 

@@ -57,17 +57,14 @@ class ReferenceLine:
 def fit_reference_line(xy: FloatArray, forward: NDArray[np.bool_]) -> tuple[ReferenceLine, FloatArray, FloatArray]:
     """Line midway between the innermost lanes of both directions, and every point's (s, d) on it.
 
+    Raises `NotEnoughDataError` if the tracks don't cover at least 1 km in both directions.
+
     Parameters
     ----------
     xy : array, shape (n, 2)
         Positions of all vehicles, sorted by vehicle and time. [m]
     forward : array of bool, shape (n,)
         True where the vehicle travels in the first direction (`s` grows with it).
-
-    Raises
-    ------
-    NotEnoughDataError
-        If the tracks don't cover at least 1 km in both directions.
 
     Notes
     -----

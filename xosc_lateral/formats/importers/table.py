@@ -17,7 +17,7 @@ from xosc_lateral.drives.cleaning import LANE_WIDTHS, MAX_OUTSIDE
 from xosc_lateral.errors import FormatError, NotEnoughDataError
 from xosc_lateral.formats.hashes import parsed_hash
 from xosc_lateral.formats.importers.cuts import KEPT
-from xosc_lateral.formats.output_tables import write_table
+from xosc_lateral.formats.output_tables import harmless_frame, write_table
 from xosc_lateral.formats.tables import foreign_errors
 from xosc_lateral.limits import TIME, Range, context_range
 from xosc_lateral.version import __version__
@@ -86,12 +86,8 @@ Importer = TypeVar("Importer", bound=Callable[..., Imported])
 def guarded(read: Importer) -> Importer:
     """An importer whose source, damaged in whatever way, ends in one line, and never in a table of nonsense.
 
-    Raises
-    ------
-    NotEnoughDataError
-        Too little is left; the message begins with the source.
-    FormatError
-        Whatever else breaks in the source; offsets and lane widths that are none; a column beyond `limits`.
+    Raises `NotEnoughDataError`: Too little is left; the message begins with the source; `FormatError`: whatever else
+    breaks in the source; offsets and lane widths that are none; a column beyond `limits`.
     """
 
     @wraps(read)
@@ -194,7 +190,7 @@ def write_imported(imported: Imported, path: Path) -> None:
         path,
         asdict(imported.provenance),
         frame=lambda: table,
-        text=lambda: table.to_csv(index=False, lineterminator="\n"),
+        text=lambda: harmless_frame(table).to_csv(index=False, lineterminator="\n"),
     )
 
 

@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.errors import FormatError, NotEnoughDataError
-from xosc_lateral.formats.drives import parse_map
 from xosc_lateral.formats.importers.esmini_log import is_esmini_log, read_esmini_log
 from xosc_lateral.formats.importers.placed import PlacedTracks, ground_speed, travel_heading
+from xosc_lateral.formats.mapping import MappingLike, TableMapping, as_mapping, parse_map
 from xosc_lateral.formats.tables import read_table
 from xosc_lateral.formats.text_columns import comma_numbers, seconds_of_text
 
@@ -72,11 +72,12 @@ class Tracks:
         return PlacedTracks(*who, piece, middle, offset, lane_width, self.speed, self.length, self.kind, road, zone)
 
 
-def read_tracks(path: Path, columns: Sequence[str] = ()) -> Tracks:
+def read_tracks(path: Path, columns: Sequence[str] = (), mapping: MappingLike | None = None) -> Tracks:
     """Read a table of tracks.
 
     Parameters
     ----------
+    mapping : TableMapping, mapping of str to str, or path, optional
     columns : sequence of str
         ``NAME=COLUMN[:UNIT]`` for headers that aren't understood, and for units other than m, s, rad, m/s.
 
@@ -87,8 +88,9 @@ def read_tracks(path: Path, columns: Sequence[str] = ()) -> Tracks:
     NotEnoughDataError
         No vehicle with two rows.
     """
-    table = read_esmini_log(path) if is_esmini_log(path) else read_table(path)[0]
-    found = _columns(table, path, columns)
+    saved = as_mapping(mapping)
+    table = read_esmini_log(path) if is_esmini_log(path) else read_table(path, saved)[0]
+    found = _columns(table, path, saved, columns)
     order = found.sort_values(["vehicle", "time"], kind="stable", ignore_index=True)
     order = order.drop_duplicates(["vehicle", "time"], ignore_index=True)
     codes, names = order["vehicle"].factorize()
@@ -124,11 +126,11 @@ def _given(table: pd.DataFrame, name: str, otherwise: FloatArray) -> FloatArray:
     return np.where(np.isfinite(values), values, otherwise)
 
 
-def _columns(table: pd.DataFrame, path: Path, words: Sequence[str]) -> pd.DataFrame:
+def _columns(table: pd.DataFrame, path: Path, saved: TableMapping, words: Sequence[str]) -> pd.DataFrame:
     """The columns that are needed, under their own names, in our units."""
     import pandas as pd
 
-    mapping = parse_map(words)
+    mapping = {**saved.columns, **parse_map(words)}
     if unknown := mapping.keys() - HEADERS.keys():
         raise FormatError(f"--map {min(unknown)}: tracks have {', '.join(HEADERS)}", path=path)
     by_lower = {str(name).strip().lower(): name for name in reversed(list(table.columns))}

@@ -19,6 +19,7 @@ from xosc_lateral.formats.importers.lane_graph import LaneGraph
 from xosc_lateral.formats.importers.placed import PlacedTracks, import_placed
 from xosc_lateral.formats.importers.table import Imported, guarded
 from xosc_lateral.formats.importers.track_table import Tracks, read_tracks
+from xosc_lateral.formats.mapping import MappingLike
 from xosc_lateral.formats.opendrive import read_opendrive
 from xosc_lateral.road.network import DRIVING, RoadNetwork
 
@@ -40,10 +41,14 @@ def import_tracks(
     *,
     road: Path | str,
     columns: Sequence[str] = (),
+    mapping: MappingLike | None = None,
     settings: CutSettings = DEFAULT_CUTS,
     keep_cut: bool = False,
 ) -> Imported:
     """Read tracks on a known road.
+
+    Raises `FormatError`: A missing column, or tracks that lie beside the road; `NotEnoughDataError` if nothing is left
+    once lane changes are cut.
 
     Parameters
     ----------
@@ -55,16 +60,11 @@ def import_tracks(
     columns : sequence of str
         ``NAME=COLUMN[:UNIT]`` for `vehicle`, `time`, `x`, `y`, `heading`, `speed`, `length`,
         `rear`, `vehicle_class`.
-
-    Raises
-    ------
-    FormatError
-        A missing column, or tracks that lie beside the road.
-    NotEnoughDataError
-        If nothing is left once lane changes are cut.
+    mapping : TableMapping, mapping of str to str, or path, optional
+        More of them, saved.
     """
     network = read_opendrive(road)
-    tracks = read_tracks(source, columns)
+    tracks = read_tracks(source, columns, mapping)
     pieces, graph = lane_graph(network)
     if not pieces:
         raise FormatError("the road has no driving lane that tracks could lie in", path=Path(road))

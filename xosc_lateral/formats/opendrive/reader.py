@@ -29,6 +29,9 @@ LONGEST = 1e6
 def read_opendrive(path: str | PathLike[str]) -> RoadNetwork:
     """Read one ``.xodr``.
 
+    Raises `FormatError` if it is no OpenDRIVE, or can't be understood: file, line, element and value; `OSError` if it
+    can't be opened.
+
     Parameters
     ----------
     path : path-like
@@ -38,13 +41,6 @@ def read_opendrive(path: str | PathLike[str]) -> RoadNetwork:
     -------
     RoadNetwork
         Its `notes` name what was repaired, ignored or degenerate.
-
-    Raises
-    ------
-    FormatError
-        If it is no OpenDRIVE, or can't be understood: file, line, element and value.
-    OSError
-        If it can't be opened.
     """
     root, source = open_document(path)
     elements = list(root.iterfind("road"))

@@ -47,11 +47,8 @@ class Catalogs:
     def entry(self, reference: XmlElement) -> XmlElement:
         """The element that a CatalogReference names, in the scope of its parameters and the assigned values.
 
-        Raises
-        ------
-        FormatError
-            No such entry, or a catalog folder that is there, outside the allowed ones; a `MissingFileError` without the
-            catalog.
+        Raises `FormatError`: No such entry, or a catalog folder that is there, outside the allowed ones; a
+        `MissingFileError` without the catalog.
         """
         catalog, name = reference.text("catalogName"), reference.text("entryName")
         path = self._file(catalog, reference)

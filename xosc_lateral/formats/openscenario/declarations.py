@@ -57,11 +57,8 @@ def read_declarations(
 ) -> tuple[Scope, dict[str, Parameter]]:
     """Global scope and parameters, with overrides in place.
 
-    Raises
-    ------
-    FormatError
-        An override of a parameter that is not declared or that violates its constraints, or a value that can't be
-        evaluated. A declared value that violates the constraints beside it is only remarked: it plays.
+    Raises `FormatError`: An override of a parameter that is not declared or that violates its constraints, or a value
+    that can't be evaluated. A declared value that violates the constraints beside it is only remarked: it plays.
     """
     values = declared_values(root)
     unknown = sorted(set(overrides) - set(values))

@@ -77,15 +77,12 @@ class LogicalScenario:
 
         Combinations of a deterministic distribution that violate them are left out; stochastic ones are drawn again.
 
+        Raises `FormatError`: A parameter that the scenario does not declare, or constraints that nothing satisfies.
+
         Parameters
         ----------
         seed : int
             For a stochastic distribution without a ``randomSeed`` of its own.
-
-        Raises
-        ------
-        FormatError
-            A parameter that the scenario does not declare, or constraints that nothing satisfies.
         """
         self.discarded, begin = 0, time.monotonic()
         limit = PARAMETER_SETS if isinstance(self.distribution, Stochastic) else COMBINATIONS
@@ -155,17 +152,14 @@ def is_distribution(path: Path | str) -> bool:
 def read_distribution(path: Path | str, *, allowed: Iterable[Path] = ()) -> LogicalScenario:
     """Read a ParameterValueDistribution file (1.1 and later).
 
+    Raises `FormatError` with file, line and element; user-defined distributions among others.
+
     Parameters
     ----------
     path : path
         The ``.xosc`` file.
     allowed : iterable of path
         Folders, besides the file's own and the two above it, that the scenario may lie in.
-
-    Raises
-    ------
-    FormatError
-        With file, line and element; user-defined distributions among others.
     """
     path = Path(path)
     document, _ = read_xml(path)

@@ -15,6 +15,9 @@ from xosc_lateral.scenario.vehicle import Axle, Axles, BoundingBox, Performance
 DEFAULT_BOX = BoundingBox(1.5, 0.0, 0.9, 5.0, 2.0, 1.8)
 """Where a file gives none: the middle of the field's passenger cars."""
 
+USUAL_ACCELERATION = 10.0
+"""Where a file leaves out a limit that the standard asks for; esmini 3.6.0 takes the same. [m/s2]"""
+
 CATEGORIES = {
     "Vehicle": EntityCategory.VEHICLE,
     "Pedestrian": EntityCategory.PEDESTRIAN,
@@ -84,7 +87,7 @@ def _read_object(item: XmlElement, context: Context, name: str | None = None) ->
         place=item.place(),
         bounding_box=DEFAULT_BOX if box is None else _bounding_box(box),
         vehicle_category=_vehicle_category(content, context) if category is EntityCategory.VEHICLE else None,
-        performance=_performance(content.child("Performance")),
+        performance=_performance(content.child("Performance"), context),
         axles=_axles(content.child("Axles")),
         controllers=_controllers(item, context),
         object_name=content.text("name", ""),
@@ -163,12 +166,16 @@ def _bounding_box(box: XmlElement) -> BoundingBox:
     return BoundingBox(center.number("x"), center.number("y"), center.number("z", 0.0), length, width, height)
 
 
-def _performance(element: XmlElement | None) -> Performance:
+def _performance(element: XmlElement | None, context: Context) -> Performance:
     if element is None:
         return Performance()
     inf = float("inf")
-    names = ("maxSpeed", "maxAcceleration", "maxDeceleration", "maxAccelerationRate", "maxDecelerationRate")
-    return Performance(*(element.number(name, inf, finite=False) for name in names))
+    usual = {"maxSpeed": inf, "maxAcceleration": USUAL_ACCELERATION, "maxDeceleration": USUAL_ACCELERATION}
+    for name in ("maxAcceleration", "maxDeceleration"):
+        if element.optional_text(name) is None:
+            context.remark(element, f"{name} is missing: {USUAL_ACCELERATION:g} m/s2 is taken")
+    names = (*usual, "maxAccelerationRate", "maxDecelerationRate")
+    return Performance(*(element.number(name, usual.get(name, inf), finite=False) for name in names))
 
 
 def _axles(element: XmlElement | None) -> Axles | None:

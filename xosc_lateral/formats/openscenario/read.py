@@ -38,17 +38,14 @@ LEFT_HANDED = "written for CARLA: its left-handed coordinates are mirrored, its 
 class RoadSearch:
     """Where a road may lie besides where the scenario says: what the user names is allowed.
 
+    Raises `FormatError`: No such file, no such folder.
+
     Parameters
     ----------
     file : Path or None
         The road, whatever the scenario says.
     folders : tuple of Path
         Looked through for a file of the road's name.
-
-    Raises
-    ------
-    FormatError
-        No such file, no such folder.
     """
 
     file: Path | None = None
@@ -75,6 +72,9 @@ def read_scenario(
 ) -> Scenario:
     """Read a scenario with all that it takes from catalogs.
 
+    Raises `FormatError`: File, line, element and what is wrong: no XML, no scenario, a missing or malformed value, an
+    unknown entity, catalog or parameter, a reference that leads outside, a missing road file.
+
     Parameters
     ----------
     path : path
@@ -91,12 +91,6 @@ def read_scenario(
     Returns
     -------
     Scenario
-
-    Raises
-    ------
-    FormatError
-        File, line, element and what is wrong: no XML, no scenario, a missing or malformed value, an unknown entity,
-        catalog or parameter, a reference that leads outside, a missing road file.
     """
     path = Path(path)
     document = read_document(path)

@@ -30,10 +30,7 @@ _WINDOWS_DRIVE = re.compile(r"[A-Za-z]:[\\/]")
 def allowed_roots(scenario: Path, extra: Iterable[Path] = ()) -> tuple[Path, ...]:
     """Folders that files named by this scenario may lie in, real paths.
 
-    Raises
-    ------
-    FormatError
-        One of the further folders isn't one.
+    Raises `FormatError`: One of the further folders isn't one.
     """
     extra = list(extra)
     require_folders(extra)
@@ -78,10 +75,7 @@ class Boundary:
     def path(self, reference: str, place: Place) -> Path:
         """Path of a file or folder, wherever it is.
 
-        Raises
-        ------
-        FormatError
-            The reference is empty or no path at all.
+        Raises `FormatError`: The reference is empty or no path at all.
         """
         text = reference.strip()
         if not text or "\0" in text:
@@ -105,10 +99,7 @@ class Boundary:
     def inside(self, reference: str, place: Place) -> Path:
         """Path of a file or folder that has to lie inside.
 
-        Raises
-        ------
-        FormatError
-            It leads outside, is empty, or no path at all.
+        Raises `FormatError`: It leads outside, is empty, or no path at all.
         """
         path = self.path(reference, place)
         windows = bool(_WINDOWS_DRIVE.match(reference.strip())) and os.name != "nt"

@@ -16,10 +16,7 @@ SUFFIXES = (".mcap", ".osi")
 def osi(module: str) -> Any:
     """A module of `osi3` or `osi_utilities`.
 
-    Raises
-    ------
-    XoscLateralError
-        They are not installed.
+    Raises `XoscLateralError`: They are not installed.
     """
     try:
         found = import_module(module)

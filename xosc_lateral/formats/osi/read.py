@@ -67,12 +67,8 @@ class Recorded:
 def read_osi(path: Path, channel: str | None = None) -> Recorded:
     """Read a trace, message by message.
 
-    Raises
-    ------
-    FormatError
-        No trace; a vehicle without a position; times that are none.
-    NotEnoughDataError
-        No vehicle in two messages.
+    Raises `FormatError`: No trace; a vehicle without a position; times that are none; `NotEnoughDataError`: No vehicle
+    in two messages.
     """
     with Trace(path, channel) as trace:
         collected = _Collected(path)

@@ -18,6 +18,8 @@ TRUTHS = ("GROUND_TRUTH", "SENSOR_VIEW")
 class Trace:
     """An open trace; use it as a context.
 
+    Raises `FormatError`: No trace, or none of ground truth; `XoscLateralError`: The extra `osi` is not installed.
+
     Parameters
     ----------
     path : path
@@ -30,13 +32,6 @@ class Trace:
         Channels that are not read.
     opendrive : bytes or None
         The road, where the file has it as OpenDRIVE.
-
-    Raises
-    ------
-    FormatError
-        No trace, or none of ground truth.
-    XoscLateralError
-        The extra `osi` is not installed.
     """
 
     def __init__(self, path: Path, channel: str | None = None) -> None:

@@ -78,6 +78,9 @@ def write_osi(
 ) -> Path:
     """Write a trace; same motion, same bytes.
 
+    Raises `FormatError`: Another suffix; `XoscLateralError`: The extra `osi` is not installed; `OSError`: The file
+    can't be written; it is as it was then.
+
     Parameters
     ----------
     path : path
@@ -91,15 +94,6 @@ def write_osi(
         Entity that is the host vehicle; without it the trace has none.
     description : str
         For the metadata of the file.
-
-    Raises
-    ------
-    FormatError
-        Another suffix.
-    XoscLateralError
-        The extra `osi` is not installed.
-    OSError
-        The file can't be written; it is as it was then.
     """
     if path.suffix.lower() not in SUFFIXES:
         raise FormatError(f"an OSI trace ends in {' or '.join(SUFFIXES)}", path=path)

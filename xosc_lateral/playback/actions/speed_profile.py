@@ -47,6 +47,8 @@ class RunningSpeedProfile(RunningAction):
         """Lay the profile out from the present speed (and acceleration)."""
         state = self.state
         offset = 0.0 if self._reference is None else self._reference.speed
+        if self._reference is not None:
+            self.note(f"speeds are relative to that of '{self.content.entity_ref}' as it is now: {offset:.2f} m/s")
         limits = limits_of(self.content.constraints, state.entity.performance)
         self._current = 0
         targets = self._targets(offset, limits)

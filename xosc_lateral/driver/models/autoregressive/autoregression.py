@@ -29,10 +29,7 @@ FREQUENCIES.flags.writeable = False
 class Autoregression(Record, frozen=True, eq=False):
     """z[t] = sum over k of coefficients[k] z[t - 1 - k] + scale * noise[t], noise white with variance 1.
 
-    Raises
-    ------
-    DriverProfileError
-        If it is not stable, or the scale is negative.
+    Raises `DriverProfileError` if it is not stable, or the scale is negative.
     """
 
     coefficients: FloatArray

@@ -30,6 +30,8 @@ START_LAGS = 300
 class AutoregressiveParameters(CoreModel, frozen=True, eq=False, dict=True):
     """Parameters of the model.
 
+    Raises `DriverProfileError` if a number is out of its range.
+
     Parameters
     ----------
     mean : float
@@ -47,11 +49,6 @@ class AutoregressiveParameters(CoreModel, frozen=True, eq=False, dict=True):
         Between the logarithms of the two factors. [-]
     step : float
         [s]
-
-    Raises
-    ------
-    DriverProfileError
-        If a number is out of its range.
     """
 
     mean: float

@@ -28,6 +28,8 @@ SLOW_CORRELATION_TIME = 300.0
 class Volatility(Record, frozen=True):
     """Parameters of the factor.
 
+    Raises `DriverProfileError` if a variance is negative or the correlation time not above 0.
+
     Parameters
     ----------
     between : float
@@ -38,11 +40,6 @@ class Volatility(Record, frozen=True):
         Of the part that varies within seconds; `memory` in files. [s]
     slow : float
         Variance of the part that varies with the correlation time `SLOW_CORRELATION_TIME`. [-]
-
-    Raises
-    ------
-    DriverProfileError
-        If a variance is negative or the correlation time not above 0.
     """
 
     between: float = 0.0

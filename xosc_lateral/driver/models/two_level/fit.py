@@ -48,17 +48,14 @@ def split_levels(rel_offset: FloatArray, settings: TwoLevelSettings = PAPER_SETT
 def fit_markov_chain(rel_offsets: Sequence[FloatArray], *, n_bins: int = N_BINS) -> MarkovChain:
     """Count transitions inside each run; none across two runs.
 
+    Raises `NotEnoughDataError` when there is no transition.
+
     Parameters
     ----------
     rel_offsets : sequence of array, shape (n_i,)
         Relative offsets, one array per run, evenly sampled. [-]
     n_bins : int
         Over [-0.5, 0.5].
-
-    Raises
-    ------
-    NotEnoughDataError
-        When there is no transition.
     """
     counts = np.zeros((n_bins, n_bins), dtype=np.int64)
     for run in rel_offsets:
@@ -74,10 +71,7 @@ def fit_two_level(rel_offsets: Sequence[FloatArray], settings: TwoLevelSettings 
 
     Reference: arXiv:2405.17080, section III.
 
-    Raises
-    ------
-    NotEnoughDataError
-        When there is no transition, or no run of 5 s.
+    Raises `NotEnoughDataError` when there is no transition, or no run of 5 s.
     """
     chain = fit_markov_chain(rel_offsets, n_bins=settings.n_bins)
     fine = [split_levels(run, settings)[1] for run in rel_offsets]

@@ -12,11 +12,53 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.driver.models.two_level.alias_table import AliasTable
-from xosc_lateral.driver.models.two_level.traps import open_traps
 from xosc_lateral.errors import DriverProfileError
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
+
+
+def open_traps(counts: IntArray) -> IntArray:
+    """Counts with a way out of every bin that has none; see the module. Shape as `counts`. [-]"""
+    bins = np.arange(len(counts))
+    visited = (counts.sum(axis=0) + counts.sum(axis=1)) > 0
+    main = _main_part(counts)
+    stuck = np.flatnonzero(visited & ~_reachable(counts.T, main))
+    opened = counts.copy()
+    opened[stuck, _nearest(bins[stuck], bins[main])] += 1
+    empty = np.flatnonzero(~visited)
+    opened[empty, empty + np.sign(_nearest(empty, bins[visited]) - empty)] += 1
+    return opened
+
+
+def _nearest(bins: IntArray, goals: IntArray) -> IntArray:
+    return np.asarray(goals[np.abs(bins[:, None] - goals[None, :]).argmin(axis=1)])
+
+
+def _reachable(counts: IntArray, start: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Bins that the chain can get to from `start` (itself included)."""
+    found = start.copy()
+    while True:
+        more = found | (counts[found] > 0).any(axis=0)
+        if (more == found).all():
+            return found
+        found = more
+
+
+def _main_part(counts: IntArray) -> NDArray[np.bool_]:
+    """The set of bins that all lead to one another in which most time was spent."""
+    best, most = np.zeros(len(counts), dtype=np.bool_), -1
+    left = counts.sum(axis=0) + counts.sum(axis=1) > 0
+    while left.any():
+        seed = np.zeros(len(counts), dtype=np.bool_)
+        seed[np.argmax(left)] = True
+        part = _reachable(counts, seed) & _reachable(counts.T, seed)
+        inside = int(counts[np.ix_(part, part)].sum())
+        if inside > most:
+            best, most = part, inside
+        left &= ~part
+    return best
+
 
 N_BINS = 20
 """Bins of the relative offset over [-0.5, 0.5]. [-]"""
@@ -26,15 +68,12 @@ N_BINS = 20
 class MarkovChain:
     """Coarse lateral position as a chain over bins of the relative offset.
 
+    Raises `DriverProfileError` if it isn't square, a count is negative, or there is no transition at all.
+
     Parameters
     ----------
     counts : array of int, shape (n_bins, n_bins)
         Observed transitions: row i, column j: from bin i to bin j in one step.
-
-    Raises
-    ------
-    DriverProfileError
-        If it isn't square, a count is negative, or there is no transition at all.
     """
 
     counts: IntArray

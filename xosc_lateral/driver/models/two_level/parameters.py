@@ -21,6 +21,8 @@ IntArray = NDArray[np.int64]
 class TwoLevelParameters(CoreModel, frozen=True, eq=False, dict=True):
     """Fitted two-level model: x = kappa + phi.
 
+    Raises `DriverProfileError` if counts and settings disagree, or counts or damping are none.
+
     Parameters
     ----------
     settings : TwoLevelSettings
@@ -28,11 +30,6 @@ class TwoLevelParameters(CoreModel, frozen=True, eq=False, dict=True):
         Transitions of the coarse part before smoothing, from the row's bin to the column's in one step.
     damping : array, shape (n_knots,)
         Of the fine part's noise, at frequencies evenly spaced from 0 to half the sampling rate. [lane widths]
-
-    Raises
-    ------
-    DriverProfileError
-        If counts and settings disagree, or counts or damping are none.
     """
 
     settings: TwoLevelSettings

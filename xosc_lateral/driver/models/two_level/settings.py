@@ -17,6 +17,8 @@ FloatArray = NDArray[np.float64]
 class TwoLevelSettings(Record, frozen=True):
     """Constants of the model; the defaults are the paper's.
 
+    Raises `DriverProfileError` if a number is not above 0.
+
     Parameters
     ----------
     n_bins : int
@@ -36,11 +38,6 @@ class TwoLevelSettings(Record, frozen=True):
         within this time. (The paper's starts in the right bin.) [s]
     step : float
         [s]
-
-    Raises
-    ------
-    DriverProfileError
-        If a number is not above 0.
     """
 
     n_bins: int = N_BINS

@@ -96,10 +96,12 @@ def _by_value(trigger: etree._Element, moment: float) -> etree._Element:
     return sub(condition, "ByValueCondition")
 
 
-def state_condition(group: etree._Element, kind: str, reference: str, state: str, delay: float) -> None:
+def state_condition(
+    group: etree._Element, kind: str, reference: str, state: str, delay: float, edge: str = "none"
+) -> None:
     """Add a condition on the state of a storyboard element."""
     name = f"{state} after {decimal(delay, 3)}"
-    condition = sub(group, "Condition", name=name, delay=decimal(delay, 6), conditionEdge="none")
+    condition = sub(group, "Condition", name=name, delay=decimal(delay, 6), conditionEdge=edge)
     sub(
         sub(condition, "ByValueCondition"),
         "StoryboardElementStateCondition",

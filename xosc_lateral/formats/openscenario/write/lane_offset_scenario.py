@@ -1,37 +1,35 @@
 """Write a scenario that keeps its maneuvers and gets the offsets as lane offset actions on top.
 
 For scenarios that have to stay reactive: triggers look at what happens, an ego under test may drive itself. Each
-road-following segment gets an act of its own. It starts when the lateral action before it has ended (or at its
-time), and is stopped by any lateral action of the same entity: a lane change overrules it, whenever it comes. Each of
-its events begins when the one before has ended, and after the last the second comes again: the car goes on moving for
-as long as the segment lasts, which is not for the nominal run to say where somebody drives along.
+road-following segment gets an act of its own. It starts when the lateral action before it has ended, when the car is no
+longer too slow, or at its time, and is stopped by any lateral action of the same entity: a lane change overrules it,
+whenever it comes. Each of its events begins when the one before has ended, and after the last one leads back to the
+first one's target: the car goes on moving for as long as the segment lasts, which is not for the nominal run to say
+where somebody drives along. Lateral actions that the nominal run does not come to, or once less, are followed by such
+an act, too.
 """
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Collection, Mapping, Sequence
+from dataclasses import replace
+from itertools import product
+from math import inf
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from lxml import etree
 
-from xosc_lateral.formats.atomic import write_pieces_atomically
 from xosc_lateral.formats.openscenario.element import local_name
-from xosc_lateral.formats.openscenario.provenance import mark
+from xosc_lateral.formats.openscenario.provenance import mark, write_sealed
 from xosc_lateral.formats.openscenario.write import build
 from xosc_lateral.formats.openscenario.write.checks import check_convertible
 from xosc_lateral.formats.openscenario.write.fit import fit
-from xosc_lateral.formats.openscenario.write.lateral_actions import (
-    LATERAL,
-    LateralAction,
-    LateralActions,
-    lateral_actions,
-)
+from xosc_lateral.formats.openscenario.write.lateral_actions import LATERAL, LateralAction, awaited, lateral_actions
 from xosc_lateral.formats.openscenario.write.literal import inline_maneuvers, name_literally
 from xosc_lateral.formats.openscenario.write.moving import Moving
-from xosc_lateral.formats.openscenario.write.offset_chain import LEAST_CHANGE, SLACK, OffsetChain, ramps
+from xosc_lateral.formats.openscenario.write.offset_chain import LEAST_CHANGE, SLACK, OffsetChain, leading, ramps
 from xosc_lateral.formats.openscenario.write.parameters import global_scope, override_parameters
 from xosc_lateral.formats.openscenario.write.ramp_targets import Ramp, acceleration
 from xosc_lateral.formats.openscenario.write.relative_paths import rewrite_paths
@@ -41,8 +39,10 @@ from xosc_lateral.formats.openscenario.write.target import STANDARD, TargetPlaye
 from xosc_lateral.formats.openscenario.write.vertices import Vertices
 from xosc_lateral.formats.xml import parse_xml
 from xosc_lateral.motion.nominal import NominalMotion, PlayedAction
+from xosc_lateral.motion.segments import MINIMUM_SPEED
 from xosc_lateral.motion.trajectory import WorldTrajectory
 from xosc_lateral.scenario import Scenario
+from xosc_lateral.scenario.dependence import Dependence
 from xosc_lateral.scenario.enums import Priority
 
 CHAIN = "xosc-lateral offsets"
@@ -51,11 +51,15 @@ AT_ONCE = 0.1
 TURNS = 10000
 """Runs of a chain's events: as good as for ever. [-]"""
 LEAST_RING = 2
-"""Transitions at least of a chain that goes round. [-]"""
+"""Transitions at least of a chain that goes round: one leads nowhere from where it ended. [-]"""
 PAUSE = 0.5
 """Before a chain goes round: time for the maneuver that ends it in the nominal run. [s]"""
 SLOWEST = 10.0
 """A car that gets slower keeps its place in the lane: a little below what counts as road-following. [m/s]"""
+FIRST = 0.05
+"""After a lateral action its chain waits so long, a few frames: what overrules the action begins with its end. [s]"""
+MOST_AGAIN = 4
+"""Actions that run again and are waited for: conditions for each combination of their states. [-]"""
 PLACED = 1e-3
 """What begins with the scenario begins only now: it would overrule an init action that has not been stepped yet. [s]"""
 
@@ -71,6 +75,7 @@ def write_lane_offset_scenario(
     save: bool = True,
     target: TargetPlayer = STANDARD,
     trajectories: Mapping[str, WorldTrajectory] | None = None,
+    depends: Dependence | None = None,
 ) -> WrittenScenario:
     """Write the scenario with its maneuvers as they are and lane offset actions added.
 
@@ -93,6 +98,8 @@ def write_lane_offset_scenario(
         Player and version that it is made for.
     trajectories : mapping of str to WorldTrajectory, optional
         Entities that follow trajectories in place of their maneuvers: none that a chain is for.
+    depends : Dependence, optional
+        What depends on vehicles under test.
 
     Raises
     ------
@@ -112,12 +119,12 @@ def write_lane_offset_scenario(
     version, vertices = target.version_for(scenario), Vertices(scenario.source)
     story = build.story("xosc-lateral")
     lateral = lateral_actions(scenario)
-    for number, chain in enumerate(chains, start=1):
+    for chain in chains:
         if not np.isfinite(chain.offset_t).all():
             raise ValueError(f"offsets of '{chain.entity}' are not finite")
-        later = [k for k, one in enumerate(chains, start=1) if k > number and one.entity == chain.entity and ramps(one)]
-        following = f"{CHAIN} {later[0]}" if later else None
-        _add_act(story, f"{CHAIN} {number}", chain, motion, lateral, version, following)
+    for entity in dict.fromkeys(chain.entity for chain in chains):
+        own = [chain for chain in chains if chain.entity == entity and ramps(chain)]
+        _Acts(story, entity, motion, lateral.get(entity, ()), version).add(own, depends)
     _put_into(root, story, scenario, chains)
     scope, referred = global_scope(scenario), _referred(story)
     name_literally(root, scenario.path, scope, referred)
@@ -128,10 +135,9 @@ def write_lane_offset_scenario(
     rewrite_paths(root, scenario, output, scope)
     mark(root, provenance, summary)
     pieces = vertices.document(root) if moving else [build.document(root)]
-    data = b"" if save else b"".join(pieces)
-    sha256 = write_pieces_atomically(output, pieces) if save else hashlib.sha256(data).hexdigest()
+    sha256, content, data = write_sealed(output, pieces, save=save)
     names = tuple(dict.fromkeys([*moving, *(chain.entity for chain in chains)]))
-    return WrittenScenario(output, sha256, names, tuple(removed), data, notes)
+    return WrittenScenario(output, sha256, content, names, tuple(removed), data, notes)
 
 
 def _put_into(root: etree._Element, story: etree._Element, scenario: Scenario, chains: Sequence[OffsetChain]) -> None:
@@ -150,7 +156,7 @@ def _place_aside(storyboard: etree._Element, scenario: Scenario, chains: Sequenc
         for chain in chains
         if chain.is_placed
     }
-    owners = list(storyboard.iter("{*}Private"))
+    owners = storyboard.findall("{*}Init/{*}Actions/{*}Private")
     # The reader's order is the file's: names need no parameters filled in again.
     last = {
         private.entity_ref: owner
@@ -169,74 +175,165 @@ def _referred(story: etree._Element) -> set[str]:
     return {name for reference in references for name in reference.split("::")}
 
 
-def _add_act(
-    story: etree._Element,
-    name: str,
-    chain: OffsetChain,
-    motion: NominalMotion,
-    lateral: LateralActions,
-    version: build.Version,
-    following: str | None,
-) -> None:
-    """The act of one chain; `following` is the act of the entity's next one, which takes over from it."""
-    found = ramps(chain)
-    if not found:
-        return
-    begin = float(chain.time[0])
-    before = [played for played in motion.actions if _is_lateral(played, chain.entity) and played.start < begin]
-    cause = _cause(before, begin)
-    act = build.sub(story, "Act", name=name)
-    maneuver = build.sub(build.maneuver_group(act, f"{name} group", chain.entity), "Maneuver", name=f"{name} maneuver")
-    ring = len(found) - 1 if chain.goes_on and len(found) > LEAST_RING else 0
-    for number, ramp in enumerate(found, start=1):
-        event = build.event(maneuver, f"{name}.{number}", Priority.OVERRIDE, version)
-        _add_ramp(event, f"{name}.{number} action", ramp)
-        if number == 1 and cause is None:
-            build.time_trigger(event, "StartTrigger", max(ramp.start, PLACED), version)
-            continue
-        trigger = build.sub(event, "StartTrigger")
-        if number == 1:
-            group = build.sub(trigger, "ConditionGroup")
-            build.state_condition(group, "act", name, "runningState", ramp.start - begin)
-            continue
-        _add_link(trigger, f"{name}.{number - 1}", ramp.start - found[number - 2].end)
-        if ring:
+class _Acts:
+    """The acts of one entity, and its lateral actions."""
+
+    def __init__(
+        self,
+        story: etree._Element,
+        entity: str,
+        motion: NominalMotion,
+        items: Sequence[LateralAction],
+        version: build.Version,
+    ) -> None:
+        self._story, self._entity, self._items, self._version = story, entity, items, version
+        self._played = [one for one in motion.actions if one.actor == entity and _is_lateral(one)]
+        self._by_path = {item.path: item for item in items}
+        self._last = dict[tuple[str, ...] | None, str]()  # act after each lateral action, and the last one of all
+
+    def add(self, chains: Sequence[OffsetChain], depends: Dependence | None) -> None:
+        """One act for each chain, and one after each lateral action that the run does not come to."""
+        for k, chain in enumerate(chains):
+            begin, before = float(chain.time[0]), self._before(chain)
+            cause = None if (found := _cause(before, begin)) is None else found.path
+            is_clocked = self._is_clocked(chain)
+            act, events = self._act(ramps(chain), begin, is_clocked=is_clocked)
+            if is_clocked:
+                group = build.time_trigger(act, "StartTrigger", begin, self._version)[0]
+                _add_speed(group, self._entity, SLOWEST, "none")
+            elif cause is not None:
+                self._start_after(act, self._by_path[cause])
+            else:
+                self._start_when_faster(act, before)
+            ring = self._go_round(events, chain) if _may_go_round(chain) else False
+            clocked = ring and k + 1 < len(chains) and self._is_clocked(chains[k + 1])
+            following = f"{CHAIN} {len(self._story) + 1}" if clocked else None
+            self._stop(act, {played.path for played in before}, following)
+            self._last[cause] = self._last[None] = str(act.get("name"))
+        rings = [chain for chain in chains if _may_go_round(chain)]
+        for item in awaited(self._items, depends) if depends is not None and rings else ():
+            if item.repeats or item.path not in self._last:
+                self._add_after(item, max(rings, key=lambda one: (one.is_overruled, len(one.time))))
+
+    def _add_after(self, item: LateralAction, chain: OffsetChain) -> None:
+        """An act with the ring of a chain after a lateral action, from the middle of whatever lane that led to."""
+        first, *others = ramps(chain)
+        back = leading(0.0, first.target, chain)
+        moved = back.end - first.end
+        others = [replace(ramp, start=ramp.start + moved, end=ramp.end + moved) for ramp in others]
+        act, events = self._act((back, *others), 0.0, is_clocked=False)
+        self._start_after(act, item)
+        self._go_round(events, chain)
+        begin = next((played.start for played in self._played if played.path == item.path), inf)
+        self._stop(act, {item.path, *(played.path for played in self._played if played.start < begin)}, None)
+
+    def _before(self, chain: OffsetChain) -> list[PlayedAction]:
+        return [played for played in self._played if played.start < chain.time[0]]
+
+    def _is_clocked(self, chain: OffsetChain) -> bool:
+        """It begins at its time, as nothing that can be waited for makes it."""
+        return not chain.after_slow and _cause(self._before(chain), float(chain.time[0])) is None
+
+    def _act(
+        self, found: Sequence[Ramp], begin: float, *, is_clocked: bool
+    ) -> tuple[etree._Element, list[etree._Element]]:
+        """An act without triggers, and its events: each begins when the one before has ended."""
+        name = f"{CHAIN} {len(self._story) + 1}"
+        act = build.sub(self._story, "Act", name=name)
+        group = build.maneuver_group(act, f"{name} group", self._entity)
+        maneuver = build.sub(group, "Maneuver", name=f"{name} maneuver")
+        events: list[etree._Element] = []
+        for number, ramp in enumerate(found, start=1):
+            event = build.event(maneuver, f"{name}.{number}", Priority.OVERRIDE, self._version)
+            _add_ramp(event, f"{name}.{number} action", ramp)
+            if number > 1:
+                _add_link(build.sub(event, "StartTrigger"), events[-1], ramp.start - found[number - 2].end)
+            elif is_clocked:
+                build.time_trigger(event, "StartTrigger", max(ramp.start, PLACED), self._version)
+            else:
+                group = build.sub(build.sub(event, "StartTrigger"), "ConditionGroup")
+                build.state_condition(group, "act", name, "runningState", max(ramp.start - begin, FIRST))
+            events.append(event)
+        return act, events
+
+    def _go_round(self, events: Sequence[etree._Element], chain: OffsetChain) -> bool:
+        """After the last event one leads back to where the first did, unless the car is about to be too slow."""
+        first, second, last = ramps(chain)[0], ramps(chain)[1], ramps(chain)[-1]
+        name = str(events[0].get("name")).rpartition(".")[0]
+        owner = events[0].getparent()
+        assert owner is not None
+        back = build.event(owner, f"{name}.{len(events) + 1}", Priority.OVERRIDE, self._version)
+        _add_ramp(back, f"{name}.{len(events) + 1} action", leading(last.target, first.target, chain))
+        group = _add_link(build.sub(back, "StartTrigger"), events[-1], PAUSE)
+        _add_speed(group, self._entity, MINIMUM_SPEED, "none")
+        _add_link(
+            next(item for item in events[1] if local_name(item) == "StartTrigger"), back, second.start - first.end
+        )
+        for event in (*events[1:], back):
             event.set("maximumExecutionCount", str(TURNS))
-            if number == 2:
-                _add_link(trigger, f"{name}.{len(found)}", PAUSE)
-    if cause is None:
-        build.time_trigger(act, "StartTrigger", begin, version)
-    else:
-        _add_start_after(act, lateral.by_path[cause.path])
-    _add_stop(act, lateral.by_entity.get(chain.entity, ()), {played.path for played in before})
-    _add_end(act, chain.entity, following if ring else None)
-    for trigger in [item for item in act if local_name(item) == "StartTrigger"]:
-        for group in trigger:
-            _add_speed(group, chain.entity, "none")
+        return True
+
+    def _start_after(self, act: etree._Element, item: LateralAction) -> None:
+        """When it ends, not when it is stopped midway: who is keeps his heading."""
+        trigger = build.sub(act, "StartTrigger")
+        again = [one for one in self._items if one.repeats and one != item][:MOST_AGAIN]
+        # One that runs again may do so with the end: a condition with a delay is looked at all the time, and knows.
+        for states in product(("standbyState", "completeState"), repeat=len(again)):
+            group = build.sub(trigger, "ConditionGroup")
+            build.state_condition(group, item.kind, item.reference, "endTransition", FIRST if again else 0.0)
+            for one, state in zip(again, states, strict=True):
+                build.state_condition(group, "event", "::".join(one.path[:-1]), state, SLACK / 3.0)
+            if item.path in self._last:
+                build.state_condition(group, "act", self._last[item.path], "completeState", 0.0)
+            _add_speed(group, self._entity, SLOWEST, "none")
+
+    def _start_when_faster(self, act: etree._Element, before: Sequence[PlayedAction]) -> None:
+        """Again, if it was fast enough before."""
+        group = build.sub(build.sub(act, "StartTrigger"), "ConditionGroup")
+        if None in self._last:
+            build.state_condition(group, "act", self._last[None], "completeState", 0.0)
+        elif before and not (item := self._by_path[before[-1].path]).repeats:
+            build.state_condition(group, item.kind, item.reference, "completeState", 0.0)
+        _add_speed(group, self._entity, MINIMUM_SPEED, "none")
+
+    def _stop(self, act: etree._Element, ran: Collection[tuple[str, ...] | None], following: str | None) -> None:
+        """By lateral actions, where the next chain takes over by the clock, or when the car hardly drives any more.
+
+        A condition that is looked at for the first time sees all that was before. So a lateral action that has not run
+        yet stops an act, too, that begins in the same frame; one that has run has to begin anew.
+        """
+        trigger = build.sub(act, "StopTrigger")
+        for item in self._items:
+            state, edge = ("startTransition", "rising") if item.path in ran else ("runningState", "none")
+            if item.repeats or item.path not in ran:
+                group = build.sub(trigger, "ConditionGroup")
+                build.state_condition(group, item.kind, item.reference, state, 0.0, edge)
+        if following is not None:
+            build.state_condition(build.sub(trigger, "ConditionGroup"), "act", following, "runningState", 0.0)
+        _add_speed(build.sub(trigger, "ConditionGroup"), self._entity, SLOWEST, "falling")
 
 
-def _add_link(trigger: etree._Element, event: str, gap: float) -> None:
+def _may_go_round(chain: OffsetChain) -> bool:
+    """Its targets are on the side that +t is on all along, and lead somewhere."""
+    return chain.goes_on and not chain.flips and len(ramps(chain)) >= LEAST_RING
+
+
+def _add_link(trigger: etree._Element, event: etree._Element, gap: float) -> etree._Element:
     """Begin when an event has ended; the player takes a frame or two of the gap."""
     group = build.sub(trigger, "ConditionGroup")
-    build.state_condition(group, "event", event, "endTransition", max(gap - SLACK, 0.0))
+    build.state_condition(group, "event", str(event.get("name")), "endTransition", max(gap - SLACK, 0.0))
+    return group
 
 
-def _add_end(act: etree._Element, entity: str, following: str | None) -> None:
-    """A chain ends where the next one takes over, or when the car hardly drives any more."""
-    trigger = next((item for item in act if local_name(item) == "StopTrigger"), None)
-    trigger = build.sub(act, "StopTrigger") if trigger is None else trigger
-    if following is not None:
-        build.state_condition(build.sub(trigger, "ConditionGroup"), "act", following, "runningState", 0.0)
-    _add_speed(build.sub(trigger, "ConditionGroup"), entity, "falling")
-
-
-def _add_speed(group: etree._Element, entity: str, edge: str) -> None:
-    """The car is faster than what it needs to move aside without turning much; `edge` "falling": it no longer is."""
+def _add_speed(group: etree._Element, entity: str, speed: float, edge: str) -> None:
+    """The car is faster; `edge` "falling": it no longer is."""
     condition = build.sub(group, "Condition", name=f"speed {edge}", delay="0", conditionEdge=edge)
     by_entity = build.sub(condition, "ByEntityCondition")
     triggering = build.sub(by_entity, "TriggeringEntities", triggeringEntitiesRule="any")
     build.sub(triggering, "EntityRef", entityRef=entity)
-    build.sub(build.sub(by_entity, "EntityCondition"), "SpeedCondition", value=str(SLOWEST), rule="greaterThan")
+    build.sub(
+        build.sub(by_entity, "EntityCondition"), "SpeedCondition", value=build.decimal(speed, 4), rule="greaterThan"
+    )
 
 
 def _add_ramp(event: etree._Element, name: str, ramp: Ramp) -> None:
@@ -258,28 +355,8 @@ def _lane_offset(owner: etree._Element, dynamics: Mapping[str, str], offset_t: f
     build.sub(target, "AbsoluteTargetLaneOffset", value=build.decimal(offset_t, 4))
 
 
-def _add_start_after(act: etree._Element, cause: LateralAction) -> None:
-    trigger = build.sub(act, "StartTrigger")
-    # An event that may run again goes back to standby instead of being complete.
-    for state in ("completeState", "endTransition"):
-        group = build.sub(trigger, "ConditionGroup")
-        build.state_condition(group, cause.kind, cause.reference, state, 0.0)
-
-
-def _add_stop(act: etree._Element, overruling: Sequence[LateralAction], already: Collection[tuple[str, ...]]) -> None:
-    """By a lateral action that has not run yet, or that begins again."""
-    states = [(item, "startTransition" if item.path in already else "runningState") for item in overruling]
-    states = [(item, state) for item, state in states if item.repeats or item.path not in already]
-    if not states:
-        return
-    trigger = build.sub(act, "StopTrigger")
-    for item, state in states:
-        group = build.sub(trigger, "ConditionGroup")
-        build.state_condition(group, item.kind, item.reference, state, 0.0)
-
-
-def _is_lateral(played: PlayedAction, entity: str) -> bool:
-    return played.actor == entity and isinstance(played.action.content, LATERAL) and played.path != ("Init",)
+def _is_lateral(played: PlayedAction) -> bool:
+    return isinstance(played.action.content, LATERAL) and played.path != ("Init",)
 
 
 def _cause(before: Sequence[PlayedAction], begin: float) -> PlayedAction | None:

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, replace
+from math import inf
 
+from xosc_lateral.motion.nominal import NominalMotion
 from xosc_lateral.scenario import Action, Event, Scenario
 from xosc_lateral.scenario.actions.lateral import LaneChangeAction, LaneOffsetAction, LateralDistanceAction
 from xosc_lateral.scenario.actions.routing import FollowTrajectoryAction
+from xosc_lateral.scenario.dependence import Dependence
 
 LATERAL = (LaneChangeAction, LaneOffsetAction, LateralDistanceAction, FollowTrajectoryAction)
 
@@ -26,27 +29,30 @@ class LateralAction:
     repeats: bool = False
 
 
-@dataclass(frozen=True, slots=True)
-class LateralActions:
-    """Lateral actions of events, per entity in file order, and by their names."""
-
-    by_entity: Mapping[str, tuple[LateralAction, ...]]
-    by_path: Mapping[tuple[str, ...], LateralAction]
-
-
-def lateral_actions(scenario: Scenario) -> LateralActions:
-    """All of a scenario's."""
+def lateral_actions(scenario: Scenario) -> dict[str, tuple[LateralAction, ...]]:
+    """Lateral actions of events, by entity, in file order."""
     names = Counter(_names(scenario))
     by_entity: dict[str, dict[LateralAction, None]] = {}
-    by_path = {}
     for above, event, action, actors, repeats in _event_actions(scenario):
         if isinstance(action.content, LATERAL):
             found = _referable((*above, event.name, action.name), len(event.actions) == 1, names)
             found = replace(found, repeats=repeats)
-            by_path[found.path] = found
             for actor in actors:
                 by_entity.setdefault(actor, {})[found] = None
-    return LateralActions({entity: tuple(actions) for entity, actions in by_entity.items()}, by_path)
+    return {entity: tuple(actions) for entity, actions in by_entity.items()}
+
+
+def awaited(items: Collection[LateralAction], depends: Dependence) -> list[LateralAction]:
+    """Those whose start depends on a vehicle under test."""
+    return [item for item in items if item.path in depends.begins]
+
+
+def overruled_until(items: Collection[LateralAction], motion: NominalMotion) -> float:
+    """Until when one of them may still come: its last start, for ever if it may run again or never did. [s]"""
+    last = dict[tuple[str, ...], float]()
+    for played in motion.actions:
+        last[played.path] = max(played.start, last.get(played.path, played.start))
+    return max((inf if item.repeats else last.get(item.path, inf) for item in items), default=-inf)
 
 
 def _referable(path: tuple[str, ...], is_alone: bool, names: Mapping[str, int]) -> LateralAction:

@@ -44,13 +44,15 @@ def acceleration(change: ArrayLike, duration: ArrayLike) -> FloatArray:
     return np.asarray(0.5 * np.pi**2 * np.abs(change) / np.square(duration))
 
 
-def turning(change: ArrayLike, duration: ArrayLike, slowing: ArrayLike) -> FloatArray:
-    """As much lateral acceleration as turns the car as fast as a transition does at most. [m/s2]
+def largest_change(duration: ArrayLike, limit: ArrayLike, slowing: ArrayLike, speed: ArrayLike) -> FloatArray:
+    """As far as a transition may lead in some time. [m]
 
-    `slowing` is how fast the speed changes, as a share of itself [1/s]: a car that brakes turns by its lateral speed.
+    `limit` is on what turns the car [m/s2], `speed` on the lateral speed [m/s]; `slowing` is how fast the car's speed
+    changes, as a share of itself [1/s]: a car that brakes turns by its lateral speed.
     """
     share = np.asarray(duration) * np.asarray(slowing) / np.pi
-    return np.asarray(acceleration(change, duration) * np.sqrt(1.0 + share**2))
+    by_turn = np.asarray(limit) / (acceleration(1.0, duration) * np.sqrt(1.0 + share**2))
+    return np.asarray(np.minimum(by_turn, 2.0 / np.pi * np.asarray(duration) * np.asarray(speed)))
 
 
 def slowing(time: FloatArray, limit: FloatArray) -> FloatArray:
@@ -63,6 +65,7 @@ def fitted(
     time: FloatArray,
     offset: FloatArray,
     limit: FloatArray,
+    speed: FloatArray,
     *,
     settles: bool,
     starts: bool,
@@ -77,6 +80,8 @@ def fitted(
         To be followed. [s], [m]
     limit : array, shape (n,)
         Of the lateral acceleration, with which the largest change of each transition is found. [m/s2]
+    speed : array, shape (n,)
+        The same of the lateral speed. [m/s]
     settles : bool
         The first transition only leads there: its own errors don't count.
     starts : bool
@@ -107,8 +112,8 @@ def fitted(
     ]
     parts = [(time >= a - 1e-9) & (time <= b + 1e-9) for a, b in zip(start, end, strict=True)]
     change_of_speed = slowing(time, limit)
-    lowest, fastest = np.array([(limit[part].min(), change_of_speed[part].max()) for part in parts]).T
-    most = lowest / turning(1.0, end - start, fastest)
+    bounds = np.array([(limit[part].min(), change_of_speed[part].max(), speed[part].min()) for part in parts]).T
+    most = largest_change(end - start, *bounds)
     lower, upper = np.repeat([-np.inf, 0.0], count + 1), np.full(2 * count + 2, np.inf)
     if not starts:
         lower[0] = upper[0] = ramps[0].origin

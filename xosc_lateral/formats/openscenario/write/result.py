@@ -17,6 +17,8 @@ class WrittenScenario:
     path : Path
     sha256 : str
         Of the file's bytes.
+    content_sha256 : str
+        Of the file without its provenance.
     converted : tuple of str
         Entities that move otherwise than in the input.
     removed : tuple of Unsupported
@@ -29,6 +31,7 @@ class WrittenScenario:
 
     path: Path
     sha256: str
+    content_sha256: str
     converted: tuple[str, ...]
     removed: tuple[Unsupported, ...]
     data: bytes

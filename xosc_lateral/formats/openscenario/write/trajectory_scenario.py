@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -12,9 +11,8 @@ import numpy as np
 from lxml import etree
 from numpy.typing import NDArray
 
-from xosc_lateral.formats.atomic import write_pieces_atomically
 from xosc_lateral.formats.openscenario.element import local_name
-from xosc_lateral.formats.openscenario.provenance import mark
+from xosc_lateral.formats.openscenario.provenance import mark, write_sealed
 from xosc_lateral.formats.openscenario.write import build
 from xosc_lateral.formats.openscenario.write.carla import add_drives, start_of
 from xosc_lateral.formats.openscenario.write.checks import check_convertible
@@ -121,9 +119,8 @@ def write_trajectory_scenario(
     rewrite_paths(root, scenario, output, scope)
     mark(root, provenance, summary)
     pieces = vertices.document(root)
-    data = b"" if save else b"".join(pieces)
-    sha256 = write_pieces_atomically(output, pieces) if save else hashlib.sha256(data).hexdigest()
-    return WrittenScenario(output, sha256, tuple(moving), tuple(removed), data, notes)
+    sha256, content, data = write_sealed(output, pieces, save=save)
+    return WrittenScenario(output, sha256, content, tuple(moving), tuple(removed), data, notes)
 
 
 def _trailers(scenario: Scenario, motion: NominalMotion) -> set[str]:

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from msgspec.structs import replace
 
+from benchmarks.comparison import compare_profiles
 from tests.driver.models.made_models import POPULATION, STEADY
 from xosc_lateral.driver.profile import DriverProfile
-from xosc_lateral.evaluation.comparison import compare_profiles
 from xosc_lateral.evaluation.movement_summary import free_runs, summarise
 
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from benchmarks.refined import rounded_profile
+from benchmarks.rounding import rounded_effect
 from xosc_lateral.driver.effects import Acts, Levels, Product, Saturating
 from xosc_lateral.driver.effects.product import Factor
-from xosc_lateral.driver.effects.rounding import rounded_effect
 from xosc_lateral.formats.profiles import read_profile
 
 

@@ -1,0 +1,207 @@
+"""What foreign tables hold, in standard names: a mapping given word by word (``--map``) or saved in a file.
+
+A file is TOML: how tables are written (``encoding``, ``separator``, ``decimal``), ``[columns]`` with a line per
+standard name, as in ``--map``, ``[values.NAME]`` with the number that each text of a column stands for, ``[roles]``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeAlias
+
+import numpy as np
+
+from xosc_lateral.errors import FormatError
+from xosc_lateral.formats.units import factor
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+KEYS = ("encoding", "separator", "decimal", "columns", "values", "roles")
+
+
+@dataclass(frozen=True, slots=True)
+class ColumnSource:
+    """Where a column comes from in a foreign table: its header, and the factor to the standard unit."""
+
+    column: str
+    factor: float = 1.0
+    unit: str = ""
+    """As named by the user; empty: none was."""
+
+
+@dataclass(frozen=True, slots=True)
+class TableMapping:
+    """How to read foreign tables.
+
+    Parameters
+    ----------
+    columns : mapping of str to ColumnSource
+        By standard name.
+    values : mapping of str to mapping of str to float
+        By standard name, the number that a text stands for, in the standard unit.
+    roles : mapping of str to str
+        By standard name, where a column comes from ("road", say), for who asks what may be a cause.
+    encoding, separator : str, optional
+        Of text files; None: found out.
+    decimal : str
+        Decimal mark, "." or ",".
+    """
+
+    columns: Mapping[str, ColumnSource] = field(default_factory=dict)
+    values: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+    roles: Mapping[str, str] = field(default_factory=dict)
+    encoding: str | None = None
+    separator: str | None = None
+    decimal: str = "."
+
+    def with_words(self, words: Mapping[str, str]) -> TableMapping:
+        """With further columns, as ``--map`` has them, in place of those of the same name."""
+        more = parse_map(f"{name}={column}" for name, column in words.items())
+        return replace(self, columns={**self.columns, **more}) if more else self
+
+    def numbers(self, name: str, column: pd.Series, path: Path) -> pd.Series:
+        """The column `name`, its texts as the numbers that they stand for.
+
+        Raises
+        ------
+        FormatError
+            For a text that stands for none.
+        """
+        import pandas as pd
+
+        if name not in self.values:
+            return column
+        known = {text.strip().lower(): number for text, number in self.values[name].items()}
+        texts = column.map(lambda cell: "" if pd.isna(cell) else _as_word(cell))
+        strange = texts[(texts != "") & ~texts.isin(list(known))]
+        if len(strange):
+            raise FormatError(
+                f"{strange.iloc[0]!r} is not in [values.{name}] of the mapping: {', '.join(self.values[name])}",
+                path=path,
+                line=int(strange.index[0]) + 2,
+                element=f"column {name!r}",
+            )
+        return texts.map({**known, "": np.nan}).astype(np.float64)
+
+
+MappingLike: TypeAlias = "TableMapping | Mapping[str, str] | Mapping[str, ColumnSource] | str | Path"
+"""A mapping, words or sources by name as of ``--map``, or the file of one."""
+
+
+def as_mapping(given: MappingLike | None) -> TableMapping:
+    """Whatever stands for a mapping."""
+    if given is None:
+        return TableMapping()
+    if isinstance(given, TableMapping):
+        return given
+    if isinstance(given, str | Path):
+        return read_mapping(Path(given))
+    words = {name: entry for name, entry in given.items() if isinstance(entry, str)}
+    sources = {name: entry for name, entry in given.items() if isinstance(entry, ColumnSource)}
+    return TableMapping(sources).with_words(words)
+
+
+def _as_word(cell: object) -> str:
+    whole = isinstance(cell, float) and cell.is_integer()
+    return str(int(cell) if whole else cell).strip().lower()  # type: ignore[call-overload]
+
+
+def parse_map(words: Iterable[str]) -> dict[str, ColumnSource]:
+    """Read ``NAME=COLUMN`` or ``NAME=COLUMN:UNIT`` (``speed=v_kmh:km/h``, ``offset=lat:-cm``).
+
+    Raises
+    ------
+    FormatError
+        When a word has no ``=`` or its unit does not fit the column.
+    """
+    mapping: dict[str, ColumnSource] = {}
+    for word in words:
+        name, equals, rest = word.partition("=")
+        if not equals or not name or not rest:
+            raise FormatError(f"--map {word!r}: expected NAME=COLUMN or NAME=COLUMN:UNIT")
+        try:
+            mapping[name] = _source(name, rest)
+        except ValueError as error:
+            raise FormatError(f"--map {word!r}: {error}") from error
+    return mapping
+
+
+def _source(name: str, words: str) -> ColumnSource:
+    column, colon, unit = words.rpartition(":")
+    return ColumnSource(column, factor(name, unit), unit) if colon else ColumnSource(words)
+
+
+def read_mapping(path: Path) -> TableMapping:
+    """Read a mapping's file.
+
+    Raises
+    ------
+    FormatError
+        It is no TOML, or holds what no mapping has; names the entry.
+    """
+    import tomllib
+
+    from xosc_lateral.formats.source import open_source
+
+    with open_source(path) as source:
+        try:
+            values = tomllib.loads(source.file.read().decode("utf-8-sig"))
+        except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+            raise FormatError(f"no mapping in TOML and UTF-8: {error}", path=path) from error
+    if unknown := values.keys() - set(KEYS):
+        raise FormatError(f"unknown entry {min(unknown)!r}; there are {', '.join(KEYS)}", path=path)
+    for key in ("columns", "values", "roles"):
+        if not isinstance(values.get(key, {}), dict):
+            raise FormatError("expected a table of names", path=path, element=f"[{key}]")
+    decimal = values.get("decimal", ".")
+    if decimal not in (".", ","):
+        raise FormatError(f"decimal {decimal!r}, expected . or ,", path=path)
+    for key in ("encoding", "separator"):
+        if not isinstance(values.get(key, ""), str) or values.get(key) == "":
+            raise FormatError(f"{key} {values[key]!r}, expected a text", path=path)
+    return TableMapping(
+        {name: _column(name, entry, path) for name, entry in values.get("columns", {}).items()},
+        {name: _numbers(name, entry, path) for name, entry in values.get("values", {}).items()},
+        {name: _text(entry, path, f"[roles] {name}") for name, entry in values.get("roles", {}).items()},
+        values.get("encoding"),
+        values.get("separator"),
+        decimal,
+    )
+
+
+def _text(entry: Any, path: Path, where: str) -> str:
+    if not isinstance(entry, str) or not entry:
+        raise FormatError(f"{entry!r}, expected a text", path=path, element=where)
+    return entry
+
+
+def _column(name: str, entry: Any, path: Path) -> ColumnSource:
+    where = f"[columns] {name}"
+    if isinstance(entry, dict):  # a header with a colon, or a sign by itself
+        if unknown := entry.keys() - {"column", "unit", "sign"}:
+            raise FormatError(f"unknown {min(unknown)!r}; there are column, unit, sign", path=path, element=where)
+        if entry.get("sign", 1) not in (1, -1):
+            raise FormatError(f"sign {entry['sign']!r}, expected 1 or -1", path=path, element=where)
+        source = ColumnSource(_text(entry.get("column"), path, where))
+        unit, sign = entry.get("unit", ""), float(entry.get("sign", 1))
+        try:
+            return replace(source, factor=sign * (factor(name, unit) if unit else 1.0), unit=unit)
+        except (ValueError, AttributeError) as error:
+            raise FormatError(str(error), path=path, element=where) from error
+    try:
+        return _source(name, _text(entry, path, where))
+    except ValueError as error:
+        raise FormatError(str(error), path=path, element=where) from error
+
+
+def _numbers(name: str, entry: Any, path: Path) -> dict[str, float]:
+    where = f"[values.{name}]"
+    if not isinstance(entry, dict) or not entry:
+        raise FormatError("expected texts and the numbers that they stand for", path=path, element=where)
+    for text, number in entry.items():
+        if isinstance(number, str | dict | list) or not np.isfinite(float(number)):
+            raise FormatError(f"{text} = {number!r}, expected a number", path=path, element=where)
+    return {text: float(number) for text, number in entry.items()}
