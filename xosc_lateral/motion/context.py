@@ -356,7 +356,11 @@ def _see(
 
 
 def _travel(
-    network: RoadNetwork, road: IntArray, lane: IntArray, heading: FloatArray, present: NDArray[np.bool_]
+    network: RoadNetwork,
+    road: NDArray[np.integer],
+    lane: NDArray[np.integer],
+    heading: FloatArray,
+    present: NDArray[np.bool_],
 ) -> NDArray[np.int64]:
     """Which way somebody drives along s, +1 or -1, shape as the arguments; 0 where it is on no lane."""
     direction = np.zeros(present.shape, dtype=np.int64)
