@@ -28,6 +28,9 @@ import xosc_lateral as xl
 from benchmarks.many_cars import write
 
 VERB = (sys.executable, "-m", "xosc_lateral")
+LONGEST = 60.0
+"""esmini plays on where a scenario has no end. [s]"""
+
 REPLAYED = {"profile": "motorway-refined", "mode": "trajectory", "ego": "none", "force": True}
 
 
@@ -151,12 +154,13 @@ def rewrite(path: Path) -> tuple[float, float]:
 def play(library: Path, scenario: Path) -> tuple[float, float]:
     """The reference player, without a window and without a log."""
     player = ctypes.CDLL(str(library))
-    player.SE_StepDT.argtypes = [ctypes.c_double]
+    os.chdir(scenario.parent)  # where its log goes
+    player.SE_StepDT.argtypes, player.SE_GetSimulationTime.restype = [ctypes.c_double], ctypes.c_double
 
     def run() -> None:
         assert player.SE_Init(str(scenario).encode(), 0, 0, 0, 0) == 0, f"{scenario} can't be played"
-        while player.SE_GetQuitFlag() == 0 and player.SE_StepDT(0.02) == 0:
-            pass
+        while player.SE_GetQuitFlag() == 0 and player.SE_GetSimulationTime() < LONGEST:
+            player.SE_StepDT(0.02)
         player.SE_Close()
 
     folder = os.open(os.devnull, os.O_WRONLY)
