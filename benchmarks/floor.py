@@ -24,7 +24,7 @@ from xosc_lateral.identification.column_search import best_probability
 from xosc_lateral.identification.identify import usable_columns
 from xosc_lateral.identification.regression import Coarse, fit_model
 from xosc_lateral.identification.search import Search
-from xosc_lateral.identification.stages import ERROR_BUDGET
+from xosc_lateral.identification.selection import ERROR_BUDGET
 from xosc_lateral.identification.terms.mean import MeanTerm
 from xosc_lateral.identification.timeline import join_drives
 from xosc_lateral.normal import NORMAL_95
@@ -61,7 +61,7 @@ def measured(case: dict[str, Any], protocol: dict[str, Any]) -> list[dict[str, A
     for smooth in (False, True):
         table = smoothed_tracks(planted) if smooth else planted
         coarse = Coarse.of(join_drives(drives_of_table(table, {})))
-        search = Search.over(coarse, usable_columns(coarse.timeline)[0], np.random.SeedSequence(1), ERROR_BUDGET)
+        search = Search.over(coarse, usable_columns(coarse.timeline).columns, np.random.SeedSequence(1), ERROR_BUDGET)
         for floor in FLOORS:
             regression.FLOOR = floor
             p_value = best_probability(search, MeanTerm, fit_model(coarse, ()))

@@ -26,7 +26,7 @@ from benchmarks.identification_tables import calibration, summary, table
 from benchmarks.outcome_lines import append_outcome, read_outcomes
 from xosc_lateral.identification.identify import VETOED, identify
 from xosc_lateral.identification.regression import Coarse
-from xosc_lateral.identification.stages import ERROR_BUDGET, TERMS
+from xosc_lateral.identification.selection import ERROR_BUDGET, TERMS
 from xosc_lateral.identification.timeline import coarse_mean
 
 

@@ -22,7 +22,7 @@ from xosc_lateral.identification.identify import usable_columns
 from xosc_lateral.identification.innovations import LONGEST
 from xosc_lateral.identification.regression import Coarse, fit_model
 from xosc_lateral.identification.search import Search
-from xosc_lateral.identification.stages import ERROR_BUDGET
+from xosc_lateral.identification.selection import ERROR_BUDGET
 from xosc_lateral.identification.terms.spread import SpreadTerm
 from xosc_lateral.identification.timeline import join_drives
 
@@ -49,7 +49,7 @@ def p_values(case: dict[str, Any], protocol: dict[str, Any]) -> list[float]:
     """Family-wise p-value of the best candidate for the spread, per memory."""
     table = planted_drive(case, protocol, protocol["drives"]["long_s"])[1]
     coarse = Coarse.of(join_drives(drives_of_table(table, {})))
-    search = Search.over(coarse, usable_columns(coarse.timeline)[0], np.random.SeedSequence(1), ERROR_BUDGET)
+    search = Search.over(coarse, usable_columns(coarse.timeline).columns, np.random.SeedSequence(1), ERROR_BUDGET)
     found, usual = [], problem.SQUARES_S
     for memory in MEMORIES_S:
         problem.SQUARES_S = memory

@@ -24,7 +24,7 @@ from xosc_lateral.identification import dictionary
 from xosc_lateral.identification.identify import usable_columns
 from xosc_lateral.identification.regression import fit_model
 from xosc_lateral.identification.search import Search
-from xosc_lateral.identification.stages import ERROR_BUDGET, STAGES
+from xosc_lateral.identification.selection import ERROR_BUDGET, STAGES
 
 FIRST_SEED = 310_000
 """Of drives that serve for nothing else; those from 300,000 on were what the null was mended with."""
@@ -40,7 +40,7 @@ def probabilities(movement: str, seed: int, seconds: float, smoothed: bool) -> d
     coarse = coarse_of(smoothed_tracks(table) if smoothed else table)
     found: dict[str, float] = {}
     with threadpool_limits(1, user_api="blas"):
-        columns, _, _ = usable_columns(coarse.timeline)
+        columns = usable_columns(coarse.timeline).columns
         search = Search.over(coarse, columns, np.random.SeedSequence(1), ERROR_BUDGET)
         fitted = fit_model(coarse, ())
         for kind in {kind.component: kind for stage in STAGES for kind in stage}.values():

@@ -14,7 +14,7 @@ import xosc_lateral.discovery as discovery
 from xosc_lateral.discovery import defined_in
 from xosc_lateral.driver import effects
 from xosc_lateral.driver.effects import ColumnEffect, Effect, HiddenEffect
-from xosc_lateral.identification.stages import TERMS, shared_among
+from xosc_lateral.identification.selection import TERMS, shared_among
 
 NAME = "made_for_discovery"
 

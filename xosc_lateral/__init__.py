@@ -12,6 +12,7 @@ TYPE_CHECKING = False  # importing `typing` for it would take longer than all th
 _HOME = {
     "convert": "api.convert",
     "convert_many": "api.batch",
+    "reconstruct": "api.reconstruct",
     "verify": "api.verify",
     "reproduce": "api.verify",
     "play": "api.play",
@@ -28,10 +29,19 @@ _HOME = {
     "compare_profiles": "api.profiles",
     "list_templates": "api.templates",
     "write_template": "api.templates",
+    "live_esmini": "api.live",
+    "live_sumo": "api.live",
+    "Traffic": "live.traffic",
+    "Moment": "live.traffic",
+    "EsminiTraffic": "live.esmini",
+    "SumoTraffic": "live.sumo",
+    "export_fmu": "live.fmu",
+    "LiveRun": "api.live",
     "OffsetStream": "driver.stream",
     "DriverProfile": "driver.profile",
     "Drive": "drives.drive",
     "Conversion": "api.convert",
+    "Reconstruction": "api.reconstruct",
     "ConvertOptions": "pipeline.settings",
     "BatchResult": "api.batch",
     "Verification": "api.verify",
@@ -46,12 +56,14 @@ _HOME = {
     "PlaybackError": "errors",
     "DriverProfileError": "errors",
     "NotEnoughDataError": "errors",
+    "SimulationError": "errors",
 }
 """Public name -> module that has it."""
 
 __all__ = [  # noqa: RUF022 (the order of the documentation)
     "convert",
     "convert_many",
+    "reconstruct",
     "verify",
     "reproduce",
     "play",
@@ -68,10 +80,19 @@ __all__ = [  # noqa: RUF022 (the order of the documentation)
     "compare_profiles",
     "list_templates",
     "write_template",
+    "live_esmini",
+    "live_sumo",
+    "Traffic",
+    "Moment",
+    "EsminiTraffic",
+    "SumoTraffic",
+    "export_fmu",
+    "LiveRun",
     "OffsetStream",
     "DriverProfile",
     "Drive",
     "Conversion",
+    "Reconstruction",
     "ConvertOptions",
     "BatchResult",
     "Verification",
@@ -86,6 +107,7 @@ __all__ = [  # noqa: RUF022 (the order of the documentation)
     "PlaybackError",
     "DriverProfileError",
     "NotEnoughDataError",
+    "SimulationError",
     "__version__",
 ]
 
@@ -95,9 +117,11 @@ if TYPE_CHECKING:
     from xosc_lateral.api.evaluate import Evaluation, evaluate
     from xosc_lateral.api.fit import fit, read_drives
     from xosc_lateral.api.importing import ImportedDrives, import_drives
+    from xosc_lateral.api.live import LiveRun, live_esmini, live_sumo
     from xosc_lateral.api.loop import ClosedLoop, close_loop
     from xosc_lateral.api.play import Playback, Segments, play, segments
     from xosc_lateral.api.profiles import compare_profiles, list_profiles, read_profile, write_profile
+    from xosc_lateral.api.reconstruct import Reconstruction, reconstruct
     from xosc_lateral.api.sample import Offsets, sample
     from xosc_lateral.api.templates import list_templates, write_template
     from xosc_lateral.api.verify import Verification, reproduce, verify
@@ -109,8 +133,13 @@ if TYPE_CHECKING:
         FormatError,
         NotEnoughDataError,
         PlaybackError,
+        SimulationError,
         XoscLateralError,
     )
+    from xosc_lateral.live.esmini import EsminiTraffic
+    from xosc_lateral.live.fmu import export_fmu
+    from xosc_lateral.live.sumo import SumoTraffic
+    from xosc_lateral.live.traffic import Moment, Traffic
     from xosc_lateral.pipeline.settings import ConvertOptions
 
 

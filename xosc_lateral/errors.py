@@ -43,6 +43,10 @@ class PlaybackError(FormatError):
     """The scenario is valid XML, yet it can't be played (an entity without a place, a lane that is not there)."""
 
 
+class SimulationError(XoscLateralError, ValueError):
+    """A running simulation, its library or what it says can't be used; whatever ran before goes on."""
+
+
 class DriverProfileError(XoscLateralError, ValueError):
     """A driver profile contradicts itself, or a profile of that name is unknown."""
 

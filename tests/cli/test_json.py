@@ -67,6 +67,7 @@ def test_every_schema_is_one_and_is_listed():
         ("profiles-list", "profiles list"),
         ("profiles-show", "profiles show motorway-refined"),
         ("profiles-compare", "profiles compare motorway motorway-vehicle-1"),
+        ("profiles-derive", "profiles derive motorway-vehicle-1 --preset drowsy -o derived.json"),
         ("profiles-add", "profiles add motorway --library lib --name mine"),
         ("profiles-list", "profiles list --library lib"),
         ("profiles-tag", "profiles tag mine --library lib --tag night --set country=DE"),

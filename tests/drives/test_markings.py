@@ -168,7 +168,8 @@ def test_tables_are_mended_and_profiles_say_so(tmp_path: Path) -> None:
     assert drive.half_width is not None
     kept = np.isin(seen.time, drive.time)
     np.testing.assert_allclose(drive.half_width, 0.5 * seen.lane_width[kept])
-    columns, _, unused = usable_columns(join_drives([drive]))
+    usable = usable_columns(join_drives([drive]))
+    columns, unused = usable.columns, usable.unused
     assert "lane_width" not in [column.name for column in columns]
     assert "camera" in unused["lane_width"]
     profile = fit_profile([drive], name="phone")

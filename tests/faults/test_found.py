@@ -14,12 +14,18 @@ import pytest
 from tests.faults.readers import manifest_row
 from tests.formats.made_scenario import scenario_text, write_scenario
 from tests.profiles import simulated_profile
+from xosc_lateral import write_template
 from xosc_lateral.cli import main
 from xosc_lateral.datasets import simulate_drive
 from xosc_lateral.driver.stream import OffsetStream
 from xosc_lateral.formats.profiles import profile_bytes
+from xosc_lateral.pipeline.batch import STATE
 from xosc_lateral.pipeline.journal import Journal
+from xosc_lateral.pipeline.lock import folder_lock
 from xosc_lateral.pipeline.manifest import MANIFEST, read_manifest
+from xosc_lateral.scenario.deterministic import Deterministic, ValueSets
+from xosc_lateral.scenario.place import Place
+from xosc_lateral.shipped import shipped_folder
 
 
 @pytest.fixture
@@ -146,3 +152,49 @@ def test_a_journal_with_a_damaged_row_ends_before_it(row, tmp_path):
         assert list(journal) == ["1.xosc"]
         journal.finish()
     assert [row.output for row in read_manifest(tmp_path / MANIFEST)] == ["1.xosc"]
+
+
+def test_a_card_of_an_evaluation_in_other_words_says_so(tmp_path, capsys):
+    values = json.loads(profile_bytes(simulated_profile()))
+    values["provenance"]["evaluation"] = {"snippets": "good", "held_out": 3}
+    (tmp_path / "mine.json").write_text(json.dumps(values))
+    assert main(["profiles", "show", str(tmp_path / "mine.json")]) == 0
+    assert "not as this package writes it" in capsys.readouterr().out
+    text = (tmp_path / "mine.json").read_text().replace('"held_out": 3', '"held_out": 1e400')
+    (tmp_path / "mine.json").write_text(text)
+    line = refused(["profiles", "show", tmp_path / "mine.json"], capsys)
+    assert "mine.json" in line and "1e400" in line
+
+
+def test_an_effect_of_levels_needs_a_level(tmp_path, capsys):
+    values = json.loads((shipped_folder("driver_profiles") / "motorway.json").read_text(encoding="utf-8"))
+    number = next(k for k, effect in enumerate(values["effects"]) if effect.get("levels"))
+    values["effects"][number]["levels"] = []
+    (tmp_path / "mine.json").write_text(json.dumps(values))
+    line = refused(["profiles", "show", tmp_path / "mine.json"], capsys)
+    assert "mine.json" in line and "0 levels" in line
+
+
+def test_a_private_in_a_trigger_belongs_to_nobody(tmp_path):
+    scenario, _ = write_template("cut-in", tmp_path)
+    text = scenario.read_text(encoding="utf-8")
+    scenario.write_text(text.replace("<ConditionGroup>", '<ConditionGroup><Private entityRef="Ego"/>', 1))
+    assert main(["convert", str(scenario), "-o", str(tmp_path / "out.xosc"), "-q", "--time-limit", "5"]) == 0
+
+
+def test_a_product_of_many_parts_comes_one_by_one():
+    place = Place("x.xosc", 1, "Deterministic")
+    single = ValueSets(({"a": "1"},), place)
+    many = Deterministic((*[single] * 2000, ValueSets(tuple({"b": str(k)} for k in range(50)), place), single))
+    assert [values["b"] for values in many] == [str(k) for k in range(50)]
+    both = Deterministic((ValueSets(({"a": "1"}, {"a": "2"}), place), ValueSets(({"b": "1"}, {"b": "2"}), place)))
+    assert [(values["a"], values["b"]) for values in both] == [("1", "1"), ("1", "2"), ("2", "1"), ("2", "2")]
+    assert list(Deterministic((single, ValueSets((), place)))) == []
+
+
+def test_the_lock_is_an_event_where_the_log_is_json(tmp_path, capsys):
+    write_template("cut-in", tmp_path / "in")
+    with folder_lock(tmp_path / "out" / STATE / "lock"):
+        assert main(["convert", str(tmp_path / "in"), "-o", str(tmp_path / "out"), "--log-json"]) == 1
+    event = json.loads(capsys.readouterr().err.splitlines()[-1])
+    assert event["event"] == "error" and "another run" in event["error"]["message"]

@@ -107,7 +107,10 @@ BAD = {
     ),
     "model without counts": (broken(model={"kind": "two-level", "settings": {}}), "model: no 'counts'"),
     "unknown setting": (broken(model={"kind": "two-level", "settings": {"x": 1}}), "model.settings: unknown field 'x'"),
-    "unknown effect": (broken(effects=[{"kind": "magic"}]), r"effects\[0\]: unknown kind 'magic'; known are angular, "),
+    "unknown effect": (
+        broken(effects=[{"kind": "magic"}]),
+        r"effects\[0\]: unknown kind 'magic'; known are adapted, ang",
+    ),
     "effect no object": (broken(effects=["magic"]), r"effects\[0\]: expected 'object', got 'str'"),
     "unknown field": (broken(colour="red"), "unknown field 'colour'"),
     "unknown field of an effect": (

@@ -10,14 +10,13 @@ from xosc_lateral.drives.drive import Drive
 from xosc_lateral.identification.identify import usable_columns
 from xosc_lateral.identification.regression import Coarse
 from xosc_lateral.identification.search import Search
-from xosc_lateral.identification.selection import Selection, select
-from xosc_lateral.identification.stages import ERROR_BUDGET
+from xosc_lateral.identification.selection import ERROR_BUDGET, Selection, select
 from xosc_lateral.identification.timeline import join_drives
 
 
 def selected(drives: Sequence[Drive], excluded: Sequence[str] = ()) -> Selection:
     coarse = Coarse.of(join_drives(drives))
-    columns, _, _ = usable_columns(coarse.timeline, excluded)
+    columns = usable_columns(coarse.timeline, excluded).columns
     return select(Search.over(coarse, columns, np.random.SeedSequence(1), ERROR_BUDGET))
 
 

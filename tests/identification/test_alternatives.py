@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from xosc_lateral.identification.alternatives import explains_as_much
+from xosc_lateral.identification.refinement import explains_as_much
 
 N, MINUTE = 3000, 60
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from xosc_lateral.identification.best_of_drives import Best, best_of_drives
 from xosc_lateral.identification.significance import as_one_degree
+from xosc_lateral.identification.terms.between import Best, best_of_drives
 
 DRIVES = 300
 

@@ -13,7 +13,7 @@ from xosc_lateral.identification.close import close_loop
 from xosc_lateral.identification.identify import usable_columns
 from xosc_lateral.identification.regression import Coarse, fit_model
 from xosc_lateral.identification.search import Search
-from xosc_lateral.identification.stages import ERROR_BUDGET
+from xosc_lateral.identification.selection import ERROR_BUDGET
 from xosc_lateral.identification.terms.base import Outcome
 from xosc_lateral.identification.terms.between import USUAL_S, BetweenTerm
 from xosc_lateral.identification.timeline import join_drives
@@ -57,7 +57,7 @@ def wander(rng: np.random.Generator, n: int, time_constant: float) -> np.ndarray
 
 def outcome_of(made: list[Drive], seed: int = 2) -> tuple[Coarse, Outcome | None]:
     coarse = Coarse.of(join_drives(made))
-    search = Search.over(coarse, usable_columns(coarse.timeline)[0], np.random.SeedSequence(seed), ERROR_BUDGET)
+    search = Search.over(coarse, usable_columns(coarse.timeline).columns, np.random.SeedSequence(seed), ERROR_BUDGET)
     return coarse, BetweenTerm.test(search, fit_model(coarse, ()))
 
 

@@ -11,18 +11,17 @@ from tests.identification.made_coarse import coarse_of, movement, wander
 from xosc_lateral.driver.effects import Acts, Linear
 from xosc_lateral.driver.effects.response import respond
 from xosc_lateral.identification.column_search import find_column, likely_response
-from xosc_lateral.identification.columns import Column, Role
+from xosc_lateral.identification.columns import Column, Values
 from xosc_lateral.identification.regression import Coarse, fit_model
 from xosc_lateral.identification.search import Search
-from xosc_lateral.identification.selection import select
-from xosc_lateral.identification.stages import ERROR_BUDGET
+from xosc_lateral.identification.selection import ERROR_BUDGET, select
 from xosc_lateral.identification.terms.base import Outcome
 from xosc_lateral.identification.terms.mean import MeanTerm
 from xosc_lateral.identification.terms.restoring import RestoringTerm
 from xosc_lateral.identification.terms.spread import SpreadTerm
 
 SECONDS = 700.0
-COLUMNS = [Column(name, Role.NUMBER, False) for name in ("idle", "x")]
+COLUMNS = [Column(name, Values.NUMBER, False) for name in ("idle", "x")]
 
 
 def drive(seed: int, shift: float = 0.0, *, lag_s: float = 0.0, log_spread: float = 0.0) -> Coarse:
@@ -69,16 +68,18 @@ def test_what_a_column_may_do_is_told_by_the_best_p_value() -> None:
     coarse = drive(36, log_spread=0.5)
     search = Search.over(coarse, COLUMNS, np.random.SeedSequence(1), ERROR_BUDGET)
     fitted = fit_model(coarse, ())
-    response = likely_response(search, SpreadTerm, fitted, 0.1)
+    response, p_value = likely_response(search, SpreadTerm, fitted, 0.1)
+    assert p_value <= 0.1
     assert response.shape == (len(coarse), 1)
     x = coarse.response(Linear(acts=Acts.LOCATION, column="x"))
     assert abs(np.corrcoef(response[coarse.valid, 0], x[coarse.valid, 0])[0, 1]) > 0.7
-    assert likely_response(search, SpreadTerm, fitted, 0.0).shape == (len(coarse), 0)
+    nothing, unsure = likely_response(search, SpreadTerm, fitted, 0.0)
+    assert (nothing.shape, unsure) == ((len(coarse), 0), 1.0)
 
 
 def test_a_part_of_a_table_is_given_as_many_terms_as_the_table_has_and_no_others() -> None:
     """Folds: the best candidate although nothing is significant; and nothing where the table has nothing."""
-    coarse = drive(32)
+    coarse = drive(33)
     search = Search.over(coarse, COLUMNS, np.random.SeedSequence(1), ERROR_BUDGET)
     assert select(search).accepted == ()
     one = select(replace(search, wanted={"mean": 1}))

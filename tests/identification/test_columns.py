@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from tests.identification.made_coarse import timeline_of
-from xosc_lateral.identification.columns import MAX_LEVELS, MIN_SHARE, Column, Role, known_columns
+from xosc_lateral.identification.columns import MAX_LEVELS, MIN_SHARE, Column, Values, known_columns
 
 N = 6000
 RNG = np.random.default_rng(121)
@@ -26,12 +26,12 @@ def roles(**columns: np.ndarray) -> tuple[dict[str, Column], dict[str, str]]:
 @pytest.mark.parametrize(
     ("values", "expected"),
     [
-        (NUMBER, Column("c", Role.NUMBER, False)),
-        (SWITCH, Column("c", Role.SWITCH, False, (0.0, 1.0))),
-        (LANES, Column("c", Role.LEVELS, False, (0.0, 1.0, 2.0))),
-        (np.where(NOBODY, np.nan, NUMBER), Column("c", Role.NUMBER, True)),
-        (np.where(NOBODY, np.nan, SWITCH), Column("c", Role.SWITCH, True, (0.0, 1.0))),
-        (RNG.integers(0, 40, N).astype(float), Column("c", Role.NUMBER, False)),
+        (NUMBER, Column("c", Values.NUMBER, False)),
+        (SWITCH, Column("c", Values.SWITCH, False, (0.0, 1.0))),
+        (LANES, Column("c", Values.LEVELS, False, (0.0, 1.0, 2.0))),
+        (np.where(NOBODY, np.nan, NUMBER), Column("c", Values.NUMBER, True)),
+        (np.where(NOBODY, np.nan, SWITCH), Column("c", Values.SWITCH, True, (0.0, 1.0))),
+        (RNG.integers(0, 40, N).astype(float), Column("c", Values.NUMBER, False)),
     ],
     ids=["number", "switch", "lanes", "neighbour", "neighbour's class", "counter"],
 )
@@ -58,7 +58,7 @@ def test_what_tells_nothing_is_left_out_with_the_reason(values: np.ndarray, why:
 def test_a_neighbour_that_is_always_as_far_away_still_comes_and_goes() -> None:
     assert roles(c=np.where(NOBODY, np.nan, 12.0))[1]["c"] == "it hardly varies"
     near = np.where(NOBODY, np.nan, 12.0 + 1e-12 * NUMBER)
-    assert roles(c=near)[0]["c"] == Column("c", Role.NUMBER, True)
+    assert roles(c=near)[0]["c"] == Column("c", Values.NUMBER, True)
 
 
 def test_rare_levels_do_not_make_a_number() -> None:
@@ -71,14 +71,14 @@ def test_rare_levels_do_not_make_a_number() -> None:
 @pytest.mark.parametrize("count", [MAX_LEVELS, MAX_LEVELS + 1])
 def test_up_to_eight_whole_numbers_are_levels(count: int) -> None:
     column = roles(c=np.arange(N) % count + 0.0)[0]["c"]
-    assert column.role is (Role.LEVELS if count == MAX_LEVELS else Role.NUMBER)
+    assert column.values is (Values.LEVELS if count == MAX_LEVELS else Values.NUMBER)
 
 
 def test_a_column_that_wraps_is_an_angle() -> None:
     timeline = replace(timeline_of(np.zeros(N), {"c": RNG.uniform(0.0, 360.0, N)}), periods={"c": 360.0})
     found, _ = known_columns(timeline)
     (column,) = [one for one in found if one.name == "c"]
-    assert (column.role, column.period) == (Role.ANGLE, 360.0)
+    assert (column.values, column.period) == (Values.ANGLE, 360.0)
 
 
 def test_columns_come_in_alphabetical_order_and_the_lane_s_width_is_one() -> None:

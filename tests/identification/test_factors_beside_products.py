@@ -10,7 +10,7 @@ from xosc_lateral.identification.column_search import best_probability, probabil
 from xosc_lateral.identification.identify import usable_columns
 from xosc_lateral.identification.regression import fit_model
 from xosc_lateral.identification.search import Search
-from xosc_lateral.identification.stages import ERROR_BUDGET
+from xosc_lateral.identification.selection import ERROR_BUDGET
 from xosc_lateral.identification.terms.mean import MeanTerm
 
 PRODUCT = MeanTerm.of(
@@ -27,7 +27,7 @@ def test_a_factor_stands_beside_its_product_if_it_acts_by_itself(seed: int) -> N
     coarse = planted_drive(
         lambda column: 0.12 * column["gust"] + 0.12 * column["gust"] * column["slope"], seed, ("gust", "slope")
     )
-    search = Search.over(coarse, usable_columns(coarse.timeline)[0], np.random.SeedSequence(1), ERROR_BUDGET)
+    search = Search.over(coarse, usable_columns(coarse.timeline).columns, np.random.SeedSequence(1), ERROR_BUDGET)
     beside = fit_model(coarse, (PRODUCT,))
     assert probability_of(search, MeanTerm, beside, ("gust",)) < 1e-3
     assert probability_of(search, MeanTerm, beside, ("slope",)) > 0.02

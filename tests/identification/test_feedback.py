@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from scipy.signal import lfilter
+from scipy.signal import butter, lfilter
 
-from xosc_lateral.identification.columns import Column, Role
+from xosc_lateral.identification.columns import Column, Values
 from xosc_lateral.identification.feedback import Feedback, find_feedback
+from xosc_lateral.identification.roles import Assigned, Role
 from xosc_lateral.identification.timeline import Timeline
 
 STEP = 0.2
@@ -35,8 +36,8 @@ def driven(seed: int) -> tuple[np.ndarray, np.random.Generator]:
     return 0.15 * low_passed(6.0, rng) + 0.05 * low_passed(1.0, rng), rng
 
 
-def feedback(offset: np.ndarray, values: np.ndarray, role: Role = Role.NUMBER) -> Feedback | None:
-    found = find_feedback(timeline(offset, x=values), [Column("x", role, False)])
+def feedback(offset: np.ndarray, values: np.ndarray, kind: Values = Values.NUMBER) -> Feedback | None:
+    found = find_feedback(timeline(offset, x=values), [Column("x", kind, False)])
     return found[0] if found else None
 
 
@@ -84,8 +85,8 @@ def test_what_has_nothing_to_do_with_the_car_does_not_follow_from_it(seed: int) 
         "fast": rng.normal(size=N),
         "switch": (low_passed(10.0, rng) > 1).astype(float),
     }
-    roles = {"slow": Role.NUMBER, "fast": Role.NUMBER, "switch": Role.SWITCH}
-    found = find_feedback(timeline(offset, **columns), [Column(name, role, False) for name, role in roles.items()])
+    kinds = {"slow": Values.NUMBER, "fast": Values.NUMBER, "switch": Values.SWITCH}
+    found = find_feedback(timeline(offset, **columns), [Column(name, kind, False) for name, kind in kinds.items()])
     assert not found
 
 
@@ -95,18 +96,18 @@ def test_gaps_and_missing_values_are_no_evidence() -> None:
     column[rng.random(N) < 0.05] = np.nan
     valid = np.ones(N, dtype=bool)
     valid[4000:5000] = False
-    assert not find_feedback(timeline(offset, valid, x=column), [Column("x", Role.NUMBER, True)])
+    assert not find_feedback(timeline(offset, valid, x=column), [Column("x", Values.NUMBER, True)])
 
 
 def test_a_direction_that_turns_by_itself_is_no_feedback() -> None:
     offset, rng = driven(52)
-    assert feedback(offset, 2.0 * low_passed(30.0, rng) % 3.0, Role.ANGLE) is None
+    assert feedback(offset, 2.0 * low_passed(30.0, rng) % 3.0, Values.ANGLE) is None
 
 
 def test_what_jumps_like_an_angle_may_follow_too() -> None:
     """A torque that keeps the lane changes its sign at each lane change."""
     offset, rng = driven(52)
-    found = feedback(offset, -2.0 * offset + 0.05 * rng.normal(size=N), Role.ANGLE)
+    found = feedback(offset, -2.0 * offset + 0.05 * rng.normal(size=N), Values.ANGLE)
     assert found is not None
     assert not found.doubtful
 
@@ -133,7 +134,7 @@ def test_what_makes_a_car_restless_does_not_follow_from_it(seed: int) -> None:
 def test_too_short_a_drive_says_nothing() -> None:
     offset, _ = driven(53)
     short = offset[: round(12.0 / STEP)]
-    assert not find_feedback(timeline(short, x=-short), [Column("x", Role.NUMBER, False)])
+    assert not find_feedback(timeline(short, x=-short), [Column("x", Values.NUMBER, False)])
 
 
 @pytest.mark.parametrize("seed", [61, 62, 63, 64])
@@ -144,7 +145,7 @@ def test_runs_of_seconds_tell_too(seed: int) -> None:
     valid = (seconds < 750.0) & (seconds % 18.75 < 15.0)
     acceleration = np.gradient(np.gradient(offset, STEP), STEP)
     acceleration += 1.0 * acceleration.std() * rng.normal(size=N)
-    columns = [Column("acceleration", Role.NUMBER, False), Column("speed", Role.NUMBER, False)]
+    columns = [Column("acceleration", Values.NUMBER, False), Column("speed", Values.NUMBER, False)]
     found = find_feedback(timeline(offset, valid, acceleration=acceleration, speed=low_passed(30.0, rng)), columns)
     assert [one.column for one in found] == ["acceleration"]
 
@@ -157,4 +158,51 @@ def test_runs_of_seconds_bar_no_cause(seed: int) -> None:
     cause = low_passed(20.0, rng)
     keep = np.exp(-STEP / 2.0)
     moved = offset + 0.1 * lfilter([1.0 - keep], [1.0, -keep], cause)
-    assert not find_feedback(timeline(moved, valid, x=cause), [Column("x", Role.NUMBER, False)])
+    assert not find_feedback(timeline(moved, valid, x=cause), [Column("x", Values.NUMBER, False)])
+
+
+def warning(offset: np.ndarray, on: float, off: float) -> np.ndarray:
+    """1 from `on` metres away until it is nearer than `off` metres."""
+    state, out = False, np.zeros(len(offset))
+    for row, distance in enumerate(np.abs(offset)):
+        state = distance > (off if state else on)
+        out[row] = state
+    return out
+
+
+@pytest.mark.parametrize("seed", [81, 82, 83])
+@pytest.mark.parametrize("hysteresis", [0.0, 0.06])
+def test_a_warning_is_a_function_of_the_present_offset(seed: int, hysteresis: float) -> None:
+    offset, _ = driven(seed)
+    found = feedback(offset, warning(offset, 0.3, 0.3 - hysteresis), Values.SWITCH)
+    assert found is not None
+    assert (found.of, found.doubtful) == ("offset", False)
+    assert found.function > 0.5
+
+
+@pytest.mark.parametrize("seed", [84, 85, 86])
+def test_a_switch_that_moves_the_car_is_no_function_of_where_it_is(seed: int) -> None:
+    offset, rng = driven(seed)
+    switch = (low_passed(15.0, rng) > 0.8).astype(float)
+    keep = np.exp(-STEP / 1.5)
+    assert feedback(offset + 0.3 * lfilter([1.0 - keep], [1.0, -keep], switch), switch, Values.SWITCH) is None
+
+
+def test_declared_road_is_never_dismissed_and_a_name_alone_only_if_both_marks_are_strong() -> None:
+    offset, rng = driven(87)
+    columns = {"curvature": -2.0 * offset + 0.05 * rng.normal(size=N)}
+    kinds = [Column("curvature", Values.NUMBER, False)]
+    by_name = {"curvature": Assigned("curvature", Role.ROAD, "name")}
+    declared = {"curvature": Assigned("curvature", Role.ROAD, "declared")}
+    assert find_feedback(timeline(offset, **columns), kinds, by_name)
+    assert not find_feedback(timeline(offset, **columns), kinds, declared)
+
+
+@pytest.mark.parametrize("seed", [88, 89, 90, 91])
+def test_a_bend_that_is_answered_before_it_comes_stays_a_cause(seed: int) -> None:
+    """The car is at its place a second before the bend is: what it does predicts the column."""
+    offset, rng = driven(seed)
+    bend = lfilter(*butter(2, 0.1, fs=1.0 / STEP), low_passed(8.0, rng))
+    moved = offset + 0.5 * np.roll(bend, -round(1.0 / STEP))
+    by_name = {"curvature": Assigned("curvature", Role.ROAD, "name")}
+    assert not find_feedback(timeline(moved, curvature=bend), [Column("curvature", Values.NUMBER, False)], by_name)

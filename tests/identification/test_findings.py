@@ -6,11 +6,10 @@ import numpy as np
 import pytest
 
 from xosc_lateral.driver.effects import Step
+from xosc_lateral.identification.core_model import TIMES_S, DriverVariance, SpectrumShape
 from xosc_lateral.identification.findings import describe_finding, population_finding, spectrum_finding
-from xosc_lateral.identification.population import DriverVariance
 from xosc_lateral.identification.selection import Accepted
-from xosc_lateral.identification.spectrum_shape import TIMES_S, SpectrumShape
-from xosc_lateral.identification.terms.step import StepTerm
+from xosc_lateral.identification.terms.time import StepTerm
 
 REAL = {"mean by effect: step 0": np.array([0.1, -0.1]), "movement by band": np.array([0.2, 0.1, np.nan])}
 BEFORE = {"mean by effect: step 0": np.array([0.0, 0.0]), "movement by band": np.array([0.2, 0.4, 0.3])}
@@ -21,7 +20,7 @@ COMPARED = (REAL, BEFORE, AFTER)
 def test_an_accepted_term_is_told_with_its_errors_on_held_out_rows() -> None:
     accepted = Accepted(StepTerm(at=300), 1e-6)
     effects = (Step(size=0.2, size_error=0.02, at_s=285.0),)
-    found = describe_finding(accepted, "step 0", None, effects, None, COMPARED)  # type: ignore[arg-type]
+    found = describe_finding(accepted, "step 0", None, effects, COMPARED)  # type: ignore[arg-type]
     assert (found.effect, found.kind, found.shape) == ("step", "step", "at 285 s")
     assert (found.size_m, found.size_error, found.p_value) == (0.2, 0.02, 1e-6)
     assert (found.error_before, found.error_after) == pytest.approx((0.1, 0.0))
@@ -29,7 +28,7 @@ def test_an_accepted_term_is_told_with_its_errors_on_held_out_rows() -> None:
 
 
 def test_a_group_that_nobody_described_has_no_error() -> None:
-    found = describe_finding(Accepted(StepTerm(at=300), 1e-6), "step 7", None, (Step(size=0.2),), None, COMPARED)  # type: ignore[arg-type]
+    found = describe_finding(Accepted(StepTerm(at=300), 1e-6), "step 7", None, (Step(size=0.2),), COMPARED)  # type: ignore[arg-type]
     assert (found.error_before, found.error_after) == (0.0, 0.0)
 
 

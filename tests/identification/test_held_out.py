@@ -10,7 +10,7 @@ from xosc_lateral.driver.effects import Acts, Linear
 from xosc_lateral.driver.models.kinds import ModelKind
 from xosc_lateral.driver.provenance import Provenance
 from xosc_lateral.errors import NotEnoughDataError
-from xosc_lateral.identification.columns import Column, Role
+from xosc_lateral.identification.columns import Column, Values
 from xosc_lateral.identification.held_out import _frequency, _quantities, fit_without
 from xosc_lateral.identification.nested import Gain, Nested, _over_blocks
 from xosc_lateral.identification.regression import Coarse, fit_model
@@ -19,7 +19,7 @@ from xosc_lateral.identification.selection import Accepted, Selection
 from xosc_lateral.identification.terms.base import Term
 from xosc_lateral.identification.terms.cycle import CycleTerm
 from xosc_lateral.identification.terms.mean import MeanTerm
-from xosc_lateral.identification.terms.step import StepTerm
+from xosc_lateral.identification.terms.time import StepTerm
 
 SECONDS = 900.0
 N = round(SECONDS / 0.2)
@@ -129,7 +129,7 @@ def test_without_a_run_of_ten_seconds_there_is_no_base(coarse: Coarse) -> None:
 
 
 def test_the_residual_is_cut_by_every_column_and_by_what_was_found(coarse: Coarse) -> None:
-    columns = [Column("idle", Role.NUMBER, False), Column("wind", Role.ANGLE, False, period=360.0)]
+    columns = [Column("idle", Values.NUMBER, False), Column("wind", Values.ANGLE, False, period=360.0)]
     quantities = _quantities(chosen(coarse, X, StepTerm(at=300)), columns)
     assert list(quantities) == ["idle", "sin(wind)", "cos(wind)", "effect: mean 0", "effect: step 0"]
     np.testing.assert_allclose(quantities["sin(wind)"] ** 2 + quantities["cos(wind)"] ** 2, 1.0)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -11,15 +13,13 @@ from tests.identification.made_coarse import movement, timeline_of, wander
 from xosc_lateral.driver.effects import Acts, Cycle, Drift, Effect, Linear, VarianceTrend
 from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.drives.drive import Drive
-from xosc_lateral.identification.identify import UNSURE, _of_some_size, initial_terms, usable_columns
+from xosc_lateral.identification.identify import CLOCK, UNSURE, _of_some_size, initial_terms, usable_columns
 from xosc_lateral.identification.regression import Coarse, fit_model
 from xosc_lateral.identification.selection import Accepted, Selection
 from xosc_lateral.identification.terms.between import BetweenTerm
-from xosc_lateral.identification.terms.drift import DriftTerm
-from xosc_lateral.identification.terms.fine_noise import FineNoiseTerm
 from xosc_lateral.identification.terms.mean import MeanTerm
-from xosc_lateral.identification.terms.spread import SpreadTerm
-from xosc_lateral.identification.terms.variance_trend import VarianceTrendTerm
+from xosc_lateral.identification.terms.spread import FineNoiseTerm, SpreadTerm
+from xosc_lateral.identification.terms.time import TimeMeanTerm, TimeSpreadTerm
 from xosc_lateral.identification.timeline import Timeline, join_drives
 
 SECONDS = 900.0
@@ -45,16 +45,28 @@ def initial(timeline: Timeline, *effects: Effect) -> tuple:
 
 
 def test_what_follows_from_the_movement_may_not_act_and_is_told(timeline: Timeline) -> None:
-    columns, feedback, unused = usable_columns(timeline)
-    assert {column.name for column in columns} == {"grade", "rain"}
-    assert [one.column for one in feedback] == ["yaw_angle"]
-    assert unused["still"] == "it hardly varies"
+    usable = usable_columns(timeline)
+    assert {column.name for column in usable.columns} == {"grade", "rain"}
+    assert [one.column for one in usable.feedback] == ["yaw_angle"]
+    assert usable.unused["still"] == "it hardly varies"
 
 
 def test_what_is_left_out_on_request_is_told_so(timeline: Timeline) -> None:
-    columns, _, unused = usable_columns(timeline, ["rain"])
-    assert {column.name for column in columns} == {"grade"}
-    assert unused["rain"] == "left out on request"
+    usable = usable_columns(timeline, ["rain"])
+    assert {column.name for column in usable.columns} == {"grade"}
+    assert usable.unused["rain"] == "left out on request"
+
+
+def test_a_clock_is_not_looked_at(timeline: Timeline) -> None:
+    with_clock = replace(timeline, context={**timeline.context, "kilometres": 0.03 * timeline.time})
+    usable = usable_columns(with_clock)
+    assert "kilometres" not in {column.name for column in usable.columns}
+    assert usable.unused["kilometres"] == CLOCK
+
+
+def test_what_is_declared_own_movement_is_a_consequence(timeline: Timeline) -> None:
+    usable = usable_columns(timeline, roles={"rain": "own"})
+    assert {one.column: one.source for one in usable.feedback} == {"rain": "declared", "yaw_angle": "name"}
 
 
 def test_a_base_s_effects_are_fitted_anew_from_nothing(timeline: Timeline) -> None:
@@ -78,7 +90,7 @@ def test_each_part_of_the_movement_has_its_term(timeline: Timeline) -> None:
         Drift(size=0.1),
     )
     terms = initial(timeline, *effects)
-    assert [type(term) for term in terms] == [SpreadTerm, MeanTerm, VarianceTrendTerm, DriftTerm]
+    assert [type(term) for term in terms] == [SpreadTerm, MeanTerm, TimeSpreadTerm, TimeMeanTerm]
 
 
 def test_effects_of_columns_that_the_table_lacks_and_cycles_begin_nothing(timeline: Timeline) -> None:

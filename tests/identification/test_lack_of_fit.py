@@ -66,13 +66,16 @@ def closed(drive: Any, runs: np.ndarray, error: float, floor: float = 0.01) -> A
     """What is read of a closed loop whose refined profile gives `runs`."""
     timeline, statistics, real = drive
     after = statistics.describe(runs, timeline.valid)
-    return SimpleNamespace(
+    scored = SimpleNamespace(
         statistics=statistics,
-        seed=1,
-        unmoved=timeline.offset,
         real=real,
         before={name: np.zeros_like(values) for name, values in real.items()},
         after=after,
+    )
+    return SimpleNamespace(
+        scored=scored,
+        seed=1,
+        unmoved=timeline.offset,
         error_after=error,
         floor=floor,
     )

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from xosc_lateral.identification.least_squares import clustered_least_squares
+from xosc_lateral.identification.regression import clustered_least_squares
 
 
 def test_sizes_are_those_of_least_squares_and_errors_those_of_the_definition() -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from xosc_lateral.identification.log_scale import (
+from xosc_lateral.identification.innovations import (
     CLIP,
     MOST_LOG_SCALE,
     OWN_LEVEL_S,

@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 from scipy.stats import norm
 
-from xosc_lateral.identification.forward_backward import forward_backward
-from xosc_lateral.identification.markov_switching import fit_regimes
+from xosc_lateral.identification.markov_switching import fit_regimes, forward_backward
 
 
 def all_paths(rows: np.ndarray, valid: np.ndarray, quiet: float, loud: float, go: float, leave: float):

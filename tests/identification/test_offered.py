@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from xosc_lateral.driver.effects import EFFECTS, Acts, HiddenEffect, Linear
-from xosc_lateral.identification import offered
-from xosc_lateral.identification.offered import offered_effects
+from xosc_lateral.identification import candidates
+from xosc_lateral.identification.candidates import offered_effects
 
 
 class Cubed(Linear, frozen=True, kw_only=True):
@@ -26,7 +26,7 @@ class Sleepy(HiddenEffect, frozen=True, kw_only=True):
 
 @pytest.fixture
 def installed(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(offered, "known_effects", lambda: (*EFFECTS, Cubed, Sleepy))
+    monkeypatch.setattr(candidates, "known_effects", lambda: (*EFFECTS, Cubed, Sleepy))
 
 
 def test_without_plug_ins_nothing_is_offered() -> None:

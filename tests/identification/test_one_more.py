@@ -22,8 +22,8 @@ from xosc_lateral.identification import selection, terms
 from xosc_lateral.identification.regression import Coarse
 from xosc_lateral.identification.removal import estimate_all, removal_of
 from xosc_lateral.identification.search import Search
+from xosc_lateral.identification.selection import STAGES, TERMS, in_stages, shared_among
 from xosc_lateral.identification.significance import BUDGET, MANY_DRIVES
-from xosc_lateral.identification.stages import STAGES, TERMS, in_stages, shared_among
 from xosc_lateral.identification.terms.base import Stage, Term
 from xosc_lateral.segment import Segment
 

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from scipy.stats import f_oneway, kstest
 
-from xosc_lateral.identification import population
-from xosc_lateral.identification.population import LEVEL, MIN_DRIVES, MIN_SECONDS, DriverVariance
+from xosc_lateral.identification import core_model
+from xosc_lateral.identification.core_model import DRIVERS_LEVEL, MIN_DRIVES, MIN_SECONDS, DriverVariance
 
 SECONDS = 120
 
@@ -27,7 +27,7 @@ def drivers(
         scale=0.1, drive=np.repeat(np.arange(drives), seconds), valid=np.ones(drives * seconds, dtype=bool)
     )
     fitted = SimpleNamespace(whitener=whitener, movement=rows.ravel() / 0.1, levels=levels)
-    found = population.test_population(fitted, np.zeros(drives) if known is None else known)  # type: ignore[arg-type]
+    found = core_model.test_population(fitted, np.zeros(drives) if known is None else known)  # type: ignore[arg-type]
     own = levels if known is None else levels - known
     return found, [row + level for row, level in zip(rows, own, strict=True)]
 
@@ -39,7 +39,7 @@ def test_the_probability_is_that_of_an_analysis_of_variance_with_halves_as_repea
     means = f_oneway(*([a.mean(), b.mean()] for a, b in halves)).pvalue
     spreads = f_oneway(*([np.log(a.std()), np.log(b.std())] for a, b in halves)).pvalue
     assert found is not None
-    assert found.p_value == pytest.approx(max(min(1.0, 2.0 * min(means, spreads)), population.LEAST), rel=1e-6)
+    assert found.p_value == pytest.approx(max(min(1.0, 2.0 * min(means, spreads)), core_model.LEAST), rel=1e-6)
 
 
 @pytest.mark.parametrize(("shift", "log_spread"), [(0.15, 0.0), (0.2, 0.3), (0.0, 0.4)])
@@ -55,7 +55,7 @@ def test_drives_of_one_driver_are_told_from_none_and_their_probabilities_are_eve
     found = [drivers(100 + seed, 20)[0] for seed in range(200)]
     p_values = [one.p_value for one in found if one is not None]
     assert len(p_values) == 200
-    assert sum(p < LEVEL for p in p_values) <= 3  # 0.4 expected of 200
+    assert sum(p < DRIVERS_LEVEL for p in p_values) <= 3  # 0.4 expected of 200
     # twice the smaller of two: never too small, whatever the two have to do with each other
     assert kstest(p_values, "uniform", alternative="greater").pvalue > 0.001
 
@@ -75,14 +75,14 @@ def test_few_drives_and_short_ones_say_nothing():
 
 def test_scatter_is_tested_as_in_an_analysis_of_variance() -> None:
     halves = np.random.default_rng(2).normal(size=(12, 2)) + np.random.default_rng(3).normal(size=(12, 1))
-    _, p_value = population._scatter(halves)
+    _, p_value = core_model._scatter(halves)
     assert p_value == pytest.approx(f_oneway(*halves).pvalue, rel=1e-9)
 
 
 def test_scatter_between_drives_is_freed_of_noise() -> None:
     rng = np.random.default_rng(4)
     halves = 0.3 * rng.normal(size=(4000, 1)) + 0.5 * rng.normal(size=(4000, 2))
-    deviation, p_value = population._scatter(halves)
+    deviation, p_value = core_model._scatter(halves)
     assert deviation == pytest.approx(0.3, abs=0.02)
     assert p_value < 1e-6
-    assert population._scatter(0.5 * rng.normal(size=(10, 2)))[0] >= 0.0
+    assert core_model._scatter(0.5 * rng.normal(size=(10, 2)))[0] >= 0.0

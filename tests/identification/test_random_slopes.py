@@ -9,9 +9,8 @@ from scipy.ndimage import gaussian_filter1d
 from tests.identification.test_between import STEP, wander
 from xosc_lateral.driver.effects import Linear
 from xosc_lateral.drives.drive import Drive
-from xosc_lateral.identification.random_slopes import slope_deviation
 from xosc_lateral.identification.regression import Coarse, fit_model
-from xosc_lateral.identification.terms.mean import MeanTerm
+from xosc_lateral.identification.terms.mean import MeanTerm, slope_deviation
 from xosc_lateral.identification.timeline import join_drives
 
 

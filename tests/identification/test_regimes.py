@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from xosc_lateral.identification.log_scale import squared_innovations
+from xosc_lateral.identification.innovations import squared_innovations
 from xosc_lateral.identification.terms.regimes import probability_of_persistence
 
 N = 3000

@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 
 from tests.identification.made_coarse import coarse_of, movement, wander
-from xosc_lateral.identification.columns import Column, Role
+from xosc_lateral.identification.columns import Column, Values
 from xosc_lateral.identification.search import Recent, Search
-from xosc_lateral.identification.stages import ERROR_BUDGET
+from xosc_lateral.identification.selection import ERROR_BUDGET
 
 
 def test_the_last_few_are_kept() -> None:
@@ -31,7 +31,7 @@ def test_the_search_of_a_part_begins_with_a_memory_of_its_own() -> None:
     """Folds are searched side by side, in threads."""
     rng = np.random.default_rng(1)
     coarse = coarse_of(movement(rng, 200.0), {"x": wander(rng, 1000, 12.0)})
-    search = Search.over(coarse, [Column("x", Role.NUMBER, False)], np.random.SeedSequence(1), ERROR_BUDGET)
+    search = Search.over(coarse, [Column("x", Values.NUMBER, False)], np.random.SeedSequence(1), ERROR_BUDGET)
     fit, kind = object(), object()
     assert search.likeliest(kind, fit, lambda: None) is None
     asked = []

@@ -21,7 +21,7 @@ from xosc_lateral.formats.drives import read_drives
 from xosc_lateral.identification.identify import usable_columns
 from xosc_lateral.identification.selection import Selection
 from xosc_lateral.identification.terms.column import ColumnTerm
-from xosc_lateral.identification.terms.step import StepTerm
+from xosc_lateral.identification.terms.time import StepTerm
 from xosc_lateral.identification.timeline import join_drives
 
 Driven = Callable[..., list[Drive]]
@@ -106,7 +106,7 @@ def test_a_pull_to_the_middle_by_a_column_is_blamed_on_that_column(tmp_path: Pat
 
 
 def test_steering_and_yaw_rate_are_consequences_and_never_causes(driven: Driven) -> None:
-    _, feedback, _ = usable_columns(join_drives(driven(101, [plants.curve_cutting(0.4)])))
+    feedback = usable_columns(join_drives(driven(101, [plants.curve_cutting(0.4)]))).feedback
     assert {one.column for one in feedback} == {"steering_wheel_angle", "yaw_rate"}
     assert not any(one.doubtful for one in feedback)
 
@@ -132,7 +132,7 @@ def test_an_effect_whose_column_is_missing_is_blamed_on_no_other(driven: Driven)
 def test_a_column_that_is_left_out_is_not_looked_at(driven: Driven) -> None:
     drives = driven(101, [plants.truck_avoidance(0.3)])
     assert not any("truck_right" in columns for _, columns in named(selected(drives, excluded=["truck_right"])))
-    assert "truck_right" in usable_columns(join_drives(drives), ["truck_right"])[2]
+    assert "truck_right" in usable_columns(join_drives(drives), ["truck_right"]).unused
 
 
 def test_same_seed_same_selection(driven: Driven) -> None:

@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from scipy.signal import lfilter
 from scipy.stats import gumbel_r, kstest
 
+from xosc_lateral.identification.selection import ERROR_BUDGET
 from xosc_lateral.identification.significance import (
     BUDGET,
     HEAVY_TAIL_SHARE,
@@ -16,7 +17,6 @@ from xosc_lateral.identification.significance import (
     effective_number,
     upper_tail,
 )
-from xosc_lateral.identification.stages import ERROR_BUDGET
 
 level_of = ERROR_BUDGET.level_of
 

@@ -12,7 +12,7 @@ from xosc_lateral.driver.effects.product import Factor
 from xosc_lateral.driver.effects.response import respond
 from xosc_lateral.formats.drives import drives_of_table
 from xosc_lateral.identification.candidates import FINE_SCALES, Family, candidates_of, shapes_of
-from xosc_lateral.identification.columns import Column, Role
+from xosc_lateral.identification.columns import Column, Values
 from xosc_lateral.identification.refinement import Refinement
 from xosc_lateral.identification.regression import Coarse, Fitted, fit_model
 from xosc_lateral.identification.terms.mean import MeanTerm
@@ -50,7 +50,7 @@ def test_a_time_constant_is_found_between_the_dictionarys(passed: Coarse) -> Non
     bare = fit_model(passed, ())
     problem = MeanTerm.problem(bare)
     refinement = Refinement(passed, problem, np.zeros((len(problem.observed), 0)), {})
-    columns = {"truck": Column("truck", Role.SWITCH, gaps=False, levels=(0.0, 1.0))}
+    columns = {"truck": Column("truck", Values.SWITCH, gaps=False, levels=(0.0, 1.0))}
     found = refinement.refine(structs.replace(term().effect, lag_s=0.0, response_s=4.0), 0.0, columns).effect
     assert found.lag_s == pytest.approx(LAG, abs=0.4)
     assert found.response_s == pytest.approx(RESPONSE, rel=0.25)
@@ -97,7 +97,7 @@ def test_a_finer_choice_pays_for_its_number() -> None:
     """A product of a distance has no more scales than the distance alone, and both pay for them once."""
     rng = np.random.default_rng(1)
     distance = np.where(rng.random(400) < 0.5, np.nan, rng.exponential(40.0, 400))
-    columns = [Column("gap", Role.NUMBER, gaps=True), Column("lane", Role.LEVELS, gaps=False, levels=(0.0, 1.0))]
+    columns = [Column("gap", Values.NUMBER, gaps=True), Column("lane", Values.LEVELS, gaps=False, levels=(0.0, 1.0))]
     context = {"gap": distance, "lane": (rng.random(400) < 0.5).astype(float)}
     candidates = candidates_of(columns, context, most=24)
     for family in Family:
@@ -115,7 +115,7 @@ def test_a_column_that_mostly_has_one_of_two_values_has_limits_in_between() -> N
     """A crossfall: -2.5 or 2.5 % nearly always, and on its way from one to the other for a tenth of the time."""
     way = np.linspace(-2.5, 2.5, 100)
     crossfall = np.concatenate([np.full(600, -2.5), way, np.full(200, 2.5), way[::-1]])
-    shapes = shapes_of(Column("crossfall", Role.NUMBER, False), crossfall, curves=True)
+    shapes = shapes_of(Column("crossfall", Values.NUMBER, False), crossfall, curves=True)
     limits = {shape.at for shape in shapes.bent if isinstance(shape, Threshold)}
     assert len(limits) > 10
     assert min(np.abs(list(limits))) < 0.2

@@ -9,8 +9,8 @@ from msgspec.structs import replace
 from tests.driver.models.made_models import STEADY
 from tests.identification.made_coarse import movement, timeline_of
 from xosc_lateral.driver.profile import DriverProfile
-from xosc_lateral.identification import spectrum_shape
-from xosc_lateral.identification.spectrum_shape import BLOCK, TIMES_S, WORTH_ADDING, SpectrumShape, _shapes
+from xosc_lateral.identification import core_model
+from xosc_lateral.identification.core_model import BLOCK, TIMES_S, WORTH_ADDING, SpectrumShape, _shapes
 from xosc_lateral.identification.timeline import Timeline
 
 WIDTH = 3.6
@@ -31,7 +31,7 @@ def profile() -> DriverProfile:
 
 def test_a_profile_s_own_drives_show_its_spectrum(profile: DriverProfile) -> None:
     found = [
-        spectrum_shape.compare_spectrum_shapes(profile, driven(STEADY, seed), np.random.SeedSequence(1))
+        core_model.compare_spectrum_shapes(profile, driven(STEADY, seed), np.random.SeedSequence(1))
         for seed in (21, 22, 23)
     ]
     assert not any(one.found for one in found)
@@ -42,7 +42,7 @@ def test_a_profile_s_own_drives_show_its_spectrum(profile: DriverProfile) -> Non
 
 def test_a_drive_with_more_fine_movement_is_found_and_the_band_told(profile: DriverProfile) -> None:
     rough = replace(STEADY, fine=replace(STEADY.fine, damping=3.0 * STEADY.fine.damping))
-    found = spectrum_shape.compare_spectrum_shapes(profile, driven(rough, 24), np.random.SeedSequence(1))
+    found = core_model.compare_spectrum_shapes(profile, driven(rough, 24), np.random.SeedSequence(1))
     assert found.found
     assert found.ratio[0] == pytest.approx(1.0 / 3.0, rel=0.2)
     np.testing.assert_allclose(found.ratio[-1], 1.0, atol=0.15)
@@ -76,7 +76,7 @@ def test_movement_that_stands_still_has_no_blocks() -> None:
 
 def test_too_short_a_drive_says_nothing(profile: DriverProfile) -> None:
     timeline = timeline_of(movement(np.random.default_rng(2), 300.0))
-    found = spectrum_shape.compare_spectrum_shapes(profile, timeline, np.random.SeedSequence(1))
+    found = core_model.compare_spectrum_shapes(profile, timeline, np.random.SeedSequence(1))
     assert found.p_value == 1.0
     assert not found.found
 
@@ -90,8 +90,6 @@ def test_a_difference_is_sure_and_large_enough_or_none(p_value: float, ratio: fl
 
 def test_the_same_seed_says_the_same(profile: DriverProfile) -> None:
     timeline = driven(STEADY, 26)
-    one, other = (
-        spectrum_shape.compare_spectrum_shapes(profile, timeline, np.random.SeedSequence(7)) for _ in range(2)
-    )
+    one, other = (core_model.compare_spectrum_shapes(profile, timeline, np.random.SeedSequence(7)) for _ in range(2))
     assert one.p_value == other.p_value
     np.testing.assert_array_equal(one.ratio, other.ratio)

@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-from xosc_lateral.identification.stages import ERROR_BUDGET, STAGES, TERMS
+from xosc_lateral.identification.selection import ERROR_BUDGET, STAGES, TERMS
 from xosc_lateral.identification.terms.cycle import CycleTerm
-from xosc_lateral.identification.terms.drift import DriftTerm
 from xosc_lateral.identification.terms.mean import MeanTerm
 from xosc_lateral.identification.terms.regimes import RegimesTerm
 from xosc_lateral.identification.terms.spread import SpreadTerm
+from xosc_lateral.identification.terms.time import TimeMeanTerm
 
 LISTED = [kind for stage in STAGES for kind in stage]
 
 
 def test_every_term_is_looked_for() -> None:
     """A drift is looked for with a step, which it competes with."""
-    assert set(TERMS) - set(LISTED) == {DriftTerm}
+    assert set(TERMS) - set(LISTED) == {TimeMeanTerm}
 
 
 def test_the_order_is_the_one_that_p_values_and_reports_of_0_1_came_from() -> None:
@@ -22,11 +22,11 @@ def test_the_order_is_the_one_that_p_values_and_reports_of_0_1_came_from() -> No
     names = [[kind.component for kind in stage] for stage in STAGES]
     assert names == [
         ["mean"],
-        ["cycle", "low_frequency"],
+        ["cycle", "time_mean"],
         ["mean"],
-        ["variance_trend", "spread", "slow_spread"],
+        ["time_spread", "spread", "slow_spread"],
         ["regimes"],
-        ["fine_noise", "restoring"],
+        ["restoring", "fine_noise"],
         ["between"],
     ]
 

@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-from types import SimpleNamespace
-from typing import Any
-
 import numpy as np
 import pytest
 from scipy.stats import chi2
 
 from xosc_lateral.identification.lack_of_fit import _beyond, _mean_of_finite
-from xosc_lateral.identification.low_frequency import DRIFT_TERMS, MIN_DRIFT_S, half_cosines
 from xosc_lateral.identification.residual import (
     OSCILLATION,
     SPARE_ROWS,
@@ -149,29 +145,3 @@ def test_a_score_of_several_degrees_becomes_one_of_one_degree_as_rare(degrees: i
     for p_value in (0.5, 1e-2, 1e-8):
         score = float(chi2.isf(p_value, degrees))
         assert chi2.sf(as_one_degree(score, degrees), 1) == pytest.approx(p_value, rel=1e-6)
-
-
-def coarse(*seconds: int) -> Any:
-    drive = np.repeat(np.arange(len(seconds)), seconds).astype(np.intp)
-
-    class Seconds(SimpleNamespace):
-        def __len__(self) -> int:
-            return len(drive)
-
-    return Seconds(drive=drive, drives=len(seconds), valid=np.ones(len(drive), dtype=bool))
-
-
-def test_half_cosines_are_orthogonal_and_each_drive_has_its_own() -> None:
-    long = int(2 * MIN_DRIFT_S)
-    columns = half_cosines(coarse(long, long))
-    assert columns.shape == (2 * long, 2 * DRIFT_TERMS)
-    assert not columns[long:, :DRIFT_TERMS].any()
-    assert not columns[:long, DRIFT_TERMS:].any()
-    products = columns.T @ columns / long
-    np.testing.assert_allclose(products, 0.5 * np.eye(2 * DRIFT_TERMS), atol=0.01)
-    assert columns[0, 0] == 1.0
-    assert columns[long - 1, 0] == pytest.approx(-1.0)
-
-
-def test_a_drive_too_short_for_a_drift_has_none() -> None:
-    assert half_cosines(coarse(int(MIN_DRIFT_S) - 1)).shape == (int(MIN_DRIFT_S) - 1, 0)

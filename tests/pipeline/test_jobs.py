@@ -218,6 +218,10 @@ def test_the_fingerprint_follows_a_profiles_bytes_not_its_place(database: Path, 
     assert fingerprint(here) != fingerprint(here, parameters={"Speed": "1"})
     targets = ((Player.ESMINI, None), (Player.CARLA, None), (Player.ESMINI, "1.2"))
     assert len({fingerprint(here, player=player, version=version) for player, version in targets}) == 3
+    roads = [tmp_path / "a.xodr", tmp_path / "b.xodr"]
+    for road in roads:
+        road.write_text(road.name)
+    assert len({fingerprint(here, road=road) for road in (None, *roads)}) == 3, "another road is another output"
     before = fingerprint(here)
     here.write_text('{"changed": true}')
     assert fingerprint(here) != before

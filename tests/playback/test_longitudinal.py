@@ -129,6 +129,24 @@ def test_a_speed_profile_whose_time_is_too_short_takes_what_its_limits_need(tmp_
     np.testing.assert_allclose(motion.speed, np.interp(motion.time, [1.0, 3.5], [20.0, 30.0]), atol=0.09)
 
 
+def test_a_speed_profile_beside_another_vehicle_takes_its_speed_as_it_is_and_says_so(tmp_path: Path) -> None:
+    entries = '<SpeedProfileEntry time="2" speed="3"/>'
+    action = f'<SpeedProfileAction entityRef="Lead" followingMode="position">{entries}</SpeedProfileAction>'
+    brakes = maneuvers(event(longitudinal(action), trigger=after(1.0)))
+    played = Stage(tmp_path).play(brakes, start=TWO, last=6.0)
+    assert entity(played).speed[-1] == pytest.approx(18.0)
+    (note,) = played.motion.notes
+    assert note.what == "speeds are relative to that of 'Lead' as it is now: 15.00 m/s" and note.line
+
+
+def test_a_limit_that_is_missing_is_the_players_and_is_said(tmp_path: Path) -> None:
+    lacking = car("Ego").replace(' maxDeceleration="10.0"', "").replace('maxAcceleration="10.0"', 'maxAcceleration="4"')
+    played = Stage(tmp_path).play(entities=(lacking,), last=1.0)
+    performance = played.scenario.entities[0].performance
+    assert (performance.max_acceleration, performance.max_deceleration) == (4.0, 10.0)
+    assert [note.what for note in played.motion.notes] == ["maxDeceleration is missing: 10 m/s2 is taken"]
+
+
 def test_a_distance_without_limits_is_taken_at_once(tmp_path: Path) -> None:
     keep = longitudinal(
         '<LongitudinalDistanceAction entityRef="Lead" continuous="true" freespace="false" distance="30" '

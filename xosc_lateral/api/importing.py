@@ -28,7 +28,7 @@ def import_drives(
     ----------
     format : str
         "dlr-ht" (DLR Highway Traffic), "levelx" (highD, exiD), "mf4" (ASAM MDF; extra `mdf`),
-        "tracks" (x, y on an OpenDRIVE road), "commonroad" (extra `commonroad`),
+        "tracks" (x, y on an OpenDRIVE road), "fcd" (SUMO), "commonroad" (extra `commonroad`),
         "osi" (ASAM OSI traces; extra `osi`), or a plug-in's.
     source : path or paths
         File or folder; "mf4" and some plug-ins take several files.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -36,6 +36,7 @@ def close_loop(
     seed: int = 0,
     name: str = "refined",
     leave_out: Collection[str] = (),
+    roles: Mapping[str, str] | None = None,
     columns: MappingLike | None = None,
     library: Paths = (),
     progress: Callable[[float, str], None] | None = None,
@@ -54,6 +55,10 @@ def close_loop(
         Of the refined profile.
     leave_out : collection of str
         Columns not to look at.
+    roles : mapping of str to str, optional
+        What columns are: column -> road, weather, traffic, time, own, driver or unknown. Road, weather and traffic are
+        never dismissed as consequences of the car's movement, own movement and time are never causes. Default: what a
+        mapping file says in `[roles]`, then by name and values.
     library : path or paths
         Folders with further profiles.
     progress : callable, optional
@@ -63,17 +68,23 @@ def close_loop(
     ------
     NotEnoughDataError
         Too little road-following is left after cutting.
+    FormatError
+        A role that there is not, or of a column that the drives lack.
     """
     from dataclasses import replace
 
     from msgspec.structs import replace as with_fields
 
     from xosc_lateral.driver.provenance import Provenance
+    from xosc_lateral.formats.mapping import as_mapping
     from xosc_lateral.identification import close
     from xosc_lateral.identification.lack_of_fit import lack_of_fit_of
 
     base = None if profile is None else given_profile(profile, library)
     given = given_drives(drives, columns)
+    # a mapping file serves many tables: what it says of columns that these lack is no mistake
+    there = {"lane_width"}.union(*(drive.context for drive in given.drives))
+    of_file = {name: role for name, role in as_mapping(columns).roles.items() if name in there}
     with naming(given):
         result = close.close_loop(
             given.drives,
@@ -82,6 +93,7 @@ def close_loop(
             name=name,
             provenance=Provenance(source=", ".join(given.inputs), inputs=dict(given.inputs)),
             excluded=list(leave_out),
+            roles={**of_file, **(roles or {})},
             progress=progress or (lambda share, what: None),
         )
     if base is not None:

@@ -19,6 +19,7 @@ from xosc_lateral.version import __version__
 
 VERBS = {
     "convert": "Make scenarios lifelike: one, several, a folder.",
+    "reconstruct": "Turn a recording into a maneuver-based scenario.",
     "verify": "Whether outputs are what would be made today.",
     "reproduce": "Make an output again from what it carries.",
     "view": "Play a scenario in the browser.",
@@ -31,6 +32,7 @@ VERBS = {
     "import": "Convert recordings into drive tables.",
     "profiles": "The library of driver profiles.",
     "template": "Scenarios to start from.",
+    "live": "Drivers in a simulation that runs.",
 }
 """Name -> what it does. Each has a module named like it with `register(app)`, which is loaded when the verb is used."""
 

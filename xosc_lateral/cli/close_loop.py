@@ -18,6 +18,7 @@ from xosc_lateral.cli.words import (
     Tables,
     examples,
     mapped,
+    pairs,
     say,
 )
 
@@ -43,6 +44,13 @@ def close_loop(
     leave_out: Annotated[
         list[str] | None, typer.Option(metavar="COLUMN", help="Context column to ignore; may be repeated.")
     ] = None,
+    role: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="COLUMN=ROLE",
+            help="What a column is: road, weather, traffic, time, own, driver or unknown; may be repeated.",
+        ),
+    ] = None,
     columns: Columns = None,
     mapping_file: MappingFile = None,
     library: Library = None,
@@ -66,6 +74,7 @@ def close_loop(
             seed=seed,
             name=written.stem,
             leave_out=leave_out or (),
+            roles=pairs(role, "--role"),
             columns=mapped(columns, mapping_file),
             library=library or (),
             progress=progress,

@@ -43,6 +43,8 @@ def register(app: typer.Typer) -> None:
     formats.command("mf4", short_help="ASAM MDF bus logs.", epilog=mf4_example)(mf4)
     tracks_example = examples("import tracks tracks.csv --road road.xodr -o drives.parquet --map vehicle=obj")
     formats.command("tracks", short_help="Tracks on an OpenDRIVE road.", epilog=tracks_example)(tracks)
+    fcd_example = examples("import fcd fcd.xml --net run.net.xml -o drives.parquet")
+    formats.command("fcd", short_help="SUMO's FCD output.", epilog=fcd_example)(fcd)
     commonroad_example = examples("import commonroad DEU_A9-1_1_T-1.xml -o drives.parquet")
     formats.command("commonroad", short_help="CommonRoad scenarios.", epilog=commonroad_example)(commonroad)
     osi_example = examples(
@@ -173,6 +175,19 @@ def tracks(
     """A table of tracks (x, y and heading of any recording) on a known road: lanes, offsets, neighbours."""
     options = {"road": road, "columns": columns or (), "mapping": mapping_file, "keep_cut": keep_cut}
     _import("tracks", [source], output, options, force, quiet, as_json)
+
+
+def fcd(
+    source: Annotated[Path, typer.Argument(help="What --fcd-output wrote (.xml).", show_default=False)],
+    output: Output,
+    net: Annotated[Path | None, typer.Option(help="Road network (.net.xml): widths and counts of lanes.")] = None,
+    lane_width: Annotated[float, typer.Option(help="Without a network. [m]", min=1, max=10)] = 3.2,
+    force: Force = False,
+    quiet: Quiet = False,
+    as_json: AsJson = False,
+) -> None:
+    """SUMO's FCD output of a run with the sublane model: a drive for every vehicle."""
+    _import("fcd", [source], output, {"net": net, "lane_width": lane_width}, force, quiet, as_json)
 
 
 def commonroad(

@@ -7,7 +7,7 @@ same however a drive is cut into blocks.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import msgspec
 import numpy as np
@@ -56,6 +56,31 @@ class DriveState(msgspec.Struct, kw_only=True):
     past: FloatArray | None = None
 
 
+class Movement(NamedTuple):
+    """What is random of offsets at some rows, before effects act on it. [lane widths]
+
+    The mean that the coarse part moves about, coarse and fine part, and what is quick of the coarse one where an effect
+    acts on that.
+    """
+
+    mean: FloatArray | float
+    coarse: FloatArray
+    fine: FloatArray
+    quick: FloatArray | None
+
+
+def offsets_of(movement: Movement, terms: EffectTerms, width: FloatArray) -> FloatArray:
+    """Offsets, by the formula of `EffectTerms`; rows of one drive, or one row of many drives, shape (n,) each. [m]"""
+    mean, coarse, fine, quick = movement
+    if terms.quick is not None:
+        fine = terms.quick * fine
+        coarse = coarse if quick is None else coarse + (terms.quick - 1.0) * quick
+    moved = coarse if terms.spread is None else mean + terms.spread * (coarse - mean)
+    moved = moved + (fine if terms.fine is None else terms.fine * fine)
+    offset = moved * width
+    return np.asarray(offset if terms.location is None else offset + terms.location)
+
+
 class DriveProcess:
     """One drive.
 
@@ -91,6 +116,11 @@ class DriveProcess:
     def has_begun(self) -> bool:
         """Whether offsets were taken."""
         return self._core is not None
+
+    @property
+    def hidden(self) -> tuple[HiddenEffect, ...]:
+        """The hidden effects."""
+        return self._hidden
 
     def begin_at(self, time: float) -> None:
         """Time of row 0 in the drive's clock; once. [s]"""
@@ -174,16 +204,22 @@ class DriveProcess:
         elif start is not None:
             raise ValueError("a drive that continues from a state has no start")
         acts_on_quick = (terms.quick is not None or self.state.past is not None) and terms.rate is None
-        beyond = reach(self._model.step) if acts_on_quick else 0
-        coarse, fine = self._take_core(self._core, len(width), terms.rate, beyond)
-        mean, quick = self._core.mean, self._quick_of(coarse) if acts_on_quick else None
-        if terms.quick is not None:
-            fine = terms.quick * fine
-            coarse = coarse if quick is None else coarse + (terms.quick - 1.0) * quick
-        moved = coarse if terms.spread is None else mean + terms.spread * (coarse - mean)
-        moved = moved + (fine if terms.fine is None else terms.fine * fine)
-        offset = moved * width
-        return np.asarray(offset if terms.location is None else offset + terms.location)
+        return offsets_of(self._movement(len(width), terms.rate, quick=acts_on_quick), terms, width)
+
+    def movement(self, n: int, *, quick: bool, rate: FloatArray | None = None) -> Movement:
+        """Next movement of a drive that begins as chance has it, before effects act: what `take` makes offsets of.
+
+        With what is quick of it where asked for, which must be from the drive's start on; `rate` [-] of shape (n,).
+        """
+        if self._core is None:
+            self._core = self._model.stream(child(self._seed, DriveSeed.CORE), None)
+            self.state.core = self._core.state
+        return self._movement(n, rate, quick=quick)
+
+    def _movement(self, n: int, rate: FloatArray | None, *, quick: bool) -> Movement:
+        assert self._core is not None
+        coarse, fine = self._take_core(self._core, n, rate, reach(self._model.step) if quick else 0)
+        return Movement(self._core.mean, coarse, fine, self._quick_of(coarse) if quick else None)
 
     def _quick_of(self, coarse: FloatArray) -> FloatArray:
         """What is quick of the coarse movement just taken, that drawn ahead being known. [lane widths]

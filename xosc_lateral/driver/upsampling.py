@@ -63,6 +63,6 @@ def upsample(offsets: FloatArray, factor: int) -> FloatArray:
     return np.append(dense.ravel(), offsets[-1])
 
 
-def extrapolate(before: float, last: float) -> float:
+def extrapolate(before: Number, last: Number) -> Number:
     """The sample that would follow on a straight line. [unit of the samples]"""
     return 2.0 * last - before

@@ -237,8 +237,8 @@ def _draw(
             segment = _with_nobody_beside(segment)
         neutral |= _unknown(driver, segment)
         other_hand = _is_left_hand(entity, network, knots) != driver.left_hand
-        heeds |= _sides(driver, {Basis.POPULATION}, other_hand=other_hand)
-        alone |= _sides(driver, {Basis.MEASURED, Basis.DECLARED}, other_hand=other_hand)
+        heeds |= sides_known(driver, {Basis.POPULATION}, other_hand=other_hand)
+        alone |= sides_known(driver, {Basis.MEASURED, Basis.DECLARED}, other_hand=other_hand)
         seen, side = (mirrored(segment), -1.0) if other_hand else (segment, 1.0)
         wanted = side * sampler.sample(seen)
         later = _going_on(seen, max(least - len(knots), 0))
@@ -257,7 +257,7 @@ def _draw(
     )  # fmt: skip
 
 
-def _sides(driver: DriverProfile, known: set[Basis], *, other_hand: bool) -> set[str]:
+def sides_known(driver: DriverProfile, known: set[Basis], *, other_hand: bool) -> set[str]:
     """Sides of the road, "left" and "right", on which the driver's answer to neighbours is known in such a way."""
     return {other_side(side) if other_hand else side for side in SIDES if basis_of(driver, side) in known}
 

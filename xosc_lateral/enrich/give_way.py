@@ -96,19 +96,20 @@ def give_way(
     """
     count, n = len(sampled), len(rows)
     left, right = np.zeros((count, n)), np.zeros((count, n))
-    frames = [_Frame.of(one, rows) for one in sampled]
+    frames = [Frame.of(one, rows) for one in sampled]
     left_hand = _left_hand(network, sampled, rows)
     x, y = ([np.where(frame.present, getattr(frame, name), np.nan) for frame in frames] for name in ("x", "y"))
-    longest = max((frame.length for frame in frames), default=0.0)
+    longest = max((one.motion.entity.bounding_box.length for one in sampled), default=0.0)
     for i, j in pairs_within(x, y, FADES + longest + MARGIN):
         if not (sampled[i].can_move.any() or sampled[j].can_move.any()):
             continue
         for own, other in ((i, j), (j, i)):
-            widening = _widening(frames[own], frames[other], sampled[own].heeds)
+            heeds = sampled[own].heeds
+            widening = widened(frames[own], frames[other], "left" in heeds, "right" in heeds)
             if widening is None:
                 continue
             aside, is_left, heeded = widening  # of `own`, by where `other` is
-            share = _part(is_left == left_hand[own], heeded)
+            share = part_of(is_left == left_hand[own], heeded)
             share = np.where(frames[other].can_move, share, 1.0) * frames[own].can_move
             share *= np.where(is_left, "left" not in sampled[own].alone, "right" not in sampled[own].alone)
             right[own] = np.maximum(right[own], np.where(is_left, share * aside, 0.0))
@@ -128,8 +129,11 @@ MARGIN = 10.0
 
 
 @dataclass(frozen=True, eq=False)
-class _Frame:
-    """A vehicle on the rows that are looked at: middle, heading, size, and where it is present and may move."""
+class Frame:
+    """A vehicle on the rows that are looked at: middle, heading, size, and where it is present and may move.
+
+    Or one of two vehicles each row, of a moment: size is then an array, too. Shape (n,).
+    """
 
     x: FloatArray
     y: FloatArray
@@ -137,11 +141,12 @@ class _Frame:
     deviation: FloatArray
     can_move: NDArray[np.bool_]
     present: NDArray[np.bool_]
-    length: float
-    width: float
+    length: float | FloatArray
+    width: float | FloatArray
 
     @classmethod
-    def of(cls, sampled: SampledVehicle, rows: IntArray) -> _Frame:
+    def of(cls, sampled: SampledVehicle, rows: IntArray) -> Frame:
+        """Of one vehicle at some rows of its motion, shape (n,)."""
         motion = sampled.motion
         box = motion.entity.bounding_box
         heading = motion.heading[rows]
@@ -158,8 +163,8 @@ class _Frame:
         )
 
 
-def _widening(
-    own: _Frame, other: _Frame, heeds: frozenset[str]
+def widened(
+    own: Frame, other: Frame, heeds_left: bool | NDArray[np.bool_], heeds_right: bool | NDArray[np.bool_]
 ) -> tuple[FloatArray, NDArray[np.bool_], NDArray[np.bool_]] | None:
     """By how much the gap to the other is widened, whether the other is to the left, and whether its profile heeds it.
 
@@ -178,13 +183,13 @@ def _widening(
     nominal = np.abs(aside) - half
     gap = nominal + np.where(is_left, 1.0, -1.0) * (other.deviation - own.deviation)
     free = np.maximum(np.abs(along) - 0.5 * (own.length + other.length), 0.0)
-    heeded = np.where(is_left, "left" in heeds, "right" in heeds)
+    heeded = np.where(is_left, heeds_left, heeds_right)
     weight = 1.0 - smooth_step(free / np.where(heeded, HEEDED_FADES, FADES))
     weight *= smooth_step(nominal / ENTERING) * (near & same_way)
     return weight * np.where(heeded, wider(gap, heeded=True), wider(gap, heeded=False)), is_left, heeded
 
 
-def _part(overtakes: NDArray[np.bool_], heeded: NDArray[np.bool_]) -> FloatArray:
+def part_of(overtakes: NDArray[np.bool_], heeded: NDArray[np.bool_]) -> FloatArray:
     """What a vehicle takes of a widening, by whether it is the overtaking one and heeds the other, shape (n,). [-]
 
     By itself `motorway` moves 0.209 m from whom it overtakes and 0.083 m from who overtakes it, where real vehicles

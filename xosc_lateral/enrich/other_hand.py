@@ -29,10 +29,11 @@ def mirrored(segment: Segment) -> Segment:
     curvature and crossfall change their sign, the wind its side; lanes are counted from the other edge. A column of
     another name stays.
     """
-    return replace(segment, context=_mirrored(segment.context))
+    return replace(segment, context=mirrored_context(segment.context))
 
 
-def _mirrored(context: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
+def mirrored_context(context: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
+    """Context columns with left and right exchanged; shapes and units as they are."""
     found = {other_side(name): values for name, values in context.items()}
     for name in OTHER_SIGN:
         if name in found:

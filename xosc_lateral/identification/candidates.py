@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.driver.effects import (
+    EFFECTS,
     Acts,
     Angular,
     ColumnEffect,
@@ -34,9 +35,10 @@ from xosc_lateral.driver.effects import (
     Proximity,
     Saturating,
     Threshold,
+    known_effects,
 )
-from xosc_lateral.identification.columns import Column, Role
-from xosc_lateral.identification.offered import offered_effects
+from xosc_lateral.identification.columns import Column, Values
+from xosc_lateral.identification.roles import Role
 
 FloatArray = NDArray[np.float64]
 
@@ -54,6 +56,9 @@ SCALES = (0.25, 0.5, 0.75)
 
 FINE_SCALES = (0.35, 0.5, 0.7, 1.0, 1.4, 2.0)
 """Scales that refinement tries, alone and in products, as shares of the median distance. [-]"""
+
+NEAR = 2.0 / 3.0
+"""A distance comes near: its 5 % quantile is below this share of its median. [-]"""
 
 PHASES = np.pi * np.arange(4) / 4.0
 """Directions that an angle is projected on: at most 8 % of a score is lost between two of them. [rad]"""
@@ -100,15 +105,16 @@ class Candidate:
 def candidates_of(columns: Sequence[Column], context: Mapping[str, FloatArray], *, most: int) -> list[Candidate]:
     """All candidates; `context` holds the road-following rows alone.
 
-    Beyond `most` columns, products are those of levels and switches with all others.
+    Beyond `most` columns, products are of those whose role is known before any others.
     """
     plain = [shape for column in columns for shape in _plain(column, context[column.name])]
     bent = [shape for column in columns for shape in _bent(column, context[column.name])]
+    known_first = sorted(columns, key=lambda column: column.role is Role.UNKNOWN)[:most]
+    paired = [column for column in columns if column in known_first]
     factors = {column.name: _factors(column, context[column.name]) for column in columns}
     pairs: list[tuple[ColumnEffect, tuple[float, ...]]] = [
         (Product(acts=Acts.LOCATION, factors=pair), (1.0,))
-        for first, second in combinations(columns, 2)
-        if len(columns) <= most or {first.role, second.role} & {Role.LEVELS, Role.SWITCH}
+        for first, second in combinations(paired, 2)
         for pair in _pairs(first, second, factors)
     ]
     families = {Family.PLAIN: plain, Family.BENT: bent, Family.PRODUCT: pairs}
@@ -146,7 +152,7 @@ def shapes_of(column: Column, values: FloatArray, *, curves: bool) -> Shapes:
 
 
 def _fading(column: Column, values: FloatArray) -> Iterator[tuple[ColumnEffect, tuple[float, ...]]]:
-    if column.gaps and column.role is Role.NUMBER and (scale := _scale(values, 0.5)) > 0.0:
+    if column.gaps and column.values is Values.NUMBER and (scale := _scale(values, 0.5)) > 0.0:
         for share in FINE_SCALES:
             yield Proximity(acts=Acts.LOCATION, column=column.name, scale=share * scale), (1.0,)
 
@@ -157,7 +163,7 @@ def _unique(shapes: Iterator[tuple[ColumnEffect, tuple[float, ...]]]) -> list[Co
 
 def _curves(column: Column, values: FloatArray) -> list[ColumnEffect]:
     """Curves with one or two bends; a neighbour that is not there is far away, which a curve does not say."""
-    if column.role is not Role.NUMBER or column.gaps:
+    if column.values is not Values.NUMBER or column.gaps:
         return []
     knots = np.unique(_quantiles(values[np.isfinite(values)], KNOTS)).tolist()
     return [
@@ -169,7 +175,7 @@ def _curves(column: Column, values: FloatArray) -> list[ColumnEffect]:
 
 def _plain(column: Column, values: FloatArray) -> Iterator[tuple[ColumnEffect, tuple[float, ...]]]:
     name = column.name
-    if column.role is Role.ANGLE:
+    if column.values is Values.ANGLE:
         angular = Angular(acts=Acts.LOCATION, column=name, period=column.period)
         yield from ((angular, (float(np.sin(phase)), float(np.cos(phase)))) for phase in PHASES)
         return
@@ -177,7 +183,7 @@ def _plain(column: Column, values: FloatArray) -> Iterator[tuple[ColumnEffect, t
         yield Linear(acts=Acts.LOCATION, column=name), (1.0,)
     if column.gaps:
         yield Nearness(acts=Acts.LOCATION, column=name, presence=True), (1.0,)
-        if column.role is Role.NUMBER and (scale := _scale(values, 0.5)) > 0.0:
+        if column.values is Values.NUMBER and (scale := _scale(values, 0.5)) > 0.0:
             yield Proximity(acts=Acts.LOCATION, column=name, scale=scale), (1.0,)
 
 
@@ -187,10 +193,10 @@ def _bent(
     name, seen = column.name, values[np.isfinite(values)]
     for effect in offered_effects(name, values):
         yield effect, (1.0,) * effect.quantity({name: values[:1]}).shape[1]
-    if column.role is Role.LEVELS:
+    if column.values is Values.LEVELS:
         for level in column.levels:
             yield Levels(acts=Acts.LOCATION, column=name, levels=(level,)), (1.0,)
-    if column.role is not Role.NUMBER or not _varies(values):
+    if column.values is not Values.NUMBER or not _varies(values):
         return
     for at in np.unique(_quantiles(seen, limits)):
         if seen.min() < at < seen.max():
@@ -215,12 +221,12 @@ def _bent(
 def _factors(column: Column, values: FloatArray) -> list[Factor]:
     """How a column enters products: a number about its natural zero, else about its median."""
     name = column.name
-    if column.role is Role.ANGLE:
+    if column.values is Values.ANGLE:
         return [Factor(column=name, form=form, at=column.period) for form in (Form.SINE, Form.COSINE)]
-    if column.role is Role.LEVELS:
+    if column.values is Values.LEVELS:
         return [Factor(column=name, form=Form.EQUALS, at=level) for level in column.levels]
     found = []
-    if column.role is Role.SWITCH:
+    if column.values is Values.SWITCH:
         high = max(column.levels)
         return [
             Factor(column=name, form=Form.EQUALS, at=high)
@@ -240,7 +246,7 @@ def _factors(column: Column, values: FloatArray) -> list[Factor]:
 def _pairs(first: Column, second: Column, factors: Mapping[str, list[Factor]]) -> Iterator[tuple[Factor, Factor]]:
     for one in factors[first.name]:
         for other in factors[second.name]:
-            if Role.ANGLE in (first.role, second.role):  # a vector's component: speed counts from its own zero
+            if Values.ANGLE in (first.values, second.values):  # a vector's component: speed counts from its own zero
                 one_, other_ = (Factor(column=f.column) if f.form is Form.VALUE else f for f in (one, other))
                 yield one_, other_
             else:
@@ -263,12 +269,23 @@ def _quantiles(seen: FloatArray, shares: Sequence[float]) -> FloatArray:
 
 
 def _scale(values: FloatArray, share: float) -> float:
-    """Quantile of the size of what is there and not zero: overlapping vehicles have distance 0 and tell no scale."""
+    """Quantile of the size of what is there and not zero: overlapping vehicles have distance 0 and tell no scale.
+
+    0 for what never comes near, as a leader's speed: nearness to it is whether there is a leader, and no more.
+    """
     size = np.abs(values[np.isfinite(values)])
     size = size[size > 0.0]
-    return float(np.quantile(size, share)) if len(size) else 0.0
+    if not len(size) or float(np.quantile(size, 0.05)) > NEAR * float(np.median(size)):
+        return 0.0
+    return float(np.quantile(size, share))
 
 
 def _varies(values: FloatArray) -> bool:
     seen = values[np.isfinite(values)]
     return len(seen) > 1 and bool(np.ptp(seen) > 0.0)
+
+
+def offered_effects(column: str, values: NDArray[np.float64]) -> list[ColumnEffect]:
+    """What installed plug-ins propose for a column with these values, shape (n,), without coefficients."""
+    kinds = [kind for kind in known_effects() if kind not in EFFECTS and issubclass(kind, ColumnEffect)]
+    return [effect for kind in kinds for effect in kind.proposals(column, values)]

@@ -4,35 +4,33 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
 
+from xosc_lateral.driver.effects import Effect
 from xosc_lateral.driver.models.kinds import ModelKind
 from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.driver.provenance import Provenance
 from xosc_lateral.drives.drive import Drive
-from xosc_lateral.identification.blocks import held_out_words, hold_out_blocks
-from xosc_lateral.identification.columns import Column
-from xosc_lateral.identification.feedback import Feedback
-from xosc_lateral.identification.findings import (
-    Compared,
-    Finding,
-    describe_finding,
-    population_finding,
-    spectrum_finding,
+from xosc_lateral.identification.core_model import (
+    DriverVariance,
+    SpectrumShape,
+    compare_spectrum_shapes,
+    test_population,
 )
-from xosc_lateral.identification.held_out import Setting, fit_without, score_held_out
-from xosc_lateral.identification.identify import Progress, identify, initial_terms
-from xosc_lateral.identification.nested import Gain
-from xosc_lateral.identification.population import DriverVariance, test_population
+from xosc_lateral.identification.findings import Finding, describe_finding, population_finding, spectrum_finding
+from xosc_lateral.identification.held_out import HeldOut, Setting, fit_without, score_held_out
+from xosc_lateral.identification.held_out_gain import held_out_words, hold_out_blocks
+from xosc_lateral.identification.identify import Identified, Progress, identify, initial_terms
 from xosc_lateral.identification.regression import Coarse, Fitted, fit_model
 from xosc_lateral.identification.removal import Estimates, estimate_all, removal_of
-from xosc_lateral.identification.residual import SummaryStatistics, floor_of
+from xosc_lateral.identification.residual import floor_of, size_of, split_differences
 from xosc_lateral.identification.scorecard import Scorecard, score_runs
-from xosc_lateral.identification.seeds import LoopSeed
-from xosc_lateral.identification.selection import Rejected, Selection
-from xosc_lateral.identification.spectrum_shape import SpectrumShape, compare_spectrum_shapes
+from xosc_lateral.identification.selection import Accepted, Selection
+from xosc_lateral.identification.significance import LoopSeed
+from xosc_lateral.identification.terms.base import Term
 from xosc_lateral.identification.terms.between import between_shift
 from xosc_lateral.identification.timeline import join_drives
 
@@ -42,81 +40,81 @@ NO_WORSE = 1.05
 """The held-out error of a profile with more effects may be so many times the base's: 24 runs leave 2 % of noise. [-]"""
 
 
-@dataclass(frozen=True, eq=False)
+HARMFUL = "significant, but with it held-out blocks are predicted worse by its own quantity, beyond what chance does"
+"""Why an effect that does not help is taken back."""
+
+SPLITS = 16
+"""Random halves of the blocks that tell how far chance moves an effect's own error."""
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
 class LoopResult:
     """What the loop found, as data; `xosc_lateral.report.loop` turns it into words.
 
     Parameters
     ----------
-    names : tuple of str
-        Drives.
     base, refined : DriverProfile
         Before and after.
     given : bool
         Whether the base was given; else it was fitted first.
     findings : tuple of Finding
     coarse : Coarse
-    final : Fitted
-        All accepted terms, fitted to everything.
-    columns : list of Column
-        That were looked at.
-    feedback : list of Feedback
-        Columns that follow from the car's own movement.
-    rejected : tuple of Rejected
-    unused : mapping of str to str
-        Columns that were not looked at, and why.
-    gain : Gain or None
-        Nested held-out gain of all findings together; None: nothing was found.
-    returned_base : str
-        Why the base is returned although effects were found; empty otherwise.
+    identified : Identified
+        Terms that are kept and those that are not, and the columns.
     spectrum : SpectrumShape
         How the base's own runs compare with the drives from band to band.
     population : DriverVariance or None
         How much the drives differ; None with too few of them.
-    held_out : str
-        What was held out, in words.
-    statistics : SummaryStatistics
+    scored : HeldOut
+        Both profiles on held-out blocks.
     unmoved : array, shape (n,)
         Measured offsets less the effects on the mean. [m]
-    real, before, after : mapping of str to array
-        Summary statistics of measured and expected offsets on held-out blocks. [m]
-    error_before, error_after, floor : float
-        [m]
+    floor : float
+        What the measured drives differ from themselves by. [m]
     scores : Scorecard
         The ten metrics.
-    runs_before, runs_after : array, shape (runs, n)
-        Held-out runs of both profiles. [m]
     seed : int
     """
 
-    names: tuple[str, ...]
     base: DriverProfile
     refined: DriverProfile
     given: bool
     findings: tuple[Finding, ...]
     coarse: Coarse
-    final: Fitted
-    columns: list[Column]
-    feedback: list[Feedback]
-    rejected: tuple[Rejected, ...]
-    unused: dict[str, str]
-    gain: Gain | None
-    returned_base: str
+    identified: Identified
     spectrum: SpectrumShape
     population: DriverVariance | None
-    held_out: str
-    statistics: SummaryStatistics
+    scored: HeldOut
     unmoved: FloatArray
-    real: dict[str, FloatArray]
-    before: dict[str, FloatArray]
-    after: dict[str, FloatArray]
-    error_before: float
-    error_after: float
     floor: float
     scores: Scorecard
-    runs_before: FloatArray
-    runs_after: FloatArray
     seed: int
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Drives."""
+        return self.coarse.timeline.names
+
+    @property
+    def final(self) -> Fitted:
+        """All terms that are kept, fitted to everything."""
+        return self.identified.selection.final
+
+    @property
+    def error_before(self) -> float:
+        """Of the base on held-out blocks. [m]"""
+        return self.scored.errors[0]
+
+    @property
+    def error_after(self) -> float:
+        """Of the refined profile. [m]"""
+        return self.scored.errors[1]
+
+    @property
+    def held_out(self) -> str:
+        """What was held out, in words."""
+        timeline = self.coarse.timeline
+        return held_out_words(timeline, hold_out_blocks(timeline))
 
 
 def close_loop(
@@ -127,6 +125,7 @@ def close_loop(
     name: str = "refined",
     provenance: Provenance | None = None,
     excluded: Sequence[str] = (),
+    roles: Mapping[str, str] = MappingProxyType({}),
     progress: Progress = lambda share, what: None,
 ) -> LoopResult:
     """Find what a profile fails to reproduce, trace it, add it, and score it on held-out blocks.
@@ -144,12 +143,17 @@ def close_loop(
         What is known about the drives.
     excluded : sequence of str
         Columns that are not to be looked at.
+    roles : mapping of str to str
+        What columns are: column -> road, weather, traffic, time, own, driver or unknown. Those that it lacks are
+        proposed from name and values.
     progress : callable
 
     Raises
     ------
     NotEnoughDataError
         When less than two minutes of road-following are left after cutting.
+    FormatError
+        A role that there is not, or of a column that the drives lack.
     """
     root = np.random.SeedSequence(seed)
     progress(0.0, "reading the drives")
@@ -164,19 +168,14 @@ def close_loop(
     spectrum = compare_spectrum_shapes(base, timeline, root)
     # the loop's own base knows what class, lane and speed do as `fit` has it; what acts is found, not begun with
     initial = initial_terms(base, timeline) if given else ()
-    found = identify(coarse, root, initial=initial, excluded=excluded, progress=progress)
-    population = test_population(found.selection.final, between_shift(found.selection.final))
+    found = identify(coarse, root, initial=initial, excluded=excluded, roles=roles, progress=progress)
+    final = found.selection.final
+    population = test_population(final, between_shift(final))
     differ = population is not None and population.found
     refined_kind = ModelKind.AUTOREGRESSIVE if spectrum.found or differ else kind
     blocks = hold_out_blocks(timeline)
     setting = Setting(coarse, blocks, base if given else None, kind, refined_kind, root)
-    scored = score_held_out(setting, found.selection, found.nested, found.columns, progress)
-    before, after = scored.errors
-    if found.selection.accepted and kind is refined_kind and after > NO_WORSE * before:
-        found = found.emptied(
-            f"with the effects that were found the held-out error rises from {before:.4f} to {after:.4f} m"
-        )
-        scored = score_held_out(setting, found.selection, None, found.columns, progress)
+    found, scored = _that_helps(setting, found, progress)
     selection = found.selection
     progress(0.95, "refitting on everything")
     estimates = estimate_all(selection.final)
@@ -184,10 +183,10 @@ def close_loop(
     if selection.accepted or not given or kind is not refined_kind:
         refined = fit_without(selection.final, estimates, everything, refined_kind, name, provenance)
     unmoved = timeline.offset - removal_of(selection.final, estimates).location
-    compared = (scored.real, scored.before, scored.after)
-    findings = _findings(selection, estimates, found.gains, compared)
+    findings = _findings(selection, estimates, scored)
     if kind is ModelKind.TWO_LEVEL:
         # what the core model lacks is found once, by replacing it; the autoregressive one has both
+        compared = scored.compared
         findings += [spectrum_finding(spectrum, compared)] if spectrum.found else []
         findings += [population_finding(population, compared)] if population is not None and population.found else []
     rng = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(LoopSeed.BLOCKS,)))
@@ -195,26 +194,74 @@ def close_loop(
     scores = score_runs(timeline, scored.runs_before, scored.runs_after, blocks, rng)
     progress(1.0, "done")
     return LoopResult(
-        timeline.names, base, refined, given, tuple(findings), coarse, selection.final, found.columns, found.feedback,
-        selection.rejected, dict(found.unused), found.total if found.gains else None,
-        found.returned_base, spectrum, population, held_out_words(timeline, blocks), scored.statistics,
-        unmoved, scored.real,
-        scored.before, scored.after, *scored.errors, floor, scores, scored.runs_before, scored.runs_after, seed,
-    )  # fmt: skip
+        base=base,
+        refined=refined,
+        given=given,
+        findings=tuple(findings),
+        coarse=coarse,
+        identified=found,
+        spectrum=spectrum,
+        population=population,
+        scored=scored,
+        unmoved=unmoved,
+        floor=floor,
+        scores=scores,
+        seed=seed,
+    )
 
 
-def _findings(
-    selection: Selection,
-    estimates: Estimates,
-    gains: Mapping[int, Gain],
-    compared: Compared,
-) -> list[Finding]:
+def _that_helps(setting: Setting, found: Identified, progress: Progress) -> tuple[Identified, HeldOut]:
+    """Less what makes held-out blocks look less like the profile, the worst first; and how the rest is scored."""
+    while True:
+        scored = score_held_out(setting, found.selection, found.nested, found.usable.columns, progress)
+        before, after = scored.errors
+        if not found.selection.accepted:
+            return found, scored
+        harmful = _most_harmful(setting, found, scored)
+        if harmful is not None:
+            found = found.without([harmful], HARMFUL)
+        elif setting.kind is setting.refined_kind and after > NO_WORSE * before:
+            why = f"with the effects that were found the held-out error rises from {before:.4f} to {after:.4f} m"
+            found = found.without([one.term for one in found.selection.accepted], why)
+        else:
+            return found, scored
+
+
+def _most_harmful(setting: Setting, found: Identified, scored: HeldOut) -> Term | None:
+    """The accepted term with which held-out mean or spread by its own quantity differ most from what is measured.
+
+    Of those that are not sure to gain likelihood there, and by more than halves of the drives differ: an error grows by
+    chance as well.
+    """
+    fitted = found.selection.final
+    estimates = estimate_all(fitted)
+    rng = np.random.default_rng(np.random.SeedSequence(setting.root.entropy, spawn_key=(LoopSeed.BLOCKS,)))
+    offset = setting.coarse.timeline.offset - removal_of(fitted, estimates).location
+    splits = split_differences(scored.statistics, offset, setting.blocks, rng, SPLITS)
+    worst: tuple[float, Term | None] = (0.0, None)
+    for one, key, effects in _accepted(found.selection, estimates):
+        if one.gain is not None and one.gain.interval[0] > 0.0:
+            continue
+        own = {f"{what} by effect: {key}" for what in ("mean", "spread")} & set(scored.real)
+        for group in own or {one.term.describe(fitted, effects, key).statistic} & set(scored.real):
+            before, after = (size_of({"": scored.real[group] - side[group]}) for side in (scored.before, scored.after))
+            chance = np.mean([size_of({"": split[group]}) ** 2 for split in splits])
+            loss = (after**2 - before**2) / max(float(chance), 1e-300)
+            worst = max(worst, (loss, one.term), key=lambda pair: pair[0]) if loss > 1.0 else worst
+    return worst[1]
+
+
+def _accepted(selection: Selection, estimates: Estimates) -> list[tuple[Accepted, str, tuple[Effect, ...]]]:
+    """What was accepted, with its key and what the profile gets."""
     keys = {id(term): (key, effects) for key, (term, effects) in estimates.items()}
-    found = []
-    for one in selection.accepted:
-        key, effects = keys[id(one.term)]
-        found.append(describe_finding(one, key, selection.final, effects, gains.get(id(one.term)), compared))
-    return found
+    return [(one, *keys[id(one.term)]) for one in selection.accepted]
+
+
+def _findings(selection: Selection, estimates: Estimates, scored: HeldOut) -> list[Finding]:
+    return [
+        describe_finding(one, key, selection.final, effects, scored.compared)
+        for one, key, effects in _accepted(selection, estimates)
+    ]
 
 
 def _kind_of(profile: DriverProfile) -> ModelKind:

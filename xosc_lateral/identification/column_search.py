@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
-from typing import ClassVar, Protocol, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.driver.effects import ColumnEffect
-from xosc_lateral.identification.alternatives import Alternatives
 from xosc_lateral.identification.dictionary import (
     CROSS_BASIS,
     NULL_DRAWS,
@@ -22,11 +20,11 @@ from xosc_lateral.identification.dictionary import (
 )
 from xosc_lateral.identification.problem import Problem
 from xosc_lateral.identification.refinement import Refined, Refinement
-from xosc_lateral.identification.regression import Fitted, ModelTerm, fit_model
+from xosc_lateral.identification.regression import Fitted, fit_model
 from xosc_lateral.identification.search import Likeliest, Search
-from xosc_lateral.identification.seeds import LoopSeed
-from xosc_lateral.identification.significance import upper_tail
-from xosc_lateral.identification.terms.base import Outcome, Term
+from xosc_lateral.identification.significance import LoopSeed, upper_tail
+from xosc_lateral.identification.terms.base import Outcome
+from xosc_lateral.identification.terms.column import ColumnTerm
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
@@ -53,39 +51,35 @@ ROUNDS = 2
 """Times that what acts is looked for beside what was found before; the first changes most."""
 
 
-class ColumnKind(ModelTerm, Protocol):
-    """What the search asks of a kind of term; see `terms.column.ColumnTerm`."""
-
-    component: ClassVar[str]
-    single: ClassVar[bool]
-
-    @property
-    def columns(self) -> tuple[str, ...]:
-        """Columns that it reads."""
-        ...
+class SearchedTerm(ColumnTerm):
+    """An effect that the dictionary is searched for, in a regression of its own."""
 
     @classmethod
-    def of(cls, effect: ColumnEffect, alike: Alternatives = ()) -> Self:
-        """A term of an effect."""
-        ...
-
-    @classmethod
+    @abstractmethod
     def problem(cls, fitted: Fitted) -> Problem:
-        """Its regression."""
-        ...
+        """Regression in which a column of this kind is looked for, with the terms fitted already."""
 
     @classmethod
     def reweighted(cls, fitted: Fitted, after: Fitted) -> Problem | None:
-        """The regression beside `fitted`, weighted by the noise that is left in `after`; None: it is the same."""
-        ...
+        """The same regression beside `fitted`, weighted by the noise that is left in `after`; None: no other."""
+        return None
 
     @classmethod
     def barred(cls, fitted: Fitted) -> frozenset[str]:
-        """Columns that it may not take up."""
-        ...
+        """Columns that this kind may not take up beside the terms fitted."""
+        return frozenset()
+
+    @classmethod
+    def test(cls, search: Search, fitted: Fitted) -> Outcome | None:
+        """The best candidate of the whole dictionary against rotations."""
+        return find_column(search, cls, fitted)
+
+    def probability_beside(self, search: Search, fitted: Fitted) -> float:
+        """p-value of its columns in whatever shape suits them beside the terms fitted."""
+        return probability_of(search, type(self), fitted, self.columns)
 
 
-def find_column(search: Search, kind: type[ColumnKind], fitted: Fitted) -> Outcome | None:
+def find_column(search: Search, kind: type[SearchedTerm], fitted: Fitted) -> Outcome | None:
     """Best candidate of one kind; None: there is no candidate.
 
     The p-value is that of a score test [1]_: data and null are whitened alike, by what is left *without* the candidate.
@@ -110,12 +104,11 @@ def find_column(search: Search, kind: type[ColumnKind], fitted: Fitted) -> Outco
             return Outcome(None, found.effect.columns, p_value)
         term, after = _best(search, kind, fitted, scored, refused)
         if not _grows(fitted, after) and after.log_likelihood >= fitted.log_likelihood - ROUNDING:
-            assert isinstance(term, Term)
             return Outcome(term, term.columns, p_value, after)
         refused.add(term.columns)
 
 
-def probability_of(search: Search, kind: type[ColumnKind], fitted: Fitted, columns: tuple[str, ...]) -> float:
+def probability_of(search: Search, kind: type[SearchedTerm], fitted: Fitted, columns: tuple[str, ...]) -> float:
     """p-value of the best candidate of given columns, against the same null as in `find_column`.
 
     Parameters
@@ -131,21 +124,21 @@ def probability_of(search: Search, kind: type[ColumnKind], fitted: Fitted, colum
     return upper_tail(float(scored.scores.scores[own].max()), scored.scores.maxima) if own else 1.0
 
 
-def best_probability(search: Search, kind: type[ColumnKind], fitted: Fitted) -> float:
+def best_probability(search: Search, kind: type[SearchedTerm], fitted: Fitted) -> float:
     """p-value of the best candidate of all, before refinement."""
     best = _likeliest(search, kind, fitted)
     return 1.0 if best is None else best.p_value
 
 
-def likely_response(search: Search, kind: type[ColumnKind], fitted: Fitted, level: float) -> FloatArray:
-    """Response of the best candidate, shape (n, 1), where its p-value is at most `level`; else of shape (n, 0)."""
+def likely_response(search: Search, kind: type[SearchedTerm], fitted: Fitted, level: float) -> tuple[FloatArray, float]:
+    """Response of the best candidate and its p-value, shape (n, 1) where that is at most `level`; else (n, 0)."""
     best = _likeliest(search, kind, fitted)
     if best is None or best.p_value > level:
-        return np.zeros((len(fitted.coarse), 0))
-    return fitted.coarse.response(best.effect)
+        return np.zeros((len(fitted.coarse), 0)), 1.0
+    return fitted.coarse.response(best.effect), best.p_value
 
 
-def _likeliest(search: Search, kind: type[ColumnKind], fitted: Fitted) -> Likeliest | None:
+def _likeliest(search: Search, kind: type[SearchedTerm], fitted: Fitted) -> Likeliest | None:
     def score() -> Likeliest | None:
         scored = _score_all(search, kind, fitted)
         return None if scored is None else scored.likeliest()
@@ -153,7 +146,9 @@ def _likeliest(search: Search, kind: type[ColumnKind], fitted: Fitted) -> Likeli
     return search.likeliest(kind, fitted, score)
 
 
-def _score_all(search: Search, kind: type[ColumnKind], fitted: Fitted, spared: tuple[str, ...] = ()) -> _Scored | None:
+def _score_all(
+    search: Search, kind: type[SearchedTerm], fitted: Fitted, spared: tuple[str, ...] = ()
+) -> _Scored | None:
     problem = kind.problem(fitted)
     dictionary = search.dictionary(kind, fitted, problem)
     return _score(search, kind, fitted, problem, dictionary, (), draws=NULL_DRAWS, spared=spared)
@@ -176,7 +171,7 @@ class _Scored:
 
 def _score(
     search: Search,
-    kind: type[ColumnKind],
+    kind: type[SearchedTerm],
     fitted: Fitted,
     problem: Problem,
     dictionary: Dictionary,
@@ -197,15 +192,15 @@ def _score(
 
 
 def _best(
-    search: Search, kind: type[ColumnKind], fitted: Fitted, scored: _Scored, refused: Collection[tuple[str, ...]]
-) -> tuple[ColumnKind, Fitted]:
+    search: Search, kind: type[SearchedTerm], fitted: Fitted, scored: _Scored, refused: Collection[tuple[str, ...]]
+) -> tuple[SearchedTerm, Fitted]:
     """The term that the best candidate becomes, and the fit with it.
 
     *That* something acts is tested with the noise that is left without it, for data and null alike. *What* acts is
     looked for once more with the noise that is left beside what was found: a strong slow effect makes the noise look
     slow, and against slow noise a quicker look-alike stands out better than the effect itself.
     """
-    term: ColumnKind = kind.of(scored.dictionary.timed(scored.scores.best))
+    term: SearchedTerm = kind.of(scored.dictionary.timed(scored.scores.best))
     after = fit_model(fitted.coarse, (*fitted.terms, term))
     best: Refined | None = None
     for _ in range(ROUNDS):
@@ -246,7 +241,9 @@ def _grows(before: Fitted, after: Fitted) -> bool:
     return len(sums) > 1 and float(sums.sum()) < -GROWN * float(np.std(sums, ddof=1)) * np.sqrt(len(sums))
 
 
-def _known(problem: Problem, dictionary: Dictionary, own: Sequence[ColumnKind], spared: tuple[str, ...]) -> FloatArray:
+def _known(
+    problem: Problem, dictionary: Dictionary, own: Sequence[SearchedTerm], spared: tuple[str, ...]
+) -> FloatArray:
     """What the model has already, and the whole cross-basis of its columns, but for one set that is `spared`: nothing
     may be blamed on their likes."""
     known = problem.known
@@ -260,7 +257,7 @@ def _known(problem: Problem, dictionary: Dictionary, own: Sequence[ColumnKind], 
     return orthonormal(np.concatenate(blocks, axis=1), 1e-6)
 
 
-def _refined(search: Search, kind: type[ColumnKind], scored: _Scored) -> tuple[Refined, ColumnKind]:
+def _refined(search: Search, kind: type[SearchedTerm], scored: _Scored) -> tuple[Refined, SearchedTerm]:
     """Refine the best sets of columns; the best of them, which knows what others explain as much."""
     from scipy.stats import chi2
 
@@ -287,7 +284,7 @@ def _contenders(dictionary: Dictionary, scores: Scores) -> list[int]:
 
     A product of a column and what is nearly constant wherever it acts is that column: refined, the cheaper one wins.
     """
-    order = np.argsort(-scores.scores)
+    order = np.argsort(-scores.scores, kind="stable")
     best: dict[tuple[str, ...], int] = {}
     for index in order:
         if scores.scores[index] < scores.scores[scores.best] - WITHIN or len(best) == CONTENDERS:
@@ -301,7 +298,7 @@ def _contenders(dictionary: Dictionary, scores: Scores) -> list[int]:
 
 
 def _barred(
-    dictionary: Dictionary, kind: type[ColumnKind], fitted: Fitted, refused: Collection[tuple[str, ...]]
+    dictionary: Dictionary, kind: type[SearchedTerm], fitted: Fitted, refused: Collection[tuple[str, ...]]
 ) -> BoolArray:
     """Entries that this kind may not take up."""
     columns = kind.barred(fitted)

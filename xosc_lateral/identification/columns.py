@@ -8,6 +8,7 @@ from enum import Enum
 import numpy as np
 from numpy.typing import NDArray
 
+from xosc_lateral.identification.roles import Role
 from xosc_lateral.identification.timeline import Timeline
 
 FloatArray = NDArray[np.float64]
@@ -19,8 +20,8 @@ MIN_SHARE = 0.004
 """A level or presence on for less than this share of the road-following time (12 s of 50 min) tells nothing. [-]"""
 
 
-class Role(Enum):
-    """How a column can act."""
+class Values(Enum):
+    """What values a column has: they say how it can act."""
 
     NUMBER = "number"
     SWITCH = "switch"
@@ -36,7 +37,7 @@ class Column:
     ----------
     name : str
         Column.
-    role : Role
+    values : Values
         How it can act.
     gaps : bool
         NaN ("there is none") occurs often enough to tell.
@@ -44,13 +45,16 @@ class Column:
         Values, for a switch or levels; those that are rare left out.
     period : float
         Full circle of an angle, else 0.
+    role : Role
+        What it is.
     """
 
     name: str
-    role: Role
+    values: Values
     gaps: bool
     levels: tuple[float, ...] = ()
     period: float = 0.0
+    role: Role = Role.UNKNOWN
 
 
 def known_columns(timeline: Timeline) -> tuple[list[Column], dict[str, str]]:
@@ -79,14 +83,14 @@ def read_column(name: str, seen: FloatArray, period: float) -> Column | str:
     values = seen[there]
     gaps = MIN_SHARE <= share <= 1.0 - MIN_SHARE
     if period > 0.0:
-        return Column(name, Role.ANGLE, gaps, period=period)
+        return Column(name, Values.ANGLE, gaps, period=period)
     low, high = np.quantile(values, [MIN_SHARE, 1.0 - MIN_SHARE])
     levels = _levels(values)
     if len(levels) == 1 or (not levels and high - low <= 1e-9 * max(1e-9, abs(low), abs(high))):
-        return Column(name, Role.NUMBER, True) if gaps and not levels else "it hardly varies"
+        return Column(name, Values.NUMBER, True) if gaps and not levels else "it hardly varies"
     if len(levels) > MAX_LEVELS or not levels:
-        return Column(name, Role.NUMBER, gaps)
-    return Column(name, Role.SWITCH if len(levels) == 2 else Role.LEVELS, gaps, levels)
+        return Column(name, Values.NUMBER, gaps)
+    return Column(name, Values.SWITCH if len(levels) == 2 else Values.LEVELS, gaps, levels)
 
 
 def _levels(values: FloatArray) -> tuple[float, ...]:

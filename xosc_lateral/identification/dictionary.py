@@ -4,6 +4,7 @@ References
 ----------
 .. [1] C. R. Rao, "Large sample tests of statistical hypotheses concerning several parameters with applications to
        problems of estimation", Proc. Cambridge Philosophical Society 44, 1948: scores, fitted under the null alone.
+.. [2] H. White, "A heteroskedasticity-consistent covariance matrix estimator", Econometrica 48, 1980.
 """
 
 from __future__ import annotations
@@ -53,6 +54,9 @@ LEFT_OVER = 0.05
 
 CROSS_BASIS = 0.01
 """Directions of a column's cross-basis with less than this share of the largest variance are left in. [-]"""
+
+ROBUST = 200
+"""Entries whose scores are set beside the squares of their own rows: those that may be the best."""
 
 CHUNK = 48
 """Candidates that are whitened at once: few enough to stay in a processor's cache."""
@@ -263,7 +267,28 @@ def score_entries(
     squared -= dictionary.costs.astype(np.float32)[:, None]
     squared[~usable] = -np.inf
     largest = squared.max(axis=0).astype(np.float64)
-    return Scores(squared[:, 0].astype(np.float64), largest[1:] if np.isfinite(largest).all() else np.zeros(0))
+    scores = _beside_loud_stretches(squared[:, 0].astype(np.float64), dictionary, left, basis)
+    return Scores(scores, largest[1:] if np.isfinite(largest).all() else np.zeros(0))
+
+
+def _beside_loud_stretches(
+    scores: FloatArray, dictionary: Dictionary, left: FloatArray, basis: SingleArray
+) -> FloatArray:
+    """Scores of the best entries beside the squares of the very rows that they rest on, where these are larger [2]_.
+
+    The null deals residuals anew, and loses that they are larger where the column is: in bends, say.
+    """
+    order = np.argsort(-scores)[:ROBUST]
+    order = order[np.isfinite(scores[order])]
+    rows = dictionary.rows[order].astype(np.float64)
+    rows -= (rows @ basis) @ basis.T
+    power = np.maximum(np.square(rows).sum(axis=1), TINY)
+    size = rows @ left / power
+    scatter = np.maximum(np.square(rows * (left - size[:, None] * rows)).sum(axis=1) / power, 1.0)
+    robust = scores.copy()
+    costs = dictionary.costs[order]
+    robust[order] = (scores[order] + costs) / scatter - costs
+    return robust
 
 
 def draw_null(residual: FloatArray, drive: IntArray, rng: np.random.Generator, draws: int = NULL_DRAWS) -> FloatArray:

@@ -1,6 +1,8 @@
 """Feedback: columns that the car's own movement brings about are no cause, whatever they correlate with.
 
-Two marks, either of them enough.
+What a column is (`roles`) comes first: what is declared to be road, weather or traffic is never a consequence, and the
+car's own movement never a cause. A name alone is overruled where both marks are strong. All others are tested for three
+marks.
 
 *Coherence.* A driver responds to a cause within seconds, as through a low-pass: above 0.2 Hz an offset shares next to
 nothing with its causes. A steering angle or a yaw rate is the movement's own derivative, and shares nearly all.
@@ -9,24 +11,28 @@ nothing with its causes. A steering angle or a yaw rate is the movement's own de
 computes from the offset (a torque that keeps the lane, a filtered copy) is predicted by it [1]_.
 
 Both are asked of the offset, its size, how far it is beyond its usual size, its speed and the size of that: what
-follows may follow in any of these ways. They are asked of every column: one that is computed from the offset jumps
+follows may follow in any of these ways. All are asked of every column: one that is computed from the offset jumps
 across its range at each lane change, and looks like an angle.
 
 References
 ----------
 .. [1] C. W. J. Granger, "Investigating causal relations by econometric models and cross-spectral methods",
    Econometrica 37, 1969.
+.. [2] L. Breiman, J. Friedman, "Estimating optimal transformations for multiple regression and correlation", J.
+   American Statistical Association 80, 1985: the conditional mean is the function that is most correlated.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.identification.columns import Column, Role
+from xosc_lateral.identification.columns import Column, Values
+from xosc_lateral.identification.roles import Assigned, Role
 from xosc_lateral.identification.timeline import Timeline
 
 FloatArray = NDArray[np.float64]
@@ -41,15 +47,25 @@ BAND = (0.2, 0.3, 0.4, 0.6, 0.8)
 """Edges of the parts of the band where a driver no longer responds, and sensors still see the car move. [Hz]"""
 
 CLEAR, ALONE = 0.2, 0.5
-"""Squared coherence from which a column is feedback if the movement foretells it too, and from which it is doubtful if
+"""Squared coherence from which a column is feedback if the movement predicts it too, and from which it is doubtful if
 not. Causes that change over ten seconds and more stay below 0.06, also where they move the car by 0.9 m; a switch that
 moves a car of little movement of its own by 0.2 m has 0.29, gusts of 3 s that push a car by 0.8 m up to 0.49;
 consequences are above 0.5, and 0.35 where most of the column is something else. [-]"""
 
 PREDICTED, PERHAPS, HARDLY = 0.05, 0.02, 0.003
-"""Share of a column's innovations that the movement foretells: from the first on it is feedback, from the second on
+"""Share of a column's innovations that the movement predicts: from the first on it is feedback, from the second on
 doubtful; below the last, coherence alone is doubtful too. Causes that share more than 0.2 (gusts that push a car by
 0.8 m) stay below 0.0006; a steering angle or a yaw rate that mostly follows the road's curves has 0.0065. [-]"""
+
+FUNCTION = 0.4
+"""Squared coherence with its own mean given the present offset or lateral speed, from which a column is a function of
+it. Warnings with hysteresis have 0.8, a lateral speed 0.4 to 0.7, causes below 0.06. [-]"""
+
+PARTS = np.concatenate([np.array([0.005, 0.01, 0.02]), np.linspace(0.04, 0.96, 24), np.array([0.98, 0.99, 0.995])])
+"""Quantiles of the movement between which that mean is taken: finer at the ends, where warnings fire. [-]"""
+
+PARTS_S = 150.0
+"""Stretches of so long are dealt to two halves; the mean of either half is taken from the other. [s]"""
 
 OWN_PAST, MOVED_PAST = 10, 5
 """Past samples of the column, and of the movement, in the test of time's direction: 2 s and 1 s."""
@@ -75,29 +91,40 @@ class Feedback:
     coherence : float
         Squared, above 0.2 Hz, with what it follows most. [-]
     predicted_share : float
-        Share of its innovations that the movement foretells. [-]
+        Share of its innovations that the movement predicts. [-]
+    function : float
+        Squared coherence, in the same band, with its own mean given the present movement. [-]
     of : str
         What it follows: "offset", "size of the offset", ...
     doubtful : bool
-        Neither mark is clear.
+        No mark is clear.
+    source : str
+        By whom it is said to be the car's own movement: "declared", "name"; empty: its values show it.
     """
 
     column: str
     coherence: float
     predicted_share: float
+    function: float
     of: str
     doubtful: bool
+    source: str = ""
 
 
-def find_feedback(timeline: Timeline, columns: Iterable[Column]) -> list[Feedback]:
+def find_feedback(
+    timeline: Timeline, columns: Iterable[Column], roles: Mapping[str, Assigned] = MappingProxyType({})
+) -> list[Feedback]:
     """Columns that follow from the movement, doubtful ones included."""
     segments = _segments(timeline.valid)
     moved = _movement(timeline)
     spectra = {name: segments.spectra(values) for name, values in moved.items()}
     rows = _rows_with_past(timeline.valid, max(OWN_PAST, MOVED_PAST))
-    floor = CHANCE / max(1, len(segments.starts))
+    limit = CHANCE / max(1, len(segments.starts))
     found = []
     for column in columns:
+        assigned = roles.get(column.name)
+        if assigned is not None and assigned.declared and assigned.role.is_exogenous:
+            continue
         values = timeline.context.get(column.name, timeline.lane_width)
         known = np.isfinite(values)
         values = np.where(known, values, np.median(values[timeline.valid & known]))
@@ -108,12 +135,39 @@ def find_feedback(timeline: Timeline, columns: Iterable[Column]) -> list[Feedbac
             shared[name] = max(shared[name], segments.coherence(size, spectra[name]))
         of = max(shared, key=lambda name: shared[name])
         # a switch has hardly any changes that could be predicted
-        changes = column.role in (Role.NUMBER, Role.ANGLE)
+        changes = column.values in (Values.NUMBER, Values.ANGLE)
         predicted_share = _predicted_share(values, moved, rows) if changes else 0.0
-        clear = predicted_share >= PREDICTED or (shared[of] >= max(CLEAR, floor) and predicted_share >= HARDLY)
-        if clear or shared[of] >= max(ALONE, floor) or predicted_share >= PERHAPS:
-            found.append(Feedback(column.name, shared[of], predicted_share, of, not clear))
+        means = {name: _mean_given(values, moved[name], timeline) for name in ("offset", "lateral speed")}
+        given = {name: segments.coherence(seen, segments.spectra(mean)) for name, mean in means.items()}
+        function = max(given.values())
+        is_function = function >= max(FUNCTION, limit)
+        clear = predicted_share >= PREDICTED or (shared[of] >= max(CLEAR, limit) and predicted_share >= HARDLY)
+        if is_function and not clear:
+            of = max(given, key=lambda name: given[name])
+        strong = predicted_share >= PREDICTED and shared[of] >= max(ALONE, limit)
+        doubtful = shared[of] >= max(ALONE, limit) or predicted_share >= PERHAPS
+        if assigned is not None and assigned.role.is_exogenous:
+            clear, doubtful = strong, False
+        if assigned is not None and assigned.role is Role.OWN:
+            found.append(Feedback(column.name, shared[of], predicted_share, function, of, False, assigned.source))
+        elif clear or is_function or doubtful:
+            sure = clear or is_function
+            found.append(Feedback(column.name, shared[of], predicted_share, function, of, not sure))
     return found
+
+
+def _mean_given(values: FloatArray, movement: FloatArray, timeline: Timeline) -> FloatArray:
+    """Mean of a column given the movement just then, by the other half of the drives; shape (n,), in its unit."""
+    part = np.searchsorted(np.unique(np.quantile(movement[timeline.valid], PARTS)), movement)
+    half = (np.arange(len(values)) // round(PARTS_S / timeline.step)) % 2
+    usual, size = float(values[timeline.valid].mean()), int(part.max()) + 1
+    result = np.full(len(values), usual)
+    for own in (0, 1):
+        other = timeline.valid & (half != own)
+        count = np.bincount(part[other], minlength=size)
+        sums = np.bincount(part[other], values[other], minlength=size)
+        result[half == own] = ((sums + usual) / (count + 1.0))[part[half == own]]
+    return result
 
 
 def _movement(timeline: Timeline) -> Mapping[str, FloatArray]:

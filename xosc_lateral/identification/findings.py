@@ -9,12 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.driver.effects import Effect
-from xosc_lateral.identification.alternatives import Alternatives
-from xosc_lateral.identification.nested import Gain
-from xosc_lateral.identification.population import DriverVariance
+from xosc_lateral.identification.core_model import DriverVariance, SpectrumShape
+from xosc_lateral.identification.held_out_gain import Gain
+from xosc_lateral.identification.refinement import Alternatives
 from xosc_lateral.identification.regression import Fitted
 from xosc_lateral.identification.selection import Accepted
-from xosc_lateral.identification.spectrum_shape import SpectrumShape
 
 FloatArray = NDArray[np.float64]
 Compared = tuple[Mapping[str, FloatArray], Mapping[str, FloatArray], Mapping[str, FloatArray]]
@@ -74,14 +73,14 @@ class Finding:
 
 
 def describe_finding(
-    one: Accepted, key: str, fitted: Fitted, effects: tuple[Effect, ...], gain: Gain | None, compared: Compared
+    one: Accepted, key: str, fitted: Fitted, effects: tuple[Effect, ...], compared: Compared
 ) -> Finding:
     """Put sizes and errors to what was accepted."""
     told = one.term.describe(fitted, effects, key)
     before, after = _errors(compared, told.statistic)
     return Finding(
         told.name, one.term.kind, one.term.columns, one.alike, told.lag_s, told.response_s, told.shape, told.size,
-        told.error, one.p_value, before, after, told.measure, effects, told.statistic, gain,
+        told.error, one.p_value, before, after, told.measure, effects, told.statistic, one.gain,
     )  # fmt: skip
 
 

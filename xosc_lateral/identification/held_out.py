@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,14 +10,14 @@ from msgspec import structs
 from numpy.typing import NDArray
 
 from xosc_lateral.driver.beside import COLUMNS
-from xosc_lateral.driver.effects import ColumnEffect, Effect
+from xosc_lateral.driver.effects import ColumnEffect, Effect, TimeSmooth
 from xosc_lateral.driver.fitting import fit_population, fit_runs
 from xosc_lateral.driver.models.kinds import ModelKind
 from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.driver.provenance import Provenance
 from xosc_lateral.errors import NotEnoughDataError
-from xosc_lateral.identification.blocks import folds_of
 from xosc_lateral.identification.columns import Column
+from xosc_lateral.identification.held_out_gain import folds_of
 from xosc_lateral.identification.nested import Nested
 from xosc_lateral.identification.regression import Coarse, Fitted, fit_model
 from xosc_lateral.identification.removal import Estimates, bare_runs, estimate_all, removal_of
@@ -28,11 +28,11 @@ from xosc_lateral.identification.residual import (
     simulated_runs,
     statistics_of,
 )
-from xosc_lateral.identification.seeds import LoopSeed
 from xosc_lateral.identification.selection import Selection
+from xosc_lateral.identification.significance import LoopSeed
 from xosc_lateral.identification.terms.base import Term
 from xosc_lateral.identification.terms.cycle import CycleTerm
-from xosc_lateral.identification.terms.step import StepTerm
+from xosc_lateral.identification.terms.time import StepTerm
 from xosc_lateral.identification.timeline import COARSE
 
 FloatArray = NDArray[np.float64]
@@ -63,6 +63,11 @@ class HeldOut:
     after: dict[str, FloatArray]
     runs_before: FloatArray
     runs_after: FloatArray
+
+    @property
+    def compared(self) -> tuple[Mapping[str, FloatArray], Mapping[str, FloatArray], Mapping[str, FloatArray]]:
+        """Summary statistics of measured offsets, before, after. [m]"""
+        return self.real, self.before, self.after
 
     @property
     def errors(self) -> tuple[float, float]:
@@ -151,6 +156,9 @@ def _quantities(selection: Selection, columns: list[Column]) -> dict[str, FloatA
         effect = effects[0] if effects else None
         if isinstance(effect, ColumnEffect):
             quantities[f"effect: {key}"] = coarse.strength(effect)
+        elif isinstance(effect, TimeSmooth):
+            path = effect.path(effect.location or effect.spread, coarse.timeline.time)
+            quantities[f"effect: {key}"] = path
         elif isinstance(term, StepTerm):
             quantities[f"effect: {key}"] = (np.arange(len(coarse.timeline)) >= term.at * COARSE).astype(float)
     return quantities

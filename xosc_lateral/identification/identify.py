@@ -5,28 +5,26 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from types import MappingProxyType
 
 import numpy as np
 from msgspec import structs
-from numpy.typing import NDArray
 
-from xosc_lateral.driver.effects import Acts, ColumnEffect, Drift, VarianceTrend
+from xosc_lateral.driver.effects import Acts, ColumnEffect, Drift, TimeSmooth, VarianceTrend
 from xosc_lateral.driver.profile import DriverProfile
-from xosc_lateral.identification.blocks import hold_out_blocks
 from xosc_lateral.identification.columns import Column, known_columns
 from xosc_lateral.identification.feedback import Feedback, find_feedback
-from xosc_lateral.identification.nested import Gain, Nested, nest
+from xosc_lateral.identification.held_out_gain import Gain, hold_out_blocks
+from xosc_lateral.identification.nested import Nested, nest
 from xosc_lateral.identification.regression import Coarse
+from xosc_lateral.identification.roles import Assigned, Role, roles_of
 from xosc_lateral.identification.search import Search
-from xosc_lateral.identification.selection import Selection, select
-from xosc_lateral.identification.stages import ERROR_BUDGET
+from xosc_lateral.identification.selection import ERROR_BUDGET, Rejected, Selection, select
 from xosc_lateral.identification.terms.base import Term
 from xosc_lateral.identification.terms.between import BetweenTerm, is_between
-from xosc_lateral.identification.terms.drift import DriftTerm
 from xosc_lateral.identification.terms.mean import MeanTerm
 from xosc_lateral.identification.terms.spread import SpreadTerm
-from xosc_lateral.identification.terms.step import StepTerm
-from xosc_lateral.identification.terms.variance_trend import VarianceTrendTerm
+from xosc_lateral.identification.terms.time import StepTerm, TimeMeanTerm, TimeSpreadTerm
 from xosc_lateral.identification.timeline import Timeline
 
 VETOED = "significant, but chosen and estimated on other blocks it predicts the held-out ones worse than nothing"
@@ -35,8 +33,33 @@ VETOED = "significant, but chosen and estimated on other blocks it predicts the 
 UNSURE = "significant by itself, but within its error of nothing beside what else was found"
 """Why a term whose size is shrunk to nothing is rejected."""
 
+CLOCK = "a clock: what changes with it changes with time, which is tested as such"
+"""Why a column that goes one way is not looked at."""
+
 Progress = Callable[[float, str], None]
 """Told the share that is done and what is being done."""
+
+
+@dataclass(frozen=True, eq=False)
+class Usable:
+    """The columns of a table.
+
+    Parameters
+    ----------
+    columns : list of Column
+        That may act.
+    feedback : list of Feedback
+        Columns that follow from the movement.
+    unused : mapping of str to str
+        Columns that are not looked at, and why.
+    roles : mapping of str to Assigned
+        What each column of the table is.
+    """
+
+    columns: list[Column]
+    feedback: list[Feedback]
+    unused: Mapping[str, str]
+    roles: Mapping[str, Assigned]
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,43 +68,36 @@ class Identified:
 
     Parameters
     ----------
+    usable : Usable
     selection : Selection
-        Terms that are kept, and everything rejected.
+        Terms that are kept, each with its held-out gain, and everything rejected.
     nested : Nested or None
         Selections of all folds; None: nothing was found.
-    gains : mapping of int to Gain
-        By identity of the term.
     total : Gain or None
         Of all kept terms together.
     returned_base : str
         Why nothing is kept although something was found; empty otherwise.
-    columns : list of Column
-        That may act.
-    feedback : list of Feedback
-        Columns that follow from the movement.
-    unused : mapping of str to str
-        Columns that tell nothing, and why.
     """
 
+    usable: Usable
     selection: Selection
-    nested: Nested | None
-    gains: Mapping[int, Gain]
-    total: Gain | None
-    returned_base: str
-    columns: list[Column]
-    feedback: list[Feedback]
-    unused: Mapping[str, str]
+    nested: Nested | None = None
+    total: Gain | None = None
+    returned_base: str = ""
 
-    def least(self, component: str) -> float | None:
-        """Smallest p-value that a component was given; None: it was not looked at."""
-        seen = [one.p_value for one in self.selection.accepted if one.term.component == component]
-        seen += [one.p_value for one in self.selection.rejected if one.component == component]
-        return min(seen) if seen else None
+    @property
+    def taken_back(self) -> tuple[Rejected, ...]:
+        """What was significant and is not kept."""
+        return tuple(one for one in self.selection.rejected if one.was_found)
 
-    def emptied(self, why: str) -> Identified:
-        """Everything that was found is taken back."""
-        out = self.selection.without([one.term for one in self.selection.accepted], why)
-        return replace(self, selection=out, gains={}, returned_base=why)
+    def without(self, terms: Sequence[Term], why: str) -> Identified:
+        """Some of what was found is taken back; the base is returned where nothing is left."""
+        out = self.selection.without(terms, why)
+        if not out.accepted:
+            return replace(self, selection=out, nested=None, total=None, returned_base=why)
+        kept = [one.term for one in out.accepted]
+        nested = None if self.nested is None else self.nested.only(kept)
+        return replace(self, selection=out, nested=nested)
 
 
 def identify(
@@ -90,9 +106,10 @@ def identify(
     *,
     initial: Sequence[Term] = (),
     excluded: Sequence[str] = (),
+    roles: Mapping[str, str] = MappingProxyType({}),
     progress: Progress = lambda share, what: None,
 ) -> Identified:
-    """Select terms, and keep those that foretell blocks on which they were neither selected nor sized.
+    """Select terms, and keep those that predict blocks on which they were neither selected nor sized.
 
     Parameters
     ----------
@@ -103,31 +120,48 @@ def identify(
         In the model already.
     excluded : sequence of str
         Columns that are not to be looked at.
+    roles : mapping of str to str
+        What columns are declared to be; see `roles`.
     progress : callable
     """
     from threadpoolctl import threadpool_limits
 
-    columns, feedback, unused = usable_columns(coarse.timeline, excluded)
+    usable = usable_columns(coarse.timeline, excluded, roles)
     # products of small matrices gain nothing from threads, and lose a factor of ten to them where all cores are busy
     with threadpool_limits(1, user_api="blas"):
-        search = Search.over(coarse, columns, seed, ERROR_BUDGET, lambda what: progress(0.1, what))
+        search = Search.over(coarse, usable.columns, seed, ERROR_BUDGET, lambda what: progress(0.1, what))
         selection = _of_some_size(select(search, initial))
-        blocks = hold_out_blocks(coarse.timeline)
-        kept, nested, gains, total, reason = _judged(search, selection, blocks, initial, progress)
-    return Identified(kept, nested, gains, total, reason, columns, feedback, unused)
+        if not selection.accepted:
+            return Identified(usable, selection)
+        # what happened once, and when, can't be found without the block in which it happened: folds size it, and know
+        # of it
+        once = tuple(one.term for one in selection.accepted if one.term.component == StepTerm.component)
+        there = Counter(getattr(term, "component", "") for term in selection.final.terms)
+        looked_for = {one.term.component for one in selection.accepted} - {StepTerm.component}
+        nested = nest(
+            search,
+            hold_out_blocks(coarse.timeline),
+            (*initial, *once),
+            {component: there[component] for component in sorted(looked_for)},
+            lambda share: progress(0.3 + 0.3 * share, "selecting without a fold"),
+        )
+        return _worst_first(Identified(usable, selection, nested))
 
 
 def usable_columns(
-    timeline: Timeline, excluded: Sequence[str] = ()
-) -> tuple[list[Column], list[Feedback], dict[str, str]]:
-    """Columns that may act, those that follow from the movement, and those that tell nothing with the reason."""
+    timeline: Timeline, excluded: Sequence[str] = (), roles: Mapping[str, str] = MappingProxyType({})
+) -> Usable:
+    """Columns that may act, those that follow from the movement, and those that are not looked at with the reason."""
     columns, unused = known_columns(timeline)
+    assigned = roles_of(timeline, {"lane_width", *timeline.context}, roles)
     unused |= dict.fromkeys(timeline.of_one_camera, "from the camera that measured the offset: it has the same errors")
     unused |= dict.fromkeys(excluded, "left out on request")
-    columns = [column for column in columns if column.name not in unused]
-    feedback = find_feedback(timeline, columns)
+    clocks = (column.name for column in columns if assigned[column.name].role is Role.TIME)
+    unused |= {name: CLOCK for name in clocks if name not in unused}
+    columns = [replace(one, role=assigned[one.name].role) for one in columns if one.name not in unused]
+    feedback = find_feedback(timeline, columns, assigned)
     follow = {one.column for one in feedback}
-    return [column for column in columns if column.name not in follow], feedback, unused
+    return Usable([column for column in columns if column.name not in follow], feedback, unused, assigned)
 
 
 def initial_terms(base: DriverProfile, timeline: Timeline) -> tuple[Term, ...]:
@@ -139,7 +173,7 @@ def initial_terms(base: DriverProfile, timeline: Timeline) -> tuple[Term, ...]:
     terms: list[Term] = []
     for effect in base.effects:
         if isinstance(effect, ColumnEffect) and set(effect.columns) <= there:
-            bare = structs.replace(
+            unsized = structs.replace(
                 effect,
                 coefficients=(),
                 errors=(),
@@ -151,13 +185,16 @@ def initial_terms(base: DriverProfile, timeline: Timeline) -> tuple[Term, ...]:
             )
             if effect.acts is Acts.LOCATION:
                 between = is_between(effect) or _same_throughout(effect, timeline)
-                terms.append(BetweenTerm.of(bare) if between else MeanTerm.of(bare))
+                terms.append(BetweenTerm.of(unsized) if between else MeanTerm.of(unsized))
             elif effect.acts is Acts.SPREAD:
-                terms.append(SpreadTerm.of(bare))
+                terms.append(SpreadTerm.of(unsized))
         elif isinstance(effect, VarianceTrend):
-            terms.append(VarianceTrendTerm())
+            terms.append(TimeSpreadTerm(order=1))
         elif isinstance(effect, Drift):
-            terms.append(DriftTerm())
+            terms.append(TimeMeanTerm())
+        elif isinstance(effect, TimeSmooth):
+            terms += [TimeMeanTerm(len(effect.location))] if effect.location else []
+            terms += [TimeSpreadTerm(len(effect.spread))] if effect.spread else []
     return tuple(terms)
 
 
@@ -181,40 +218,24 @@ def _of_some_size(selection: Selection) -> Selection:
     return selection
 
 
-def _judged(
-    search: Search, selection: Selection, blocks: NDArray[np.intp], initial: Sequence[Term], progress: Progress
-) -> tuple[Selection, Nested | None, dict[int, Gain], Gain | None, str]:
-    """What loses on blocks that it was not chosen on goes, and all of it if all together loses."""
-    if not selection.accepted:
-        return selection, None, {}, None, ""
-    # what happened once, and when, can't be found without the block in which it happened: folds size it, and know of it
-    once = tuple(one.term for one in selection.accepted if one.term.component == StepTerm.component)
-    there = Counter(getattr(term, "component", "") for term in selection.final.terms)
-    looked_for = {one.term.component for one in selection.accepted} - {StepTerm.component}
-    nested = nest(
-        search,
-        blocks,
-        (*initial, *once),
-        {component: there[component] for component in sorted(looked_for)},
-        lambda share: progress(0.3 + 0.3 * share, "selecting without a fold"),
-    )
-    selection, nested, gains = _worst_first(selection, nested)
-    reason, total = "", nested.together([one.term for one in selection.accepted if one.term.predictable])
-    if any(one.term.predictable for one in selection.accepted) and not total.stands:
-        low, high = total.interval
-        reason = f"the effects found gain {total.mean:.2f} nat a held-out block ({low:.2f} to {high:.2f})"
-        selection = selection.without([one.term for one in selection.accepted], reason)
-    return selection, nested, gains, total, reason
-
-
-def _worst_first(selection: Selection, nested: Nested) -> tuple[Selection, Nested, dict[int, Gain]]:
-    """Less what loses, one by one, beginning with what loses most."""
-    while True:
+def _worst_first(found: Identified) -> Identified:
+    """Less what loses on blocks that it was not chosen on, the worst first; or nothing, if all together loses."""
+    while found.nested is not None:
         # each beside those that are kept, and nothing else: a fold's misfit would be blamed on what is right
-        nested = nested.only([one.term for one in selection.accepted])
-        gains = {id(one.term): nested.of(one.term) for one in selection.accepted if one.term.predictable}
-        judged = [one.term for one in selection.accepted if id(one.term) in gains]
-        fallen = [term for term in judged if not gains[id(term)].stands]
-        if not fallen:
-            return selection, nested, gains
-        selection = selection.without([min(fallen, key=lambda term: gains[id(term)].mean)], VETOED)
+        nested = found.nested.only([one.term for one in found.selection.accepted])
+        found = replace(found, nested=nested)
+        gains = [(one, nested.of(one.term)) for one in found.selection.accepted if one.term.predictable]
+        fallen = [(gain.mean, one.term) for one, gain in gains if not gain.stands]
+        if fallen:
+            found = found.without([min(fallen, key=lambda pair: pair[0])[1]], VETOED)
+            continue
+        known = {id(one): gain for one, gain in gains}
+        accepted = tuple(replace(one, gain=known.get(id(one))) for one in found.selection.accepted)
+        total = nested.together([one.term for one, _ in gains])
+        found = replace(found, selection=replace(found.selection, accepted=accepted), total=total if gains else None)
+        if gains and not total.stands:
+            low, high = total.interval
+            why = f"the effects found gain {total.mean:.2f} nat a held-out block ({low:.2f} to {high:.2f})"
+            found = found.without([one.term for one in accepted], why)
+        break
+    return found

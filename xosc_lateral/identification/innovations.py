@@ -11,10 +11,86 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.identification.autocorrelation import Whitener, fit_autoregression, start_factors
+from xosc_lateral.identification.timeline import means_by_drive
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
 IntArray = NDArray[np.intp]
+
+CLIP = 9.0
+"""Squared innovations (variance 1) beyond this count as this: three standard deviations. [-]"""
+
+MOST_LOG_SCALE = 3.0
+"""Scale terms together change the movement by at most this factor's logarithm, 20 either way: scoring steps of a factor
+that the movement contradicts grow without end. [-]"""
+
+CLUSTER_S = 60
+"""Length of one cluster of squares in errors of the log scale. [s]"""
+
+OWN_LEVEL_S = 30.0
+"""A drive's level of the scale is its own as far as it lasts longer than this. [s]"""
+
+
+def squared_innovations(rows: FloatArray, valid: BoolArray) -> FloatArray:
+    """Clipped squares of white rows, standardised over the valid ones, shape (n,); 0 elsewhere. [-]"""
+    squares = np.minimum(rows**2, CLIP)
+    mean, deviation = squares[valid].mean(), squares[valid].std()
+    return np.where(valid, (squares - mean) / max(deviation, 1e-12), 0.0)
+
+
+def own_levels(squares: FloatArray, valid: BoolArray, drive: IntArray) -> FloatArray:
+    """Mean square of every drive over that of all, shape (drives,); 1 for a single drive, near 1 for short ones."""
+    groups = int(drive.max()) + 1
+    if groups == 1 or not valid.any():
+        return np.ones(groups)
+    relative = squares / max(float(squares[valid].mean()), 1e-300)
+    seconds = np.bincount(drive, valid.astype(float), minlength=groups)
+    sums = np.bincount(drive, np.where(valid, relative, 0.0), minlength=groups)
+    return np.asarray((sums + OWN_LEVEL_S) / (seconds + OWN_LEVEL_S))
+
+
+def clipped_squares(rows: FloatArray, valid: BoolArray) -> FloatArray:
+    """Squares over their mean where valid, at most `CLIP`, shape (n,). [-]"""
+    return np.asarray(np.minimum(np.square(rows) / max(float(np.mean(rows[valid] ** 2)), 1e-300), CLIP))
+
+
+def _within_drives(scales: FloatArray, valid: BoolArray, drive: IntArray) -> FloatArray:
+    """Valid rows of the scale's columns about their drive's mean."""
+    means = np.stack([means_by_drive(column, valid, drive) for column in scales.T], axis=1)
+    return np.asarray((scales - means[drive])[valid])
+
+
+def scoring_step(scales: FloatArray, rows: FloatArray, valid: BoolArray, drive: IntArray) -> FloatArray:
+    """One Fisher-scoring step [-], shape (j,), for log sd = scales . sizes (variance of a squared normal is 2)."""
+    variance = np.minimum(rows[valid] ** 2, CLIP * float(np.mean(rows[valid] ** 2)))
+    design = _within_drives(scales, valid, drive)
+    return np.asarray(np.linalg.pinv(2.0 * design.T @ design) @ (design.T @ (variance / variance.mean() - 1.0)))
+
+
+def bounded(log_sizes: FloatArray, scales: FloatArray) -> FloatArray:
+    """Log sizes [-], shape (j,), scaled down as a whole so that no row's log scale is beyond `MOST_LOG_SCALE`."""
+    reach = float(np.max(np.abs(scales @ log_sizes), initial=0.0))
+    return log_sizes * min(1.0, MOST_LOG_SCALE / max(reach, 1e-300))
+
+
+def covariance_of_log_sizes(scales: FloatArray, rows: FloatArray, valid: BoolArray, drive: IntArray) -> FloatArray:
+    """Sandwich, clustered [1]_: squares have heavy tails and come in clusters.
+
+    References
+    ----------
+    .. [1] K.-Y. Liang, S. Zeger, "Longitudinal data analysis using generalized linear models", Biometrika 73, 1986.
+    """
+    if scales.shape[1] == 0:
+        return np.zeros((0, 0))
+    design = _within_drives(scales, valid, drive)
+    bread = np.linalg.pinv(2.0 * design.T @ design)
+    squares = clipped_squares(rows, valid)[valid]
+    scores = design * (squares / squares.mean() - 1.0)[:, None]
+    cluster = np.flatnonzero(valid) // CLUSTER_S
+    edges = np.flatnonzero(np.diff(cluster, prepend=-1))
+    sums = np.add.reduceat(scores, edges, axis=0)
+    return np.asarray(bread @ (sums.T @ sums) @ bread * len(sums) / max(1, len(sums) - 1))
+
 
 ORDER = 12
 """Past seconds that have a coefficient each in the movement's autoregression. [s]"""

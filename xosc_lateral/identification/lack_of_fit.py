@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.identification.blocks import hold_out_blocks
 from xosc_lateral.identification.close import LoopResult
+from xosc_lateral.identification.held_out_gain import hold_out_blocks
 from xosc_lateral.identification.residual import size_of, split_differences
-from xosc_lateral.identification.seeds import LoopSeed
+from xosc_lateral.identification.significance import LoopSeed
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
@@ -87,18 +87,20 @@ class LackOfFit:
 
 def lack_of_fit_of(result: LoopResult) -> LackOfFit:
     """Compare every group of statistics, and all of them, with what the drives differ from themselves by (seeded)."""
-    timeline = result.statistics.timeline
+    timeline = result.scored.statistics.timeline
     rng = np.random.default_rng(np.random.SeedSequence(result.seed, spawn_key=(LoopSeed.LACK_OF_FIT,)))
-    splits = split_differences(result.statistics, result.unmoved, hold_out_blocks(timeline), rng, SPLITS)
-    floors = {name: np.sqrt(_mean_of_finite(np.stack([split[name] for split in splits]) ** 2)) for name in result.real}
+    splits = split_differences(result.scored.statistics, result.unmoved, hold_out_blocks(timeline), rng, SPLITS)
+    floors = {
+        name: np.sqrt(_mean_of_finite(np.stack([split[name] for split in splits]) ** 2)) for name in result.scored.real
+    }
     groups = tuple(
         GroupError(
             name,
-            before=_size(real - result.before[name]),
-            after=_size(real - result.after[name]),
+            before=_size(real - result.scored.before[name]),
+            after=_size(real - result.scored.after[name]),
             floor=_size(floors[name]),
         )
-        for name, real in result.real.items()
+        for name, real in result.scored.real.items()
     )
     as_far = sum(size_of(split) >= result.error_after for split in splits)
     p_value = (1.0 + as_far) / (1.0 + len(splits))

@@ -4,7 +4,6 @@ References
 ----------
 .. [1] S. Varma, R. Simon, "Bias in error estimation when using cross-validation for model selection", BMC
        Bioinformatics 7, 2006.
-.. [2] L. Breiman, J. Friedman, R. Olshen, C. Stone, "Classification and Regression Trees", 1984, section 3.4.3.
 """
 
 from __future__ import annotations
@@ -16,49 +15,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.identification.blocks import folds_of
-from xosc_lateral.identification.held_out_gain import held_out_gain
+from xosc_lateral.identification.held_out_gain import Gain, folds_of, held_out_gain
 from xosc_lateral.identification.regression import Coarse, fit_model
 from xosc_lateral.identification.search import Search
 from xosc_lateral.identification.selection import Selection, select
 from xosc_lateral.identification.terms.base import Term
 from xosc_lateral.identification.timeline import coarse_middle
-from xosc_lateral.normal import NORMAL_95
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
 IntArray = NDArray[np.intp]
-
-
-@dataclass(frozen=True, slots=True)
-class Gain:
-    """Gain in log-likelihood on rows that nothing was chosen or fitted on.
-
-    Parameters
-    ----------
-    mean, error : float
-        Over blocks, per block, with the standard error of the mean. [nat]
-    folds : int
-        In how many folds the term was chosen again.
-    """
-
-    mean: float
-    error: float
-    folds: int
-
-    @property
-    def interval(self) -> tuple[float, float]:
-        """95 % interval of the mean gain."""
-        return self.mean - NORMAL_95 * self.error, self.mean + NORMAL_95 * self.error
-
-    @property
-    def stands(self) -> bool:
-        """Whether the held-out blocks leave a significant term standing: no loss by a standard error [2]_.
-
-        They are a veto, not a second proof: beside a gain of 12 nat over all blocks chance alone gives 6 either way,
-        and what a fold gets wrong of lag, shape and size is lost on top. What no fold found again does not stand.
-        """
-        return self.mean + self.error > 0.0
 
 
 @dataclass(frozen=True, eq=False)

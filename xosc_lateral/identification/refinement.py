@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 
 from xosc_lateral.driver.effects import ColumnEffect, Product
 from xosc_lateral.driver.effects.product import Form
-from xosc_lateral.identification.alternatives import explains_as_much
 from xosc_lateral.identification.candidates import FINE_SCALES, Family, shapes_of
 from xosc_lateral.identification.columns import Column
 from xosc_lateral.identification.dictionary import orthonormal
@@ -25,6 +24,42 @@ from xosc_lateral.identification.regression import Coarse
 from xosc_lateral.identification.timeline import COARSE
 
 FloatArray = NDArray[np.float64]
+
+IntArray = NDArray[np.intp]
+
+Alternatives = tuple[tuple[str, ...], ...]
+"""Columns of each effect that explains as much."""
+
+CLEARLY = 1.645
+"""Standard errors by which the better of two has to be better: 5 %, one-sided; the better is known to be it. [-]"""
+
+
+def explains_as_much(chosen: FloatArray, other: FloatArray, observed: FloatArray, cluster: IntArray) -> bool:
+    """Whether squared residuals of two regressions differ by no more than they scatter from cluster to cluster [1]_.
+
+    Neither has to be true, nor one a part of the other.
+
+    Parameters
+    ----------
+    chosen, other : array, shape (n, k) and (n, j)
+        White columns of either.
+    observed : array, shape (n,)
+        White.
+    cluster : int array, shape (n,)
+        Rows of one cluster are not independent.
+    """
+    better = _squares(other, observed) - _squares(chosen, observed)
+    sums = np.bincount(np.unique(cluster, return_inverse=True)[1], better)
+    if len(sums) < 2:
+        return True
+    error = float(np.sqrt(len(sums)) * np.std(sums, ddof=1))
+    return float(sums.sum()) <= CLEARLY * error
+
+
+def _squares(columns: FloatArray, observed: FloatArray) -> FloatArray:
+    sizes = np.linalg.lstsq(columns, observed, rcond=None)[0]
+    return np.asarray(np.square(observed - columns @ sizes))
+
 
 RESPONSES = (0.3, 0.6, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0)
 """Time constants that are tried. [s]"""

@@ -28,8 +28,8 @@ FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
 
 MAX_PRODUCT_COLUMNS = 24
-"""Products are tried among all columns up to this number; beyond, of levels and switches with every column: sixty more
-columns must not cost twenty times as much."""
+"""Products are tried among so many columns at most, those whose role is known first: sixty more columns must not cost
+twenty times as much."""
 
 BUILT, SCORED = 2, 8
 """Dictionaries that are kept (each of tens of megabytes), and best candidates: as many as kinds of terms, and some."""

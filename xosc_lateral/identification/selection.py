@@ -5,11 +5,37 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from xosc_lateral.identification.alternatives import Alternatives
+from xosc_lateral.discovery import defined_in
+from xosc_lateral.identification import terms
+from xosc_lateral.identification.held_out_gain import Gain
+from xosc_lateral.identification.refinement import Alternatives
 from xosc_lateral.identification.regression import Fitted, fit_model
 from xosc_lateral.identification.search import Search
-from xosc_lateral.identification.stages import STAGES
-from xosc_lateral.identification.terms.base import Outcome, Term
+from xosc_lateral.identification.significance import Budget
+from xosc_lateral.identification.terms.base import Outcome, Stage, Term
+
+TERMS: tuple[type[Term], ...] = defined_in(terms.__name__, Term)  # type: ignore[type-abstract]
+"""Every term that a file of `terms` defines, by the file's name."""
+
+
+def in_stages(kinds: tuple[type[Term], ...]) -> tuple[tuple[type[Term], ...], ...]:
+    """What is looked for at each stage, in the order in which it is asked."""
+    asked = sorted(kinds, key=lambda kind: kind.place)
+    return tuple(tuple(kind for kind in asked if stage in kind.stages) for stage in Stage)
+
+
+def shared_among(kinds: tuple[type[Term], ...]) -> Budget:
+    """The error budget by the terms' own weights; those of one component compete, and share one part of it."""
+    return Budget(
+        {kind.component: kind.weight for kind in kinds}, {kind.component: kind.least_drives for kind in kinds}
+    )
+
+
+STAGES = in_stages(TERMS)
+"""Of a stage, what has the smallest p-value is added first."""
+
+ERROR_BUDGET = shared_among(TERMS)
+"""Of all terms that are looked for."""
 
 MAX_TERMS = 8
 """More terms than this in one table are not looked for."""
@@ -17,10 +43,19 @@ MAX_TERMS = 8
 
 @dataclass(frozen=True, eq=False)
 class Accepted:
-    """A term that chance does not explain."""
+    """A term that chance does not explain.
+
+    Parameters
+    ----------
+    term : Term
+    p_value : float
+    gain : Gain or None
+        On held-out rows; None: not judged, or not yet.
+    """
 
     term: Term
     p_value: float
+    gain: Gain | None = None
 
     @property
     def alike(self) -> Alternatives:
@@ -39,12 +74,15 @@ class Rejected:
     columns : tuple of str
     p_value : float
     why : str
+    was_found : bool
+        Whether it was significant, and taken back.
     """
 
     component: str
     columns: tuple[str, ...]
     p_value: float
     why: str
+    was_found: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,7 +109,9 @@ class Selection:
         out = [one for one in self.accepted if any(one.term is term for term in terms)]
         kept = tuple(one for one in self.accepted if one not in out)
         left = tuple(term for term in self.final.terms if not any(term is other for other in terms))
-        rejected = tuple(Rejected(one.term.component, one.term.columns, one.p_value, why) for one in out)
+        rejected = tuple(
+            Rejected(one.term.component, one.term.columns, one.p_value, why, was_found=True) for one in out
+        )
         return replace(
             self, accepted=kept, rejected=(*self.rejected, *rejected), final=fit_model(self.final.coarse, left)
         )
@@ -125,20 +165,12 @@ def _tested_again(search: Search, selection: Selection, one: Accepted) -> Select
     if one not in selection.accepted:
         return selection
     later = [other.term for other in selection.accepted[selection.accepted.index(one) + 1 :]]
-    if one.term.component == "mean":
-        explains = [term for term in later if _changes_scale(term, search)]
-    else:
-        explains = [term for term in later if term.columns and not one.term.columns]
-    if not explains:
+    if not any(one.term.may_be_explained_by(term, search.coarse) for term in later):
         return selection
     without = selection.without([one.term], "what was found after it explains it")
     search.progress(f"looking at {one.term.component.replace('_', ' ')} again")
     p_value = one.term.probability_beside(search, without.final)
     return selection if search.passes(one.term.component, p_value, without.final.terms) else without
-
-
-def _changes_scale(term: Term, search: Search) -> bool:
-    return bool(term.scale_columns(search.coarse).shape[1]) or term.known_scale(search.coarse) is not None
 
 
 def _asked(search: Search, kind: type[Term], fitted: Fitted) -> Outcome | None:

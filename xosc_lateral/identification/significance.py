@@ -4,11 +4,34 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from enum import IntEnum
 
 import numpy as np
 from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]
+
+
+class LoopSeed(IntEnum):
+    """Key of a source of chance."""
+
+    COLUMNS = 0
+    """Rotations that candidates of a column are compared with."""
+    REGIMES = 3
+    """Simulated loudness that regimes are compared with."""
+    LOW_FREQUENCY = 4
+    """Simulated rows and drawn signs that drifts and steps are compared with."""
+    BETWEEN = 5
+    """Places dealt anew to drives."""
+    FOLDS = 5
+    """Runs before and after on held-out folds. The key of `BETWEEN`, too: that draws nothing but an order of drives."""
+    SPECTRUM = 7
+    """Runs whose spectrum is compared with the drives'."""
+    BLOCKS = 9
+    """Blocks drawn for the floor, and for the error before and after."""
+    LACK_OF_FIT = 11
+    """Halves of blocks that tell the floor."""
+
 
 LEAST = 1e-300
 """p-values stay above: their logarithm is taken. [-]"""
@@ -42,9 +65,12 @@ class Budget:
     weights : mapping of str to float
         Of each component. As shipped: as much for the mean within drives as between them; a quarter for what changes
         the movement's size or its strength; the rest for hidden effects, which are few to choose among. [-]
+    least_drives : mapping of str to int
+        Drives from which a component is asked at all, where that is more than one.
     """
 
     weights: Mapping[str, float]
+    least_drives: Mapping[str, int]
 
     def level_of(self, component: str, drives: int) -> float:
         """Family-wise level that a component may spend.
@@ -56,7 +82,7 @@ class Budget:
             In the table. Where nothing can be asked between them, that share is not spent: a table on which something
             acts is searched again beside it, at the same levels.
         """
-        if drives < MANY_DRIVES and component == "between":
+        if drives < self.least_drives.get(component, 1):
             return 0.0
         return BUDGET * self.weights[component] / sum(self.weights.values())
 

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.identification.autocorrelation import fit_autoregression, moving_sum
-from xosc_lateral.identification.log_scale import CLIP, own_levels
+from xosc_lateral.identification.innovations import CLIP, own_levels
 from xosc_lateral.identification.regression import Fitted
 from xosc_lateral.identification.timeline import COARSE, coarse_all, coarse_mean
 

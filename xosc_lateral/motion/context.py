@@ -10,13 +10,13 @@ border of sections, is what the vehicle has around it: the mean over the way tha
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from xosc_lateral.motion.nearby import pairs_within
 from xosc_lateral.motion.nominal import Activity, EntityMotion, NominalMotion
@@ -96,24 +96,33 @@ def _own_motion(entity: EntityMotion, grid: IntArray) -> dict[str, FloatArray]:
 def _road(entity: EntityMotion, network: RoadNetwork, grid: IntArray) -> dict[str, FloatArray]:
     on = entity.road[grid] >= 0
     rows = grid[on]
-    road, lane, s = entity.road[rows], entity.lane[rows], entity.s[rows]
-    lane_index, lane_count = network.lane_index(road, lane, s)
     # Against the lane's traffic all is seen the other way round.
     along = np.where(np.cos(entity.heading_relative[rows]) < 0.0, -1.0, 1.0)
+    values = road_columns(network, entity.road[rows], entity.lane[rows], entity.s[rows], entity.offset[rows], along)
+    context = {}
+    for name, part in values.items():
+        context[name] = np.full(len(grid), np.nan)
+        context[name][on] = part
+    return context
+
+
+def road_columns(
+    network: RoadNetwork, road: ArrayLike, lane: ArrayLike, s: ArrayLike, offset: ArrayLike, along: FloatArray
+) -> dict[str, FloatArray]:
+    """What the road is like at places on lanes, by the names of context columns; `along`: 1, or -1 against traffic.
+
+    Shape (n,) each.
+    """
+    lane_index, lane_count = network.lane_index(road, lane, s)
     lane_seen = np.where(along > 0, lane_index, lane_count - 1 - lane_index)
-    values: dict[str, FloatArray] = {
-        "curvature": along * network.lane_curvature(road, lane, s, entity.offset[rows]),
+    return {
+        "curvature": along * network.lane_curvature(road, lane, s, offset),
         "lane_width": network.lane_width(road, lane, s),
         "lane_index": np.where(lane_index >= 0, lane_seen, np.nan).astype(np.float64),
         "lane_count": lane_count.astype(np.float64),
         "crossfall": along * network.crossfall(road, lane, s),
         "grade": along * network.grade(road, lane, s),
     }
-    context = {}
-    for name, part in values.items():
-        context[name] = np.full(len(grid), np.nan)
-        context[name][on] = part
-    return context
 
 
 def _around(values: FloatArray, step: float) -> FloatArray:
@@ -129,7 +138,7 @@ def _around(values: FloatArray, step: float) -> FloatArray:
 
 
 # ---- other vehicles --------------------------------------------------------------------------------------------------
-class _Reach(NamedTuple):
+class Reach(NamedTuple):
     """A lane section within reach along the own lane: u(s) = at + sign * (s - s_entry) counts along travel. [m]"""
 
     road: int
@@ -141,10 +150,10 @@ class _Reach(NamedTuple):
     sign: int
 
 
-def _lane_path(network: RoadNetwork, road: int, lane: int, s: float, forward: int) -> list[_Reach]:
+def lane_path(network: RoadNetwork, road: int, lane: int, s: float, forward: int) -> list[Reach]:
     """Sections along a lane within `REACH` both ways, in a coordinate u that is 0 at `s` and grows along travel."""
     low, high = network.section_at(road, s)
-    path = [_Reach(road, low, high, lane, 0.0, s, forward)]
+    path = [Reach(road, low, high, lane, 0.0, s, forward)]
     for way in (1, -1):
         here, direction, done = (road, lane, s), way * forward, 0.0
         while done < REACH + (high - low):
@@ -157,7 +166,7 @@ def _lane_path(network: RoadNetwork, road: int, lane: int, s: float, forward: in
             here, direction = (step.road, step.lane, step.s), step.direction
             start, end = network.section_at(step.road, step.s)
             s_entry = step.s - direction * _INTO_NEXT
-            path.append(_Reach(step.road, start, end, step.lane, way * done, s_entry, way * direction))
+            path.append(Reach(step.road, start, end, step.lane, way * done, s_entry, way * direction))
     return path
 
 
@@ -165,7 +174,7 @@ _INTO_NEXT = 1e-6
 """Step beyond a section's end that brings one into the next. [m]"""
 
 
-class _Others(NamedTuple):
+class Others(NamedTuple):
     """Where another vehicle is, seen along the own lane: u ahead [m], from the own path to the left [m], which way."""
 
     ahead: FloatArray
@@ -181,37 +190,74 @@ def _neighbours(
     motion: NominalMotion, network: RoadNetwork, index: int, grid: IntArray, lanes: Mapping[str, FloatArray]
 ) -> dict[str, FloatArray]:
     own = motion.entities[index]
-    sides = {side: _Side.nobody(len(grid)) for side in ZONES}
-    oncoming = np.full(len(grid), np.nan)
+    around = Around.nobody(len(grid))
     groups = _own_lane_groups(own, network, grid)
     width = _own_lane_width(own, network, grid)
     numbers = [k for k in _in_sight(motion)[index] if motion.entities[k].entity.is_vehicle]
     together = max(1, CELLS // len(grid))
     for begin in range(0, len(numbers), together):
         others = [motion.entities[k] for k in numbers[begin : begin + together]]
-        boxes = [other.entity.bounding_box for other in others]
         seen = _see(own, others, network, grid, groups)
-        gap = _free_space(seen, own.entity.bounding_box, boxes)
+        boxes = [other.entity.bounding_box for other in others]
+        length, centre, other_width = (
+            np.repeat([getattr(box, name) for box in boxes], len(grid)) for name in ("length", "center_x", "width")
+        )
+        is_truck = np.repeat([other.entity.vehicle_category in TRUCKS for other in others], len(grid))
+        rows = np.tile(np.arange(len(grid)), len(others))
+        gap = free_space(seen, own.entity.bounding_box, Extent(length, centre))
+        around.add(rows, seen, gap, width[rows], other_width, is_truck)
+    return around.columns(lanes)
+
+
+@dataclass(eq=False, slots=True)
+class Around:
+    """Who is around: on each side of `ZONES`, and free space to who comes towards one, shape (n,). [m]"""
+
+    sides: Mapping[str, _Side]
+    oncoming: FloatArray
+
+    @classmethod
+    def nobody(cls, n: int) -> Around:
+        """Nobody around anybody."""
+        return cls({side: _Side.nobody(n) for side in ZONES}, np.full(n, np.nan))
+
+    def add(
+        self,
+        rows: IntArray,
+        seen: Others,
+        gap: FloatArray,
+        width: FloatArray,
+        other_width: float | FloatArray,
+        is_truck: NDArray[np.bool_],
+    ) -> None:
+        """Others, seen from the rows, which may come again; free space to them, own lane and their bodies wide. [m]
+
+        Shape (m,) each.
+        """
         with np.errstate(invalid="ignore"):
             there = (gap <= REACH) & ~np.isnan(seen.left)
-            ahead = there & (seen.ahead > 0)
-        oncoming = np.fmin(oncoming, np.fmin.reduce(np.where(ahead & seen.oncoming, gap, np.nan), axis=0))
-        is_truck = np.array([other.entity.vehicle_category in TRUCKS for other in others])
-        widths = np.array([[box.width] for box in boxes]) / width
+            towards = there & seen.oncoming & (seen.ahead > 0)
+            there &= ~seen.oncoming
+        np.fmin.at(self.oncoming, rows[towards], gap[towards])
         for side, middle in ZONES.items():
-            share = _share_inside(seen.left / width - middle, widths)
-            share = np.where((ahead if side == "lead" else there) & ~seen.oncoming, share, 0.0)
-            sides[side].add(gap, share, is_truck)
-    columns = {"oncoming_distance": oncoming}
-    for side, found in sides.items():
-        columns |= {f"{side}_is_truck": found.is_truck}
-        lane = np.maximum(lanes[side], np.minimum(found.influence, 1.0))
-        columns[f"{side}_distance"] = np.where((lane > 0) & np.isnan(found.distance), np.inf, found.distance)
-        if lane.max(initial=0.0) > 0.0 and lane.min(initial=1.0) < 1.0:
-            columns[f"{side}_distance{FADES}"] = lane
-        if side != "lead":  # the same as measured drives often have it: a flag for what drives beside
-            columns |= {f"truck_{side}": found.truck_alongside, f"car_{side}": found.car_alongside}
-    return columns
+            share = _share_inside(seen.left / width - middle, other_width / width)
+            share = np.where(there & ((side != "lead") | (seen.ahead > 0)), share, 0.0)
+            k = np.flatnonzero(share)
+            if len(k):
+                self.sides[side].add(rows[k], gap[k], share[k], is_truck[k])
+
+    def columns(self, lanes: Mapping[str, FloatArray], *, always_fade: bool = False) -> dict[str, FloatArray]:
+        """Context columns, shape (n,) each; `lanes`: how far there is one on each side. [-]"""
+        columns = {"oncoming_distance": self.oncoming}
+        for side, found in self.sides.items():
+            columns |= {f"{side}_is_truck": found.is_truck}
+            lane = np.maximum(lanes[side], np.minimum(found.influence, 1.0))
+            columns[f"{side}_distance"] = np.where((lane > 0) & np.isnan(found.distance), np.inf, found.distance)
+            if always_fade or (lane.max(initial=0.0) > 0.0 and lane.min(initial=1.0) < 1.0):
+                columns[f"{side}_distance{FADES}"] = lane
+            if side != "lead":  # the same as measured drives often have it: a flag for what drives beside
+                columns |= {f"truck_{side}": found.truck_alongside, f"car_{side}": found.car_alongside}
+        return columns
 
 
 @dataclass(eq=False, slots=True)
@@ -228,22 +274,16 @@ class _Side:
     def nobody(cls, n: int) -> _Side:
         return cls(np.full(n, np.nan), *np.zeros((4, n)))
 
-    def add(self, gap: FloatArray, share: FloatArray, is_truck: NDArray[np.bool_]) -> None:
-        """More vehicles with free space `gap` [m], of which so much lies in the lane [-], shape (others, n) each."""
-        there = share > 0
-        distance = np.full(gap.shape, np.nan)
-        influence, of_truck, alongside = np.zeros((3, *gap.shape))
-        gap, share = gap[there], share[there]
-        distance[there] = gap - NEAR * np.log(share)
-        influence[there] = share * np.exp(-gap / NEAR)
-        alongside[there] = share * (1.0 - smooth_step(gap / ALONGSIDE - 0.5))
+    def add(self, rows: IntArray, gap: FloatArray, share: FloatArray, is_truck: NDArray[np.bool_]) -> None:
+        """More vehicles, each seen from a row, with free space `gap` [m], of which so much lies in the lane [-]."""
+        np.fmin.at(self.distance, rows, gap - NEAR * np.log(share))
+        influence = share * np.exp(-gap / NEAR)
+        np.add.at(self.influence, rows, influence)
+        alongside = share * (1.0 - smooth_step(gap / ALONGSIDE - 0.5))
         # a truck comes into sight in the last quarter of the reach
-        of_truck[there] = influence[there] * (1.0 - smooth_step(4.0 * gap / REACH - 3.0))
-        self.distance = np.fmin(self.distance, np.fmin.reduce(distance, axis=0))
-        self.influence = np.sum([self.influence, *influence], axis=0)
-        self.of_trucks = np.sum([self.of_trucks, *of_truck[is_truck]], axis=0)
-        self.truck_alongside = np.max([self.truck_alongside, *alongside[is_truck]], axis=0)
-        self.car_alongside = np.max([self.car_alongside, *alongside[~is_truck]], axis=0)
+        np.add.at(self.of_trucks, rows, is_truck * influence * (1.0 - smooth_step(4.0 * gap / REACH - 3.0)))
+        np.maximum.at(self.truck_alongside, rows, is_truck * alongside)
+        np.maximum.at(self.car_alongside, rows, ~is_truck * alongside)
 
     @property
     def is_truck(self) -> FloatArray:
@@ -274,10 +314,14 @@ def _own_lane_width(own: EntityMotion, network: RoadNetwork, grid: IntArray) -> 
 
 def _lanes_there(road: Mapping[str, FloatArray], step: float) -> dict[str, FloatArray]:
     """How far there is a lane on each side of the way around, shape (n,) each. [-]"""
-    index, count = road["lane_index"], road["lane_count"]
-    there = {"lead": index >= 0, "right": index > 0, "left": index < count - 1}
-    shares = {side: _around(one.astype(np.float64), step) for side, one in there.items()}
+    shares = {side: _around(one.astype(np.float64), step) for side, one in lanes_beside(road).items()}
     return {side: np.clip((share - _NONE) / (1.0 - 2.0 * _NONE), 0.0, 1.0) for side, share in shares.items()}
+
+
+def lanes_beside(road: Mapping[str, FloatArray]) -> dict[str, NDArray[np.bool_]]:
+    """Whether there is a lane on each side, shape (n,) each."""
+    index, count = road["lane_index"], road["lane_count"]
+    return {"lead": index >= 0, "right": index > 0, "left": index < count - 1}
 
 
 _NONE = 1e-3
@@ -301,7 +345,7 @@ def _in_sight(motion: NominalMotion) -> tuple[tuple[int, ...], ...]:
 
 def _own_lane_groups(
     own: EntityMotion, network: RoadNetwork, grid: IntArray
-) -> list[tuple[IntArray, FloatArray, list[_Reach]]]:
+) -> list[tuple[IntArray, FloatArray, list[Reach]]]:
     """Rows of the grid that share one lane path: positions in the grid, own u there, and the path."""
     groups: dict[tuple[int, int, float, int], list[int]] = {}
     present = ((own.activity[grid] & Activity.ACTIVE) != 0) & (own.road[grid] >= 0) & (own.lane[grid] != 0)
@@ -314,7 +358,7 @@ def _own_lane_groups(
     for (road, lane, _, forward), members in groups.items():
         rows = np.array(members)
         along = own.s[grid[rows]]
-        path = _lane_path(network, road, lane, float(along[0]), forward)
+        path = lane_path(network, road, lane, float(along[0]), forward)
         result.append((rows, path[0].sign * (along - along[0]), path))
     return result
 
@@ -324,34 +368,69 @@ def _see(
     others: Sequence[EntityMotion],
     network: RoadNetwork,
     grid: IntArray,
-    groups: list[tuple[IntArray, FloatArray, list[_Reach]]],
-) -> _Others:
-    """Others along the own lane, shape (others, n)."""
+    groups: list[tuple[IntArray, FloatArray, list[Reach]]],
+) -> Others:
+    """Others along the own lane, one after the other, shape (others * n,)."""
     names = ("road", "lane", "s", "offset", "activity", "heading_relative")
-    road, lane, s, offset, activity, heading = (
-        np.stack([getattr(one, name)[grid] for one in others]) for name in names
-    )
+    stacked = (np.concatenate([getattr(one, name)[grid] for one in others]) for name in names)
+    road, lane, s, offset, activity, heading = stacked
     present = ((activity & Activity.ACTIVE) != 0) & (road >= 0) & (lane != 0)
     direction = _travel(network, road, lane, heading, present)
-    t = np.full(s.shape, np.nan)
+    t = np.full(len(s), np.nan)
     t[present] = network.offset_to_t(road[present], lane[present], s[present], offset[present])
-    seen = _Others(np.full(s.shape, np.nan), np.full(s.shape, np.nan), np.zeros(s.shape, dtype=bool))
+    seen = Others(np.full(len(s), np.nan), np.full(len(s), np.nan), np.zeros(len(s), dtype=bool))
     for members, own_u, path in groups:
-        for part in path:
-            on = present[:, members] & (road[:, members] == part.road)
-            on &= (s[:, members] >= part.s_low - 1e-9) & (s[:, members] <= part.s_high + 1e-9)
-            who, at = np.nonzero(on)
-            if not len(who):
-                continue
-            k = members[at]
-            ahead = part.at + part.sign * (s[who, k] - part.s_entry) - own_u[at]
-            # the own lane path may pass a place twice (a ring road): the nearer view counts
-            nearer = ~(np.abs(seen.ahead[who, k]) <= np.abs(ahead))
-            who, k, ahead = who[nearer], k[nearer], ahead[nearer]
-            seen.ahead[who, k] = ahead
-            centre = network.lane_centre_t(part.road, part.lane, s[who, k])
-            seen.left[who, k] = part.sign * (t[who, k] - centre) - own.offset[grid[k]]
-            seen.oncoming[who, k] = direction[who, k] != part.sign
+        k = (np.arange(len(others))[:, None] * len(grid) + members).ravel()
+        u, beside = (np.tile(values, len(others)) for values in (own_u, own.offset[grid[members]]))
+        along = see_along(
+            path, u, beside, road[k], lane[k], s[k], t[k], direction[k], present[k], network.lane_centre_t
+        )  # fmt: skip
+        for values, found in zip(seen, along, strict=True):
+            values[k] = found
+    return seen
+
+
+def see_along(
+    path: Sequence[Reach],
+    own_u: FloatArray,
+    own_offset: FloatArray,
+    road: NDArray[np.integer],
+    lane: NDArray[np.integer],
+    s: FloatArray,
+    t: FloatArray,
+    direction: IntArray,
+    there: NDArray[np.bool_],
+    centre_t: Callable[[int, int, FloatArray], FloatArray],
+) -> Others:
+    """Where others are along one's lane path, row by row: other moments, or other vehicles. Shape (n,) each.
+
+    Parameters
+    ----------
+    path : sequence of Reach
+        What `lane_path` gives; others elsewhere are not seen (NaN).
+    own_u, own_offset : array
+        Where one is on it, and from its lane's centre, positive left. [m]
+    road, lane, s, t, direction : array
+        Where the other is, and which way it drives along s. [-], [-], [m], [m], [-]
+    there : array of bool
+        Whether it is anywhere.
+    centre_t : callable
+        t of a lane's centre, by road, lane and s. [m]
+    """
+    n = len(own_u)
+    seen = Others(np.full(n, np.nan), np.full(n, np.nan), np.zeros(n, dtype=bool))
+    for part in path:
+        on = there & (road == part.road) & (s >= part.s_low - 1e-9) & (s <= part.s_high + 1e-9)
+        k = np.flatnonzero(on)
+        if not len(k):
+            continue
+        ahead = part.at + part.sign * (s[k] - part.s_entry) - own_u[k]
+        # the own lane path may pass a place twice (a ring road): the nearer view counts
+        nearer = ~(np.abs(seen.ahead[k]) <= np.abs(ahead))
+        k, ahead = k[nearer], ahead[nearer]
+        seen.ahead[k] = ahead
+        seen.left[k] = part.sign * (t[k] - centre_t(part.road, part.lane, s[k])) - own_offset[k]
+        seen.oncoming[k] = direction[k] != part.sign
     return seen
 
 
@@ -362,18 +441,24 @@ def _travel(
     heading: FloatArray,
     present: NDArray[np.bool_],
 ) -> NDArray[np.int64]:
-    """Which way somebody drives along s, +1 or -1, shape as the arguments; 0 where it is on no lane."""
-    direction = np.zeros(present.shape, dtype=np.int64)
+    """Which way somebody drives along s, +1 or -1, shape (n,); 0 where it is on no lane."""
+    direction = np.zeros(len(present), dtype=np.int64)
     direction[present] = network.travel_directions(road[present], lane[present])
     return np.where(np.cos(heading) < 0.0, -direction, direction)
 
 
-def _free_space(seen: _Others, own: BoundingBox, others: Sequence[BoundingBox]) -> FloatArray:
-    """Bumper to bumper, shape (others, n); 0 while overlapping lengthwise. [m]"""
-    centre, length = (np.array([[getattr(box, name)] for box in others]) for name in ("center_x", "length"))
+class Extent(NamedTuple):
+    """How long vehicles are, and how far their middles are ahead of their reference points, shape (n,) each. [m]"""
+
+    length: FloatArray
+    center_x: FloatArray
+
+
+def free_space(seen: Others, own: BoundingBox | Extent, other: BoundingBox | Extent) -> FloatArray:
+    """Bumper to bumper, 0 while overlapping lengthwise. [m]"""
     turned = np.where(seen.oncoming, -1.0, 1.0)
-    between_centres = seen.ahead + turned * centre - own.center_x
-    return np.asarray(np.maximum(np.abs(between_centres) - 0.5 * (own.length + length), 0.0))
+    between_centres = seen.ahead + turned * other.center_x - own.center_x
+    return np.maximum(np.abs(between_centres) - 0.5 * (own.length + other.length), 0.0)
 
 
 # ---- weather and time of day -----------------------------------------------------------------------------------------

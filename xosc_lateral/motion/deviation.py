@@ -89,10 +89,10 @@ class Deviation:
             level = here[0] + (there[0] - here[0]) * share
         if before and here:
             reach = min(self.settling[k][1], gap)
-            level = level + _settle(distance - before.knots[-1], reach, here[1], here[2])
+            level = level + settle(distance - before.knots[-1], reach, here[1], here[2])
         if behind and there:
             reach = min(self.settling[k + 1][0], gap)
-            level = level + _settle(behind.knots[0] - distance, reach, -there[1], there[2])
+            level = level + settle(behind.knots[0] - distance, reach, -there[1], there[2])
         return np.asarray(level)
 
 
@@ -114,9 +114,14 @@ def _smooth_step(u: FloatArray) -> FloatArray:
     return np.asarray(u**3 * (10.0 - 15.0 * u + 6.0 * u**2))
 
 
-def _settle(distance: FloatArray, reach: float, slope: float, bend: float) -> FloatArray:
-    """Quintic Hermite functions: starts with value 0, the given slope and second derivative; all three 0 at `reach`."""
-    if reach <= 0.0:
+def settle(
+    distance: FloatArray, reach: float | FloatArray, slope: float | FloatArray, bend: float | FloatArray
+) -> FloatArray:
+    """Quintic Hermite functions: starts with value 0, the given slope and second derivative; all three 0 at `reach`.
+
+    Shape (n,) as the distances, in units of the slope times theirs.
+    """
+    if np.all(np.asarray(reach) <= 0.0):
         return np.zeros_like(distance)
     u = np.clip(distance / reach, 0.0, 1.0)
     by_slope = u - 6.0 * u**3 + 8.0 * u**4 - 3.0 * u**5

@@ -41,8 +41,19 @@ def pairs_within(x: Sequence[FloatArray], y: Sequence[FloatArray], reach: float)
         high = np.stack([highs[0][:, block], highs[1][:, block]])
         there = np.flatnonzero(np.isfinite(low).all(axis=0))
         if len(there) > 1:
-            found.update(_overlapping(low[:, there], high[:, there], there, reach))
+            first, second = _overlapping(low[:, there], high[:, there], there, reach)
+            found.update(zip(first.tolist(), second.tolist(), strict=True))
     return sorted(found)
+
+
+def pairs_now(x: FloatArray, y: FloatArray, reach: float) -> tuple[IntArray, IntArray]:
+    """Pairs of points, shape (n,) each [m], within `reach` [m] of each other along both axes; indices, shape (pairs,).
+
+    The smaller index comes first.
+    """
+    there = np.flatnonzero(np.isfinite(x) & np.isfinite(y))
+    points = np.stack([x[there], y[there]])
+    return _overlapping(points, points, there, reach) if len(there) else (there, there)
 
 
 def _bounds(values: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -52,7 +63,8 @@ def _bounds(values: FloatArray) -> tuple[FloatArray, FloatArray]:
     return np.asarray(low), np.asarray(high)
 
 
-def _overlapping(low: FloatArray, high: FloatArray, names: IntArray, reach: float) -> set[tuple[int, int]]:
+def _overlapping(low: FloatArray, high: FloatArray, names: IntArray, reach: float) -> tuple[IntArray, IntArray]:
+    """Pairs of boxes that are within reach of each other, the smaller name first, shape (pairs,) each."""
     axis = int(np.argmax(high.max(axis=1) - low.min(axis=1)))
     order = np.argsort(low[axis], kind="stable")
     low, high, names = low[:, order], high[:, order], names[order]
@@ -62,5 +74,5 @@ def _overlapping(low: FloatArray, high: FloatArray, names: IntArray, reach: floa
     second = first + 1 + np.arange(len(first)) - np.repeat(np.cumsum(counts) - counts, counts)
     other = 1 - axis
     near = (low[other, second] <= high[other, first] + reach) & (low[other, first] <= high[other, second] + reach)
-    pairs = np.sort(np.stack([names[first[near]], names[second[near]]], axis=1), axis=1)
-    return {(int(a), int(b)) for a, b in pairs}
+    one, two = names[first[near]], names[second[near]]
+    return np.minimum(one, two), np.maximum(one, two)

@@ -13,7 +13,7 @@ import numpy as np
 from xosc_lateral.enrich.conversion import ConversionProvenance, ConvertedScenario
 from xosc_lateral.enrich.enrich import enrich, with_offsets
 from xosc_lateral.enrich.result import Enriched
-from xosc_lateral.errors import FormatError
+from xosc_lateral.errors import DriverProfileError, FormatError
 from xosc_lateral.formats.atomic import refuse_outputs
 from xosc_lateral.formats.context_table import read_context
 from xosc_lateral.formats.openscenario.provenance import PENDING
@@ -116,21 +116,24 @@ def _convert(
         runs = meaning_of(played, tuple(egos), step=settings.step, time_limit=settings.time_limit)
         end = min(runs.end, LONGER * played.motion.end_time)
         lasting = play_until(played, end, step=settings.step) if end > played.motion.end_time else played
-    enriched = enrich(
-        lasting.motion,
-        played.network,
-        drivers,
-        seed=settings.seed,
-        variant=variant,
-        entropy=_entropy(played),
-        context=context,
-        trailers=played.trailers,
-        attempts=settings.attempts,
-        with_sensor=settings.with_sensor,
-        neighbours=settings.neighbours,
-        uncertain=depends.entities,
-        at_least=0.0 if is_replay(settings, depends) else SUPPLY,
-    )
+    try:
+        enriched = enrich(
+            lasting.motion,
+            played.network,
+            drivers,
+            seed=settings.seed,
+            variant=variant,
+            entropy=_entropy(played),
+            context=context,
+            trailers=played.trailers,
+            attempts=settings.attempts,
+            with_sensor=settings.with_sensor,
+            neighbours=settings.neighbours,
+            uncertain=depends.entities,
+            at_least=0.0 if is_replay(settings, depends) else SUPPLY,
+        )
+    except DriverProfileError as error:  # found in the movement: who sampled knows the profile by its name alone
+        raise DriverProfileError(f"{source}: {error}") from error
     _refuse_lanes_without_width(played, enriched)
     names = [entity.name for entity in enriched.entities if entity.is_enriched]
     plan = writing_plan(played.scenario, settings, depends, names, pulled=played.trailers, sampled=sampled)

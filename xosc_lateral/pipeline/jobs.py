@@ -281,10 +281,11 @@ class _Fingerprints:
     _profiles: dict[tuple[str, tuple[Path, ...]], str] = field(default_factory=dict)
 
     def of(self, settings: ConvertSettings, variant: int) -> str:
-        values = settings.record(Path()) | {"road": None, "strict": settings.strict}  # a road counts by its hash
+        values = settings.record(Path()) | {"strict": settings.strict}
         values["profile"] = self._profile(settings.profile, settings.library)
         values["entity"] = {name: self._profile(one, settings.library) for name, one in settings.entity.items()}
-        values["context"] = None if settings.context is None else _hash_or_missing(settings.context)
+        for name, path in (("context", settings.context), ("road", settings.road)):
+            values[name] = None if path is None else _hash_or_missing(path)
         values["variant"] = variant
         return hashlib.sha256(json.dumps(values, sort_keys=True).encode()).hexdigest()
 

@@ -292,6 +292,8 @@ def _plain(name: str, value: Any, folder: Path) -> Any:
         return relative(Path(value), folder) if value.endswith(".json") or Path(value).name != value else value
     if isinstance(value, Path):
         return relative(value, folder)
+    if isinstance(value, StrEnum):
+        return value.value
     return sorted(value) if isinstance(value, frozenset) else value
 
 
@@ -307,10 +309,15 @@ def spelled_out(verb: Verb) -> Verb:
     """Name the options of a verb that takes `ConvertOptions` in its signature, for help and completion."""
     signature = inspect.signature(verb)
     own = [one for one in signature.parameters.values() if one.kind is not one.VAR_KEYWORD]
-    defaults = ConvertSettings()
+    defaults = ConvertSettings().record(Path())
     named = [
-        inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=getattr(defaults, name), annotation=hint)
-        for name, hint in inspect.get_annotations(ConvertOptions).items()
+        inspect.Parameter(
+            name,
+            inspect.Parameter.KEYWORD_ONLY,
+            default=defaults.get(name),
+            annotation=getattr(hint, "__forward_arg__", hint),
+        )
+        for name, hint in ConvertOptions.__annotations__.items()
     ]
     verb.__signature__ = signature.replace(parameters=[*own, *named])  # type: ignore[attr-defined]
     return verb

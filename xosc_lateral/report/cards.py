@@ -124,12 +124,17 @@ def card_text(profile: DriverProfile) -> str:
 
 def provenance_items(known: Provenance) -> list[tuple[str, str]]:
     """How a closed loop came to the profile, if one did, and its evaluation on held-out drives."""
-    items = _evaluation_items(known.evaluation)
-    loop = known.fit.get("closed_loop")
+    try:
+        return [*_loop_items(known.fit.get("closed_loop")), *_evaluation_items(known.evaluation)]
+    except (AttributeError, KeyError, TypeError, ValueError):  # anybody may write there what they like
+        return [("evaluation", "not as this package writes it")]
+
+
+def _loop_items(loop: Mapping[str, Any] | None) -> list[tuple[str, str]]:
     if not loop:
-        return items
+        return []
     found = ", ".join(loop["found"]) or "nothing"
-    return [("loop", f"started from a {loop['base']} model, seed {loop['seed']}; found: {found}"), *items]
+    return [("loop", f"started from a {loop['base']} model, seed {loop['seed']}; found: {found}")]
 
 
 def _evaluation_items(evaluation: Mapping[str, Any]) -> list[tuple[str, str]]:

@@ -25,6 +25,7 @@ from xosc_lateral.report.loop_words import (
     others_words,
     outcome,
     size_words,
+    taken_back_words,
 )
 
 if TYPE_CHECKING:
@@ -45,12 +46,11 @@ FAR, CLOSE = 2.0, 1.2
 def loop_text(result: LoopResult, lack_of_fit: LackOfFit | None = None) -> str:
     """The outcome in a few lines; what is left is worked out unless it is given."""
     lines = [f"{finding_sentence(finding)} (p = {finding.p_value:.1e})" for finding in result.findings]
-    lines = lines or ([] if result.returned_base else ["no significant effect found"])
-    for item in result.feedback:
+    lines = lines or ["no effect added"]
+    lines += [f"{taken_back_words(item)}: {item.why}" for item in result.identified.taken_back]
+    for item in result.identified.usable.feedback:
         sure = "possibly a" if item.doubtful else "a"
         lines.append(f"{item.column}: {sure} consequence of the car's movement, not used as a cause")
-    if result.returned_base:
-        lines.append(f"the base is returned: {result.returned_base}")
     error = f"{result.error_before:.4f} m before, {result.error_after:.4f} m after (floor {result.floor:.4f} m)"
     lines.append(f"held-out error {error}")
     lines.append(lack_of_fit_words(result, lack_of_fit or lack_of_fit_of(result)))
@@ -70,6 +70,7 @@ def finding_sentence(finding: Finding) -> str:
 
 def loop_page(result: LoopResult, lack_of_fit: LackOfFit, tables: Sequence[Path]) -> str:
     """HTML page; same result, same bytes."""
+    from xosc_lateral.report.loop_json import column_record
     from xosc_lateral.report.loop_traces import traces_figure
     from xosc_lateral.report.render import render_page
 
@@ -94,9 +95,12 @@ def loop_page(result: LoopResult, lack_of_fit: LackOfFit, tables: Sequence[Path]
         group_rows=[_group_row(group, result) for group in groups],
         group_tones={k: "bad" for k, group in enumerate(groups) if group.after > FAR * group.floor},
         n_groups=len(lack_of_fit.groups),
-        n_runs=len(result.runs_after),
-        feedback_rows=[{"column": item.column, "reason": feedback_words(item)} for item in result.feedback],
-        rejected_rows=[_rejected_row(item) for item in result.rejected],
+        n_runs=len(result.scored.runs_after),
+        role_rows=[column_record(column, result) for column in sorted(result.identified.usable.roles)],
+        feedback_rows=[
+            {"column": item.column, "reason": feedback_words(item)} for item in result.identified.usable.feedback
+        ],
+        rejected_rows=[_rejected_row(item) for item in result.identified.selection.rejected],
         **_movement(result),
     )
 
@@ -168,7 +172,9 @@ def _pictures(result: LoopResult, finding: Finding) -> list[_Picture]:
             "and band: two standard errors). Right: means of held-out blocks, by fifths of the effect."
         )
         alt = f"Curve of {finding.effect} over measured points, and measured against expected before and after."
-        return [_Picture(effect_figure(result, finding), caption, alt)] if finding.statistic in result.real else []
+        return (
+            [_Picture(effect_figure(result, finding), caption, alt)] if finding.statistic in result.scored.real else []
+        )
     draw, caption = DRAWINGS[effect.kind if effect is not None else finding.kind]
     pictures = [_Picture(draw(result, finding), caption, f"{_capital(finding.effect)}: {caption}")]
     if finding.kind in ("regime", "population"):
@@ -185,7 +191,7 @@ def _residuals(result: LoopResult, lack_of_fit: LackOfFit) -> list[tuple[str, Fi
     return [
         (words, residual_figure(result, lack_of_fit, what))
         for what, words in (("mean", "mean offset"), ("spread", SPREAD))
-        if any(name.startswith(f"{what} by ") and " by effect: " not in name for name in result.real)
+        if any(name.startswith(f"{what} by ") and " by effect: " not in name for name in result.scored.real)
     ]
 
 

@@ -11,14 +11,14 @@ from numpy.typing import NDArray
 from xosc_lateral.driver.effects import Acts, ColumnEffect, Product
 from xosc_lateral.evaluation.gapped_spectrum import gapped_spectrum
 from xosc_lateral.evaluation.metrics import METRICS
-from xosc_lateral.identification.blocks import hold_out_blocks
 from xosc_lateral.identification.close import LoopResult
 from xosc_lateral.identification.findings import Finding
+from xosc_lateral.identification.held_out_gain import hold_out_blocks
 from xosc_lateral.identification.lack_of_fit import LackOfFit
-from xosc_lateral.identification.partial import Curve, curve_of
 from xosc_lateral.identification.scorecard import Scorecard
 from xosc_lateral.mask import true_slices
 from xosc_lateral.report.figures import BLUE, GRID, MUTED, VERMILLION, figure_style, new_figure, new_panels
+from xosc_lateral.report.loop_curves import Curve, curve_of
 from xosc_lateral.report.loop_words import SPREAD, column_label, product_label
 from xosc_lateral.report.violins import LABELS, density_over
 
@@ -68,13 +68,15 @@ def residual_figure(result: LoopResult, lack_of_fit: LackOfFit, what: str) -> Fi
 def _draw_residual(axis: Axes, result: LoopResult, lack_of_fit: LackOfFit, what: str, name: str) -> None:
     """One column's fifths, over what chance gives."""
     group = f"{what} by {name}"
-    place = np.arange(len(result.real[group]))
+    place = np.arange(len(result.scored.real[group]))
     floor = 100.0 * TWO_ERRORS * lack_of_fit.floors[group]
     axis.fill_between(place, -floor, floor, color=MUTED, alpha=0.2, linewidth=0, label="sampling error")
     axis.axhline(0.0, color=MUTED, linewidth=0.6)
-    for values, color, label in ((result.before, BEFORE, "before"), (result.after, AFTER, "after")):
-        axis.plot(place, 100.0 * (result.real[group] - values[group]), "o-", color=color, markersize=3, label=label)
-    _name_bins(axis, result.statistics.middles[name], name)
+    for values, color, label in ((result.scored.before, BEFORE, "before"), (result.scored.after, AFTER, "after")):
+        axis.plot(
+            place, 100.0 * (result.scored.real[group] - values[group]), "o-", color=color, markersize=3, label=label
+        )
+    _name_bins(axis, result.scored.statistics.middles[name], name)
     axis.set_title(column_label(name, hint=False))
 
 
@@ -92,11 +94,11 @@ def effect_figure(result: LoopResult, finding: Finding) -> Figure:
 def _draw_held_out(axis: Axes, result: LoopResult, finding: Finding, effect: ColumnEffect) -> None:
     """The statistics that show an effect best, on blocks that it was not fitted on."""
     name = finding.statistic.split(" by ", 1)[1]
-    bins = _in_unit(effect, result.statistics.middles[name])
+    bins = _in_unit(effect, result.scored.statistics.middles[name])
     for values, color, label in (
-        (result.real, DRIVES, "measured"),
-        (result.before, BEFORE, "profile before"),
-        (result.after, AFTER, "profile after"),
+        (result.scored.real, DRIVES, "measured"),
+        (result.scored.before, BEFORE, "profile before"),
+        (result.scored.after, AFTER, "profile after"),
     ):
         axis.plot(bins, values[finding.statistic], "o-", color=color, markersize=3.5, label=label)
     on_mean = effect.acts is Acts.LOCATION
@@ -127,8 +129,8 @@ def draw_spectra(axis: Axes, result: LoopResult, segment: int, *, within_blocks:
     frequency, density, number = gapped_spectrum(timeline.offset[None], timeline.valid, seams, timeline.step, segment)
     _draw_measured(axis, frequency, density, number)
     for runs, color, label, style in (
-        (result.runs_before, BEFORE, "profile before", "-"),
-        (result.runs_after, AFTER, "profile after", "--"),
+        (result.scored.runs_before, BEFORE, "profile before", "-"),
+        (result.scored.runs_after, AFTER, "profile after", "--"),
     ):
         frequency, density, _ = gapped_spectrum(runs, timeline.valid, seams, timeline.step, segment)
         axis.plot(frequency, density, color=color, label=label, linestyle=style)
@@ -217,8 +219,8 @@ def _shown(result: LoopResult, what: str) -> list[str]:
     """Columns with a panel, those of the findings first."""
     names = [
         name
-        for name in result.statistics.labels
-        if f"{what} by {name}" in result.real and not name.startswith("effect: ")
+        for name in result.scored.statistics.labels
+        if f"{what} by {name}" in result.scored.real and not name.startswith("effect: ")
     ]
     acting = {column for finding in result.findings for column in finding.columns}
     return sorted(names, key=lambda name: not any(column == name or f"({column})" in name for column in acting))

@@ -9,10 +9,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.driver.effects import Cycle, Drift, Regimes, Step, VarianceTrend
+from xosc_lateral.driver.effects import Cycle, Regimes, Step, TimeSmooth
 from xosc_lateral.identification.close import LoopResult
 from xosc_lateral.identification.findings import Finding
-from xosc_lateral.identification.moving_statistics import (
+from xosc_lateral.report.figures import MUTED, ORANGE, figure_style, new_figure
+from xosc_lateral.report.loop_courses import (
     MovingStatistic,
     by_drive,
     hidden_mean,
@@ -20,7 +21,6 @@ from xosc_lateral.identification.moving_statistics import (
     moving_spread,
     regime_probability,
 )
-from xosc_lateral.report.figures import MUTED, ORANGE, figure_style, new_figure
 from xosc_lateral.report.loop_figures import AFTER, BEFORE, DRIVES, TWO_ERRORS, draw_spectra
 from xosc_lateral.report.loop_words import SPREAD
 
@@ -56,7 +56,7 @@ def cycle_figure(result: LoopResult, finding: Finding) -> Figure:
     assert isinstance(effect, Cycle)
     figure, axes = new_figure(height=3.3)
     axis = axes[0, 0]
-    longest = int(np.bincount(result.statistics.timeline.drive).max())
+    longest = int(np.bincount(result.scored.statistics.timeline.drive).max())
     segment = min(CYCLE_ROWS, 2 ** int(np.log2(longest)))
     draw_spectra(axis, result, segment, within_blocks=False)
     line = 1.0 / effect.period_s
@@ -72,24 +72,24 @@ def cycle_figure(result: LoopResult, finding: Finding) -> Figure:
 
 @figure_style()
 def spread_figure(result: LoopResult, finding: Finding) -> Figure:
-    """Spread over time, with the fitted trend."""
+    """Spread over time, with the fitted curve."""
     effect = finding.effects[0]
-    assert isinstance(effect, VarianceTrend)
+    assert isinstance(effect, TimeSmooth)
     moving = moving_spread(result, SPREAD_S)
-    share = np.clip((moving.time - effect.from_s) / max(effect.to_s - effect.from_s, 1e-9), 0.0, 1.0) - 0.5
+    curve = effect.path(effect.spread, moving.time)
+    waves = [effect.path(tuple(row), moving.time) for row in np.eye(len(effect.spread))]
+    error = np.sqrt(sum(np.square(wave * own) for wave, own in zip(waves, effect.spread_errors, strict=True)))
 
-    def fitted(factor: float) -> FloatArray:
-        shape = max(factor, 1e-3) ** share
-        return shape * float(np.exp(np.mean(np.log(moving.measured / shape))))
+    def fitted(times: float) -> FloatArray:
+        level = float(np.mean(np.log(moving.measured) - curve))
+        return np.asarray(np.exp(level + curve + times * error))
 
     figure, axes = new_figure(height=3.2)
     axis = axes[0, 0]
     _draw_statistic(axis, moving)
-    low, high = (fitted(effect.factor + sign * TWO_ERRORS * effect.factor_error) for sign in (-1.0, 1.0))
+    low, high = (fitted(sign * TWO_ERRORS) for sign in (-1.0, 1.0))
     axis.fill_between(moving.time, low, high, color=ORANGE, alpha=0.25, linewidth=0)
-    axis.plot(
-        moving.time, fitted(effect.factor), color=ORANGE, label=f"fitted: factor {effect.factor:.2f} over the drive"
-    )
+    axis.plot(moving.time, fitted(0.0), color=ORANGE, label=f"fitted: factor {finding.size_m:.2f}")
     axis.set_ylim(bottom=0.0)
     axis.set_ylabel(f"spread over {SPREAD_S / 60:.0f} min [m]")
     axis.legend()
@@ -134,11 +134,18 @@ def mean_figure(result: LoopResult, finding: Finding) -> Figure:
     figure, axes = new_figure(height=3.2)
     axis = axes[0, 0]
     _draw_statistic(axis, moving)
-    word = "step" if isinstance(finding.effects[0], Step) else "drift"
+    word = "step" if isinstance(finding.effects[0], Step) else "smooth change"
     axis.plot(moving.time, hidden + moving.measured.mean(), color=ORANGE, linewidth=2.0, label=f"fitted {word}")
     axis.set_ylabel(f"mean over {MEAN_S / 60:.0f} min [m], positive to the left")
     axis.legend()
     return figure
+
+
+def time_figure(result: LoopResult, finding: Finding) -> Figure:
+    """Mean or spread over time, with the fitted curve."""
+    effect = finding.effects[0]
+    assert isinstance(effect, TimeSmooth)
+    return mean_figure(result, finding) if effect.location else spread_figure(result, finding)
 
 
 @figure_style()
@@ -170,9 +177,12 @@ def memory_figure(result: LoopResult, finding: Finding) -> Figure:
     axis = axes[0, 0]
     statistic = finding.statistic
     labels = ["< 1 s", "1-3 s", "3-8 s", "8-20 s", "20-60 s", "60-200 s", "> 200 s"]
-    place = np.arange(len(result.real[statistic]))
-    for values, color, label in ((result.before, BEFORE, "profile before"), (result.after, AFTER, "profile after")):
-        axis.plot(place, values[statistic] / result.real[statistic], "o-", color=color, label=label)
+    place = np.arange(len(result.scored.real[statistic]))
+    for values, color, label in (
+        (result.scored.before, BEFORE, "profile before"),
+        (result.scored.after, AFTER, "profile after"),
+    ):
+        axis.plot(place, values[statistic] / result.scored.real[statistic], "o-", color=color, label=label)
     axis.axhline(1.0, color=DRIVES, label="measured")
     axis.set_xticks(place, labels)
     axis.set_xlabel("averaging times that the movement lies between")
@@ -187,9 +197,9 @@ def quantiles_figure(result: LoopResult) -> Figure:
     figure, axes = new_figure(height=2.8)
     axis = axes[0, 0]
     for values, color, label in (
-        (result.real, DRIVES, "measured"),
-        (result.before, BEFORE, "profile before"),
-        (result.after, AFTER, "profile after"),
+        (result.scored.real, DRIVES, "measured"),
+        (result.scored.before, BEFORE, "profile before"),
+        (result.scored.after, AFTER, "profile after"),
     ):
         axis.plot(100.0 * np.asarray(QUANTILES), values["quantiles of local spread"], "o-", color=color, label=label)
     axis.set_xlabel("share of the time with less spread [%]")
@@ -205,13 +215,12 @@ DRAWINGS: Mapping[str, tuple[Callable[[LoopResult, Finding], Figure], str]] = Ma
             cycle_figure,
             "Power spectral density about the fitted oscillation, a peak that the profile before does not have.",
         ),
-        VarianceTrend.kind: (spread_figure, "Spread over the drive; orange: the fitted trend."),
+        TimeSmooth.kind: (time_figure, "What changes with time, over the drive; orange: the fitted curve."),
         Regimes.kind: (
             regime_figure,
             "Local spread over the drive; shaded: the regime of large spread is more likely than not.",
         ),
         Step.kind: (mean_figure, "Mean position over the drive; orange: the fitted step."),
-        Drift.kind: (mean_figure, "Mean position over the drive; orange: the fitted drift."),
         "memory": (
             memory_figure,
             "Standard deviation of the movement by averaging time, relative to the measured one.",

@@ -15,8 +15,8 @@ from xosc_lateral.formats.profiles import profile_hash
 from xosc_lateral.identification.close import LoopResult
 from xosc_lateral.identification.feedback import Feedback
 from xosc_lateral.identification.findings import Finding
+from xosc_lateral.identification.held_out_gain import Gain
 from xosc_lateral.identification.lack_of_fit import LackOfFit
-from xosc_lateral.identification.nested import Gain
 from xosc_lateral.normal import NORMAL_95
 from xosc_lateral.report.loop_words import feedback_words, lack_of_fit_words, meaning
 from xosc_lateral.version import __version__
@@ -40,16 +40,18 @@ def loop_record(result: LoopResult, lack_of_fit: LackOfFit, tables: Sequence[Pat
         "base_profile": _profile(result.base) | {"given": result.given},
         "refined_profile": _profile(result.refined),
         "held_out": result.held_out,
+        "columns": [column_record(column, result) for column in sorted(result.identified.usable.roles)],
         "findings": [finding_record(finding) | {"meaning": meaning(finding, result)} for finding in result.findings],
-        "consequences": [_feedback(item) for item in result.feedback],
+        "consequences": [_feedback(item) for item in result.identified.usable.feedback],
         "rejected": [
             {"columns": list(item.columns), "look": item.component, "p_value": item.p_value, "why": item.why}
-            for item in result.rejected
+            | {"taken_back": item.was_found}
+            for item in result.identified.selection.rejected
         ],
-        "unused": [{"column": column, "why": why} for column, why in result.unused.items()],
+        "unused": [{"column": column, "why": why} for column, why in result.identified.usable.unused.items()],
         "error": {"measure": MEASURE, **error},
-        "held_out_gain": _gain(result.gain),
-        "returned_base": result.returned_base or None,
+        "held_out_gain": _gain(result.identified.total),
+        "returned_base": result.identified.returned_base or None,
         "unexplained": _unexplained(result, lack_of_fit),
         "residual": [
             {"group": group.name, "before": group.before, "after": group.after, "floor": group.floor}
@@ -58,6 +60,15 @@ def loop_record(result: LoopResult, lack_of_fit: LackOfFit, tables: Sequence[Pat
         "metrics": {when: _metrics(getattr(result.scores, when)) for when in ("before", "after", "floor")},
         "provenance": {"package_version": __version__, "seed": result.seed, "inputs": parsed_hashes(tables)},
     }
+
+
+def column_record(column: str, result: LoopResult) -> dict[str, Any]:
+    """What a column was taken for, by whom, and what was done with it."""
+    usable = result.identified.usable
+    assigned = usable.roles[column]
+    follows = any(item.column == column for item in usable.feedback)
+    used = "consequence" if follows else usable.unused.get(column, "tested as a cause")
+    return {"column": column, "role": assigned.role.value, "by": assigned.source or None, "use": used}
 
 
 def _interval(finding: Finding) -> list[float]:
@@ -73,6 +84,7 @@ def _feedback(item: Feedback) -> dict[str, Any]:
         "doubtful": item.doubtful,
         "coherence": item.coherence,
         "foretold": item.predicted_share,
+        "function_of_offset": item.function,
     }
 
 

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.identification.blocks import hold_out_blocks
 from xosc_lateral.identification.close import LoopResult
+from xosc_lateral.identification.held_out_gain import hold_out_blocks
 from xosc_lateral.identification.timeline import Timeline
 from xosc_lateral.report.figures import GRID, figure_style, new_panels
 from xosc_lateral.report.loop_figures import AFTER, BEFORE, DRIVES
@@ -34,8 +34,8 @@ def traces_figure(result: LoopResult) -> Figure:
     parts = longest_parts(result)
     columns = (
         ("measured", timeline.offset, DRIVES),
-        ("profile before", result.runs_before[0], BEFORE),
-        ("profile after", result.runs_after[0], AFTER),
+        ("profile before", result.scored.runs_before[0], BEFORE),
+        ("profile after", result.scored.runs_after[0], AFTER),
     )
     figure, axes = new_panels(len(parts), len(columns), panel_height=0.75, sharex=True, sharey=True)
     for row, rows in zip(axes, parts, strict=True):

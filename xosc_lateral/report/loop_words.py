@@ -10,9 +10,10 @@ from numpy.typing import NDArray
 
 from xosc_lateral.driver.effects import Acts, Angular, ColumnEffect, Levels, Magnitude, Product
 from xosc_lateral.identification.close import LoopResult
-from xosc_lateral.identification.feedback import BAND, Feedback
+from xosc_lateral.identification.feedback import BAND, FUNCTION, Feedback
 from xosc_lateral.identification.findings import Finding
 from xosc_lateral.identification.lack_of_fit import GroupError, LackOfFit
+from xosc_lateral.identification.selection import Rejected
 from xosc_lateral.identification.timeline import LOCAL_S
 from xosc_lateral.segment import CONTEXT_UNITS
 
@@ -44,10 +45,10 @@ COMPONENT_WORDS: Mapping[str, str] = MappingProxyType(
         "slow_spread": "a column that changes the spread of slow movement",
         "fine_noise": "a column that changes the fine noise",
         "restoring": "a column that changes the rate of mean reversion",
-        "variance_trend": "a trend of the variance",
+        "time_spread": "a spread that changes smoothly with time",
         "regimes": "regimes of small and large spread",
         "cycle": "a periodic oscillation",
-        "low_frequency": "a slow drift or a step of the mean offset",
+        "time_mean": "a mean offset that changes with time, smoothly or by a step",
     }
 )
 """What is asked of each component."""
@@ -65,14 +66,14 @@ _HIDDEN: Mapping[str, str] = MappingProxyType(
     {
         "periodic": "The car oscillates at a steady frequency, whatever the road and the traffic do.",
         "drift": (
-            "The mean position drifts over minutes, and no column drifts with it: a change in the driver's habits, "
-            "or a camera whose calibration depends on temperature."
+            "The mean position changes smoothly over the drive, and no column explains it: a driver who settles, or a "
+            "camera whose calibration depends on temperature."
         ),
         "step": (
             "From one moment on the car keeps to another position in the lane, and no column changes at that time: a "
             "recalibrated camera, for example, or a change of driver."
         ),
-        "scale": "The spread about the mean position changes steadily over the drive, as with fatigue.",
+        "scale": "The spread about the mean position changes smoothly over the drive: fatigue, or learning.",
         "regime": (
             "The movement switches between two levels of spread, and no column predicts when: distraction, for example."
         ),
@@ -122,8 +123,8 @@ def _size(finding: Finding) -> str:
     spread = f"{GAP}±{GAP}{about:.2f}" if about else ""
     if finding.kind in ("scale", "dynamics", "regime"):
         return f"factor{GAP}{size:.2f}{spread}"
-    sign = "+" if finding.kind in ("location", "step") else ""
-    what = {"population": "means scatter by ", "drift": "scatters by ", "periodic": "amplitude "}.get(finding.kind, "")
+    sign = "+" if finding.kind in ("location", "step", "drift") else ""
+    what = {"population": "means scatter by ", "periodic": "amplitude "}.get(finding.kind, "")
     return f"{what}{size:{sign}.2f}{spread}{GAP}m"
 
 
@@ -173,21 +174,39 @@ def others_words(finding: Finding, mark: str = "") -> str:
 
 def feedback_words(item: Feedback) -> str:
     """Why a column is no cause, in a sentence."""
+    if item.source:
+        by = "declared to be" if item.source == "declared" else "by its name"
+        return f"it is {by} the car's own movement"
+    if item.function >= FUNCTION:
+        return f"it is a function of the present {item.of} (squared coherence {item.function:.2f}), as a warning is"
     shared = f"above {BAND[0]:g}{GAP}Hz, where drivers hardly respond, its squared coherence with the {item.of} is"
-    told = f"the movement predicts {100 * item.predicted_share:.0f}{GAP}% of its changes"
+    share = f"the movement predicts {100 * item.predicted_share:.1f}{GAP}% of its changes"
     verdict = "it may follow from the car's own movement" if item.doubtful else "it follows from the car's own movement"
-    return f"{shared} {item.coherence:.2f}, and {told}: {verdict}"
+    declare = f"; if it cannot, declare what it is: `--role {item.column}=road`" if item.doubtful else ""
+    return f"{shared} {item.coherence:.2f}, and {share}: {verdict}{declare}"
 
 
 def outcome(result: LoopResult) -> str:
-    """What was found, in a sentence."""
-    if result.returned_base:
-        return f"The base profile is returned: {result.returned_base}."
-    if not result.findings:
-        return "No significant effect was found, and none was added."
-    several = len(result.findings) > 1
-    names = "; ".join(f"{finding.effect} ({size_words(finding)})" for finding in result.findings)
-    return f"{len(result.findings)} effect{'s' * several} found and added to the profile: {names}."
+    """What was found and what became of it, in sentences that are true of every outcome."""
+    found, back = result.findings, result.identified.taken_back
+    words = []
+    if found:
+        names = "; ".join(f"{finding.effect} ({size_words(finding)})" for finding in found)
+        words.append(f"{len(found)} effect{'s' * (len(found) > 1)} found and added to the profile: {names}.")
+    elif not back:
+        words.append("No significant effect was found, and none was added.")
+    if back:
+        names = "; ".join(f"{taken_back_words(item)}: {item.why}" for item in back)
+        number = f"{len(back)} {'more ' * bool(found)}" + ("effects were" if len(back) > 1 else "effect was")
+        words.append(f"{number} found and taken back ({names}).")
+        words += [] if found else ["Nothing was added: the base profile is returned."]
+    return " ".join(words)
+
+
+def taken_back_words(item: Rejected) -> str:
+    """What was found and is not kept."""
+    by = f" ({' and '.join(item.columns)})" if item.columns else ""
+    return f"{COMPONENT_WORDS.get(item.component, item.component)}{by}"
 
 
 def lack_of_fit_words(result: LoopResult, lack_of_fit: LackOfFit) -> str:

@@ -13,8 +13,7 @@ from xosc_lateral.identification.terms.base import Removal, centred
 from xosc_lateral.identification.terms.column import columns_acting, columns_on_size, of_kind, responses, shrunk
 from xosc_lateral.identification.terms.mean import MeanTerm
 from xosc_lateral.identification.terms.spread import SpreadTerm
-from xosc_lateral.identification.terms.step import StepTerm
-from xosc_lateral.identification.terms.variance_trend import VarianceTrendTerm
+from xosc_lateral.identification.terms.time import StepTerm, TimeSpreadTerm
 
 SECONDS = 900.0
 
@@ -36,7 +35,7 @@ def test_a_term_without_columns_has_none_of_any_kind(coarse: Coarse) -> None:
     assert step.scale_columns(coarse).shape == (len(coarse), 0)
     assert step.known_scale(coarse) is None
     assert step.mean_columns(coarse).shape == (len(coarse), 1)
-    assert VarianceTrendTerm().mean_columns(coarse).shape == (len(coarse), 0)
+    assert TimeSpreadTerm().mean_columns(coarse).shape == (len(coarse), 0)
 
 
 def test_columns_of_the_mean_are_there_on_the_fine_grid_too(coarse: Coarse) -> None:
@@ -48,7 +47,7 @@ def test_columns_of_the_mean_are_there_on_the_fine_grid_too(coarse: Coarse) -> N
 
 def test_terms_of_two_kinds_that_share_a_budget_are_told_apart_by_kind() -> None:
     assert StepTerm(at=1).kind_key == "step"
-    assert VarianceTrendTerm().kind_key == "variance_trend"
+    assert TimeSpreadTerm().kind_key == "time_spread"
 
 
 def test_a_term_matches_one_of_its_kind_and_columns(coarse: Coarse) -> None:
@@ -117,7 +116,7 @@ def test_a_sized_effect_is_neutral_on_average_and_holds_its_range(coarse: Coarse
 
 
 def test_lists_of_terms_by_what_they_act_on(coarse: Coarse) -> None:
-    fitted = fit_model(coarse, (term(), term(SpreadTerm, "rare"), VarianceTrendTerm()))
+    fitted = fit_model(coarse, (term(), term(SpreadTerm, "rare"), TimeSpreadTerm()))
     assert len(of_kind(fitted, MeanTerm)) == len(of_kind(fitted, SpreadTerm)) == 1
     assert columns_on_size(fitted) == {"rare"}
     assert columns_acting(fitted) == {"x", "rare"}

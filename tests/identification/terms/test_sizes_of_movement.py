@@ -11,11 +11,15 @@ from xosc_lateral.driver.effects import Acts, ColumnEffect, Linear
 from xosc_lateral.identification import regression
 from xosc_lateral.identification.regression import Coarse, Fitted, fit_model
 from xosc_lateral.identification.terms.column import ColumnTerm
-from xosc_lateral.identification.terms.fine_noise import FineNoiseTerm
 from xosc_lateral.identification.terms.mean import MeanTerm
 from xosc_lateral.identification.terms.restoring import MAX_FACTOR, RestoringTerm, recent_offset
-from xosc_lateral.identification.terms.slow_spread import SlowSpreadTerm
-from xosc_lateral.identification.terms.spread import SpreadTerm, fine_twin, known_log_scale
+from xosc_lateral.identification.terms.spread import (
+    FineNoiseTerm,
+    SlowSpreadTerm,
+    SpreadTerm,
+    fine_twin,
+    known_log_scale,
+)
 
 SECONDS = 2400.0
 N = round(SECONDS / 0.2)

@@ -28,6 +28,7 @@ from xosc_lateral.driver.effects.regimes import Regimes
 from xosc_lateral.driver.effects.saturating import Saturating
 from xosc_lateral.driver.effects.step import Step
 from xosc_lateral.driver.effects.threshold import Threshold
+from xosc_lateral.driver.effects.time_smooth import TimeSmooth
 from xosc_lateral.driver.effects.variance_trend import VarianceTrend
 from xosc_lateral.driver.effects.zones import Zones
 from xosc_lateral.driver.records import read_as
@@ -112,6 +113,7 @@ __all__ = [
     "Saturating",
     "Step",
     "Threshold",
+    "TimeSmooth",
     "VarianceTrend",
     "Zones",
     "any_effect",

@@ -186,9 +186,12 @@ class ColumnEffect(Effect, frozen=True, kw_only=True):
         """Driving quantity as the driver responds to it, shape (n, k), on a grid of the given step [s]."""
         return respond(self.known(context), step, self.lag_s, self.response_s, order=self.response_order)
 
-    def response_in_blocks(self, step: float, state: ResponseState | None = None) -> Response:
-        """The response block by block, shape (n, k) each, from the start of a drive or from a state; `step` in [s]."""
-        return Response(step, self.lag_s, self.response_s, state, order=self.response_order)
+    def response_in_blocks(self, step: float, state: ResponseState | None = None, *, delay: int = 0) -> Response:
+        """The response block by block, shape (n, k) each, from the start of a drive or from a state.
+
+        `step` in [s], `delay` in steps: see `Response`.
+        """
+        return Response(step, self.lag_s, self.response_s, state, order=self.response_order, delay=delay)
 
     def strength(self, step: float, context: Mapping[str, FloatArray]) -> FloatArray | None:
         """[m] or natural logarithm of a factor, shape (n,); None when a column is missing."""
@@ -196,12 +199,17 @@ class ColumnEffect(Effect, frozen=True, kw_only=True):
             return None
         return self.weighed(self.response(step, context))
 
-    def weighed(self, response: FloatArray) -> FloatArray:
-        """Strength of responses, shape (n, k): coefficients . (response - reference), shape (n,). [m] or [-]"""
+    def weighed(self, response: FloatArray, coefficients: Iterable[float | FloatArray] | None = None) -> FloatArray:
+        """Strength of responses, shape (n, k): coefficients . (response - reference), shape (n,). [m] or [-]
+
+        Coefficients are the effect's, or k of shape (n,) where every row is another driver's.
+        """
         # Component by component: a matrix product adds in another order for one row than for many.
         parts = [
             (self._within(response[:, k], k) - reference) * coefficient
-            for k, (coefficient, reference) in enumerate(zip(self.coefficients, self.reference, strict=True))
+            for k, (coefficient, reference) in enumerate(
+                zip(self.coefficients if coefficients is None else coefficients, self.reference, strict=True)
+            )
         ]
         return np.asarray(reduce(add, parts) if parts else np.zeros(len(response)))
 

@@ -55,14 +55,24 @@ class Response:
         To go on from.
     order : int
         Count of first-order lags: after two, a jump is a bend without a corner.
+    delay : int
+        Rows that everything comes later by, for who doesn't know what lies ahead.
     """
 
     def __init__(
-        self, step: float, lag_s: float, response_s: float, state: ResponseState | None = None, *, order: int = 1
+        self,
+        step: float,
+        lag_s: float,
+        response_s: float,
+        state: ResponseState | None = None,
+        *,
+        order: int = 1,
+        delay: int = 0,
     ) -> None:
         self.state = ResponseState() if state is None else state
         self._order = order
-        self._whole, self._share = split_shift(lag_s / step)
+        whole, self._share = split_shift(lag_s / step)
+        self._whole = whole - delay
         self._keep = float(np.exp(-step / response_s)) if response_s > 0 else None
         self.ahead = max(0, self._whole + (1 if self._share else 0))
         """Rows that it looks ahead."""

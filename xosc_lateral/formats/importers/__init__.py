@@ -28,6 +28,7 @@ IMPORTERS = {
     "tracks": "xosc_lateral.formats.importers.tracks:import_tracks",
     "table": "xosc_lateral.formats.importers.foreign_table:import_table",
     "osi": "xosc_lateral.formats.importers.osi:import_osi",
+    "fcd": "xosc_lateral.formats.importers.fcd:import_fcd",
     "commonroad": "xosc_lateral.formats.importers.commonroad:import_commonroad",
 }
 """Format -> its reader, loaded when it is wanted."""

@@ -22,7 +22,6 @@ from xosc_lateral.formats.importers.cuts import DEFAULT_CUTS, CutSettings
 from xosc_lateral.formats.importers.lane_graph import LaneGraph
 from xosc_lateral.formats.importers.lane_shapes import curvature_along, place_in_shapes
 from xosc_lateral.formats.importers.placed import (
-    PlacedTracks,
     ground_speed,
     import_each,
     import_placed,
@@ -53,7 +52,7 @@ def import_commonroad(
 def _read(path: Path, settings: CutSettings) -> Imported:
     scenario = _opened(path)
     graph, shapes = _graph(scenario)
-    tracks = _placed(scenario, shapes, graph.left, path)
+    tracks = place_in_shapes(_tracks(scenario, path), shapes, graph.left)
     return import_placed(
         tracks,
         graph,
@@ -99,8 +98,17 @@ def _opened(path: Path) -> Any:
     return scenario
 
 
-def _placed(scenario: Any, shapes: list[_Shape], left: IntArray, path: Path) -> PlacedTracks:
-    """Rows of all obstacles that move along a recorded trajectory."""
+def read_obstacles(path: Path) -> Tracks:
+    """All obstacles that move along a recorded trajectory.
+
+    Raises
+    ------
+    FormatError, NotEnoughDataError
+    """
+    return _tracks(_opened(path), path)
+
+
+def _tracks(scenario: Any, path: Path) -> Tracks:
     names: list[str] = []
     rows: list[tuple[float, ...]] = []
     lengths: list[float] = []
@@ -128,8 +136,7 @@ def _placed(scenario: Any, shapes: list[_Shape], left: IntArray, path: Path) -> 
     speed = np.where(np.isfinite(values[:, 5]), values[:, 5], ground_speed(x, y, vehicle, step))
     length, kind = np.array(lengths)[vehicle], np.array(kinds)[vehicle]
     time = step * values[:, 1]
-    tracks = Tracks(tuple(names), vehicle, time, step, x, y, heading, np.abs(speed), length, kind)
-    return place_in_shapes(tracks, shapes, left)
+    return Tracks(tuple(names), vehicle, time, step, x, y, heading, np.abs(speed), length, kind)
 
 
 class _Shape:

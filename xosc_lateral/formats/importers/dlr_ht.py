@@ -38,7 +38,7 @@ from xosc_lateral.formats.importers.cuts import (
 )
 from xosc_lateral.formats.importers.lanes_from_tracks import LaneCentreLine, fit_lane_centre
 from xosc_lateral.formats.importers.neighbours import find_neighbours
-from xosc_lateral.formats.importers.road_from_tracks import fit_reference_line
+from xosc_lateral.formats.importers.road_from_tracks import ReferenceLine, fit_reference_line
 from xosc_lateral.formats.importers.table import Imported, drop_cut, guarded, make_provenance
 from xosc_lateral.formats.source import Source, open_source
 
@@ -56,6 +56,8 @@ COLUMNS = (
     *("acceleration_signed", "dimension_length", "dimension_height", "interpolated"),
     *(f"classifications_{name}" for name in CLASSES),
 )
+WIDTH = "dimension_width"
+"""Read where it is there: nothing of an import needs it."""
 LICENCE = (
     "DLR Highway Traffic dataset (Deutsches Zentrum für Luft- und Raumfahrt, doi:10.5281/zenodo.14012005), said by "
     "others to be under CC BY-NC-SA 4.0; its first file lies in the wheel of tasi, licensed Apache-2.0. No tracks are "
@@ -74,29 +76,17 @@ def import_dlr_ht(source: Path, settings: CutSettings = DEFAULT_CUTS, *, keep_cu
         naming why a row would have been cut.
     """
     tracks = read_tracks(source)
-    xy = tracks[["center_easting", "center_northing"]].to_numpy()
-    vehicle = tracks["vehicle"].to_numpy()
-    forward = travels_north(tracks)
-    reference, s_road, d_road = fit_reference_line(xy, forward)
-    # From here on every carriageway has its own s and d: s grows with travel, d is positive to the left of it.
+    found = find_lanes(tracks, settings)
+    forward, reference, s_road = found.forward, found.reference, found.s
+    placed, lanes, gap = found.placed, found.lanes, found.gap
     s = np.where(forward, s_road, reference.length - s_road)
-    d = np.where(forward, d_road, -d_road)
-
-    height = tracks["dimension_height"].to_numpy()
-    gap = long_gaps(tracks["interpolated"].to_numpy(), vehicle, STEP, settings.max_gap)
-    placed = _Placed.empty(len(tracks))
-    lanes: dict[str, list[LaneCentreLine]] = {}
-    for name, mine in (("northbound", forward), ("southbound", ~forward)):
-        rows = np.flatnonzero(mine)
-        part, lanes[name] = _place_in_lanes(s[rows], d[rows], height[rows], vehicle[rows], gap[rows], settings)
-        placed.put(rows, part)
     table = _context(tracks, placed, s, forward)
     table[ZONE] = zones_along(_strands(forward, placed.lane), s_road)
     table["curvature"] = reference.curvature(s_road) * np.where(forward, 1.0, -1.0)
     # 0.1 mm, 0.1 per km: below any measurement, above what linear algebra does differently from machine to machine.
     table = table.round({"curvature": 7, **dict.fromkeys(table.columns.drop(["curvature", "drive", "time", ZONE]), 4)})
     reasons = {"no lane": placed.lane < 0, "lane change": placed.changing, "gap": gap}
-    frame = np.round(tracks["time"].to_numpy() / STEP).astype(np.int64)
+    vehicle, frame = tracks["vehicle"].to_numpy(), np.round(tracks["time"].to_numpy() / STEP).astype(np.int64)
     table["state"] = name_states(reasons, placed.lane, vehicle, frame, STEP, settings)
     table[RUN] = number_runs(table["state"].to_numpy(), placed.lane, vehicle, frame)
     record = make_provenance(
@@ -167,7 +157,7 @@ def _read_csv(stream: io.BufferedIOBase, source: Path) -> pd.DataFrame:
             raise FormatError(f"no column {', '.join(missing)}; is this a DLR HT trajectory file?", path=source, line=1)
         stream.seek(0)
         try:
-            frame = pd.read_csv(stream, usecols=list(COLUMNS), engine="pyarrow")
+            frame = pd.read_csv(stream, usecols=[name for name in (*COLUMNS, WIDTH) if name in head], engine="pyarrow")
         except ValueError as error:  # pandas' and pyarrow's parser errors are both of this kind
             raise FormatError(f"can't be read as CSV: {error}", path=source) from error
     for name in frame.columns.drop("timestamp"):
@@ -207,6 +197,36 @@ class _Placed:
     def put(self, rows: IntArray, part: _Placed) -> None:
         self.lane[rows], self.offset[rows] = part.lane, part.offset
         self.width[rows], self.changing[rows] = part.width, part.changing
+
+
+@dataclass(frozen=True, eq=False)
+class Carriageways:
+    """The road's reference line, lane centres of both directions (right to left), and every row's place in them."""
+
+    reference: ReferenceLine
+    forward: NDArray[np.bool_]
+    s: FloatArray
+    gap: NDArray[np.bool_]
+    placed: _Placed
+    lanes: dict[str, list[LaneCentreLine]]
+
+
+def find_lanes(tracks: pd.DataFrame, settings: CutSettings = DEFAULT_CUTS) -> Carriageways:
+    """Lanes out of nothing but the tracks; "northbound" ones along the reference line, "southbound" ones against it."""
+    forward = travels_north(tracks)
+    reference, s_road, d_road = fit_reference_line(tracks[["center_easting", "center_northing"]].to_numpy(), forward)
+    # From here on every carriageway has its own s and d: s grows with travel, d is positive to the left of it.
+    s = np.where(forward, s_road, reference.length - s_road)
+    d = np.where(forward, d_road, -d_road)
+    vehicle, height = tracks["vehicle"].to_numpy(), tracks["dimension_height"].to_numpy()
+    gap = long_gaps(tracks["interpolated"].to_numpy(), vehicle, STEP, settings.max_gap)
+    placed = _Placed.empty(len(tracks))
+    lanes: dict[str, list[LaneCentreLine]] = {}
+    for name, mine in (("northbound", forward), ("southbound", ~forward)):
+        rows = np.flatnonzero(mine)
+        part, lanes[name] = _place_in_lanes(s[rows], d[rows], height[rows], vehicle[rows], gap[rows], settings)
+        placed.put(rows, part)
+    return Carriageways(reference, forward, s_road, gap, placed, lanes)
 
 
 def _place_in_lanes(
@@ -284,7 +304,7 @@ def _context(tracks: pd.DataFrame, placed: _Placed, s: FloatArray, forward: NDAr
     """The drive table's columns, for every row of the tracks."""
     import pandas as pd
 
-    kind = _vehicle_class(tracks)
+    kind = vehicle_classes(tracks)
     frame = np.round(tracks["time"].to_numpy() / STEP).astype(np.int64) * 2 + forward
     near = find_neighbours(
         frame,
@@ -320,7 +340,7 @@ def _strands(forward: NDArray[np.bool_], lane: IntArray) -> NDArray[np.object_]:
     return np.where(lane >= 0, names[forward * LANES + np.clip(lane, 0, LANES - 1)], "")
 
 
-def _vehicle_class(tracks: pd.DataFrame) -> NDArray[np.str_]:
+def vehicle_classes(tracks: pd.DataFrame) -> NDArray[np.str_]:
     """The provider's likeliest class of each vehicle."""
     scores = tracks[[f"classifications_{name}" for name in CLASSES]].to_numpy()
     return np.asarray(np.array(CLASSES)[scores.argmax(axis=1)])

@@ -85,18 +85,27 @@ def import_levelx(source: Path, settings: CutSettings = DEFAULT_CUTS, *, keep_cu
 
 def _read_recording(path: Path, settings: CutSettings) -> tuple[pd.DataFrame, str, float]:
     """Table with `state`, layout and step of one recording."""
-    tracks, tracks_meta, recording = (
-        _read(path.with_name(path.name.replace("_tracks.csv", ending)))
-        for ending in ("_tracks.csv", "_tracksMeta.csv", "_recordingMeta.csv")
-    )
+    tracks, tracks_meta, recording = read_recording_files(path)
     number = path.name.split("_")[0]
-    rate = _cell(recording, "frameRate", path)
+    rate = cell(recording, "frameRate", path)
     if not (rate.replace(".", "", 1).isdigit() and 1.0 <= float(rate) <= 1000.0):
         raise FormatError(f"frameRate={rate!r}, expected 1 to 1000 per second", path=path)
     step = 1.0 / float(rate)
     if "latLaneCenterOffset" in tracks.columns:
         return _from_exid(tracks, tracks_meta, number, step, path, settings), "exiD", step
     return _from_highd(tracks, tracks_meta, recording, number, step, path, settings), "highD", step
+
+
+def read_recording_files(path: Path) -> tuple[pd.DataFrame, pd.DataFrame, pd.DataFrame]:
+    """Tracks, their meta table and that of the recording."""
+    endings = ("_tracks.csv", "_tracksMeta.csv", "_recordingMeta.csv")
+    tracks, tracks_meta, recording = (_read(path.with_name(path.name.replace(endings[0], end))) for end in endings)
+    return tracks, tracks_meta, recording
+
+
+def markings(recording: pd.DataFrame, side: str, path: Path) -> FloatArray:
+    """Of highD's "upper" or "lower" lanes, y pointing down. [m]"""
+    return np.array([float(part) for part in cell(recording, f"{side}LaneMarkings", path).split(";")])
 
 
 def _read(path: Path) -> pd.DataFrame:
@@ -107,13 +116,15 @@ def _read(path: Path) -> pd.DataFrame:
     return read_table(path)[0]
 
 
-def _cell(frame: pd.DataFrame, column: str, path: Path) -> str:
+def cell(frame: pd.DataFrame, column: str, path: Path) -> str:
+    """Of a meta file's only row."""
     if column not in frame.columns or frame.empty:
         raise FormatError(f"no value of {column} in the recording's meta file", path=path)
     return str(frame[column].iloc[0])
 
 
-def _require(frame: pd.DataFrame, columns: Sequence[str], path: Path) -> None:
+def require(frame: pd.DataFrame, columns: Sequence[str], path: Path) -> None:
+    """Refuse a table that lacks a column."""
     missing = [name for name in columns if name not in frame.columns]
     if missing:
         raise FormatError(f"no column {', '.join(missing)}; neither highD nor exiD", path=path, line=1)
@@ -131,7 +142,7 @@ def _from_highd(
 ) -> pd.DataFrame:
     import pandas as pd
 
-    _require(tracks, HIGHD_COLUMNS, path)
+    require(tracks, HIGHD_COLUMNS, path)
     tracks = tracks.sort_values(["id", "frame"], ignore_index=True)
     meta = tracks_meta.set_index("id").reindex(tracks["id"])
     rightwards = meta["drivingDirection"].to_numpy() == 2
@@ -140,8 +151,8 @@ def _from_highd(
     x = way * (tracks["x"] + 0.5 * tracks["width"]).to_numpy()
     left = -way * (tracks["y"] + 0.5 * tracks["height"]).to_numpy()
     lane, offset, width, count = (np.zeros(len(tracks)) for _ in range(4))
-    for mine, column, sign in ((rightwards, "lowerLaneMarkings", -1.0), (~rightwards, "upperLaneMarkings", 1.0)):
-        marks = np.sort(sign * np.array([float(part) for part in _cell(recording, column, path).split(";")]))
+    for mine, side, sign in ((rightwards, "lower", -1.0), (~rightwards, "upper", 1.0)):
+        marks = np.sort(sign * markings(recording, side, path))
         index = np.searchsorted(marks, left[mine]) - 1
         inside = np.clip(index, 0, len(marks) - 2)
         lane[mine] = np.where(index == inside, index, -1)
@@ -189,7 +200,7 @@ def _from_exid(
 ) -> pd.DataFrame:
     import pandas as pd
 
-    _require(tracks, EXID_COLUMNS, path)
+    require(tracks, EXID_COLUMNS, path)
     tracks = tracks.sort_values(["trackId", "frame"], ignore_index=True)
     kind = tracks_meta.set_index("trackId").reindex(tracks["trackId"])["class"].astype(str).str.lower().to_numpy()
     offset, width = _first(tracks["latLaneCenterOffset"]), _first(tracks["laneWidth"])

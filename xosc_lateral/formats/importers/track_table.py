@@ -14,6 +14,7 @@ from xosc_lateral.errors import FormatError, NotEnoughDataError
 from xosc_lateral.formats.importers.esmini_log import is_esmini_log, read_esmini_log
 from xosc_lateral.formats.importers.placed import PlacedTracks, ground_speed, travel_heading
 from xosc_lateral.formats.mapping import MappingLike, TableMapping, as_mapping, parse_map
+from xosc_lateral.formats.states import COLUMNS
 from xosc_lateral.formats.tables import read_table
 from xosc_lateral.formats.text_columns import comma_numbers, seconds_of_text
 
@@ -24,13 +25,14 @@ FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
 HEADERS: Mapping[str, tuple[str, ...]] = {
-    "vehicle": ("vehicle", "id", "track_id", "trackid", "vehicle_id", "object_id", "track", "drive"),
+    "vehicle": ("vehicle", "id", "track_id", "trackid", "vehicle_id", "object_id", "track", "drive", "name"),
     "time": ("time", "timestamp", "t"),
     "x": ("x", "x_center", "center_x", "xcenter", "easting", "center_easting", "pos_x"),
     "y": ("y", "y_center", "center_y", "ycenter", "northing", "center_northing", "pos_y"),
-    "heading": ("heading", "yaw", "psi", "psi_rad", "orientation"),
+    "heading": ("heading", "yaw", "psi", "psi_rad", "orientation", "h"),
     "speed": ("speed", "velocity", "v"),
     "length": ("length", "vehicle_length", "dimension_length"),
+    "width": ("width", "vehicle_width", "dimension_width"),
     "rear": ("rear",),
     "vehicle_class": ("vehicle_class", "class", "type", "agent_type", "object_type"),
 }
@@ -54,6 +56,9 @@ class Tracks:
     speed: FloatArray
     length: FloatArray
     kind: NDArray[np.str_]
+    width: FloatArray | None = None
+    is_reference: bool = False
+    """Positions are those of the reference point, as in a table of states that `play` writes, not of the middle."""
     rear: FloatArray | None = None
     """How far x and y lie behind the vehicle's middle; None: they are the middle. [m]"""
 
@@ -90,7 +95,14 @@ def read_tracks(path: Path, columns: Sequence[str] = (), mapping: MappingLike | 
     """
     saved = as_mapping(mapping)
     table = read_esmini_log(path) if is_esmini_log(path) else read_table(path, saved)[0]
-    found = _columns(table, path, saved, columns)
+    return tracks_of(table, path, columns, saved)
+
+
+def tracks_of(
+    table: pd.DataFrame, path: Path, columns: Sequence[str] = (), saved: TableMapping | None = None
+) -> Tracks:
+    """Tracks of a table that is read; see `read_tracks`."""
+    found = _columns(table, path, as_mapping(None) if saved is None else saved, columns)
     order = found.sort_values(["vehicle", "time"], kind="stable", ignore_index=True)
     order = order.drop_duplicates(["vehicle", "time"], ignore_index=True)
     codes, names = order["vehicle"].factorize()
@@ -115,6 +127,8 @@ def read_tracks(path: Path, columns: Sequence[str] = (), mapping: MappingLike | 
         np.abs(_given(order, "speed", ground_speed(x, y, vehicle, step))),
         _given(order, "length", usual),
         kinds,
+        order["width"].to_numpy(dtype=np.float64) if "width" in order else None,
+        is_reference=set(COLUMNS) <= set(map(str, table.columns)),
         rear=_given(order, "rear", np.zeros(len(order))) if "rear" in order else None,
     )
 

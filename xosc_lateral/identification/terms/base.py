@@ -126,9 +126,11 @@ class Term(ABC):
     """Among those of a stage: smaller ones are asked first, and first where two are equally sure; then by name. [-]"""
     weight: ClassVar[float]
     """Of its component in the error budget; one for each kind of hidden effect. [-]"""
+    least_drives: ClassVar[int] = 1
+    """In a table that it is looked for in."""
     seen_held_out: ClassVar[bool] = True
     """Whether the mean or the innovations' scale follow terms of this class on held-out rows: not the latent path of a
-    cycle or a drift, nor what changes the slow movement alone."""
+    cycle, nor what changes the slow movement alone."""
 
     @property
     def columns(self) -> tuple[str, ...]:
@@ -143,7 +145,7 @@ class Term(ABC):
     @property
     def kind_key(self) -> str:
         """Component, or kind where two kinds share one: names its groups of summary statistics."""
-        return self.kind if self.component == "low_frequency" else self.component
+        return self.kind if self.component == "time_mean" else self.component
 
     def mean_columns(self, coarse: Coarse) -> FloatArray:
         """Columns of the mean, shape (n, k). [any unit]"""
@@ -164,6 +166,10 @@ class Term(ABC):
     def known_scale(self, coarse: Coarse) -> FloatArray | None:
         """Log scale that is known as a whole, shape (n,). [-]"""
         return None
+
+    def may_be_explained_by(self, later: Term, coarse: Coarse) -> bool:
+        """Whether a term that was found later may be why this one was found: a column is why a hidden effect was."""
+        return bool(later.columns) and not self.columns
 
     @classmethod
     @abstractmethod

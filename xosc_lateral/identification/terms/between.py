@@ -17,16 +17,19 @@ from msgspec import structs
 from numpy.typing import NDArray
 
 from xosc_lateral.driver.effects import Acts, ColumnEffect, Effect, Linear
-from xosc_lateral.identification.best_of_drives import best_of_drives
-from xosc_lateral.identification.problem import Problem
 from xosc_lateral.identification.regression import Fitted
-from xosc_lateral.identification.seeds import LoopSeed
-from xosc_lateral.identification.significance import MANY_DRIVES
+from xosc_lateral.identification.significance import MANY_DRIVES, LoopSeed
 from xosc_lateral.identification.terms.base import Description, Outcome, Stage
 from xosc_lateral.identification.terms.column import ColumnTerm, of_kind
 
 if TYPE_CHECKING:
     from xosc_lateral.identification.search import Search
+
+
+from collections.abc import Sequence
+
+from xosc_lateral.identification.dictionary import NULL_DRAWS
+from xosc_lateral.identification.significance import as_one_degree, upper_tail
 
 FloatArray = NDArray[np.float64]
 
@@ -35,6 +38,10 @@ USUAL_S = 60.0
 
 MIN_SECONDS = 10
 """Of road-following in a drive that is counted. [s]"""
+
+ROUNDS, SETTLED = 50, 1e-9
+"""Rounds of Newton's method at most, and the share of the variance that the last one may change it by: the sum of
+squares falls and is convex in the variance, so that rounds from zero approach the root from below."""
 
 MIN_SUPPORT = 8.0
 """A quantity that rests on fewer drives than this is not looked at."""
@@ -48,15 +55,11 @@ class BetweenTerm(ColumnTerm):
     kind: ClassVar[str] = "location"
     stages: ClassVar[tuple[Stage, ...]] = (Stage.BETWEEN_DRIVES,)
     weight: ClassVar[float] = 5.0
+    least_drives: ClassVar[int] = MANY_DRIVES
     seen_held_out: ClassVar[bool] = False
     acts: ClassVar[Acts] = Acts.LOCATION
     what: ClassVar[str] = "place that a drive keeps"
     group: ClassVar[str] = "mean"
-
-    @classmethod
-    def problem(cls, fitted: Fitted) -> Problem:
-        """Levels of drives are no rows of the grid; see `test`."""
-        raise NotImplementedError
 
     @classmethod
     def test(cls, search: Search, fitted: Fitted) -> Outcome | None:
@@ -142,7 +145,13 @@ class _Places:
 
     @classmethod
     def of(cls, fitted: Fitted) -> _Places:
-        """Weights at which the weighed squares add up to their degrees of freedom (DerSimonian and Laird)."""
+        """Weights at which the weighed squares add up to their degrees of freedom [1]_, by Newton's method.
+
+        References
+        ----------
+        .. [1] R. Paule, J. Mandel, "Consensus values and weighting factors", J. Research of the National Bureau of
+               Standards 87, 1982.
+        """
         coarse, groups = fitted.coarse, fitted.coarse.drives
         seconds = np.bincount(coarse.drive, coarse.valid.astype(float), minlength=groups)
         power = fitted.whitener.power
@@ -151,12 +160,15 @@ class _Places:
         usual = [coarse.by_drive(coarse.response(term.effect)[:, 0]) for term in of_kind(fitted, BetweenTerm)]
         known = np.column_stack([np.ones(groups), *usual])
         scatter = 0.0
-        for _ in range(20):
+        for _ in range(ROUNDS):
             places = cls(fitted.levels, np.where(counted, 1.0 / (scatter + noise), 0.0), known)
-            left = places.left(fitted.levels)
-            excess = float(left @ left) / max(int(counted.sum()) - known.shape[1], 1) - 1.0
-            typical = float(places.weight[counted].mean()) if counted.any() else 1.0
-            scatter = max(scatter + excess / max(typical, 1e-30), 0.0)
+            squares = np.square(places.left(fitted.levels))
+            excess = float(squares.sum()) - max(int(counted.sum()) - known.shape[1], 1)
+            change = excess / max(float(squares @ places.weight), 1e-300)
+            settled = abs(change) <= SETTLED * scatter or (change < 0.0 and scatter == 0.0)
+            scatter = max(scatter + change, 0.0)
+            if settled:
+                break
         return places
 
     def left(self, values: FloatArray) -> FloatArray:
@@ -171,3 +183,106 @@ class _Places:
         weighed = self.known * self.weight[:, None]
         inverse = np.linalg.pinv(weighed.T @ self.known)
         return (inverse @ (weighed.T @ self.place))[1:], np.sqrt(np.diag(inverse))[1:]
+
+
+BoolArray = NDArray[np.bool_]
+
+LEAST_APART = 0.1
+"""Share of either member's variance that the other must leave: below, the two are one quantity twice. [-]"""
+
+
+@dataclass(frozen=True, slots=True)
+class Best:
+    """What explains most.
+
+    Parameters
+    ----------
+    members : tuple of int
+        One candidate, or two.
+    p_value : float
+        Family-wise over all candidates and pairs.
+    """
+
+    members: tuple[int, ...]
+    p_value: float
+
+
+def best_of_drives(
+    left: FloatArray,
+    counted: BoolArray,
+    quantities: FloatArray,
+    costs: FloatArray,
+    columns: Sequence[str],
+    rng: np.random.Generator,
+) -> Best:
+    """Largest gain in chi-square less what its choice costs, against drives that are dealt anew.
+
+    Parameters
+    ----------
+    left : array, shape (drives,)
+        What is not explained, of variance 1. [-]
+    counted : bool array, shape (drives,)
+        Drives that are long enough.
+    quantities : array, shape (drives, k)
+        Candidates, free of what is known, of length 1.
+    costs : array, shape (k,)
+        Of choosing each among its family.
+    columns : sequence of str
+        Each candidate's; the two of a pair are of different columns.
+    rng : Generator
+    """
+    rows = np.flatnonzero(counted)
+    draws = np.zeros((NULL_DRAWS + 1, len(left)))
+    draws[0] = left
+    for drawn in draws[1:]:
+        drawn[rows] = left[rng.permutation(rows)]
+    z = draws @ quantities
+    singles = np.square(z) - costs
+    pairs = _Pairs.of(quantities, columns)
+    scores = np.maximum(singles.max(axis=1), pairs.scores(z))
+    p_value = upper_tail(float(scores[0]), scores[1:])
+    alone = int(np.argmax(singles[0]))
+    return Best((alone,) if singles[0, alone] >= scores[0] else pairs.best(z[0]), p_value)
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class _Pairs:
+    """Pairs of candidates that are two quantities.
+
+    Parameters
+    ----------
+    first, second : int array, shape (pairs,)
+    product : array, shape (pairs,)
+        Cosine of the angle between the two.
+    """
+
+    first: NDArray[np.intp]
+    second: NDArray[np.intp]
+    product: FloatArray
+
+    @classmethod
+    def of(cls, quantities: FloatArray, columns: Sequence[str]) -> _Pairs:
+        names = np.array(columns)
+        products = quantities.T @ quantities
+        apart = (names[:, None] != names) & (1.0 - np.square(products) >= LEAST_APART)
+        first, second = np.nonzero(np.triu(apart, 1))
+        return cls(first, second, products[first, second])
+
+    def best(self, z: FloatArray) -> tuple[int, int]:
+        """The pair that gains most, of the scores of one draw, shape (k,)."""
+        index = int(np.argmax(self._gained(z)))
+        return int(self.first[index]), int(self.second[index])
+
+    def scores(self, z: FloatArray) -> FloatArray:
+        """Largest gain of a pair, as that of one candidate: chi-square that is as rare with one degree of freedom, less
+        the choice among all pairs; shape (draws,) of `z`, shape (draws, k)."""
+        if not len(self.first):
+            return np.full(len(z), -np.inf)
+        gained = np.array([self._gained(drawn).max() for drawn in z])  # one by one: a table of all would fill gigabytes
+        return np.asarray(as_one_degree(gained, 2) - 2.0 * np.log(len(self.first)))
+
+    def _gained(self, z: FloatArray) -> FloatArray:
+        """Chi-square of two degrees, shape (pairs,)."""
+        one, other = z[self.first], z[self.second]
+        power = np.square(one) + np.square(other) - 2.0 * self.product * one * other
+        return np.asarray(power / (1.0 - np.square(self.product)))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from abc import abstractmethod
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar, Self
 
@@ -11,15 +10,13 @@ from msgspec import structs
 from numpy.typing import NDArray
 
 from xosc_lateral.driver.effects import Acts, ColumnEffect, Effect
-from xosc_lateral.identification.alternatives import Alternatives
-from xosc_lateral.identification.column_search import find_column, probability_of
-from xosc_lateral.identification.problem import Problem
-from xosc_lateral.identification.ranges import span
+from xosc_lateral.identification.refinement import Alternatives
 from xosc_lateral.identification.regression import Coarse, Fitted
-from xosc_lateral.identification.terms.base import Description, Outcome, Removal, Term
+from xosc_lateral.identification.terms.base import Description, Removal, Term
+from xosc_lateral.identification.timing import span
 
 if TYPE_CHECKING:
-    from xosc_lateral.identification.search import Search
+    pass
 
 FloatArray = NDArray[np.float64]
 
@@ -58,30 +55,6 @@ class ColumnTerm(Term):
     def of(cls, effect: ColumnEffect, alike: Alternatives = ()) -> Self:
         """A term of an effect that may act on something else."""
         return cls(structs.replace(effect, acts=cls.acts), alike)
-
-    @classmethod
-    @abstractmethod
-    def problem(cls, fitted: Fitted) -> Problem:
-        """Regression in which a column of this kind is looked for, with the terms fitted already."""
-
-    @classmethod
-    def reweighted(cls, fitted: Fitted, after: Fitted) -> Problem | None:
-        """The same regression beside `fitted`, weighted by the noise that is left in `after`; None: no other."""
-        return None
-
-    @classmethod
-    def barred(cls, fitted: Fitted) -> frozenset[str]:
-        """Columns that this kind may not take up beside the terms fitted."""
-        return frozenset()
-
-    @classmethod
-    def test(cls, search: Search, fitted: Fitted) -> Outcome | None:
-        """The best candidate of the whole dictionary against rotations."""
-        return find_column(search, cls, fitted)
-
-    def probability_beside(self, search: Search, fitted: Fitted) -> float:
-        """p-value of its columns in whatever shape suits them beside the terms fitted."""
-        return probability_of(search, type(self), fitted, self.columns)
 
     def remove(self, fitted: Fitted, effects: tuple[Effect, ...], removal: Removal) -> None:
         """Evaluate the sized effects."""

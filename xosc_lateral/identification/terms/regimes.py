@@ -22,14 +22,14 @@ from numpy.typing import NDArray
 
 from xosc_lateral.driver.effects import Effect, Regimes
 from xosc_lateral.identification.dictionary import in_another_order
-from xosc_lateral.identification.log_scale import squared_innovations
+from xosc_lateral.identification.innovations import squared_innovations
+from xosc_lateral.identification.low_frequencies import SPREAD_ORDERS, half_cosines_of
 from xosc_lateral.identification.markov_switching import RegimeFit, fit_regimes
 from xosc_lateral.identification.regression import Coarse, Fitted
-from xosc_lateral.identification.seeds import LoopSeed
-from xosc_lateral.identification.significance import HEAVY_TAIL_SHARE, upper_tail
+from xosc_lateral.identification.significance import HEAVY_TAIL_SHARE, LoopSeed, upper_tail
 from xosc_lateral.identification.squares import SLOW_S, fine_squares, log_sizes, slow_squares
 from xosc_lateral.identification.terms.base import Description, Outcome, Removal, Stage, Term
-from xosc_lateral.identification.terms.spread import known_log_scale, what_columns_may_do
+from xosc_lateral.identification.terms.spread import known_log_scale, what_a_column_may_do, what_columns_do
 
 if TYPE_CHECKING:
     from xosc_lateral.identification.search import Search
@@ -83,7 +83,12 @@ class RegimesTerm(Term):
         if not coarse.lasts or any(isinstance(term, cls) for term in fitted.terms):
             return None
         # what a column does to the size in another shape than the one that was found is no regime
-        known = [known_log_scale(fitted), what_columns_may_do(search, fitted)]
+        known = [
+            known_log_scale(fitted),
+            what_columns_do(search, fitted),
+            what_a_column_may_do(search, fitted)[0],
+            half_cosines_of(coarse, max(SPREAD_ORDERS)),  # nor is what a smooth of time may do
+        ]
         p_value = probability_of_persistence(
             squared_innovations(fitted.innovations, coarse.valid),
             coarse.valid,

@@ -10,11 +10,12 @@ from msgspec import structs
 from numpy.typing import NDArray
 
 from xosc_lateral.driver.effects import Acts, Effect
+from xosc_lateral.identification.column_search import SearchedTerm
 from xosc_lateral.identification.problem import Problem, of_products
-from xosc_lateral.identification.ranges import driving_range
 from xosc_lateral.identification.regression import Fitted
 from xosc_lateral.identification.terms.base import Stage
-from xosc_lateral.identification.terms.column import ColumnTerm, columns_acting, responses
+from xosc_lateral.identification.terms.column import columns_acting, responses
+from xosc_lateral.identification.timing import driving_range
 
 FloatArray = NDArray[np.float64]
 
@@ -26,7 +27,7 @@ MAX_FACTOR = 3.0
 
 
 @dataclass(frozen=True, eq=False)
-class RestoringTerm(ColumnTerm):
+class RestoringTerm(SearchedTerm):
     """Innovations by a column times the recent offset."""
 
     component: ClassVar[str] = "restoring"

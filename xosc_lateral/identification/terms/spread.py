@@ -16,8 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.driver.effects import Acts, ColumnEffect, Effect
-from xosc_lateral.identification.column_search import likely_response
-from xosc_lateral.identification.log_scale import squared_innovations
+from xosc_lateral.identification.column_search import SearchedTerm, likely_response
+from xosc_lateral.identification.innovations import squared_innovations
 from xosc_lateral.identification.problem import Problem, of_squares
 from xosc_lateral.identification.regression import Coarse, Fitted
 from xosc_lateral.identification.squares import fine_squares, log_sizes
@@ -26,6 +26,11 @@ from xosc_lateral.identification.terms.column import ColumnTerm, columns_on_size
 
 if TYPE_CHECKING:
     from xosc_lateral.identification.search import Search
+
+
+from xosc_lateral.identification.squares import SLOW_S, slow_squares
+from xosc_lateral.identification.terms.column import columns_acting, responses
+from xosc_lateral.identification.terms.mean import MeanTerm
 
 FloatArray = NDArray[np.float64]
 
@@ -39,7 +44,7 @@ FINE_TWIN_Z = 2.0
 
 
 @dataclass(frozen=True, eq=False)
-class SpreadTerm(ColumnTerm):
+class SpreadTerm(SearchedTerm):
     """Log standard deviation of the innovations by a column: regression of their squares."""
 
     component: ClassVar[str] = "spread"
@@ -91,10 +96,86 @@ def known_log_scale(fitted: Fitted) -> FloatArray:
     return np.concatenate([np.zeros((len(coarse), 0)), *columns, *known], axis=1)
 
 
-def what_columns_may_do(search: Search, fitted: Fitted) -> FloatArray:
-    """What columns do to the movement's size, in any shape, and what the best of the others may do, shape (n, k).
+def what_columns_do(search: Search, fitted: Fitted) -> FloatArray:
+    """What columns that were found do to the movement's size, in any shape, shape (n, k)."""
+    return search.cross_basis(columns_on_size(fitted))
 
-    Beside it hidden changes of the size have to stand: regimes, a trend.
+
+def what_a_column_may_do(search: Search, fitted: Fitted) -> tuple[FloatArray, float]:
+    """What the best of the other columns may do to the movement's size, shape (n, k), and its p-value.
+
+    Beside it hidden changes of the size have to stand: regimes, a smooth of time.
     """
-    may = likely_response(search, SpreadTerm, fitted, MAY_ACT)
-    return np.concatenate([search.cross_basis(columns_on_size(fitted)), may], axis=1)
+    return likely_response(search, SpreadTerm, fitted, MAY_ACT)
+
+
+@dataclass(frozen=True, eq=False)
+class FineNoiseTerm(SearchedTerm):
+    """Log standard deviation of the innovations at 5 Hz by a column."""
+
+    component: ClassVar[str] = "fine_noise"
+    kind: ClassVar[str] = "scale"
+    stages: ClassVar[tuple[Stage, ...]] = (Stage.MOVEMENT,)
+    weight: ClassVar[float] = 1.0
+    seen_held_out: ClassVar[bool] = False
+    single: ClassVar[bool] = True
+    acts: ClassVar[Acts] = Acts.FINE
+    what: ClassVar[str] = "fine noise"
+
+    @classmethod
+    def problem(cls, fitted: Fitted) -> Problem:
+        """Squared innovations at 5 Hz.
+
+        An effect on the mean is followed with errors: they grow with it where its size is a little wrong, and with its
+        rate of change where its timing is.
+        """
+        squares = fine_squares(fitted)
+        moved = responses(fitted, MeanTerm)
+        known = [known_log_scale(fitted), responses(fitted, cls), np.abs(moved)]
+        if moved.shape[1]:
+            known.append(np.abs(np.gradient(moved, axis=0)))
+        return of_squares(fitted.coarse, squares.standardised, squares.valid, np.concatenate(known, axis=1))
+
+    @classmethod
+    def barred(cls, fitted: Fitted) -> frozenset[str]:
+        """What acts on anything else already: what its shape leaves of itself looks like noise."""
+        return columns_acting(fitted)
+
+    def estimate(self, fitted: Fitted) -> tuple[Effect, ...]:
+        """Log-linear regression of the squares."""
+        return (fine_twin(self, fitted),)
+
+
+@dataclass(frozen=True, eq=False)
+class SlowSpreadTerm(SearchedTerm):
+    """Log standard deviation of eight-second sums of the innovations by a column."""
+
+    component: ClassVar[str] = "slow_spread"
+    kind: ClassVar[str] = "scale"
+    stages: ClassVar[tuple[Stage, ...]] = (Stage.SPREAD,)
+    place: ClassVar[int] = 2
+    weight: ClassVar[float] = 2.0
+    seen_held_out: ClassVar[bool] = False
+    acts: ClassVar[Acts] = Acts.SPREAD
+    what: ClassVar[str] = "spread"
+
+    def size_columns(self, coarse: Coarse) -> FloatArray:
+        """The bounded response, although the innovations' own scale does not follow it."""
+        return self.bounded(coarse)
+
+    @classmethod
+    def problem(cls, fitted: Fitted) -> Problem:
+        """Squares of running sums; an effect on the mean whose size is a little wrong leaves some where it is large."""
+        squares = slow_squares(fitted)
+        known = np.concatenate([known_log_scale(fitted), np.abs(responses(fitted, MeanTerm))], axis=1)
+        return of_squares(fitted.coarse, squares.standardised, squares.valid, known)
+
+    @classmethod
+    def barred(cls, fitted: Fitted) -> frozenset[str]:
+        """Columns that act on the movement's size already."""
+        return columns_on_size(fitted)
+
+    def estimate(self, fitted: Fitted) -> tuple[Effect, ...]:
+        """Neighbouring sums overlap, so errors are wider."""
+        sizes, errors = log_sizes(slow_squares(fitted), self.bounded(fitted.coarse))
+        return (self.sized(fitted.coarse, Acts.SPREAD, sizes, errors * np.sqrt(SLOW_S)),)

@@ -110,7 +110,12 @@ TRACK_RESOLUTION = 0.005
 
 def enriched_scene(enriched: Enriched) -> str:
     """JSON for the player: enriched motion, and the nominal one as ghosts."""
-    return _json(enriched.network, enriched.motion, [(result.motion, result) for result in enriched.entities])
+    return paths_scene(enriched.motion, enriched.network, enriched.entities)
+
+
+def paths_scene(motion: NominalMotion, network: RoadNetwork, results: Sequence[EntityResult]) -> str:
+    """JSON for the player: other paths than the motion's, which is shown as ghosts."""
+    return _json(network, motion, list(zip(motion.entities, results, strict=True)))
 
 
 def nominal_scene(motion: NominalMotion, network: RoadNetwork) -> str:

@@ -202,7 +202,7 @@ def ramps(chain: OffsetChain) -> tuple[Ramp, ...]:
     limit, most = MOST_TURNING * driven, np.full(len(grid), inf)
     if chain.is_overruled:
         most = MOST_HEADING * driven
-        offset = _slower(grid, offset, 2.0 / np.pi * most, None if chain.is_placed else chain.start_t)
+        offset = _slower(grid, offset, 2.0 / np.pi * most, float(offset[0]) if chain.is_placed else chain.start_t)
     starts = offset[:1] + PLACED_ASIDE if chain.is_placed else np.array([chain.start_t])
     near = np.abs(grid[:, None] - np.array(chain.flips)[None, :]) < FLIP_MARGIN
     found = _transitions(grid, offset, limit, most, starts, settles=not chain.is_placed, barred=near.any(axis=1))
@@ -221,20 +221,13 @@ def leading(origin: float, target: float, chain: OffsetChain) -> Ramp:
     return Ramp(0.0, max(by_turn, by_speed, SETTLING_TIME), origin, target)
 
 
-def _slower(time: FloatArray, offset: FloatArray, most: FloatArray, start: float | None) -> FloatArray:
-    """The nearest offsets that change no faster than allowed [m/s], from a start if there is one.
-
-    Midway between the largest such function below and the smallest above (E. J. McShane, "Extension of range of
-    functions", Bulletin of the AMS 40, 1934).
-    """
-    way = np.append(0.0, np.cumsum(0.5 * (most[1:] + most[:-1]) * np.diff(time)))
-
-    def below(values: FloatArray) -> FloatArray:
-        after = np.minimum.accumulate((values + way)[::-1])[::-1] - way
-        return np.asarray(np.minimum(np.minimum.accumulate(values - way) + way, after))
-
-    found = 0.5 * (below(offset) - below(-offset))
-    return found if start is None else np.clip(found, start - way, start + way)
+def _slower(time: FloatArray, offset: FloatArray, most: FloatArray, start: float) -> FloatArray:
+    """Offsets that go after others as fast as they may [m/s]: late, but always on the move. [m]"""
+    found, at = np.empty(len(time)), start
+    for k, step in enumerate(np.append(0.0, np.diff(time))):
+        at += float(np.clip(offset[k] - at, -most[k] * step, most[k] * step))
+        found[k] = at
+    return found
 
 
 def _side(chain: OffsetChain, time: FloatArray) -> FloatArray:

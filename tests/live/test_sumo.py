@@ -1,0 +1,80 @@
+"""Drivers in a SUMO that is really run, and its FCD output read as drives."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import xosc_lateral as xl
+from tests.live.sumo_run import write_run
+from xosc_lateral.cli import main
+from xosc_lateral.errors import FormatError, SimulationError
+
+pytest.importorskip("libsumo", reason="the extra sumo is not installed")
+pytest.importorskip("sumo", reason="the extra sumo is not installed")
+pytestmark = pytest.mark.filterwarnings("ignore")  # libsumo's, about the pyarrow that is installed
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A minute with drivers: SUMO's FCD output, and our own states."""
+    folder = tmp_path_factory.mktemp("sumo")
+    config = write_run(folder)
+    words = ["live", "sumo", str(config), "--seed", "1", "-q", "--fcd-output", str(folder / "fcd.xml")]
+    assert main([*words, "--states", str(folder / "states.csv")]) == 0
+    return folder
+
+
+def test_in_sumos_own_output_vehicles_are_where_their_drivers_say(run: Path) -> None:
+    import pandas as pd
+
+    states = pd.read_csv(run / "states.csv")
+    own = states[states.steered]
+    away = np.abs(own.offset - own.driver)
+    assert own.name.nunique() > 10 and len(own) > 0.7 * len(states)
+    assert np.quantile(away, 0.9) < 0.02 and away.max() < 0.4
+    table = xl.import_drives("fcd", run / "fcd.xml", net=run / "run.net.xml").to_frame()
+    states["time"] = (states.time - 0.1).round(2)  # SUMO writes a step under the time at which it began
+    both = states.merge(table, left_on=["name", "time"], right_on=["drive", "time"])
+    assert len(both) > 0.9 * len(states)
+    np.testing.assert_allclose(both.offset_x, both.offset_y, atol=0.011)  # SUMO writes centimetres
+    assert set(table.lane_width) == {3.75} and set(table.lane_count) == {2}
+    assert set(table.is_truck) == {0.0, 1.0}
+
+
+def test_nobody_collides_and_drivers_differ(run: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["live", "sumo", str(run / "run.sumocfg"), "--seed", "1", "--duration", "30"]) == 0
+    said = capsys.readouterr()
+    assert "warning" not in said.err and "vehicles driven by motorway" in said.out
+
+
+def test_fcd_output_is_fitted(run: Path) -> None:
+    assert main(["import", "fcd", str(run / "fcd.xml"), "-o", str(run / "drives.parquet"), "-q"]) == 0
+    drives = xl.read_drives(run / "drives.parquet")
+    assert len(drives) > 8
+    assert all(np.isfinite(one.offset).all() for one in drives)
+
+
+def test_what_is_no_good_is_said_in_a_line(run: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "off").mkdir()
+    plain = write_run(tmp_path / "off", sublane=0.0)
+    assert main(["live", "sumo", str(plain)]) == 1
+    assert "sublane model is off" in capsys.readouterr().err
+    assert main(["live", "sumo", str(tmp_path / "none.sumocfg")]) == 1
+    bad = "<configuration><input><net-file value='none.net.xml'/></input></configuration>"
+    (tmp_path / "bad.sumocfg").write_text(bad)
+    assert main(["live", "sumo", str(tmp_path / "bad.sumocfg")]) == 1
+    for text, words in (
+        (
+            "<fcd-export><timestep time='0'><vehicle id='a' lane='e_0' pos='1' speed='2'/></timestep></fcd-export>",
+            "posLat",
+        ),
+        ("<fcd-export><timestep time='x'/></fcd-export>", "time='x'"),
+        ("<fcd-export>", "not XML"),
+    ):
+        (tmp_path / "fcd.xml").write_text(text)
+        with pytest.raises(FormatError, match=words):
+            xl.import_drives("fcd", tmp_path / "fcd.xml")
+    assert issubclass(SimulationError, xl.XoscLateralError)

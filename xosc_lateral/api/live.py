@@ -1,0 +1,205 @@
+"""`live`: drivers in a simulation that runs, from its start to its end."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from xosc_lateral.api.inputs import PathLike, Paths, ProfileLike, given_profile
+from xosc_lateral.api.result import Result
+from xosc_lateral.enrich.neighbours import Neighbours
+from xosc_lateral.errors import SimulationError
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+STATES = ("time", "name", "x", "y", "h", "speed", "road", "lane", "s", "offset", "driver", "steered")
+"""Columns of a run: where vehicles are; offset from the lane's centre, positive left; the driver's; if it counts."""
+
+
+def live_esmini(
+    scenario: PathLike,
+    library: Any,
+    *,
+    profile: ProfileLike = "motorway",
+    profiles: Mapping[str, ProfileLike] | None = None,
+    ego: Sequence[str] = (),
+    seed: int = 0,
+    duration: float = 3600.0,
+    step: float = 0.01,
+    window: bool = False,
+    neighbours: str = Neighbours.BORROW,
+    folders: Paths = (),
+) -> LiveRun:
+    """Play a scenario in esmini with drivers in its vehicles.
+
+    Parameters
+    ----------
+    scenario : path
+    library : path, ctypes.CDLL, or object with the same functions
+        ``libesminiLib.so``, ``esminiLib.dll``: the user's own.
+    profile, profiles
+        Who drives; by vehicle where it is another.
+    ego : sequence of str
+        Vehicles under test: none of our drivers.
+    duration, step : float
+        [s]
+    window : bool
+        Open esmini's.
+    folders : path or paths
+        With further profiles.
+
+    Raises
+    ------
+    SimulationError, FormatError
+        In one line.
+    """
+    from xosc_lateral.live.esmini import EsminiTraffic, open_player
+
+    chosen = given_profile(profile, folders)
+    others = {name: given_profile(one, folders) for name, one in (profiles or {}).items()}
+    if not Path(scenario).is_file():
+        raise FileNotFoundError(2, "No such file or directory", str(scenario))
+    player = open_player(library, scenario, window=window)
+    rows: list[tuple[Any, ...]] = []
+    events: list[tuple[float, str, int]] = []
+    try:
+
+        def note(_name: bytes, _kind: int, state: int, path: bytes) -> None:
+            events.append((round(player.SE_GetSimulationTime(), 6), path.decode(errors="replace"), state))
+
+        traffic = EsminiTraffic(
+            player, scenario, chosen, ego=ego, seed=seed, profiles=others, neighbours=Neighbours(neighbours),
+            on_element=note,
+        )  # fmt: skip
+        traffic.steer(0.0)
+        for k in range(round(duration / step) + 1):
+            time = player.SE_GetSimulationTime()
+            for name, state in traffic.states().items():
+                wanted, steered = traffic.moves.get(name, (float("nan"), False))
+                place = (state.road, state.lane, state.s, traffic.offset_of(state))
+                rows.append((time, name, state.x, state.y, state.h, state.speed, *place, wanted, steered))
+            if player.SE_GetQuitFlag() == 1 or k == round(duration / step):
+                break
+            traffic.steer(step)
+            if player.SE_StepDT(step) != 0:
+                raise SimulationError(f"{scenario}: {player.where} stopped at {time:g} s")
+    finally:
+        player.SE_Close()
+    settings = {"scenario": Path(scenario).name, "profile": chosen.name, "seed": seed}
+    return LiveRun(rows, settings, traffic.warnings, events)
+
+
+def live_sumo(
+    config: PathLike,
+    *,
+    profile: ProfileLike = "motorway",
+    profiles: Mapping[str, ProfileLike] | None = None,
+    ego: Sequence[str] = (),
+    seed: int = 0,
+    duration: float = 86_400.0,
+    lateral_resolution: float | None = None,
+    options: Sequence[str] = (),
+    neighbours: str = Neighbours.BORROW,
+    folders: Paths = (),
+) -> LiveRun:
+    """Run a SUMO simulation with drivers in its vehicles; the extra `sumo`.
+
+    Parameters
+    ----------
+    config : path
+        ``.sumocfg``; SUMO's own random seed is as it says.
+    lateral_resolution : float, optional
+        Switches the sublane model on, if the configuration does not. [m]
+    options : sequence of str
+        Further words of SUMO's command line.
+    profile, profiles, ego, seed, duration, neighbours, folders
+        See `live_esmini`.
+
+    Raises
+    ------
+    SimulationError
+        In one line.
+    """
+    from xosc_lateral.live.sumo import SumoTraffic, start
+
+    chosen = given_profile(profile, folders)
+    others = {name: given_profile(one, folders) for name, one in (profiles or {}).items()}
+    if not Path(config).is_file():
+        raise FileNotFoundError(2, "No such file or directory", str(config))
+    sublane = [] if lateral_resolution is None else ["--lateral-resolution", f"{lateral_resolution:g}"]
+    connection = start(["-c", str(config), *sublane, *options])
+    rows: list[tuple[Any, ...]] = []
+    collisions = teleports = 0
+    try:
+        traffic = SumoTraffic(
+            connection, chosen, ego=ego, seed=seed, profiles=others, neighbours=Neighbours(neighbours)
+        )
+        end = float(connection.simulation.getTime()) + duration
+        while connection.simulation.getMinExpectedNumber() > 0 and connection.simulation.getTime() < end - 1e-9:
+            traffic.steer()
+            connection.simulationStep()
+            time = float(connection.simulation.getTime())
+            collisions += len(connection.simulation.getCollisions())
+            teleports += connection.simulation.getStartingTeleportNumber()
+            for name, x, y, h, speed, lane, s, offset in traffic.states():
+                wanted, steered = traffic.moves.get(name, (float("nan"), False))
+                edge, _, index = lane.rpartition("_")
+                rows.append((time, name, x, y, h, speed, edge, int(index), s, offset, wanted, steered))
+    finally:
+        connection.close()
+    settings = {"scenario": Path(config).name, "profile": chosen.name, "seed": seed}
+    warnings = [f"SUMO reports {count} {what}" for count, what in ((collisions, "collisions"), (teleports, "teleports"))
+                if count]  # fmt: skip
+    return LiveRun(rows, settings, [*traffic.warnings, *warnings])
+
+
+class LiveRun(Result):
+    """A run of a simulation with drivers in it."""
+
+    __slots__ = ("_rows", "_settings", "events", "warnings")
+
+    def __init__(
+        self,
+        rows: Sequence[tuple[Any, ...]],
+        settings: Mapping[str, Any],
+        warnings: Sequence[str],
+        events: Sequence[tuple[float, str, int]] = (),
+    ) -> None:
+        self._rows, self._settings = rows, dict(settings)
+        self.warnings = tuple(warnings)
+        """What a user has to know, a line each."""
+        self.events = tuple(events)
+        """Changes of storyboard elements: time [s], path, state."""
+
+    def headline(self) -> str:
+        """One line."""
+        names = {row[1] for row in self._rows}
+        steered = {row[1] for row in self._rows if row[-1]}
+        time = self._rows[-1][0] if self._rows else 0.0
+        source, profile, seed = (self._settings[key] for key in ("scenario", "profile", "seed"))
+        return f"{source}: {time:g} s, {len(steered)} of {len(names)} vehicles driven by {profile}, seed {seed}"
+
+    def __str__(self) -> str:
+        return "\n".join([self.headline(), *(f"  warning: {warning}" for warning in self.warnings)])
+
+    def to_frame(self) -> pd.DataFrame:
+        """One row per vehicle and step, see `STATES`; SI units, offsets positive left of travel."""
+        import pandas as pd
+
+        return pd.DataFrame(self._rows, columns=list(STATES))
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain values, as ``--json`` prints them: what ran, without its rows."""
+        return {"rows": len(self._rows), "warnings": list(self.warnings), **self._settings}
+
+    def write(self, path: PathLike, *, force: bool = False) -> Path:
+        """Write the table: ``.csv``, ``.csv.gz`` or ``.parquet``, with its provenance."""
+        from xosc_lateral.formats.output_paths import claim, output_file
+        from xosc_lateral.formats.output_tables import output_suffixes, write_frame
+
+        output = output_file(path, "states.csv", output_suffixes())
+        claim([output], force=force)
+        write_frame(self.to_frame(), output, self._settings)
+        return output

@@ -1,0 +1,187 @@
+"""`reconstruct`: from a recording to a maneuver-based scenario, its road, and the drivers who drove."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from xosc_lateral.api.inputs import PathLike, Paths, as_paths
+from xosc_lateral.api.result import Result
+from xosc_lateral.formats.output_paths import claim, output_folder
+from xosc_lateral.pipeline.reconstruct import (
+    Reconstructed,
+    ReconstructSettings,
+    drivers_table,
+    fitted_profiles,
+    reconstruct_recording,
+    version_named,
+)
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+
+def reconstruct(
+    recording: PathLike,
+    output: PathLike | None = None,
+    *,
+    format: str | None = None,  # noqa: A002 (as in `import_drives`)
+    road: PathLike | None = None,
+    columns: Sequence[str] = (),
+    begin: float | None = None,
+    end: float | None = None,
+    vehicles: Collection[str] | None = None,
+    around: str | None = None,
+    window: float = 60.0,
+    host: str | None = None,
+    error: float = 0.5,
+    version: str = "1.2",
+    relative: bool = False,
+    exact: bool = False,
+    fit: bool = False,
+    library: Paths = (),
+    force: bool = False,
+) -> Reconstruction:
+    """Turn a recording into maneuvers, a road and drivers.
+
+    Parameters
+    ----------
+    recording : str or Path
+        Tracks of several vehicles: DLR Highway Traffic, levelX, an OSI trace, CommonRoad, or a table.
+    output : str or Path, optional
+        Folder to write to, see `Reconstruction.write`; without it nothing is written.
+    format : str, optional
+        "dlr-ht", "levelx", "osi", "commonroad" or "tracks"; without it, told from the file's name.
+    road : str or Path, optional
+        OpenDRIVE file, for recordings that come without their lanes.
+    columns : sequence of str
+        ``NAME=COLUMN[:UNIT]`` for tables of tracks.
+    begin, end : float, optional
+        Part of the recording. [s]
+    vehicles : collection of str, optional
+        These alone.
+    around, window
+        A vehicle and those who come near it, for so many seconds in the middle of its passage.
+    host : str, optional
+        The vehicle under test: `convert` leaves it to the system that drives it.
+    error : float
+        Positions along the road are within this; smaller: more corners in the speeds. [m]
+    version : str
+        Of OpenSCENARIO, "1.0" to "1.3".
+    relative : bool
+        Lane changes and braking begin at a distance to another vehicle, where the recording bears it out.
+    exact : bool
+        Recorded paths as trajectories, instead of maneuvers.
+    fit : bool
+        A driver profile of its own for every vehicle that drove long enough.
+    library : path or paths
+        Folders with further profiles to choose from.
+    force : bool
+        Replace files that this package did not write.
+
+    Raises
+    ------
+    FormatError, NotEnoughDataError
+    """
+    from xosc_lateral.formats.recordings import read_recording
+
+    settings = ReconstructSettings(
+        begin=begin,
+        end=end,
+        vehicles=None if vehicles is None else frozenset(vehicles),
+        around=around,
+        window=window,
+        host=host,
+        error=error,
+        version=version_named(version),
+        relative=relative,
+        exact=exact,
+        fit=fit,
+        libraries=as_paths(library),
+    )
+    source = Path(recording)
+    traffic = read_recording(source, kind=format, road=None if road is None else Path(road), columns=columns)
+    result = Reconstruction(reconstruct_recording(traffic, settings))
+    if output is not None:
+        result.write(output, force=force)
+    return result
+
+
+class Reconstruction(Result):
+    """A scenario with its road and drivers, and how near it is to the recording."""
+
+    __slots__ = ("_made", "outputs")
+
+    def __init__(self, made: Reconstructed) -> None:
+        self._made = made
+        self.outputs: tuple[Path, ...] = ()
+        """Files that were written."""
+
+    @property
+    def name(self) -> str:
+        """Of the files, without suffix."""
+        return self._made.traffic.name
+
+    @property
+    def scenario(self) -> str:
+        """The OpenSCENARIO document."""
+        return self._made.scenario
+
+    @property
+    def left_out(self) -> tuple[str, ...]:
+        """Vehicles, and parts of them, that are not in the scenario: a line each, with the reason."""
+        return self._made.recording.left_out
+
+    def headline(self) -> str:
+        """One line."""
+        return str(self).splitlines()[0]
+
+    def __str__(self) -> str:
+        from xosc_lateral.report.reconstruction import as_text
+
+        return as_text(self.to_dict())
+
+    def to_frame(self) -> pd.DataFrame:
+        """One row per vehicle: when it is there, its maneuvers, residuals and driver."""
+        import pandas as pd
+
+        return pd.DataFrame(self.to_dict()["vehicles"])
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain values, as ``--json`` prints them and the report holds them."""
+        from xosc_lateral.report.reconstruction import facts_of
+
+        return facts_of(self._made) | {"outputs": [str(path) for path in self.outputs]}
+
+    def write(self, folder: PathLike, *, force: bool = False) -> tuple[Path, ...]:
+        """Write NAME.xosc and its road, drivers.csv for `convert`, report.html and report.json, all or none.
+
+        Returns
+        -------
+        tuple of Path
+        """
+        from xosc_lateral.formats.atomic import write_atomically
+        from xosc_lateral.formats.json_text import canonical_json
+        from xosc_lateral.report.reconstruction import facts_of, page_of
+
+        made, where = self._made, output_folder(folder)
+        facts = facts_of(made)
+        files: dict[str, bytes | str] = {
+            made.traffic.road_name: made.traffic.road,
+            f"{made.traffic.name}.xosc": made.scenario,
+            **fitted_profiles(made),
+            "report.html": page_of(made, facts),
+            "report.json": canonical_json(facts),
+        }
+        table = where / "drivers.csv"
+        paths = {where / name: data for name, data in files.items()}
+        kept = {path for path in made.traffic.sources if path.exists() and (where / path.name).exists()}
+        same = {path for path in paths if any(path.resolve() == one.resolve() for one in kept)}
+        claim([*(path for path in paths if path not in same), table], made.traffic.sources, force=force)
+        for path, data in paths.items():
+            if path not in same:  # a road that lies there already stays as it is
+                write_atomically(path, data)
+        drivers_table(made, table)
+        self.outputs = (*paths, table)
+        return self.outputs

@@ -1,0 +1,179 @@
+"""`xosc-lateral live`: drivers in a simulation that runs."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from xosc_lateral.cli.words import AsJson, Force, Library, Quiet, Seed, examples, pairs, say, warn
+
+if TYPE_CHECKING:
+    from xosc_lateral.api.live import LiveRun
+
+Profile = Annotated[str, typer.Option("--profile", "-p", metavar="NAME|PATH", help="Driver profile.")]
+PerVehicle = Annotated[
+    list[str] | None,
+    typer.Option("--vehicle", metavar="NAME=PROFILE", help="Another profile for one vehicle; may be repeated."),
+]
+Ego = Annotated[list[str] | None, typer.Option(metavar="NAME", help="Vehicle under test: not driven; may be repeated.")]
+FCD = "x,y,angle,type,speed,pos,posLat,lane"
+"""What `import fcd` reads; SUMO leaves `posLat` out unless told."""
+
+States = Annotated[
+    str | None, typer.Option("--states", metavar="OUT", help="Table of where everybody was: .csv, .csv.gz, .parquet.")
+]
+
+HELP = {
+    "esmini": (
+        "Play a scenario in esmini, through your library of it.",
+        examples("live esmini cut-in.xosc --player-library libesminiLib.so --ego Ego --states states.csv"),
+    ),
+    "sumo": (
+        "Run a SUMO simulation (extra sumo).",
+        examples("live sumo run.sumocfg -p motorway --seed 1 --lateral-resolution 0.25 --states states.parquet"),
+    ),
+    "stdio": (
+        "Answer over a pipe: one line of JSON in, one out.",
+        examples("live stdio -p motorway --seed 1 --road motorway.xodr"),
+    ),
+}
+
+
+def register(app: typer.Typer) -> None:
+    """Add the verb to the command line."""
+    live = typer.Typer(help="Drivers in a simulation that runs.", no_args_is_help=True)
+    for verb in (esmini, sumo, stdio):
+        short, epilog = HELP[verb.__name__]
+        live.command(verb.__name__, short_help=short, epilog=epilog)(verb)
+    app.add_typer(live, name="live", short_help="Drivers in a simulation that runs.")
+    export = typer.Typer(help="Drivers as parts for other tools.", no_args_is_help=True)
+    lines = examples("export fmu -p motorway -o driver.fmu", "export fmu -p motorway --fmi 3.0 -o driver.fmu")
+    export.command("fmu", short_help="A functional mock-up unit (extra fmu).", epilog=lines)(fmu)
+    app.add_typer(export, name="export", short_help="Drivers as parts for other tools.")
+
+
+def esmini(
+    scenario: Annotated[Path, typer.Argument(help="Scenario (.xosc).", show_default=False)],
+    player_library: Annotated[
+        Path, typer.Option(help="libesminiLib.so or esminiLib.dll of esmini 3.", show_default=False)
+    ],
+    profile: Profile = "motorway",
+    vehicle: PerVehicle = None,
+    ego: Ego = None,
+    seed: Seed = 0,
+    duration: Annotated[float, typer.Option(help="Ends here, if not before. [s]", min=0.01, max=86_400)] = 3600.0,
+    step: Annotated[float, typer.Option(help="Length of a step. [s]", min=0.001, max=0.2)] = 0.01,
+    window: Annotated[bool, typer.Option("--window", help="Open esmini's window.")] = False,
+    states: States = None,
+    library: Library = None,
+    force: Force = False,
+    quiet: Quiet = False,
+    as_json: AsJson = False,
+) -> None:
+    """Play a scenario in esmini with drivers in its vehicles; its triggers and maneuvers stay as written."""
+    from xosc_lateral.api.live import live_esmini
+
+    _claim(states, [scenario], force=force)
+    run = live_esmini(
+        scenario, player_library, profile=profile, profiles=pairs(vehicle, "--vehicle"), ego=ego or (), seed=seed,
+        duration=duration, step=step, window=window, folders=library or (),
+    )  # fmt: skip
+    _finish(run, states, force=force, quiet=quiet, as_json=as_json)
+
+
+def sumo(
+    config: Annotated[Path, typer.Argument(help="Configuration (.sumocfg).", show_default=False)],
+    profile: Profile = "motorway",
+    vehicle: PerVehicle = None,
+    ego: Ego = None,
+    seed: Seed = 0,
+    duration: Annotated[float, typer.Option(help="Ends here, if not before. [s]", min=0.01, max=1e7)] = 86_400.0,
+    lateral_resolution: Annotated[
+        float | None,
+        typer.Option(help="Switch the sublane model on [m]; default: as configured.", min=0.01, max=5.0),
+    ] = None,
+    fcd_output: Annotated[
+        Path | None, typer.Option(metavar="FCD.xml", help="SUMO's own output of where everybody was.")
+    ] = None,
+    states: States = None,
+    library: Library = None,
+    force: Force = False,
+    quiet: Quiet = False,
+    as_json: AsJson = False,
+) -> None:
+    """Run a SUMO simulation with the sublane model and drivers in its vehicles; lane changes stay SUMO's."""
+    from xosc_lateral.api.live import live_sumo
+
+    _claim(states, [config], force=force)
+    run = live_sumo(
+        config, profile=profile, profiles=pairs(vehicle, "--vehicle"), ego=ego or (), seed=seed, duration=duration,
+        lateral_resolution=lateral_resolution, folders=library or (),
+        options=() if fcd_output is None else ("--fcd-output", str(fcd_output), "--fcd-output.attributes", FCD),
+    )  # fmt: skip
+    _finish(run, states, force=force, quiet=quiet, as_json=as_json)
+
+
+def stdio(
+    profile: Profile = "motorway",
+    seed: Seed = 0,
+    road: Annotated[Path | None, typer.Option(help="OpenDRIVE file that vehicles' places are on.")] = None,
+    library: Library = None,
+) -> None:
+    """Answer lines on standard input, as docs/schemas/live.json has them, until there are no more."""
+    import os
+    import sys
+
+    from xosc_lateral.api.inputs import given_profile
+    from xosc_lateral.live.stdio import Pipe
+
+    pipe = Pipe(given_profile(profile, library or ()), seed=seed, road=road)
+    try:
+        for line in pipe.answers(sys.stdin):
+            print(line, flush=True)
+    except BrokenPipeError:  # nobody listens any more; nor is there anybody to flush to at the end
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+
+
+class Fmi(StrEnum):
+    """Versions of the standard."""
+
+    TWO = "2.0"
+    THREE = "3.0"
+
+
+def fmu(
+    output: Annotated[Path, typer.Option("--output", "-o", metavar="OUT.fmu", help="The unit.")],
+    profile: Profile = "motorway",
+    fmi: Annotated[Fmi, typer.Option(help="Version of FMI.")] = Fmi.TWO,
+    library: Library = None,
+    force: Force = False,
+    quiet: Quiet = False,
+) -> None:
+    """Write a driver as a functional mock-up unit for co-simulation; it needs this package where it is simulated."""
+    from xosc_lateral.api.inputs import given_profile
+    from xosc_lateral.formats.output_paths import claim
+    from xosc_lateral.live.fmu import export_fmu
+
+    claim([output], force=force)
+    chosen = given_profile(profile, library or ())
+    export_fmu(chosen, output, fmi=fmi)
+    if not quiet:
+        typer.echo(f"{chosen.name} as FMI {fmi} in {output}", err=True)
+
+
+def _claim(states: str | None, inputs: list[Path], *, force: bool) -> None:
+    from xosc_lateral.formats.output_paths import claim, output_file
+    from xosc_lateral.formats.tables import TABLE_SUFFIXES
+
+    if states is not None:
+        claim([output_file(states, "states.csv", TABLE_SUFFIXES)], inputs, force=force)
+
+
+def _finish(run: LiveRun, states: str | None, *, force: bool, quiet: bool, as_json: bool) -> None:
+    if states is not None:
+        run.write(states, force=force)
+    warn(run.warnings)
+    say(run, as_json=as_json, quiet=quiet)

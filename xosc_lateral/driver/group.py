@@ -1,0 +1,244 @@
+"""Drivers of one profile side by side, a model step at a time: what `OffsetStream` gives each, for many at once.
+
+A thousand streams spend their time on a dozen effects of one row each. Here an effect is one operation on all drivers;
+what is random is drawn ahead for each as a stream draws it, so that nobody's numbers depend on who else drives.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from xosc_lateral.driver.effects import Acts, EffectTerms
+from xosc_lateral.driver.effects.acts import terms_of
+from xosc_lateral.driver.effects.response import Response, ResponseState
+from xosc_lateral.driver.process import DriveProcess, Movement, combine, offsets_of
+from xosc_lateral.driver.profile import DriverProfile
+from xosc_lateral.driver.records import plain, read_as
+from xosc_lateral.driver.upsampling import extrapolate, piece
+from xosc_lateral.segment import FADES
+
+FloatArray = NDArray[np.float64]
+
+BLOCK = 64
+"""Model steps drawn at once for a driver. [-]"""
+
+_NEIGHBOURS = 2
+"""Samples ahead that the curve between two samples needs. [-]"""
+
+_PARTS = ("coarse", "fine", "quick", *(f"hidden_{name}" for name in ("location", "spread", "rate", "fine", "quick")))
+"""What is drawn ahead: of the movement [lane widths], then factors of hidden effects (location: [m])."""
+
+_NEUTRAL = (0.0, 0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 1.0)
+
+
+class OffsetGroup:
+    """Drivers of one profile; each has an index, 0 to n - 1, in the order in which they came.
+
+    Parameters
+    ----------
+    profile : DriverProfile
+    columns : collection of str
+        Context columns that `advance` is given; effects of others don't act.
+    """
+
+    def __init__(self, profile: DriverProfile, columns: Iterable[str]) -> None:
+        self.profile, self.columns = profile, tuple(sorted(set(columns)))
+        example = DriveProcess(profile, np.random.SeedSequence(0))
+        columned, self._hidden = example.columned, bool(example.hidden)
+        own = [k for k, effect in enumerate(columned) if not effect.is_of_recording]
+        step = profile.model.step
+        # as of a stream: who looks farthest ahead decides how much later everybody responds, whatever is known
+        self._ahead = max((columned[k].response_in_blocks(step).ahead for k in own), default=0)
+        self._which = [k for k in own if set(columned[k].columns) <= set(self.columns)]
+        self._effects = [columned[k] for k in self._which]
+        self._responses = [self._response(k) for k in range(len(self._effects))]
+        self._rated = any(effect.acts is Acts.RATE for effect in self._effects)
+        acts = [getattr(effect, "acts", None) for effect in (*self._effects, *example.hidden)]
+        self._quick = Acts.QUICK in acts and Acts.RATE not in acts
+        self._drives: list[DriveProcess] = []
+        self._slopes: list[FloatArray] = [np.empty((0, len(effect.reference))) for effect in self._effects]
+        self._mean = np.empty(0)
+        self._drawn = np.empty((0, 2 * BLOCK, len(_PARTS)))
+        self._at, self._left, self._row = (np.empty(0, dtype=np.int64) for _ in range(3))
+        self._samples = np.empty((0, 4))
+
+    def _response(self, k: int, state: ResponseState | None = None) -> Response:
+        return self._effects[k].response_in_blocks(self.profile.model.step, state, delay=self._ahead)
+
+    def __len__(self) -> int:
+        return len(self._drives)
+
+    @property
+    def preview(self) -> float:
+        """By how much later drivers respond than those who know what lies ahead. [s]"""
+        return (self._ahead + _NEIGHBOURS) * self.profile.model.step
+
+    def add(self, seeds: Sequence[np.random.SeedSequence]) -> None:
+        """More drivers, whose drives begin with the next `advance`, at 0 s of their own clocks."""
+        new = [DriveProcess(self.profile, seed) for seed in seeds]
+        for drive in new:
+            drive.begin_at(0.0)
+        self._join(new, np.zeros((len(new), 2 * BLOCK, len(_PARTS))), np.zeros((len(new), 4)))
+
+    def _join(self, new: Sequence[DriveProcess], drawn: FloatArray, samples: FloatArray) -> None:
+        self._drives += new
+        for k, which in enumerate(self._which):
+            slopes = [drive.columned[which].coefficients for drive in new]
+            self._slopes[k] = np.concatenate(
+                [self._slopes[k], np.reshape(slopes, (len(new), self._slopes[k].shape[1]))]
+            )
+        self._mean = np.append(self._mean, np.zeros(len(new)))
+        self._drawn = np.concatenate([self._drawn, drawn])
+        self._samples = np.concatenate([self._samples, samples])
+        self._at, self._left, self._row = (
+            np.append(old, np.zeros(len(new), dtype=np.int64)) for old in (self._at, self._left, self._row)
+        )
+
+    def keep(self, there: NDArray[np.bool_]) -> None:
+        """Drop the drivers that are not there, shape (n,)."""
+        if there.all():
+            return
+        self._drives = [drive for drive, stays in zip(self._drives, there, strict=True) if stays]
+        for response, slopes in zip(self._responses, self._slopes, strict=True):
+            state, known = response.state, there[: self._known(response, slopes.shape[1])]
+            if state.held is not None:
+                wide = np.repeat(known, slopes.shape[1])
+                state.held = state.held[:, wide]
+                if state.settled is not None:
+                    state.settled = state.settled.reshape(-1, len(wide))[:, wide].ravel()
+        self._slopes = [slopes[there] for slopes in self._slopes]
+        self._mean, self._drawn, self._samples = self._mean[there], self._drawn[there], self._samples[there]
+        self._at, self._left, self._row = self._at[there], self._left[there], self._row[there]
+
+    @staticmethod
+    def _known(response: Response, components: int) -> int:
+        """Drivers whose quantity a response has seen; others have come since."""
+        held = response.state.held
+        return 0 if held is None else held.shape[1] // max(components, 1)
+
+    def advance(self, context: Mapping[str, FloatArray], width: FloatArray) -> FloatArray:
+        """One model step of everybody.
+
+        Parameters
+        ----------
+        context : mapping of str to array, shape (n,)
+            Of this moment, all `columns`; a driver responds to it `preview` seconds later.
+        width : array, shape (n,)
+            Of the lane. [m]
+
+        Returns
+        -------
+        array, shape (n, 6)
+            Coefficients in u, from 0 at this moment to 1 at the next, lowest power first, of the offset. [m]
+        """
+        effects = self._terms(context)
+        fresh = np.flatnonzero(self._row == 0)
+        if len(fresh):
+            first, second = (self._next(fresh, effects.rows(fresh), width[fresh]) for _ in range(2))
+            self._samples[fresh] = np.stack([np.zeros(len(fresh)), extrapolate(second, first), first, second], axis=1)
+        sample = self._next(np.arange(len(self)), effects, width)
+        self._samples = np.concatenate([self._samples[:, 1:], sample[:, None]], axis=1)
+        return np.stack(np.broadcast_arrays(*piece(*self._samples.T)), axis=1)
+
+    def _terms(self, context: Mapping[str, FloatArray]) -> EffectTerms:
+        """What the effects of columns do to each driver at the sample that is next, shape (n,) each."""
+        found = []
+        for effect, response, slopes in zip(self._effects, self._responses, self._slopes, strict=True):
+            names = (*effect.columns, *(f"{column}{FADES}" for column in effect.columns))
+            values = effect.known({name: context[name] for name in names if name in context})
+            state, known = response.state, self._known(response, values.shape[1])
+            row = values.ravel()
+            if state.held is not None and known < len(values):  # to who has come, it has always been as it is now
+                new = values[known:].ravel()
+                state.held = np.concatenate([state.held, np.tile(new, (len(state.held), 1))], axis=1)
+                if state.settled is not None:
+                    lags = state.settled.reshape(-1, known * values.shape[1])
+                    state.settled = np.concatenate([lags, np.tile(new, (len(lags), 1))], axis=1).ravel()
+            due = response.take(row[None, :]).reshape(values.shape)
+            found.append(terms_of(effect.acts, effect.weighed(due, slopes.T)))
+        return combine(found)
+
+    def _next(self, who: NDArray[np.int64], effects: EffectTerms, width: FloatArray) -> FloatArray:
+        """The next sample of some drivers, shape (m,). [m]"""
+        if self._rated:
+            return self._next_rated(who, effects, width)
+        self._draw(who)
+        parts = self._drawn[who, self._at[who]].T
+        self._at[who] += 1
+        self._left[who] -= 1
+        self._row[who] += 1
+        movement = Movement(self._mean[who], parts[0], parts[1], parts[2] if self._quick else None)
+        hidden = EffectTerms(*parts[3:]) if self._hidden else EffectTerms()
+        terms = combine([hidden, effects])
+        return offsets_of(movement, EffectTerms(terms.location, terms.spread, None, terms.fine, terms.quick), width)
+
+    def _next_rated(self, who: NDArray[np.int64], effects: EffectTerms, width: FloatArray) -> FloatArray:
+        """The same where effects act on the rate of mean reversion: nothing can be drawn ahead."""
+        found = np.empty(len(who))
+        for k, index in enumerate(who):
+            drive, one = self._drives[index], slice(k, k + 1)
+            terms = combine([drive.hidden_terms_at(self._row[index : index + 1]), effects.rows(one)])
+            found[k] = drive.take(terms, width[one])[0]
+        self._row[who] += 1
+        return found
+
+    def _draw(self, who: NDArray[np.int64]) -> None:
+        """Have at least one row drawn of each; a few of those with few left, so that not all are due at once."""
+        due = set(who[self._left[who] == 0].tolist())
+        spare = who[self._left[who] <= BLOCK]
+        few = spare[np.argsort(self._left[spare], kind="stable")[: 1 + 2 * len(self) // BLOCK]]
+        for k in sorted(due | set(few.tolist())):
+            left = self._left[k]
+            self._drawn[k, :left] = self._drawn[k, self._at[k] : self._at[k] + left]
+            self._drawn[k, left : left + BLOCK] = self._block(k, int(self._row[k] + left))
+            self._at[k], self._left[k] = 0, left + BLOCK
+
+    def _block(self, k: int, row: int) -> FloatArray:
+        """`BLOCK` rows of a drive from `row` on, shape (BLOCK, parts)."""
+        drive = self._drives[k]
+        hidden = drive.hidden_terms_at(np.arange(row, row + BLOCK))
+        movement = drive.movement(BLOCK, quick=self._quick, rate=hidden.rate)
+        self._mean[k] = float(movement.mean)
+        rows = np.tile(_NEUTRAL, (BLOCK, 1))
+        for column, values in enumerate((movement.coarse, movement.fine, movement.quick, *hidden.parts)):
+            if values is not None:
+                rows[:, column] = values
+        return rows
+
+    # ---- state -------------------------------------------------------------------------------------------------------
+    def to_dict(self) -> dict[str, Any]:
+        """All that changes while driving, as plain JSON values."""
+        drives = [
+            {
+                "process": drive.state,
+                "mean": float(self._mean[k]),
+                "drawn": self._drawn[k, self._at[k] : self._at[k] + self._left[k]].tolist(),
+                "row": int(self._row[k]),
+                "samples": self._samples[k].tolist(),
+            }
+            for k, drive in enumerate(self._drives)
+        ]
+        values: dict[str, Any] = plain(
+            {"responses": [response.state for response in self._responses], "drives": drives, "columns": self.columns}
+        )
+        return values
+
+    def restore(self, state: Mapping[str, Any], seeds: Sequence[np.random.SeedSequence]) -> None:
+        """Go on from a state; the group is empty and of the same profile and columns, the seeds are the drivers'."""
+        new = [DriveProcess(self.profile, seed) for seed in seeds]
+        drawn, samples = np.zeros((len(new), 2 * BLOCK, len(_PARTS))), np.zeros((len(new), 4))
+        self._join(new, drawn, samples)
+        for k, (drive, own) in enumerate(zip(new, state["drives"], strict=True)):
+            drive.restore(own["process"], f"drives[{k}]")
+            rows = np.reshape(own["drawn"], (-1, len(_PARTS)))
+            self._drawn[k, : len(rows)] = rows
+            self._left[k], self._row[k], self._mean[k] = len(rows), int(own["row"]), float(own["mean"])
+            self._samples[k] = own["samples"]
+        self._responses = [
+            self._response(k, read_as(ResponseState, own, f"responses[{k}]"))
+            for k, own in enumerate(state["responses"])
+        ]

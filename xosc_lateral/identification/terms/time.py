@@ -1,0 +1,333 @@
+"""What changes with time and no column explains: the mean or the spread as a smooth function, or one step of the mean.
+
+A driver learns or tires, a camera warms up or is calibrated anew. The smooths are half cosines over the drive, as many
+as the test asks for; what the profile gets is penalised: the k-th one's size has a prior variance that falls with the
+fourth power of k, as of an integrated random walk, at the scale that the sizes themselves make likeliest [1]_.
+
+References
+----------
+.. [1] S. N. Wood, "Generalized Additive Models", 2nd ed., 2017, section 5.8 and chapter 6: smooths as random effects.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, ClassVar, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from xosc_lateral.driver.effects import Effect, Step, TimeSmooth
+from xosc_lateral.identification.innovations import squared_innovations
+from xosc_lateral.identification.low_frequencies import (
+    MEAN_SHORTEST_S,
+    ORDERS,
+    SAME_S,
+    SHORTEST_S,
+    SPREAD_ORDERS,
+    STEP_SHORTEST_S,
+    clock_range,
+    explained,
+    explained_jointly,
+    half_cosines_of,
+    low_frequencies,
+    mean_probability,
+    moment_of,
+    slow_rows,
+    smooth_probabilities,
+    step_moments,
+    without_known,
+)
+from xosc_lateral.identification.regression import Coarse, Fitted
+from xosc_lateral.identification.significance import LoopSeed, as_one_degree
+from xosc_lateral.identification.squares import SLOW_S, fine_squares, log_sizes, slow_squares
+from xosc_lateral.identification.terms.base import Description, Outcome, Removal, Stage, Term, centred
+from xosc_lateral.identification.terms.cycle import latent_path
+from xosc_lateral.identification.terms.spread import what_a_column_may_do, what_columns_do
+
+if TYPE_CHECKING:
+    from xosc_lateral.identification.search import Search
+from xosc_lateral.identification.timeline import on_fine_grid
+
+FloatArray = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
+
+
+STEP_COST = 5.0
+"""A step has a free moment. [chi-square]"""
+
+
+SURER = 0.01
+"""Where it is surer than the best column by this factor, what that column may do is left to time. [-]"""
+
+
+@dataclass(frozen=True, eq=False)
+class StepTerm(Term):
+    """The mean jumps once.
+
+    Parameters
+    ----------
+    at : int
+        Row of the 1 Hz grid.
+    """
+
+    component: ClassVar[str] = "time_mean"
+    kind: ClassVar[str] = "step"
+    stages: ClassVar[tuple[Stage, ...]] = (Stage.LOW_FREQUENCY,)
+    weight: ClassVar[float] = 3.0
+    seen_held_out: ClassVar[bool] = False
+    at: int
+
+    def mean_columns(self, coarse: Coarse) -> FloatArray:
+        """0 before, 1 after, shape (n, 1). [-]"""
+        return (np.arange(len(coarse)) >= self.at).astype(np.float64)[:, None]
+
+    @classmethod
+    def test(cls, search: Search, fitted: Fitted) -> Outcome | None:
+        """Step or smooth, whichever explains more, beyond what an ordinary drift continues to."""
+        coarse = fitted.coarse
+        if not coarse.lasts or any(isinstance(term, StepTerm | TimeMeanTerm) for term in fitted.terms):
+            return None
+        rows, whitener = slow_rows(fitted)
+        moments = step_moments(coarse)
+        jumps = whitener.rows((np.arange(len(coarse))[:, None] >= moments).astype(np.float64))
+        waves = whitener.rows(half_cosines_of(coarse, max(ORDERS)))
+        slow = [low_frequencies(one, coarse, coarse.valid, MEAN_SHORTEST_S) for one in (rows[:, None], waves, jumps)]
+        smooth = smooth_probabilities(slow[0][:, 0], slow[1], ORDERS)
+        order = min(smooth, key=lambda one: smooth[one])
+        p_value = mean_probability(slow[0][:, 0], slow[1], slow[2], search.rng(LoopSeed.LOW_FREQUENCY))
+        # which of the two it is, quicker movement tells as well
+        quick = [low_frequencies(one, coarse, coarse.valid, STEP_SHORTEST_S) for one in (rows[:, None], waves, jumps)]
+        gains = explained(quick[0][:, 0], quick[2], len(slow[0]))
+        gain = explained_jointly(quick[0][:, 0], quick[1][:, :order], len(slow[0]))
+        if len(moments) and gains.max() - STEP_COST > float(as_one_degree(gain, order)):
+            return Outcome(cls(moment_of(rows, whitener, int(moments[np.argmax(gains)]))), (), p_value)
+        return Outcome(TimeMeanTerm(), (), p_value)
+
+    def probability_beside(self, search: Search, fitted: Fitted) -> float:
+        """p-value of the mean by time, whichever of the two it looks like beside the terms fitted."""
+        return probability_of_mean(search, fitted)
+
+    def matches(self, other: Self) -> bool:
+        """About the same moment."""
+        return isinstance(other, StepTerm) and abs(self.at - other.at) <= SAME_S
+
+    def estimate(self, fitted: Fitted) -> tuple[Effect, ...]:
+        """Height, moment, and the share of the drive before it: the mean stays."""
+        coarse, part = fitted.coarse, fitted.mean_part(self)
+        before = coarse.valid & (np.arange(len(coarse)) < self.at)
+        return (
+            Step(
+                size=float(fitted.sizes[part][0]),
+                size_error=float(np.sqrt(fitted.covariance[part, part][0, 0])),
+                at_s=float(coarse.time[self.at]),
+                share_before=float(before.sum() / coarse.valid.sum()),
+            ),
+        )
+
+    def remove(self, fitted: Fitted, effects: tuple[Effect, ...], removal: Removal) -> None:
+        """As fitted."""
+        removal.location += on_fine_grid(centred(latent_path(self, fitted), fitted.coarse), fitted.coarse.timeline)
+
+    def describe(self, fitted: Fitted, effects: tuple[Effect, ...], key: str) -> Description:
+        """Height and moment."""
+        effect = effects[0]
+        assert isinstance(effect, Step)
+        statistic = f"mean by effect: {key}"
+        return Description("step", f"at {effect.at_s:.0f} s", effect.size, effect.size_error, statistic, statistic)
+
+
+@dataclass(frozen=True, eq=False)
+class TimeMeanTerm(Term):
+    """The mean is a smooth function of time; `StepTerm` tests both.
+
+    Parameters
+    ----------
+    order : int
+        Half cosines that it is made of.
+    """
+
+    component: ClassVar[str] = "time_mean"
+    kind: ClassVar[str] = "drift"
+    weight: ClassVar[float] = 3.0
+    order: int = max(ORDERS)
+
+    def mean_columns(self, coarse: Coarse) -> FloatArray:
+        """Half cosines, within -1..1, shape (n, order). [-]"""
+        return half_cosines_of(coarse, self.order)
+
+    @classmethod
+    def test(cls, search: Search, fitted: Fitted) -> Outcome | None:
+        """Nothing of its own: a step is looked for at the same time."""
+        return None
+
+    def probability_beside(self, search: Search, fitted: Fitted) -> float:
+        """p-value of the mean by time, whichever of the two it looks like beside the terms fitted."""
+        return probability_of_mean(search, fitted)
+
+    def estimate(self, fitted: Fitted) -> tuple[Effect, ...]:
+        """Penalised sizes."""
+        part = fitted.mean_part(self)
+        sizes, covariance = penalised(fitted.sizes[part], fitted.covariance[part, part])
+        errors = np.sqrt(np.diag(covariance))
+        return (_smooth(fitted.coarse, location=tuple(sizes), location_errors=tuple(errors)),)
+
+    def remove(self, fitted: Fitted, effects: tuple[Effect, ...], removal: Removal) -> None:
+        """As the profile has it."""
+        effect, timeline = effects[0], fitted.coarse.timeline
+        assert isinstance(effect, TimeSmooth)
+        path = effect.path(effect.location, timeline.time)
+        removal.location += path - path[timeline.valid].mean()
+
+    def describe(self, fitted: Fitted, effects: tuple[Effect, ...], key: str) -> Description:
+        """Change between its extremes, in the order of time."""
+        effect = effects[0]
+        assert isinstance(effect, TimeSmooth)
+        size, error, shape = _swing(fitted.coarse, effect, effect.location, effect.location_errors)
+        statistic = f"mean by effect: {key}"
+        return Description("mean offset by time", shape, size, error, statistic, statistic)
+
+
+@dataclass(frozen=True, eq=False)
+class TimeSpreadTerm(Term):
+    """The logarithm of the spread is a smooth function of time.
+
+    Parameters
+    ----------
+    order : int
+        Half cosines that it is made of.
+    slow : bool
+        Of the slower movement only.
+    """
+
+    component: ClassVar[str] = "time_spread"
+    kind: ClassVar[str] = "scale"
+    stages: ClassVar[tuple[Stage, ...]] = (Stage.SPREAD,)
+    weight: ClassVar[float] = 2.0
+    order: int = max(ORDERS)
+    slow: bool = False
+
+    @property
+    def predictable(self) -> bool:
+        """As far as the innovations change."""
+        return not self.slow
+
+    def scale_columns(self, coarse: Coarse) -> FloatArray:
+        """Half cosines, shape (n, order); none where only slow movement changes. [-]"""
+        return np.zeros((len(coarse), 0)) if self.slow else half_cosines_of(coarse, self.order)
+
+    def size_columns(self, coarse: Coarse) -> FloatArray:
+        """Half cosines, shape (n, order), whichever movement changes. [-]"""
+        return half_cosines_of(coarse, self.order)
+
+    @classmethod
+    def test(cls, search: Search, fitted: Fitted) -> Outcome | None:
+        """The slowest half cosines of the squares beside those that are a little quicker, by an F test."""
+        if not fitted.coarse.lasts or any(isinstance(term, cls) for term in fitted.terms):
+            return None
+        # what a column does to the size of any part of the movement is not time's doing, slow as the column may be
+        known = what_columns_do(search, fitted)
+        own = slow_squares(fitted)
+        looked_at = (
+            (squared_innovations(fitted.innovations, fitted.coarse.valid), fitted.coarse.valid),
+            (own.standardised, own.valid),
+        )
+        may_act, p_column = what_a_column_may_do(search, fitted)
+        columns = half_cosines_of(fitted.coarse, max(SPREAD_ORDERS))
+
+        def best_beside(known: FloatArray) -> tuple[float, bool] | None:
+            found = []
+            for slow, (squares, valid) in enumerate(looked_at):
+                own, basis = without_known(known, squares, columns, valid)
+                own, basis = (low_frequencies(one, fitted.coarse, valid, SHORTEST_S) for one in (own, basis))
+                tests = smooth_probabilities(own[:, 0], basis, SPREAD_ORDERS)
+                found += [(p_value, bool(slow)) for p_value in tests.values()]
+            return (min(1.0, min(found)[0] * len(found)), min(found)[1]) if found else None
+
+        best = best_beside(known)
+        if best is not None and best[0] > SURER * p_column:
+            best = best_beside(np.concatenate([known, may_act], axis=1))
+        return None if best is None else Outcome(cls(slow=best[1]), (), best[0])
+
+    def matches(self, other: Self) -> bool:
+        """Whichever movement changes."""
+        return isinstance(other, TimeSpreadTerm)
+
+    def estimate(self, fitted: Fitted) -> tuple[Effect, ...]:
+        """Penalised sizes; the fine noise goes along as far as it does."""
+        coarse = fitted.coarse
+        columns = half_cosines_of(coarse, self.order)
+        fine = penalised(*_log_sizes(log_sizes(fine_squares(fitted), columns), 1.0))[0]
+        if self.slow:
+            sizes, covariance = penalised(*_log_sizes(log_sizes(slow_squares(fitted), columns), SLOW_S))
+            fine = 0.0 * fine
+        else:
+            part = fitted.scale_part(self)
+            sizes, covariance = penalised(fitted.log_sizes[part], fitted.log_covariance[part, part])
+        errors = np.sqrt(np.diag(covariance))
+        return (_smooth(coarse, spread=tuple(sizes), spread_errors=tuple(errors), fine=tuple(fine)),)
+
+    def remove(self, fitted: Fitted, effects: tuple[Effect, ...], removal: Removal) -> None:
+        """A plain function of time."""
+        effect, time = effects[0], fitted.coarse.timeline.time
+        assert isinstance(effect, TimeSmooth)
+        removal.spread += effect.path(effect.spread, time)
+        removal.fine += effect.path(effect.fine, time)
+
+    def describe(self, fitted: Fitted, effects: tuple[Effect, ...], key: str) -> Description:
+        """Factor between its extremes, in the order of time."""
+        effect = effects[0]
+        assert isinstance(effect, TimeSmooth)
+        size, error, shape = _swing(fitted.coarse, effect, effect.spread, effect.spread_errors)
+        statistic = f"spread by effect: {key}"
+        factor = float(np.exp(size))
+        return Description("spread by time", shape, factor, factor * error, statistic, statistic)
+
+
+def probability_of_mean(search: Search, fitted: Fitted) -> float:
+    """p-value of a smooth or a step of the mean; 1 where none is looked for."""
+    test = StepTerm.test(search, fitted)
+    return 1.0 if test is None else test.p_value
+
+
+def penalised(sizes: FloatArray, covariance: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Sizes of half cosines, shape (k,), and their covariance, given that rougher ones are smaller beforehand.
+
+    The prior's scale is the one under which the sizes are likeliest (restricted maximum likelihood).
+    """
+    shape = np.arange(1, len(sizes) + 1, dtype=np.float64) ** -4.0
+    largest = float(np.max(np.square(sizes) / shape, initial=1e-300))
+    best, found = -np.inf, np.zeros(len(sizes))
+    for scale in largest * np.geomspace(1e-6, 10.0, 60):
+        total = covariance + np.diag(scale * shape)
+        sign, volume = np.linalg.slogdet(total)
+        likelihood = -0.5 * float(sizes @ np.linalg.solve(total, sizes)) - 0.5 * volume if sign > 0 else -np.inf
+        if likelihood > best:
+            best, found = likelihood, scale * shape
+    gain = np.linalg.solve(covariance + np.diag(found), np.diag(found)).T
+    return gain @ sizes, np.asarray(gain @ covariance)
+
+
+def _log_sizes(found: tuple[FloatArray, FloatArray], rows_each: float) -> tuple[FloatArray, FloatArray]:
+    """Sizes and covariance, where so many neighbouring rows count as one."""
+    sizes, errors = found
+    return sizes, np.diag(np.square(errors) * rows_each)
+
+
+def _smooth(coarse: Coarse, **sizes: tuple[float, ...]) -> TimeSmooth:
+    from_s, to_s = clock_range(coarse)
+    return TimeSmooth(from_s=from_s, to_s=to_s, **sizes)
+
+
+def _swing(
+    coarse: Coarse, effect: TimeSmooth, sizes: tuple[float, ...], errors: tuple[float, ...]
+) -> tuple[float, float, str]:
+    """Later extreme less earlier, its standard error, and when they are. [m] or natural logarithm"""
+    time = np.unique(coarse.time[coarse.valid])
+    path = effect.path(sizes, time)
+    first, last = sorted((int(np.argmin(path)), int(np.argmax(path))))
+    contrast = np.diff(
+        np.stack([effect.path(tuple(row), time[[first, last]]) for row in np.eye(len(sizes))], axis=1), axis=0
+    )[0]
+    error = float(np.sqrt(np.sum(np.square(contrast * np.asarray(errors)))))
+    return float(path[last] - path[first]), error, f"smooth, from {time[first]:.0f} s to {time[last]:.0f} s"

@@ -1,0 +1,1 @@
+"""The driver as a part of somebody else's running simulation."""

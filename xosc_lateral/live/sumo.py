@@ -1,0 +1,323 @@
+"""Drivers in SUMO, through libsumo or TraCI, with the sublane model: SUMO chooses lanes, drivers their places in them.
+
+``changeSublane`` moves a vehicle sideways within what SUMO finds safe, and keeps SUMO from changing lanes while it is
+asked for. So a vehicle is left alone as long as SUMO wants another lane for it and nobody is in the way there, and
+until SUMO has moved it. (``setLateralAlignment`` with a number leaves lane changes alone, too, but vehicles reach their
+places by decimetres only.)
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from xosc_lateral.driver.profile import DriverProfile
+from xosc_lateral.enrich.neighbours import Neighbours
+from xosc_lateral.errors import SimulationError
+from xosc_lateral.live.surroundings import Places
+from xosc_lateral.live.traffic import Moment, Moves, Traffic
+from xosc_lateral.motion.context import REACH, Reach
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+
+HOLD = 0.5
+"""A lane change is over when SUMO has wanted none for so long, and moves the vehicle no more. [s]"""
+
+PATIENCE = 8.0
+"""Longest time that a vehicle is left to SUMO for one lane change: at 1 m/s, SUMO's lateral speed, one takes 4 s, and
+some wishes are never acted on. [s]"""
+
+AGAIN = 20.0
+"""Shortest time from one lane change to the next: SUMO's reasons gather while its changes are held back, and would
+give more of them than without drivers (tried with two seeds of 200 s). [s]"""
+
+ELSEWHERE = 0.3
+"""A vehicle this far from where its driver wants it was moved by SUMO: its driver goes on from there. [m]"""
+
+_STILL = 0.05
+"""Lateral speed of a vehicle that SUMO does not move. [m/s]"""
+
+_REASONS, _SIDES, _BLOCKED = 8 | 16 | 32 | 64, 2 | 4, 512 | 1024 | 2048 | 4096
+"""Bits of a lane change state (`LaneChangeAction`): strategic, cooperative, for speed, keeping right; left or right;
+blocked by a leader or follower there."""
+
+TRUCKS = frozenset({"truck", "trailer", "bus", "coach"})
+"""Vehicle classes that a profile knows as trucks."""
+
+OTHERS = frozenset(
+    {"bicycle", "moped", "motorcycle", "scooter", "pedestrian", "wheelchair", "tram", "rail", "rail_urban", "rail_fast",
+     "rail_electric", "ship", "container", "cable_car", "subway", "aircraft", "drone"}
+)  # fmt: skip
+"""Vehicle classes that have no driver of ours."""
+
+_BEND = 20.0
+"""Length over which a lane's direction gives its curvature: arcs have a point every few metres. [m]"""
+
+
+def start(words: Iterable[str]) -> Any:
+    """Libsumo with a loaded simulation; the words of SUMO's command line.
+
+    Raises
+    ------
+    SimulationError
+        If it is not installed, or can't load that.
+    """
+    try:
+        import libsumo
+    except ImportError as error:
+        raise SimulationError("libsumo is not installed: pip install 'xosc-lateral[sumo]'") from error
+    try:
+        libsumo.start(["sumo", "--no-step-log", *words])
+    except Exception as error:  # libsumo's own have no common base
+        raise SimulationError(f"SUMO can't start: {' '.join(str(error).split())}") from error
+    return libsumo
+
+
+class SumoRoads:
+    """SUMO's lanes as `Roads`: a road is an edge, a lane is its index plus 1, so that ids grow to the left."""
+
+    def __init__(self, connection: Any) -> None:
+        self._lane = connection.lane
+        self.names: list[str] = list(connection.lane.getIDList())
+        edges = [name.rpartition("_")[0] for name in self.names]
+        numbers = {edge: k for k, edge in enumerate(dict.fromkeys(edges))}
+        self.place = {name: (numbers[edge], int(name.rpartition("_")[2]) + 1)
+                      for name, edge in zip(self.names, edges, strict=True)}  # fmt: skip
+        self._name = {place: name for name, place in self.place.items()}
+        self.width = {place: float(connection.lane.getWidth(name)) for name, place in self.place.items()}
+        self._length = {place: float(connection.lane.getLength(name)) for name, place in self.place.items()}
+        self._count = dict.fromkeys(numbers.values(), 0)
+        for edge, _ in self._name:
+            self._count[edge] += 1
+        self._middle = {
+            (edge, lane): sum(self.width[edge, k] for k in range(1, lane)) + 0.5 * self.width[edge, lane]
+            for edge, lane in self._name
+        }
+        self._courses: dict[tuple[int, int], tuple[FloatArray, FloatArray]] = {}
+
+    @cached_property
+    def _next(self) -> dict[str, str]:
+        """The lane that each leads to: by the inner lane of a junction, the straightest way where there are several."""
+        found = {}
+        for name in self.names:
+            links = sorted(self._lane.getLinks(name), key=lambda link: (link[6] != "s", link[0]))
+            if links:
+                found[name] = links[0][4] or links[0][0]
+        return found
+
+    @cached_property
+    def _before(self) -> dict[str, str]:
+        return {there: here for here, there in reversed(self._next.items())}
+
+    def course(self, place: tuple[int, int]) -> tuple[FloatArray, FloatArray]:
+        """Distances along a lane [m] and its direction there [rad], unwrapped."""
+        if place not in self._courses:
+            shape = np.array(self._lane.getShape(self._name[place]), dtype=np.float64)[:, :2]
+            step = np.diff(shape, axis=0)
+            length = np.hypot(*step.T)
+            step, length = step[length > 0.0], length[length > 0.0]
+            along = np.concatenate([[0.0], np.cumsum(length)])
+            scale = self._length[place] / max(along[-1], 1e-9)  # a lane's length may be given by hand
+            middle = 0.5 * (along[1:] + along[:-1]) * scale
+            self._courses[place] = middle, np.unwrap(np.arctan2(step[:, 1], step[:, 0]))
+        return self._courses[place]
+
+    def heading(self, place: tuple[int, int], s: float) -> float:
+        """Direction of travel, counter-clockwise from x. [rad]"""
+        return float(np.interp(s, *self.course(place)))
+
+    def columns(self, road: IntArray, lane: IntArray, s: FloatArray) -> dict[str, FloatArray]:
+        """See `Roads`; cross slope and grade are not known."""
+        places = list(zip(road.tolist(), lane.tolist(), strict=True))
+        bend = [
+            np.diff(np.interp([at - 0.5 * _BEND, at + 0.5 * _BEND], *self.course(place)))[0] / _BEND
+            for place, at in zip(places, s.tolist(), strict=True)
+        ]
+        return {
+            "curvature": np.array(bend, dtype=np.float64),
+            "lane_width": np.array([self.width[place] for place in places], dtype=np.float64),
+            "lane_index": lane.astype(np.float64) - 1.0,
+            "lane_count": np.array([self._count[edge] for edge in road.tolist()], dtype=np.float64),
+        }
+
+    def section(self, road: int, lane: int, s: float) -> float:
+        """See `Roads`: an edge is one."""
+        return 0.0
+
+    def path(self, road: int, lane: int, s: float) -> list[Reach]:
+        """See `Roads`."""
+        found = [Reach(road, 0.0, self._length[road, lane], lane, 0.0, s, 1)]
+        name, ahead, edge = self._name[road, lane], self._length[road, lane] - s, self._length[road, lane]
+        while ahead < REACH + edge and (name := self._next.get(name, "")):
+            place = self.place[name]
+            found.append(Reach(place[0], 0.0, self._length[place], place[1], ahead, 0.0, 1))
+            ahead += self._length[place]
+        name, behind = self._name[road, lane], s
+        while behind < REACH + edge and (name := self._before.get(name, "")):
+            place = self.place[name]
+            behind += self._length[place]
+            found.append(Reach(place[0], 0.0, self._length[place], place[1], -behind, 0.0, 1))
+        return found
+
+    def directions(self, road: IntArray, lane: IntArray) -> IntArray:
+        """See `Roads`: every lane is driven along its own direction."""
+        return np.ones(len(road), dtype=np.int64)
+
+    def across(self, road: IntArray, lane: IntArray, s: FloatArray, offset: FloatArray) -> FloatArray:
+        """See `Roads`: from the edge's right border."""
+        places = zip(road.tolist(), lane.tolist(), strict=True)
+        return np.array([self._middle[place] for place in places], dtype=np.float64) + offset
+
+    def centre(self, road: int, lane: int, s: FloatArray) -> FloatArray:
+        """See `Roads`."""
+        return np.full(len(s), self._middle[road, lane])
+
+
+class SumoTraffic:
+    """Drivers of the vehicles of a SUMO simulation that runs.
+
+    Call `steer` before (or after) every ``simulationStep``.
+
+    Parameters
+    ----------
+    connection : libsumo, or a connection of traci
+        With a loaded simulation.
+    profile : DriverProfile
+    ego : str or collection of str
+        Vehicles that nobody of ours drives.
+    seed, profiles, neighbours
+        See `Traffic`.
+
+    Raises
+    ------
+    SimulationError
+        If the sublane model is off.
+    """
+
+    def __init__(
+        self,
+        connection: Any,
+        profile: DriverProfile,
+        *,
+        ego: str | Iterable[str] = (),
+        seed: int = 0,
+        profiles: Mapping[str, DriverProfile] | None = None,
+        neighbours: Neighbours = Neighbours.BORROW,
+    ) -> None:
+        self.connection = connection
+        if float(connection.simulation.getOption("lateral-resolution")) <= 0.0:
+            raise SimulationError("SUMO's sublane model is off: start it with --lateral-resolution 0.25, say")
+        self.roads = SumoRoads(connection)
+        self._ego = {ego} if isinstance(ego, str) else set(ego)
+        self.traffic = Traffic(profile, profiles=profiles, seed=seed, roads=self.roads, neighbours=neighbours)
+        self._kinds: dict[str, tuple[str, float, float]] = {}
+        self._changes: dict[str, _Change] = {}
+        self.moves: dict[str, tuple[float, bool]] = {}
+        self.warnings: list[str] = []
+
+    def steer(self) -> Moves:
+        """Say where everybody is sideways after the next step.
+
+        Raises
+        ------
+        SimulationError
+            If what the simulation says can't be used; nothing was asked for then, and the simulation can go on.
+        """
+        vehicles, now = self.connection.vehicle, float(self.connection.simulation.getTime())
+        step = float(self.connection.simulation.getDeltaT())
+        moment = self._moment(now)
+        moves = self.traffic.step(now + step, moment)
+        for row, name in enumerate(moment.names):
+            if moves.steered[row]:
+                vehicles.changeSublane(name, float(moves.offset[row] - moment.offset[row]))
+        steered = zip(moment.names, moves.offset.tolist(), moves.steered.tolist(), strict=True)
+        self.moves = {name: (offset, own) for name, offset, own in steered}
+        return moves
+
+    def states(self) -> Iterable[tuple[str, float, float, float, float, str, float, float]]:
+        """Of everybody on a lane: name, x, y [m], heading [rad], speed [m/s], lane, s and offset [m]."""
+        vehicles = self.connection.vehicle
+        for name in vehicles.getIDList():
+            lane, offset = vehicles.getLaneID(name), float(vehicles.getLateralLanePosition(name))
+            x, y = vehicles.getPosition(name)
+            if lane not in self.roads.place:  # it is being teleported
+                continue
+            values = (float(x), float(y), float(vehicles.getSpeed(name)), float(vehicles.getLanePosition(name)), offset)
+            if not np.isfinite(values).all() or abs(offset) > _INVALID:
+                line = f"vehicle {name!r}: a number that is none; it is left alone"
+                if line not in self.warnings:
+                    self.warnings.append(line)
+                continue
+            turned = np.radians(90.0 - float(vehicles.getAngle(name)))
+            yield name, values[0], values[1], float(turned), values[2], lane, values[3], offset
+
+    def _moment(self, now: float) -> Moment:
+        seen = list(self.states())
+        names = tuple(row[0] for row in seen)
+        for gone in self._kinds.keys() - set(names):
+            del self._kinds[gone]
+            self._changes.pop(gone, None)
+        for name in names:
+            if name not in self._kinds:
+                vehicles = self.connection.vehicle
+                self._kinds[name] = (
+                    vehicles.getVehicleClass(name), float(vehicles.getLength(name)), float(vehicles.getWidth(name)),
+                )  # fmt: skip
+        kinds = [self._kinds[name] for name in names]
+        following = np.array([self._follows(row[0], row[5], row[7], now) for row in seen], dtype=np.bool_)
+        x, y, speed, s, offset = (np.array([row[k] for row in seen], dtype=np.float64) for k in (1, 2, 4, 6, 7))
+        where = [self.roads.place[row[5]] for row in seen]
+        heading = np.array([self.roads.heading(place, at) for place, at in zip(where, s.tolist(), strict=True)])
+        road, lane = (np.array([place[k] for place in where], dtype=np.int64) for k in (0, 1))
+        length, width = (np.array([kind[k] for kind in kinds], dtype=np.float64) for k in (1, 2))
+        return Moment(
+            names, speed, np.array([self.roads.width[place] for place in where]), offset, following,
+            np.array([kind[0] not in OTHERS and name not in self._ego for name, kind in zip(names, kinds, strict=True)],
+                     dtype=np.bool_),
+            np.array([kind[0] in TRUCKS for kind in kinds], dtype=np.bool_),
+            places=Places(x, y, heading, road, lane, s, length, width, -0.5 * length),
+        )  # fmt: skip
+
+    def _follows(self, name: str, lane: str, offset: float, now: float) -> bool:
+        """Whether a vehicle keeps its lane, as far as SUMO is concerned."""
+        vehicles, change = self.connection.vehicle, self._changes.setdefault(name, _Change(lane))
+        wishes = [int(vehicles.getLaneChangeState(name, side)[0]) for side in (1, -1)]
+        wants = any(wish & _REASONS and wish & _SIDES and not wish & _BLOCKED for wish in wishes)
+        flipped = change.lane != lane and change.lane.rpartition("_")[0] == lane.rpartition("_")[0]
+        wanted, steered = self.moves.get(name, (offset, False))
+        pushed = steered and abs(wanted - offset) > ELSEWHERE
+        change.lane = lane
+        if (wants and now >= change.not_before) or flipped or pushed:
+            if change.since is None:
+                change.since = now
+            change.until = now + HOLD
+        if change.since is None:
+            return True
+        if flipped or now - change.since > PATIENCE:  # changed, or wanted in vain
+            change.not_before = now + AGAIN
+        if now < change.until and now - change.since <= PATIENCE:
+            return False
+        if abs(float(vehicles.getLateralSpeed(name))) > _STILL and now - change.since <= PATIENCE:
+            return False
+        change.since = None
+        return True
+
+
+@dataclass(slots=True)
+class _Change:
+    """A vehicle's lane, since when SUMO has it for a change, until when at least, and no sooner than when again. [s]"""
+
+    lane: str
+    since: float | None = None
+    until: float = -1.0
+    not_before: float = -1.0
+
+
+_INVALID = 1e6
+"""SUMO's ``INVALID_DOUBLE`` is far beyond. [m]"""

@@ -1,0 +1,268 @@
+"""From a recording to a folder: scenario, road, drivers and report."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+
+from xosc_lateral.driver.profile import DriverProfile
+from xosc_lateral.errors import FormatError, XoscLateralError
+from xosc_lateral.formats.hashes import parsed_hashes
+from xosc_lateral.formats.openscenario.write.build import Version, named
+from xosc_lateral.formats.openscenario.write.reconstructed import Triggers, reconstructed_scenario
+from xosc_lateral.formats.output_tables import write_frame
+from xosc_lateral.formats.profile_folders import find_profile, list_profiles
+from xosc_lateral.formats.profiles import profile_bytes, read_profile
+from xosc_lateral.formats.recordings import RecordedTraffic
+from xosc_lateral.pipeline.drivers import AUTO_PROFILE
+from xosc_lateral.reconstruction.drivers import ChosenDriver, WindowModel, choose_driver, drive_of, in_lane_offsets
+from xosc_lateral.reconstruction.encounters import Encounter, encounters, relative_triggers
+from xosc_lateral.reconstruction.plan import VehiclePlan, plan_vehicles
+from xosc_lateral.reconstruction.recorded import Recording, Track, place_tracks
+from xosc_lateral.reconstruction.residuals import Residuals, residuals_of
+
+VERSIONS: tuple[Version, ...] = ((1, 0), (1, 1), (1, 2), (1, 3))
+"""Of the standard that can be written."""
+LONG_DRIVE = 100.0
+"""Of road-following, for a profile of one vehicle: ten windows that the evaluation compares drivers by. [s]"""
+AROUND = 100.0
+"""Who comes as near as this to the vehicle in question, along or across, belongs to its surroundings. [m]"""
+
+
+@dataclass(frozen=True, slots=True)
+class ReconstructSettings:
+    """What is reconstructed, and how.
+
+    Parameters
+    ----------
+    begin, end : float or None
+        Of the part of the recording. [s]
+    vehicles : collection of str or None
+        These alone, by their recorded names.
+    around : str or None
+        A vehicle, and those within `AROUND`, for `window` seconds in the middle of its passage.
+    window : float
+        [s]
+    host : str or None
+        Recorded name of the vehicle under test.
+    error : float
+        Bound of positions along the road. [m]
+    version : (int, int)
+    relative : bool
+        Lane changes and braking begin by distances, where the recording bears it out.
+    exact : bool
+        Recorded paths as trajectories, instead of maneuvers.
+    fit : bool
+        A profile of its own for every vehicle that drove long enough.
+    libraries : tuple of Path
+        Folders with further profiles.
+    """
+
+    begin: float | None = None
+    end: float | None = None
+    vehicles: Collection[str] | None = None
+    around: str | None = None
+    window: float = 60.0
+    host: str | None = None
+    error: float = 0.5
+    version: Version = (1, 2)
+    relative: bool = False
+    exact: bool = False
+    fit: bool = False
+    libraries: tuple[Path, ...] = ()
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Reconstructed:
+    """A scenario as text, how it was made, and how far it is from the recording.
+
+    Parameters
+    ----------
+    traffic : RecordedTraffic
+    recording : Recording
+    plans : tuple of VehiclePlan
+    scenario : str
+    residuals : tuple of Residuals
+        In the order of `plans`.
+    encounters : tuple of Encounter
+    relative : mapping
+        Entity -> triggers that are distances.
+    drivers : tuple of ChosenDriver
+        In the order of `plans`.
+    fitted : mapping of str to DriverProfile
+        Profiles of single vehicles, by name.
+    settings : ReconstructSettings
+    """
+
+    traffic: RecordedTraffic
+    recording: Recording
+    plans: tuple[VehiclePlan, ...]
+    scenario: str
+    residuals: tuple[Residuals, ...]
+    encounters: tuple[Encounter, ...]
+    relative: Mapping[str, Triggers]
+    drivers: tuple[ChosenDriver, ...]
+    fitted: Mapping[str, DriverProfile]
+    settings: ReconstructSettings
+
+    @property
+    def host(self) -> str | None:
+        """Entity that is the vehicle under test."""
+        wanted = self.settings.host
+        return next((plan.name for plan in self.plans if plan.vehicle.name == wanted), None)
+
+    @property
+    def files(self) -> tuple[Path, ...]:
+        """Inputs that are files."""
+        return tuple(path for path in self.traffic.sources if path.is_file())
+
+
+def reconstruct_recording(traffic: RecordedTraffic, settings: ReconstructSettings) -> Reconstructed:
+    """Choose vehicles, plan their maneuvers, write the scenario in memory and play it.
+
+    Raises
+    ------
+    FormatError
+        A vehicle that is not in the recording, a window without time.
+    NotEnoughDataError
+        If no vehicle is left.
+    """
+    tracks, begin, end = chosen(traffic, settings)
+    recording = place_tracks(tracks, traffic.network, begin, end)
+    plans = plan_vehicles(recording, traffic.network, error=settings.error)
+    by_name = {plan.vehicle.name: plan.name for plan in plans}
+    if settings.host is not None and settings.host not in by_name:
+        raise FormatError(f"host {settings.host!r} is not among the reconstructed vehicles", path=traffic.sources[0])
+    relative = {}
+    if settings.relative and not settings.exact:
+        relative = {plan.name: relative_triggers(plan, plans, traffic.network) for plan in plans}
+    scenario = reconstructed_scenario(
+        plans,
+        traffic.network,
+        road_file=traffic.road_name,
+        duration=end - begin,
+        version=settings.version,
+        host=None if settings.host is None else by_name[settings.host],
+        description=f"{traffic.name}: reconstructed from {traffic.sources[0].name}, {begin:g} to {end:g} s",
+        relative=relative,
+        exact=settings.exact,
+    )
+    residuals = tuple(map(residuals_of, plans))
+    met = encounters(plans, traffic.network)
+    drivers, fitted = _drivers(plans, residuals, settings)
+    parts = traffic, recording, plans, scenario, residuals, met, relative, drivers, fitted
+    return Reconstructed(*parts, settings)
+
+
+def _drivers(
+    plans: Sequence[VehiclePlan], residuals: Sequence[Residuals], settings: ReconstructSettings
+) -> tuple[tuple[ChosenDriver, ...], dict[str, DriverProfile]]:
+    """A profile for each vehicle: its own, the likeliest of the library, or the population's."""
+    from xosc_lateral.driver.fitting import fit_profile
+
+    population = find_profile(AUTO_PROFILE, settings.libraries)
+    paths = {path.stem: path for path in reversed(list_profiles(settings.libraries))}
+    models = {name: _window_model(path, path.stat().st_mtime_ns) for name, path in paths.items()}
+    chosen, fitted = list[ChosenDriver](), dict[str, DriverProfile]()
+    for plan, residual in zip(plans, residuals, strict=True):
+        if plan.lateral.is_played:
+            chosen.append(ChosenDriver("", 0.0, 0.0, "stands still in its lane: no person drove it"))
+            continue
+        stretches = in_lane_offsets(plan, residual)
+        one = choose_driver([offset for _, offset, _ in stretches], models, population.stem)
+        if settings.fit and one.seconds >= LONG_DRIVE:
+            drive = drive_of(plan, residual)
+            assert drive is not None
+            try:
+                fitted[plan.name] = fit_profile([drive], name=plan.name)
+                one = replace(one, profile=f"drivers/{plan.name}.json", why="fitted to its own drive")
+            except XoscLateralError as error:
+                one = replace(one, why=f"{one.why}; can't be fitted: {error}")
+        chosen.append(one)
+    return tuple(chosen), fitted
+
+
+@lru_cache(maxsize=64)
+def _window_model(path: Path, _changed: int) -> WindowModel:
+    return WindowModel.of(read_profile(path))
+
+
+def drivers_table(made: Reconstructed, path: Path) -> None:
+    """Write the table of one row that `convert` takes: the scenario, who is under test, and everybody's profile."""
+    import pandas as pd
+
+    cells = {"scenario": f"{made.traffic.name}.xosc"}
+    if made.host is not None:
+        cells["ego"] = made.host
+    drivers = {plan.name: driver.profile for plan, driver in zip(made.plans, made.drivers, strict=True)}
+    driven = {name: profile for name, profile in drivers.items() if profile and name != made.host}
+    cells |= {f"profile:{name}": profile for name, profile in driven.items()}
+    cells["only"] = ";".join(driven)
+    write_frame(pd.DataFrame([cells]), path, {"inputs": parsed_hashes(made.files)})
+
+
+def fitted_profiles(made: Reconstructed) -> dict[str, bytes]:
+    """Files of the profiles that were fitted, by their paths below the folder."""
+    return {f"drivers/{name}.json": profile_bytes(profile) for name, profile in made.fitted.items()}
+
+
+def version_named(text: str) -> Version:
+    """A version that can be written, by its name; `ValueError` for another."""
+    found = {named(version): version for version in VERSIONS}
+    if text not in found:
+        raise ValueError(f"version {text!r}, expected {', '.join(found)}")
+    return found[text]
+
+
+def chosen(traffic: RecordedTraffic, settings: ReconstructSettings) -> tuple[list[Track], float, float]:
+    """Tracks and window of time [s] that the settings ask for.
+
+    Raises
+    ------
+    FormatError
+        A vehicle that is not in the recording, a window without time.
+    """
+    by_name = {track.name: track for track in traffic.tracks}
+    source = traffic.sources[0]
+    for word, names in (
+        ("vehicles", settings.vehicles or ()),
+        ("around", [settings.around]),
+        ("host", [settings.host]),
+    ):
+        for name in names:
+            if name is not None and name not in by_name:
+                some = ", ".join(list(by_name)[:8])
+                raise FormatError(f"--{word} {name}: no such vehicle; there are {some}, ...", path=source)
+    first, last = traffic.span
+    begin = first if settings.begin is None else settings.begin
+    end = last if settings.end is None else settings.end
+    tracks = list(traffic.tracks)
+    if settings.around is not None:
+        centre = by_name[settings.around]
+        middle = 0.5 * (max(centre.time[0], begin) + min(centre.time[-1], end))
+        begin, end = max(begin, middle - 0.5 * settings.window), min(end, middle + 0.5 * settings.window)
+        tracks = [track for track in tracks if _comes_near(track, centre, begin, end)]
+    if settings.vehicles is not None:
+        tracks = [track for track in tracks if track.name in set(settings.vehicles)]
+    begin, end = max(begin, first), min(end, last)
+    if end - begin < 1.0:
+        raise FormatError(
+            f"from {begin:g} to {end:g} s is no second; it lasts from {first:g} to {last:g} s", path=source
+        )
+    return tracks, begin, end
+
+
+def _comes_near(track: Track, centre: Track, begin: float, end: float) -> bool:
+    time = track.time[(track.time >= begin) & (track.time <= end)]
+    time = time[(time >= centre.time[0]) & (time <= centre.time[-1])]
+    if not len(time):
+        return False
+    away = [
+        np.interp(time, track.time, getattr(track, axis)) - np.interp(time, centre.time, getattr(centre, axis))
+        for axis in "xy"
+    ]
+    return bool((np.hypot(*away) <= AROUND).any())

@@ -1,0 +1,214 @@
+"""A recorded vehicle in the lanes of a road, row by row."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from xosc_lateral.errors import NotEnoughDataError
+from xosc_lateral.mask import true_slices
+from xosc_lateral.road.network import RoadNetwork
+from xosc_lateral.road.positions import Poses
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+
+BESIDE = 1.0
+"""So far beside every driving lane a vehicle still keeps to one: it drives on its marking. [m]"""
+LONGEST_GAP = 1.0
+"""Rows farther apart than this are not of one passage, as in `formats.importers.cuts`. [s]"""
+SHORTEST = 2.0
+"""Passages below this are left out: a speed and its change can't be told in less. [s]"""
+LEAP = 3.0
+"""Farther than twice what it drives in a step, and by this much: an identifier that has gone to another vehicle. [m]"""
+SLOW = 0.5
+"""Below this speed the direction of movement is none: that of the row before holds. [m/s]"""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class RecordedVehicle:
+    """One passage of one vehicle; arrays of shape (n,), rows in order of time.
+
+    Parameters
+    ----------
+    name, kind : str
+        As recorded; the class in lower case, empty where not known.
+    length, width, height : float
+        [m]
+    centre : float
+        Middle of the vehicle ahead of its reference point, the rear axle. [m]
+    time : array
+        [s]
+    x, y : array
+        Of the reference point, in the coordinates of the road. [m]
+    road, lane : array of int
+        Index of the road in the network, OpenDRIVE lane.
+    s, offset, lane_width : array
+        Offset from the lane's centre, positive to the LEFT of the vehicle's travel. [m]
+    way : array of int
+        +1: it drives as its lane is driven, -1: against it, as who overtakes on a road with one lane each way.
+    """
+
+    name: str
+    kind: str
+    length: float
+    width: float
+    height: float
+    centre: float
+    time: FloatArray
+    x: FloatArray
+    y: FloatArray
+    road: IntArray
+    lane: IntArray
+    s: FloatArray
+    offset: FloatArray
+    lane_width: FloatArray
+    way: IntArray
+
+    def poses(self, network: RoadNetwork, offset: FloatArray) -> Poses:
+        """World poses at each row's place along the road, `offset` [m] to the left of its lane's centre; shape (n,)."""
+        poses = network.lane_to_world(self.road, self.lane, self.s, self.way * offset)
+        return poses._replace(heading=poses.heading + np.where(self.way < 0, np.pi, 0.0))
+
+    @property
+    def levels(self) -> tuple[FloatArray, IntArray]:
+        """Lateral position of each row's lane centre from the first row's [m], and how many lanes to its left it is.
+
+        A step of the offset by more than half a lane is a new lane; one lane that goes over into another one ahead
+        has none. Shape (n,) each.
+        """
+        step = np.diff(self.offset)
+        width = 0.5 * (self.lane_width[1:] + self.lane_width[:-1])
+        lanes = np.where(np.abs(step) > 0.5 * width, -np.round(step / width), 0.0)
+        return np.r_[0.0, np.cumsum(lanes * width)], np.r_[0, np.cumsum(lanes)].astype(np.int64)
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Recording:
+    """Vehicles on a road, and what was left out, a line each.
+
+    Parameters
+    ----------
+    vehicles : tuple of RecordedVehicle
+    left_out : tuple of str
+    start, end : float
+        Of the window. [s]
+    """
+
+    vehicles: tuple[RecordedVehicle, ...]
+    left_out: tuple[str, ...]
+    start: float
+    end: float
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Track:
+    """One vehicle as recorded, in the coordinates of the road; arrays of shape (n,).
+
+    Parameters
+    ----------
+    name, kind : str
+    length, width, height : float
+        [m]
+    ahead : float
+        The recorded point ahead of the reference point. [m]
+    middle : float
+        The vehicle's middle ahead of it. [m]
+    time, x, y, heading : array
+        Of the recorded point. [s], [m], [rad]
+    """
+
+    name: str
+    kind: str
+    length: float
+    width: float
+    height: float
+    ahead: float
+    middle: float
+    time: FloatArray
+    x: FloatArray
+    y: FloatArray
+    heading: FloatArray
+
+
+def place_tracks(tracks: Sequence[Track], network: RoadNetwork, start: float, end: float) -> Recording:
+    """Each vehicle's longest passage in driving lanes within a window of time.
+
+    Raises
+    ------
+    NotEnoughDataError
+        If no vehicle is left.
+    """
+    vehicles, left_out = list[RecordedVehicle](), list[str]()
+    for track in tracks:
+        inside = (track.time >= start - 1e-9) & (track.time <= end + 1e-9)
+        if inside.any():
+            found = _place(track, inside, network, left_out)
+            if found is not None:
+                vehicles.append(replace(found, time=found.time - start))
+    if not vehicles:
+        why = f": {left_out[0]}" if left_out else ""
+        raise NotEnoughDataError(f"no vehicle can be reconstructed between {start:g} and {end:g} s{why}")
+    return Recording(tuple(vehicles), tuple(left_out), start, end)
+
+
+def _place(
+    track: Track, inside: NDArray[np.bool_], network: RoadNetwork, left_out: list[str]
+) -> RecordedVehicle | None:
+    time, x, y = track.time[inside], track.x[inside], track.y[inside]
+    heading = _held(time, x, y, track.heading[inside])
+    x, y = x - track.ahead * np.cos(heading), y - track.ahead * np.sin(heading)
+    found = network.world_to_lane(x, y, heading=heading)
+    on_lane = (found.distance <= BESIDE) & (found.lane != 0)
+    if not on_lane.any():
+        left_out.append(f"{track.name}: on no driving lane")
+        return None
+    lane_heading = np.zeros(len(x))
+    there = np.flatnonzero(on_lane)
+    place = found.road[there], found.lane[there], found.s[there]
+    lane_heading[there] = network.lane_to_world(*place).heading
+    width = np.full(len(x), np.nan)
+    width[there] = network.lane_width(*place)
+    way = np.where(np.cos(heading - lane_heading) < 0.0, -1, 1)
+    passages = _passages(time, x, y, on_lane)
+    if not passages:
+        left_out.append(f"{track.name}: no {SHORTEST:g} s along a driving lane without a gap")
+        return None
+    best = max(passages, key=lambda part: time[part.stop - 1] - time[part.start])
+    lost = len(time) - (best.stop - best.start)
+    if lost:
+        left_out.append(f"{track.name}: {lost} of {len(time)} rows (off the lanes, or beyond a gap or a leap)")
+    size = track.length, track.width, track.height, track.middle
+    road, lane = (each.astype(np.int64)[best] for each in (found.road, found.lane))
+    where = road, lane, found.s[best], (way * found.offset)[best]
+    return RecordedVehicle(
+        track.name, track.kind, *size, time[best], x[best], y[best], *where, width[best], way[best].astype(np.int64)
+    )
+
+
+def _held(time: FloatArray, x: FloatArray, y: FloatArray, heading: FloatArray) -> FloatArray:
+    """Headings where it moves; else that of the last row that does."""
+    if len(time) < 2:
+        return heading
+    moving = np.hypot(np.gradient(x, time), np.gradient(y, time)) >= SLOW
+    if not moving.any():
+        return heading
+    last = np.maximum.accumulate(np.where(moving, np.arange(len(time)), -1))
+    return np.asarray(heading[np.where(last >= 0, last, int(np.argmax(moving)))])
+
+
+def _passages(time: FloatArray, x: FloatArray, y: FloatArray, on_lane: NDArray[np.bool_]) -> list[slice]:
+    """Stretches of rows on a lane without a gap or a leap, `SHORTEST` at least."""
+    step, moved = np.diff(time), np.hypot(np.diff(x), np.diff(y))
+    speed = np.median(moved / np.maximum(step, 1e-9)) if len(step) else 0.0
+    broken = (step > LONGEST_GAP) | (moved > 2.0 * max(float(speed), 1.0) * step + LEAP)
+    parts = []
+    for part in true_slices(on_lane):
+        cuts = part.start + 1 + np.flatnonzero(broken[part.start : part.stop - 1])
+        edges = [part.start, *cuts.tolist(), part.stop]
+        parts += [slice(a, b) for a, b in pairwise(edges)]
+    return [part for part in parts if time[part.stop - 1] - time[part.start] >= SHORTEST and part.stop - part.start > 3]

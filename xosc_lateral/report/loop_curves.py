@@ -1,0 +1,147 @@
+"""What the measured drives show of one effect alone: offsets with everything else taken out, averaged by its column.
+
+References
+----------
+.. [1] W. A. Larsen, S. J. McCleary, "The use of partial residual plots in regression analysis", Technometrics 14, 1972.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from xosc_lateral.driver.effects import Acts, Angular, ColumnEffect, Product
+from xosc_lateral.identification.close import LoopResult
+from xosc_lateral.identification.held_out_gain import hold_out_blocks
+from xosc_lateral.identification.terms.between import is_between
+from xosc_lateral.identification.timeline import LOCAL_S, coarse_mean, coarse_middle, local_mean
+
+FloatArray = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
+IntArray = NDArray[np.intp]
+
+POINTS = 9
+"""Equally wide bins between the 1 % and 99 % quantile of what drives an effect."""
+
+LEAST_S = 30
+"""A bin with less driving is left out. [s]"""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Curve:
+    """A fitted effect over what drives it, and what was measured there.
+
+    Parameters
+    ----------
+    over : array, shape (n,)
+        The column, or the product, in its own unit.
+    strength, error : array, shape (n,)
+        Fitted, with its standard error: [m], or a natural logarithm.
+    seen, measured, measured_error : array, shape (k,)
+        Means of bins: where, how much, standard error from blocks. Empty where it can't be measured alone.
+    """
+
+    over: FloatArray
+    strength: FloatArray
+    error: FloatArray
+    seen: FloatArray
+    measured: FloatArray
+    measured_error: FloatArray
+
+
+def curve_of(result: LoopResult, effect: ColumnEffect) -> Curve:
+    """Curve of an effect that was found, with measured points where it acts on mean, spread or fine noise."""
+    over, strength, error = _fitted(result, effect)
+    nothing = np.zeros(0)
+    if effect.acts is Acts.RATE:
+        return Curve(over, strength, error, nothing, nothing, nothing)
+    where, own = _driving(result, effect)
+    inside = result.coarse.valid & np.isfinite(where)
+    blocks = coarse_middle(hold_out_blocks(result.scored.statistics.timeline))
+    values = _values(result, effect, inside)
+    seen, mean, spread, fitted = _binned(where, values, own, blocks, inside)
+    if effect.acts is not Acts.LOCATION:
+        mean, spread = 0.5 * np.log(np.maximum(mean, 1e-9)), 0.5 * spread / np.maximum(mean, 1e-9)
+    # where the curve is zero is a matter of taste, so the points are shifted onto it as a whole
+    shift = float(np.mean(fitted - mean)) if len(mean) else 0.0
+    return Curve(over, strength, error, seen, mean + shift, spread)
+
+
+def _values(result: LoopResult, effect: ColumnEffect, inside: BoolArray) -> FloatArray:
+    """What is measured of what the effect acts on, shape (n,): metres, or squares about 1."""
+    if effect.acts is Acts.LOCATION:
+        values = _alone(result, effect)
+    else:
+        squares = _squares(result, effect.acts)
+        values = squares / max(float(squares[inside].mean()), 1e-30)
+    return values
+
+
+def _fitted(result: LoopResult, effect: ColumnEffect) -> tuple[FloatArray, FloatArray, FloatArray]:
+    coarse = result.coarse
+    context = {column: coarse.context[column][coarse.timeline.valid] for column in effect.columns}
+    seen = effect.seen(context)[:, 0] if isinstance(effect, Product) else context[effect.columns[0]]
+    seen = seen[np.isfinite(seen)]
+    low, high = _ends(seen)
+    over = np.linspace(low, high, 200)
+    quantity = over[:, None] if isinstance(effect, Product) else effect.quantity({effect.columns[0]: over})
+    about = quantity - np.asarray(effect.reference)
+    return over, about @ np.asarray(effect.coefficients), np.sqrt(about**2 @ np.square(effect.errors))
+
+
+def _ends(values: FloatArray) -> tuple[float, float]:
+    """1 % and 99 % quantile; the extremes of what is nearly always the same."""
+    low, high = np.quantile(values, [0.01, 0.99])
+    return (float(low), float(high)) if low < high else (float(values.min()), float(values.max()))
+
+
+def _driving(result: LoopResult, effect: ColumnEffect) -> tuple[FloatArray, FloatArray]:
+    """Column (or product) as the driver responds to it, where that can be said, and the effect's strength; at 1 Hz."""
+    coarse = result.coarse
+    own = coarse.strength(effect)
+    if isinstance(effect, Product):
+        return coarse_mean(coarse.fine_response(effect)[:, 0]), coarse_mean(own)
+    column = coarse.context[effect.columns[0]]
+    if isinstance(effect, Angular) or not np.isfinite(column).all():  # neither angles nor "none" can be averaged
+        return coarse_middle(column), coarse_mean(own)
+    return coarse_mean(coarse.timeline.respond(column, effect.lag_s, effect.response_s)), coarse_mean(own)
+
+
+def _alone(result: LoopResult, effect: ColumnEffect) -> FloatArray:
+    """Offsets less intercepts and all other effects on the mean, at 1 Hz. [m]"""
+    coarse, fitted = result.coarse, result.final
+    rest = coarse.offset - fitted.columns @ fitted.sizes
+    if is_between(effect):  # the places that the drives keep are what it explains
+        return np.asarray(rest)
+    rest = rest - fitted.levels[coarse.drive]
+    return np.asarray(rest + coarse_mean(coarse.strength(effect)))
+
+
+def _squares(result: LoopResult, acts: Acts) -> FloatArray:
+    """Mean square of the movement within 20 s (or, for fine noise, from sample to sample), per second. [m^2]"""
+    timeline = result.scored.statistics.timeline
+    if acts is Acts.FINE:
+        return coarse_mean(np.square(np.diff(timeline.offset, prepend=timeline.offset[:1])))
+    fast = timeline.offset - local_mean(timeline.offset, timeline.valid, LOCAL_S, timeline.step)
+    return coarse_mean(np.square(fast))
+
+
+def _binned(
+    where: FloatArray, values: FloatArray, own: FloatArray, blocks: IntArray, inside: BoolArray
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Mean place, mean value, its standard error with blocks as the independent pieces, mean of the fit, per bin."""
+    low, high = _ends(where[inside])
+    label = np.clip(((where - low) / max(high - low, 1e-12) * POINTS), 0, POINTS - 1)
+    rows = []
+    for index in range(POINTS):
+        own_rows = np.flatnonzero(inside & (np.where(inside, label, -1.0).astype(int) == index))
+        if len(own_rows) < LEAST_S:
+            continue
+        mean = float(values[own_rows].mean())
+        together = np.bincount(blocks[own_rows], values[own_rows] - mean)
+        error = float(np.sqrt(np.sum(together**2))) / len(own_rows)
+        rows.append((float(where[own_rows].mean()), mean, error, float(own[own_rows].mean())))
+    columns = np.asarray(rows).reshape(-1, 4).T
+    return columns[0], columns[1], columns[2], columns[3]
