@@ -21,6 +21,7 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Callable, Sequence
+from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -58,8 +59,8 @@ def measured(options: argparse.Namespace, folder: Path) -> Any:
     """Lines of the table, as they come."""
 
     def line(what: str, task: Callable[..., tuple[float, float]], *args: Any, per: float = 1) -> float:
-        with multiprocessing.get_context("spawn").Pool(1) as pool:
-            cpu, memory = pool.apply(task, args)
+        with ProcessPoolExecutor(1, multiprocessing.get_context("spawn")) as pool:
+            cpu, memory = pool.submit(task, *args).result()
         lines.append(f"| {what} | {1e3 * cpu / per:.3g} ms |  | {memory:.0f} MB |")
         print(lines[-1], file=sys.stderr, flush=True)
         return cpu
