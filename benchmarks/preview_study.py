@@ -1,37 +1,56 @@
 """What the loop names on drives of `simulated.preview_driver`.
 
-`python -m benchmarks.preview_study design|validation|test [KIND ...]`
-
-One line per drive: what was found, whether it is what was planted, columns that were dismissed, and for a spread that
-changes with time the ratio of the loudest sixth of the drive to the quietest, measured and sampled.
+`python -m benchmarks.preview_study design|validation|test [--whole] [KIND ...]`: one line per drive with everything that
+is selected, "!" where it is not what was planted. With `--whole` the loop is closed: folds and held-out blocks judge,
+and for a spread that changes with time the ratio of the loudest sixth of the drive to the quietest is shown, measured
+and sampled.
 """
 
 from __future__ import annotations
 
 import sys
+from collections.abc import Sequence
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 
 from benchmarks.simulated import preview_driver
+from xosc_lateral.drives.drive import Drive
 from xosc_lateral.formats.drives import drives_of_table
 from xosc_lateral.identification.close import LoopResult, close_loop
+from xosc_lateral.identification.identify import usable_columns
+from xosc_lateral.identification.regression import Coarse
+from xosc_lateral.identification.search import Search
+from xosc_lateral.identification.selection import ERROR_BUDGET, Accepted, select
+from xosc_lateral.identification.timeline import join_drives
 
-BENDS = ({"curvature"}, {"crossfall"}, {"curvature", "speed"}, {"crossfall", "speed"})
-"""By which the effect of the bends may be named: crossfall follows from curvature."""
+BENDS = {"curvature", "crossfall", "speed"}
+"""By which what bends do may be named: crossfall goes along with curvature, and speed changes how the car turns."""
+
+SEEDS = {"design": preview_driver.DESIGN, "validation": preview_driver.VALIDATION, "test": preview_driver.TEST}
 
 
-def verdict(result: LoopResult, act: preview_driver.Act) -> tuple[str, bool, int]:
+def verdict(accepted: Sequence[Accepted], act: preview_driver.Act) -> tuple[str, bool, int]:
     """Everything found, whether what was planted is among it, and how many findings are wrong."""
     planted = bool(act.columns or act.target or act.log_spread or act.camera)
     words, hit, wrong = [], not planted, 0
-    for one in result.findings:
-        columns = set(one.columns)
-        right = planted and (columns <= set(act.columns) if act.columns else not columns and one.kind != "regime")
-        hit |= right and bool(columns) == bool(act.columns)
-        wrong += not right and columns not in BENDS
-        size = f"{one.size_m:.2f} p {one.p_value:.0e} {one.shape}"
-        words.append(f"{'' if right or columns in BENDS else '!'}{one.kind} {'*'.join(one.columns) or 'time'} {size}")
+    for one in accepted:
+        columns = set(one.term.columns)
+        named = planted and (columns == set(act.columns) if act.columns else one.term.component.startswith("time_"))
+        hit |= named
+        wrong += not named and not columns <= BENDS
+        sign = "" if named or (columns <= BENDS and columns) else "!"
+        words.append(f"{sign}{one.term.component} {'*'.join(one.term.columns)} {one.p_value:.0e}")
     return "; ".join(words) or "nothing", hit, wrong
+
+
+def selected(drives: Sequence[Drive]) -> tuple[Sequence[Accepted], set[str]]:
+    """What is selected, and columns that are dismissed as consequences."""
+    coarse = Coarse.of(join_drives(drives))
+    usable = usable_columns(coarse.timeline)
+    with threadpool_limits(1, user_api="blas"):
+        found = select(Search.over(coarse, usable.columns, np.random.SeedSequence(1), ERROR_BUDGET))
+    return found.accepted, {item.column for item in usable.feedback}
 
 
 def spread_ratio(result: LoopResult) -> tuple[float, float]:
@@ -41,26 +60,26 @@ def spread_ratio(result: LoopResult) -> tuple[float, float]:
     return float(real[high] / real[low]), float(after[high] / after[low])
 
 
-def main(which: str, names: list[str]) -> None:
+def main(which: str, names: list[str], *, whole: bool) -> None:
     """Print a line per drive, then the sums."""
-    seeds = {"design": preview_driver.DESIGN, "validation": preview_driver.VALIDATION, "test": preview_driver.TEST}[
-        which
-    ]
     hits = wrongs = 0
-    for kind in names or list(seeds):
-        drive = preview_driver.simulate(kind, seeds[kind])
-        result = close_loop(drives_of_table(drive.table, {}), seed=1)
-        words, hit, wrong = verdict(result, drive.act)
+    for kind in names or list(SEEDS[which]):
+        drive = preview_driver.simulate(kind, SEEDS[which][kind])
+        drives, more = drives_of_table(drive.table, {}), ""
+        if whole:
+            result = close_loop(drives, seed=1)
+            accepted = result.identified.selection.accepted
+            follow = {item.column for item in result.identified.usable.feedback}
+            more = " | spread ratio {:.2f}, sampled {:.2f}".format(*spread_ratio(result))
+            more += f" | {1000 * result.error_before:.1f} -> {1000 * result.error_after:.1f} mm"
+        else:
+            accepted, follow = selected(drives)
+        words, hit, wrong = verdict(accepted, drive.act)
         hits, wrongs = hits + hit, wrongs + wrong
-        road = {"curvature", "crossfall", "grade"}
-        dismissed = road & {item.column for item in result.identified.usable.feedback}
-        back = "; ".join(f"{one.component} {'*'.join(one.columns)}" for one in result.identified.taken_back)
-        ratio = "{:.2f} sampled {:.2f}".format(*spread_ratio(result))
-        error = f"{1000 * result.error_before:.1f} -> {1000 * result.error_after:.1f} ({1000 * result.floor:.1f}) mm"
-        print(f"{kind}: {'ok' if hit else 'MISSED'} | {words} | back: {back or '-'} | dismissed {dismissed or '-'} "
-              f"| spread ratio {ratio} | {error}", flush=True)  # fmt: skip
-    print(f"named {hits} of {len(names or seeds)}, wrong {wrongs}")
+        dismissed = ", ".join(sorted(follow & {"curvature", "crossfall", "grade"})) or "no road"
+        print(f"{kind}: {'named' if hit else 'MISSED'} | {words} | dismissed: {dismissed}{more}", flush=True)
+    print(f"named {hits} of {len(names or SEEDS[which])}, wrong {wrongs}")
 
 
 if __name__ == "__main__":
-    main(sys.argv[1], sys.argv[2:])
+    main(sys.argv[1], [word for word in sys.argv[2:] if word != "--whole"], whole="--whole" in sys.argv)

@@ -176,7 +176,7 @@ def twins(traffic: RecordedTraffic, begin: float, variants: int) -> list[str]:
         drivers = {plan.name: one.profile for plan, one in zip(made.plans, made.drivers, strict=True) if one.profile}
         gaps = []
         for variant in range(variants):
-            twin = xl.convert(scenario, entity=drivers, only=list(drivers), variant=variant, mode="trajectory")
+            twin = xl.convert(scenario, entity=drivers, only=list(drivers), variant=variant + 1, mode="trajectory")
             before, after = twin.smallest_gap
             gaps.append(after)
             rows = {str(name): one for name, one in twin.to_frame().groupby("name")}

@@ -25,6 +25,7 @@ from tests.playback.stage import (
     speed_to,
     teleport,
 )
+from xosc_lateral.errors import FormatError
 from xosc_lateral.pipeline.load import Played
 
 TWO = {"Ego": teleport(on_lane(-1, 10.0)) + speed(20.0), "Lead": teleport(on_lane(-1, 100.0)) + speed(15.0)}
@@ -145,6 +146,9 @@ def test_a_limit_that_is_missing_is_the_players_and_is_said(tmp_path: Path) -> N
     performance = played.scenario.entities[0].performance
     assert (performance.max_acceleration, performance.max_deceleration) == (4.0, 10.0)
     assert [note.what for note in played.motion.notes] == ["maxDeceleration is missing: 10 m/s2 is taken"]
+    backwards = car("Ego").replace('maxDeceleration="10.0"', 'maxDeceleration="-1e308"')
+    with pytest.raises(FormatError, match=r"Performance of Vehicle 'car': maxDeceleration -1e\+308, expected"):
+        Stage(tmp_path).play(entities=(backwards,), last=1.0)
 
 
 def test_a_distance_without_limits_is_taken_at_once(tmp_path: Path) -> None:

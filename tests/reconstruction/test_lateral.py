@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from xosc_lateral.reconstruction.lateral import SHAPES, lateral_plan
+from xosc_lateral.reconstruction.lateral import lateral_plan
 from xosc_lateral.reconstruction.recorded import RecordedVehicle
+from xosc_lateral.reconstruction.transitions import SHAPES
 from xosc_lateral.scenario.enums import DynamicsShape
 
 WIDTH = 3.5

@@ -41,9 +41,9 @@ from xosc_lateral.scenario.dependence import Dependence, dependence
 from xosc_lateral.version import BEHAVIOUR, __version__
 
 CHANGES = "with offsets, what happens would happen otherwise"
-LONGER = 2.0
-"""A vehicle under test may be later at what ends the run: others follow trajectories for so many times the nominal run
-at most. A file of trajectories grows as their time does. [-]"""
+LEAST_LONGER, LONGER = 1.3, 2.0
+"""A vehicle under test may be later at what ends the run, or never come to it: others follow trajectories for so
+many times the nominal run. A fifth slower takes a quarter longer; a file of trajectories grows with their time. [-]"""
 SUPPLY = 10.0
 """For so long at least, where it may last longer in another run, a stretch has movement of its own. What comes after it
 is the same again; some of the slow movement of a driver is seen in that time. [s]"""
@@ -114,7 +114,8 @@ def _convert(
     ends = depends.of_trigger(played.scenario.storyboard.stop_trigger) and played.motion.cut_off is None
     if reacts and ends:
         runs = meaning_of(played, tuple(egos), step=settings.step, time_limit=settings.time_limit)
-        end = min(runs.end, LONGER * played.motion.end_time)
+        end = min(max(runs.end, LEAST_LONGER * played.motion.end_time), LONGER * played.motion.end_time)
+        end = min(end, runs.limit)
         lasting = play_until(played, end, step=settings.step) if end > played.motion.end_time else played
     try:
         enriched = enrich(

@@ -21,9 +21,8 @@ from xosc_lateral.formats.recordings import RecordedTraffic
 from xosc_lateral.pipeline.drivers import AUTO_PROFILE
 from xosc_lateral.reconstruction.drivers import ChosenDriver, WindowModel, choose_driver, drive_of, in_lane_offsets
 from xosc_lateral.reconstruction.encounters import Encounter, encounters, relative_triggers
-from xosc_lateral.reconstruction.plan import VehiclePlan, plan_vehicles
+from xosc_lateral.reconstruction.plan import Residuals, VehiclePlan, plan_vehicles, residuals_of
 from xosc_lateral.reconstruction.recorded import Recording, Track, place_tracks
-from xosc_lateral.reconstruction.residuals import Residuals, residuals_of
 
 VERSIONS: tuple[Version, ...] = ((1, 0), (1, 1), (1, 2), (1, 3))
 """Of the standard that can be written."""

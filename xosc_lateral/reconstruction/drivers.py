@@ -21,8 +21,7 @@ from xosc_lateral.drives.drive import Drive
 from xosc_lateral.evaluation.movement_summary import free_runs
 from xosc_lateral.mask import true_slices
 from xosc_lateral.motion.segments import MINIMUM_SPEED
-from xosc_lateral.reconstruction.plan import VehiclePlan
-from xosc_lateral.reconstruction.residuals import Residuals
+from xosc_lateral.reconstruction.plan import Residuals, VehiclePlan
 
 FloatArray = NDArray[np.float64]
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from xosc_lateral.mask import true_slices
 from xosc_lateral.reconstruction.recorded import RecordedVehicle
-from xosc_lateral.scenario.enums import DynamicsShape
+from xosc_lateral.reconstruction.transitions import SHAPES, Rough, Transition, fit_transition
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -24,69 +24,12 @@ LEAVING = 0.3
 """Who crosses a marking at this lateral speed means to; slower, he drifts. [m/s]"""
 LONGEST = 8.0
 """From the crossing to either end, see there. [s]"""
-MARGIN = 1.0
-"""Rows of road-following that are fitted along, at both ends. [s]"""
-DURATIONS = (1.0, 16.0)
-"""Of lane changes; naturalistic ones last 1 to 16.5 s (T. Toledo, D. Zohar, Transportation Research Record 1999, 2007:
-mean 4.6 s). [s]"""
-SPREAD, NOISE = 0.1, 0.05
-"""Of the levels between which a driver changes lanes from where he sets off and settles, and of the path from its
-shape: nobody moves from centre to centre. [m]"""
 STILL, STEADY = 1e-3, 0.5
 """Lateral speed below which a vehicle stands still sideways [m/s], for at least so long [s]."""
 LEVEL = 0.02
 """Movement between two still stretches that is worth a maneuver. [m]"""
 RATE_WINDOW = 0.5
 """The lateral speed is a difference over this. [s]"""
-
-SHAPES = {
-    DynamicsShape.SINUSOIDAL: lambda u: 0.5 - 0.5 * np.cos(np.pi * u),
-    DynamicsShape.CUBIC: lambda u: u * u * (3.0 - 2.0 * u),
-    DynamicsShape.LINEAR: lambda u: u,
-}
-"""Share of the way over share of the duration, as in `playback.transition`."""
-
-
-@dataclass(frozen=True, slots=True)
-class Transition:
-    """From one lateral level to another.
-
-    Parameters
-    ----------
-    start, duration : float
-        [s]
-    shape : DynamicsShape
-    lanes : int
-        Lanes to the left (negative: to the right); 0: within the lane.
-    offset : float
-        Where it ends, from the centre of the lane that it leads to, positive left. [m]
-    level : float
-        The same from the centre of the first row's lane. [m]
-    aborted : bool
-        One half of a lane change that was not carried through.
-    cut : bool
-        The recording begins or ends within it.
-    change : float
-        Of the level, positive left. [m]
-    residual : float
-        Root mean square of the recorded path from the fitted one. [m]
-    """
-
-    start: float
-    duration: float
-    shape: DynamicsShape
-    lanes: int
-    offset: float
-    level: float
-    aborted: bool = False
-    cut: bool = False
-    change: float = 0.0
-    residual: float = 0.0
-
-    @property
-    def end(self) -> float:
-        """[s]"""
-        return self.start + self.duration
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -118,30 +61,6 @@ class LateralPlan:
         return value
 
 
-@dataclass(frozen=True, slots=True)
-class _Rough:
-    """Rows of a transition as found, and between which levels: `held` are known exactly."""
-
-    first: int
-    last: int
-    before: float
-    after: float
-    lanes: int
-    offset: float = 0.0
-    held: bool = False
-    aborted: bool = False
-    cut: bool = False
-
-
-def peak_acceleration(shape: DynamicsShape, change: float, duration: float) -> float:
-    """Largest lateral acceleration of a transition, by which a lane offset states its duration. [m/s2]
-
-    A linear one is given that of the cubic, as in `playback.transition`.
-    """
-    factor = 0.5 * np.pi**2 if shape is DynamicsShape.SINUSOIDAL else 6.0
-    return float(factor * abs(change) / duration**2)
-
-
 def lateral_plan(vehicle: RecordedVehicle, begin: float) -> LateralPlan:
     """Find and fit all lateral maneuvers; none starts before `begin` [s]."""
     base, lanes = vehicle.levels
@@ -160,7 +79,7 @@ def lateral_plan(vehicle: RecordedVehicle, begin: float) -> LateralPlan:
     transitions = list[Transition]()
     free, before = begin, start
     for one in rough:
-        found = _fit(vehicle.time, y, one, free)
+        found = fit_transition(vehicle.time, y, one, free)
         transitions.append(replace(found, change=found.level - before))
         before = found.level
         free = found.end
@@ -186,7 +105,7 @@ def _still(time: FloatArray, rate: FloatArray) -> NDArray[np.bool_]:
 # ---- who stands still between maneuvers ------------------------------------------------------------------------------
 def _between_levels(
     vehicle: RecordedVehicle, y: FloatArray, base: FloatArray, lanes: IntArray, still: NDArray[np.bool_]
-) -> list[_Rough]:
+) -> list[Rough]:
     rough = []
     parts = true_slices(still)
     for one, other in pairwise([slice(0, 1), *parts] if not still[0] else parts):
@@ -196,13 +115,13 @@ def _between_levels(
             if abs(high - low) > LEVEL:
                 change = int(lanes[last] - lanes[first])
                 rows = _reach(y, first, last, low, high)
-                rough.append(_Rough(*rows, low, high, change, float(high - base[last]), held=True))
+                rough.append(Rough(*rows, low, high, change, float(high - base[last]), held=True))
     if not still[-1] and parts:
         first, before = parts[-1].stop - 1, float(np.median(y[parts[-1]]))
         if abs(y[-1] - before) > LEVEL:
             change = int(lanes[-1] - lanes[first])
             after = float(y[-1])
-            rough.append(_Rough(first, len(y) - 1, before, after, change, float(after - base[-1]), held=True, cut=True))
+            rough.append(Rough(first, len(y) - 1, before, after, change, float(after - base[-1]), held=True, cut=True))
     return rough
 
 
@@ -227,14 +146,14 @@ def _reach(y: FloatArray, first: int, last: int, before: float, after: float) ->
 # ---- drivers ---------------------------------------------------------------------------------------------------------
 def _lane_changes(
     vehicle: RecordedVehicle, y: FloatArray, base: FloatArray, lanes: IntArray, rate: FloatArray
-) -> list[_Rough]:
+) -> list[Rough]:
     """Changes between lanes that the vehicle settled in, and excursions from one of them."""
     edges = np.r_[0, np.flatnonzero(np.diff(lanes)) + 1, len(lanes)]
     episodes = [slice(int(a), int(b)) for a, b in pairwise(edges)]
     settled = [part for k, part in enumerate(episodes) if _is_settled(vehicle, y, base, rate, episodes, k)]
     if not settled:
         settled = [max(episodes, key=lambda part: part.stop - part.start)]
-    rough = list[_Rough]()
+    rough = list[Rough]()
     if settled[0].start > 0:  # it comes from a lane that was not seen
         rough.append(_rough(vehicle, y, base, lanes, rate, 0, settled[0].start, settled[0].start, cut=True))
     else:
@@ -288,13 +207,13 @@ def _rough(
     after: int,
     *,
     cut: bool = False,
-) -> _Rough:
+) -> Rough:
     """A change from the lane of row `before` to that of row `after`, as far as it moves towards it."""
     towards = np.sign(base[after] - base[before]) or 1.0
     first, last = _ends(vehicle, y, rate * towards, before, crossing, after, base)
     change = int(lanes[after] - lanes[before])
     begin = float(y[0]) if cut and first == 0 else float(base[before])
-    return _Rough(first, last, begin, float(base[after]), change, cut=cut)
+    return Rough(first, last, begin, float(base[after]), change, cut=cut)
 
 
 def _ends(
@@ -325,7 +244,7 @@ def _nearest(away: FloatArray) -> int:
 
 def _open_start(
     vehicle: RecordedVehicle, y: FloatArray, base: FloatArray, rate: FloatArray, part: slice
-) -> list[_Rough]:
+) -> list[Rough]:
     """A track that begins far from its lane's centre, moving towards it: within a lane change."""
     begin, level = float(y[0]), float(base[0])
     towards = -np.sign(begin - level)
@@ -335,10 +254,10 @@ def _open_start(
     if not near.any():
         return []
     done = np.flatnonzero(near & (towards * rate[part] < CALM))
-    return [_Rough(0, int(done[0]) if len(done) else _nearest(y[part] - level), begin, level, 0, cut=True)]
+    return [Rough(0, int(done[0]) if len(done) else _nearest(y[part] - level), begin, level, 0, cut=True)]
 
 
-def _open_end(vehicle: RecordedVehicle, y: FloatArray, base: FloatArray, rate: FloatArray, part: slice) -> list[_Rough]:
+def _open_end(vehicle: RecordedVehicle, y: FloatArray, base: FloatArray, rate: FloatArray, part: slice) -> list[Rough]:
     """A track that ends far from its lane's centre, moving away: within a lane change, or on its way to a ramp."""
     level, end = float(base[-1]), float(y[-1])
     away = np.sign(end - level)
@@ -349,10 +268,10 @@ def _open_end(vehicle: RecordedVehicle, y: FloatArray, base: FloatArray, rate: F
         return []
     calm = np.flatnonzero(near & (away * rate[part] < CALM))
     first = part.start + (int(calm[-1]) if len(calm) else _nearest(y[part] - level))
-    return [_Rough(first, len(y) - 1, level, end, 0, end - level, cut=True)]
+    return [Rough(first, len(y) - 1, level, end, 0, end - level, cut=True)]
 
 
-def _drifts(vehicle: RecordedVehicle, y: FloatArray, rate: FloatArray, level: float, part: slice) -> list[_Rough]:
+def _drifts(vehicle: RecordedVehicle, y: FloatArray, rate: FloatArray, level: float, part: slice) -> list[Rough]:
     """Excursions within a lane: a side beyond the marking, left for quickly, and back."""
     found = []
     for out in true_slices(np.abs(y[part] - level) > _room(vehicle, part)):
@@ -367,7 +286,7 @@ def _drifts(vehicle: RecordedVehicle, y: FloatArray, rate: FloatArray, level: fl
 
 def _excursion(
     vehicle: RecordedVehicle, y: FloatArray, rate: FloatArray, level: float, first: int, last: int
-) -> list[_Rough]:
+) -> list[Rough]:
     """Out of a lane and back into it: two lane offsets."""
     peak = first + int(np.abs(y[first : last + 1] - level).argmax())
     side, height = np.sign(y[peak] - level), float(y[peak])
@@ -376,83 +295,14 @@ def _excursion(
     _, end = _ends(vehicle, y, -side * rate, peak, peak, last, base)
     offset = height - level
     return [
-        _Rough(begin, peak, level, height, 0, offset, aborted=True),
-        _Rough(peak, end, height, level, 0, aborted=True),
+        Rough(begin, peak, level, height, 0, offset, aborted=True),
+        Rough(peak, end, height, level, 0, aborted=True),
     ]
 
 
-def _apart(rough: list[_Rough]) -> list[_Rough]:
+def _apart(rough: list[Rough]) -> list[Rough]:
     """Without movement within a lane that is part of a lane change."""
     changes = [(one.first, one.last) for one in rough if one.lanes]
     return [
         one for one in rough if one.lanes or not any(first < one.last and one.first < last for first, last in changes)
     ]
-
-
-# ---- the fit ---------------------------------------------------------------------------------------------------------
-def _fit(time: FloatArray, y: FloatArray, rough: _Rough, free: float) -> Transition:
-    """Start, duration and shape by least squares over a grid that is made finer; not before `free` [s]."""
-    level = rough.after
-    if not rough.held and not rough.aborted:
-        rough = replace(rough, before=float(y[rough.first]), after=float(y[rough.last]))
-    margin = 0.0 if rough.aborted else MARGIN
-    first = int(np.searchsorted(time, max(time[rough.first] - margin, free)))
-    last = int(np.searchsorted(time, time[rough.last] + margin, side="right"))
-    t, rows = time[first:last], y[first:last]
-    if len(t) < 4:
-        t, rows = time[rough.first : rough.last + 1], y[rough.first : rough.last + 1]
-    begin, end = max(time[rough.first], free), max(time[rough.last], free + 0.1)
-    middle, duration = (
-        0.5 * (begin + end),
-        float(np.clip(end - begin, 0.1 if rough.held else DURATIONS[0], DURATIONS[1])),
-    )
-    best: tuple[float, float, float, DynamicsShape] = (np.inf, begin, duration, DynamicsShape.SINUSOIDAL)
-    for shape in SHAPES if rough.held else (DynamicsShape.SINUSOIDAL, DynamicsShape.CUBIC):
-        found = _search(t, rows, rough, shape, middle, duration, free)
-        if found[0] < best[0] * (1.0 - 1e-9):
-            best = (*found, shape)
-    _, start, duration, shape = best
-    residual = float(np.sqrt(best[0] / len(t))) if np.isfinite(best[0]) else 0.0
-    where = rough.lanes, rough.offset, level
-    return Transition(start, duration, shape, *where, rough.aborted, rough.cut, residual=residual)
-
-
-def _search(
-    t: FloatArray, y: FloatArray, rough: _Rough, shape: DynamicsShape, middle: float, duration: float, free: float
-) -> tuple[float, float, float]:
-    """Least cost [m2], start and duration [s]."""
-    shortest = 0.1 if rough.held else DURATIONS[0]
-    half, factor = 0.5 * duration + 0.5, 2.0
-    best = (np.inf, middle - 0.5 * duration, duration)
-    for _ in range(7 if rough.held else 5):
-        middles = middle + half * np.linspace(-1.0, 1.0, 13)
-        durations = np.clip(duration * factor ** np.linspace(-1.0, 1.0, 13), shortest, DURATIONS[1])
-        m, d = (each.ravel() for each in np.meshgrid(middles, durations))
-        possible = m - 0.5 * d >= free - 1e-9
-        if not possible.any():
-            m, d = np.array([free + 0.5 * duration]), np.array([duration])
-            possible = np.ones(1, dtype=bool)
-        m, d = m[possible], d[possible]
-        share = SHAPES[shape](np.clip((t - (m - 0.5 * d)[:, None]) / d[:, None], 0.0, 1.0))
-        cost = _cost(t, y, share, rough)
-        k = int(cost.argmin())
-        if cost[k] < best[0]:
-            best = (float(cost[k]), float(m[k] - 0.5 * d[k]), float(d[k]))
-        middle, duration = best[1] + 0.5 * best[2], best[2]
-        half, factor = half / 4.0, factor**0.25
-    return best
-
-
-def _cost(t: FloatArray, y: FloatArray, share: FloatArray, rough: _Rough) -> FloatArray:
-    """Squared distance from the shape, whose levels are held, or free at a price, shape (candidates,). [m2]"""
-    if rough.held:
-        return np.asarray(((y - rough.before - (rough.after - rough.before) * share) ** 2).sum(axis=1))
-    price = (NOISE / SPREAD) ** 2 / float(np.median(np.diff(t)))
-    p = 1.0 - share
-    a, b, c = (p * p).sum(axis=1) + price, (p * share).sum(axis=1), (share * share).sum(axis=1) + price
-    u, v = p @ y + price * rough.before, share @ y + price * rough.after
-    det = a * c - b * b
-    before, after = (c * u - b * v) / det, (a * v - b * u) / det
-    away = y - before[:, None] * p - after[:, None] * share
-    priced = price * ((before - rough.before) ** 2 + (after - rough.after) ** 2)
-    return np.asarray((away**2).sum(axis=1) + priced)

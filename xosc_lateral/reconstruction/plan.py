@@ -10,9 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.motion.nominal import Activity, EntityMotion
-from xosc_lateral.reconstruction.lateral import LateralPlan, Transition, lateral_plan
+from xosc_lateral.reconstruction.lateral import LateralPlan, lateral_plan
 from xosc_lateral.reconstruction.recorded import RecordedVehicle, Recording
 from xosc_lateral.reconstruction.speed import APART, SpeedProfile, fit_speed
+from xosc_lateral.reconstruction.transitions import Transition
 from xosc_lateral.road.network import RoadNetwork
 from xosc_lateral.scenario import Entity
 from xosc_lateral.scenario.enums import EntityCategory
@@ -178,3 +179,35 @@ def _target(vehicle: RecordedVehicle, network: RoadNetwork, one: Transition) -> 
     for _ in range(abs(steps)):
         target = target + side or target + 2 * side
     return target
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Residuals:
+    """Recorded less planned, at the recorded rows.
+
+    Parameters
+    ----------
+    time : array, shape (n,)
+        [s]
+    along, across : array, shape (n,)
+        Ahead, and to the left, of the planned place. [m]
+    in_lane : bool array, shape (n,)
+        Outside of all transitions: what is across is the driver's.
+    """
+
+    time: FloatArray
+    along: FloatArray
+    across: FloatArray
+    in_lane: NDArray[np.bool_]
+
+
+def residuals_of(plan: VehiclePlan) -> Residuals:
+    """Of the rows from which on the vehicle is there."""
+    vehicle = plan.vehicle
+    rows = vehicle.time >= plan.present[0] - 1e-9
+    time = vehicle.time[rows]
+    across = (vehicle.offset + vehicle.levels[0])[rows] - plan.lateral.at(time)
+    in_lane = np.ones(len(time), dtype=np.bool_)
+    for one in plan.lateral.transitions:
+        in_lane &= (time < one.start) | (time > one.end)
+    return Residuals(time, plan.way[rows] - plan.speed.way(time), across, in_lane)

@@ -15,8 +15,7 @@ from xosc_lateral.motion.segments import SegmentKind, SegmentSpan
 from xosc_lateral.motion.trajectory import WorldTrajectory
 from xosc_lateral.reconstruction.drivers import ChosenDriver
 from xosc_lateral.reconstruction.encounters import Beside, Encounter
-from xosc_lateral.reconstruction.plan import VehiclePlan, planned_motion
-from xosc_lateral.reconstruction.residuals import Residuals
+from xosc_lateral.reconstruction.plan import Residuals, VehiclePlan, planned_motion
 from xosc_lateral.report.figures import MEASURED, SAMPLED, figure_style, new_figure
 from xosc_lateral.report.player.scene import paths_scene
 from xosc_lateral.report.render import KeyFigure, render_page

@@ -25,11 +25,11 @@ FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
 HEADERS: Mapping[str, tuple[str, ...]] = {
-    "vehicle": ("vehicle", "id", "track_id", "trackid", "vehicle_id", "object_id", "track", "drive", "name"),
+    "vehicle": ("vehicle", "id", "track_id", "trackid", "vehicle_id", "object_id", "track", "drive"),
     "time": ("time", "timestamp", "t"),
     "x": ("x", "x_center", "center_x", "xcenter", "easting", "center_easting", "pos_x"),
     "y": ("y", "y_center", "center_y", "ycenter", "northing", "center_northing", "pos_y"),
-    "heading": ("heading", "yaw", "psi", "psi_rad", "orientation", "h"),
+    "heading": ("heading", "yaw", "psi", "psi_rad", "orientation"),
     "speed": ("speed", "velocity", "v"),
     "length": ("length", "vehicle_length", "dimension_length"),
     "width": ("width", "vehicle_width", "dimension_width"),
@@ -102,6 +102,9 @@ def tracks_of(
     table: pd.DataFrame, path: Path, columns: Sequence[str] = (), saved: TableMapping | None = None
 ) -> Tracks:
     """Tracks of a table that is read; see `read_tracks`."""
+    is_played = set(COLUMNS) <= set(map(str, table.columns))
+    if is_played:  # a table of states, as `play` writes it
+        table = table.rename(columns={"name": "vehicle", "h": "heading"})
     found = _columns(table, path, as_mapping(None) if saved is None else saved, columns)
     order = found.sort_values(["vehicle", "time"], kind="stable", ignore_index=True)
     order = order.drop_duplicates(["vehicle", "time"], ignore_index=True)
@@ -128,7 +131,7 @@ def tracks_of(
         _given(order, "length", usual),
         kinds,
         order["width"].to_numpy(dtype=np.float64) if "width" in order else None,
-        is_reference=set(COLUMNS) <= set(map(str, table.columns)),
+        is_reference=is_played,
         rear=_given(order, "rear", np.zeros(len(order))) if "rear" in order else None,
     )
 

@@ -175,7 +175,11 @@ def _performance(element: XmlElement | None, context: Context) -> Performance:
         if element.optional_text(name) is None:
             context.remark(element, f"{name} is missing: {USUAL_ACCELERATION:g} m/s2 is taken")
     names = (*usual, "maxAccelerationRate", "maxDecelerationRate")
-    return Performance(*(element.number(name, usual.get(name, inf), finite=False) for name in names))
+    limits = [element.number(name, usual.get(name, inf), finite=False) for name in names]
+    for name, limit in zip(names, limits, strict=True):
+        if not limit >= 0.0:
+            element.fail(f"{name} {limit:g}, expected 0 or more")
+    return Performance(*limits)
 
 
 def _axles(element: XmlElement | None) -> Axles | None:

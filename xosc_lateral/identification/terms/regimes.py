@@ -23,7 +23,6 @@ from numpy.typing import NDArray
 from xosc_lateral.driver.effects import Effect, Regimes
 from xosc_lateral.identification.dictionary import in_another_order
 from xosc_lateral.identification.innovations import squared_innovations
-from xosc_lateral.identification.low_frequencies import SPREAD_ORDERS, half_cosines_of
 from xosc_lateral.identification.markov_switching import RegimeFit, fit_regimes
 from xosc_lateral.identification.regression import Coarse, Fitted
 from xosc_lateral.identification.significance import HEAVY_TAIL_SHARE, LoopSeed, upper_tail
@@ -87,7 +86,6 @@ class RegimesTerm(Term):
             known_log_scale(fitted),
             what_columns_do(search, fitted),
             what_a_column_may_do(search, fitted)[0],
-            half_cosines_of(coarse, max(SPREAD_ORDERS)),  # nor is what a smooth of time may do
         ]
         p_value = probability_of_persistence(
             squared_innovations(fitted.innovations, coarse.valid),
