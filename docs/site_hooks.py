@@ -66,17 +66,14 @@ def elements() -> str:
 def command_line() -> str:
     """Every verb with its options, as the parser knows them."""
     os.environ.setdefault("COLUMNS", "100")
-    from typer.main import get_command
+    from xosc_lateral.cli import VERBS, verb
 
-    from xosc_lateral.cli import app
-
-    root = get_command(app)
     parts = [
         "# Command line",
         "Generated from the code; `xosc-lateral VERB --help` prints the same.",
         "Exit code 0: done. 1: the input is at fault, in one line with file, line, element and value. 2: wrong usage.",
     ]
-    parts += [part for name, command in root.commands.items() for part in _verb([name], command)]  # type: ignore[attr-defined]
+    parts += [part for name in VERBS for part in _verb([name], verb(name))]
     return "\n\n".join(parts) + "\n"
 
 

@@ -17,10 +17,9 @@ from pathlib import Path
 from urllib.parse import unquote
 
 import pytest
-from typer.main import get_command
 
 from tests.docs.printed import difference
-from xosc_lateral.cli import app, main
+from xosc_lateral.cli import main, verb
 
 ROOT = Path(__file__).resolve().parents[2]
 DOCS = ROOT / "docs"
@@ -145,7 +144,7 @@ def parse_verb(words: list[str]) -> None:
         if Path(word).suffix and not word.startswith("-"):
             Path(word).parent.mkdir(parents=True, exist_ok=True)
             Path(word).touch()
-    command = get_command(app)
+    command = verb(words.pop(0))
     while hasattr(command, "commands"):
         command = command.commands[words.pop(0)]
     command.make_context(command.name, words)

@@ -1,4 +1,4 @@
-"""The command line: one verb per file; this module only gathers them and turns errors into exit codes."""
+"""The command line: one verb per file; this module only names them and turns errors into exit codes."""
 
 from __future__ import annotations
 
@@ -6,47 +6,67 @@ import json
 import sys
 import time
 from collections.abc import Sequence
+from functools import cache
 from importlib import import_module
 from typing import Annotated, Any, cast
 
 import typer
+from typer.core import TyperCommand, TyperGroup
 
 from xosc_lateral.errors import FormatError, XoscLateralError
 from xosc_lateral.formats.source import guarding_inputs
 from xosc_lateral.version import __version__
 
-HELP_NAMES = {"help_option_names": ["-h", "--help"]}
+VERBS = {
+    "convert": "Make scenarios lifelike: one, several, a folder.",
+    "reconstruct": "Turn a recording into a maneuver-based scenario.",
+    "verify": "Whether outputs are what would be made today.",
+    "reproduce": "Make an output again from what it carries.",
+    "view": "Play a scenario in the browser.",
+    "play": "Write the nominal motion as a table.",
+    "segments": "Where offsets are sampled, and why not elsewhere.",
+    "fit": "Fit a profile to measured drives.",
+    "sample": "Sample offsets alone, as a table.",
+    "evaluate": "Score a profile on measured drives.",
+    "close-loop": "Find and add what a profile lacks.",
+    "import": "Convert recordings into drive tables.",
+    "profiles": "The library of driver profiles.",
+    "template": "Scenarios to start from.",
+    "live": "Drivers in a simulation that runs.",
+}
+"""Name -> what it does. Each has a module named like it with `register(app)`, which is loaded when the verb is used."""
 
-app = typer.Typer(
-    name="xosc-lateral",
-    help="Lifelike lateral movement for OpenSCENARIO traffic.",
-    no_args_is_help=True,
-    pretty_exceptions_enable=False,
-    context_settings=HELP_NAMES,
-    rich_markup_mode=None,  # units in help texts are in brackets, which rich would take for markup
-)
+LOOKS: dict[str, Any] = {
+    "no_args_is_help": True,
+    "pretty_exceptions_enable": False,
+    "context_settings": {"help_option_names": ["-h", "--help"]},
+    "rich_markup_mode": None,  # units in help texts are in brackets, which rich would take for markup
+}
 
-# One module per verb, named like it; each has `register(app)`. They import nothing heavy at the top.
-VERBS = (
-    "convert",
-    "reconstruct",
-    "verify",
-    "reproduce",
-    "view",
-    "play",
-    "segments",
-    "import_",
-    "fit",
-    "sample",
-    "evaluate",
-    "close_loop",
-    "profiles",
-    "template",
-    "live",
-)
 
-for _verb in VERBS:
-    import_module(f"xosc_lateral.cli.{_verb}").register(app)
+@cache
+def verb(name: str) -> Any:
+    """The command of a verb, its module loaded."""
+    module = name.replace("-", "_")
+    alone = typer.Typer(**LOOKS)
+    alone.callback()(_root)  # a group, though of one verb
+    import_module(f"xosc_lateral.cli.{'import_' if name == 'import' else module}").register(alone)
+    return cast(TyperGroup, typer.main.get_command(alone)).commands[name]
+
+
+class _Verbs(TyperGroup):
+    """Help and completion have the names and lines of `VERBS`; the verb that is run is loaded."""
+
+    def __init__(self, **settings: Any) -> None:
+        super().__init__(**settings)
+        self.commands = {name: TyperCommand(name, short_help=does) for name, does in VERBS.items()}
+
+    def resolve_command(self, ctx: Any, args: list[str]) -> Any:
+        name, known, rest = super().resolve_command(ctx, args)
+        return name, known and verb(str(name)), rest
+
+
+app = typer.Typer(cls=_Verbs, name="xosc-lateral", help="Lifelike lateral movement for OpenSCENARIO traffic.", **LOOKS)
 
 
 def _version(wanted: bool) -> None:

@@ -104,13 +104,14 @@ def enrich(
         entity.name: cut_segments(entity, network, is_trailer=entity.name in trailers) for entity in motion.entities
     }
     gaps_before = gaps_of(motion, [_nominal(entity) for entity in motion.entities])
+    certain = replace(motion, entities=tuple(one for one in motion.entities if one.name not in uncertain))
     best: Enriched | None = None
     for attempt in range(max(1, attempts)):
         drawn = [
             _draw(
-                motion,
+                entity,
+                replace(motion, entities=(entity,)) if entity.name in uncertain else certain,
                 network,
-                index,
                 spans[entity.name],
                 drivers.get(entity.name, "not chosen"),
                 np.random.SeedSequence(
@@ -118,11 +119,10 @@ def enrich(
                 ),
                 context or {},
                 with_sensor,
-                uncertain,
                 neighbours,
                 round(at_least / SAMPLE_STEP),
             )
-            for index, entity in enumerate(motion.entities)
+            for entity in motion.entities
         ]
         if neighbours is Neighbours.BORROW:
             drawn = _apart(drawn, motion, network, uncertain)
@@ -207,20 +207,19 @@ class _Drawn:
 
 
 def _draw(
+    entity: EntityMotion,
     motion: NominalMotion,
     network: RoadNetwork,
-    index: int,
     spans: tuple[SegmentSpan, ...],
     driver: DriverProfile | str,
     seed: np.random.SeedSequence,
     foreign_context: Mapping[str, tuple[FloatArray, FloatArray]],
     with_sensor: bool,
-    uncertain: Collection[str],
     neighbours: Neighbours,
     least: int,
 ) -> _Drawn:
-    entity = motion.entities[index]
-    motion, index = _foreseen(motion, index, uncertain)
+    """Offsets of one entity; `motion` is the run with those alone whose place beside it is certain."""
+    index = next(k for k, one in enumerate(motion.entities) if one is entity)
     if isinstance(driver, str):
         return _Drawn(entity, spans, None, driver)
     sampler, sensor = OffsetSampler(driver, seed), known_sensor(driver) if with_sensor else None
@@ -270,16 +269,6 @@ def _with_nobody_beside(segment: Segment) -> Segment:
         if name in NEIGHBOURS
     }
     return replace(segment, context={**segment.context, **nobody})
-
-
-def _foreseen(motion: NominalMotion, index: int, uncertain: Collection[str]) -> tuple[NominalMotion, int]:
-    """The run with those alone whose place beside an entity is certain, and its index among them."""
-    if not uncertain:
-        return motion, index
-    own = motion.entities[index]
-    others = [one for one in motion.entities if own.name not in uncertain and one.name not in uncertain]
-    entities = [one for one in motion.entities if one is own or one in others]
-    return replace(motion, entities=tuple(entities)), next(k for k, one in enumerate(entities) if one is own)
 
 
 def _apart(

@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.motion.context import STEERING, smooth_step
+from xosc_lateral.motion.nearby import pairs_within
 from xosc_lateral.motion.nominal import Activity, EntityMotion, NominalMotion
 from xosc_lateral.road.network import RoadNetwork
 
@@ -97,21 +98,22 @@ def give_way(
     left, right = np.zeros((count, n)), np.zeros((count, n))
     frames = [Frame.of(one, rows) for one in sampled]
     left_hand = _left_hand(network, sampled, rows)
-    for i in range(count):
-        for j in range(i + 1, count):
-            if not (sampled[i].can_move.any() or sampled[j].can_move.any()):
+    x, y = ([np.where(frame.present, getattr(frame, name), np.nan) for frame in frames] for name in ("x", "y"))
+    longest = max((one.motion.entity.bounding_box.length for one in sampled), default=0.0)
+    for i, j in pairs_within(x, y, FADES + longest + MARGIN):
+        if not (sampled[i].can_move.any() or sampled[j].can_move.any()):
+            continue
+        for own, other in ((i, j), (j, i)):
+            heeds = sampled[own].heeds
+            widening = widened(frames[own], frames[other], "left" in heeds, "right" in heeds)
+            if widening is None:
                 continue
-            for own, other in ((i, j), (j, i)):
-                heeds = sampled[own].heeds
-                widening = widened(frames[own], frames[other], "left" in heeds, "right" in heeds)
-                if widening is None:
-                    continue
-                aside, is_left, heeded = widening  # of `own`, by where `other` is
-                share = part_of(is_left == left_hand[own], heeded)
-                share = np.where(frames[other].can_move, share, 1.0) * frames[own].can_move
-                share *= np.where(is_left, "left" not in sampled[own].alone, "right" not in sampled[own].alone)
-                right[own] = np.maximum(right[own], np.where(is_left, share * aside, 0.0))
-                left[own] = np.maximum(left[own], np.where(is_left, 0.0, share * aside))
+            aside, is_left, heeded = widening  # of `own`, by where `other` is
+            share = part_of(is_left == left_hand[own], heeded)
+            share = np.where(frames[other].can_move, share, 1.0) * frames[own].can_move
+            share *= np.where(is_left, "left" not in sampled[own].alone, "right" not in sampled[own].alone)
+            right[own] = np.maximum(right[own], np.where(is_left, share * aside, 0.0))
+            left[own] = np.maximum(left[own], np.where(is_left, 0.0, share * aside))
     every = max(1, int(rows[1] - rows[0])) if n > 1 else 1
     width = STEERING / (motion.step * every)
     all_rows = np.arange(len(motion.entities[0].time)) if count else np.empty(0)
@@ -120,6 +122,10 @@ def give_way(
         aside = left[k] - right[k]
         result.append(np.interp(all_rows, rows, _smoothed(aside, width)) if aside.any() else None)
     return result
+
+
+MARGIN = 10.0
+"""Added to the reach for what lies aside: more than two widths and deviations. [m]"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -166,7 +172,7 @@ def widened(
     """
     ahead_x, ahead_y = other.x - own.x, other.y - own.y
     reach = FADES + 0.5 * (own.length + other.length)
-    near = own.present & other.present & (ahead_x**2 + ahead_y**2 < (reach + 10.0) ** 2)
+    near = own.present & other.present & (ahead_x**2 + ahead_y**2 < (reach + MARGIN) ** 2)
     if not near.any():
         return None
     cos, sin = np.cos(own.heading), np.sin(own.heading)

@@ -48,6 +48,9 @@ STEERING = 1.0
 """Standard deviation of the kernel over which roads are seen and by which drivers respond: steering takes a second or
 two. [s]"""
 
+CELLS = 100_000
+"""Rows of all others that are looked at together: as many as stay in a processor's cache. [-]"""
+
 TRUCKS = frozenset({VehicleCategory.TRUCK, VehicleCategory.SEMITRAILER, VehicleCategory.TRAILER, VehicleCategory.BUS})
 
 
@@ -190,14 +193,19 @@ def _neighbours(
     around = Around.nobody(len(grid))
     groups = _own_lane_groups(own, network, grid)
     width = _own_lane_width(own, network, grid)
-    for number in _in_sight(motion)[index]:
-        other = motion.entities[number]
-        if not other.entity.is_vehicle:
-            continue
-        seen = _see(own, other, network, grid, groups)
-        gap = free_space(seen, own.entity.bounding_box, other.entity.bounding_box)
-        is_truck = np.full(len(grid), other.entity.vehicle_category in TRUCKS)
-        around.add(np.arange(len(grid)), seen, gap, width, other.entity.bounding_box.width, is_truck)
+    numbers = [k for k in _in_sight(motion)[index] if motion.entities[k].entity.is_vehicle]
+    together = max(1, CELLS // len(grid))
+    for begin in range(0, len(numbers), together):
+        others = [motion.entities[k] for k in numbers[begin : begin + together]]
+        seen = _see(own, others, network, grid, groups)
+        boxes = [other.entity.bounding_box for other in others]
+        length, centre, other_width = (
+            np.repeat([getattr(box, name) for box in boxes], len(grid)) for name in ("length", "center_x", "width")
+        )
+        is_truck = np.repeat([other.entity.vehicle_category in TRUCKS for other in others], len(grid))
+        rows = np.tile(np.arange(len(grid)), len(others))
+        gap = free_space(seen, own.entity.bounding_box, Extent(length, centre))
+        around.add(rows, seen, gap, width[rows], other_width, is_truck)
     return around.columns(lanes)
 
 
@@ -341,7 +349,7 @@ def _own_lane_groups(
     """Rows of the grid that share one lane path: positions in the grid, own u there, and the path."""
     groups: dict[tuple[int, int, float, int], list[int]] = {}
     present = ((own.activity[grid] & Activity.ACTIVE) != 0) & (own.road[grid] >= 0) & (own.lane[grid] != 0)
-    direction = _travel(own, network, grid, present)
+    direction = _travel(network, own.road[grid], own.lane[grid], own.heading_relative[grid], present)
     for k in np.flatnonzero(present):
         row = grid[k]
         road, lane, s = int(own.road[row]), int(own.lane[row]), float(own.s[row])
@@ -357,22 +365,25 @@ def _own_lane_groups(
 
 def _see(
     own: EntityMotion,
-    other: EntityMotion,
+    others: Sequence[EntityMotion],
     network: RoadNetwork,
     grid: IntArray,
     groups: list[tuple[IntArray, FloatArray, list[Reach]]],
 ) -> Others:
-    n = len(grid)
-    seen = Others(np.full(n, np.nan), np.full(n, np.nan), np.zeros(n, dtype=bool))
-    road, lane, s = other.road[grid], other.lane[grid], other.s[grid]
-    present = ((other.activity[grid] & Activity.ACTIVE) != 0) & (road >= 0) & (lane != 0)
-    direction = _travel(other, network, grid, present)
-    t = np.full(n, np.nan)
-    t[present] = network.offset_to_t(road[present], lane[present], s[present], other.offset[grid[present]])
-    for k, own_u, path in groups:
+    """Others along the own lane, one after the other, shape (others * n,)."""
+    names = ("road", "lane", "s", "offset", "activity", "heading_relative")
+    stacked = (np.concatenate([getattr(one, name)[grid] for one in others]) for name in names)
+    road, lane, s, offset, activity, heading = stacked
+    present = ((activity & Activity.ACTIVE) != 0) & (road >= 0) & (lane != 0)
+    direction = _travel(network, road, lane, heading, present)
+    t = np.full(len(s), np.nan)
+    t[present] = network.offset_to_t(road[present], lane[present], s[present], offset[present])
+    seen = Others(np.full(len(s), np.nan), np.full(len(s), np.nan), np.zeros(len(s), dtype=bool))
+    for members, own_u, path in groups:
+        k = (np.arange(len(others))[:, None] * len(grid) + members).ravel()
+        u, beside = (np.tile(values, len(others)) for values in (own_u, own.offset[grid[members]]))
         along = see_along(
-            path, own_u, own.offset[grid[k]], road[k], lane[k], s[k], t[k], direction[k], present[k],
-            network.lane_centre_t,
+            path, u, beside, road[k], lane[k], s[k], t[k], direction[k], present[k], network.lane_centre_t
         )  # fmt: skip
         for values, found in zip(seen, along, strict=True):
             values[k] = found
@@ -423,13 +434,17 @@ def see_along(
     return seen
 
 
-def _travel(other: EntityMotion, network: RoadNetwork, grid: IntArray, present: NDArray[np.bool_]) -> NDArray[np.int64]:
+def _travel(
+    network: RoadNetwork,
+    road: NDArray[np.integer],
+    lane: NDArray[np.integer],
+    heading: FloatArray,
+    present: NDArray[np.bool_],
+) -> NDArray[np.int64]:
     """Which way somebody drives along s, +1 or -1, shape (n,); 0 where it is on no lane."""
-    road, lane = other.road[grid], other.lane[grid]
-    direction = np.zeros(len(grid), dtype=np.int64)
+    direction = np.zeros(len(present), dtype=np.int64)
     direction[present] = network.travel_directions(road[present], lane[present])
-    direction = np.where(np.cos(other.heading_relative[grid]) < 0.0, -direction, direction)
-    return np.asarray(direction)
+    return np.where(np.cos(heading) < 0.0, -direction, direction)
 
 
 class Extent(NamedTuple):

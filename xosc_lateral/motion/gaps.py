@@ -22,6 +22,13 @@ REACH = 30.0
 """Boxes farther apart than this at all times are no pair worth naming. [m]"""
 
 
+LEAST_SIZE = 1e-9
+"""A box is at least this long and wide: sides without a length have no direction. [m]"""
+
+TOGETHER = 256
+"""Pairs whose boxes are compared at once: a numpy call costs as much as some hundred boxes. [-]"""
+
+
 @dataclass(frozen=True, eq=False, slots=True)
 class BoxPath:
     """A vehicle's bounding box along its path.
@@ -90,7 +97,7 @@ def smallest_gaps(time: FloatArray, paths: Sequence[BoxPath], *, reach: float = 
     reach : float
         [m]
     """
-    gaps = []
+    near_pairs: list[tuple[BoxPath, BoxPath, NDArray[np.bool_]]] = []
     extent = max((np.hypot(path.length, path.width) / 2 + abs(path.centre) for path in paths), default=0.0)
     for first, second in pairs_within([path.x for path in paths], [path.y for path in paths], reach + 2 * extent):
         a, b = paths[first], paths[second]
@@ -101,16 +108,24 @@ def smallest_gaps(time: FloatArray, paths: Sequence[BoxPath], *, reach: float = 
             continue
         # the exact distance is only needed where a lower bound of it undercuts the best upper bound
         upper = np.min(np.hypot(a.x - b.x, a.y - b.y)[near] + abs(a.centre) + abs(b.centre))
-        near &= apart <= upper
-        distance = box_distance(a.corners(near), b.corners(near))
-        best = int(np.argmin(distance))
-        if distance[best] <= reach:
-            gaps.append(Gap((a.name, b.name), float(distance[best]), float(time[near][best])))
+        near_pairs.append((a, b, near & (apart <= upper)))
+    gaps = []
+    for begin in range(0, len(near_pairs), TOGETHER):
+        part = near_pairs[begin : begin + TOGETHER]
+        corners = [
+            np.concatenate([path.corners(near) for path, near in side])
+            for side in ([(a, near) for a, _, near in part], [(b, near) for _, b, near in part])
+        ]
+        ends = np.cumsum([np.count_nonzero(near) for _, _, near in part])
+        for (a, b, near), distance in zip(part, np.split(box_distance(*corners), ends[:-1]), strict=True):
+            best = int(np.argmin(distance))
+            if distance[best] <= reach:
+                gaps.append(Gap((a.name, b.name), float(distance[best]), float(time[near][best])))
     return tuple(gaps)
 
 
 def box_distance(a: FloatArray, b: FloatArray) -> FloatArray:
-    """Distance between convex quadrilaterals, row by row; 0 where they overlap.
+    """Distance between rectangles, row by row; 0 where they overlap.
 
     Parameters
     ----------
@@ -122,26 +137,22 @@ def box_distance(a: FloatArray, b: FloatArray) -> FloatArray:
     array, shape (n,)
         [m]
     """
-    distance = np.minimum(_corners_to_edges(a, b), _corners_to_edges(b, a))
-    return np.where(_overlap(a, b), 0.0, distance)
+    from_a, apart_of_a = _beyond(a, b)
+    from_b, apart_of_b = _beyond(b, a)
+    return np.where(apart_of_a | apart_of_b, np.minimum(from_a, from_b), 0.0)
 
 
-def _corners_to_edges(points: FloatArray, polygon: FloatArray) -> FloatArray:
-    start = polygon[:, None, :, :]
-    along = np.roll(polygon, -1, axis=1)[:, None, :, :] - start
-    to_point = points[:, :, None, :] - start
-    share = np.clip((to_point * along).sum(-1) / np.maximum((along**2).sum(-1), 1e-12), 0.0, 1.0)
-    nearest = np.linalg.norm(to_point - share[..., None] * along, axis=-1)
-    return np.asarray(nearest.min(axis=(1, 2)))
+def _beyond(box: FloatArray, corners: FloatArray) -> tuple[FloatArray, NDArray[np.bool_]]:
+    """Distance of the nearest corner from a box that they are not in [m], and whether a side of it parts them from it.
 
-
-def _overlap(a: FloatArray, b: FloatArray) -> NDArray[np.bool_]:
-    """Separating axis theorem: two convex shapes overlap unless some edge's normal separates them."""
-    apart = np.zeros(len(a), dtype=bool)
-    for polygon in (a, b):
-        edges = np.roll(polygon, -1, axis=1) - polygon
-        normals = np.stack([-edges[..., 1], edges[..., 0]], axis=-1)
-        on_a = np.einsum("nkd,nad->nka", normals, a)
-        on_b = np.einsum("nkd,nbd->nkb", normals, b)
-        apart |= ((on_a.max(-1) < on_b.min(-1)) | (on_b.max(-1) < on_a.min(-1))).any(axis=1)
-    return ~apart
+    Convex shapes are nearest to each other at a corner of one of them, and apart if a side of one parts them.
+    """
+    x, y = (np.ascontiguousarray(corners[..., k].T) - 0.5 * (box[:, 0, k] + box[:, 2, k]) for k in (0, 1))
+    outside, parted = [], np.zeros(len(box), dtype=bool)
+    for neighbour in (1, 3):
+        east, north = (0.5 * (box[:, 0, k] - box[:, neighbour, k]) for k in (0, 1))
+        half = np.maximum(np.hypot(east, north), LEAST_SIZE)
+        along = (x * east + y * north) / half
+        parted |= (along.min(axis=0) > half) | (along.max(axis=0) < -half)
+        outside.append(np.maximum(np.abs(along) - half, 0.0))
+    return np.hypot(*outside).min(axis=0), parted

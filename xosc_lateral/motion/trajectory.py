@@ -10,12 +10,14 @@ References
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
+from xosc_lateral.mask import BLOCK, true_blocks
 from xosc_lateral.motion.nominal import Activity, EntityMotion
 from xosc_lateral.road.network import RoadNetwork
 
@@ -88,22 +90,21 @@ def displace(motion: EntityMotion, network: RoadNetwork, deviation: FloatArray) 
     deviation : array, shape (n,)
         Added to the nominal offset, positive to the left of the vehicle's travel; ignored where it is on no road. [m]
     """
-    x, y, z = motion.x.copy(), motion.y.copy(), motion.z.copy()
-    heading, pitch, roll = motion.heading.copy(), motion.pitch.copy(), motion.roll.copy()
+    x, y, z, heading = motion.x.copy(), motion.y.copy(), motion.z.copy(), motion.heading
     moved = (motion.road >= 0) & (deviation != 0.0)
-    if moved.any():
+    for rows in true_blocks(moved):
         # a vehicle that meets its lane's traffic head-on has its left on the lane's right
-        along_lane = np.where(np.cos(motion.heading_relative[moved]) >= 0.0, 1.0, -1.0)
-        road, lane, s = motion.road[moved], motion.lane[moved], motion.s[moved]
-        nominal = motion.offset[moved]
+        along_lane = np.where(np.cos(motion.heading_relative[rows]) >= 0.0, 1.0, -1.0)
+        road, lane, s, nominal = motion.road[rows], motion.lane[rows], motion.s[rows], motion.offset[rows]
         before = network.lane_to_world(road, lane, s, nominal)
-        after = network.lane_to_world(road, lane, s, nominal + along_lane * deviation[moved])
+        after = network.lane_to_world(road, lane, s, nominal + along_lane * deviation[rows])
         # the nominal pose is kept to the bit and only the difference added, so that a zero deviation changes nothing
-        x[moved] += after.x - before.x
-        y[moved] += after.y - before.y
-        z[moved] += after.z - before.z
-        heading += _direction_change(motion, x, y)
-    return WorldTrajectory(motion.time, x, y, z, heading, pitch, roll, _speed(motion, x, y))
+        x[rows] += after.x - before.x
+        y[rows] += after.y - before.y
+        z[rows] += after.z - before.z
+    if moved.any():
+        heading = heading + _direction_change(motion, x, y)
+    return WorldTrajectory(motion.time, x, y, z, heading, motion.pitch, motion.roll, _speed(motion, x, y))
 
 
 def _pieces(motion: EntityMotion) -> list[slice]:
@@ -113,18 +114,28 @@ def _pieces(motion: EntityMotion) -> list[slice]:
     return [slice(int(a), int(b)) for a, b in pairwise(borders)]
 
 
+def _overlapping(piece: slice) -> Iterator[tuple[slice, slice, slice]]:
+    """Rows of a piece in blocks: counted in the piece; with a row more on each side, for derivatives; without it."""
+    for begin in range(piece.start, piece.stop, BLOCK):
+        end = min(begin + BLOCK, piece.stop)
+        first, last = max(begin - 1, piece.start), min(end + 1, piece.stop)
+        yield slice(begin - piece.start, end - piece.start), slice(first, last), slice(begin - first, end - first)
+
+
 def _direction_change(motion: EntityMotion, x: FloatArray, y: FloatArray) -> FloatArray:
     """Direction of the shifted path against the nominal one's, held where the vehicle stands. [rad]"""
     change = np.zeros(len(x))
     for piece in _pieces(motion):
         if piece.stop - piece.start < 2:
             continue
-        nominal = np.gradient(motion.x[piece]) + 1j * np.gradient(motion.y[piece])
-        shifted = np.gradient(x[piece]) + 1j * np.gradient(y[piece])
-        moving = np.minimum(np.abs(nominal), np.abs(shifted)) > _STANDSTILL
+        turn, moving = np.empty(piece.stop - piece.start), np.empty(piece.stop - piece.start, dtype=bool)
+        for part, around, inside in _overlapping(piece):
+            nominal = np.gradient(motion.x[around]) + 1j * np.gradient(motion.y[around])
+            shifted = np.gradient(x[around]) + 1j * np.gradient(y[around])
+            moving[part] = (np.minimum(np.abs(nominal), np.abs(shifted)) > _STANDSTILL)[inside]
+            turn[part] = np.angle(shifted * np.conj(nominal))[inside]
         if not moving.any():
             continue
-        turn = np.angle(shifted * np.conj(nominal))
         last = np.maximum.accumulate(np.where(moving, np.arange(len(moving)), -1))
         last[last < 0] = int(np.argmax(moving))
         change[piece] = turn[last]
@@ -137,8 +148,9 @@ def _speed(motion: EntityMotion, x: FloatArray, y: FloatArray) -> FloatArray:
     for piece in _pieces(motion):
         if piece.stop - piece.start < 2:
             continue
-        nominal = np.hypot(np.gradient(motion.x[piece]), np.gradient(motion.y[piece]))
-        shifted = np.hypot(np.gradient(x[piece]), np.gradient(y[piece]))
-        moving = nominal > _STANDSTILL
-        speed[piece] = np.where(moving, speed[piece] * (shifted / np.where(moving, nominal, 1.0)), speed[piece])
+        for part, around, inside in _overlapping(piece):
+            nominal = np.hypot(np.gradient(motion.x[around]), np.gradient(motion.y[around]))[inside]
+            shifted = np.hypot(np.gradient(x[around]), np.gradient(y[around]))[inside]
+            moving = nominal > _STANDSTILL
+            speed[piece][part][moving] *= (shifted / np.where(moving, nominal, 1.0))[moving]
     return speed

@@ -153,7 +153,7 @@ class ManifestRow:
 
     def to_dict(self) -> dict[str, Any]:
         """Plain JSON values."""
-        values = {item.name: getattr(self, item.name) for item in fields(self)}
+        values = {name: getattr(self, name) for name in self.__slots__}
         return {
             name: dict(value) if isinstance(value, Mapping) else list(value) if isinstance(value, tuple) else value
             for name, value in values.items()

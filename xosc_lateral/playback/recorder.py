@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.errors import PlaybackError
+from xosc_lateral.mask import true_blocks
 from xosc_lateral.motion.nominal import Activity, EntityMotion, FloatArray, IntArray
 from xosc_lateral.playback.placement import NOWHERE
 from xosc_lateral.playback.state import EntityState
@@ -32,6 +33,9 @@ FARTHEST_IN_A_FRAME = 1000.0
 """No entity gets further within a frame, unless it is placed anew. [m]"""
 
 
+_TELEPORTED, _ROAD_END = int(Activity.TELEPORTED), int(Activity.ROAD_END)  # plain: flags take ten times as long
+
+
 class Rows:
     """Rows of one entity."""
 
@@ -52,7 +56,7 @@ class Rows:
         state = self.state
         free = state._free_pose
         x, y = (state.s, state.offset_t) if free is None else (free.x, free.y)
-        speed = 0.0 if state.activity & Activity.TELEPORTED else state.speed  # that of a leap is none
+        speed = 0.0 if state.activity & _TELEPORTED else state.speed  # that of a leap is none
         if state.active and not (abs(x) <= FARTHEST and abs(y) <= FARTHEST and abs(speed) <= FASTEST):
             words = ("s", "offset") if free is None else ("x", "y")
             raise self._implausible(time, f"{words[0]} = {x:g} m, {words[1]} = {y:g} m, speed = {state.speed:g} m/s")
@@ -65,7 +69,7 @@ class Rows:
         self._offset_t.append(state.offset_t)
         self._relative_heading.append(state.relative_heading)
         self._speed.append(state.speed)
-        self._activity.append(state.activity | Activity.ROAD_END if state.at_road_end else state.activity)
+        self._activity.append(state.activity | _ROAD_END if state.at_road_end else state.activity)
 
     def _implausible(self, time: float, what: str) -> PlaybackError:
         place = self.state.entity.place
@@ -88,18 +92,18 @@ class Rows:
 
     def motion(self, network: RoadNetwork, time: FloatArray) -> EntityMotion:
         """All rows, with world poses and directions of travel."""
-        road: IntArray = np.frombuffer(self._road, dtype=np.int32).copy()
-        lane: IntArray = np.frombuffer(self._lane, dtype=np.int32).copy()
-        s, offset_t, along, speed = (
-            np.frombuffer(column, dtype=np.float64).copy()
+        # The rows themselves, not copies: nobody writes on.
+        road: IntArray = np.frombuffer(self._road, dtype=np.int32)
+        lane: IntArray = np.frombuffer(self._lane, dtype=np.int32)
+        s, offset, along, speed = (
+            np.frombuffer(column, dtype=np.float64)
             for column in (self._s, self._offset_t, self._relative_heading, self._speed)
         )
-        activity = np.frombuffer(self._activity, dtype=np.uint8).copy()
+        activity = np.frombuffer(self._activity, dtype=np.uint8)
         free_rows = np.frombuffer(self._free_rows, dtype=np.int64)
         free = np.frombuffer(self._free, dtype=np.float64).reshape(-1, 6)
 
         direction = np.ones(len(road))
-        offset = offset_t.copy()
         looked_up = free_rows[road[free_rows] == _UNKNOWN]
         known = road >= 0
         if known.any():
@@ -119,12 +123,12 @@ class Rows:
         return EntityMotion(
             entity=self.state.entity,
             time=time,
-            x=pose[:, 0].copy(),
-            y=pose[:, 1].copy(),
-            z=pose[:, 2].copy(),
-            heading=pose[:, 3] % (2.0 * pi),
-            pitch=pose[:, 4].copy(),
-            roll=pose[:, 5].copy(),
+            x=pose[:, 0],
+            y=pose[:, 1],
+            z=pose[:, 2],
+            heading=np.mod(pose[:, 3], 2.0 * pi, out=pose[:, 3]),
+            pitch=pose[:, 4],
+            roll=pose[:, 5],
             speed=speed,
             road=road,
             lane=lane,
@@ -140,11 +144,9 @@ def _poses(
 ) -> FloatArray:
     """World poses of the rows that are on a road, shape (n, 6), turned by `to_lane` [rad] against their lanes."""
     on_road = road >= 0
-    pose = np.zeros((len(road), 6))
-    if on_road.any():
-        pose[on_road] = np.column_stack(
-            network.lane_to_world(road[on_road], lane[on_road], s[on_road], offset[on_road])
-        )
+    pose = np.zeros((len(road), 6), order="F")  # each column is then an array of its own
+    for rows in true_blocks(on_road):
+        pose[rows] = np.column_stack(network.lane_to_world(road[rows], lane[rows], s[rows], offset[rows]))
     _turn(pose, to_lane, on_road)
 
     return pose
@@ -225,10 +227,11 @@ def _suspects(
     network: RoadNetwork, road: IntArray, lane: IntArray, s: FloatArray, offset: FloatArray, on_road: NDArray[np.bool_]
 ) -> NDArray[np.int64]:
     """Rows that lie beyond their own lane."""
-    suspects = np.flatnonzero(on_road)
-    half = 0.5 * network.lane_width(road[suspects], lane[suspects], s[suspects])
-    suspects = suspects[np.abs(offset[suspects]) > half + _TOUCH]
-    return suspects
+    suspects = [np.empty(0, dtype=np.int64)]
+    for rows in true_blocks(on_road):
+        half = 0.5 * network.lane_width(road[rows], lane[rows], s[rows])
+        suspects.append(rows[np.abs(offset[rows]) > half + _TOUCH])
+    return np.concatenate(suspects)
 
 
 _TOUCH = 1e-3

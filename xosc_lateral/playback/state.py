@@ -13,6 +13,8 @@ from xosc_lateral.road import Pose, RoadNetwork
 from xosc_lateral.road.places import turn_for_heading, turned_in_surface
 from xosc_lateral.scenario import Entity
 
+_ACTIVE = int(Activity.ACTIVE)  # plain: arithmetic of flags takes ten times as long
+
 
 class EntityState:
     """Where an entity is, how fast, and what happened to it in the present frame.
@@ -184,7 +186,7 @@ class EntityState:
     # ---- what happened to it -----------------------------------------------------------------------------------------
     def begin_frame(self) -> None:
         """Forget what happened in the frame before."""
-        self.activity = Activity.ACTIVE if self.active else 0
+        self.activity = _ACTIVE if self.active else 0
         self.longitudinal_taken = False
         self.speed_taken = False
         self.teleported = False
@@ -197,7 +199,7 @@ class EntityState:
     def take_control(self, activity: Activity) -> None:
         """An action moves the entity in this frame, both ways; the default driver must not."""
         self.longitudinal_taken = True
-        self.activity |= activity
+        self.activity |= int(activity)
 
     def body_frame(self, vector: tuple[float, float, float]) -> tuple[float, float, float]:
         """A world vector along the entity's own axes (in the plane)."""

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from functools import cache, reduce
-from importlib.metadata import entry_points
 from operator import or_
 from typing import Any
 
@@ -34,6 +33,7 @@ from xosc_lateral.driver.effects.variance_trend import VarianceTrend
 from xosc_lateral.driver.effects.zones import Zones
 from xosc_lateral.driver.records import read_as
 from xosc_lateral.errors import DriverProfileError
+from xosc_lateral.plugins import entry_points
 
 EFFECTS: tuple[type[Effect], ...] = defined_in(__name__, Effect)  # type: ignore[type-abstract]
 """The effects of this package; a profile file names them by their `kind`."""

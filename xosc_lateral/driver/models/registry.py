@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cache, reduce
-from importlib.metadata import entry_points
 from operator import or_
 from typing import Any
 
@@ -18,6 +17,7 @@ from xosc_lateral.driver.models.base import CoreModel
 from xosc_lateral.driver.models.two_level.fit import fit_two_level
 from xosc_lateral.driver.models.two_level.model import TwoLevelModel
 from xosc_lateral.errors import DriverProfileError
+from xosc_lateral.plugins import entry_points
 
 FloatArray = NDArray[np.float64]
 

@@ -78,6 +78,8 @@ def spot_at(position: written.Position, simulation: Simulation) -> Callable[[], 
 
 def pose_of(position: written.Position, simulation: Simulation) -> Pose:
     """World pose of a position now. z, pitch and roll are the road's where none are given. [m], [rad]"""
+    if isinstance(position, written.WorldPosition) and None not in (position.z, position.p, position.r):
+        return world.pose_of(position)  # nothing of it is the road's, which need not be looked for
     return pose_at(resolve(position, simulation), simulation)
 
 

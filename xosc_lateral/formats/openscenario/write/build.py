@@ -26,6 +26,13 @@ def decimal(value: float, digits: int) -> str:
     return "0" if text in ("-0", "") else text
 
 
+def shortened(text: str) -> str:
+    """Attributes that are numbers with a point all of them, as `decimal` writes each."""
+    while '0"' in text:  # as often as numbers have decimals; a pattern takes three times as long
+        text = text.replace('0"', '"')
+    return text.replace('."', '"').replace('="-0"', '="0"')
+
+
 def sub(parent: etree._Element, tag: str, **attributes: str) -> etree._Element:
     """Append a child."""
     return etree.SubElement(parent, tag, attributes)

@@ -107,11 +107,14 @@ def vertex_times(time: FloatArray, x: FloatArray, y: FloatArray) -> FloatArray:
         while len(head) > 1 and _way_at(tail[0], time, way) - _way_at(head[-1], time, way) < LEAST_SPACING:
             head.pop()
         times = np.array([*head, *tail])
-    for attempt in range(2 * REFINEMENTS):
-        error = _error(times, time, x, y)
-        refined = _refined(times, time, way, error, replace=attempt >= REFINEMENTS)
-        if _error(refined, time, x, y).max() < error.max():
-            times = refined
+    error = _error(times, time, x, y)
+    for replace in (False, True):
+        for _ in range(REFINEMENTS):
+            refined = _refined(times, time, way, error, replace=replace)
+            after = error if refined is times else _error(refined, time, x, y)
+            if after.max() >= error.max():
+                break
+            times, error = refined, after
     return _apart(times, np.interp(times, time, x), np.interp(times, time, y))
 
 
@@ -120,6 +123,8 @@ def _apart(times: FloatArray, x: FloatArray, y: FloatArray) -> FloatArray:
 
     Where even the ends are that close (the entity came back to where it began), the first alone: no path to follow.
     """
+    if (np.hypot(np.diff(x), np.diff(y)) >= LEAST_SPACING).all():
+        return times
     kept = [0]
     for k in range(1, len(times)):
         if np.hypot(x[k] - x[kept[-1]], y[k] - y[kept[-1]]) >= LEAST_SPACING:
@@ -155,7 +160,9 @@ def _refined(times: FloatArray, time: FloatArray, way: FloatArray, error: FloatA
     order = candidates[np.lexsort((-error[candidates], gap[candidates]))]
     _, worst = np.unique(gap[order], return_index=True)
     added = _spaced(order[worst], way)
-    keep = np.abs(at[:, None] - way[added][None, :]).min(axis=1) >= LEAST_SPACING
+    taken = np.concatenate(([-np.inf], way[added], [np.inf]))
+    after = np.searchsorted(taken, at)
+    keep = np.minimum(at - taken[after - 1], taken[after] - at) >= LEAST_SPACING
     keep[[0, -1]] = True
     return np.sort(np.concatenate((times[keep], time[added])))
 
@@ -245,13 +252,19 @@ def _head(time: FloatArray, way: FloatArray, until: float, step: float) -> list[
     """Vertices up to where those of the tail begin; evenly, since a player turns the car within half a gap."""
     times = [float(time[0])]
     step = (until - times[0]) / max(1, round((until - times[0]) / step))
+    count = 16
     while True:
-        at = _way_at(times[-1], time, way)
-        nearest, farthest = (_time_at(at + far, time, way) for far in (VERTEX_SPACING, FARTHEST))
-        following = min(max(times[-1] + step, nearest), farthest)
-        if following >= until - 1e-9:
-            return times
-        times.append(following)
+        # As long as neither bound counts many at once, the more the longer that holds.
+        even = np.add.accumulate(np.array([times[-1], *[step] * count]))
+        at = np.interp(even[:-1], time, way)
+        nearest, farthest = (np.interp(at + far, way, time, right=np.inf) for far in (VERTEX_SPACING, FARTHEST))
+        following = np.minimum(np.maximum(even[1:], nearest), farthest)
+        count = 1 + int(np.argmax(np.append(following != even[1:], True)))
+        for moment in following[:count].tolist():
+            if moment >= until - 1e-9:
+                return times
+            times.append(moment)
+        count = min(2 * count, 10_000)
 
 
 def _tail(time: FloatArray, way: FloatArray, step: float) -> list[float]:

@@ -15,12 +15,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.optimize import linprog
-from scipy.sparse import block_array, coo_array, eye_array
+
+if TYPE_CHECKING:
+    from scipy.sparse import coo_array
 
 FloatArray = NDArray[np.float64]
 
@@ -86,6 +87,9 @@ def fitted(
     starts : bool
         It may start anywhere.
     """
+    from scipy.optimize import linprog
+    from scipy.sparse import block_array, coo_array, eye_array
+
     if not ramps:
         return []
     count = len(ramps)
@@ -130,6 +134,8 @@ def fitted(
 
 def _sparse(rows: NDArray[np.intp], *columns: tuple[NDArray[np.intp], FloatArray], shape: tuple[int, int]) -> coo_array:
     """A matrix with a few numbers in each row."""
+    from scipy.sparse import coo_array
+
     at = np.concatenate([column for column, _ in columns])
     values = np.concatenate([value for _, value in columns])
     return coo_array((values, (np.tile(rows, len(columns)), at)), shape=shape)

@@ -42,23 +42,19 @@ class TimedVertices:
 
     def text(self, indent: str, unit: str) -> Iterator[str]:
         """XML of the vertices, set out at `indent`, each level below by `unit` more; the first without its indent."""
-        columns = (self.times, *self.pose, *(self.motion or ()))
+        columns = np.stack((self.times, *self.pose, *(self.motion or ())), axis=1)
         inner, innermost = f"\n{indent}{unit}", f"\n{indent}{unit}{unit}"
+        position = f"{inner}<Position>{innermost}<WorldPosition{_attributes(_POSE)}/>{inner}</Position>"
+        motion = f"{inner}<Motion{_attributes(_MOTION)}/>" if self.motion else ""
+        vertex = f'<Vertex time="%.6f">{position}{motion}\n{indent}</Vertex>'
         for begin in range(0, len(self.times), BLOCK):
-            block = zip(*(column[begin : begin + BLOCK].tolist() for column in columns), strict=True)
-            lines = [_vertex(values, inner, innermost) + f"\n{indent}</Vertex>" for values in block]
-            yield (f"\n{indent}" if begin else "") + f"\n{indent}".join(lines)
+            block = columns[begin : begin + BLOCK]
+            text = f"\n{indent}".join([vertex] * len(block)) % tuple(block.ravel().tolist())
+            yield (f"\n{indent}" if begin else "") + build.shortened(text)
 
 
-def _vertex(values: tuple[float, ...], inner: str, innermost: str) -> str:
-    position = f"<Position>{innermost}<WorldPosition{_attributes(_POSE, values[1:7])}/>{inner}</Position>"
-    motion = f"{inner}<Motion{_attributes(_MOTION, values[7:])}/>" if len(values) > 7 else ""
-    return f'<Vertex time="{build.decimal(values[0], 6)}">{inner}{position}{motion}'
-
-
-def _attributes(names: Sequence[tuple[str, int]], values: Sequence[float]) -> str:
-    pairs = zip(names, values, strict=True)
-    return "".join(f' {name}="{build.decimal(value, digits)}"' for (name, digits), value in pairs)
+def _attributes(names: Sequence[tuple[str, int]]) -> str:
+    return "".join(f' {name}="%.{digits}f"' for name, digits in names)
 
 
 class Vertices:
