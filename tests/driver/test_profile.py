@@ -49,7 +49,7 @@ def test_a_profile_is_valid_by_the_schema(profile: DriverProfile) -> None:
         ({"lane_width": MAX_LANE_WIDTH + 1.0}, "at most 10 m"),
         ({"lane_width": "wide"}, "lane_width: expected 'float', got 'str'"),
         ({"colour": "red"}, "unknown field 'colour'"),
-        ({"effects": [{"kind": "psychic"}]}, r"effects\[0\]: unknown kind 'psychic'; known are angular"),
+        ({"effects": [{"kind": "psychic"}]}, r"effects\[0\]: unknown kind 'psychic'; known are adapted, angular"),
         ({"model": {"kind": "crystal-ball"}}, "model: unknown kind 'crystal-ball'"),
         ({"provenance": {"hours": -1.0}}, "provenance.hours"),
         ({"metadata": {"mood": "good"}}, "metadata: unknown field 'mood'"),

@@ -12,6 +12,7 @@ from msgspec.structs import replace
 from xosc_lateral.driver.effects import (
     EFFECTS,
     Acts,
+    Adapted,
     ColumnEffect,
     Cycle,
     Drift,
@@ -22,6 +23,7 @@ from xosc_lateral.driver.effects import (
     Population,
     Regimes,
     Step,
+    TimeSmooth,
     VarianceTrend,
     Zones,
 )
@@ -72,6 +74,8 @@ HIDDEN: tuple[Effect, ...] = (
     Population(shift=0.1, log_spread=0.2, log_fine=0.1),
     VarianceTrend(factor=1.5, to_s=600.0),
     Step(size=0.2, at_s=130.0),
+    Adapted(shift=-0.1, spread=1.2, rate=0.8, fine=1.5),
+    TimeSmooth(location=(0.1, -0.05), location_errors=(0.02, 0.02), spread=(0.3,), spread_errors=(0.1,), to_s=300.0),
 )
 PACED: tuple[Effect, ...] = (
     Linear(column="speed", acts=Acts.RATE, coefficients=(0.03,), errors=(0.01,), reference=(30.0,), response_s=1.0),

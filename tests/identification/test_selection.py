@@ -53,19 +53,27 @@ def test_a_planted_spread_is_named(driven: Driven) -> None:
 
 
 @pytest.mark.parametrize(
-    ("plant", "shape"),
+    ("plant", "shape", "seconds"),
     [
-        (plants.ShiftBy(("truck_right", "lane_index"), 0.5, plants.SimulatedResponse(lag=1.0)), Product),
-        (plants.ShiftBy(("grade",), 0.4, plants.SimulatedResponse(plants.threshold(2.0), lag=1.0)), Threshold),
-        (plants.ShiftBy(("grade",), 0.4, plants.SimulatedResponse(plants.saturating(1.0), lag=1.0)), Saturating),
-        (plants.LanePreference((0.3, -0.3, 0.3)), Levels),
+        (plants.ShiftBy(("truck_right", "lane_index"), 0.5, plants.SimulatedResponse(lag=1.0)), Product, 2400.0),
+        (plants.ShiftBy(("grade",), 0.4, plants.SimulatedResponse(plants.threshold(2.0), lag=1.0)), Threshold, 2400.0),
+        (
+            plants.ShiftBy(("grade",), 0.4, plants.SimulatedResponse(plants.saturating(1.0), lag=1.0)),
+            Saturating,
+            2400.0,
+        ),
+        (
+            plants.LanePreference((0.3, -0.3, 0.3)),
+            Levels,
+            3600.0,
+        ),  # lanes change seldom: what they do rests on few rows
     ],
     ids=["product", "threshold", "saturating", "levels"],
 )
 def test_a_shift_is_named_by_its_column_and_its_shape(
-    driven: Driven, plant: plants.Plant, shape: type[ColumnEffect]
+    driven: Driven, plant: plants.Plant, shape: type[ColumnEffect], seconds: float
 ) -> None:
-    selection = selected(driven(401, [plant], 2400.0))
+    selection = selected(driven(401, [plant], seconds))
     assert ("location", tuple(sorted(plant.columns))) in named(selection)
     assert isinstance(effect_of(selection, plant.columns), shape)
 

@@ -15,6 +15,7 @@ from tests.report.made_enriched import made_enriched
 from tests.road.places import hand_written
 from xosc_lateral.enrich.conversion import ConversionProvenance, ConvertedScenario
 from xosc_lateral.motion.nominal import Activity
+from xosc_lateral.pipeline.settings import ConvertSettings
 from xosc_lateral.report.conversion import as_text, facts
 from xosc_lateral.report.figures import figure_style, new_figure
 from xosc_lateral.report.frames import conversion_frame
@@ -140,7 +141,10 @@ def test_rows_of_one_moment_come_in_the_order_of_the_scenario(enriched):
 
 
 def _converted(enriched, **more) -> ConvertedScenario:
-    made = ConversionProvenance("0.1", {"in.xosc": "a" * 64}, {"Ego": ("calm", "b" * 64)}, 7, 2, {"speed": "30"})
+    options = ConvertSettings(seed=7, parameters={"speed": "30"}).record(Path())
+    made = ConversionProvenance(
+        "0.1", 1, "in.xosc", {"in.xosc": "a" * 64}, {"Ego": ("calm", "b" * 64)}, options, 2, "1.2", (), {}, "d" * 64
+    )
     return ConvertedScenario(Path("in.xosc"), Path("out.xosc"), "c" * 64, enriched, made, ("mind this",), **more)
 
 

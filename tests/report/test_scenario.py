@@ -13,6 +13,7 @@ from tests.report.made_enriched import made_enriched
 from xosc_lateral.enrich.conversion import ConversionProvenance, ConvertedScenario
 from xosc_lateral.motion.gaps import Gap
 from xosc_lateral.motion.nominal import Activity, Note
+from xosc_lateral.pipeline.settings import ConvertSettings
 from xosc_lateral.report import scenario_figures as figures
 from xosc_lateral.report.path_dynamics import lateral_dynamics
 from xosc_lateral.report.road_drawing import view_along
@@ -85,7 +86,20 @@ def test_a_scenario_in_which_nothing_was_enriched_gets_a_page_that_says_so(enric
 
 
 def test_provenance_is_in_the_footer(enriched):
-    made = ConversionProvenance("0.1", {"cut-in.xosc": "a" * 64}, {"Ego": ("calm", "b" * 64)}, 7, 2, {"speed": "30"})
+    options = ConvertSettings(seed=7, parameters={"speed": "30"}).record(Path())
+    made = ConversionProvenance(
+        "0.1",
+        1,
+        "cut-in.xosc",
+        {"cut-in.xosc": "a" * 64},
+        {"Ego": ("calm", "b" * 64)},
+        options,
+        2,
+        "1.2",
+        (),
+        {},
+        "d" * 64,
+    )
     conversion = ConvertedScenario(
         Path("in/cut-in.xosc"), Path("out/lively.xosc"), "c" * 64, enriched, made, ("mind this",)
     )

@@ -33,8 +33,12 @@ VERBS = {
     "profiles": "The library of driver profiles.",
     "template": "Scenarios to start from.",
     "live": "Drivers in a simulation that runs.",
+    "export": "Drivers as parts for other tools.",
 }
-"""Name -> what it does. Each has a module named like it with `register(app)`, which is loaded when the verb is used."""
+"""Name -> what it does. Each has a module with `register(app)`, which is loaded when the verb is used."""
+
+MODULES = {"import": "import_", "export": "live"}
+"""Verbs whose module is not called like them."""
 
 LOOKS: dict[str, Any] = {
     "no_args_is_help": True,
@@ -47,10 +51,10 @@ LOOKS: dict[str, Any] = {
 @cache
 def verb(name: str) -> Any:
     """The command of a verb, its module loaded."""
-    module = name.replace("-", "_")
+    module = MODULES.get(name, name.replace("-", "_"))
     alone = typer.Typer(**LOOKS)
     alone.callback()(_root)  # a group, though of one verb
-    import_module(f"xosc_lateral.cli.{'import_' if name == 'import' else module}").register(alone)
+    import_module(f"xosc_lateral.cli.{module}").register(alone)
     return cast(TyperGroup, typer.main.get_command(alone)).commands[name]
 
 

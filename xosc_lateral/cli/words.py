@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import sys
 from collections.abc import Iterable
 from enum import StrEnum
@@ -53,10 +54,20 @@ RoadPath = Annotated[
     list[Path] | None,
     typer.Option("--road-path", metavar="DIR", help='Folder with roads known by name ("Town04"); may be repeated.'),
 ]
+
+
+def _number(value: float | None) -> float | None:
+    """NaN is within every range that is tested by comparing."""
+    if value is not None and math.isnan(value):
+        raise typer.BadParameter(f"{value} is not a number")
+    return value
+
+
 TimeLimit = Annotated[
     float | None,
     typer.Option(
         help="Cut runs off here [s]; default: 60 without a stop trigger, 3600 with one.",
+        callback=_number,
         min=0.1,
         max=86_400,
         show_default=False,

@@ -187,7 +187,8 @@ def _score(
     known = _known(problem, dictionary, [term for term in fitted.terms if isinstance(term, kind)], spared)
     drive = search.coarse.drive[problem.valid]
     rng = search.rng(LoopSeed.COLUMNS)
-    scores = score_entries(dictionary, problem.observed, known, barred, drive, rng, draws=draws)
+    of_mean = kind.component == "mean"
+    scores = score_entries(dictionary, problem.observed, known, barred, drive, rng, draws=draws, of_mean=of_mean)
     return _Scored(problem, dictionary, known, scores)
 
 

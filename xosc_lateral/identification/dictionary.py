@@ -58,6 +58,9 @@ CROSS_BASIS = 0.01
 ROBUST = 200
 """Entries whose scores are set beside the squares of their own rows: those that may be the best."""
 
+RESPONSES = 12
+"""Of one column's entries, the best so many stand for all that it may do; more of them span hardly more."""
+
 CHUNK = 48
 """Candidates that are whitened at once: few enough to stay in a processor's cache."""
 
@@ -233,6 +236,7 @@ def score_entries(
     rng: np.random.Generator,
     *,
     draws: int = NULL_DRAWS,
+    of_mean: bool = True,
 ) -> Scores:
     """Score every entry, and all of them against the null's residuals.
 
@@ -247,6 +251,8 @@ def score_entries(
         Drive that each row is of.
     draws : int
         Of the null; without any, no maxima.
+    of_mean : bool
+        Entries shift the mean, so that loudness where they act is no evidence; of a spread it is all there is.
     """
     left = residual - known @ (known.T @ residual)
     left = left / max(float(np.sqrt(np.mean(left**2))), 1e-300)
@@ -267,7 +273,9 @@ def score_entries(
     squared -= dictionary.costs.astype(np.float32)[:, None]
     squared[~usable] = -np.inf
     largest = squared.max(axis=0).astype(np.float64)
-    scores = _beside_loud_stretches(squared[:, 0].astype(np.float64), dictionary, left, basis)
+    scores = squared[:, 0].astype(np.float64)
+    if of_mean:
+        scores = _beside_loud_stretches(scores, dictionary, left, basis)
     return Scores(scores, largest[1:] if np.isfinite(largest).all() else np.zeros(0))
 
 
@@ -282,9 +290,19 @@ def _beside_loud_stretches(
     order = order[np.isfinite(scores[order])]
     rows = dictionary.rows[order].astype(np.float64)
     rows -= (rows @ basis) @ basis.T
+    columns = [frozenset(dictionary.candidates[index].effect.columns) for index in order]
+    rest = np.empty_like(rows)
+    for own in set(columns):  # what some response to the same columns explains is not loudness
+        alike = [k for k, others in enumerate(columns) if others <= own or own <= others][:RESPONSES]
+        span = orthonormal(rows[alike].T)
+        rest[[others == own for others in columns]] = left - span @ (span.T @ left)
     power = np.maximum(np.square(rows).sum(axis=1), TINY)
-    size = rows @ left / power
-    scatter = np.maximum(np.square(rows * (left - size[:, None] * rows)).sum(axis=1) / power, 1.0)
+    weights = np.square(rows) / power[:, None]
+    scatter = (weights * np.square(rest)).sum(axis=1)
+    # of few rows it is a rough estimate: what counts is what is sure of it, two standard errors less
+    kurtosis = float(np.mean(left**4) / np.mean(left**2) ** 2)
+    scatter /= 1.0 + 2.0 * np.sqrt((kurtosis - 1.0) * np.square(weights).sum(axis=1))
+    scatter = np.maximum(scatter, 1.0)
     robust = scores.copy()
     costs = dictionary.costs[order]
     robust[order] = (scores[order] + costs) / scatter - costs

@@ -28,6 +28,7 @@ from xosc_lateral.driver.effects import (
     Saturating,
     Step,
     Threshold,
+    TimeSmooth,
     VarianceTrend,
     Zones,
 )
@@ -72,6 +73,9 @@ EXAMPLES: tuple[Effect, ...] = (
     Cycle(amplitude=0.1, period_s=12.0),
     Regimes(factor=2.0, on_s=20.0, off_s=40.0),
     Population(shift=0.1, log_spread=0.2),
+    TimeSmooth(
+        location=(0.1, -0.05), location_errors=(0.02, 0.02), spread=(0.3,), spread_errors=(0.1,), fine=(0.1,), to_s=90.0
+    ),
     Adapted(shift=-0.1, spread=1.2, rate=0.8, fine=1.5),
 )
 """One of each kind, of columns `x` and `y`: every test of all effects takes them from here."""

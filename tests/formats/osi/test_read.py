@@ -298,7 +298,7 @@ def test_bad_traces_are_refused_in_one_line(tmp_path, capsys, change, said: str)
         ("trace_gt.osi", b"\x10\0\0\0abc", "message 1: damaged: Truncated message body"),
         ("trace_gt.osi", b"\xff\xff\xff\xff", "message 1: damaged: Message size 4294967295 exceeds"),
         ("trace_sd.osi", b"\x10\0\0\0abc", "its name says SENSOR_DATA"),
-        ("trace.txt", b"x", "an OSI trace ends in .mcap or .osi"),
+        ("trace.txt", b"x", "an OSI trace ends in .mcap, .osi"),
     ],
 )
 def test_files_that_are_no_traces_are_refused_in_one_line(tmp_path, capsys, name, data, said) -> None:

@@ -57,6 +57,10 @@ STEP_COST = 5.0
 """A step has a free moment. [chi-square]"""
 
 
+STEP_LEVEL = 1e-3
+"""A step is told from a smooth where it explains so improbably much beside it, among as many moments as the mean's
+shortest period is contained in the drive. [-]"""
+
 SURER = 0.01
 """Where it is surer than the best column by this factor, what that column may do is left to time. [-]"""
 
@@ -85,6 +89,8 @@ class StepTerm(Term):
     @classmethod
     def test(cls, search: Search, fitted: Fitted) -> Outcome | None:
         """Step or smooth, whichever explains more, beyond what an ordinary drift continues to."""
+        from scipy.stats import chi2
+
         coarse = fitted.coarse
         if not coarse.lasts or any(isinstance(term, StepTerm | TimeMeanTerm) for term in fitted.terms):
             return None
@@ -96,13 +102,19 @@ class StepTerm(Term):
         smooth = smooth_probabilities(slow[0][:, 0], slow[1], ORDERS)
         order = min(smooth, key=lambda one: smooth[one])
         p_value = mean_probability(slow[0][:, 0], slow[1], slow[2], search.rng(LoopSeed.LOW_FREQUENCY))
-        # which of the two it is, quicker movement tells as well
-        quick = [low_frequencies(one, coarse, coarse.valid, STEP_SHORTEST_S) for one in (rows[:, None], waves, jumps)]
-        gains = explained(quick[0][:, 0], quick[2], len(slow[0]))
+        if not len(moments):
+            return Outcome(TimeMeanTerm(), (), p_value)
+        # which of the two it is, quicker movement tells as well, once the step is at its second
+        unit = slow[2] / np.maximum(np.linalg.norm(slow[2], axis=0), 1e-12)
+        at = moment_of(rows, whitener, int(moments[np.argmax(np.abs(unit.T @ slow[0][:, 0]))]))
+        jump = whitener.rows((np.arange(len(coarse)) >= at).astype(np.float64)[:, None])
+        quick = [low_frequencies(one, coarse, coarse.valid, STEP_SHORTEST_S) for one in (rows[:, None], waves, jump)]
+        step = float(explained(quick[0][:, 0], quick[2], len(slow[0]))[0])
         gain = explained_jointly(quick[0][:, 0], quick[1][:, :order], len(slow[0]))
-        if len(moments) and gains.max() - STEP_COST > float(as_one_degree(gain, order)):
-            return Outcome(cls(moment_of(rows, whitener, int(moments[np.argmax(gains)]))), (), p_value)
-        return Outcome(TimeMeanTerm(), (), p_value)
+        both = explained_jointly(quick[0][:, 0], np.column_stack([quick[1][:, :order], quick[2]]), len(slow[0]))
+        beside = float(chi2.isf(STEP_LEVEL * MEAN_SHORTEST_S / max(int(coarse.valid.sum()), 1), 1))
+        is_step = step - STEP_COST > float(as_one_degree(gain, order)) or both - gain > beside
+        return Outcome(cls(at) if is_step else TimeMeanTerm(), (), p_value)
 
     def probability_beside(self, search: Search, fitted: Fitted) -> float:
         """p-value of the mean by time, whichever of the two it looks like beside the terms fitted."""

@@ -110,7 +110,7 @@ TRACK_RESOLUTION = 0.005
 
 def enriched_scene(enriched: Enriched) -> str:
     """JSON for the player: enriched motion, and the nominal one as ghosts."""
-    return paths_scene(enriched.motion, enriched.network, enriched.entities)
+    return _json(enriched.network, enriched.motion, [(one.motion, one) for one in enriched.entities])
 
 
 def paths_scene(motion: NominalMotion, network: RoadNetwork, results: Sequence[EntityResult]) -> str:
