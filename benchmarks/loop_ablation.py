@@ -6,8 +6,8 @@ beside those of the whole method. Selection alone: what folds or held-out errors
 
 from __future__ import annotations
 
-import sys
-from collections.abc import Callable, Iterator
+import argparse
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from unittest.mock import patch
 
@@ -93,8 +93,11 @@ def named(table: pd.DataFrame, wanted: set[str]) -> tuple[bool, int]:
     return any(one <= wanted for one in sets), sum(not one <= wanted and not one <= BENDS for one in sets)
 
 
-def main(parts: list[str]) -> None:
+def main(argv: Sequence[str] | None = None) -> None:
     """A line per part."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("part", nargs="*", choices=[*PARTS, []], help="all, if none is named")
+    parts = parser.parse_args(argv).part
     tables = list(drives())
     assert all(np.isfinite(offset_of(table)).all() for _, table, _ in tables if "distance_left" in table)
     for part in parts or list(PARTS):
@@ -106,4 +109,4 @@ def main(parts: list[str]) -> None:
 
 
 if __name__ == "__main__":
-    main(sys.argv[1:])
+    main()

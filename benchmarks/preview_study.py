@@ -8,7 +8,7 @@ and sampled.
 
 from __future__ import annotations
 
-import sys
+import argparse
 from collections.abc import Sequence
 
 import numpy as np
@@ -61,8 +61,14 @@ def spread_ratio(result: LoopResult) -> tuple[float, float]:
     return float(real[high] / real[low]), float(after[high] / after[low])
 
 
-def main(which: str, names: list[str], *, whole: bool) -> None:
+def main(argv: Sequence[str] | None = None) -> None:
     """Print a line per drive, then the sums."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("set", choices=list(SEEDS))
+    parser.add_argument("kind", nargs="*")
+    parser.add_argument("--whole", action="store_true", help="close the loop: folds and held-out blocks judge as well")
+    args = parser.parse_args(argv)
+    which, names, whole = args.set, args.kind, args.whole
     hits = wrongs = 0
     for kind in names or list(SEEDS[which]):
         drive = preview_driver.simulate(kind, SEEDS[which][kind])
@@ -83,4 +89,4 @@ def main(which: str, names: list[str], *, whole: bool) -> None:
 
 
 if __name__ == "__main__":
-    main(sys.argv[1], [word for word in sys.argv[2:] if word != "--whole"], whole="--whole" in sys.argv)
+    main()
