@@ -119,9 +119,7 @@ def _osi(source: Path, road: Path | None, columns: Sequence[str]) -> RecordedTra
     from xosc_lateral.formats.osi.read import read_osi
 
     recorded = read_osi(source)
-    known = bool((recorded.rear > 0.0).any())  # where the trace says it, positions are the rear axle's already
-    tracks = replace(recorded.tracks, rear=recorded.rear) if known else recorded.tracks
-    return replace(_on_road(tracks, source, road), notes=tuple(recorded.notes))
+    return replace(_on_road(recorded.tracks, source, road), notes=tuple(recorded.notes))
 
 
 def _commonroad(source: Path, road: Path | None, columns: Sequence[str]) -> RecordedTraffic:

@@ -130,5 +130,4 @@ def _placed(recorded: Recorded, path: Path, road: Path | None) -> tuple[PlacedTr
             f"y from {tracks.y.min():.1f} to {tracks.y.max():.1f} m",
             path=path,
         )
-    # gaps count from the middle, wherever the offset is measured
-    return replace(placed, along=placed.along + recorded.rear), graph, files
+    return placed, graph, files

@@ -42,8 +42,6 @@ class Recorded:
     ----------
     tracks : Tracks
         x and y are those of the ground below the rear axle where the trace says where that is, else below the middle.
-    rear : array, shape (n,)
-        How far that lies behind the middle. [m]
     lanes, boundaries, logical_lanes, logical_boundaries : dict
         Messages by identifier, as first said.
     hosts : tuple of str
@@ -53,7 +51,6 @@ class Recorded:
     """
 
     tracks: Tracks
-    rear: FloatArray
     lanes: dict[int, Any]
     boundaries: dict[int, Any]
     logical_lanes: dict[int, Any]
@@ -162,13 +159,13 @@ class _Collected:
             raise NotEnoughDataError(f"{self.path}: no vehicle in two of {self.messages} messages")
         step = float(np.median(np.diff(rows[:, 1])[same]))
         vehicle, names = self._split(rows, same, step, notes)
-        tracks, rear = self._tracks(rows, vehicle, names, step)
+        tracks = self._tracks(rows, vehicle, names, step)
         hosts = tuple(self.names.get(host, str(host)) for host in self.hosts)
         if len(hosts) > 1:
             notes.append(f"several host vehicles: {', '.join(hosts)}")
         numbers = {name: str(number) for number, name in self.names.items()}
         things = self.lanes, self.boundaries, self.logical_lanes, self.logical_boundaries
-        return Recorded(tracks, rear, *things, hosts, numbers, notes)
+        return Recorded(tracks, *things, hosts, numbers, notes)
 
     def _split(
         self, rows: FloatArray, same: NDArray[np.bool_], step: float, notes: list[str]
@@ -188,14 +185,14 @@ class _Collected:
             notes.append(f"{int(leaps.sum())} leaps of a vehicle: another one from there on (NAME#2 ...)")
         return vehicle, names
 
-    def _tracks(self, rows: FloatArray, vehicle: IntArray, names: list[str], step: float) -> tuple[Tracks, FloatArray]:
+    def _tracks(self, rows: FloatArray, vehicle: IntArray, names: list[str], step: float) -> Tracks:
         _, time, x, y, yaw, speed, length, pitch, roll, *rear = rows.T
         kinds = np.array([self.kinds[int(number)] for number in rows[:, 0]])
         usual = np.array([USUAL_LENGTH.get(kind, 4.6) for kind in kinds])
         heading = np.where(np.isfinite(yaw), yaw, travel_heading(x, y, vehicle, step))
         speed = np.where(np.isfinite(speed), speed, ground_speed(x, y, vehicle, step))
         arm = sum(part[:, None] * axis for part, axis in zip(rear, axes(heading, pitch, roll), strict=True))
-        tracks = Tracks(
+        return Tracks(
             tuple(names),
             vehicle,
             time - float(time.min()),
@@ -206,5 +203,5 @@ class _Collected:
             speed,
             np.where(np.isfinite(length), length, usual),
             kinds,
+            rear=-rear[0] if rear[0].any() else None,
         )
-        return tracks, -rear[0]
