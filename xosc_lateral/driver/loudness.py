@@ -13,7 +13,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.rounding import rounded_number
+from xosc_lateral.digits import all_significant
 from xosc_lateral.driver.effects import Acts, Zones
 from xosc_lateral.driver.quick import BORDER, quick_part
 from xosc_lateral.driver.zone_levels import Passages, zone_levels
@@ -61,7 +61,7 @@ def quick_by_zone(runs: Sequence[Run], beside: Callable[[Run], FloatArray]) -> l
     if found is None:
         return []
     # Of the logarithm of power, which is twice that of size.
-    values, errors = (tuple(map(rounded_number, (0.5 * part).tolist())) for part in (found.values, found.errors))
+    values, errors = (all_significant((0.5 * part).tolist(), 6) for part in (found.values, found.errors))
     return [
         Zones(
             acts=Acts.QUICK,

@@ -14,7 +14,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.rounding import rounded_number
 from xosc_lateral.digits import all_significant
 from xosc_lateral.driver.effects import Acts, ColumnEffect, Levels, Linear, Piecewise, Proximity
 from xosc_lateral.driver.loudness import quick_by_zone
@@ -39,6 +38,9 @@ WITHIN = (0.05, 0.95)
 
 RIGHTMOST = 0.0
 """Lane index with a level of its own; overtaking lanes share another."""
+
+DIGITS = 6
+"""Significant digits kept of effects: what differs beyond is the processor's rounding. [-]"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -234,7 +236,7 @@ def _regressed(observed: FloatArray, quantities: FloatArray, drive: NDArray[np.i
 def _effect(shape: ColumnEffect, acts: Acts, slope: float, error: float, reference: float) -> ColumnEffect:
     from msgspec.structs import replace as with_fields
 
-    slope, error, reference = (rounded_number(value) for value in (slope, error, reference))
+    slope, error, reference = all_significant((slope, error, reference), DIGITS)
     if isinstance(shape, Proximity):
         reference = 0.0  # nobody there
     if not isinstance(shape, Piecewise):
