@@ -40,7 +40,7 @@ def cut(values: np.ndarray) -> list[np.ndarray]:
 
 
 def same(one: EffectTerms, other: EffectTerms) -> None:
-    for name in ("location", "spread", "rate", "fine", "quick"):
+    for name in ("location", "spread", "rate", "fine"):
         a, b = getattr(one, name), getattr(other, name)
         assert (a is None) == (b is None)
         if a is not None:
@@ -48,7 +48,7 @@ def same(one: EffectTerms, other: EffectTerms) -> None:
 
 
 def joined(parts: list[EffectTerms]) -> EffectTerms:
-    columns = ([getattr(part, name) for part in parts] for name in ("location", "spread", "rate", "fine", "quick"))
+    columns = ([getattr(part, name) for part in parts] for name in ("location", "spread", "rate", "fine"))
     return EffectTerms(*(None if own[0] is None else np.concatenate(own) for own in columns))
 
 
