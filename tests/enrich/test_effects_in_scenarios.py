@@ -16,9 +16,9 @@ from xosc_lateral.motion.context import STEERING
 from xosc_lateral.motion.nominal import NominalMotion, PlayedAction
 from xosc_lateral.road.network import RoadNetwork
 from xosc_lateral.scenario import Action, Place
-from xosc_lateral.scenario.actions.environment import EnvironmentAction
 from xosc_lateral.scenario.enums import VehicleCategory
 from xosc_lateral.scenario.environment import Environment, Weather
+from xosc_lateral.scenario.global_actions import EnvironmentAction
 
 PROFILE = Neighbours.PROFILE
 

@@ -24,9 +24,13 @@ from xosc_lateral.formats.openscenario.read import read_scenario
 from xosc_lateral.live.surroundings import OpenDriveRoads, Places
 from xosc_lateral.live.traffic import Moment, Moves, Traffic
 from xosc_lateral.scenario import Scenario
-from xosc_lateral.scenario.actions.lateral import LaneChangeAction, LaneOffsetAction, LateralDistanceAction
-from xosc_lateral.scenario.actions.routing import FollowTrajectoryAction
-from xosc_lateral.scenario.actions.teleport import TeleportAction
+from xosc_lateral.scenario.private_actions import (
+    FollowTrajectoryAction,
+    LaneChangeAction,
+    LaneOffsetAction,
+    LateralDistanceAction,
+    TeleportAction,
+)
 
 LATERAL = (LaneChangeAction, LaneOffsetAction, LateralDistanceAction, FollowTrajectoryAction, TeleportAction)
 """Actions that say where a vehicle is sideways."""

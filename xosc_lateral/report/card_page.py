@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.driver.profile import DriverProfile
-from xosc_lateral.evaluation.movement_summary import DURATION, free_runs, summarise
+from xosc_lateral.evaluation.metrics import DURATION, free_runs, summarise
 from xosc_lateral.evaluation.spectra import Spectrum, spectrum
 from xosc_lateral.formats.profiles import profile_hash
 from xosc_lateral.report.cards import amount, effect_line, provenance_items

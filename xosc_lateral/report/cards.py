@@ -12,7 +12,7 @@ from xosc_lateral.driver.effects import Acts, ColumnEffect, Effect
 from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.driver.provenance import Provenance
 from xosc_lateral.evaluation.lane_keeping import LaneKeeping, keeping_of
-from xosc_lateral.evaluation.movement_summary import DURATION, MovementSummary, summary_of
+from xosc_lateral.evaluation.metrics import DURATION, MovementSummary, summary_of
 from xosc_lateral.formats.library import FIELDS, Entry, facts_of
 from xosc_lateral.formats.profiles import profile_hash
 from xosc_lateral.report.values import format_value

@@ -7,13 +7,12 @@ from math import isfinite
 from typing import Any
 
 from xosc_lateral.driver.profile import DriverProfile
-from xosc_lateral.evaluation.margins import NEAR_MARKING, Margins
+from xosc_lateral.evaluation.lane_keeping import NEAR_MARKING, Margins
 from xosc_lateral.evaluation.metrics import METRICS
 from xosc_lateral.evaluation.parts import PartEvaluation
 from xosc_lateral.evaluation.realism import Realism
 from xosc_lateral.evaluation.record import scores_to_dict
-from xosc_lateral.evaluation.scores import ProfileScores
-from xosc_lateral.evaluation.snippet_scores import SNIPPET, SnippetScores
+from xosc_lateral.evaluation.scores import SNIPPET, ProfileScores, SnippetScores
 from xosc_lateral.formats.profiles import profile_hash
 from xosc_lateral.report import evaluation_figures as figures
 from xosc_lateral.report.realism import (

@@ -5,9 +5,43 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from xosc_lateral.scenario.enums import Priority
+from xosc_lateral.scenario.enums import ConditionEdge, Priority, TriggeringEntitiesRule
 from xosc_lateral.scenario.place import Content, Place
-from xosc_lateral.scenario.trigger import Trigger
+
+
+@dataclass(frozen=True, slots=True)
+class TriggeringEntities:
+    """Whose state a condition looks at; entity selections are already replaced by their members."""
+
+    rule: TriggeringEntitiesRule
+    entity_refs: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Condition:
+    """One condition. `triggering_entities` is None for value conditions. `delay` [s]"""
+
+    name: str
+    delay: float
+    edge: ConditionEdge
+    content: Content
+    triggering_entities: TriggeringEntities | None
+    place: Place
+
+
+@dataclass(frozen=True, slots=True)
+class ConditionGroup:
+    """True when all of its conditions are."""
+
+    conditions: tuple[Condition, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Trigger:
+    """True when one of its groups is. No groups at all: see the player."""
+
+    groups: tuple[ConditionGroup, ...]
+    place: Place
 
 
 @dataclass(frozen=True, slots=True)

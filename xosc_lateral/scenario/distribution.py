@@ -1,15 +1,93 @@
-"""Stochastic logical scenarios: values drawn from distributions."""
+"""Parameter distributions: every combination (deterministic), or drawn (stochastic)."""
 
 from __future__ import annotations
 
+import itertools
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from decimal import Decimal
 from typing import Protocol
 
 import numpy as np
 
-from xosc_lateral.scenario.deterministic import ParameterSet
+from xosc_lateral.scenario.place import Place
+
+ParameterSet = Mapping[str, str]
+
+
+@dataclass(frozen=True, slots=True)
+class ValueSets:
+    """Deterministic: one of these sets of values, in this order."""
+
+    sets: tuple[ParameterSet, ...]
+    place: Place
+
+    def __len__(self) -> int:
+        """How many."""
+        return len(self.sets)
+
+    def __iter__(self) -> Iterator[ParameterSet]:
+        """One after another."""
+        return iter(self.sets)
+
+
+@dataclass(frozen=True, slots=True)
+class SteppedRange:
+    """Deterministic: ``lower, lower + step ...`` up to and including `upper`, in exact decimals as written."""
+
+    parameter: str
+    lower: Decimal
+    upper: Decimal
+    step: Decimal
+    place: Place
+
+    def __len__(self) -> int:
+        """How many values."""
+        return int((self.upper - self.lower) / self.step) + 1 if self.upper >= self.lower else 0
+
+    def __iter__(self) -> Iterator[ParameterSet]:
+        """One value after another."""
+        return ({self.parameter: format(self.lower + index * self.step, "f")} for index in range(len(self)))
+
+
+@dataclass(frozen=True, slots=True)
+class Deterministic:
+    """Every combination of its parts; the part declared first varies slowest."""
+
+    parts: tuple[ValueSets | SteppedRange, ...]
+
+    def __len__(self) -> int:
+        """Number of combinations."""
+        return math.prod(len(part) for part in self.parts)
+
+    def __iter__(self) -> Iterator[ParameterSet]:
+        """One combination after another, made when asked for: there may be millions."""
+        return (_merged(combination) for combination in _product(self.parts))
+
+
+def _product(parts: Sequence[ValueSets | SteppedRange]) -> Iterator[tuple[ParameterSet, ...]]:
+    """`itertools.product` without its copies of every part."""
+    if not all(parts):
+        return
+    rows = [iter(part) for part in parts]
+    chosen = [next(row) for row in rows]
+    while True:
+        yield tuple(chosen)
+        for place in reversed(range(len(parts))):
+            following = next(rows[place], None)
+            if following is not None:
+                chosen[place] = following
+                break
+            rows[place] = iter(parts[place])
+            chosen[place] = next(rows[place])
+        else:
+            return
+
+
+def _merged(sets: Sequence[ParameterSet]) -> ParameterSet:
+    return dict(itertools.chain.from_iterable(values.items() for values in sets))
+
 
 MAX_TRIES = 10_000
 """Draws until a truncated distribution gives up."""

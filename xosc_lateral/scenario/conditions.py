@@ -1,20 +1,107 @@
-"""Conditions on the state of triggering entities. `value` is in the quantity's SI unit."""
+"""Conditions as a file says them: on values, and on entities."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from datetime import datetime
 
 from xosc_lateral.scenario.enums import (
     AngleType,
+    ConditionEdge,
     CoordinateSystem,
     DirectionalDimension,
     EntityCategory,
     RelativeDistanceType,
     RoutingAlgorithm,
     Rule,
+    StoryboardElementState,
+    StoryboardElementType,
 )
 from xosc_lateral.scenario.place import Place
 from xosc_lateral.scenario.position import Position
+from xosc_lateral.scenario.storyboard import Condition, ConditionGroup, Trigger
+
+
+@dataclass(frozen=True, slots=True)
+class ParameterCondition:
+    """`value` is text: numbers are compared as numbers where both are."""
+
+    parameter_ref: str
+    value: str
+    rule: Rule
+    place: Place
+
+
+@dataclass(frozen=True, slots=True)
+class VariableCondition:
+    """`value` is text: numbers are compared as numbers where both are."""
+
+    variable_ref: str
+    value: str
+    rule: Rule
+    place: Place
+
+
+@dataclass(frozen=True, slots=True)
+class SimulationTimeCondition:
+    """[s]"""
+
+    value: float
+    rule: Rule
+    place: Place
+
+
+def at_time(moment: float, name: str, place: Place) -> Trigger:
+    """Trigger of our own that holds from a moment on. [s]"""
+    condition = SimulationTimeCondition(moment, Rule.GREATER_THAN, place)
+    return Trigger((ConditionGroup((Condition(name, 0.0, ConditionEdge.NONE, condition, None, place),)),), place)
+
+
+@dataclass(frozen=True, slots=True)
+class TimeOfDayCondition:
+    """Against the environment's clock."""
+
+    date_time: datetime
+    rule: Rule
+    place: Place
+
+
+@dataclass(frozen=True, slots=True)
+class StoryboardElementStateCondition:
+    """State or transition of a storyboard element; `element_ref` is the trailing part of ``story::act::...::name``."""
+
+    element_type: StoryboardElementType
+    element_ref: str
+    state: StoryboardElementState
+    place: Place
+
+
+@dataclass(frozen=True, slots=True)
+class TrafficSignalCondition:
+    """A signal shows a state."""
+
+    name: str
+    state: str
+    place: Place
+
+
+@dataclass(frozen=True, slots=True)
+class TrafficSignalControllerCondition:
+    """A signal controller is in a phase."""
+
+    controller_ref: str
+    phase: str
+    place: Place
+
+
+@dataclass(frozen=True, slots=True)
+class UserDefinedValueCondition:
+    """A value from outside: never known while playing."""
+
+    name: str
+    value: str
+    rule: Rule
+    place: Place
 
 
 @dataclass(frozen=True, slots=True)
