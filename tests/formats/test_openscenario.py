@@ -26,7 +26,7 @@ from tests.formats.made_scenario import (
 )
 from xosc_lateral.errors import FormatError
 from xosc_lateral.formats.openscenario import read_scenario
-from xosc_lateral.formats.openscenario.references import LEVELS_UP
+from xosc_lateral.formats.openscenario.catalogs import LEVELS_UP
 from xosc_lateral.scenario.conditions import SimulationTimeCondition, TimeHeadwayCondition
 from xosc_lateral.scenario.enums import ConditionEdge, DynamicsShape, Priority, Rule, VehicleCategory
 from xosc_lateral.scenario.place import Unsupported

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.driver.profile import DriverProfile
-from xosc_lateral.enrich.neighbours import Neighbours
+from xosc_lateral.enrich.result import Neighbours
 from xosc_lateral.errors import FormatError, SimulationError
 from xosc_lateral.formats.opendrive import read_opendrive
 from xosc_lateral.formats.openscenario.read import read_scenario
