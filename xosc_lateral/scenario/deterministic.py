@@ -5,16 +5,16 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from decimal import Decimal
+
+from msgspec import Struct
 
 from xosc_lateral.scenario.place import Place
 
 ParameterSet = Mapping[str, str]
 
 
-@dataclass(frozen=True, slots=True)
-class ValueSets:
+class ValueSets(Struct, frozen=True):
     """Deterministic: one of these sets of values, in this order."""
 
     sets: tuple[ParameterSet, ...]
@@ -29,8 +29,7 @@ class ValueSets:
         return iter(self.sets)
 
 
-@dataclass(frozen=True, slots=True)
-class SteppedRange:
+class SteppedRange(Struct, frozen=True):
     """Deterministic: ``lower, lower + step ...`` up to and including `upper`, in exact decimals as written."""
 
     parameter: str
@@ -48,8 +47,7 @@ class SteppedRange:
         return ({self.parameter: format(self.lower + index * self.step, "f")} for index in range(len(self)))
 
 
-@dataclass(frozen=True, slots=True)
-class Deterministic:
+class Deterministic(Struct, frozen=True):
     """Every combination of its parts; the part declared first varies slowest."""
 
     parts: tuple[ValueSets | SteppedRange, ...]

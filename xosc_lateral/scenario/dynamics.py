@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from msgspec import Struct
 
 from xosc_lateral.scenario.enums import DynamicsDimension, DynamicsShape, FollowingMode
 
 
-@dataclass(frozen=True, slots=True)
-class TransitionDynamics:
+class TransitionDynamics(Struct, frozen=True):
     """Shape, dimension and value of a transition; `value` in s, m, or 1/s of the quantity (peak rate)."""
 
     shape: DynamicsShape
@@ -17,8 +16,7 @@ class TransitionDynamics:
     following_mode: FollowingMode = FollowingMode.POSITION
 
 
-@dataclass(frozen=True, slots=True)
-class DynamicConstraints:
+class DynamicConstraints(Struct, frozen=True):
     """Limits of one action; None where the file has none (the performance holds then). [m/s], [m/s2], [m/s3]"""
 
     max_acceleration: float | None = None

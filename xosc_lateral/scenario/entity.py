@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+
+from msgspec import Struct, field
 
 from xosc_lateral.scenario.enums import EntityCategory, VehicleCategory
 from xosc_lateral.scenario.place import Place
 from xosc_lateral.scenario.vehicle import Axles, BoundingBox, Performance
 
 
-@dataclass(frozen=True, slots=True)
-class Controller:
+class Controller(Struct, frozen=True):
     """A controller by name. It is named and reported; playback uses the default driver instead."""
 
     name: str
@@ -21,8 +21,7 @@ class Controller:
     """Name of the ObjectController (1.3), which ActivateControllerAction may refer to."""
 
 
-@dataclass(frozen=True, slots=True)
-class Entity:
+class Entity(Struct, frozen=True):
     """One scenario object.
 
     Parameters

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
+from msgspec import Struct
 
 from xosc_lateral.scenario.deterministic import ParameterSet
 
@@ -23,8 +23,7 @@ class Draw(Protocol):
         ...
 
 
-@dataclass(frozen=True, slots=True)
-class Weighted:
+class Weighted(Struct, frozen=True):
     """Values with weights that need not sum to 1."""
 
     values: tuple[str, ...]
@@ -35,8 +34,7 @@ class Weighted:
         return self.values[_weighted_index(self.weights, rng)]
 
 
-@dataclass(frozen=True, slots=True)
-class Uniform:
+class Uniform(Struct, frozen=True):
     """Evenly between two limits."""
 
     lower: float
@@ -47,8 +45,7 @@ class Uniform:
         return repr(float(rng.uniform(self.lower, self.upper)))
 
 
-@dataclass(frozen=True, slots=True)
-class Histogram:
+class Histogram(Struct, frozen=True):
     """Bins with weights, evenly inside a bin."""
 
     bins: tuple[tuple[float, float], ...]
@@ -60,8 +57,7 @@ class Histogram:
         return repr(float(rng.uniform(lower, upper)))
 
 
-@dataclass(frozen=True, slots=True)
-class Normal:
+class Normal(Struct, frozen=True):
     """Normal, by mean and variance; truncated to the limits by drawing again."""
 
     mean: float
@@ -74,8 +70,7 @@ class Normal:
         return repr(_truncated(lambda: float(rng.normal(self.mean, scale)), self.limits))
 
 
-@dataclass(frozen=True, slots=True)
-class LogNormal:
+class LogNormal(Struct, frozen=True):
     """Log-normal; `mean` and `variance` are those of the parameter itself, not of its logarithm."""
 
     mean: float
@@ -89,8 +84,7 @@ class LogNormal:
         return repr(_truncated(lambda: float(rng.lognormal(centre, math.sqrt(spread))), self.limits))
 
 
-@dataclass(frozen=True, slots=True)
-class Poisson:
+class Poisson(Struct, frozen=True):
     """Poisson; whole numbers."""
 
     mean: float
@@ -105,8 +99,7 @@ class DistributionError(ValueError):
     """No value of the distribution lies inside its limits. The reader adds file and line."""
 
 
-@dataclass(frozen=True, slots=True)
-class Stochastic:
+class Stochastic(Struct, frozen=True):
     """`number_of_test_runs` independent draws; `seed` None: the file has none."""
 
     draws: tuple[tuple[str, Draw], ...]

@@ -2,22 +2,20 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from msgspec import Struct
 
 from xosc_lateral.scenario.enums import ConditionEdge, TriggeringEntitiesRule
 from xosc_lateral.scenario.place import Content, Place
 
 
-@dataclass(frozen=True, slots=True)
-class TriggeringEntities:
+class TriggeringEntities(Struct, frozen=True):
     """Whose state a condition looks at; entity selections are already replaced by their members."""
 
     rule: TriggeringEntitiesRule
     entity_refs: tuple[str, ...]
 
 
-@dataclass(frozen=True, slots=True)
-class Condition:
+class Condition(Struct, frozen=True):
     """One condition. `triggering_entities` is None for value conditions. `delay` [s]"""
 
     name: str
@@ -28,15 +26,13 @@ class Condition:
     place: Place
 
 
-@dataclass(frozen=True, slots=True)
-class ConditionGroup:
+class ConditionGroup(Struct, frozen=True):
     """True when all of its conditions are."""
 
     conditions: tuple[Condition, ...]
 
 
-@dataclass(frozen=True, slots=True)
-class Trigger:
+class Trigger(Struct, frozen=True):
     """True when one of its groups is. No groups at all: see the player."""
 
     groups: tuple[ConditionGroup, ...]

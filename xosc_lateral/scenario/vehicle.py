@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from msgspec import Struct
 
 
-@dataclass(frozen=True, slots=True)
-class BoundingBox:
+class BoundingBox(Struct, frozen=True):
     """Box around the entity; its centre in the entity's frame (x ahead of the reference point, y left, z up). [m]"""
 
     center_x: float
@@ -17,8 +16,7 @@ class BoundingBox:
     height: float
 
 
-@dataclass(frozen=True, slots=True)
-class Performance:
+class Performance(Struct, frozen=True):
     """Limits of a vehicle; infinite where the file has none. [m/s], [m/s2], [m/s3]"""
 
     max_speed: float = float("inf")
@@ -28,8 +26,7 @@ class Performance:
     max_deceleration_rate: float = float("inf")
 
 
-@dataclass(frozen=True, slots=True)
-class Axle:
+class Axle(Struct, frozen=True):
     """An axle; `position_x` ahead of the reference point. [m], [rad]"""
 
     max_steering: float
@@ -39,8 +36,7 @@ class Axle:
     wheel_diameter: float
 
 
-@dataclass(frozen=True, slots=True)
-class Axles:
+class Axles(Struct, frozen=True):
     """Front (a trailer may have none), rear and further axles."""
 
     front: Axle | None

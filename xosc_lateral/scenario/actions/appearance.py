@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from msgspec import Struct
 
 from xosc_lateral.scenario.place import Place
 
 
-@dataclass(frozen=True, slots=True)
-class VisibilityAction:
+class VisibilityAction(Struct, frozen=True):
     """Seen by graphics, sensors, other traffic."""
 
     graphics: bool
@@ -17,8 +16,7 @@ class VisibilityAction:
     place: Place
 
 
-@dataclass(frozen=True, slots=True)
-class LightStateAction:
+class LightStateAction(Struct, frozen=True):
     """A light goes on, off, or flashes."""
 
     light: str
@@ -27,8 +25,7 @@ class LightStateAction:
     transition_time: float = 0.0
 
 
-@dataclass(frozen=True, slots=True)
-class AnimationAction:
+class AnimationAction(Struct, frozen=True):
     """A component or a pedestrian is animated; `duration` [s]."""
 
     kind: str

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from msgspec import Struct
 
 from xosc_lateral.scenario.entity import Controller
 from xosc_lateral.scenario.place import Place
 
 
-@dataclass(frozen=True, slots=True)
-class AssignControllerAction:
+class AssignControllerAction(Struct, frozen=True):
     """Assign, and perhaps activate on a domain (None: not said)."""
 
     controller: Controller | None
@@ -18,8 +17,7 @@ class AssignControllerAction:
     activate_longitudinal: bool | None = None
 
 
-@dataclass(frozen=True, slots=True)
-class ActivateControllerAction:
+class ActivateControllerAction(Struct, frozen=True):
     """Activate or deactivate on a domain (None: unchanged)."""
 
     place: Place
@@ -28,8 +26,7 @@ class ActivateControllerAction:
     controller_ref: str | None = None
 
 
-@dataclass(frozen=True, slots=True)
-class OverrideControllerValueAction:
+class OverrideControllerValueAction(Struct, frozen=True):
     """Pedals, gear, steering wheel; `overrides` holds their names and values."""
 
     overrides: tuple[tuple[str, bool, float | None], ...]

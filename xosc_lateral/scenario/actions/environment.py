@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from msgspec import Struct
 
 from xosc_lateral.scenario.environment import Environment
 from xosc_lateral.scenario.place import Place
 
 
-@dataclass(frozen=True, slots=True)
-class EnvironmentAction:
+class EnvironmentAction(Struct, frozen=True):
     """Set the environment; parts that are None stay as they are."""
 
     environment: Environment

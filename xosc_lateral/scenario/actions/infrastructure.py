@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from msgspec import Struct
 
 from xosc_lateral.scenario.place import Place
 
 
-@dataclass(frozen=True, slots=True)
-class TrafficSignalStateAction:
+class TrafficSignalStateAction(Struct, frozen=True):
     """One signal gets a state."""
 
     name: str
@@ -16,8 +15,7 @@ class TrafficSignalStateAction:
     place: Place
 
 
-@dataclass(frozen=True, slots=True)
-class TrafficSignalControllerAction:
+class TrafficSignalControllerAction(Struct, frozen=True):
     """A signal controller goes to a phase."""
 
     controller_ref: str

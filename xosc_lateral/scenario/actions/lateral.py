@@ -2,30 +2,27 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from msgspec import Struct
 
 from xosc_lateral.scenario.dynamics import DynamicConstraints, TransitionDynamics
 from xosc_lateral.scenario.enums import CoordinateSystem, DynamicsShape, LateralDisplacement
 from xosc_lateral.scenario.place import Place
 
 
-@dataclass(frozen=True, slots=True)
-class AbsoluteTargetLane:
+class AbsoluteTargetLane(Struct, frozen=True):
     """By lane id."""
 
     lane_id: int
 
 
-@dataclass(frozen=True, slots=True)
-class RelativeTargetLane:
+class RelativeTargetLane(Struct, frozen=True):
     """`value` lanes from an entity's lane."""
 
     entity_ref: str
     value: int
 
 
-@dataclass(frozen=True, slots=True)
-class LaneChangeAction:
+class LaneChangeAction(Struct, frozen=True):
     """Change to a lane; `target_lane_offset` along +t. [m]"""
 
     target: AbsoluteTargetLane | RelativeTargetLane
@@ -34,23 +31,20 @@ class LaneChangeAction:
     target_lane_offset: float = 0.0
 
 
-@dataclass(frozen=True, slots=True)
-class AbsoluteTargetLaneOffset:
+class AbsoluteTargetLaneOffset(Struct, frozen=True):
     """Along +t from the lane's centre. [m]"""
 
     value: float
 
 
-@dataclass(frozen=True, slots=True)
-class RelativeTargetLaneOffset:
+class RelativeTargetLaneOffset(Struct, frozen=True):
     """Along +t from an entity's position. [m]"""
 
     entity_ref: str
     value: float
 
 
-@dataclass(frozen=True, slots=True)
-class LaneOffsetAction:
+class LaneOffsetAction(Struct, frozen=True):
     """Move inside the lane; `max_lateral_acc` None: as fast as can be (DESIGN: the player's default). [m/s2]"""
 
     target: AbsoluteTargetLaneOffset | RelativeTargetLaneOffset
@@ -60,8 +54,7 @@ class LaneOffsetAction:
     max_lateral_acc: float | None = None
 
 
-@dataclass(frozen=True, slots=True)
-class LateralDistanceAction:
+class LateralDistanceAction(Struct, frozen=True):
     """Keep a lateral distance [m] to an entity; `distance` None: the present one."""
 
     entity_ref: str

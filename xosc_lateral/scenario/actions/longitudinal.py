@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from msgspec import Struct
 
 from xosc_lateral.scenario.dynamics import DynamicConstraints, TransitionDynamics
 from xosc_lateral.scenario.enums import (
@@ -14,15 +14,13 @@ from xosc_lateral.scenario.enums import (
 from xosc_lateral.scenario.place import Place
 
 
-@dataclass(frozen=True, slots=True)
-class AbsoluteTargetSpeed:
+class AbsoluteTargetSpeed(Struct, frozen=True):
     """[m/s]"""
 
     value: float
 
 
-@dataclass(frozen=True, slots=True)
-class RelativeTargetSpeed:
+class RelativeTargetSpeed(Struct, frozen=True):
     """From an entity's speed: plus `value` [m/s] or times `value` [-]; `continuous`: for ever."""
 
     entity_ref: str
@@ -31,8 +29,7 @@ class RelativeTargetSpeed:
     continuous: bool
 
 
-@dataclass(frozen=True, slots=True)
-class SpeedAction:
+class SpeedAction(Struct, frozen=True):
     """Go to a speed."""
 
     target: AbsoluteTargetSpeed | RelativeTargetSpeed
@@ -40,16 +37,14 @@ class SpeedAction:
     place: Place
 
 
-@dataclass(frozen=True, slots=True)
-class SpeedProfileEntry:
+class SpeedProfileEntry(Struct, frozen=True):
     """A speed [m/s] and the time since the entry before [s]; None: as fast as the constraints allow."""
 
     speed: float
     time: float | None
 
 
-@dataclass(frozen=True, slots=True)
-class SpeedProfileAction:
+class SpeedProfileAction(Struct, frozen=True):
     """Speeds over time; with `entity_ref`, relative to that entity's speed."""
 
     entries: tuple[SpeedProfileEntry, ...]
@@ -59,8 +54,7 @@ class SpeedProfileAction:
     constraints: DynamicConstraints | None = None
 
 
-@dataclass(frozen=True, slots=True)
-class LongitudinalDistanceAction:
+class LongitudinalDistanceAction(Struct, frozen=True):
     """Keep a distance [m] or time gap [s] to an entity; both None: the present distance."""
 
     entity_ref: str

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from msgspec import Struct
 
 from xosc_lateral.scenario.place import Place
 from xosc_lateral.scenario.position import Position
 
 
-@dataclass(frozen=True, slots=True)
-class AddEntityAction:
+class AddEntityAction(Struct, frozen=True):
     """The entity appears."""
 
     entity_ref: str
@@ -17,16 +16,14 @@ class AddEntityAction:
     place: Place
 
 
-@dataclass(frozen=True, slots=True)
-class DeleteEntityAction:
+class DeleteEntityAction(Struct, frozen=True):
     """The entity is gone."""
 
     entity_ref: str
     place: Place
 
 
-@dataclass(frozen=True, slots=True)
-class TrafficAction:
+class TrafficAction(Struct, frozen=True):
     """Traffic source, sink, swarm, area, stop: kept and named, not played: its cars are the tool's own."""
 
     kind: str

@@ -2,31 +2,28 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from msgspec import Struct
 
 from xosc_lateral.scenario.enums import FollowingMode
 from xosc_lateral.scenario.place import Place
 from xosc_lateral.scenario.position import Position, Route, Timing, Trajectory
 
 
-@dataclass(frozen=True, slots=True)
-class AssignRouteAction:
+class AssignRouteAction(Struct, frozen=True):
     """Take this route at junctions."""
 
     route: Route
     place: Place
 
 
-@dataclass(frozen=True, slots=True)
-class AcquirePositionAction:
+class AcquirePositionAction(Struct, frozen=True):
     """Take the route from here to there."""
 
     position: Position
     place: Place
 
 
-@dataclass(frozen=True, slots=True)
-class FollowTrajectoryAction:
+class FollowTrajectoryAction(Struct, frozen=True):
     """Follow a path; `timing` None: with the entity's own speed. `initial_distance_offset` [m]"""
 
     trajectory: Trajectory

@@ -2,31 +2,28 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from msgspec import Struct
 
 from xosc_lateral.scenario.enums import SpeedTargetValueType
 from xosc_lateral.scenario.place import Place
 from xosc_lateral.scenario.position import Position
 
 
-@dataclass(frozen=True, slots=True)
-class SteadyState:
+class SteadyState(Struct, frozen=True):
     """The final speed holds for this `distance` [m] or `time` [s] before the target (one of them)."""
 
     distance: float | None = None
     time: float | None = None
 
 
-@dataclass(frozen=True, slots=True)
-class AbsoluteSpeed:
+class AbsoluteSpeed(Struct, frozen=True):
     """[m/s]"""
 
     value: float
     steady_state: SteadyState | None = None
 
 
-@dataclass(frozen=True, slots=True)
-class RelativeSpeedToMaster:
+class RelativeSpeedToMaster(Struct, frozen=True):
     """From the master's speed: plus `value` [m/s] or times `value` [-]."""
 
     value: float
@@ -34,8 +31,7 @@ class RelativeSpeedToMaster:
     steady_state: SteadyState | None = None
 
 
-@dataclass(frozen=True, slots=True)
-class SynchronizeAction:
+class SynchronizeAction(Struct, frozen=True):
     """Tolerances None: not said. [m]"""
 
     master_entity_ref: str

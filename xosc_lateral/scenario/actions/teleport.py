@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from msgspec import Struct
 
 from xosc_lateral.scenario.place import Place
 from xosc_lateral.scenario.position import Position
 
 
-@dataclass(frozen=True, slots=True)
-class TeleportAction:
+class TeleportAction(Struct, frozen=True):
     """At once."""
 
     position: Position

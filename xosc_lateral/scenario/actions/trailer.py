@@ -2,21 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from msgspec import Struct
 
 from xosc_lateral.scenario.place import Place
 
 
-@dataclass(frozen=True, slots=True)
-class ConnectTrailerAction:
+class ConnectTrailerAction(Struct, frozen=True):
     """Hitch that entity."""
 
     trailer_ref: str
     place: Place
 
 
-@dataclass(frozen=True, slots=True)
-class DisconnectTrailerAction:
+class DisconnectTrailerAction(Struct, frozen=True):
     """Leave it where it is."""
 
     place: Place

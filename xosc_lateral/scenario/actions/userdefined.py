@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from msgspec import Struct
 
 from xosc_lateral.scenario.place import Place
 
 
-@dataclass(frozen=True, slots=True)
-class UserDefinedAction:
+class UserDefinedAction(Struct, frozen=True):
     """`type` and the text of a CustomCommandAction."""
 
     type: str

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from enum import StrEnum
+
+from msgspec import Struct
 
 from xosc_lateral.scenario.place import Place
 
@@ -15,8 +16,7 @@ class ModifyOperation(StrEnum):
     MULTIPLY = "MultiplyByValue"
 
 
-@dataclass(frozen=True, slots=True)
-class ParameterSetAction:
+class ParameterSetAction(Struct, frozen=True):
     """The parameter gets this value."""
 
     parameter_ref: str
@@ -24,8 +24,7 @@ class ParameterSetAction:
     place: Place
 
 
-@dataclass(frozen=True, slots=True)
-class ParameterModifyAction:
+class ParameterModifyAction(Struct, frozen=True):
     """The parameter's number is changed."""
 
     parameter_ref: str
@@ -34,8 +33,7 @@ class ParameterModifyAction:
     place: Place
 
 
-@dataclass(frozen=True, slots=True)
-class VariableSetAction:
+class VariableSetAction(Struct, frozen=True):
     """The variable gets this value."""
 
     variable_ref: str
@@ -43,8 +41,7 @@ class VariableSetAction:
     place: Place
 
 
-@dataclass(frozen=True, slots=True)
-class VariableModifyAction:
+class VariableModifyAction(Struct, frozen=True):
     """The variable's number is changed."""
 
     variable_ref: str
@@ -53,8 +50,7 @@ class VariableModifyAction:
     place: Place
 
 
-@dataclass(frozen=True, slots=True)
-class SetMonitorAction:
+class SetMonitorAction(Struct, frozen=True):
     """A monitor is set (1.3); nothing in playback reads it."""
 
     monitor_ref: str

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from datetime import datetime
+
+from msgspec import Struct
 
 from xosc_lateral.scenario.enums import ConditionEdge, Rule, StoryboardElementState, StoryboardElementType
 from xosc_lateral.scenario.place import Place
 from xosc_lateral.scenario.trigger import Condition, ConditionGroup, Trigger
 
 
-@dataclass(frozen=True, slots=True)
-class ParameterCondition:
+class ParameterCondition(Struct, frozen=True):
     """`value` is text: numbers are compared as numbers where both are."""
 
     parameter_ref: str
@@ -20,8 +20,7 @@ class ParameterCondition:
     place: Place
 
 
-@dataclass(frozen=True, slots=True)
-class VariableCondition:
+class VariableCondition(Struct, frozen=True):
     """`value` is text: numbers are compared as numbers where both are."""
 
     variable_ref: str
@@ -30,8 +29,7 @@ class VariableCondition:
     place: Place
 
 
-@dataclass(frozen=True, slots=True)
-class SimulationTimeCondition:
+class SimulationTimeCondition(Struct, frozen=True):
     """[s]"""
 
     value: float
@@ -45,8 +43,7 @@ def at_time(moment: float, name: str, place: Place) -> Trigger:
     return Trigger((ConditionGroup((Condition(name, 0.0, ConditionEdge.NONE, condition, None, place),)),), place)
 
 
-@dataclass(frozen=True, slots=True)
-class TimeOfDayCondition:
+class TimeOfDayCondition(Struct, frozen=True):
     """Against the environment's clock."""
 
     date_time: datetime
@@ -54,8 +51,7 @@ class TimeOfDayCondition:
     place: Place
 
 
-@dataclass(frozen=True, slots=True)
-class StoryboardElementStateCondition:
+class StoryboardElementStateCondition(Struct, frozen=True):
     """State or transition of a storyboard element; `element_ref` is the trailing part of ``story::act::...::name``."""
 
     element_type: StoryboardElementType
@@ -64,8 +60,7 @@ class StoryboardElementStateCondition:
     place: Place
 
 
-@dataclass(frozen=True, slots=True)
-class TrafficSignalCondition:
+class TrafficSignalCondition(Struct, frozen=True):
     """A signal shows a state."""
 
     name: str
@@ -73,8 +68,7 @@ class TrafficSignalCondition:
     place: Place
 
 
-@dataclass(frozen=True, slots=True)
-class TrafficSignalControllerCondition:
+class TrafficSignalControllerCondition(Struct, frozen=True):
     """A signal controller is in a phase."""
 
     controller_ref: str
@@ -82,8 +76,7 @@ class TrafficSignalControllerCondition:
     place: Place
 
 
-@dataclass(frozen=True, slots=True)
-class UserDefinedValueCondition:
+class UserDefinedValueCondition(Struct, frozen=True):
     """A value from outside: never known while playing."""
 
     name: str
