@@ -11,6 +11,8 @@ from dataclasses import replace
 from functools import lru_cache
 from math import inf
 
+from msgspec import structs
+
 from xosc_lateral.formats.openscenario.write.replaced_maneuvers import replaced_groups
 from xosc_lateral.motion.nominal import NominalMotion
 from xosc_lateral.pipeline.load import Played
@@ -106,7 +108,7 @@ def with_speeds(scenario: Scenario, motion: NominalMotion, egos: Collection[str]
             actors = Actors((entity.name,), False, place)
             groups.append(ManeuverGroup(name, actors, (Maneuver(name, (event,), place),), place))
     story = Story(STORY, (Act(STORY, tuple(groups), None, None, place),), place)
-    storyboard = replace(scenario.storyboard, stories=(*scenario.storyboard.stories, story))
+    storyboard = structs.replace(scenario.storyboard, stories=(*scenario.storyboard.stories, story))
     return replace(scenario, storyboard=storyboard)
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from msgspec import Struct
+
 from dataclasses import dataclass
 from datetime import datetime
 
@@ -22,8 +24,7 @@ from xosc_lateral.scenario.position import Position
 from xosc_lateral.scenario.storyboard import Condition, ConditionGroup, Trigger
 
 
-@dataclass(frozen=True, slots=True)
-class ParameterCondition:
+class ParameterCondition(Struct, frozen=True):
     """`value` is text: numbers are compared as numbers where both are."""
 
     parameter_ref: str
@@ -32,8 +33,7 @@ class ParameterCondition:
     place: Place
 
 
-@dataclass(frozen=True, slots=True)
-class VariableCondition:
+class VariableCondition(Struct, frozen=True):
     """`value` is text: numbers are compared as numbers where both are."""
 
     variable_ref: str
@@ -42,8 +42,7 @@ class VariableCondition:
     place: Place
 
 
-@dataclass(frozen=True, slots=True)
-class SimulationTimeCondition:
+class SimulationTimeCondition(Struct, frozen=True):
     """[s]"""
 
     value: float
@@ -57,8 +56,7 @@ def at_time(moment: float, name: str, place: Place) -> Trigger:
     return Trigger((ConditionGroup((Condition(name, 0.0, ConditionEdge.NONE, condition, None, place),)),), place)
 
 
-@dataclass(frozen=True, slots=True)
-class TimeOfDayCondition:
+class TimeOfDayCondition(Struct, frozen=True):
     """Against the environment's clock."""
 
     date_time: datetime
@@ -66,8 +64,7 @@ class TimeOfDayCondition:
     place: Place
 
 
-@dataclass(frozen=True, slots=True)
-class StoryboardElementStateCondition:
+class StoryboardElementStateCondition(Struct, frozen=True):
     """State or transition of a storyboard element; `element_ref` is the trailing part of ``story::act::...::name``."""
 
     element_type: StoryboardElementType
@@ -76,8 +73,7 @@ class StoryboardElementStateCondition:
     place: Place
 
 
-@dataclass(frozen=True, slots=True)
-class TrafficSignalCondition:
+class TrafficSignalCondition(Struct, frozen=True):
     """A signal shows a state."""
 
     name: str
@@ -85,8 +81,7 @@ class TrafficSignalCondition:
     place: Place
 
 
-@dataclass(frozen=True, slots=True)
-class TrafficSignalControllerCondition:
+class TrafficSignalControllerCondition(Struct, frozen=True):
     """A signal controller is in a phase."""
 
     controller_ref: str
@@ -94,8 +89,7 @@ class TrafficSignalControllerCondition:
     place: Place
 
 
-@dataclass(frozen=True, slots=True)
-class UserDefinedValueCondition:
+class UserDefinedValueCondition(Struct, frozen=True):
     """A value from outside: never known while playing."""
 
     name: str
@@ -104,16 +98,14 @@ class UserDefinedValueCondition:
     place: Place
 
 
-@dataclass(frozen=True, slots=True)
-class EndOfRoadCondition:
+class EndOfRoadCondition(Struct, frozen=True):
     """At the end of its road for this long. [s]"""
 
     duration: float
     place: Place
 
 
-@dataclass(frozen=True, slots=True)
-class CollisionCondition:
+class CollisionCondition(Struct, frozen=True):
     """Touches that entity, or any of that category."""
 
     place: Place
@@ -121,16 +113,14 @@ class CollisionCondition:
     by_type: EntityCategory | None = None
 
 
-@dataclass(frozen=True, slots=True)
-class OffroadCondition:
+class OffroadCondition(Struct, frozen=True):
     """Off the road for this long. [s]"""
 
     duration: float
     place: Place
 
 
-@dataclass(frozen=True, slots=True)
-class TimeHeadwayCondition:
+class TimeHeadwayCondition(Struct, frozen=True):
     """Distance to an entity over own speed. [s] `along_route` (1.0) None: not said."""
 
     entity_ref: str
@@ -144,8 +134,7 @@ class TimeHeadwayCondition:
     routing_algorithm: RoutingAlgorithm | None = None
 
 
-@dataclass(frozen=True, slots=True)
-class TimeToCollisionCondition:
+class TimeToCollisionCondition(Struct, frozen=True):
     """Distance to an entity or position over closing speed. [s]"""
 
     target: str | Position
@@ -159,8 +148,7 @@ class TimeToCollisionCondition:
     routing_algorithm: RoutingAlgorithm | None = None
 
 
-@dataclass(frozen=True, slots=True)
-class AccelerationCondition:
+class AccelerationCondition(Struct, frozen=True):
     """[m/s2]; `direction` None: the magnitude."""
 
     value: float
@@ -169,16 +157,14 @@ class AccelerationCondition:
     direction: DirectionalDimension | None = None
 
 
-@dataclass(frozen=True, slots=True)
-class StandStillCondition:
+class StandStillCondition(Struct, frozen=True):
     """Stands for this long. [s]"""
 
     duration: float
     place: Place
 
 
-@dataclass(frozen=True, slots=True)
-class SpeedCondition:
+class SpeedCondition(Struct, frozen=True):
     """[m/s]; `direction` None: the scalar speed."""
 
     value: float
@@ -187,8 +173,7 @@ class SpeedCondition:
     direction: DirectionalDimension | None = None
 
 
-@dataclass(frozen=True, slots=True)
-class RelativeSpeedCondition:
+class RelativeSpeedCondition(Struct, frozen=True):
     """Own speed minus that of an entity. [m/s]"""
 
     entity_ref: str
@@ -198,16 +183,14 @@ class RelativeSpeedCondition:
     direction: DirectionalDimension | None = None
 
 
-@dataclass(frozen=True, slots=True)
-class TraveledDistanceCondition:
+class TraveledDistanceCondition(Struct, frozen=True):
     """Since the scenario's start. [m]"""
 
     value: float
     place: Place
 
 
-@dataclass(frozen=True, slots=True)
-class ReachPositionCondition:
+class ReachPositionCondition(Struct, frozen=True):
     """Within `tolerance` of a position. [m]"""
 
     position: Position
@@ -215,8 +198,7 @@ class ReachPositionCondition:
     place: Place
 
 
-@dataclass(frozen=True, slots=True)
-class DistanceCondition:
+class DistanceCondition(Struct, frozen=True):
     """Distance to a position. [m]"""
 
     position: Position
@@ -230,8 +212,7 @@ class DistanceCondition:
     routing_algorithm: RoutingAlgorithm | None = None
 
 
-@dataclass(frozen=True, slots=True)
-class RelativeDistanceCondition:
+class RelativeDistanceCondition(Struct, frozen=True):
     """Distance to an entity. [m]"""
 
     entity_ref: str
@@ -244,16 +225,14 @@ class RelativeDistanceCondition:
     routing_algorithm: RoutingAlgorithm | None = None
 
 
-@dataclass(frozen=True, slots=True)
-class RelativeLaneRange:
+class RelativeLaneRange(Struct, frozen=True):
     """Lanes `from_lane` to `to_lane`, relative to the own one; None: open."""
 
     from_lane: int | None
     to_lane: int | None
 
 
-@dataclass(frozen=True, slots=True)
-class RelativeClearanceCondition:
+class RelativeClearanceCondition(Struct, frozen=True):
     """Nobody (of `entity_refs`, or at all when empty) in these lanes within these distances. [m]"""
 
     opposite_lanes: bool
@@ -265,8 +244,7 @@ class RelativeClearanceCondition:
     entity_refs: tuple[str, ...] = ()
 
 
-@dataclass(frozen=True, slots=True)
-class AngleCondition:
+class AngleCondition(Struct, frozen=True):
     """Own angle within a tolerance. [rad]"""
 
     angle_type: AngleType
@@ -276,8 +254,7 @@ class AngleCondition:
     coordinate_system: CoordinateSystem | None = None
 
 
-@dataclass(frozen=True, slots=True)
-class RelativeAngleCondition:
+class RelativeAngleCondition(Struct, frozen=True):
     """Angle relative to an entity's within a tolerance. [rad]"""
 
     entity_ref: str

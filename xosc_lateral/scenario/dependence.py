@@ -8,7 +8,8 @@ event that moves it or an action that refers to somebody. In doubt a thing depen
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator
-from dataclasses import dataclass, field, fields, is_dataclass
+from dataclasses import dataclass, field
+from msgspec import Struct
 from typing import Any
 
 from xosc_lateral.scenario.conditions import (
@@ -23,7 +24,6 @@ from xosc_lateral.scenario.conditions import (
 )
 from xosc_lateral.scenario.enums import StoryboardElementState, StoryboardElementType
 from xosc_lateral.scenario.global_actions import TrafficSignalControllerAction, TrafficSignalStateAction
-from xosc_lateral.scenario.place import Place
 from xosc_lateral.scenario.private_actions import AnimationAction, LightStateAction, TeleportAction, VisibilityAction
 from xosc_lateral.scenario.scenario import Scenario
 from xosc_lateral.scenario.storyboard import Act, Condition, Event, ManeuverGroup, Trigger
@@ -118,15 +118,15 @@ def entity_references(content: object) -> Iterator[str]:
     if isinstance(content, tuple):
         for item in content:
             yield from entity_references(item)
-    elif is_dataclass(content) and not isinstance(content, Place):
-        for part in fields(content):
-            value: Any = getattr(content, part.name)
+    elif isinstance(content, Struct):
+        for name in content.__struct_fields__:
+            value: Any = getattr(content, name)
             # A time to collision has an entity's name or a position.
-            if isinstance(value, str) and (part.name in _REFERENCES or part.name == "target"):
+            if isinstance(value, str) and (name in _REFERENCES or name == "target"):
                 yield value
-            elif part.name in _REFERENCES and isinstance(value, tuple):
+            elif name in _REFERENCES and isinstance(value, tuple):
                 yield from value
-            elif part.name != "properties":
+            elif name != "properties":
                 yield from entity_references(value)
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from msgspec import Struct
+
 import itertools
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -16,8 +18,7 @@ from xosc_lateral.scenario.place import Place
 ParameterSet = Mapping[str, str]
 
 
-@dataclass(frozen=True, slots=True)
-class ValueSets:
+class ValueSets(Struct, frozen=True):
     """Deterministic: one of these sets of values, in this order."""
 
     sets: tuple[ParameterSet, ...]
@@ -32,8 +33,7 @@ class ValueSets:
         return iter(self.sets)
 
 
-@dataclass(frozen=True, slots=True)
-class SteppedRange:
+class SteppedRange(Struct, frozen=True):
     """Deterministic: ``lower, lower + step ...`` up to and including `upper`, in exact decimals as written."""
 
     parameter: str
@@ -51,8 +51,7 @@ class SteppedRange:
         return ({self.parameter: format(self.lower + index * self.step, "f")} for index in range(len(self)))
 
 
-@dataclass(frozen=True, slots=True)
-class Deterministic:
+class Deterministic(Struct, frozen=True):
     """Every combination of its parts; the part declared first varies slowest."""
 
     parts: tuple[ValueSets | SteppedRange, ...]
@@ -101,8 +100,7 @@ class Draw(Protocol):
         ...
 
 
-@dataclass(frozen=True, slots=True)
-class Weighted:
+class Weighted(Struct, frozen=True):
     """Values with weights that need not sum to 1."""
 
     values: tuple[str, ...]
@@ -113,8 +111,7 @@ class Weighted:
         return self.values[_weighted_index(self.weights, rng)]
 
 
-@dataclass(frozen=True, slots=True)
-class Uniform:
+class Uniform(Struct, frozen=True):
     """Evenly between two limits."""
 
     lower: float
@@ -125,8 +122,7 @@ class Uniform:
         return repr(float(rng.uniform(self.lower, self.upper)))
 
 
-@dataclass(frozen=True, slots=True)
-class Histogram:
+class Histogram(Struct, frozen=True):
     """Bins with weights, evenly inside a bin."""
 
     bins: tuple[tuple[float, float], ...]
@@ -138,8 +134,7 @@ class Histogram:
         return repr(float(rng.uniform(lower, upper)))
 
 
-@dataclass(frozen=True, slots=True)
-class Normal:
+class Normal(Struct, frozen=True):
     """Normal, by mean and variance; truncated to the limits by drawing again."""
 
     mean: float
@@ -152,8 +147,7 @@ class Normal:
         return repr(_truncated(lambda: float(rng.normal(self.mean, scale)), self.limits))
 
 
-@dataclass(frozen=True, slots=True)
-class LogNormal:
+class LogNormal(Struct, frozen=True):
     """Log-normal; `mean` and `variance` are those of the parameter itself, not of its logarithm."""
 
     mean: float
@@ -167,8 +161,7 @@ class LogNormal:
         return repr(_truncated(lambda: float(rng.lognormal(centre, math.sqrt(spread))), self.limits))
 
 
-@dataclass(frozen=True, slots=True)
-class Poisson:
+class Poisson(Struct, frozen=True):
     """Poisson; whole numbers."""
 
     mean: float
@@ -183,8 +176,7 @@ class DistributionError(ValueError):
     """No value of the distribution lies inside its limits. The reader adds file and line."""
 
 
-@dataclass(frozen=True, slots=True)
-class Stochastic:
+class Stochastic(Struct, frozen=True):
     """`number_of_test_runs` independent draws; `seed` None: the file has none."""
 
     draws: tuple[tuple[str, Draw], ...]

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+
+from msgspec import Struct, field, field
 
 from xosc_lateral.scenario.enums import EntityCategory, VehicleCategory
 from xosc_lateral.scenario.place import Place
 
 
-@dataclass(frozen=True, slots=True)
-class BoundingBox:
+class BoundingBox(Struct, frozen=True):
     """Box around the entity; its centre in the entity's frame (x ahead of the reference point, y left, z up). [m]"""
 
     center_x: float
@@ -21,8 +21,7 @@ class BoundingBox:
     height: float
 
 
-@dataclass(frozen=True, slots=True)
-class Performance:
+class Performance(Struct, frozen=True):
     """Limits of a vehicle; infinite where the file has none. [m/s], [m/s2], [m/s3]"""
 
     max_speed: float = float("inf")
@@ -32,8 +31,7 @@ class Performance:
     max_deceleration_rate: float = float("inf")
 
 
-@dataclass(frozen=True, slots=True)
-class Axle:
+class Axle(Struct, frozen=True):
     """An axle; `position_x` ahead of the reference point. [m], [rad]"""
 
     max_steering: float
@@ -43,8 +41,7 @@ class Axle:
     wheel_diameter: float
 
 
-@dataclass(frozen=True, slots=True)
-class Axles:
+class Axles(Struct, frozen=True):
     """Front (a trailer may have none), rear and further axles."""
 
     front: Axle | None
@@ -57,8 +54,7 @@ class Axles:
         return None if self.front is None or self.rear is None else self.front.position_x - self.rear.position_x
 
 
-@dataclass(frozen=True, slots=True)
-class Controller:
+class Controller(Struct, frozen=True):
     """A controller by name. It is named and reported; playback uses the default driver instead."""
 
     name: str
@@ -68,8 +64,7 @@ class Controller:
     """Name of the ObjectController (1.3), which ActivateControllerAction may refer to."""
 
 
-@dataclass(frozen=True, slots=True)
-class Entity:
+class Entity(Struct, frozen=True):
     """One scenario object.
 
     Parameters

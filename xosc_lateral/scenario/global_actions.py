@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from msgspec import Struct
+
 from dataclasses import dataclass
 from enum import StrEnum
 
@@ -10,8 +12,7 @@ from xosc_lateral.scenario.place import Place
 from xosc_lateral.scenario.position import Position
 
 
-@dataclass(frozen=True, slots=True)
-class EnvironmentAction:
+class EnvironmentAction(Struct, frozen=True):
     """Set the environment; parts that are None stay as they are."""
 
     environment: Environment
@@ -25,8 +26,7 @@ class ModifyOperation(StrEnum):
     MULTIPLY = "MultiplyByValue"
 
 
-@dataclass(frozen=True, slots=True)
-class ParameterSetAction:
+class ParameterSetAction(Struct, frozen=True):
     """The parameter gets this value."""
 
     parameter_ref: str
@@ -34,8 +34,7 @@ class ParameterSetAction:
     place: Place
 
 
-@dataclass(frozen=True, slots=True)
-class ParameterModifyAction:
+class ParameterModifyAction(Struct, frozen=True):
     """The parameter's number is changed."""
 
     parameter_ref: str
@@ -44,8 +43,7 @@ class ParameterModifyAction:
     place: Place
 
 
-@dataclass(frozen=True, slots=True)
-class VariableSetAction:
+class VariableSetAction(Struct, frozen=True):
     """The variable gets this value."""
 
     variable_ref: str
@@ -53,8 +51,7 @@ class VariableSetAction:
     place: Place
 
 
-@dataclass(frozen=True, slots=True)
-class VariableModifyAction:
+class VariableModifyAction(Struct, frozen=True):
     """The variable's number is changed."""
 
     variable_ref: str
@@ -63,8 +60,7 @@ class VariableModifyAction:
     place: Place
 
 
-@dataclass(frozen=True, slots=True)
-class SetMonitorAction:
+class SetMonitorAction(Struct, frozen=True):
     """A monitor is set (1.3); nothing in playback reads it."""
 
     monitor_ref: str
@@ -72,8 +68,7 @@ class SetMonitorAction:
     place: Place
 
 
-@dataclass(frozen=True, slots=True)
-class TrafficSignalStateAction:
+class TrafficSignalStateAction(Struct, frozen=True):
     """One signal gets a state."""
 
     name: str
@@ -81,8 +76,7 @@ class TrafficSignalStateAction:
     place: Place
 
 
-@dataclass(frozen=True, slots=True)
-class TrafficSignalControllerAction:
+class TrafficSignalControllerAction(Struct, frozen=True):
     """A signal controller goes to a phase."""
 
     controller_ref: str
@@ -90,8 +84,7 @@ class TrafficSignalControllerAction:
     place: Place
 
 
-@dataclass(frozen=True, slots=True)
-class AddEntityAction:
+class AddEntityAction(Struct, frozen=True):
     """The entity appears."""
 
     entity_ref: str
@@ -99,24 +92,21 @@ class AddEntityAction:
     place: Place
 
 
-@dataclass(frozen=True, slots=True)
-class DeleteEntityAction:
+class DeleteEntityAction(Struct, frozen=True):
     """The entity is gone."""
 
     entity_ref: str
     place: Place
 
 
-@dataclass(frozen=True, slots=True)
-class TrafficAction:
+class TrafficAction(Struct, frozen=True):
     """Traffic source, sink, swarm, area, stop: kept and named, not played: its cars are the tool's own."""
 
     kind: str
     place: Place
 
 
-@dataclass(frozen=True, slots=True)
-class UserDefinedAction:
+class UserDefinedAction(Struct, frozen=True):
     """`type` and the text of a CustomCommandAction."""
 
     type: str

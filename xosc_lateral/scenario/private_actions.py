@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from msgspec import Struct
+
 from dataclasses import dataclass
 
 from xosc_lateral.scenario.entity import Controller
@@ -18,8 +20,7 @@ from xosc_lateral.scenario.place import Place
 from xosc_lateral.scenario.position import Position, Route, Timing, Trajectory
 
 
-@dataclass(frozen=True, slots=True)
-class TransitionDynamics:
+class TransitionDynamics(Struct, frozen=True):
     """Shape, dimension and value of a transition; `value` in s, m, or 1/s of the quantity (peak rate)."""
 
     shape: DynamicsShape
@@ -28,8 +29,7 @@ class TransitionDynamics:
     following_mode: FollowingMode = FollowingMode.POSITION
 
 
-@dataclass(frozen=True, slots=True)
-class DynamicConstraints:
+class DynamicConstraints(Struct, frozen=True):
     """Limits of one action; None where the file has none (the performance holds then). [m/s], [m/s2], [m/s3]"""
 
     max_acceleration: float | None = None
@@ -39,15 +39,13 @@ class DynamicConstraints:
     max_deceleration_rate: float | None = None
 
 
-@dataclass(frozen=True, slots=True)
-class AbsoluteTargetSpeed:
+class AbsoluteTargetSpeed(Struct, frozen=True):
     """[m/s]"""
 
     value: float
 
 
-@dataclass(frozen=True, slots=True)
-class RelativeTargetSpeed:
+class RelativeTargetSpeed(Struct, frozen=True):
     """From an entity's speed: plus `value` [m/s] or times `value` [-]; `continuous`: for ever."""
 
     entity_ref: str
@@ -56,8 +54,7 @@ class RelativeTargetSpeed:
     continuous: bool
 
 
-@dataclass(frozen=True, slots=True)
-class SpeedAction:
+class SpeedAction(Struct, frozen=True):
     """Go to a speed."""
 
     target: AbsoluteTargetSpeed | RelativeTargetSpeed
@@ -65,16 +62,14 @@ class SpeedAction:
     place: Place
 
 
-@dataclass(frozen=True, slots=True)
-class SpeedProfileEntry:
+class SpeedProfileEntry(Struct, frozen=True):
     """A speed [m/s] and the time since the entry before [s]; None: as fast as the constraints allow."""
 
     speed: float
     time: float | None
 
 
-@dataclass(frozen=True, slots=True)
-class SpeedProfileAction:
+class SpeedProfileAction(Struct, frozen=True):
     """Speeds over time; with `entity_ref`, relative to that entity's speed."""
 
     entries: tuple[SpeedProfileEntry, ...]
@@ -84,8 +79,7 @@ class SpeedProfileAction:
     constraints: DynamicConstraints | None = None
 
 
-@dataclass(frozen=True, slots=True)
-class LongitudinalDistanceAction:
+class LongitudinalDistanceAction(Struct, frozen=True):
     """Keep a distance [m] or time gap [s] to an entity; both None: the present distance."""
 
     entity_ref: str
@@ -99,23 +93,20 @@ class LongitudinalDistanceAction:
     constraints: DynamicConstraints | None = None
 
 
-@dataclass(frozen=True, slots=True)
-class AbsoluteTargetLane:
+class AbsoluteTargetLane(Struct, frozen=True):
     """By lane id."""
 
     lane_id: int
 
 
-@dataclass(frozen=True, slots=True)
-class RelativeTargetLane:
+class RelativeTargetLane(Struct, frozen=True):
     """`value` lanes from an entity's lane."""
 
     entity_ref: str
     value: int
 
 
-@dataclass(frozen=True, slots=True)
-class LaneChangeAction:
+class LaneChangeAction(Struct, frozen=True):
     """Change to a lane; `target_lane_offset` along +t. [m]"""
 
     target: AbsoluteTargetLane | RelativeTargetLane
@@ -124,23 +115,20 @@ class LaneChangeAction:
     target_lane_offset: float = 0.0
 
 
-@dataclass(frozen=True, slots=True)
-class AbsoluteTargetLaneOffset:
+class AbsoluteTargetLaneOffset(Struct, frozen=True):
     """Along +t from the lane's centre. [m]"""
 
     value: float
 
 
-@dataclass(frozen=True, slots=True)
-class RelativeTargetLaneOffset:
+class RelativeTargetLaneOffset(Struct, frozen=True):
     """Along +t from an entity's position. [m]"""
 
     entity_ref: str
     value: float
 
 
-@dataclass(frozen=True, slots=True)
-class LaneOffsetAction:
+class LaneOffsetAction(Struct, frozen=True):
     """Move inside the lane; `max_lateral_acc` None: as fast as can be (DESIGN: the player's default). [m/s2]"""
 
     target: AbsoluteTargetLaneOffset | RelativeTargetLaneOffset
@@ -150,8 +138,7 @@ class LaneOffsetAction:
     max_lateral_acc: float | None = None
 
 
-@dataclass(frozen=True, slots=True)
-class LateralDistanceAction:
+class LateralDistanceAction(Struct, frozen=True):
     """Keep a lateral distance [m] to an entity; `distance` None: the present one."""
 
     entity_ref: str
@@ -164,24 +151,21 @@ class LateralDistanceAction:
     constraints: DynamicConstraints | None = None
 
 
-@dataclass(frozen=True, slots=True)
-class SteadyState:
+class SteadyState(Struct, frozen=True):
     """The final speed holds for this `distance` [m] or `time` [s] before the target (one of them)."""
 
     distance: float | None = None
     time: float | None = None
 
 
-@dataclass(frozen=True, slots=True)
-class AbsoluteSpeed:
+class AbsoluteSpeed(Struct, frozen=True):
     """[m/s]"""
 
     value: float
     steady_state: SteadyState | None = None
 
 
-@dataclass(frozen=True, slots=True)
-class RelativeSpeedToMaster:
+class RelativeSpeedToMaster(Struct, frozen=True):
     """From the master's speed: plus `value` [m/s] or times `value` [-]."""
 
     value: float
@@ -189,8 +173,7 @@ class RelativeSpeedToMaster:
     steady_state: SteadyState | None = None
 
 
-@dataclass(frozen=True, slots=True)
-class SynchronizeAction:
+class SynchronizeAction(Struct, frozen=True):
     """Tolerances None: not said. [m]"""
 
     master_entity_ref: str
@@ -202,24 +185,21 @@ class SynchronizeAction:
     target_tolerance: float | None = None
 
 
-@dataclass(frozen=True, slots=True)
-class AssignRouteAction:
+class AssignRouteAction(Struct, frozen=True):
     """Take this route at junctions."""
 
     route: Route
     place: Place
 
 
-@dataclass(frozen=True, slots=True)
-class AcquirePositionAction:
+class AcquirePositionAction(Struct, frozen=True):
     """Take the route from here to there."""
 
     position: Position
     place: Place
 
 
-@dataclass(frozen=True, slots=True)
-class FollowTrajectoryAction:
+class FollowTrajectoryAction(Struct, frozen=True):
     """Follow a path; `timing` None: with the entity's own speed. `initial_distance_offset` [m]"""
 
     trajectory: Trajectory
@@ -229,16 +209,14 @@ class FollowTrajectoryAction:
     initial_distance_offset: float = 0.0
 
 
-@dataclass(frozen=True, slots=True)
-class TeleportAction:
+class TeleportAction(Struct, frozen=True):
     """At once."""
 
     position: Position
     place: Place
 
 
-@dataclass(frozen=True, slots=True)
-class AssignControllerAction:
+class AssignControllerAction(Struct, frozen=True):
     """Assign, and perhaps activate on a domain (None: not said)."""
 
     controller: Controller | None
@@ -247,8 +225,7 @@ class AssignControllerAction:
     activate_longitudinal: bool | None = None
 
 
-@dataclass(frozen=True, slots=True)
-class ActivateControllerAction:
+class ActivateControllerAction(Struct, frozen=True):
     """Activate or deactivate on a domain (None: unchanged)."""
 
     place: Place
@@ -257,31 +234,27 @@ class ActivateControllerAction:
     controller_ref: str | None = None
 
 
-@dataclass(frozen=True, slots=True)
-class OverrideControllerValueAction:
+class OverrideControllerValueAction(Struct, frozen=True):
     """Pedals, gear, steering wheel; `overrides` holds their names and values."""
 
     overrides: tuple[tuple[str, bool, float | None], ...]
     place: Place
 
 
-@dataclass(frozen=True, slots=True)
-class ConnectTrailerAction:
+class ConnectTrailerAction(Struct, frozen=True):
     """Hitch that entity."""
 
     trailer_ref: str
     place: Place
 
 
-@dataclass(frozen=True, slots=True)
-class DisconnectTrailerAction:
+class DisconnectTrailerAction(Struct, frozen=True):
     """Leave it where it is."""
 
     place: Place
 
 
-@dataclass(frozen=True, slots=True)
-class VisibilityAction:
+class VisibilityAction(Struct, frozen=True):
     """Seen by graphics, sensors, other traffic."""
 
     graphics: bool
@@ -290,8 +263,7 @@ class VisibilityAction:
     place: Place
 
 
-@dataclass(frozen=True, slots=True)
-class LightStateAction:
+class LightStateAction(Struct, frozen=True):
     """A light goes on, off, or flashes."""
 
     light: str
@@ -300,8 +272,7 @@ class LightStateAction:
     transition_time: float = 0.0
 
 
-@dataclass(frozen=True, slots=True)
-class AnimationAction:
+class AnimationAction(Struct, frozen=True):
     """A component or a pedestrian is animated; `duration` [s]."""
 
     kind: str

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from msgspec.structs import replace
 
 from xosc_lateral.errors import FormatError, MissingFileError
 from xosc_lateral.formats.openscenario.context import Context
