@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from msgspec import Struct
-
-from dataclasses import dataclass
 from datetime import datetime
+
+from msgspec import Struct
 
 from xosc_lateral.scenario.enums import (
     AngleType,

@@ -9,8 +9,9 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterator
 from dataclasses import dataclass, field
-from msgspec import Struct
 from typing import Any
+
+from msgspec import Struct
 
 from xosc_lateral.scenario.conditions import (
     CollisionCondition,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from msgspec import Struct, field, field
+from msgspec import Struct, field
 
 from xosc_lateral.scenario.enums import EntityCategory, VehicleCategory
 from xosc_lateral.scenario.place import Place

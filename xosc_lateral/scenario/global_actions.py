@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from msgspec import Struct
-
-from dataclasses import dataclass
 from enum import StrEnum
+
+from msgspec import Struct
 
 from xosc_lateral.scenario.environment import Environment
 from xosc_lateral.scenario.place import Place

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from msgspec import Struct
 
-from dataclasses import dataclass
-
 from xosc_lateral.scenario.entity import Controller
 from xosc_lateral.scenario.enums import (
     CoordinateSystem,

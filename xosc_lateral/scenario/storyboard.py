@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from msgspec import Struct
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+
+from msgspec import Struct
 
 from xosc_lateral.scenario.enums import ConditionEdge, Priority, TriggeringEntitiesRule
 from xosc_lateral.scenario.place import Content, Place
