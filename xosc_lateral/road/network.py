@@ -17,7 +17,6 @@ from functools import cached_property
 from numpy.typing import ArrayLike
 
 from xosc_lateral.errors import PlaybackError
-from xosc_lateral.road.header_offset import HeaderOffset
 from xosc_lateral.road.index import SurfaceIndex
 from xosc_lateral.road.lanes import DRIVING
 from xosc_lateral.road.links import Links
@@ -41,6 +40,7 @@ from xosc_lateral.road.positions import (
 )
 from xosc_lateral.road.road import Junction, Road, road_marks
 from xosc_lateral.road.routes import path_between, route
+from xosc_lateral.road.surface import HeaderOffset
 from xosc_lateral.road.tables import NetworkTables
 
 
