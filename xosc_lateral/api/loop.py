@@ -104,10 +104,11 @@ def close_loop(
 class ClosedLoop(Result):
     """What was missing, how sure and how big; the refined profile; the error before and after."""
 
-    __slots__ = ("_given", "_lack_of_fit", "_result")
+    __slots__ = ("_given", "_lack_of_fit", "_proofs", "_result")
 
     def __init__(self, result: LoopResult, lack_of_fit: LackOfFit, given: GivenDrives) -> None:
         self._result, self._lack_of_fit, self._given = result, lack_of_fit, given
+        self._proofs: tuple[str, ...] | None = None
 
     @property
     def profile(self) -> DriverProfile:
@@ -123,6 +124,16 @@ class ClosedLoop(Result):
     def findings(self) -> tuple[str, ...]:
         """Names of the effects that were found."""
         return tuple(finding.effect for finding in self._result.findings)
+
+    @property
+    def proofs(self) -> tuple[str, ...]:
+        """For each effect on the mean that was found: a scenario converted with it and without, in words."""
+        from xosc_lateral.pipeline.proof import proofs_of
+
+        if self._proofs is None:
+            found = [effect for effect in self.profile.effects if effect not in self.base.effects]
+            self._proofs = tuple(map(str, proofs_of(self.profile, found)))
+        return self._proofs
 
     @property
     def error_before(self) -> float:
@@ -147,7 +158,7 @@ class ClosedLoop(Result):
     def __str__(self) -> str:
         from xosc_lateral.report.loop import loop_text
 
-        return loop_text(self._result, self._lack_of_fit)
+        return "\n".join([loop_text(self._result, self._lack_of_fit), *(f"converted: {one}" for one in self.proofs)])
 
     def to_frame(self) -> pd.DataFrame:
         """One row per finding: `effect`, `kind`, `columns`, `lag_s`, `response_s`, `shape`, `size_m`, `p_value`, ..."""
@@ -179,7 +190,9 @@ class ClosedLoop(Result):
         output = output_folder(folder)
         claim(self.report_files(output), self._given.files, force=force)
         write_atomically(output / "report.json", canonical_json(self.to_dict()) + "\n")
-        write_atomically(output / "report.html", loop_page(self._result, self._lack_of_fit, self._given.files))
+        write_atomically(
+            output / "report.html", loop_page(self._result, self._lack_of_fit, self._given.files, self.proofs)
+        )
         return output
 
     @staticmethod
