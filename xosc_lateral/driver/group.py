@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.driver.effects import Acts, EffectTerms
-from xosc_lateral.driver.effects.acts import terms_of
+from xosc_lateral.driver.effects.base import terms_of
 from xosc_lateral.driver.effects.response import Response, ResponseState
 from xosc_lateral.driver.process import DriveProcess, Movement, combine, offsets_of
 from xosc_lateral.driver.profile import DriverProfile

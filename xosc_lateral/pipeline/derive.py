@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from xosc_lateral.driver.drivability import SELDOM, strain
 from xosc_lateral.driver.effects import Acts, Adapted, ColumnEffect, Population
-from xosc_lateral.driver.effects.acts import FACTOR_LIMIT
+from xosc_lateral.driver.effects.base import FACTOR_LIMIT
 from xosc_lateral.driver.models.autoregressive.model import AutoregressiveModel
 from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.driver.provenance import Metadata, Provenance

@@ -22,8 +22,7 @@ import numpy as np
 from msgspec.structs import replace
 from numpy.typing import NDArray
 
-from xosc_lateral.driver.effects.acts import Acts, terms_of
-from xosc_lateral.driver.effects.base import Effect, EffectTerms, step_of
+from xosc_lateral.driver.effects.base import Acts, Effect, EffectTerms, step_of, terms_of
 from xosc_lateral.driver.effects.response import Response, ResponseState, respond
 from xosc_lateral.driver.records import plain, set_once
 from xosc_lateral.errors import DriverProfileError
