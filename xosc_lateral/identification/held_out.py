@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from xosc_lateral.driver.beside import COLUMNS
 from xosc_lateral.driver.effects import ColumnEffect, Effect, TimeSmooth
 from xosc_lateral.driver.fitting import fit_population, fit_runs
-from xosc_lateral.driver.models.kinds import ModelKind
+from xosc_lateral.driver.models.base import ModelKind
 from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.driver.provenance import Provenance
 from xosc_lateral.errors import NotEnoughDataError

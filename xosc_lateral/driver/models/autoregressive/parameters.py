@@ -16,8 +16,7 @@ from xosc_lateral.driver.models.autoregressive.autoregression import Autoregress
 from xosc_lateral.driver.models.autoregressive.filters import COARSE_EVERY, building_low_pass
 from xosc_lateral.driver.models.autoregressive.volatility import Volatility
 from xosc_lateral.driver.models.base import CoreModel
-from xosc_lateral.driver.models.fit_noise import NOISE_VARIANCE
-from xosc_lateral.driver.models.noise import ShapedNoise
+from xosc_lateral.driver.models.noise import NOISE_VARIANCE, ShapedNoise
 from xosc_lateral.drives.resampling import STEP
 from xosc_lateral.errors import DriverProfileError
 

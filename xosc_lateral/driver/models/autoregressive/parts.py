@@ -12,7 +12,7 @@ from xosc_lateral.driver.convolution import convolve
 from xosc_lateral.driver.models.autoregressive.driver import DriverState
 from xosc_lateral.driver.models.autoregressive.filters import COARSE_EVERY, TICKS, interpolate
 from xosc_lateral.driver.models.autoregressive.parameters import AutoregressiveParameters
-from xosc_lateral.driver.models.autoregressive.volatility_stream import COARSE, FINE, Factors, FactorState
+from xosc_lateral.driver.models.autoregressive.volatility import COARSE, FINE, Factors, FactorState
 from xosc_lateral.driver.recursion import recur
 
 FloatArray = NDArray[np.float64]
