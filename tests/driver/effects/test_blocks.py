@@ -72,7 +72,7 @@ def test_hidden_effects_go_on_from_their_state_and_from_a_saved_one(kind: str) -
     elif kind == "time-smooth":  # a sum over half cosines is rounded by how many rows there are
         for name in ("location", "spread", "fine"):
             np.testing.assert_allclose(getattr(pieces, name), getattr(whole, name), rtol=0, atol=1e-15)
-    elif kind == "weave":
+    elif kind == "cycle":
         np.testing.assert_allclose(pieces.location, whole.location, rtol=0, atol=1e-9)  # type: ignore[arg-type]
     else:
         same(pieces, whole)

@@ -59,27 +59,18 @@ class EffectTerms:
         return self.location, self.spread, self.rate, self.fine
 
 
-FILE_WORDS = {"Cycle": "weave", "VarianceTrend": "growing-spread"}
-"""Effects whose kind in files is not their name: what version 0.1 called them."""
-
-
-def kind_of(name: str) -> str:
-    """Kind in files of an effect's class."""
-    return FILE_WORDS.get(name) or kebab(name)
-
-
-class Effect(Record, frozen=True, kw_only=True, tag_field="kind", tag=kind_of):
-    """One effect. Frozen, small, one file each; parameters and their uncertainty are its fields.
+class Effect(Record, frozen=True, kw_only=True, tag_field="kind", tag=kebab):
+    """One effect, frozen; parameters and their uncertainty are its fields.
 
     `ColumnEffect` and `HiddenEffect` are what effects are made from.
     """
 
     kind: ClassVar[str]
-    """Name in the profile file: the class's, in lower case with hyphens, or its word of `FILE_WORDS`."""
+    """Name in the profile file: the class's, in lower case with hyphens."""
 
     def __init_subclass__(cls, **settings: Any) -> None:
         super().__init_subclass__(**settings)
-        cls.kind = kind_of(cls.__name__)
+        cls.kind = kebab(cls.__name__)
 
     @property
     @abstractmethod
