@@ -75,7 +75,7 @@ def close_loop(
 
     from msgspec.structs import replace as with_fields
 
-    from xosc_lateral.driver.provenance import Provenance
+    from xosc_lateral.driver.profile import Provenance
     from xosc_lateral.formats.mapping import as_mapping
     from xosc_lateral.identification import close
     from xosc_lateral.identification.lack_of_fit import lack_of_fit_of

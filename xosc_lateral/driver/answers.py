@@ -16,8 +16,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.driver.beside import COLUMNS, SIDES, Basis, Beside
 from xosc_lateral.driver.effects import Acts, ColumnEffect, Linear, Proximity
+from xosc_lateral.driver.profile import COLUMNS, SIDES, Basis, Beside
 from xosc_lateral.drives.drive import Run
 from xosc_lateral.drives.resampling import STEP
 

@@ -10,10 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.driver.answers import basis_of
-from xosc_lateral.driver.beside import COLUMNS, SIDES, Basis
 from xosc_lateral.driver.drivability import drivable
 from xosc_lateral.driver.plausibility import check_offsets
-from xosc_lateral.driver.profile import DriverProfile
+from xosc_lateral.driver.profile import COLUMNS, SIDES, Basis, DriverProfile
 from xosc_lateral.driver.sampled_offsets import known_sensor, sensor_error
 from xosc_lateral.driver.sampling import OffsetSampler
 from xosc_lateral.enrich.consequences import gaps_of, lane_departures

@@ -9,12 +9,10 @@ import numpy as np
 from msgspec import structs
 from numpy.typing import NDArray
 
-from xosc_lateral.driver.beside import COLUMNS
 from xosc_lateral.driver.effects import ColumnEffect, Effect, TimeSmooth
 from xosc_lateral.driver.fitting import fit_population, fit_runs
 from xosc_lateral.driver.models.base import ModelKind
-from xosc_lateral.driver.profile import DriverProfile
-from xosc_lateral.driver.provenance import Provenance
+from xosc_lateral.driver.profile import COLUMNS, DriverProfile, Provenance
 from xosc_lateral.errors import NotEnoughDataError
 from xosc_lateral.evaluation.distances import Distances, mean_distances, metric_distances
 from xosc_lateral.evaluation.metrics import METRICS, snippet_metrics

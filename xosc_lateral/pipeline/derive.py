@@ -21,8 +21,7 @@ from xosc_lateral.driver.drivability import SELDOM, strain
 from xosc_lateral.driver.effects import Acts, Adapted, ColumnEffect, Population
 from xosc_lateral.driver.effects.base import FACTOR_LIMIT
 from xosc_lateral.driver.models.autoregressive.model import AutoregressiveModel
-from xosc_lateral.driver.profile import DriverProfile
-from xosc_lateral.driver.provenance import Metadata, Provenance
+from xosc_lateral.driver.profile import DriverProfile, Metadata, Provenance
 from xosc_lateral.errors import DriverProfileError
 from xosc_lateral.evaluation.lane_keeping import HIGHWAY_SPEED, LaneKeeping, highway_drives, lane_keeping
 from xosc_lateral.motion.segments import MINIMUM_SPEED

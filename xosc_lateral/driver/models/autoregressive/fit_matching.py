@@ -21,9 +21,9 @@ from numpy.typing import NDArray
 from xosc_lateral.driver.models.autoregressive.autoregression import FREQUENCIES, Autoregression
 from xosc_lateral.driver.models.autoregressive.filters import BORDER, COARSE_EVERY, split_bands
 from xosc_lateral.driver.models.autoregressive.fit_coarse import scaled_spectrum
-from xosc_lateral.driver.models.autoregressive.fit_settings import FitSettings
 from xosc_lateral.driver.models.autoregressive.fit_spectrum import rise, window_of
 from xosc_lateral.driver.models.autoregressive.model import AutoregressiveModel
+from xosc_lateral.driver.models.autoregressive.parameters import FitSettings
 from xosc_lateral.driver.models.autoregressive.volatility import Volatility, averaged_covariance
 from xosc_lateral.driver.models.base import Start
 from xosc_lateral.drives.periodogram import Detrend, periodograms

@@ -21,10 +21,16 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.driver.models.autoregressive.driver import DriverState, draw_drivers
 from xosc_lateral.driver.models.autoregressive.filters import COARSE_EVERY, TICKS
 from xosc_lateral.driver.models.autoregressive.parameters import AutoregressiveParameters
-from xosc_lateral.driver.models.autoregressive.parts import CoarsePart, CoarseState, FinePart, FineState
+from xosc_lateral.driver.models.autoregressive.parts import (
+    CoarsePart,
+    CoarseState,
+    DriverState,
+    FinePart,
+    FineState,
+    draw_drivers,
+)
 from xosc_lateral.driver.models.autoregressive.volatility import FactorState, begin_factors
 from xosc_lateral.driver.models.base import Start
 from xosc_lateral.driver.models.mean_reversion import ClockState, take_at_rate
