@@ -16,10 +16,9 @@ import numpy as np
 from xosc_lateral.errors import PlaybackError
 from xosc_lateral.motion.nominal import CUT_OFF, Activity, NominalMotion, Note
 from xosc_lateral.playback.drive import drive, halt_at_road_end
-from xosc_lateral.playback.placement import NOWHERE
 from xosc_lateral.playback.recorder import NO_LANE, Rows
 from xosc_lateral.playback.simulation import Simulation
-from xosc_lateral.playback.state import EntityState
+from xosc_lateral.playback.state import NOWHERE, EntityState
 from xosc_lateral.playback.storyboard import ElementState
 from xosc_lateral.playback.storyboard_builder import build_storyboard, init_actions
 from xosc_lateral.playback.trailers import align_trailers, connect, pull_trailers

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from xosc_lateral.playback.conditions.base import EntityCheck, EntityChecks
 from xosc_lateral.playback.distances import free_road_gap, road_gap, spot_of
-from xosc_lateral.playback.placement import NOWHERE
 from xosc_lateral.playback.simulation import Simulation
-from xosc_lateral.playback.state import EntityState
+from xosc_lateral.playback.state import NOWHERE, EntityState
 from xosc_lateral.road.network import DRIVING
 from xosc_lateral.scenario.conditions import RelativeClearanceCondition
 
