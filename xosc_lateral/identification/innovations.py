@@ -93,6 +93,7 @@ ORDER = 12
 LONGEST = 96
 """Past seconds that it sees as means over doubling times: drifts of a minute and a half. [s]"""
 
+
 def whitener_as_seen(movement: FloatArray, valid: BoolArray, drive: IntArray, scale: FloatArray) -> Whitener:
     """What turns the movement as it is seen into independent rows: without a floor.
 

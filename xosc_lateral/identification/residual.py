@@ -108,7 +108,6 @@ class SummaryStatistics:
         )
         return found
 
-
     def shares(self, half: BoolArray) -> dict[str, FloatArray]:
         """Share of each bin's rows that are in a part of them, shape (n,), by group of statistics. [-]"""
         found = {}
