@@ -264,7 +264,7 @@ def _refined(search: Search, kind: type[SearchedTerm], scored: _Scored) -> tuple
 
     candidates = scored.dictionary.candidates
     costs = {candidate.family: candidate.cost for candidate in candidates}
-    refinement = Refinement(search.coarse, scored.problem, scored.known, costs, single=kind.single)
+    refinement = Refinement(search.coarse, scored.problem, scored.known, costs)
     outcomes = [
         refinement.refine(scored.dictionary.timed(index), candidates[index].cost, search.columns)
         for index in _contenders(scored.dictionary, scored.scores)
@@ -303,11 +303,6 @@ def _barred(
 ) -> BoolArray:
     """Entries that this kind may not take up."""
     columns = kind.barred(fitted)
-    most = 1 if kind.single else 2
     return np.array(
-        [
-            bool(columns & set(one.columns)) or len(one.contrast) > most or one.columns in refused
-            for one in dictionary.candidates
-        ],
-        dtype=np.bool_,
+        [bool(columns & set(one.columns)) or one.columns in refused for one in dictionary.candidates], dtype=np.bool_
     )

@@ -28,9 +28,6 @@ from xosc_lateral.identification.timeline import Timeline
 VETOED = "significant, but chosen and estimated on other blocks it predicts the held-out ones worse than nothing"
 """Why a term that loses on held-out rows is rejected."""
 
-UNSURE = "significant by itself, but within its error of nothing beside what else was found"
-"""Why a term whose size is shrunk to nothing is rejected."""
-
 CLOCK = "a clock: what changes with it changes with time, which is tested as such"
 """Why a column that goes one way is not looked at."""
 
@@ -128,7 +125,7 @@ def identify(
     # products of small matrices gain nothing from threads, and lose a factor of ten to them where all cores are busy
     with threadpool_limits(1, user_api="blas"):
         search = Search.over(coarse, usable.columns, seed, ERROR_BUDGET, lambda what: progress(0.1, what))
-        selection = _of_some_size(select(search, initial))
+        selection = select(search, initial)
         if not selection.accepted:
             return Identified(usable, selection)
         # what happened once, and when, can't be found without the block in which it happened: folds size it, and know
@@ -202,18 +199,6 @@ def _same_throughout(effect: ColumnEffect, timeline: Timeline) -> bool:
     values = effect.known({name: context[name] for name in effect.columns})
     inside = [values[rows][timeline.valid[rows]] for rows in timeline.spans]
     return all(np.ptp(own, axis=0).max() == 0.0 for own in inside if len(own))
-
-
-def _of_some_size(selection: Selection) -> Selection:
-    """Less what is within one standard error of nothing beside what was found with it, and would be shrunk to nothing.
-
-    Of terms that held-out rows can't judge: the others are told from nothing there.
-    """
-    for one in [one for one in selection.accepted if not one.term.predictable]:
-        effects = [effect for effect in one.term.estimate(selection.final) if isinstance(effect, ColumnEffect)]
-        if effects and not any(any(effect.coefficients) for effect in effects):
-            selection = selection.without([one.term], UNSURE)
-    return selection
 
 
 def _worst_first(found: Identified) -> Identified:

@@ -15,7 +15,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.identification.autocorrelation import MovementProcess, Whitener, fit_autoregression
+from xosc_lateral.identification.autocorrelation import Whitener, fit_autoregression
 from xosc_lateral.identification.innovations import ORDER
 from xosc_lateral.identification.regression import Coarse
 
@@ -78,13 +78,3 @@ def of_squares(coarse: Coarse, squares: FloatArray, valid: BoolArray, columns: F
         left = squares - design @ np.linalg.lstsq(design[valid], squares[valid], rcond=None)[0]
     process = fit_autoregression(np.where(valid, left, 0.0), valid, min(ORDER, SQUARES_S), longest=SQUARES_S)
     return Problem(Whitener(process, valid, coarse.drive, np.ones(len(coarse))), squares, columns)
-
-
-def of_products(coarse: Coarse, rows: FloatArray, columns: FloatArray, factor: FloatArray) -> Problem:
-    """Regression of white rows [-] times a factor, shape (n,) each, on columns, about one level for all drives.
-
-    The products themselves are rotated in the null: a few loud seconds, in which both are large, stay what they are.
-    """
-    nothing = MovementProcess((np.zeros(0),), np.ones(1))
-    whitener = Whitener(nothing, coarse.valid, np.zeros(len(coarse), dtype=np.intp), np.ones(len(coarse)))
-    return Problem(whitener, rows * factor, columns)

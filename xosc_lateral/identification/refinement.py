@@ -107,8 +107,6 @@ class Refinement:
         Orthonormal; partialled out.
     costs : mapping of Family to float
         What a member of each family costs.
-    single : bool
-        Only shapes with one coefficient will do.
     """
 
     def __init__(
@@ -117,10 +115,8 @@ class Refinement:
         problem: Problem,
         known: FloatArray,
         costs: Mapping[Family, float],
-        *,
-        single: bool = False,
     ) -> None:
-        self._coarse, self._problem, self._costs, self._single = coarse, problem, costs, single
+        self._coarse, self._problem, self._costs = coarse, problem, costs
         self._basis = known.astype(np.float32)
         left = problem.observed
         left = left - known @ (known.T @ left)
@@ -209,7 +205,7 @@ class Refinement:
             return
         column = columns[effect.columns[0]]
         seen = self._coarse.context[column.name][self._coarse.timeline.valid]
-        shapes = shapes_of(column, seen, curves=not self._single)
+        shapes = shapes_of(column, seen, curves=True)
         plain = self._costs.get(Family.PLAIN, 0.0)
         bent = self._costs.get(Family.BENT, plain) + 2.0 * float(np.log(max(1.0, shapes.finer)))
         yield from ((structs.replace(shape, **timing), plain) for shape in shapes.plain)

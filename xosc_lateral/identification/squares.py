@@ -1,4 +1,4 @@
-"""Squares of innovations, slower and finer than a second: what tells how large the movement is just now.
+"""Squares of innovations, slower and finer than a second: how large the movement is just now.
 
 References
 ----------

@@ -21,10 +21,9 @@ FloatArray = NDArray[np.float64]
 
 
 class Stage(IntEnum):
-    """When a term is looked for. The mean comes first: a mean that is not known looks like a spread.
+    """When a term is tested. The mean comes first: a mean that is not known looks like a spread.
 
-    Regimes come after the spread, because they explain whatever comes in clusters, and before what a regime's loud
-    stretches might be taken for.
+    Regimes come after the spread, because they explain whatever comes in clusters.
     """
 
     MEAN = 1
@@ -32,8 +31,7 @@ class Stage(IntEnum):
     MEAN_AGAIN = 3
     SPREAD = 4
     REGIMES = 5
-    MOVEMENT = 6
-    BETWEEN_DRIVES = 7
+    BETWEEN_DRIVES = 6
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,18 +72,17 @@ class Removal:
     ----------
     location : array
         [m]
-    spread, fine, rate : array
+    spread, fine : array
         Natural logarithm of a factor.
     """
 
     location: FloatArray
     spread: FloatArray = field(init=False)
     fine: FloatArray = field(init=False)
-    rate: FloatArray = field(init=False)
 
     def __post_init__(self) -> None:
         """Nothing but the location so far."""
-        self.spread, self.fine, self.rate = (np.zeros(len(self.location)) for _ in range(3))
+        self.spread, self.fine = np.zeros(len(self.location)), np.zeros(len(self.location))
 
 
 @dataclass(frozen=True, eq=False)
