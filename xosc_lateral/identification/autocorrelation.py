@@ -215,18 +215,11 @@ def start_factors(rows: FloatArray, valid: BoolArray, order: int) -> FloatArray:
 def unbiased(
     process: MovementProcess, valid: BoolArray, drive: IntArray, order: int, *, longest: int | None = None
 ) -> MovementProcess:
-    """Take out what free levels of short drives do to a fitted autoregression.
+    """A process fitted to `valid` rows less each drive's level, freed of what estimated levels of short drives do to it.
 
-    A level that is estimated takes part of the slow movement with it, so that the process looks less persistent than it
-    is (Nickell's bias: the errors of effects in runs of a minute come out an eighth too small). The same is done to
-    drives simulated from the fitted process, and the difference taken off: indirect inference for panels [3]_.
-
-    Parameters
-    ----------
-    process : MovementProcess
-        Fitted to `valid` rows less each drive's level.
-    valid, drive, order, longest
-        As it was fitted.
+    A level takes part of the slow movement with it, so that the process looks less persistent than it is (Nickell's
+    bias: the errors of effects in runs of a minute come out an eighth too small). The same is done to drives simulated
+    from the fitted process, and the difference taken off: indirect inference for panels [3]_.
 
     References
     ----------
@@ -348,3 +341,41 @@ class Whitener:
     def rows(self, values: FloatArray) -> FloatArray:
         """Whitened, levels out; shape of `values` [m], the rows of variance 1. [-]"""
         return self.without_levels(self.white(values))
+
+
+@dataclass(frozen=True, eq=False)
+class Problem:
+    """One linear regression.
+
+    Parameters
+    ----------
+    whitener : Whitener
+        For series and columns.
+    series : array, shape (n,)
+        With what the model has of this component still in.
+    columns : array, shape (n, k)
+        What the model has already.
+    """
+
+    whitener: Whitener
+    series: FloatArray
+    columns: FloatArray
+
+    @property
+    def valid(self) -> BoolArray:
+        """Rows that count, shape (n,)."""
+        return self.whitener.valid
+
+    @cached_property
+    def observed(self) -> FloatArray:
+        """White series, levels out, shape (seconds,), valid ones only. [-]"""
+        return self.rows(self.series)
+
+    @cached_property
+    def known(self) -> FloatArray:
+        """White columns, shape (seconds, k). [-]"""
+        return self.rows(self.columns)
+
+    def rows(self, values: FloatArray) -> FloatArray:
+        """White rows [-] of series or columns, shape (n,) or (n, k); valid ones only."""
+        return self.whitener.compact.rows(values[self.valid])

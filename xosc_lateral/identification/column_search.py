@@ -9,6 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from xosc_lateral.driver.effects import ColumnEffect
+from xosc_lateral.identification.autocorrelation import Problem
 from xosc_lateral.identification.dictionary import (
     CROSS_BASIS,
     NULL_DRAWS,
@@ -18,10 +20,9 @@ from xosc_lateral.identification.dictionary import (
     orthonormal,
     score_entries,
 )
-from xosc_lateral.identification.problem import Problem
 from xosc_lateral.identification.refinement import Refined, Refinement
 from xosc_lateral.identification.regression import Fitted, fit_model
-from xosc_lateral.identification.search import Likeliest, Search
+from xosc_lateral.identification.search import Search
 from xosc_lateral.identification.significance import LoopSeed, upper_tail
 from xosc_lateral.identification.terms.base import Outcome
 from xosc_lateral.identification.terms.column import ColumnTerm
@@ -90,22 +91,17 @@ def find_column(search: Search, kind: type[SearchedTerm], fitted: Fitted) -> Out
     ----------
     .. [1] C. R. Rao, Proc. Camb. Phil. Soc. 44, 1948.
     """
-    problem = kind.problem(fitted)
-    dictionary = search.dictionary(kind, fitted, problem)
-    refused: set[tuple[str, ...]] = set()
-    while True:
-        scored = _score(search, kind, fitted, problem, dictionary, refused, draws=NULL_DRAWS)
-        if scored is None:
-            return Outcome(None, min(refused), 1.0) if refused else None
-        found = scored.likeliest() if refused else search.likeliest(kind, fitted, scored.likeliest)
-        assert found is not None
-        p_value = found.p_value
+    scored, refused = _scored(search, kind, fitted), set[tuple[str, ...]]()
+    while scored is not None:
+        found, p_value = scored.likeliest()
         if not search.passes(kind.component, p_value, fitted.terms):  # refined, it would not be accepted either
-            return Outcome(None, found.effect.columns, p_value)
+            return Outcome(None, found.columns, p_value)
         term, after = _best(search, kind, fitted, scored, refused)
         if not _grows(fitted, after) and after.log_likelihood >= fitted.log_likelihood - ROUNDING:
             return Outcome(term, term.columns, p_value, after)
         refused.add(term.columns)
+        scored = _score(search, kind, fitted, scored.problem, scored.dictionary, refused, draws=NULL_DRAWS)
+    return Outcome(None, min(refused), 1.0) if refused else None
 
 
 def probability_of(search: Search, kind: type[SearchedTerm], fitted: Fitted, columns: tuple[str, ...]) -> float:
@@ -117,7 +113,9 @@ def probability_of(search: Search, kind: type[SearchedTerm], fitted: Fitted, col
         Without a term of these columns. Where it has a product with one of them, that product is known as it is, not
         with every shape of its factors: nothing would be left to test.
     """
-    scored = _score_all(search, kind, fitted, spared=columns)
+    problem = kind.problem(fitted)
+    dictionary = build_dictionary(search.quantities, problem.whitener)
+    scored = _score(search, kind, fitted, problem, dictionary, (), draws=NULL_DRAWS, spared=columns)
     if scored is None:
         return 1.0
     own = [i for i, candidate in enumerate(scored.dictionary.candidates) if candidate.columns == columns]
@@ -126,32 +124,29 @@ def probability_of(search: Search, kind: type[SearchedTerm], fitted: Fitted, col
 
 def best_probability(search: Search, kind: type[SearchedTerm], fitted: Fitted) -> float:
     """p-value of the best candidate of all, before refinement."""
-    best = _likeliest(search, kind, fitted)
-    return 1.0 if best is None else best.p_value
+    scored = _scored(search, kind, fitted)
+    return 1.0 if scored is None else scored.likeliest()[1]
 
 
 def likely_response(search: Search, kind: type[SearchedTerm], fitted: Fitted, level: float) -> tuple[FloatArray, float]:
     """Response of the best candidate and its p-value, shape (n, 1) where that is at most `level`; else (n, 0)."""
-    best = _likeliest(search, kind, fitted)
-    if best is None or best.p_value > level:
+    scored = _scored(search, kind, fitted)
+    effect, p_value = (None, 1.0) if scored is None else scored.likeliest()
+    if effect is None or p_value > level:
         return np.zeros((len(fitted.coarse), 0)), 1.0
-    return fitted.coarse.response(best.effect), best.p_value
+    return fitted.coarse.response(effect), p_value
 
 
-def _likeliest(search: Search, kind: type[SearchedTerm], fitted: Fitted) -> Likeliest | None:
-    def score() -> Likeliest | None:
-        scored = _score_all(search, kind, fitted)
-        return None if scored is None else scored.likeliest()
+def _scored(search: Search, kind: type[SearchedTerm], fitted: Fitted) -> _Scored | None:
+    """All candidates beside a fit, scored once."""
 
-    return search.likeliest(kind, fitted, score)
+    def score() -> _Scored | None:
+        problem = kind.problem(fitted)
+        dictionary = build_dictionary(search.quantities, problem.whitener)
+        return _score(search, kind, fitted, problem, dictionary, (), draws=NULL_DRAWS)
 
-
-def _score_all(
-    search: Search, kind: type[SearchedTerm], fitted: Fitted, spared: tuple[str, ...] = ()
-) -> _Scored | None:
-    problem = kind.problem(fitted)
-    dictionary = search.dictionary(kind, fitted, problem)
-    return _score(search, kind, fitted, problem, dictionary, (), draws=NULL_DRAWS, spared=spared)
+    found: _Scored | None = search.once(kind, fitted, score)
+    return found
 
 
 @dataclass(frozen=True, eq=False)
@@ -163,10 +158,10 @@ class _Scored:
     known: FloatArray
     scores: Scores
 
-    def likeliest(self) -> Likeliest:
+    def likeliest(self) -> tuple[ColumnEffect, float]:
         """Best candidate and its p-value."""
         best = self.scores.best
-        return Likeliest(self.dictionary.timed(best), upper_tail(float(self.scores.scores[best]), self.scores.maxima))
+        return self.dictionary.timed(best), upper_tail(float(self.scores.scores[best]), self.scores.maxima)
 
 
 def _score(

@@ -12,6 +12,12 @@ FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
 IntArray = NDArray[np.intp]
 
+ORDER = 12
+"""Past seconds that have a coefficient each in the movement's autoregression. [s]"""
+
+LONGEST = 96
+"""Past seconds that it sees as means over doubling times: drifts of a minute and a half. [s]"""
+
 CLIP = 9.0
 """Squared innovations (variance 1) beyond this count as this: three standard deviations. [-]"""
 
@@ -24,13 +30,6 @@ CLUSTER_S = 60
 
 OWN_LEVEL_S = 30.0
 """A drive's level of the scale is its own as far as it lasts longer than this. [s]"""
-
-
-def squared_innovations(rows: FloatArray, valid: BoolArray) -> FloatArray:
-    """Clipped squares of white rows, standardised over the valid ones, shape (n,); 0 elsewhere. [-]"""
-    squares = np.minimum(rows**2, CLIP)
-    mean, deviation = squares[valid].mean(), squares[valid].std()
-    return np.where(valid, (squares - mean) / max(deviation, 1e-12), 0.0)
 
 
 def own_levels(squares: FloatArray, valid: BoolArray, drive: IntArray) -> FloatArray:
@@ -85,13 +84,6 @@ def covariance_of_log_sizes(scales: FloatArray, rows: FloatArray, valid: BoolArr
     edges = np.flatnonzero(np.diff(cluster, prepend=-1))
     sums = np.add.reduceat(scores, edges, axis=0)
     return np.asarray(bread @ (sums.T @ sums) @ bread * len(sums) / max(1, len(sums) - 1))
-
-
-ORDER = 12
-"""Past seconds that have a coefficient each in the movement's autoregression. [s]"""
-
-LONGEST = 96
-"""Past seconds that it sees as means over doubling times: drifts of a minute and a half. [s]"""
 
 
 def whitener_as_seen(movement: FloatArray, valid: BoolArray, drive: IntArray, scale: FloatArray) -> Whitener:

@@ -16,10 +16,10 @@ from numpy.typing import NDArray
 
 from xosc_lateral.driver.effects import ColumnEffect, Product
 from xosc_lateral.driver.effects.product import Form
+from xosc_lateral.identification.autocorrelation import Problem
 from xosc_lateral.identification.candidates import FINE_SCALES, Family, shapes_of
 from xosc_lateral.identification.columns import Column
 from xosc_lateral.identification.dictionary import orthonormal
-from xosc_lateral.identification.problem import Problem
 from xosc_lateral.identification.regression import Coarse
 from xosc_lateral.identification.timeline import COARSE
 

@@ -16,11 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.driver.effects import Acts, ColumnEffect, Effect
+from xosc_lateral.identification.autocorrelation import Problem
 from xosc_lateral.identification.column_search import SearchedTerm, likely_response
-from xosc_lateral.identification.innovations import squared_innovations
-from xosc_lateral.identification.problem import Problem, of_squares
 from xosc_lateral.identification.regression import Coarse, Fitted
-from xosc_lateral.identification.squares import SLOW_S, fine_squares, log_sizes, slow_squares
+from xosc_lateral.identification.squares import SLOW_S, fine_squares, log_sizes, of_squares, quick_squares, slow_squares
 from xosc_lateral.identification.terms.base import Stage, Term
 from xosc_lateral.identification.terms.column import ColumnTerm, columns_on_size, of_kind
 from xosc_lateral.identification.terms.mean import MeanTerm
@@ -59,10 +58,7 @@ class SpreadTerm(SearchedTerm):
     @classmethod
     def problem(cls, fitted: Fitted) -> Problem:
         """Squared innovations."""
-        coarse = fitted.coarse
-        return of_squares(
-            coarse, squared_innovations(fitted.innovations, coarse.valid), coarse.valid, known_log_scale(fitted)
-        )
+        return of_squares(fitted.coarse, quick_squares(fitted), known_log_scale(fitted))
 
     @classmethod
     def barred(cls, fitted: Fitted) -> frozenset[str]:
@@ -129,7 +125,7 @@ class SlowSpreadTerm(SearchedTerm):
         squares, coarse = slow_squares(fitted), fitted.coarse
         moved = [np.abs(coarse.response(term.effect, keep=True)) for term in of_kind(fitted, MeanTerm)]
         known = np.concatenate([known_log_scale(fitted), *moved], axis=1)
-        return of_squares(coarse, squares.standardised, squares.valid, known)
+        return of_squares(coarse, squares, known)
 
     @classmethod
     def barred(cls, fitted: Fitted) -> frozenset[str]:

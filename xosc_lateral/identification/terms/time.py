@@ -18,7 +18,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.driver.effects import Effect, Step, TimeSmooth
-from xosc_lateral.identification.innovations import squared_innovations
 from xosc_lateral.identification.low_frequencies import (
     MEAN_SHORTEST_S,
     ORDERS,
@@ -37,7 +36,7 @@ from xosc_lateral.identification.low_frequencies import (
 )
 from xosc_lateral.identification.regression import Coarse, Fitted, fit_model
 from xosc_lateral.identification.significance import LoopSeed
-from xosc_lateral.identification.squares import SLOW_S, fine_squares, log_sizes, slow_squares
+from xosc_lateral.identification.squares import SLOW_S, fine_squares, log_sizes, quick_squares, slow_squares
 from xosc_lateral.identification.terms.base import Description, Outcome, Removal, Stage, Term, centred
 from xosc_lateral.identification.terms.cycle import latent_path
 from xosc_lateral.identification.terms.spread import what_a_column_may_do, what_columns_do
@@ -223,19 +222,14 @@ class TimeSpreadTerm(Term):
             return None
         # what a column does to the size of any part of the movement is not time's doing, slow as the column may be
         known = what_columns_do(search, fitted)
-        own = slow_squares(fitted)
-        looked_at = (
-            (squared_innovations(fitted.innovations, fitted.coarse.valid), fitted.coarse.valid),
-            (own.standardised, own.valid),
-        )
         may_act, p_column = what_a_column_may_do(search, fitted)
         columns = half_cosines_of(fitted.coarse, max(SPREAD_ORDERS))
 
         def best_beside(known: FloatArray) -> tuple[float, bool] | None:
             found = []
-            for slow, (squares, valid) in enumerate(looked_at):
-                own, basis = without_known(known, squares, columns, valid)
-                own, basis = (low_frequencies(one, fitted.coarse, valid, SHORTEST_S) for one in (own, basis))
+            for slow, squares in enumerate((quick_squares(fitted), slow_squares(fitted))):
+                own, basis = without_known(known, squares.standardised, columns, squares.valid)
+                own, basis = (low_frequencies(one, fitted.coarse, squares.valid, SHORTEST_S) for one in (own, basis))
                 tests = smooth_probabilities(own[:, 0], basis, SPREAD_ORDERS)
                 found += [(p_value, bool(slow)) for p_value in tests.values()]
             return (min(1.0, min(found)[0] * len(found)), min(found)[1]) if found else None
