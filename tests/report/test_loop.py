@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import re
 from dataclasses import replace
 from pathlib import Path
@@ -39,11 +38,11 @@ from xosc_lateral.identification.findings import Finding
 from xosc_lateral.identification.residual import lack_of_fit_of
 from xosc_lateral.identification.selection import Rejected
 from xosc_lateral.report.loop import finding_sentence, loop_page, loop_text
-from xosc_lateral.report.loop_courses import by_drive, moving_spread
+from xosc_lateral.report.loop_courses import moving_spread
 from xosc_lateral.report.loop_curves import curve_of
 from xosc_lateral.report.loop_figures import DRIVES, draw_spectra, effect_figure, residual_figure
 from xosc_lateral.report.loop_hidden_figures import DRAWINGS
-from xosc_lateral.report.loop_json import column_record, finding_record, loop_json
+from xosc_lateral.report.loop_json import column_record, finding_record, finite, loop_record
 from xosc_lateral.report.loop_words import lack_of_fit_words, meaning, others_words, outcome, p_value_words, size_words
 
 SHIFT = 0.4  # [m]
@@ -169,7 +168,7 @@ def test_an_error_clearly_above_the_floor_is_called_unexplained(result: LoopResu
     assert left.clear
     sentence = lack_of_fit_words(worse)
     assert sentence.startswith(f"Unexplained residual of {1000 * left.unexplained:.0f}\N{NO-BREAK SPACE}mm")
-    record = json.loads(loop_json(worse, [table]))
+    record = loop_record(worse, [table])
     assert record["unexplained"]["clear"] is True
     assert record["unexplained"]["size_m"] == pytest.approx(left.unexplained)
     assert record["unexplained"]["where"] == [group.name for group in left.where]
@@ -184,7 +183,7 @@ def test_an_error_at_the_floor_is_not_called_unexplained(result: LoopResult) -> 
 
 
 def test_the_json_keeps_to_the_schema_and_adds_the_meaning(result: LoopResult, table: Path) -> None:
-    record = json.loads(loop_json(result, [table]))
+    record = finite(loop_record(result, [table]))
     assert {"drives", "base_profile", "held_out", "findings", "consequences", "rejected", "error", "metrics"} <= set(
         record
     )
@@ -237,14 +236,6 @@ def test_courses_leave_out_what_is_cut(result: LoopResult) -> None:
     course = moving_spread(result, 240.0)
     assert len(course.time) == result.coarse.valid.sum()
     assert np.all(course.measured > 0.0)
-
-
-def test_drives_are_described_one_by_one(result: LoopResult) -> None:
-    means, spreads = by_drive(result, 20.0)
-    assert len(means["measured"]) == 1
-    assert len(spreads["after"]) == len(result.scored.runs_after)
-    timeline = result.scored.statistics.timeline
-    assert means["measured"][0] == pytest.approx(timeline.offset[timeline.valid].mean())
 
 
 def test_a_table_whose_runs_are_all_shorter_than_a_spectrum_s_segment_has_a_spectrum_still(result: LoopResult) -> None:

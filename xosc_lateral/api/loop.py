@@ -134,12 +134,12 @@ class ClosedLoop(Result):
 
     @property
     def floor(self) -> float:
-        """What the measured drives differ from themselves by. [m]"""
+        """Sampling error of the measured drives: how far random halves of them are from all of them. [m]"""
         return self._result.floor
 
     def headline(self) -> str:
         """One line."""
-        found = ", ".join(self.findings) or "nothing found"
+        found = ", ".join(self.findings) or "no effect added"
         return f"{found}; error {self.error_before:.4f} -> {self.error_after:.4f} m (floor {self.floor:.4f} m)"
 
     def __str__(self) -> str:

@@ -215,7 +215,7 @@ def start_factors(rows: FloatArray, valid: BoolArray, order: int) -> FloatArray:
 def unbiased(
     process: MovementProcess, valid: BoolArray, drive: IntArray, order: int, *, longest: int | None = None
 ) -> MovementProcess:
-    """A process fitted to `valid` rows less each drive's level, freed of what estimated levels of short drives do to it.
+    """A process fitted to `valid` rows less each drive's level, freed of what those levels do to it in short drives.
 
     A level takes part of the slow movement with it, so that the process looks less persistent than it is (Nickell's
     bias: the errors of effects in runs of a minute come out an eighth too small). The same is done to drives simulated

@@ -135,9 +135,9 @@ def _numbers(result: LoopResult) -> list[KeyFigure]:
     errors = (result.error_before, result.error_after, result.floor)
     before, after, floor = (f"{1000 * value:.1f} mm" for value in errors)
     return [
-        KeyFigure(before, "error before", "of the profile without the effects"),
-        KeyFigure(after, "error after", "of the profile with the effects", tone=tone),
-        KeyFigure(floor, "floor", "between random halves of the measured drives"),
+        KeyFigure(before, "error before", "of the base profile"),
+        KeyFigure(after, "error after", "of the refined profile", tone=tone),
+        KeyFigure(floor, "floor", "of random halves of the drives against all of them"),
     ]
 
 
@@ -163,7 +163,7 @@ class _Picture(NamedTuple):
 
 def _pictures(result: LoopResult, finding: Finding) -> list[_Picture]:
     from xosc_lateral.report.loop_figures import effect_figure
-    from xosc_lateral.report.loop_hidden_figures import DRAWINGS, quantiles_figure
+    from xosc_lateral.report.loop_hidden_figures import DRAWINGS, QUANTILES_CAPTION, quantiles_figure
 
     effect = finding.effects[0] if finding.effects else None
     if isinstance(effect, ColumnEffect):
@@ -177,10 +177,9 @@ def _pictures(result: LoopResult, finding: Finding) -> list[_Picture]:
         )
     draw, caption = DRAWINGS[effect.kind if effect is not None else finding.kind]
     pictures = [_Picture(draw(result, finding), caption, f"{_capital(finding.effect)}: {caption}")]
-    if finding.kind in ("regime", "population"):
-        caption = "Distribution of the local spread of the movement on held-out blocks."
+    if finding.kind == "regime":
         alt = "Quantiles of the local spread, measured, before and after."
-        pictures.append(_Picture(quantiles_figure(result), caption, alt))
+        pictures.append(_Picture(quantiles_figure(result), QUANTILES_CAPTION, alt))
     return pictures
 
 

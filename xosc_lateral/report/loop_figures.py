@@ -108,7 +108,7 @@ def _draw_held_out(axis: Axes, result: LoopResult, finding: Finding, effect: Col
 
 
 @figure_style()
-def spectrum_figure(result: LoopResult) -> Figure:
+def spectrum_figure(result: LoopResult, finding: Finding | None = None) -> Figure:
     """Power density of measured offsets and of both profiles' held-out runs."""
     figure, axes = new_figure(height=3.4)
     axis = axes[0, 0]

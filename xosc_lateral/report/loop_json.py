@@ -10,7 +10,6 @@ from typing import Any
 from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.evaluation.distances import Distances
 from xosc_lateral.formats.hashes import parsed_hashes
-from xosc_lateral.formats.json_text import canonical_json
 from xosc_lateral.formats.profiles import profile_hash
 from xosc_lateral.identification.close import LoopResult
 from xosc_lateral.identification.feedback import Feedback
@@ -26,13 +25,8 @@ MEASURE = (
 )
 
 
-def loop_json(result: LoopResult, tables: Sequence[Path]) -> str:
-    """`report.json`: what people and machines ask of a closed loop, and the provenance."""
-    return canonical_json(finite(loop_record(result, tables))) + "\n"
-
-
 def loop_record(result: LoopResult, tables: Sequence[Path]) -> dict[str, Any]:
-    """The same as plain values."""
+    """`report.json` as plain values: what people and machines ask of a closed loop, and the provenance."""
     error = {"before": result.error_before, "after": result.error_after, "floor": result.floor}
     return {
         "drives": list(result.names),
