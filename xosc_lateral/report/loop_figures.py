@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.driver.effects import Acts, ColumnEffect, Product
-from xosc_lateral.evaluation.gapped_spectrum import gapped_spectrum
 from xosc_lateral.evaluation.metrics import METRICS
+from xosc_lateral.evaluation.spectra import gapped_spectrum
 from xosc_lateral.identification.close import LoopResult
 from xosc_lateral.identification.cross_validation import hold_out_blocks
 from xosc_lateral.identification.findings import Finding

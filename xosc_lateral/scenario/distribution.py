@@ -1,15 +1,90 @@
-"""Stochastic logical scenarios: values drawn from distributions."""
+"""Parameter distributions: every combination (deterministic), or drawn (stochastic)."""
 
 from __future__ import annotations
 
+import itertools
 import math
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from decimal import Decimal
 from typing import Protocol
 
 import numpy as np
+from msgspec import Struct
 
-from xosc_lateral.scenario.deterministic import ParameterSet
+from xosc_lateral.scenario.place import Place
+
+ParameterSet = Mapping[str, str]
+
+
+class ValueSets(Struct, frozen=True):
+    """Deterministic: one of these sets of values, in this order."""
+
+    sets: tuple[ParameterSet, ...]
+    place: Place
+
+    def __len__(self) -> int:
+        """How many."""
+        return len(self.sets)
+
+    def __iter__(self) -> Iterator[ParameterSet]:
+        """One after another."""
+        return iter(self.sets)
+
+
+class SteppedRange(Struct, frozen=True):
+    """Deterministic: ``lower, lower + step ...`` up to and including `upper`, in exact decimals as written."""
+
+    parameter: str
+    lower: Decimal
+    upper: Decimal
+    step: Decimal
+    place: Place
+
+    def __len__(self) -> int:
+        """How many values."""
+        return int((self.upper - self.lower) / self.step) + 1 if self.upper >= self.lower else 0
+
+    def __iter__(self) -> Iterator[ParameterSet]:
+        """One value after another."""
+        return ({self.parameter: format(self.lower + index * self.step, "f")} for index in range(len(self)))
+
+
+class Deterministic(Struct, frozen=True):
+    """Every combination of its parts; the part declared first varies slowest."""
+
+    parts: tuple[ValueSets | SteppedRange, ...]
+
+    def __len__(self) -> int:
+        """Number of combinations."""
+        return math.prod(len(part) for part in self.parts)
+
+    def __iter__(self) -> Iterator[ParameterSet]:
+        """One combination after another, made when asked for: there may be millions."""
+        return (_merged(combination) for combination in _product(self.parts))
+
+
+def _product(parts: Sequence[ValueSets | SteppedRange]) -> Iterator[tuple[ParameterSet, ...]]:
+    """`itertools.product` without its copies of every part."""
+    if not all(parts):
+        return
+    rows = [iter(part) for part in parts]
+    chosen = [next(row) for row in rows]
+    while True:
+        yield tuple(chosen)
+        for place in reversed(range(len(parts))):
+            following = next(rows[place], None)
+            if following is not None:
+                chosen[place] = following
+                break
+            rows[place] = iter(parts[place])
+            chosen[place] = next(rows[place])
+        else:
+            return
+
+
+def _merged(sets: Sequence[ParameterSet]) -> ParameterSet:
+    return dict(itertools.chain.from_iterable(values.items() for values in sets))
+
 
 MAX_TRIES = 10_000
 """Draws until a truncated distribution gives up."""
@@ -23,8 +98,7 @@ class Draw(Protocol):
         ...
 
 
-@dataclass(frozen=True, slots=True)
-class Weighted:
+class Weighted(Struct, frozen=True):
     """Values with weights that need not sum to 1."""
 
     values: tuple[str, ...]
@@ -35,8 +109,7 @@ class Weighted:
         return self.values[_weighted_index(self.weights, rng)]
 
 
-@dataclass(frozen=True, slots=True)
-class Uniform:
+class Uniform(Struct, frozen=True):
     """Evenly between two limits."""
 
     lower: float
@@ -47,8 +120,7 @@ class Uniform:
         return repr(float(rng.uniform(self.lower, self.upper)))
 
 
-@dataclass(frozen=True, slots=True)
-class Histogram:
+class Histogram(Struct, frozen=True):
     """Bins with weights, evenly inside a bin."""
 
     bins: tuple[tuple[float, float], ...]
@@ -60,8 +132,7 @@ class Histogram:
         return repr(float(rng.uniform(lower, upper)))
 
 
-@dataclass(frozen=True, slots=True)
-class Normal:
+class Normal(Struct, frozen=True):
     """Normal, by mean and variance; truncated to the limits by drawing again."""
 
     mean: float
@@ -74,8 +145,7 @@ class Normal:
         return repr(_truncated(lambda: float(rng.normal(self.mean, scale)), self.limits))
 
 
-@dataclass(frozen=True, slots=True)
-class LogNormal:
+class LogNormal(Struct, frozen=True):
     """Log-normal; `mean` and `variance` are those of the parameter itself, not of its logarithm."""
 
     mean: float
@@ -89,8 +159,7 @@ class LogNormal:
         return repr(_truncated(lambda: float(rng.lognormal(centre, math.sqrt(spread))), self.limits))
 
 
-@dataclass(frozen=True, slots=True)
-class Poisson:
+class Poisson(Struct, frozen=True):
     """Poisson; whole numbers."""
 
     mean: float
@@ -105,8 +174,7 @@ class DistributionError(ValueError):
     """No value of the distribution lies inside its limits. The reader adds file and line."""
 
 
-@dataclass(frozen=True, slots=True)
-class Stochastic:
+class Stochastic(Struct, frozen=True):
     """`number_of_test_runs` independent draws; `seed` None: the file has none."""
 
     draws: tuple[tuple[str, Draw], ...]
