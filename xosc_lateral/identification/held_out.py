@@ -201,13 +201,9 @@ SPLITS = 6
 
 @dataclass(frozen=True, eq=False)
 class Scorecard:
-    """Wasserstein distances per metric, in standard deviations of the measured metric.
+    """Wasserstein distances per metric, in standard deviations of the measured one; None: too few snippets.
 
-    Parameters
-    ----------
-    before, after, floor : Distances, or None when there are too few snippets
-    real, sampled_before, sampled_after : array, shape (snippets, 10)
-        For violins. [m]
+    The metrics themselves, shape (snippets, 10), are for violins. [m]
     """
 
     before: Distances | None

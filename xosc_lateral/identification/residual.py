@@ -122,7 +122,7 @@ class SummaryStatistics:
 def statistics_of(
     timeline: Timeline, quantities: Mapping[str, FloatArray], oscillation: float | None = None
 ) -> SummaryStatistics:
-    """Bins for every quantity, shape (n,) each on the grid, and for time; an oscillation's frequency [1/s], if any."""
+    """Bins for every quantity, shape (n,) each, and for time; an oscillation's frequency [1/s], if any."""
     labels, middles = {}, {}
     for name, values in quantities.items():
         none = np.isnan(values)
@@ -212,17 +212,7 @@ def size_of(differences: Mapping[str, FloatArray]) -> float:
 
 @dataclass(frozen=True, slots=True)
 class GroupError:
-    """Root mean square over the statistics of one group, on held-out blocks. [m]
-
-    Parameters
-    ----------
-    name : str
-        Group, as in `SummaryStatistics.describe`.
-    before, after : float
-        Measured minus expected.
-    floor : float
-        Sampling error of the measured statistics.
-    """
+    """Root mean square of measured minus expected over one group of statistics, and its sampling error. [m]"""
 
     name: str
     before: float

@@ -33,7 +33,7 @@ KEPT = 2
 
 @dataclass(frozen=True, eq=False)
 class Search:
-    """What stays the same.
+    """What stays the same in all tests.
 
     Parameters
     ----------

@@ -12,8 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.identification.autocorrelation import Problem, Whitener, fit_autoregression, moving_sum
+from xosc_lateral.identification.autocorrelation import Whitener, fit_autoregression, moving_sum
 from xosc_lateral.identification.innovations import CLIP, ORDER, own_levels
+from xosc_lateral.identification.refinement import Problem
 from xosc_lateral.identification.regression import Coarse, Fitted
 from xosc_lateral.identification.timeline import COARSE, coarse_all, coarse_mean
 

@@ -94,7 +94,6 @@ class Outcome:
     term : Term or None
         To be added, or None: nothing that could be.
     columns : tuple of str
-        What was looked at.
     p_value : float
         Family-wise over everything that the test tried.
     after : Fitted, optional
@@ -118,13 +117,13 @@ class Term(ABC):
     kind: ClassVar[str]
     """As in the report's schema."""
     stages: ClassVar[tuple[Stage, ...]] = ()
-    """At which it is looked for; none: with another term, which it competes with."""
+    """At which it is tested; none: with another term, which it competes with."""
     place: ClassVar[int] = 0
     """Among those of a stage: smaller ones are asked first, and first where two are equally sure; then by name. [-]"""
     weight: ClassVar[float]
     """Of its component in the error budget; one for each kind of hidden effect. [-]"""
     least_drives: ClassVar[int] = 1
-    """In a table that it is looked for in."""
+    """In a table in which it is tested."""
     seen_held_out: ClassVar[bool] = True
     """Whether the mean or the innovations' scale follow terms of this class on held-out rows: not the latent path of a
     cycle, nor what changes the slow movement alone."""
@@ -171,7 +170,7 @@ class Term(ABC):
     @classmethod
     @abstractmethod
     def test(cls, search: Search, fitted: Fitted) -> Outcome | None:
-        """Look for one more term of this kind beside those fitted; None: there is nothing to look at."""
+        """Test for one more term of this kind beside those fitted; None: there is no candidate."""
 
     def probability_beside(self, search: Search, fitted: Fitted) -> float:
         """p-value of this very finding beside the terms fitted, which it is not one of."""

@@ -16,8 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.driver.effects import Acts, ColumnEffect, Effect
-from xosc_lateral.identification.autocorrelation import Problem
 from xosc_lateral.identification.column_search import SearchedTerm, likely_response
+from xosc_lateral.identification.refinement import Problem
 from xosc_lateral.identification.regression import Coarse, Fitted
 from xosc_lateral.identification.squares import SLOW_S, fine_squares, log_sizes, of_squares, quick_squares, slow_squares
 from xosc_lateral.identification.terms.base import Stage, Term
