@@ -22,6 +22,7 @@ from xosc_lateral.road.header_offset import HeaderOffset
 from xosc_lateral.road.index import SurfaceIndex
 from xosc_lateral.road.lanes import DRIVING
 from xosc_lateral.road.links import Links
+from xosc_lateral.road.lookup import IndexLike
 from xosc_lateral.road.marks import road_marks
 from xosc_lateral.road.moving import Chooser, advance, straightest
 from xosc_lateral.road.onward import gone_on
@@ -250,6 +251,10 @@ class RoadNetwork:
         `s`, `t` in [m].
         """
         return lane_at(self.roads[road], road, s, t, lane_types)
+
+    def section_numbers(self, road: IntArray, s: FloatArray) -> IndexLike:
+        """Numbers of lane sections, counted over all roads; road and s [m] of the same shape (n,)."""
+        return self._tables.section_of(road, s)
 
     def section_at(self, road: int, s: float) -> tuple[float, float]:
         """Start and end s of the lane section. [m]"""
