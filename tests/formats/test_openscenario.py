@@ -25,7 +25,7 @@ from tests.formats.made_scenario import (
     write_scenario,
 )
 from xosc_lateral.errors import FormatError
-from xosc_lateral.formats.openscenario import read_scenario
+from xosc_lateral.formats.openscenario.read import read_scenario
 from xosc_lateral.formats.openscenario.references import LEVELS_UP
 from xosc_lateral.scenario.actions.lateral import LaneChangeAction, RelativeTargetLane
 from xosc_lateral.scenario.actions.longitudinal import AbsoluteTargetSpeed, SpeedAction

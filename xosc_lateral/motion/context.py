@@ -190,8 +190,8 @@ def _neighbours(
     motion: NominalMotion, network: RoadNetwork, index: int, grid: IntArray, lanes: Mapping[str, FloatArray]
 ) -> dict[str, FloatArray]:
     own = motion.entities[index]
-    steps = np.unique(np.diff(grid))
-    every = int(steps[0]) if len(steps) == 1 else 1
+    steps = np.diff(grid)
+    every = int(steps[0]) if len(steps) and (steps == steps[0]).all() else 1
     traffic = _traffic(motion, network, int(grid[0]) % every, every)
     columns = grid // every
     around = Around.nobody(len(grid))
