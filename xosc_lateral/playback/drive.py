@@ -65,7 +65,14 @@ def along_reference(network: RoadNetwork, road: int, lane: int, s: float, offset
     curvature = network.curvature_at(road, s)
     if abs(curvature) < EPSILON:
         return distance
-    shrink = 1.0 - curvature * (network.lane_state_at(road, lane, s).centre_t + offset_t)
+    return beside_line(curvature, network.lane_state_at(road, lane, s).centre_t + offset_t, distance)
+
+
+def beside_line(curvature: float, t: float, distance: float) -> float:
+    """Length along a line of a way beside it, where that line has a curvature [1/m]. [m]"""
+    if abs(curvature) < EPSILON:
+        return distance
+    shrink = 1.0 - curvature * t
     return distance / shrink if shrink > _TIGHT else distance
 
 

@@ -9,6 +9,7 @@ from typing import Any
 from xosc_lateral.errors import PlaybackError
 from xosc_lateral.motion.nominal import Note, PlayedAction
 from xosc_lateral.playback.state import EntityState
+from xosc_lateral.playback.unwatched import Unwatched
 from xosc_lateral.playback.values import Values
 from xosc_lateral.road.network import RoadNetwork
 from xosc_lateral.scenario import Action, Place, Scenario, TrafficSignalController
@@ -115,6 +116,7 @@ class Simulation:
         self.scenario = scenario
         self.network = network
         self.entities = tuple(EntityState(entity, network) for entity in scenario.entities)
+        self.unwatched = Unwatched(self.entities)
         self.by_name = {state.name: state for state in self.entities}
         self.parameters = Values(scenario.parameters)
         self.variables = Values(scenario.variables)
@@ -141,7 +143,22 @@ class Simulation:
             self.note(remark.reason or "is not read", remark.place)
 
     def entity(self, name: str, place: Place) -> EntityState:
-        """The entity of that name; raises `PlaybackError` at `place` if there is none."""
+        """The entity of that name, to be looked at now or later; raises `PlaybackError` at `place` if there is none."""
+        state = self.actor(name, place)
+        state.is_watched = True
+        self.wake(state)
+        return state
+
+    def everybody(self) -> tuple[EntityState, ...]:
+        """All entities, to be looked at now or later."""
+        return tuple(self.entity(state.name, state.entity.place) for state in self.entities)
+
+    def wake(self, state: EntityState) -> None:
+        """Bring an entity that follows its lane unwatched to where it is now."""
+        self.unwatched.wake(state, derives_motion=self.derives_motion)
+
+    def actor(self, name: str, place: Place) -> EntityState:
+        """The entity of that name, for actions of its own alone; raises `PlaybackError` as `entity` does."""
         state = self.by_name.get(name)
         if state is None:
             raise PlaybackError(

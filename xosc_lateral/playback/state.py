@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import cos, nan, pi, sin
+from typing import Protocol
 
 from xosc_lateral.motion.nominal import Activity
 from xosc_lateral.playback.angles import difference, is_forward, wrap
@@ -100,6 +101,14 @@ def guide(network: RoadNetwork, stops: Sequence[Placement]) -> RouteGuide | None
 _ACTIVE = int(Activity.ACTIVE)  # plain: arithmetic of flags takes ten times as long
 
 
+class Running(Protocol):
+    """An action of the storyboard."""
+
+    @property
+    def is_running(self) -> bool:
+        """Whether it runs now."""
+
+
 class EntityState:
     """Where an entity is, how fast, and what happened to it in the present frame.
 
@@ -120,6 +129,7 @@ class EntityState:
         "entity",
         "event_actions",
         "init_actions",
+        "is_watched",
         "lane",
         "last_place",
         "longitudinal_taken",
@@ -184,8 +194,10 @@ class EntityState:
         self.path: PathProgress | None = None
         self.tow: EntityState | None = None
         self.trailer: EntityState | None = None
-        self.init_actions: list[object] = []
-        self.event_actions: list[object] = []
+        self.init_actions: list[Running] = []
+        self.event_actions: list[Running] = []
+        self.is_watched = False
+        """Somebody else looks at it, perhaps in every frame."""
 
     # ---- where it is -------------------------------------------------------------------------------------------------
     @property
@@ -284,6 +296,10 @@ class EntityState:
         """An action moves the entity in this frame, both ways; the default driver must not."""
         self.longitudinal_taken = True
         self.activity |= int(activity)
+
+    def acts(self) -> bool:
+        """Whether one of its actions runs."""
+        return any(action.is_running for actions in (self.init_actions, self.event_actions) for action in actions)
 
     def body_frame(self, vector: tuple[float, float, float]) -> tuple[float, float, float]:
         """A world vector along the entity's own axes (in the plane)."""

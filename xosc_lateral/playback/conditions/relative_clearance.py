@@ -26,7 +26,7 @@ def prepare(content: RelativeClearanceCondition, simulation: Simulation) -> Enti
         for lanes in content.lane_ranges
     ) or ((-_MANY_LANES, _MANY_LANES),)
     names = content.entity_refs
-    others = tuple(simulation.entity(name, content.place) for name in names) if names else simulation.entities
+    others = tuple(simulation.entity(name, content.place) for name in names) if names else simulation.everybody()
     reach = max(content.distance_forward, content.distance_backward)
 
     def in_range(lanes: int) -> bool:
