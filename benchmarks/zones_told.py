@@ -27,7 +27,7 @@ from xosc_lateral.driver.records import plain
 from xosc_lateral.drives.cuts import all_runs
 from xosc_lateral.drives.drive import Run
 from xosc_lateral.drives.resampling import STEP
-from xosc_lateral.evaluation.sampled_snippets import sample_runs
+from xosc_lateral.evaluation.snippets import sample_runs
 from xosc_lateral.formats.drives import read_drives
 
 FloatArray = NDArray[np.float64]

@@ -13,10 +13,9 @@ from xosc_lateral.driver.sensor.model import SensorModel
 from xosc_lateral.driver.snippets import segment_of
 from xosc_lateral.drives.drive import Run
 from xosc_lateral.drives.resampling import STEP
-from xosc_lateral.evaluation.condition import SnippetCondition
+from xosc_lateral.evaluation.parts import SnippetCondition
 from xosc_lateral.evaluation.realism import Beside, Realism, score_realism
-from xosc_lateral.evaluation.sampled_snippets import sample_runs, sensor_noise
-from xosc_lateral.evaluation.snippets import snippets_of
+from xosc_lateral.evaluation.snippets import sample_runs, sensor_noise, snippets_of
 from xosc_lateral.report.realism import realism_lines, start_fade_note
 
 SHORT = SnippetCondition(10.0, False)

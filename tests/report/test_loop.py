@@ -11,8 +11,7 @@ import numpy as np
 import pytest
 
 from xosc_lateral.datasets.driver_simulator import simulate_drive
-from xosc_lateral.datasets.plants import ShiftBy
-from xosc_lateral.datasets.response import SimulatedResponse
+from xosc_lateral.datasets.plants import ShiftBy, SimulatedResponse
 from xosc_lateral.driver.effects import (
     Acts,
     Angular,

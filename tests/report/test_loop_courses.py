@@ -9,9 +9,8 @@ import numpy as np
 import pytest
 
 from tests.identification.made_coarse import coarse_of, movement
-from xosc_lateral.identification.markov_switching import RegimeFit
 from xosc_lateral.identification.regression import fit_model
-from xosc_lateral.identification.terms.regimes import RegimesTerm
+from xosc_lateral.identification.terms.regimes import RegimeFit, RegimesTerm
 from xosc_lateral.identification.terms.time import StepTerm
 from xosc_lateral.report.loop_courses import (
     by_drive,

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from xosc_lateral.api.inputs import PathLike, Paths, ProfileLike, given_profile
 from xosc_lateral.api.result import Result
-from xosc_lateral.enrich.neighbours import Neighbours
+from xosc_lateral.enrich.result import Neighbours
 from xosc_lateral.errors import SimulationError
 
 if TYPE_CHECKING:

@@ -183,7 +183,7 @@ class Playback(Result):
 
     def page(self) -> str:
         """A self-contained HTML page that plays the scenario."""
-        from xosc_lateral.report.view import view_page
+        from xosc_lateral.report.recording import view_page
 
         motion, network = self._played.motion, self._played.network
         return view_page(motion, network, source=self.scenario.name, provenance=self._provenance())
@@ -247,7 +247,7 @@ class Segments(Result):
         return f"{len(following)} road-following segments of {entities} entities, {seconds:.1f} s"
 
     def __str__(self) -> str:
-        from xosc_lateral.report.segments import as_text
+        from xosc_lateral.report.recording import as_text
 
         return as_text(self._rows)
 

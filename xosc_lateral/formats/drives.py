@@ -16,8 +16,7 @@ from xosc_lateral.drives.drive import Drive
 from xosc_lateral.drives.zones import ZONE
 from xosc_lateral.errors import FormatError, NotEnoughDataError
 from xosc_lateral.formats.mapping import MappingLike, TableMapping, as_mapping
-from xosc_lateral.formats.tables import read_table
-from xosc_lateral.formats.text_columns import comma_numbers, indicators, plain_cells, seconds_of_text
+from xosc_lateral.formats.tables import comma_numbers, indicators, plain_cells, read_table, seconds_of_text
 from xosc_lateral.segment import CONTEXT_UNITS
 
 if TYPE_CHECKING:

@@ -20,14 +20,13 @@ from xosc_lateral.identification.core_model import (
     compare_spectrum_shapes,
     test_population,
 )
+from xosc_lateral.identification.cross_validation import held_out_words, hold_out_blocks
 from xosc_lateral.identification.findings import Finding, describe_finding, population_finding, spectrum_finding
-from xosc_lateral.identification.held_out import HeldOut, Setting, fit_without, score_held_out
-from xosc_lateral.identification.held_out_gain import held_out_words, hold_out_blocks
+from xosc_lateral.identification.held_out import HeldOut, Scorecard, Setting, fit_without, score_held_out, score_runs
 from xosc_lateral.identification.identify import Identified, Progress, identify, initial_terms
 from xosc_lateral.identification.regression import Coarse, Fitted, fit_model
 from xosc_lateral.identification.removal import Estimates, estimate_all, removal_of
 from xosc_lateral.identification.residual import floor_of, size_of, split_differences
-from xosc_lateral.identification.scorecard import Scorecard, score_runs
 from xosc_lateral.identification.selection import Accepted, Selection
 from xosc_lateral.identification.significance import LoopSeed
 from xosc_lateral.identification.terms.base import Term

@@ -31,8 +31,7 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.identification.columns import Column, Values
-from xosc_lateral.identification.roles import Assigned, Role
+from xosc_lateral.identification.columns import Assigned, Column, Role, Values
 from xosc_lateral.identification.timeline import Timeline
 
 FloatArray = NDArray[np.float64]

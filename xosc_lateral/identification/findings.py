@@ -10,10 +10,9 @@ from numpy.typing import NDArray
 
 from xosc_lateral.driver.effects import Effect
 from xosc_lateral.identification.core_model import DriverVariance, SpectrumShape
-from xosc_lateral.identification.held_out_gain import Gain
 from xosc_lateral.identification.refinement import Alternatives
 from xosc_lateral.identification.regression import Fitted
-from xosc_lateral.identification.selection import Accepted
+from xosc_lateral.identification.selection import Accepted, Gain
 
 FloatArray = NDArray[np.float64]
 Compared = tuple[Mapping[str, FloatArray], Mapping[str, FloatArray], Mapping[str, FloatArray]]

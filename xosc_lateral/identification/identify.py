@@ -12,14 +12,12 @@ from msgspec import structs
 
 from xosc_lateral.driver.effects import Acts, ColumnEffect, Drift, TimeSmooth, VarianceTrend
 from xosc_lateral.driver.profile import DriverProfile
-from xosc_lateral.identification.columns import Column, known_columns
+from xosc_lateral.identification.columns import Assigned, Column, Role, known_columns, roles_of
+from xosc_lateral.identification.cross_validation import Nested, hold_out_blocks, nest
 from xosc_lateral.identification.feedback import Feedback, find_feedback
-from xosc_lateral.identification.held_out_gain import Gain, hold_out_blocks
-from xosc_lateral.identification.nested import Nested, nest
 from xosc_lateral.identification.regression import Coarse
-from xosc_lateral.identification.roles import Assigned, Role, roles_of
 from xosc_lateral.identification.search import Search
-from xosc_lateral.identification.selection import ERROR_BUDGET, Rejected, Selection, select
+from xosc_lateral.identification.selection import ERROR_BUDGET, Gain, Rejected, Selection, select
 from xosc_lateral.identification.terms.base import Term
 from xosc_lateral.identification.terms.between import BetweenTerm, is_between
 from xosc_lateral.identification.terms.mean import MeanTerm

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.identification.close import LoopResult
-from xosc_lateral.identification.held_out_gain import hold_out_blocks
+from xosc_lateral.identification.cross_validation import hold_out_blocks
 from xosc_lateral.identification.residual import size_of, split_differences
 from xosc_lateral.identification.significance import LoopSeed
 

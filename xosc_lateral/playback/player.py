@@ -26,8 +26,7 @@ from xosc_lateral.playback.trailers import align_trailers, connect, pull_trailer
 from xosc_lateral.playback.transition import EPSILON
 from xosc_lateral.road import RoadNetwork
 from xosc_lateral.scenario import Scenario
-from xosc_lateral.scenario.actions.routing import FollowTrajectoryAction
-from xosc_lateral.scenario.actions.teleport import TeleportAction
+from xosc_lateral.scenario.private_actions import FollowTrajectoryAction, TeleportAction
 
 _LATERAL = int(Activity.LATERAL)  # plain: arithmetic of flags takes ten times as long
 

@@ -11,8 +11,8 @@ from xosc_lateral.formats.hashes import parsed_hashes
 from xosc_lateral.formats.profiles import profile_hash
 from xosc_lateral.identification.close import LoopResult
 from xosc_lateral.identification.findings import Finding
+from xosc_lateral.identification.held_out import SNIPPET_ROWS
 from xosc_lateral.identification.lack_of_fit import GroupError, LackOfFit, lack_of_fit_of
-from xosc_lateral.identification.scorecard import SNIPPET_ROWS
 from xosc_lateral.identification.selection import Rejected
 from xosc_lateral.report.loop_words import (
     CERTAIN,

@@ -15,8 +15,8 @@ from xosc_lateral.formats.profiles import profile_hash
 from xosc_lateral.identification.close import LoopResult
 from xosc_lateral.identification.feedback import Feedback
 from xosc_lateral.identification.findings import Finding
-from xosc_lateral.identification.held_out_gain import Gain
 from xosc_lateral.identification.lack_of_fit import LackOfFit
+from xosc_lateral.identification.selection import Gain
 from xosc_lateral.normal import NORMAL_95
 from xosc_lateral.report.loop_words import feedback_words, lack_of_fit_words, meaning
 from xosc_lateral.version import __version__

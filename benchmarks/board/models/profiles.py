@@ -16,7 +16,7 @@ from xosc_lateral.driver.sampling import sample_offsets
 from xosc_lateral.driver.seeds import child
 from xosc_lateral.driver.sensor.runs import driver_runs
 from xosc_lateral.drives.drive import Drive, Run
-from xosc_lateral.evaluation.sampled_snippets import sample_recorded, sensor_noise
+from xosc_lateral.evaluation.snippets import sample_recorded, sensor_noise
 from xosc_lateral.segment import Segment
 
 FloatArray = NDArray[np.float64]

@@ -15,8 +15,7 @@ from xosc_lateral.formats.importers.esmini_log import is_esmini_log, read_esmini
 from xosc_lateral.formats.importers.placed import PlacedTracks, ground_speed, travel_heading
 from xosc_lateral.formats.mapping import MappingLike, TableMapping, as_mapping, parse_map
 from xosc_lateral.formats.states import COLUMNS
-from xosc_lateral.formats.tables import read_table
-from xosc_lateral.formats.text_columns import comma_numbers, seconds_of_text
+from xosc_lateral.formats.tables import comma_numbers, read_table, seconds_of_text
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from msgspec.structs import replace
 
 from xosc_lateral.errors import FormatError, MissingFileError
 from xosc_lateral.formats.openscenario.context import Context
 from xosc_lateral.formats.openscenario.declarations import local_scope
 from xosc_lateral.formats.openscenario.element import XmlElement
-from xosc_lateral.scenario.entity import Controller, Entity
+from xosc_lateral.scenario.entity import Axle, Axles, BoundingBox, Controller, Entity, Performance
 from xosc_lateral.scenario.enums import EntityCategory, VehicleCategory
-from xosc_lateral.scenario.vehicle import Axle, Axles, BoundingBox, Performance
 
 DEFAULT_BOX = BoundingBox(1.5, 0.0, 0.9, 5.0, 2.0, 1.8)
 """Where a file gives none: the middle of the field's passenger cars."""

@@ -11,7 +11,7 @@ from xosc_lateral.playback.simulation import Simulation
 from xosc_lateral.playback.state import EntityState
 from xosc_lateral.playback.transition import EPSILON
 from xosc_lateral.road import Pose
-from xosc_lateral.scenario.conditions.entity import AngleCondition, RelativeAngleCondition
+from xosc_lateral.scenario.conditions import AngleCondition, RelativeAngleCondition
 from xosc_lateral.scenario.enums import AngleType, CoordinateSystem
 
 

@@ -20,7 +20,7 @@ from xosc_lateral.scenario.position import (
 )
 
 
-def resolve(
+def route_position(
     position: RoutePosition, simulation: Simulation, route_guide: Callable[[Route, Simulation], RouteGuide | None]
 ) -> Placement:
     """The way along the route counts from its first waypoint; an entity on it is where it is."""
