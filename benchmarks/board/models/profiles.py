@@ -111,7 +111,6 @@ def drives_of(runs: Sequence[Run]) -> list[Drive]:
                 levels=own[0].levels,
                 run=np.concatenate([np.full(len(run), number, dtype=np.int64) for number, run in enumerate(own)]),
                 empty=own[0].empty,
-                zone=None if own[0].zone is None else np.concatenate([run.zone for run in own if run.zone is not None]),
             )
         )
     return drives
