@@ -32,8 +32,7 @@ from xosc_lateral.enrich.enrich import enrich
 from xosc_lateral.enrich.result import Enriched
 from xosc_lateral.evaluation.filters import below_half_hertz
 from xosc_lateral.evaluation.snippets import Snippets, snippets_of
-from xosc_lateral.formats.profile_folders import find_profile
-from xosc_lateral.formats.profiles import read_profile
+from xosc_lateral.formats.profiles import find_profile, read_profile
 from xosc_lateral.formats.recordings import read_recording
 from xosc_lateral.motion.nominal import Activity
 from xosc_lateral.pipeline.load import Played, play_scenario

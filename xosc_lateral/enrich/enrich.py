@@ -411,4 +411,4 @@ def _is_left_hand(entity: EntityMotion, network: RoadNetwork, knots: IntArray) -
 
 def _unknown(driver: DriverProfile, segment: Segment) -> set[str]:
     """Columns that the scenario could have told."""
-    return {column for column in driver.columns_of_any_drive if column not in segment.context}
+    return {column for column in driver.columns if column not in segment.context}
