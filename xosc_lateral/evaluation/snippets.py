@@ -175,12 +175,7 @@ def sample_runs(profile: DriverProfile, runs: Sequence[Run], seed: int, *, same_
     return paths
 
 
-def sensor_noise(
-    profile: DriverProfile, paths: Sequence[FloatArray], segments: Sequence[Segment], seed: int
-) -> list[FloatArray]:
-    """What the profile's sensor adds to paths on these segments, shape (n_i,) each; zeros where it knows none. [m]"""
+def sensor_noise(profile: DriverProfile, paths: Sequence[FloatArray], seed: int) -> list[FloatArray]:
+    """What the profile's sensor adds to paths, shape (n_i,) each; zeros where it knows none. [m]"""
     root, step = np.random.SeedSequence(seed), profile.model.step
-    return [
-        sensor_error(profile.sensor, path, step, child(root, k))
-        for k, (path, segment) in enumerate(zip(paths, segments, strict=True))
-    ]
+    return [sensor_error(profile.sensor, path, step, child(root, k)) for k, path in enumerate(paths)]

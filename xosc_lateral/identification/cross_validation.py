@@ -101,13 +101,7 @@ def _log_likelihood(fitted: Fitted, noise: Fitted, coarse: Coarse, held: BoolArr
 
 @dataclass(frozen=True, eq=False)
 class Nested:
-    """Selections of all folds, and what they gain.
-
-    Parameters
-    ----------
-    selections : tuple of Selection
-        One per fold.
-    """
+    """Selections of all folds, one each, and what they gain."""
 
     selections: tuple[Selection, ...]
     _by_row: tuple[tuple[BoolArray, Coarse], ...]

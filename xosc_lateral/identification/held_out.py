@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -24,7 +24,9 @@ from xosc_lateral.identification.residual import (
     SummaryStatistics,
     error_between,
     expected,
+    half_samples,
     simulated_runs,
+    size_of,
     statistics_of,
 )
 from xosc_lateral.identification.selection import Selection
@@ -46,16 +48,31 @@ class Setting:
     """What stays the same when findings are scored."""
 
     coarse: Coarse
-    blocks: NDArray[np.intp]
+    blocks: IntArray
     fixed: DriverProfile | None
     kind: ModelKind
     refined_kind: ModelKind
     root: np.random.SeedSequence
 
+    def rng(self, key: LoopSeed) -> np.random.Generator:
+        """Source of chance for one purpose."""
+        return np.random.default_rng(np.random.SeedSequence(self.root.entropy, spawn_key=(key,)))
+
 
 @dataclass(frozen=True, eq=False)
 class HeldOut:
-    """Summary statistics on held-out blocks."""
+    """Summary statistics on held-out blocks, measured and expected of both profiles.
+
+    Parameters
+    ----------
+    statistics : SummaryStatistics
+    real, before, after : mapping of str to array
+        By group. [m]
+    runs_before, runs_after : array, shape (runs, n)
+        Of the profiles. [m]
+    halves : list of mapping of str to array
+        See `residual.half_samples`. [m]
+    """
 
     statistics: SummaryStatistics
     real: dict[str, FloatArray]
@@ -63,30 +80,35 @@ class HeldOut:
     after: dict[str, FloatArray]
     runs_before: FloatArray
     runs_after: FloatArray
-
-    @property
-    def compared(self) -> tuple[Mapping[str, FloatArray], Mapping[str, FloatArray], Mapping[str, FloatArray]]:
-        """Summary statistics of measured offsets, before, after. [m]"""
-        return self.real, self.before, self.after
+    halves: list[dict[str, FloatArray]]
 
     @property
     def errors(self) -> tuple[float, float]:
         """Errors before and after. [m]"""
         return error_between(self.real, self.before), error_between(self.real, self.after)
 
+    def error_of(self, group: str) -> tuple[float, float]:
+        """Errors before and after in one group; 0 where there is none. [m]"""
+        if group not in self.real:
+            return 0.0, 0.0
+        before, after = (size_of({"": self.real[group] - side[group]}) for side in (self.before, self.after))
+        return before, after
+
 
 def score_held_out(
     setting: Setting, selection: Selection, nested: Nested | None, columns: list[Column], progress: Progress
 ) -> HeldOut:
     """Describe measured offsets and both profiles' runs; `nested` None: nothing is kept."""
-    timeline = setting.coarse.timeline
-    statistics = statistics_of(timeline, _quantities(selection, columns), _frequency(selection.final))
+    timeline, fitted = setting.coarse.timeline, selection.final
+    statistics = statistics_of(timeline, _quantities(selection, columns), _frequency(fitted))
     kept = tuple(one.term for one in selection.accepted)
     runs_before, runs_after = _held_out_runs(setting, nested, kept, selection.start, progress)
     real = statistics.describe(timeline.offset, timeline.valid)
     before = expected(statistics, runs_before, timeline.valid)
     after = before if runs_after is runs_before else expected(statistics, runs_after, timeline.valid)
-    return HeldOut(statistics, real, before, after, runs_before, runs_after)
+    unmoved = timeline.offset - removal_of(fitted, estimate_all(fitted)).location
+    halves = half_samples(statistics, unmoved, setting.blocks, setting.rng(LoopSeed.BLOCKS))
+    return HeldOut(statistics, real, before, after, runs_before, runs_after, halves)
 
 
 def _held_out_runs(
@@ -177,13 +199,9 @@ SPLITS = 6
 
 @dataclass(frozen=True, eq=False)
 class Scorecard:
-    """Wasserstein distances per metric, in standard deviations of the measured metric.
+    """Wasserstein distances per metric, in standard deviations of the measured one; None: too few snippets.
 
-    Parameters
-    ----------
-    before, after, floor : Distances, or None when there are too few snippets
-    real, sampled_before, sampled_after : array, shape (snippets, 10)
-        For violins. [m]
+    The metrics themselves, shape (snippets, 10), are for violins. [m]
     """
 
     before: Distances | None

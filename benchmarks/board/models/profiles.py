@@ -40,7 +40,7 @@ class ProfileModel:
             return sample_recorded(self.profile, segments, starts, seed)
         root = np.random.SeedSequence(seed)
         paths = [sample_offsets(self.profile, segment, child(root, number)) for number, segment in enumerate(segments)]
-        noise = sensor_noise(self.profile, paths, segments, seed)
+        noise = sensor_noise(self.profile, paths, seed)
         return [path + error for path, error in zip(paths, noise, strict=True)]
 
     @property

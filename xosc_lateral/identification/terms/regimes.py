@@ -22,10 +22,9 @@ from numpy.typing import NDArray
 
 from xosc_lateral.driver.effects import Effect, Regimes
 from xosc_lateral.identification.dictionary import in_another_order
-from xosc_lateral.identification.innovations import squared_innovations
 from xosc_lateral.identification.regression import Coarse, Fitted
 from xosc_lateral.identification.significance import HEAVY_TAIL_SHARE, LoopSeed, upper_tail
-from xosc_lateral.identification.squares import SLOW_S, fine_squares, log_sizes, slow_squares
+from xosc_lateral.identification.squares import SLOW_S, fine_squares, log_sizes, quick_squares, slow_squares
 from xosc_lateral.identification.terms.base import Description, Outcome, Removal, Stage, Term
 from xosc_lateral.identification.terms.spread import known_log_scale, what_a_column_may_do, what_columns_do
 
@@ -183,7 +182,7 @@ class RegimesTerm(Term):
             what_a_column_may_do(search, fitted)[0],
         ]
         p_value = probability_of_persistence(
-            squared_innovations(fitted.innovations, coarse.valid),
+            quick_squares(fitted).standardised,
             coarse.valid,
             np.concatenate(known, axis=1),
             search.rng(LoopSeed.REGIMES),
