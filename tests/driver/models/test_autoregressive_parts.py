@@ -18,8 +18,8 @@ from xosc_lateral.driver.models.autoregressive.filters import (
     split_bands,
 )
 from xosc_lateral.driver.models.autoregressive.parameters import AutoregressiveParameters
-from xosc_lateral.driver.models.autoregressive.parts import draw_drivers
-from xosc_lateral.driver.models.autoregressive.volatility import COARSE, FINE, Factors, Volatility, begin_factors
+from xosc_lateral.driver.models.autoregressive.parts import COARSE, FINE, Factors, begin_factors, draw_drivers
+from xosc_lateral.driver.models.autoregressive.volatility import Volatility
 from xosc_lateral.driver.models.base import Start
 from xosc_lateral.formats.profiles import read_profile
 from xosc_lateral.shipped import shipped_folder

@@ -10,8 +10,17 @@ from scipy.signal import lfilter
 from tests.driver.models.made_models import POPULATION, STEADY
 from xosc_lateral.driver.models.autoregressive.filters import COARSE_EVERY, TICKS, interpolate
 from xosc_lateral.driver.models.autoregressive.model import AutoregressiveModel
-from xosc_lateral.driver.models.autoregressive.parts import CoarsePart, CoarseState, DriverState, FinePart, FineState
-from xosc_lateral.driver.models.autoregressive.volatility import COARSE, FINE, Factors, begin_factors
+from xosc_lateral.driver.models.autoregressive.parts import (
+    COARSE,
+    FINE,
+    CoarsePart,
+    CoarseState,
+    DriverState,
+    Factors,
+    FinePart,
+    FineState,
+    begin_factors,
+)
 
 N = 203
 SEED = np.random.SeedSequence(3)

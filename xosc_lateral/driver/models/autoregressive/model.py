@@ -27,11 +27,12 @@ from xosc_lateral.driver.models.autoregressive.parts import (
     CoarsePart,
     CoarseState,
     DriverState,
+    FactorState,
     FinePart,
     FineState,
+    begin_factors,
     draw_drivers,
 )
-from xosc_lateral.driver.models.autoregressive.volatility import FactorState, begin_factors
 from xosc_lateral.driver.models.base import Start
 from xosc_lateral.driver.models.mean_reversion import ClockState, take_at_rate
 from xosc_lateral.driver.seeds import AutoregressiveSeed, generator
