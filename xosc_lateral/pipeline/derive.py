@@ -161,6 +161,9 @@ class Derived(NamedTuple):
 
     def __str__(self) -> str:
         had = [f"{name} {value:g}, reached {getattr(self.reached, name):.4g}" for name, value in _targets(self).items()]
+        if self.asked.near_line is not None and self.asked.mean is None and size_is_given(self.asked):
+            side = "left" if self.reached.mean > 0 else "right"
+            had.append(f"for which he drives {abs(self.reached.mean):.2f} m {side} of the lane's middle")
         return f"{self.profile.name}: " + ("; ".join(had) or "as its base")
 
 
