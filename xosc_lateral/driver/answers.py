@@ -169,7 +169,7 @@ def _within_drives(runs: Sequence[Run], near: Mapping[str, Sequence[FloatArray]]
     rest = plain[:, 0] - plain[:, 1:] @ (np.linalg.pinv(plain[:, 1:]) @ plain[:, 0])
     power = float(rest[follows - 1] @ rest[follows - 1])
     keep = min(max(float(rest[follows] @ rest[follows - 1]) / max(power, 1e-12), 0.0), KEEP)
-    # a driver's slow drift is told from what he does beside somebody
+    # a driver's slow drift is separated from what he does beside somebody
     table, groups, number = table[follows] - keep * table[follows - 1], groups[follows], number[follows]
     table = _centred(table, groups)
     observed, design = table[:, 0], table[:, 1:]

@@ -119,10 +119,10 @@ def without_place(runs: Sequence[Run], effects: Sequence[ColumnEffect]) -> list[
     """Runs as they would be with every column at its reference."""
     if not effects:
         return list(runs)
-    return [_neutral(run, effects) for run in runs]
+    return [_at_reference(run, effects) for run in runs]
 
 
-def _neutral(run: Run, effects: Sequence[ColumnEffect]) -> Run:
+def _at_reference(run: Run, effects: Sequence[ColumnEffect]) -> Run:
     strength = {acts: np.zeros(len(run)) for acts in (Acts.LOCATION, Acts.SPREAD, Acts.FINE)}
     for effect in effects:
         own = effect.strength(STEP, run.context)

@@ -49,7 +49,7 @@ class ColumnEffect(Effect, frozen=True, kw_only=True):
     errors : tuple of float
         Standard errors of the coefficients.
     lag_s, response_s : float
-        Delay (negative: looks ahead) and first-order lag of the response. [s]
+        Delay (negative: preview) and first-order lag of the response. [s]
     response_order : int
         Count of such lags one after the other: after one, a jump of the quantity is a corner of the path, after two a
         bend.

@@ -226,7 +226,7 @@ CORRELATION_TIMES = (2.0, 3.0, 4.0, 6.0, 8.0, 12.0, 16.0, 24.0, 32.0, 48.0, 64.0
 """Of the part that varies within seconds, as tried; one value a second can't hold shorter ones. [s]"""
 
 MAX_LAG = 60.0
-"""Lags up to this are looked at. [s]"""
+"""Longest lag that is fitted. [s]"""
 
 
 def log_power(values: FloatArray, window: int) -> FloatArray:
