@@ -6,6 +6,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from msgspec import structs
+
 from xosc_lateral.api.inputs import PathLike, Paths, as_paths, road_search
 from xosc_lateral.api.result import Result
 from xosc_lateral.formats.hashes import parsed_hashes
@@ -260,7 +262,6 @@ class Segments(Result):
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values, as ``--json`` prints them."""
-        from dataclasses import asdict
 
-        rows = [asdict(row) for row in self._rows]
+        rows = [structs.asdict(row) for row in self._rows]
         return {"segments": [row | {"start": round(row["start"], 6), "end": round(row["end"], 6)} for row in rows]}

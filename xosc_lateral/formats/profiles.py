@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Iterable
-from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
+
+from msgspec import Struct
 
 from xosc_lateral.driver.plausibility import check_profile
 from xosc_lateral.driver.profile import DriverProfile
@@ -66,8 +67,7 @@ def profile_hash(profile: DriverProfile) -> str:
     return _hash_of(_Identity(profile))
 
 
-@dataclass(frozen=True, eq=False, slots=True)
-class _Identity:
+class _Identity(Struct, frozen=True, eq=False):
     """A profile as a key: by identity, for it never changes and its parts can't all be hashed."""
 
     profile: DriverProfile

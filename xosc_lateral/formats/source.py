@@ -22,6 +22,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import IO
 
+from msgspec import Struct
+
 from xosc_lateral.errors import FormatError
 from xosc_lateral.limits import FILE_SIZE, PACKING_RATIO, UNPACKED_SIZE, UNPACKED_UNASKED, Limit
 
@@ -68,8 +70,7 @@ class Source:
         check_unpacked(size, self.size, self.path)
 
 
-@dataclass(frozen=True, slots=True)
-class Content:
+class Content(Struct, frozen=True):
     """A file's bytes, and their SHA-256."""
 
     data: bytes

@@ -9,9 +9,9 @@ References
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
+from msgspec import Struct
 from numpy.typing import NDArray
 
 from xosc_lateral.motion.nearby import pairs_within
@@ -29,8 +29,7 @@ TOGETHER = 256
 """Pairs whose boxes are compared at once: a numpy call costs as much as some hundred boxes. [-]"""
 
 
-@dataclass(frozen=True, eq=False, slots=True)
-class BoxPath:
+class BoxPath(Struct, frozen=True, eq=False):
     """A vehicle's bounding box along its path.
 
     Parameters
@@ -62,8 +61,7 @@ class BoxPath:
         return np.stack([x, y], axis=-1)
 
 
-@dataclass(frozen=True, slots=True)
-class Gap:
+class Gap(Struct, frozen=True):
     """Smallest free space between two vehicles over a run; 0: they touch.
 
     Parameters

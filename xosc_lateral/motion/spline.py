@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
+from msgspec import Struct
 from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]
 
 
-@dataclass(frozen=True, eq=False, slots=True)
-class NaturalSpline:
+class NaturalSpline(Struct, frozen=True, eq=False):
     """Natural cubic spline: values and second derivatives (`bends`) at its knots.
 
     Our own dozen lines since scipy.interpolate alone takes a third of `convert`'s time.

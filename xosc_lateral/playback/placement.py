@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from msgspec import Struct
 
 from xosc_lateral.road import Pose
 
@@ -10,8 +10,7 @@ NOWHERE = -1
 """Road of what is on none."""
 
 
-@dataclass(frozen=True, slots=True)
-class Placement:
+class Placement(Struct, frozen=True):
     """A place and an orientation, in road coordinates and, where it was not given in them, in world coordinates too.
 
     Parameters

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+
+from msgspec import Struct
 
 from xosc_lateral.playback.angles import is_forward
 from xosc_lateral.playback.placement import NOWHERE, Placement
 from xosc_lateral.road import LaneLink, RoadNetwork, RouteStep
 
 
-@dataclass(frozen=True, slots=True)
-class RouteGuide:
+class RouteGuide(Struct, frozen=True):
     """A way over roads. It decides at junctions only; between them, the lane is followed.
 
     Parameters

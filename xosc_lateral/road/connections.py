@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from msgspec import Struct
 
 
-@dataclass(frozen=True, slots=True)
-class RoadLink:
+class RoadLink(Struct, frozen=True):
     """What a road is linked to at one of its ends.
 
     Attributes
@@ -24,8 +23,7 @@ class RoadLink:
     contact: str
 
 
-@dataclass(frozen=True, slots=True)
-class Connection:
+class Connection(Struct, frozen=True):
     """A way through a junction: from an incoming road onto a connecting one.
 
     `lanes` holds (from, to) lane ids; empty: the file gives none.
@@ -37,8 +35,7 @@ class Connection:
     lanes: tuple[tuple[int, int], ...]
 
 
-@dataclass(frozen=True, slots=True)
-class Junction:
+class Junction(Struct, frozen=True):
     """A junction and its connections."""
 
     id: str

@@ -10,8 +10,9 @@ References
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from math import atan2, ceil, cos, hypot, sin, sqrt
+
+from msgspec import Struct
 
 TURN_PER_PIECE = 0.5
 """A clothoid is expanded in power series over pieces that turn at most by this. [rad]"""
@@ -26,8 +27,7 @@ MAX_TURN = 2000.0
 """An element that turns more than this is refused by the reader. [rad]"""
 
 
-@dataclass(frozen=True, slots=True)
-class ClothoidPiece:
+class ClothoidPiece(Struct, frozen=True):
     """A stretch of clothoid (line and arc included) about its middle.
 
     Attributes
@@ -100,8 +100,7 @@ def _horner(series: list[complex], u: float) -> complex:
     return value
 
 
-@dataclass(frozen=True, slots=True)
-class Line:
+class Line(Struct, frozen=True):
     """A straight line from (x, y); [m], heading in [rad]."""
 
     x: float
@@ -129,8 +128,7 @@ class Line:
         return clothoid_pieces(self.x, self.y, self.heading, self.length, 0.0, 0.0)
 
 
-@dataclass(frozen=True, slots=True)
-class Arc:
+class Arc(Struct, frozen=True):
     """A circular arc from (x, y); [m], heading in [rad], curvature in [1/m]."""
 
     x: float
@@ -159,8 +157,7 @@ class Arc:
         return clothoid_pieces(self.x, self.y, self.heading, self.length, self.curvature, 0.0)
 
 
-@dataclass(frozen=True, slots=True)
-class Spiral:
+class Spiral(Struct, frozen=True):
     """A clothoid: curvature [1/m] changes linearly along it; lengths in [m], heading in [rad]."""
 
     heading: float
@@ -200,8 +197,7 @@ class Spiral:
         return self.parts
 
 
-@dataclass(frozen=True, slots=True)
-class ParamCubic:
+class ParamCubic(Struct, frozen=True):
     """A parametric cubic (paramPoly3, and poly3 as its special case) run through by arc length.
 
     Attributes

@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from math import cos, sin
 from typing import TypeVar
 
 import numpy as np
+from msgspec import Struct
 from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]
 Place = TypeVar("Place", float, NDArray[np.float64])
 
 
-@dataclass(frozen=True, slots=True)
-class HeaderOffset:
+class HeaderOffset(Struct, frozen=True):
     """From the coordinates that road and scenario are written in to the inertial frame.
 
     First moved, then turned about the inertial origin (OpenDRIVE 1.7, 8.2). Everything is worked out in the coordinates

@@ -9,7 +9,8 @@ from __future__ import annotations
 
 from bisect import bisect_right
 from collections.abc import Iterable
-from dataclasses import dataclass
+
+from msgspec import Struct
 
 Cubic = tuple[float, float, float, float]
 """a, b, c, d of a + b ds + c ds^2 + d ds^3."""
@@ -25,8 +26,7 @@ def shift(cubic: Cubic, ds: float) -> Cubic:
     return (a + ds * (b + ds * (c + ds * d)), b + ds * (2.0 * c + ds * 3.0 * d), c + 3.0 * d * ds, d)
 
 
-@dataclass(frozen=True, slots=True)
-class PiecewiseCubic:
+class PiecewiseCubic(Struct, frozen=True):
     """A function of s that is one cubic from each start to the next, about that start.
 
     Parameters

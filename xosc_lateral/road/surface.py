@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from bisect import bisect_right
-from dataclasses import dataclass
 from math import asin, atan, cos, sin, sqrt, tan
+
+from msgspec import Struct
 
 from xosc_lateral.road.piecewise import PiecewiseCubic
 
@@ -12,8 +13,7 @@ BEND_STEP = 1e-3
 """Step of differences of the grade. [m]"""
 
 
-@dataclass(frozen=True, slots=True)
-class Shape:
+class Shape(Struct, frozen=True):
     """Lateral profile over t at a few stations (``lateralProfile/shape``), linear in s between them.
 
     Attributes
@@ -43,8 +43,7 @@ class Shape:
         )
 
 
-@dataclass(frozen=True, slots=True)
-class Surface:
+class Surface(Struct, frozen=True):
     """Elevation and lean of one road.
 
     Attributes

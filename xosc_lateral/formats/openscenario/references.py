@@ -15,8 +15,9 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Iterable
-from dataclasses import dataclass
 from pathlib import Path
+
+from msgspec import Struct
 
 from xosc_lateral.errors import FormatError
 from xosc_lateral.scenario.place import Place
@@ -57,8 +58,7 @@ def _highest(folder: Path) -> Path:
     return root
 
 
-@dataclass(frozen=True, slots=True)
-class Boundary:
+class Boundary(Struct, frozen=True):
     """Where references of one scenario may lead.
 
     Parameters

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from math import inf
+
+from msgspec import Struct
 
 from xosc_lateral.scenario import Performance
 from xosc_lateral.scenario.dynamics import DynamicConstraints
 
 
-@dataclass(frozen=True, slots=True)
-class Limits:
+class Limits(Struct, frozen=True):
     """[m/s], [m/s2], [m/s3]; infinite: none."""
 
     speed: float

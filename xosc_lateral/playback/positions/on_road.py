@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from math import pi
+
+from msgspec.structs import replace
 
 from xosc_lateral.errors import PlaybackError
 from xosc_lateral.playback.placement import Placement
