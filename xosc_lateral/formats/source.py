@@ -22,8 +22,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import IO
 
-from msgspec import Struct
-
 from xosc_lateral.errors import FormatError
 from xosc_lateral.limits import FILE_SIZE, PACKING_RATIO, UNPACKED_SIZE, UNPACKED_UNASKED, Limit
 
@@ -70,7 +68,8 @@ class Source:
         check_unpacked(size, self.size, self.path)
 
 
-class Content(Struct, frozen=True):
+@dataclass(frozen=True, slots=True)
+class Content:
     """A file's bytes, and their SHA-256."""
 
     data: bytes
