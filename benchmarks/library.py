@@ -32,11 +32,9 @@ from xosc_lateral.drives.cuts import all_runs
 from xosc_lateral.drives.drive import Drive, Run
 from xosc_lateral.drives.resampling import STEP
 from xosc_lateral.errors import NotEnoughDataError
-from xosc_lateral.evaluation.metrics import snippet_metrics
-from xosc_lateral.evaluation.movement_summary import summary_of
+from xosc_lateral.evaluation.metrics import snippet_metrics, summary_of
 from xosc_lateral.evaluation.record import scores_to_dict
-from xosc_lateral.evaluation.scores import score_profile
-from xosc_lateral.evaluation.snippet_scores import SNIPPET
+from xosc_lateral.evaluation.scores import SNIPPET, score_profile
 from xosc_lateral.evaluation.snippets import snippets_of
 from xosc_lateral.formats.drives import read_drives
 from xosc_lateral.formats.hashes import parsed_hash

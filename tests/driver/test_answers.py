@@ -16,7 +16,7 @@ from xosc_lateral.driver.fitting import fit_population
 from xosc_lateral.driver.neighbours import LAG, ORDER, RESPONSE, SCALE
 from xosc_lateral.drives.drive import Run
 from xosc_lateral.enrich.enrich import enrich
-from xosc_lateral.enrich.neighbours import Neighbours
+from xosc_lateral.enrich.result import Neighbours
 
 BESIDE = Proximity(
     acts=Acts.LOCATION, column="right_distance", scale=SCALE, lag_s=LAG, response_s=RESPONSE, response_order=ORDER

@@ -40,8 +40,8 @@ from xosc_lateral.motion.nominal import NominalMotion
 from xosc_lateral.motion.trajectory import WorldTrajectory
 from xosc_lateral.playback.player import play
 from xosc_lateral.scenario import Scenario
-from xosc_lateral.scenario.actions.routing import FollowTrajectoryAction
 from xosc_lateral.scenario.position import Polyline, WorldPosition
+from xosc_lateral.scenario.private_actions import FollowTrajectoryAction
 
 XSD = Path(__file__).parents[1] / "data" / "xsd"
 STEP = 0.02

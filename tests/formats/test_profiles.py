@@ -15,8 +15,16 @@ from xosc_lateral.driver.effects import Acts, Drift, Linear
 from xosc_lateral.driver.profile import DriverProfile, profile_schema
 from xosc_lateral.errors import DriverProfileError, FormatError
 from xosc_lateral.formats.json_text import canonical_json
-from xosc_lateral.formats.profile_folders import SHIPPED, find_profile, list_profiles
-from xosc_lateral.formats.profiles import SCHEMA, profile_bytes, profile_hash, read_profile, write_profile
+from xosc_lateral.formats.profiles import (
+    SCHEMA,
+    SHIPPED,
+    find_profile,
+    list_profiles,
+    profile_bytes,
+    profile_hash,
+    read_profile,
+    write_profile,
+)
 
 SMALLEST = """{"format": "xosc-lateral driver profile", "version": 2, "id": "old", "model": {"kind": "two-level",
 "settings": {"n_bins": 2}, "counts": [[5, 1], [1, 5]], "damping": [0.01, 0.0]}}"""

@@ -14,9 +14,9 @@ from xosc_lateral.motion.context import NEAR, STEERING, entity_context
 from xosc_lateral.motion.nominal import EntityMotion, PlayedAction
 from xosc_lateral.road.network import RoadNetwork
 from xosc_lateral.scenario import Action, Entity, Place
-from xosc_lateral.scenario.actions.environment import EnvironmentAction
 from xosc_lateral.scenario.enums import VehicleCategory
 from xosc_lateral.scenario.environment import Environment, TimeOfDay, Weather
+from xosc_lateral.scenario.global_actions import EnvironmentAction
 
 GRID = np.arange(0, 501, 10)
 TRUCK = VehicleCategory.TRUCK

@@ -195,7 +195,7 @@ def tag(
 ) -> None:
     """Change tags and metadata of a profile of your own, in its file."""
     from xosc_lateral.api.profiles import tag_profile
-    from xosc_lateral.formats.library import facts_of
+    from xosc_lateral.formats.profiles import facts_of
 
     metadata = pairs(fields, "--set")
     changed = tag_profile(name, library or (), add=tags or (), remove=remove or (), metadata=metadata)

@@ -22,9 +22,9 @@ from xosc_lateral.motion.nearby import pairs_within
 from xosc_lateral.motion.nominal import Activity, EntityMotion, NominalMotion
 from xosc_lateral.road.network import RoadNetwork
 from xosc_lateral.scenario import BoundingBox
-from xosc_lateral.scenario.actions.environment import EnvironmentAction
 from xosc_lateral.scenario.enums import VehicleCategory
 from xosc_lateral.scenario.environment import Environment, Weather
+from xosc_lateral.scenario.global_actions import EnvironmentAction
 from xosc_lateral.segment import FADES
 
 FloatArray = NDArray[np.float64]

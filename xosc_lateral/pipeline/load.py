@@ -17,7 +17,7 @@ from xosc_lateral.pipeline.settings import STEP
 from xosc_lateral.playback.player import play
 from xosc_lateral.road.network import RoadNetwork
 from xosc_lateral.scenario import Scenario
-from xosc_lateral.scenario.conditions.value import at_time
+from xosc_lateral.scenario.conditions import at_time
 
 
 @dataclass(frozen=True, eq=False, slots=True)

@@ -18,10 +18,9 @@ from xosc_lateral.pipeline.load import Played
 from xosc_lateral.pipeline.shifted import Shift, shifts
 from xosc_lateral.playback.player import play
 from xosc_lateral.scenario import Action, Event, Maneuver, ManeuverGroup, Scenario, Story
-from xosc_lateral.scenario.actions.longitudinal import AbsoluteTargetSpeed, SpeedAction
-from xosc_lateral.scenario.conditions.value import at_time
-from xosc_lateral.scenario.dynamics import TransitionDynamics
+from xosc_lateral.scenario.conditions import at_time
 from xosc_lateral.scenario.enums import DynamicsDimension, DynamicsShape, Priority
+from xosc_lateral.scenario.private_actions import AbsoluteTargetSpeed, SpeedAction, TransitionDynamics
 from xosc_lateral.scenario.storyboard import Act, Actors
 
 FACTORS = (0.8, 1.2)

@@ -11,7 +11,7 @@ from xosc_lateral.formats.openscenario.write.target import Player
 from xosc_lateral.pipeline.settings import ConvertSettings, OutputMode
 from xosc_lateral.scenario import Scenario
 from xosc_lateral.scenario.dependence import Dependence, conditions_of
-from xosc_lateral.scenario.trigger import Condition
+from xosc_lateral.scenario.storyboard import Condition
 from xosc_lateral.scenario.under_test import vehicles_under_test
 
 

@@ -13,8 +13,7 @@ from msgspec.structs import replace
 
 from xosc_lateral.playback import boxes
 from xosc_lateral.playback.paths.base import nearest_s
-from xosc_lateral.playback.placement import NOWHERE
-from xosc_lateral.playback.state import EntityState
+from xosc_lateral.playback.state import NOWHERE, EntityState
 from xosc_lateral.road.network import RoadNetwork
 from xosc_lateral.road.positions import RoadPath
 from xosc_lateral.scenario.enums import CoordinateSystem, RelativeDistanceType

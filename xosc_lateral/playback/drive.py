@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from math import inf, pi
 
-from xosc_lateral.playback.placement import NOWHERE
-from xosc_lateral.playback.state import EntityState
+from xosc_lateral.playback.state import NOWHERE, EntityState
 from xosc_lateral.playback.transition import EPSILON
 from xosc_lateral.road import LaneLink, RoadNetwork
 from xosc_lateral.road.moving import most_turning

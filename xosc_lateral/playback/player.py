@@ -16,18 +16,16 @@ import numpy as np
 from xosc_lateral.errors import PlaybackError
 from xosc_lateral.motion.nominal import CUT_OFF, Activity, NominalMotion, Note
 from xosc_lateral.playback.drive import drive, halt_at_road_end
-from xosc_lateral.playback.placement import NOWHERE
 from xosc_lateral.playback.recorder import NO_LANE
 from xosc_lateral.playback.simulation import Simulation
-from xosc_lateral.playback.state import EntityState
+from xosc_lateral.playback.state import NOWHERE, EntityState
 from xosc_lateral.playback.storyboard import ElementState
 from xosc_lateral.playback.storyboard_builder import build_storyboard, init_actions
 from xosc_lateral.playback.trailers import align_trailers, connect, pull_trailers
 from xosc_lateral.playback.transition import EPSILON
 from xosc_lateral.road import RoadNetwork
 from xosc_lateral.scenario import Scenario
-from xosc_lateral.scenario.actions.routing import FollowTrajectoryAction
-from xosc_lateral.scenario.actions.teleport import TeleportAction
+from xosc_lateral.scenario.private_actions import FollowTrajectoryAction, TeleportAction
 
 _LATERAL = int(Activity.LATERAL)  # plain: arithmetic of flags takes ten times as long
 

@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 from xosc_lateral.errors import PlaybackError
 from xosc_lateral.mask import true_blocks
 from xosc_lateral.motion.nominal import Activity, EntityMotion, FloatArray, IntArray
-from xosc_lateral.playback.placement import NOWHERE
-from xosc_lateral.playback.state import EntityState
+from xosc_lateral.playback.state import NOWHERE, EntityState
 from xosc_lateral.road import RoadNetwork
 from xosc_lateral.road.tables import turned_in_surface
 

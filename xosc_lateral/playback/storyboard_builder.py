@@ -6,13 +6,13 @@ from collections.abc import Iterator
 
 from xosc_lateral.playback.actions.registry import prepare_action
 from xosc_lateral.playback.conditions.registry import prepare_trigger
-from xosc_lateral.playback.positions.reference import reference_of
+from xosc_lateral.playback.positions.on_road import reference_of
 from xosc_lateral.playback.simulation import Simulation
 from xosc_lateral.playback.storyboard import ActionElement, EventElement, StoryboardElement, storyboard_root
 from xosc_lateral.playback.trigger import RunningTrigger
 from xosc_lateral.scenario import Act, Action, Event, Init, Maneuver, ManeuverGroup, Private, Story, Storyboard
-from xosc_lateral.scenario.actions.teleport import TeleportAction
 from xosc_lateral.scenario.enums import StoryboardElementType
+from xosc_lateral.scenario.private_actions import TeleportAction
 
 
 def build_storyboard(storyboard: Storyboard, simulation: Simulation) -> StoryboardElement:

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 
 from xosc_lateral.errors import PlaybackError
 from xosc_lateral.road.lanes import DRIVING, NARROW, Lane
-from xosc_lateral.road.lookup import IndexLike, Lookup
+from xosc_lateral.road.piecewise import IndexLike, Lookup
 from xosc_lateral.road.places import limit_at
 from xosc_lateral.road.positions import FloatArray, IntArray
 from xosc_lateral.road.road import Road

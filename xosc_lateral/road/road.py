@@ -7,10 +7,51 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from math import inf, nan
 
-from xosc_lateral.road.connections import RoadLink
 from xosc_lateral.road.geometry import Line, ReferenceElement
 from xosc_lateral.road.lanes import LaneSection
+from xosc_lateral.road.positions import RoadMark
 from xosc_lateral.road.surface import Surface
+
+
+@dataclass(frozen=True, slots=True)
+class RoadLink:
+    """What a road is linked to at one of its ends.
+
+    Attributes
+    ----------
+    element_type : str
+        ``"road"`` or ``"junction"``.
+    element_id : str
+        Its id.
+    contact : str
+        Where the other road is touched: ``"start"``, ``"end"``, or empty when the file does not say (junctions).
+    """
+
+    element_type: str
+    element_id: str
+    contact: str
+
+
+@dataclass(frozen=True, slots=True)
+class Connection:
+    """A way through a junction: from an incoming road onto a connecting one.
+
+    `lanes` holds (from, to) lane ids; empty: the file gives none.
+    """
+
+    incoming_road: str
+    connecting_road: str
+    contact: str
+    lanes: tuple[tuple[int, int], ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Junction:
+    """A junction and its connections."""
+
+    id: str
+    name: str
+    connections: tuple[Connection, ...]
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -102,3 +143,14 @@ class Road:
         low = max(low, found.starts[j] if j else -inf)
         high = min(high, (*found.starts[j + 1 :], inf)[0])
         return low, high, element, self.starts[i], nan if any(found.centre[j][1:]) else found.centre[j][0]
+
+
+def road_marks(road: Road) -> tuple[RoadMark, ...]:
+    """Markings at the outer edges of all lanes, lane 0 included, section by section from left to right."""
+    marks: list[RoadMark] = []
+    for section in road.sections:
+        left = [lane for lane in section.lanes if lane.id > 0]
+        right = [lane for lane in section.lanes if lane.id < 0]
+        for lane in (*left, section.centre, *right):
+            marks += [mark for mark in lane.marks if mark.type != "none"]
+    return tuple(marks)

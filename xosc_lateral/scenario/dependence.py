@@ -13,12 +13,10 @@ from typing import Any
 
 from msgspec import Struct
 
-from xosc_lateral.scenario.actions.appearance import AnimationAction, LightStateAction, VisibilityAction
-from xosc_lateral.scenario.actions.infrastructure import TrafficSignalControllerAction, TrafficSignalStateAction
-from xosc_lateral.scenario.actions.teleport import TeleportAction
-from xosc_lateral.scenario.conditions.entity import CollisionCondition, RelativeClearanceCondition
-from xosc_lateral.scenario.conditions.value import (
+from xosc_lateral.scenario.conditions import (
+    CollisionCondition,
     ParameterCondition,
+    RelativeClearanceCondition,
     StoryboardElementStateCondition,
     TrafficSignalCondition,
     TrafficSignalControllerCondition,
@@ -26,9 +24,10 @@ from xosc_lateral.scenario.conditions.value import (
     VariableCondition,
 )
 from xosc_lateral.scenario.enums import StoryboardElementState, StoryboardElementType
+from xosc_lateral.scenario.global_actions import TrafficSignalControllerAction, TrafficSignalStateAction
+from xosc_lateral.scenario.private_actions import AnimationAction, LightStateAction, TeleportAction, VisibilityAction
 from xosc_lateral.scenario.scenario import Scenario
-from xosc_lateral.scenario.storyboard import Act, Event, ManeuverGroup
-from xosc_lateral.scenario.trigger import Condition, Trigger
+from xosc_lateral.scenario.storyboard import Act, Condition, Event, ManeuverGroup, Trigger
 from xosc_lateral.scenario.under_test import controlled_entities
 
 Path = tuple[str, ...]

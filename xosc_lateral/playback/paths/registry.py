@@ -13,7 +13,7 @@ from xosc_lateral.playback.paths.base import Path
 from xosc_lateral.playback.paths.clothoid import ClothoidPath, TimedClothoid
 from xosc_lateral.playback.paths.nurbs import Control, NurbsPath, clamped_knots
 from xosc_lateral.playback.paths.polyline import Corner, PolylinePath, fill_times, has_gaps_in_time, merge_close
-from xosc_lateral.playback.positions.reference import reference_of
+from xosc_lateral.playback.positions.on_road import reference_of
 from xosc_lateral.playback.simulation import Simulation
 from xosc_lateral.playback.state import EntityState
 from xosc_lateral.road import Pose

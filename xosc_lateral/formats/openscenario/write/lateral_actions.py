@@ -11,9 +11,13 @@ from msgspec.structs import replace
 
 from xosc_lateral.motion.nominal import NominalMotion
 from xosc_lateral.scenario import Action, Event, Scenario
-from xosc_lateral.scenario.actions.lateral import LaneChangeAction, LaneOffsetAction, LateralDistanceAction
-from xosc_lateral.scenario.actions.routing import FollowTrajectoryAction
 from xosc_lateral.scenario.dependence import Dependence
+from xosc_lateral.scenario.private_actions import (
+    FollowTrajectoryAction,
+    LaneChangeAction,
+    LaneOffsetAction,
+    LateralDistanceAction,
+)
 
 LATERAL = (LaneChangeAction, LaneOffsetAction, LateralDistanceAction, FollowTrajectoryAction)
 

@@ -27,14 +27,14 @@ from xosc_lateral.formats.openscenario.write.vertices import Vertices
 from xosc_lateral.formats.xml import parse_xml
 from xosc_lateral.motion.nominal import NominalMotion, PlayedAction
 from xosc_lateral.scenario import Act, ManeuverGroup, Scenario
-from xosc_lateral.scenario.actions.population import AddEntityAction, DeleteEntityAction
-from xosc_lateral.scenario.actions.trailer import ConnectTrailerAction
-from xosc_lateral.scenario.conditions.value import StoryboardElementStateCondition
+from xosc_lateral.scenario.conditions import StoryboardElementStateCondition
 from xosc_lateral.scenario.dependence import actors_of, conditions_of, refers_to
 from xosc_lateral.scenario.enums import StoryboardElementState
+from xosc_lateral.scenario.global_actions import AddEntityAction, DeleteEntityAction
 from xosc_lateral.scenario.parameters import Scope
 from xosc_lateral.scenario.place import Unsupported
-from xosc_lateral.scenario.trigger import Condition
+from xosc_lateral.scenario.private_actions import ConnectTrailerAction
+from xosc_lateral.scenario.storyboard import Condition
 
 STORY = "xosc-lateral trajectories"
 NEVER = 1e9
