@@ -129,7 +129,7 @@ def close_loop(
     provenance : Provenance, optional
         What is known about the drives.
     excluded : sequence of str
-        Columns that are not to be looked at.
+        Columns that are not to be tested.
     roles : mapping of str to str
         What columns are: column -> road, weather, traffic, time, own, driver or unknown. Those that it lacks are
         proposed from name and values.

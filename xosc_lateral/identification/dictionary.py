@@ -30,7 +30,7 @@ BoolArray = NDArray[np.bool_]
 IntArray = NDArray[np.intp]
 
 TIMINGS: Mapping[float, tuple[int, ...]] = {1.0: (-3, -2, -1, 0, 1, 2), 4.0: (-4, -2, 0, 2)}
-"""Lags looked at first, by time constant; refined later. What is smoothed by 4 s differs little from one second to the
+"""Lags tried first, by time constant; refined later. What is smoothed by 4 s differs little from one second to the
 next. Sensitivity: docs/design/identification.md. [s]"""
 
 PRODUCT_TIMINGS: Mapping[float, tuple[int, ...]] = {2.0: (-2, -1, 0, 1)}
@@ -47,10 +47,10 @@ BLOCK_S = 300
 docs/design/identification.md. [s]"""
 
 MIN_SUPPORT_S = 45.0
-"""A quantity that rests on fewer seconds than this is not looked at: anything may have happened just then. [s]"""
+"""A quantity that rests on fewer seconds than this is not tested: anything may have happened just then. [s]"""
 
 LEFT_OVER = 0.05
-"""A candidate of which less than this share is left beside what is known is not looked at. [-]"""
+"""A candidate of which less than this share is left beside what is known is not tested. [-]"""
 
 CROSS_BASIS = 0.01
 """Directions of a column's cross-basis with less than this share of the largest variance are left in. [-]"""

@@ -21,7 +21,7 @@ from xosc_lateral.evaluation.metrics import METRICS, snippet_metrics
 from xosc_lateral.identification.columns import Column
 from xosc_lateral.identification.cross_validation import Nested, folds_of
 from xosc_lateral.identification.regression import Coarse, Fitted, fit_model
-from xosc_lateral.identification.removal import Estimates, bare_runs, estimate_all, removal_of
+from xosc_lateral.identification.removal import Estimates, estimate_all, removal_of, runs_without
 from xosc_lateral.identification.residual import (
     SummaryStatistics,
     error_between,
@@ -127,11 +127,11 @@ def _held_out_runs(
         held = blocks % folds == fold
         used = ~held if folds > 1 else np.ones(len(held), dtype=np.bool_)
         part = coarse.only(used[COARSE // 2 :: COARSE][: len(coarse)])
-        bare = fit_model(part, start.terms)
-        before = setting.fixed or fit_without(bare, estimate_all(bare), used, setting.kind, "before", None)
+        without = fit_model(part, start.terms)
+        before = setting.fixed or fit_without(without, estimate_all(without), used, setting.kind, "before", None)
         profiles = [before]
         if not same:
-            fitted = bare if own is None else own.selections[fold].final
+            fitted = without if own is None else own.selections[fold].final
             profiles.append(fit_without(fitted, estimate_all(fitted), used, setting.refined_kind, "after", None))
         for side, profile in enumerate(profiles):
             # the same luck for both sides and all folds: what differs is the profile, and runs go on from fold to fold
@@ -154,7 +154,7 @@ def fit_without(
     Of a population the base holds what class, lane and speed do to the rest, as `fit` has it; the paper's has not.
     What neighbours do is for the loop to find.
     """
-    runs = bare_runs(fitted.coarse.timeline, removal_of(fitted, estimates), used)
+    runs = runs_without(fitted.coarse.timeline, removal_of(fitted, estimates), used)
     if not runs:
         raise NotEnoughDataError("closing the loop: no run of 10 s is left to fit the base model on")
     if kind is ModelKind.TWO_LEVEL:

@@ -46,7 +46,7 @@ def removal_of(fitted: Fitted, estimates: Estimates) -> Removal:
     return removal
 
 
-def bare_runs(timeline: Timeline, removal: Removal, used: BoolArray) -> list[Run]:
+def runs_without(timeline: Timeline, removal: Removal, used: BoolArray) -> list[Run]:
     """Runs of the movement [m] without effects, from the valid rows in `used`, shape (n,); at least `MIN_RUN` long.
 
     They know class, lane and speed, as far as the table does: what these do to a population is fitted with its base.
@@ -59,7 +59,7 @@ def bare_runs(timeline: Timeline, removal: Removal, used: BoolArray) -> list[Run
     return runs
 
 
-def bare_movement(timeline: Timeline, removal: Removal, rows: slice, mean: float | None = None) -> FloatArray:
+def movement_without(timeline: Timeline, removal: Removal, rows: slice, mean: float | None = None) -> FloatArray:
     """Offsets of one uninterrupted stretch without the effects, about their own mean or a given one. [m] Shape (k,)."""
     left = timeline.offset[rows] - removal.location[rows]
     mean = float(left.mean()) if mean is None else mean
@@ -69,7 +69,7 @@ def bare_movement(timeline: Timeline, removal: Removal, rows: slice, mean: float
 
 
 def _run(timeline: Timeline, removal: Removal, rows: slice, name: str, index: int) -> Run:
-    movement = bare_movement(timeline, removal, rows)
+    movement = movement_without(timeline, removal, rows)
     width = timeline.lane_width[rows]
     context = {name: timeline.context[name][rows] for name in COLUMNS if name in timeline.context}
     time = timeline.time[rows.start] + STEP * np.arange(len(movement))

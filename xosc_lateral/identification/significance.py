@@ -58,7 +58,7 @@ MANY_DRIVES = 20
 
 @dataclass(frozen=True, slots=True)
 class Budget:
-    """How the error budget is shared among the components that are looked for.
+    """How the error budget is shared among the components that are tested.
 
     Parameters
     ----------

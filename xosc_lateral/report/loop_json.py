@@ -76,7 +76,7 @@ def _feedback(item: Feedback) -> dict[str, Any]:
         "why": feedback_words(item),
         "doubtful": item.doubtful,
         "coherence": item.coherence,
-        "foretold": item.predicted_share,
+        "predicted_share": item.predicted_share,
         "function_of_offset": item.function,
     }
 

@@ -4,7 +4,7 @@ Every drive has a level of its own, so what hardly changes within drives can't a
 themselves are regressed on what each drive usually meets, weighted by how well each is known beside how much drives
 differ anyway. The null deals the drives anew, which is exact: drives know nothing of one another. Columns of whole
 drives go along with each other (the left lane is the fast one), and two may act against each other and show together
-only: so pairs are looked at, too.
+only: so pairs are tested, too.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ ROUNDS, SETTLED = 50, 1e-9
 squares falls and is convex in the variance, so that rounds from zero approach the root from below."""
 
 MIN_SUPPORT = 8.0
-"""A quantity that rests on fewer drives than this is not looked at."""
+"""A quantity that rests on fewer drives than this is not tested."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,8 +110,8 @@ class BetweenTerm(ColumnTerm):
 
     def describe(self, fitted: Fitted, effects: tuple[Effect, ...], key: str) -> Description:
         """Change between drives; it has no lag."""
-        told = super().describe(fitted, effects, key)
-        return replace(told, shape=f"{told.shape}, between drives", lag_s=None, response_s=None)
+        size = super().describe(fitted, effects, key)
+        return replace(size, shape=f"{size.shape}, between drives", lag_s=None, response_s=None)
 
 
 def is_between(effect: ColumnEffect) -> bool:
