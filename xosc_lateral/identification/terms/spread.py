@@ -103,20 +103,20 @@ def what_a_column_may_do(search: Search, fitted: Fitted) -> tuple[FloatArray, fl
 
 
 @dataclass(frozen=True, eq=False)
-class SlowSpreadTerm(SearchedTerm):
+class SlowSpreadTerm(SpreadTerm):
     """Log standard deviation of eight-second sums of the innovations by a column: of who lets more pass."""
 
     component: ClassVar[str] = "slow_spread"
-    kind: ClassVar[str] = "scale"
-    stages: ClassVar[tuple[Stage, ...]] = (Stage.SPREAD,)
     place: ClassVar[int] = 2
     weight: ClassVar[float] = 2.0
     seen_held_out: ClassVar[bool] = False
-    acts: ClassVar[Acts] = Acts.SPREAD
-    what: ClassVar[str] = "spread"
+
+    def scale_columns(self, coarse: Coarse) -> FloatArray:
+        """None: the innovations' own scale does not follow it."""
+        return np.zeros((len(coarse), 0))
 
     def size_columns(self, coarse: Coarse) -> FloatArray:
-        """The bounded response, although the innovations' own scale does not follow it."""
+        """The bounded response, shape (n, k). [unit of the quantity]"""
         return self.bounded(coarse)
 
     @classmethod
@@ -126,11 +126,6 @@ class SlowSpreadTerm(SearchedTerm):
         moved = [np.abs(coarse.response(term.effect, keep=True)) for term in of_kind(fitted, MeanTerm)]
         known = np.concatenate([known_log_scale(fitted), *moved], axis=1)
         return of_squares(coarse, squares, known)
-
-    @classmethod
-    def barred(cls, fitted: Fitted) -> frozenset[str]:
-        """Columns that act on the movement's size already."""
-        return columns_on_size(fitted)
 
     def estimate(self, fitted: Fitted) -> tuple[Effect, ...]:
         """Neighbouring sums overlap, so errors are wider."""
