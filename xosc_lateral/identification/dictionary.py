@@ -31,7 +31,7 @@ IntArray = NDArray[np.intp]
 
 TIMINGS: Mapping[float, tuple[int, ...]] = {1.0: (-3, -2, -1, 0, 1, 2), 4.0: (-4, -2, 0, 2)}
 """Lags tried first, by time constant; refined later. What is smoothed by 4 s differs little from one second to the
-next. Sensitivity: docs/design/identification.md. [s]"""
+next. [s]"""
 
 PRODUCT_TIMINGS: Mapping[float, tuple[int, ...]] = {2.0: (-2, -1, 0, 1)}
 """The same for products, of which there are many more. [s]"""
@@ -43,8 +43,7 @@ LEAST_SHIFT_S = 60
 """No rotation is shorter: a driver's response must be out of reach. [s]"""
 
 BLOCK_S = 300
-"""Length of the blocks that are dealt in random order: three times the memory that whitening sees. Sensitivity:
-docs/design/identification.md. [s]"""
+"""Length of the blocks that are dealt in random order: three times the memory that whitening sees. [s]"""
 
 MIN_SUPPORT_S = 45.0
 """A quantity that rests on fewer seconds than this is not tested: anything may have happened just then. [s]"""

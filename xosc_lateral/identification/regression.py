@@ -41,8 +41,7 @@ IntArray = NDArray[np.intp]
 FLOOR = 0.03
 """White noise that the model of a drive has beside what it shows: no table knows the lane better (in the motorway
 recording the standard error of a lane's centre is 0.03 m; docs/real_data.md). Providers smooth their tracks, responses
-and all; without a floor an effect is sized where the smoothing left nothing of it. Sensitivity:
-docs/design/identification.md. [m]"""
+and all; without a floor an effect is sized where the smoothing left nothing of it. [m]"""
 
 CLUSTER_S = 60
 """Stretches of a drive that count as independent in the errors of sizes: far beyond what whitening leaves of the

@@ -136,7 +136,7 @@ MEMORIES_S = (6.0, 15.0, 40.0)
 
 CLUSTER_S = 15
 """Loudness that persists for up to this is how people steer, by a correction now and then and what it takes to settle,
-and no regime. Sensitivity: docs/design/identification.md. [s]"""
+and no regime. [s]"""
 
 SHORTEST_S = 12
 """Lags are compared from here on. [s]"""
