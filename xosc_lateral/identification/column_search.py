@@ -111,12 +111,6 @@ def probability_of(search: Search, kind: type[SearchedTerm], fitted: Fitted, col
     return upper_tail(float(scored.scores.scores[own].max()), scored.scores.maxima) if own else 1.0
 
 
-def best_probability(search: Search, kind: type[SearchedTerm], fitted: Fitted) -> float:
-    """p-value of the best candidate of all, before refinement."""
-    scored = _scored(search, kind, fitted)
-    return 1.0 if scored is None else scored.likeliest()[1]
-
-
 def likely_response(search: Search, kind: type[SearchedTerm], fitted: Fitted, level: float) -> tuple[FloatArray, float]:
     """Response of the best candidate and its p-value, shape (n, 1) where that is at most `level`; else (n, 0)."""
     scored = _scored(search, kind, fitted)

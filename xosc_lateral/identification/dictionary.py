@@ -21,7 +21,7 @@ from xosc_lateral.driver.effects import ColumnEffect
 from xosc_lateral.identification.autocorrelation import Whitener
 from xosc_lateral.identification.candidates import Candidate
 from xosc_lateral.identification.significance import MANY_DRIVES
-from xosc_lateral.identification.timeline import COARSE, Timeline, coarse_mean, coarse_middle, start_anew
+from xosc_lateral.identification.timeline import Timeline, coarse_mean, coarse_middle, start_anew
 
 FloatArray = NDArray[np.float64]
 SingleArray = NDArray[np.float32]
@@ -349,15 +349,3 @@ def orthonormal(columns: FloatArray, share: float = 1e-6) -> FloatArray:
     powers, directions = np.linalg.eigh(columns.T @ columns)
     kept = powers > share * max(float(powers[-1]), 1e-300)
     return np.asarray(columns @ (directions[:, kept] / np.sqrt(powers[kept])))
-
-
-__all__ = [
-    "COARSE",
-    "Dictionary",
-    "Quantities",
-    "Scores",
-    "build_dictionary",
-    "draw_null",
-    "orthonormal",
-    "score_entries",
-]

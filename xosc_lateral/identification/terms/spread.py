@@ -20,7 +20,7 @@ from xosc_lateral.identification.column_search import SearchedTerm, likely_respo
 from xosc_lateral.identification.refinement import Problem
 from xosc_lateral.identification.regression import Coarse, Fitted
 from xosc_lateral.identification.squares import SLOW_S, fine_squares, log_sizes, of_squares, quick_squares, slow_squares
-from xosc_lateral.identification.terms.base import Stage, Term
+from xosc_lateral.identification.terms.base import Stage
 from xosc_lateral.identification.terms.column import ColumnTerm, columns_on_size, of_kind
 from xosc_lateral.identification.terms.mean import MeanTerm
 
@@ -83,7 +83,7 @@ def fine_twin(term: ColumnTerm, fitted: Fitted) -> ColumnEffect:
 
 def known_log_scale(fitted: Fitted) -> FloatArray:
     """What is known of the movement's log size, shape (n, k). [any unit]"""
-    coarse, terms = fitted.coarse, [term for term in fitted.terms if isinstance(term, Term)]
+    coarse, terms = fitted.coarse, fitted.terms
     columns = [term.size_columns(coarse) for term in terms]
     known = [scale[:, None] for term in terms if (scale := term.known_scale(coarse)) is not None]
     return np.concatenate([np.zeros((len(coarse), 0)), *columns, *known], axis=1)
