@@ -200,7 +200,8 @@ class Fitted:
     def innovations(self) -> FloatArray:
         """Whitened by the movement as it is seen, without a floor: how large it is just now. Shape (n,), variance 1."""
         coarse = self.coarse
-        rows = innovations(self.movement, coarse.valid, coarse.drive, self.scale)
+        moved = coarse.offset - self.levels[coarse.drive]
+        rows = innovations(moved, self.columns @ self.sizes, coarse.valid, coarse.drive, self.scale)
         return _standardised(rows, coarse.valid, len(self.sizes))
 
     @property
