@@ -27,6 +27,7 @@ from xosc_lateral.identification import (
     column_search,
     dictionary,
     feedback,
+    innovations,
     refinement,
     regression,
     selection,
@@ -76,6 +77,9 @@ def without_kinds(*kinds: type) -> list[Any]:
 PARTS: dict[str, Callable[[], list[Any]]] = {
     "the whole": lambda: [],
     "3 cm of noise": lambda: [patch.object(regression, "FLOOR", 0.0)],
+    "responses smoothed as seen": lambda: [
+        patch.object(innovations, "smoothed_as_seen", lambda moved, seen, *rest: seen)
+    ],
     "slow spread": lambda: without_kinds(SlowSpreadTerm),
     "second look at what acts": lambda: [patch.object(column_search, "ROUNDS", 1)],
     "tested again": lambda: [patch.object(selection, "_tested_again", lambda search, found, one: found)],
