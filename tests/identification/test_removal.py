@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from xosc_lateral.identification.removal import movement_without, runs_without
+from xosc_lateral.identification.held_out import movement_without, runs_without
 from xosc_lateral.identification.terms.base import Removal
 from xosc_lateral.identification.timeline import Timeline
 

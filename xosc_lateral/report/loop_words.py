@@ -9,9 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.driver.effects import Acts, Angular, ColumnEffect, Levels, Magnitude, Product
-from xosc_lateral.identification.close import LoopResult
+from xosc_lateral.identification.close import Finding, LoopResult
 from xosc_lateral.identification.feedback import BAND, FUNCTION, Feedback
-from xosc_lateral.identification.findings import Finding
 from xosc_lateral.identification.selection import Rejected
 from xosc_lateral.identification.timeline import LOCAL_S
 from xosc_lateral.segment import CONTEXT_UNITS
