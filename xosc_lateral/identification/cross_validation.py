@@ -120,7 +120,7 @@ class Nested:
         rows = np.zeros(len(self._blocks))
         chosen = 0
         for selection, (held, coarse) in zip(self.selections, self._by_row, strict=True):
-            own = [one for one in selection.final.terms if one.matches(term)]
+            own = [one for one in selection.final.terms if isinstance(one, Term) and one.matches(term)]
             if not own:
                 continue
             chosen += 1

@@ -58,6 +58,7 @@ def estimate_all(fitted: Fitted) -> Estimates:
     """Sizes of everything in the model; the key counts terms of one component."""
     found: dict[str, tuple[Term, tuple[Effect, ...]]] = {}
     for term in fitted.terms:
+        assert isinstance(term, Term)
         number = sum(1 for key in found if key.rpartition(" ")[0] == term.kind_key)
         found[f"{term.kind_key} {number}"] = (term, term.estimate(fitted))
     return found

@@ -14,7 +14,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import Protocol
 
 import numpy as np
 from msgspec import structs
@@ -33,9 +33,6 @@ from xosc_lateral.identification.innovations import (
     scoring_step,
 )
 from xosc_lateral.identification.timeline import Timeline, coarse_all, coarse_mean, coarse_middle, means_by_drive
-
-if TYPE_CHECKING:
-    from xosc_lateral.identification.terms.base import Term
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
@@ -147,6 +144,26 @@ class Coarse:
         return means_by_drive(values, self.valid, self.drive)
 
 
+class ModelTerm(Protocol):
+    """What the regression asks of a term: its columns; see `terms.base.Term` for all that a term can do."""
+
+    def mean_columns(self, coarse: Coarse) -> FloatArray:
+        """Columns of the mean, shape (n, k). [any unit]"""
+        ...
+
+    def fine_mean_columns(self, coarse: Coarse) -> FloatArray:
+        """The same on the 0.2 s grid, shape (fine n, k). [any unit]"""
+        ...
+
+    def scale_columns(self, coarse: Coarse) -> FloatArray:
+        """Columns of the log scale, shape (n, j). [any unit]"""
+        ...
+
+    def known_scale(self, coarse: Coarse) -> FloatArray | None:
+        """Log scale that is known as a whole, shape (n,). [-]"""
+        ...
+
+
 @dataclass(frozen=True, eq=False)
 class Fitted:
     """Terms with sizes, and what is left.
@@ -154,7 +171,7 @@ class Fitted:
     Parameters
     ----------
     coarse : Coarse
-    terms : tuple of Term
+    terms : tuple of ModelTerm
     whitener : Whitener
     columns : array, shape (n, k)
         Of the mean, term by term.
@@ -177,7 +194,7 @@ class Fitted:
     """
 
     coarse: Coarse
-    terms: tuple[Term, ...]
+    terms: tuple[ModelTerm, ...]
     whitener: Whitener
     columns: FloatArray
     sizes: FloatArray
@@ -211,21 +228,21 @@ class Fitted:
         columns = joined([term.fine_mean_columns(self.coarse) for term in self.terms], len(timeline))
         return columns @ self.sizes + self.levels[timeline.drive]
 
-    def mean_part(self, term: Term) -> slice:
+    def mean_part(self, term: ModelTerm) -> slice:
         """Where a term's coefficients of the mean are."""
         return self._part(term, [other.mean_columns(self.coarse).shape[1] for other in self.terms])
 
-    def scale_part(self, term: Term) -> slice:
+    def scale_part(self, term: ModelTerm) -> slice:
         """Where a term's coefficients of the log scale are."""
         return self._part(term, [other.scale_columns(self.coarse).shape[1] for other in self.terms])
 
-    def _part(self, term: Term, widths: Sequence[int]) -> slice:
+    def _part(self, term: ModelTerm, widths: Sequence[int]) -> slice:
         index = next(i for i, other in enumerate(self.terms) if other is term)
         first = sum(widths[:index])
         return slice(first, first + widths[index])
 
 
-def fit_model(coarse: Coarse, terms: Sequence[Term]) -> Fitted:
+def fit_model(coarse: Coarse, terms: Sequence[ModelTerm]) -> Fitted:
     """Fit all terms jointly: generalised least squares and the autoregression by turns."""
     columns = joined([term.mean_columns(coarse) for term in terms], len(coarse))
     scales = joined([term.scale_columns(coarse) for term in terms], len(coarse))
@@ -275,7 +292,7 @@ def joined(blocks: Sequence[FloatArray], n: int) -> FloatArray:
     return np.concatenate(blocks, axis=1) if blocks else np.zeros((n, 0))
 
 
-def known_scale_of(coarse: Coarse, terms: Sequence[Term]) -> FloatArray:
+def known_scale_of(coarse: Coarse, terms: Sequence[ModelTerm]) -> FloatArray:
     """Log scale that terms know as a whole, shape (n,). [-]"""
     known = [scale for term in terms if (scale := term.known_scale(coarse)) is not None]
     return np.sum(known, axis=0) if known else np.zeros(len(coarse))

@@ -44,6 +44,7 @@ COMPONENT_WORDS: Mapping[str, str] = MappingProxyType(
         "between": "a column that goes with the mean offset of whole drives",
         "spread": "a column that changes the spread",
         "slow_spread": "a column that changes the spread of slow movement",
+        "fine_noise": "a column that changes the fine noise",
         "time_spread": "a spread that changes smoothly with time",
         "regimes": "regimes of small and large spread",
         "cycle": "a periodic oscillation",

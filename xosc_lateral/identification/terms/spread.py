@@ -20,7 +20,7 @@ from xosc_lateral.identification.column_search import SearchedTerm, likely_respo
 from xosc_lateral.identification.refinement import Problem
 from xosc_lateral.identification.regression import Coarse, Fitted
 from xosc_lateral.identification.squares import SLOW_S, fine_squares, log_sizes, of_squares, quick_squares, slow_squares
-from xosc_lateral.identification.terms.base import Stage
+from xosc_lateral.identification.terms.base import Stage, Term
 from xosc_lateral.identification.terms.column import ColumnTerm, columns_on_size, of_kind
 from xosc_lateral.identification.terms.mean import MeanTerm
 
@@ -83,7 +83,7 @@ def fine_twin(term: ColumnTerm, fitted: Fitted) -> ColumnEffect:
 
 def known_log_scale(fitted: Fitted) -> FloatArray:
     """What is known of the movement's log size, shape (n, k). [any unit]"""
-    coarse, terms = fitted.coarse, fitted.terms
+    coarse, terms = fitted.coarse, [term for term in fitted.terms if isinstance(term, Term)]
     columns = [term.size_columns(coarse) for term in terms]
     known = [scale[:, None] for term in terms if (scale := term.known_scale(coarse)) is not None]
     return np.concatenate([np.zeros((len(coarse), 0)), *columns, *known], axis=1)
@@ -131,3 +131,40 @@ class SlowSpreadTerm(SpreadTerm):
         """Neighbouring sums overlap, so errors are wider."""
         sizes, errors = log_sizes(slow_squares(fitted), self.bounded(fitted.coarse))
         return (self.sized(fitted.coarse, Acts.SPREAD, sizes, errors * np.sqrt(SLOW_S)),)
+
+
+@dataclass(frozen=True, eq=False)
+class FineNoiseTerm(SearchedTerm):
+    """Log standard deviation of the innovations at 5 Hz by a column: five times as many squares as by the second."""
+
+    component: ClassVar[str] = "fine_noise"
+    kind: ClassVar[str] = "scale"
+    stages: ClassVar[tuple[Stage, ...]] = (Stage.FINE_NOISE,)
+    weight: ClassVar[float] = 1.0
+    seen_held_out: ClassVar[bool] = False
+    acts: ClassVar[Acts] = Acts.FINE
+    what: ClassVar[str] = "fine noise"
+
+    @classmethod
+    def problem(cls, fitted: Fitted) -> Problem:
+        """Squared innovations at 5 Hz.
+
+        An effect on the mean is followed with errors: they grow with it where its size is a little wrong, and with its
+        rate of change where its timing is.
+        """
+        coarse = fitted.coarse
+        own = [coarse.response(term.effect, keep=True) for term in of_kind(fitted, cls)]
+        moved = [coarse.response(term.effect, keep=True) for term in of_kind(fitted, MeanTerm)]
+        errors = [np.abs(one) for shift in moved for one in (shift, np.gradient(shift, axis=0))]
+        known = np.concatenate([known_log_scale(fitted), *own, *errors], axis=1)
+        return of_squares(coarse, fine_squares(fitted), known)
+
+    @classmethod
+    def barred(cls, fitted: Fitted) -> frozenset[str]:
+        """What acts within drives already: what its shape leaves of itself looks like noise."""
+        terms = [term for term in of_kind(fitted, ColumnTerm) if term.component != "between"]
+        return frozenset(name for term in terms for name in term.columns)
+
+    def estimate(self, fitted: Fitted) -> tuple[Effect, ...]:
+        """Log-linear regression of the squares."""
+        return (fine_twin(self, fitted),)
