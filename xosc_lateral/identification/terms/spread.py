@@ -162,7 +162,7 @@ class FineNoiseTerm(SearchedTerm):
     @classmethod
     def barred(cls, fitted: Fitted) -> frozenset[str]:
         """What acts within drives already: what its shape leaves of itself looks like noise."""
-        terms = [term for term in of_kind(fitted, ColumnTerm) if term.component != "between"]
+        terms = [term for term in fitted.terms if isinstance(term, ColumnTerm) and term.component != "between"]
         return frozenset(name for term in terms for name in term.columns)
 
     def estimate(self, fitted: Fitted) -> tuple[Effect, ...]:
