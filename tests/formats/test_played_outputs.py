@@ -13,10 +13,10 @@ from lxml import etree
 from tests.formats.made_scenario import action, event, made, time_condition
 from tests.formats.test_openscenario_write import LANE_CHANGE, STEP, nominal, played, provenance
 from tests.motion.made_motion import drive, entity, together, two_roads
-from xosc_lateral.formats.openscenario import read_scenario
-from xosc_lateral.formats.openscenario.write import OffsetChain, offset_chains, write_lane_offset_scenario
+from xosc_lateral.formats.openscenario.read import read_scenario
+from xosc_lateral.formats.openscenario.write.lane_offset_scenario import write_lane_offset_scenario
 from xosc_lateral.formats.openscenario.write.moving import Moving, _heading_times
-from xosc_lateral.formats.openscenario.write.offset_chain import ramps
+from xosc_lateral.formats.openscenario.write.offset_chain import OffsetChain, offset_chains, ramps
 from xosc_lateral.formats.openscenario.write.path_pieces import vertex_times
 from xosc_lateral.formats.openscenario.write.ramp_targets import FRAME, Ramp, acceleration, fitted
 from xosc_lateral.motion.nominal import Activity

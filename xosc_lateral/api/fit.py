@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from xosc_lateral.api.inputs import DrivesLike, given_drives, naming
+from xosc_lateral.api.result import DrivesLike, given_drives, naming
 
 if TYPE_CHECKING:
     from xosc_lateral.driver.profile import DriverProfile

@@ -6,8 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from xosc_lateral.api.inputs import PathLike, Paths, as_paths, road_search
-from xosc_lateral.api.result import Result
+from xosc_lateral.api.result import PathLike, Paths, Result, as_paths, road_search
 from xosc_lateral.formats.hashes import parsed_hashes
 from xosc_lateral.formats.output_paths import claim, output_file
 from xosc_lateral.motion.segments import SegmentRow

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from functools import lru_cache
 from typing import Any
 
@@ -93,12 +93,7 @@ class DriverProfile(Record, frozen=True):
     @property
     def columns(self) -> tuple[str, ...]:
         """Context columns that its effects read."""
-        return _columns(self.effects)
-
-    @property
-    def columns_of_any_drive(self) -> tuple[str, ...]:
-        """Those that a drive can have which is of no recording, as in a scenario."""
-        return _columns(effect for effect in self.effects if not effect.is_of_recording)
+        return tuple(sorted({column for effect in self.effects for column in effect.columns}))
 
     def to_dict(self) -> dict[str, Any]:
         """Plain JSON values, as the profile file holds them."""
@@ -139,10 +134,6 @@ def _checked(values: object) -> dict[str, Any]:
         cure = ": update the package" if newer else ""
         raise DriverProfileError(f"file format {version!r}; this version of xosc-lateral reads {VERSION}{cure}")
     return {name: value for name, value in values.items() if name not in ("format", "version")}
-
-
-def _columns(effects: Iterable[Effect]) -> tuple[str, ...]:
-    return tuple(sorted({column for effect in effects for column in effect.columns}))
 
 
 @lru_cache(maxsize=16)

@@ -13,7 +13,7 @@ from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.driver.sampling import sample_offsets
 from xosc_lateral.driver.seeds import child
 from xosc_lateral.driver.sensor.error import known_sensor, recorded, sensor_error
-from xosc_lateral.driver.snippets import cut_snippets, segment_of, zone_of
+from xosc_lateral.driver.snippets import cut_snippets, segment_of
 from xosc_lateral.drives.cuts import PAPER_RULES, CutRules, all_runs, whole_run
 from xosc_lateral.drives.drive import Drive
 from xosc_lateral.drives.resampling import STEP
@@ -59,7 +59,7 @@ def sample_like(
         def draw(start: float, segment: Segment = segment, own: np.random.SeedSequence = own) -> FloatArray:
             return sample_offsets(profile, segment, own, start=start)
 
-        offset = recorded(sensor, draw, len(snippet.time), float(snippet.offset[0]), STEP, own, zone=zone_of(segment))
+        offset = recorded(sensor, draw, len(snippet.time), float(snippet.offset[0]), STEP, own)
         _check(offset, segment, profile, snippet.run.drive)
         yield SampledOffsets(snippet.run.drive, snippet.index, snippet.time, offset, snippet.offset)
 
@@ -74,7 +74,7 @@ def sample_context(
         run = whole_run(drive)
         own, segment = child(root, number), segment_of(run)
         offset = sample_offsets(profile, segment, own)
-        offset = offset + sensor_error(sensor, offset, STEP, own, zone=zone_of(segment))
+        offset = offset + sensor_error(sensor, offset, STEP, own)
         _check(offset, segment, profile, drive.name)
         yield SampledOffsets(drive.name, 0, run.time, offset, None)
 

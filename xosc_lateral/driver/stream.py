@@ -39,8 +39,7 @@ class OffsetStream:
     rate, those that `upsample` makes of them. A driver who looks ahead, and a curve between samples, need to know what
     comes: `step` is therefore given the context `preview` seconds ahead of the offset that it returns, and `look`
     the context before that. A bench that doesn't know the future gives `step` the present context without a `look`:
-    then the driver responds to it `preview` seconds later; what is random is the same. Zones of a recording are not
-    known to a stream: it is as the mean of all.
+    then the driver responds to it `preview` seconds later; what is random is the same.
 
     Parameters
     ----------
@@ -81,9 +80,7 @@ class OffsetStream:
         self._start, self._time = start, time
         self._process = DriveProcess(profile, self._seed, ahead=BLOCK)
         self._process.begin_at(time)
-        # What drives now is in no recording, and must not look ahead for, say, its next zone.
-        columned = [effect for effect in self._process.columned if not effect.is_of_recording]
-        self._responses = tuple(ResponseStream(effect, profile.model.step) for effect in columned)
+        self._responses = tuple(ResponseStream(effect, profile.model.step) for effect in self._process.columned)
         self._ahead = max([0, *(response.ahead for response in self._responses)]) + (
             _NEIGHBOURS if self._factor > 1 else 0
         )

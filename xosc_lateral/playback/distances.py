@@ -11,8 +11,7 @@ from math import copysign, cos, hypot, inf, sin
 
 from xosc_lateral.playback import boxes
 from xosc_lateral.playback.paths.base import nearest_s
-from xosc_lateral.playback.placement import NOWHERE
-from xosc_lateral.playback.state import EntityState
+from xosc_lateral.playback.state import NOWHERE, EntityState
 from xosc_lateral.road.network import RoadNetwork
 from xosc_lateral.road.positions import RoadPath
 from xosc_lateral.scenario.enums import CoordinateSystem, RelativeDistanceType

@@ -30,7 +30,6 @@ CHANGED: Mapping[Acts, str] = {
     Acts.SPREAD: "spread",
     Acts.RATE: "rate of mean reversion",
     Acts.FINE: "fine noise",
-    Acts.QUICK: "quick movement",
 }
 """What a column effect changes, in words."""
 

@@ -308,7 +308,6 @@ def _column_sentence(finding: Finding, effect: ColumnEffect, result: LoopResult)
         subject = {
             Acts.SPREAD: "the movement about the mean",
             Acts.FINE: "the fine noise",
-            Acts.QUICK: "the quick movement",
             Acts.RATE: "the rate of mean reversion",
         }[effect.acts]
         does = f"changes by a {size}"

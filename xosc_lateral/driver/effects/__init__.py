@@ -30,7 +30,6 @@ from xosc_lateral.driver.effects.step import Step
 from xosc_lateral.driver.effects.threshold import Threshold
 from xosc_lateral.driver.effects.time_smooth import TimeSmooth
 from xosc_lateral.driver.effects.variance_trend import VarianceTrend
-from xosc_lateral.driver.effects.zones import Zones
 from xosc_lateral.driver.records import read_as
 from xosc_lateral.errors import DriverProfileError
 from xosc_lateral.plugins import entry_points
@@ -115,7 +114,6 @@ __all__ = [
     "Threshold",
     "TimeSmooth",
     "VarianceTrend",
-    "Zones",
     "any_effect",
     "effect_from_dict",
     "known_effects",

@@ -18,7 +18,7 @@ from xosc_lateral.driver.effects.base import EffectTerms
 FloatArray = NDArray[np.float64]
 
 FACTOR_LIMIT = 5.0
-"""A factor on spread, rate of mean reversion, fine noise or quick movement stays within 1/5..5: beyond the fitted range
+"""A factor on spread, rate of mean reversion or fine noise stays within 1/5..5: beyond the fitted range
 of its column a log-linear effect would run away. [-]"""
 
 LOG_LIMIT = float(np.log(FACTOR_LIMIT))
@@ -32,7 +32,6 @@ class Acts(StrEnum):
     SPREAD = "spread"
     RATE = "rate"
     FINE = "fine"
-    QUICK = "quick"
 
 
 def terms_of(acts: Acts, strength: FloatArray) -> EffectTerms:
@@ -42,6 +41,4 @@ def terms_of(acts: Acts, strength: FloatArray) -> EffectTerms:
     factor = np.exp(np.minimum(np.maximum(strength, -LOG_LIMIT), LOG_LIMIT))  # np.clip takes five times as long
     if acts is Acts.SPREAD:
         return EffectTerms(spread=factor)
-    if acts is Acts.RATE:
-        return EffectTerms(rate=factor)
-    return EffectTerms(fine=factor) if acts is Acts.FINE else EffectTerms(quick=factor)
+    return EffectTerms(rate=factor) if acts is Acts.RATE else EffectTerms(fine=factor)

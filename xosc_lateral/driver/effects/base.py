@@ -27,9 +27,7 @@ class EffectTerms:
 
     The offset of a profile with effects is, with m the base model's mean and kappa, phi its coarse and fine part [m]::
 
-        offset = location + m + spread * (kappa(tau) - m + (quick - 1) * h) + fine * quick * phi,    d tau / dt = rate
-
-    where h is what is quick of kappa (`quick`).
+        offset = location + m + spread * (kappa(tau) - m) + fine * phi,    d tau / dt = rate
 
     Parameters
     ----------
@@ -41,15 +39,12 @@ class EffectTerms:
         Rate of the coarse movement's mean reversion, > 0: 2 means that it restores twice as fast. [-]
     fine : array, shape (n,), optional
         Factor on the fine movement, > 0. [-]
-    quick : array, shape (n,), optional
-        Factor on the quick movement, coarse or fine, > 0. On the coarse one it does not act where a rate does. [-]
     """
 
     location: FloatArray | None = None
     spread: FloatArray | None = None
     rate: FloatArray | None = None
     fine: FloatArray | None = None
-    quick: FloatArray | None = None
 
     def rows(self, rows: slice | NDArray[np.int64]) -> EffectTerms:
         """The same at some rows. Shape of `rows` each. [m], [-]"""
@@ -58,7 +53,7 @@ class EffectTerms:
     @property
     def parts(self) -> tuple[FloatArray | None, ...]:
         """All of them, in the order of the fields. [m], [-]"""
-        return self.location, self.spread, self.rate, self.fine, self.quick
+        return self.location, self.spread, self.rate, self.fine
 
 
 FILE_WORDS = {"Cycle": "weave", "VarianceTrend": "growing-spread"}
@@ -78,9 +73,6 @@ class Effect(Record, frozen=True, kw_only=True, tag_field="kind", tag=kind_of):
 
     kind: ClassVar[str]
     """Name in the profile file: the class's, in lower case with hyphens, or its word of `FILE_WORDS`."""
-
-    is_of_recording: ClassVar[bool] = False
-    """Whether its columns are of one recording alone: no other drive lacks them, or looks out for them."""
 
     def __init_subclass__(cls, **settings: Any) -> None:
         super().__init_subclass__(**settings)

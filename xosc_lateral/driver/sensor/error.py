@@ -31,17 +31,14 @@ def sensor_error(
     step: float,
     seed: np.random.SeedSequence,
     part: int = 0,
-    *,
-    zone: FloatArray | None = None,
 ) -> FloatArray:
     """Error on a drive's sampled path, shape (n,), from random numbers of its own; zeros without a sensor. [m]
 
-    `part` numbers the pieces of one drive: a sensor knows nothing of what it measured minutes ago. `zone` has the
-    codes of the zones of its rows, where they are known.
+    `part` numbers the pieces of one drive: a sensor knows nothing of what it measured minutes ago.
     """
     if sensor is None:
         return np.zeros(len(path))
-    return sensor.error_on(path, step, generator(seed, DriveSeed.SENSOR, part), zone)
+    return sensor.sample(len(path), step, generator(seed, DriveSeed.SENSOR, part))
 
 
 def recorded(
@@ -51,20 +48,13 @@ def recorded(
     start: float,
     step: float,
     seed: np.random.SeedSequence,
-    *,
-    zone: FloatArray | None = None,
 ) -> FloatArray:
     """A sampled path of n offsets with the sensor's error on it, the sum of which begins at `start`. [m]
 
-    `draw` samples the path from a given start [m]; `zone` as in `sensor_error`.
+    `draw` samples the path from a given start [m].
     """
     if sensor is None:
         return draw(start)
     rng = generator(seed, DriveSeed.SENSOR, 0)
-    noise = sensor.sample(n, step, rng, zone)
-    path = draw(start - float(noise[0]))
-    if sensor.slope_jumps is None:
-        return path + noise
-    jumping = sensor.slope_jumps.sample(path, step, rng, zone)
-    # They hang on the path, so they come after it; where they begin is a matter of millimetres.
-    return np.asarray(path + noise + (jumping - jumping[0]))
+    noise = sensor.sample(n, step, rng)
+    return draw(start - float(noise[0])) + noise

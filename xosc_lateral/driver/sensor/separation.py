@@ -17,7 +17,6 @@ from msgspec.structs import replace
 from numpy.typing import NDArray
 
 from xosc_lateral.digits import all_significant
-from xosc_lateral.driver.sensor.by_zone import ZonedRows
 from xosc_lateral.driver.sensor.explanations import Explanation, explanations
 from xosc_lateral.driver.sensor.hidden_path import HiddenPath
 from xosc_lateral.driver.sensor.likelihood import Colour, Known, Solution, solve
@@ -25,13 +24,10 @@ from xosc_lateral.driver.sensor.model import SensorModel
 from xosc_lateral.driver.sensor.periodogram import Periodogram, periodogram, windows_of
 from xosc_lateral.driver.sensor.quantisation import quantisation_step, rounding_density, uniform_variance
 from xosc_lateral.driver.sensor.second_view import LEVEL_SD, SecondView, second_view
-from xosc_lateral.driver.sensor.slope_jumps import SlopeJumps
-from xosc_lateral.driver.sensor.slope_jumps_fit import find_slope_jumps
 from xosc_lateral.driver.sensor.texture import (
     FAST,
     LEAST_SHARE,
     MANY,
-    level_by_zone,
     level_variation,
     measured_density,
 )
@@ -101,7 +97,7 @@ class Separation:
         driver = density(self.knots, frequency)
         share = driver / (driver + self.sensor.density(frequency) + self.beside(frequency))
         share[0] = 1.0
-        return share if self.sensor.slope_jumps is None else share * self.sensor.slope_jumps.left_to_driver(frequency)
+        return share
 
 
 def separate(
@@ -114,7 +110,6 @@ def separate(
     sensor_noise: float | None = None,
     half_widths: Sequence[FloatArray] | None = None,
     one_camera: bool = False,
-    zoned: ZonedRows | None = None,
 ) -> Separation:
     """Separate driver and sensor.
 
@@ -140,8 +135,6 @@ def separate(
     one_camera : bool
         Whether that is known to be the camera that measured the offset; else what the width shows is taken where it is
         plausible.
-    zoned : ZonedRows, optional
-        Where the rows and runs were recorded: what their sensor's level hangs on.
     """
     measured = list(rows) if rows is not None else list(runs)
     variance = _variance(measured, durations)
@@ -159,27 +152,20 @@ def separate(
     if grain and not two_levels:
         wide = split_wide_steps(data, windows, measured, grain, per_second, sensor_noise)
         if wide is not None:
-            return _textured(_seen_through(wide, per_second), runs, frequency, windows, step, zoned)
-    pieces = None if rows is None or rate is None else find_slope_jumps(rows, rate, runs, zoned)
-    slope_jumps, noise = pieces or (None, 0.0)
-    about_pieces = slope_jumps is not None and known is None
-    if about_pieces:  # where nothing slower than a piece is left
-        known = Known(noise, per_second)
+            return _textured(_seen_through(wide, per_second), runs, frequency, windows, step)
     rounding: Callable[[FloatArray], FloatArray] = _no_density
     if grain and not two_levels:
         rounding = _rounding(data, grain, variance, per_second)
         known = known and replaced(known, rounding=uniform_variance(grain))
     base = rounding(data.frequency)
-    if slope_jumps is not None:
-        base = base + slope_jumps.density(data.frequency)
     view = second_view(half_widths, step) if half_widths else None
-    found = explanations(data, base, known, view, only_view=one_camera, only_white=about_pieces)
+    found = explanations(data, base, known, view, only_view=one_camera)
     least = _taken(found)
     best, colour = least.solution, least.colour
     beside = _with_view(rounding, best, colour)
-    result = Separation(best.knots, replace(_sensor(best, colour, grain), slope_jumps=slope_jumps), beside)
+    result = Separation(best.knots, _sensor(best, colour, grain), beside)
     driver = float(np.concatenate([result.driver_part(run, step) for run in runs]).var())
-    error = _in_band(best, colour, data, slope_jumps)
+    error = _in_band(best, colour, data)
     share = min(driver, max(variance - error, 0.0)) / variance if variance > 0.0 else 1.0
     plausible = [(one.solution, one.colour) for one in found if one.criterion < least.criterion + PLAUSIBLE]
     if colour.view is not None:
@@ -188,8 +174,7 @@ def separate(
         (0.0, 1.0) if two_levels else _interval(frequency, windows, best, colour, base, known, plausible, share, data)
     )
     sensor = _sensor(best, colour, grain, share * variance, (1.0 - share) * variance, interval)
-    sensor = replace(sensor, slope_jumps=slope_jumps)
-    return _textured(Separation(best.knots, sensor, beside, two_levels), runs, frequency, windows, step, zoned)
+    return _textured(Separation(best.knots, sensor, beside, two_levels), runs, frequency, windows, step)
 
 
 def _taken(found: Sequence[Explanation]) -> Explanation:
@@ -238,13 +223,8 @@ def _textured(
     frequency: FloatArray,
     windows: FloatArray,
     step: float,
-    zoned: ZonedRows | None,
 ) -> Separation:
     """With the error's density as measured, and how its level varies where the sensor outweighs the driver."""
-    if (
-        split.sensor.slope_jumps is not None
-    ):  # what varies in level is theirs, and what they leave is as the parts have it
-        return split
     share = 1.0 - split.driver_share_of(frequency)
     frequencies, densities = measured_density(frequency, windows, share)
     sensor = replace(split.sensor, frequencies=rounded(frequencies), densities=rounded(densities))
@@ -253,8 +233,6 @@ def _textured(
         steady = sensor.sample(MANY, step, np.random.default_rng(0))
         variance, duration = level_variation(runs, steady, step)
         sensor = replace(sensor, level_variance=rounded((variance,))[0], level_duration=rounded((duration,))[0])
-        if zoned is not None:
-            sensor = replace(sensor, by_zone=level_by_zone(runs, steady, step, zoned))
     return replaced(split, sensor=sensor)
 
 
@@ -308,7 +286,7 @@ def _chance(found: Solution, colour: Colour, data: Periodogram) -> float:
     return float(np.sqrt((2.0 * power**2 / data.weight).sum()))
 
 
-def _in_band(found: Solution, colour: Colour, data: Periodogram, slope_jumps: SlopeJumps | None = None) -> float:
+def _in_band(found: Solution, colour: Colour, data: Periodogram) -> float:
     """Sensor's power among what was seen. [m2]"""
     from scipy.integrate import trapezoid
 
@@ -316,8 +294,6 @@ def _in_band(found: Solution, colour: Colour, data: Periodogram, slope_jumps: Sl
     total = np.full(len(frequency), np.exp(found.white))
     if colour.is_there:
         total += found.coloured(colour, frequency)
-    if slope_jumps is not None:
-        total += slope_jumps.density(frequency)
     return float(trapezoid(total, frequency))
 
 

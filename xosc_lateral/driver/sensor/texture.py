@@ -15,13 +15,10 @@ from collections.abc import Sequence
 from itertools import pairwise
 
 import numpy as np
-from msgspec.structs import replace
 from numpy.typing import NDArray
 
 from xosc_lateral.driver.recursion import recur
-from xosc_lateral.driver.sensor.by_zone import ByZone, ZonedRows, levels_by_zone, tidy
 from xosc_lateral.drives.filters import kaiser_design, low_pass
-from xosc_lateral.drives.zones import passages, zone_codes
 
 FloatArray = NDArray[np.float64]
 
@@ -86,32 +83,6 @@ def measured_density(
     return middles, tuple(float(density[inside].mean()) for inside in rows)
 
 
-def level_by_zone(runs: Sequence[FloatArray], noise: FloatArray, step: float, zoned: ZonedRows) -> ByZone | None:
-    """Level of fast movement in each zone, and how it varies besides; None where zones are alike.
-
-    As `level_variation`, of runs whose zones are known.
-    """
-    rows = round(PIECE / step)
-    paths = [_fast(run, step) for run in runs]
-    cut = [zone[(len(zone) - len(path)) // 2 :][: len(path)] for path, zone in zip(paths, zoned.runs, strict=True)]
-    parts = [passages(zone, rows // 2) if len(path) else [] for path, zone in zip(paths, cut, strict=True)]
-    known = levels_by_zone(
-        [np.array([_log_mean_square(path[at]) for _, at in those]) for path, those in zip(paths, parts, strict=True)],
-        [np.array([name for name, _ in those], dtype=np.object_) for those in parts],
-        zoned.drives,
-    )
-    if known is None:
-        return None
-    found = replace(known, levels=tidy(known.levels))
-    left = [
-        path * np.exp(-0.5 * smooth_level(found.at(zone_codes(zone)), step)) if len(path) else path
-        for path, zone in zip(paths, cut, strict=True)
-    ]
-    variance, duration = _variation([_of_pieces(path, rows) for path in left], _of_pieces(_fast(noise, step), rows))
-    variance, duration = tidy([variance, duration])
-    return replace(found, level_variance=variance, level_duration=duration)
-
-
 def level_variation(runs: Sequence[FloatArray], noise: FloatArray, step: float) -> tuple[float, float]:
     """How the level of fast movement varies, beyond what chance does to stationary noise.
 
@@ -156,13 +127,6 @@ def amplitude_factor(variance: float, duration: float, n: int, step: float, rng:
     return np.asarray(np.exp(0.5 * (level - 0.5 * variance)))
 
 
-def smooth_level(level: FloatArray, step: float) -> FloatArray:
-    """Levels by zone that go from one to the next within the pieces that they were seen in. Shape (n,). [-]"""
-    half = max(round(0.5 * PIECE / step), 1)
-    kernel = np.hanning(2 * half + 1)
-    return np.convolve(np.pad(level, half, mode="edge"), kernel / kernel.sum(), mode="valid")
-
-
 def _log_power(path: FloatArray, rows: int, step: float) -> FloatArray:
     return _of_pieces(_fast(path, step), rows)
 
@@ -170,10 +134,6 @@ def _log_power(path: FloatArray, rows: int, step: float) -> FloatArray:
 def _of_pieces(fast: FloatArray, rows: int) -> FloatArray:
     count = len(fast) // rows
     return np.asarray(np.log((fast[: count * rows].reshape(count, rows) ** 2).mean(axis=1) + FAINTEST))
-
-
-def _log_mean_square(fast: FloatArray) -> float:
-    return float(np.log((fast**2).mean() + FAINTEST))
 
 
 def _fast(path: FloatArray, step: float) -> FloatArray:
