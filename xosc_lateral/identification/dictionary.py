@@ -69,15 +69,7 @@ TINY = 1e-30
 
 @dataclass(frozen=True, eq=False)
 class Quantities:
-    """Candidates on the 1 Hz grid before lag and response, standardised, in single precision.
-
-    Parameters
-    ----------
-    candidates : list of Candidate
-    values : array, shape (candidates, n)
-    drive : int array, shape (n,)
-        Of each row.
-    """
+    """Candidates on the 1 Hz grid before lag and response, standardised, shape (candidates, n); `drive`, shape (n,)."""
 
     candidates: list[Candidate]
     values: SingleArray
@@ -148,13 +140,7 @@ def _without_gaps(values: FloatArray, valid: BoolArray) -> FloatArray:
 
 
 def build_dictionary(quantities: Quantities, whitener: Whitener) -> Dictionary:
-    """Pass every candidate through every response and lag, and whiten it.
-
-    Parameters
-    ----------
-    quantities : Quantities
-    whitener : Whitener
-    """
+    """Pass every candidate through every response and lag, and whiten it."""
     seconds, compact = np.flatnonzero(whitener.valid), whitener.compact
     entries: list[tuple[Candidate, float, float]] = []
     blocks: list[SingleArray] = []
