@@ -137,6 +137,10 @@ def live_sumo(
             connection, chosen, ego=ego, seed=seed, profiles=others, neighbours=Neighbours(neighbours)
         )
         end = float(connection.simulation.getTime()) + duration
+        if (
+            configured := float(connection.simulation.getEndTime())
+        ) > 0.0:  # of which SUMO makes nothing by itself here
+            end = min(end, configured)
         while connection.simulation.getMinExpectedNumber() > 0 and connection.simulation.getTime() < end - 1e-9:
             traffic.steer()
             connection.simulationStep()

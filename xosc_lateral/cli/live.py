@@ -33,7 +33,7 @@ HELP = {
     ),
     "sumo": (
         "Run a SUMO simulation (extra sumo).",
-        examples("live sumo run.sumocfg -p motorway --seed 1 --lateral-resolution 0.25 --states states.parquet"),
+        examples("live sumo run.sumocfg -p motorway --seed 1 --lateral-resolution 4 --states states.parquet"),
     ),
     "stdio": (
         "Answer over a pipe: one line of JSON in, one out.",
