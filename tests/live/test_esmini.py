@@ -11,8 +11,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
+import xosc_lateral as xl
 from tests.live.esmini_stand_in import StandIn
-from xosc_lateral.api.live import live_esmini
+from xosc_lateral.api.live import LiveRun, live_esmini
 from xosc_lateral.api.profiles import read_profile
 from xosc_lateral.cli import main
 from xosc_lateral.errors import SimulationError
@@ -48,6 +49,21 @@ def test_vehicles_are_where_their_drivers_say_and_maneuvers_stay_as_written(libr
     turned = np.abs(np.diff(np.unwrap(np.arctan2(np.diff(back.y), np.diff(back.x)))))
     road = np.abs(np.diff(np.unwrap(back.h)))[1:]
     assert (turned - road).max() < TURN * 0.01
+
+
+def test_a_run_is_a_trace_with_the_road_and_where_everybody_was(library: Any, tmp_path: Path) -> None:
+    pytest.importorskip("osi_utilities", reason="the extra osi is not installed")
+    run = live_esmini(CUT_IN, library, ego=["Ego"], seed=3, duration=14.0, step=0.05)
+    trace = run.write_osi(tmp_path / "run.mcap")
+    drives = xl.import_drives("osi", trace).to_frame()
+    both = run.to_frame().round({"time": 3}).merge(
+        drives.assign(name=drives.drive.str.partition("#")[0]).round({"time": 3}), on=["name", "time"]
+    )  # fmt: skip
+    assert len(both) > 0.4 * len(run.to_frame())  # ends and lane changes are cut
+    np.testing.assert_allclose(both.offset_y, both.offset_x, atol=1e-3)
+    np.testing.assert_allclose(both.speed_y, both.speed_x, atol=0.02)
+    with pytest.raises(SimulationError, match="no trace"):
+        LiveRun([], {"scenario": "x"}, []).write_osi(tmp_path / "no.mcap")
 
 
 def test_the_same_seed_gives_the_same_run_and_another_one_another(library: Any) -> None:

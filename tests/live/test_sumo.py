@@ -48,6 +48,21 @@ def test_in_sumos_own_output_vehicles_are_where_their_drivers_say(run: Path) -> 
     assert set(table.is_truck) == {0.0, 1.0}
 
 
+def test_a_trace_shows_the_lanes_and_where_everybody_was(run: Path, tmp_path: Path) -> None:
+    pytest.importorskip("osi_utilities", reason="the extra osi is not installed")
+    words = ["live", "sumo", str(run / "run.sumocfg"), "--duration", "10", "--states", str(tmp_path / "states.csv")]
+    assert main([*words, "--osi", str(tmp_path / "trace.mcap"), "-q"]) == 0
+    import pandas as pd
+
+    states = pd.read_csv(tmp_path / "states.csv")
+    table = xl.import_drives("osi", tmp_path / "trace.mcap").to_frame()
+    states["time"] = (states.time - 0.1).round(2)  # the trace's own begins at its first message
+    both = states.merge(table.assign(name=table.drive, time=table.time.round(2)), on=["name", "time"])
+    assert len(both) > 30
+    np.testing.assert_allclose(both.offset_y, both.offset_x, atol=0.006)  # SUMO's lanes lie at centimetres
+    np.testing.assert_allclose(both.lane_width, 3.75, atol=0.011)
+
+
 def lane_changes(fcd: Path) -> int:
     """Number of them in FCD output: the same edge, another lane."""
     table = xl.import_drives("fcd", fcd, net=fcd.parent / "run.net.xml").to_frame()

@@ -194,6 +194,7 @@ class EsminiTraffic:
     ) -> None:
         self.player = library if isinstance(library, Player) else Player(library)
         model = scenario if isinstance(scenario, Scenario) else read_scenario(scenario)
+        self.entities = model.entities
         self._ego = {ego} if isinstance(ego, str) else set(ego)
         self._moved_by = lateral_actions(model)
         self._running: Counter[str] = Counter()

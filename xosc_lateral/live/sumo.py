@@ -216,8 +216,8 @@ class SumoTraffic:
         self.warnings: list[str] = []
         if sublane < (widest := max(self.roads.width.values(), default=0.0)):
             self.warnings.append(
-                f"sublanes of {sublane:g} m in lanes of {widest:g} m: SUMO changes lanes more often as soon as vehicles "
-                "leave the middle; with --lateral-resolution of a lane's width it changes as without drivers"
+                f"sublanes of {sublane:g} m in lanes of {widest:g} m: SUMO changes lanes more often when vehicles "
+                f"leave the middle; with --lateral-resolution {np.ceil(widest):g} it does as without drivers"
             )
 
     def steer(self) -> Moves:
