@@ -44,6 +44,10 @@ def test_vehicles_are_where_their_drivers_say_and_maneuvers_stay_as_written(libr
     maneuver = cut_in[~cut_in.steered]
     assert 3.5 < maneuver.time.max() - maneuver.time.min() < 4.5  # its lane change, and nothing else
     assert {cut_in.lane.iloc[0], cut_in.lane.iloc[-1]} == {-1, -2}
+    # the driver's lateral speed runs out at the maneuver's start: direction of the path there
+    start = cut_in[(cut_in.time > maneuver.time.min() - 0.1) & (cut_in.time < maneuver.time.min() + 1.0)]
+    turned = np.abs(np.diff(np.unwrap(np.arctan2(np.diff(start.y), np.diff(start.x)))))
+    assert turned.max() < TURN * 0.01
     # back to the driver without a kink: direction of the path after the maneuver
     back = cut_in[cut_in.time > maneuver.time.max() - 0.015]
     turned = np.abs(np.diff(np.unwrap(np.arctan2(np.diff(back.y), np.diff(back.x)))))

@@ -94,6 +94,7 @@ def live_esmini(
             traffic.steer(step)
             if player.SE_StepDT(step) != 0:
                 raise SimulationError(f"{scenario}: {player.where} stopped at {time:g} s")
+            traffic.settle(step)
     finally:
         player.SE_Close()
     settings = {"scenario": Path(scenario).name, "profile": chosen.name, "seed": seed}
