@@ -191,13 +191,25 @@ def test_bad_vehicles_are_named_and_left_out(tracks, road, tmp_path):
     gap = table[(table["id"] == "C") & ((table["time"] < 10.0) | (table["time"] > 15.0))].assign(id="gap")
     leap = table[table["id"] == "B"].assign(id="leap")
     leap.loc[leap["time"] > 30.0, "x"] += 300.0
+    a = table[table["id"] == "A"]
+    x, y = world(np.full(len(a), 500.0), -8.0 + 0.5 * a["time"].to_numpy())
+    on_foot = a.assign(id="on_foot", x=x, y=y)
+    s = 900.0 + 10.0 * np.minimum(a["time"], 20.0) - 5.0 * np.maximum(a["time"] - 20.0, 0.0)
+    x, y = world(s.to_numpy(), np.full(len(a), -0.5 * WIDTH))
+    back = a.assign(id="back", x=x, y=y)
+    x, y = world(28.0 * a["time"].to_numpy(), np.where(a["time"] < 12.0, -0.5, -1.5) * WIDTH)
+    aside = a.assign(id="aside", x=x, y=y)
+    x, y = world(np.where(a["time"] < 20.0, 600.0, 604.0), np.full(len(a), -0.5 * WIDTH))
+    stood = a.assign(id="stood", x=x, y=y)
     path = tmp_path / "bad.csv"
-    pd.concat([table[table["id"] == "A"], one, beside, gap, leap]).to_csv(path, index=False)
+    pd.concat([a, one, beside, gap, leap, on_foot, back, aside, stood]).to_csv(path, index=False)
     made = xl.reconstruct(path, tmp_path / "out", road=road, columns=COLUMNS)
     said = "\n".join(made.left_out)
-    assert all(f"{name}:" in said for name in ("once", "beside", "gap", "leap"))
+    assert all(f"{name}:" in said for name in ("once", "beside", "gap", "leap", "on_foot", "back", "aside", "stood"))
     rows = {row["entity"]: row for row in made.to_dict()["vehicles"]}
-    assert set(rows) == {"A", "gap", "leap"}
+    assert set(rows) == {"A", "gap", "leap", "back", "aside", "stood"}
+    assert rows["back"]["to"] == pytest.approx(20.1, abs=0.11)
+    assert (rows["aside"]["from"], rows["aside"]["lane_changes"]) == (12.0, 0)
     assert rows["gap"]["from"] >= 15.0
     assert rows["leap"]["to"] <= 30.1
     placed(tmp_path / "out/bad.xosc")
