@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from xosc_lateral.errors import FormatError
 from xosc_lateral.formats.importers import dlr_ht, levelx
 from xosc_lateral.formats.importers.track_table import Tracks, read_tracks, tracks_of
+from xosc_lateral.formats.mapping import MappingLike, TableMapping, as_mapping
 from xosc_lateral.formats.opendrive import read_opendrive
 from xosc_lateral.formats.opendrive.write import SHOULDER, WIDTH_PIECE, WrittenLane, WrittenRoad, curved_plan
 from xosc_lateral.formats.tables import foreign_errors
@@ -70,7 +71,7 @@ def read_recording(
     *,
     kind: str | None = None,
     road: Path | None = None,
-    columns: Sequence[str] = (),
+    columns: MappingLike | None = None,
 ) -> RecordedTraffic:
     """Read a recording.
 
@@ -81,8 +82,8 @@ def read_recording(
         Its format, one of `READERS`; without it, told from the name.
     road : path, optional
         OpenDRIVE file, for formats that come without one.
-    columns : sequence of str
-        ``NAME=COLUMN[:UNIT]``, see `import_tracks`.
+    columns : TableMapping, mapping of str to str, or path, optional
+        Name -> ``COLUMN[:UNIT]``, of tables.
 
     Raises
     ------
@@ -94,7 +95,7 @@ def read_recording(
     if not source.exists():
         raise FormatError("no such file or folder", path=source)
     with foreign_errors(source, "can't be read as a recording"), np.errstate(all="ignore"):
-        return READERS[kind](source, road, columns)
+        return READERS[kind](source, road, as_mapping(columns))
 
 
 def format_of(source: Path) -> str:
@@ -110,22 +111,23 @@ def format_of(source: Path) -> str:
 
 
 # ---- tracks on a known road ------------------------------------------------------------------------------------------
-def _tracks(source: Path, road: Path | None, columns: Sequence[str]) -> RecordedTraffic:
-    tracks = read_tracks(source, columns)
-    return _on_road(tracks, source, road)
+def _tracks(source: Path, road: Path | None, columns: TableMapping) -> RecordedTraffic:
+    return _on_road(read_tracks(source, mapping=columns), source, road)
 
 
-def _osi(source: Path, road: Path | None, columns: Sequence[str]) -> RecordedTraffic:
+def _osi(source: Path, road: Path | None, columns: TableMapping) -> RecordedTraffic:
     from xosc_lateral.formats.osi.read import read_osi
 
     recorded = read_osi(source)
     return replace(_on_road(recorded.tracks, source, road), notes=tuple(recorded.notes))
 
 
-def _commonroad(source: Path, road: Path | None, columns: Sequence[str]) -> RecordedTraffic:
+def _commonroad(source: Path, road: Path | None, columns: TableMapping) -> RecordedTraffic:
     from xosc_lateral.formats.importers.commonroad import read_obstacles
 
-    return _on_road(read_obstacles(source), source, road)
+    tracks = read_obstacles(source)
+    own = tuple(name.removeprefix(f"{source.stem}:") for name in tracks.names)
+    return _on_road(replace(tracks, names=own), source, road)
 
 
 def _on_road(tracks: Tracks, source: Path, road: Path | None) -> RecordedTraffic:
@@ -186,7 +188,7 @@ def _made(road: WrittenRoad, tracks: Sequence[Track], sources: Sequence[Path], n
     return RecordedTraffic(road.name, tuple(tracks), network, *road_file, tuple(sources), tuple(notes))
 
 
-def _dlr(source: Path, road: Path | None, columns: Sequence[str]) -> RecordedTraffic:
+def _dlr(source: Path, road: Path | None, columns: TableMapping) -> RecordedTraffic:
     table = dlr_ht.read_tracks(source)
     lanes = dlr_ht.find_lanes(table)
     made = dlr_road(lanes)
@@ -224,7 +226,7 @@ def _dlr(source: Path, road: Path | None, columns: Sequence[str]) -> RecordedTra
     return _made(made, tracks, [source], [note])
 
 
-def _levelx(source: Path, road: Path | None, columns: Sequence[str]) -> RecordedTraffic:
+def _levelx(source: Path, road: Path | None, columns: TableMapping) -> RecordedTraffic:
     """One recording of highD, whose road is straight and has its markings in the meta file; exiD comes with a road."""
     files = sorted(source.glob("*_tracks.csv")) if source.is_dir() else [source]
     if len(files) != 1:
@@ -234,7 +236,7 @@ def _levelx(source: Path, road: Path | None, columns: Sequence[str]) -> Recorded
     if "latLaneCenterOffset" in table.columns:
         kinds = meta.set_index("trackId").reindex(table["trackId"])["class"].astype(str).to_numpy()
         named = table.assign(time=table["frame"] / rate, heading=np.radians(table["heading"]), vehicle_class=kinds)
-        return _on_road(tracks_of(named, files[0], columns), files[0], road)
+        return _on_road(tracks_of(named, files[0], saved=columns), files[0], road)
     levelx.require(table, levelx.HIGHD_COLUMNS, files[0])
     lower, upper = (np.sort(levelx.markings(about, side, files[0])) for side in ("lower", "upper"))
     middle = 0.5 * (upper[-1] + lower[0])
@@ -299,7 +301,7 @@ def dlr_road(found: dlr_ht.Carriageways) -> WrittenRoad:
     return WrittenRoad("dlr-ht", curved_plan(line, origin), sides[0], sides[1], origin)
 
 
-Reader = Callable[[Path, "Path | None", Sequence[str]], RecordedTraffic]
+Reader = Callable[[Path, "Path | None", TableMapping], RecordedTraffic]
 READERS: dict[str, Reader] = {
     "dlr-ht": _dlr,
     "levelx": _levelx,
