@@ -3,8 +3,8 @@
 Every vehicle's path is sampled by itself first. Where two drive side by side, the lateral gap that this leaves between
 them is mapped to the gap that real neighbours leave at the same quantile: gaps between vehicles side by side beside
 those between any two vehicles of the two lanes (`GAPS`), or beside those that profiles leave which keep away from
-neighbours by themselves, in the mean (`RESPONDING`). The narrower the gap would be, the more it is widened; both vehicles
-take their part, the one in the overtaking lane the larger one, as measured. The mapping fades with the free space
+neighbours by themselves, in the mean (`RESPONDING`). The narrower the gap would be, the more it is widened; both
+vehicles take their part, the one in the overtaking lane the larger one, as measured. The mapping fades with the free space
 lengthwise. Of what profiles leave, all is the overtaking one's: the other keeps as far away as real ones do, by itself.
 All displacements follow from the paths as first sampled, so nobody's depends on the order of
 entities, and a vehicle far away changes nobody's.
@@ -83,9 +83,9 @@ OVERTAKING_SHARE = 0.84
 alongside; `benchmarks/clearance.py`). [-]"""
 
 FADES, RESPONDING_FADES = 60.0, 20.0
-"""Free space lengthwise within which neighbours matter less and less, to profiles that do not respond to them and beyond what
-profiles do that do: `motorway` leaves 0.030 m of what real vehicles move from whom they overtake alongside, 0.002 m of
-it at up to 20 m of free space, and nothing farther away (same recording). [m]"""
+"""Free space lengthwise within which neighbours matter less and less, to profiles that do not respond to them, and
+beyond what profiles do that respond: `motorway` leaves 0.030 m of what real vehicles move from whom they overtake
+alongside, 0.002 m of it at up to 20 m of free space, and nothing farther away (same recording). [m]"""
 
 ENTERING = 0.5
 """Nominal lateral gap over which a vehicle that crosses into a lane becomes its neighbour. [m]"""
@@ -230,7 +230,7 @@ class Frame:
 def widened(
     own: Frame, other: Frame, responds_left: bool | NDArray[np.bool_], responds_right: bool | NDArray[np.bool_]
 ) -> tuple[FloatArray, NDArray[np.bool_], NDArray[np.bool_]] | None:
-    """By how much the gap to the other is widened, whether the other is to the left, and whether its profile responds to it.
+    """By how much the gap to the other is widened, whether it is to the left, and whether the profile responds to it.
 
     None if the other never is near.
     """
@@ -254,7 +254,7 @@ def widened(
 
 
 def part_of(overtakes: NDArray[np.bool_], responding: NDArray[np.bool_]) -> FloatArray:
-    """What a vehicle takes of a widening, by whether it is the overtaking one and responds to the other, shape (n,). [-]
+    """Share of a widening, by whether the vehicle is the overtaking one and responds to the other, shape (n,). [-]
 
     By itself `motorway` moves 0.209 m from whom it overtakes and 0.083 m from who overtakes it, where real vehicles
     move 0.239 and 0.045 m: the second has done more than its part already.
