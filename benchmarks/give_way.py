@@ -2,8 +2,8 @@
 
     python -m benchmarks.give_way WHEEL [--profile motorway motorway-refined] [--seeds 12] [--write PAGE.md]
 
-Then those that profiles leave which are sampled under the context of the same vehicles, nobody giving way (`RESPONDING`,
-of `motorway`), and with the law by which `convert` makes them.
+Then those that profiles leave which are sampled under the context of the same vehicles, nobody giving way
+(`RESPONDING`, of `motorway`), and with the law by which `convert` makes them.
 """
 
 from __future__ import annotations
