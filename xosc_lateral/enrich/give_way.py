@@ -1,12 +1,13 @@
 """Vehicles side by side give way to each other: sampled paths, moved apart as real neighbours are.
 
-Every vehicle's path is sampled by itself first. Where two drive side by side, the lateral gap that this leaves between
-them is mapped to the gap that real neighbours leave at the same quantile: gaps between vehicles side by side beside
-those between any two vehicles of the two lanes (`GAPS`), or beside those that profiles leave which keep away from
-neighbours by themselves, in the mean (`RESPONDING`). The narrower the gap would be, the more it is widened; both
-vehicles take their part, the one in the overtaking lane the larger one, as measured. The mapping fades with the
-free space lengthwise. Of what profiles leave, all is the overtaking one's: the other keeps as far away as real ones do, by
-itself. All displacements follow from the paths as first sampled, so nobody's depends on the order of entities, and a vehicle far away changes nobody's.
+Every vehicle's path is sampled by itself first. Where two drive side by side, the lateral gap that this leaves
+between them is mapped to the gap that real neighbours leave at the same quantile: gaps between vehicles side by side
+beside those between any two vehicles of the two lanes (`GAPS`), or beside those that profiles leave which keep away
+from neighbours by themselves, in the mean (`RESPONDING`). The narrower the gap would be, the more it is widened; both
+vehicles take their part, the one in the overtaking lane the larger one, as measured. The mapping fades with the free
+space lengthwise. Of what profiles leave, all is the overtaking one's: the other keeps as far away as real ones do, by
+itself. All displacements follow from the paths as first sampled, so nobody's depends on the order of entities, and a
+vehicle far away changes nobody's.
 
 Our own rule: quantile mapping to gaps that were measured in DLR Highway Traffic v1.1.0 (benchmarks/give_way.py).
 """
