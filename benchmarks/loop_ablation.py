@@ -17,6 +17,7 @@ from unittest.mock import patch
 import numpy as np
 import pandas as pd
 from threadpoolctl import threadpool_limits
+from xosc_lateral.identification.terms.restoring import RestoringTerm
 
 from benchmarks import simulated as plants
 from benchmarks.identification_cases import PROTOCOL, cases, planted_drive
@@ -36,7 +37,6 @@ from xosc_lateral.identification.identify import usable_columns
 from xosc_lateral.identification.regression import Coarse
 from xosc_lateral.identification.search import Search
 from xosc_lateral.identification.terms import between, spread
-from xosc_lateral.identification.terms.restoring import RestoringTerm
 from xosc_lateral.identification.terms.spread import FineNoiseTerm, SlowSpreadTerm
 from xosc_lateral.identification.timeline import join_drives
 
