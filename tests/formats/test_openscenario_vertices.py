@@ -43,6 +43,6 @@ def test_many_numbers_become_the_same_text_as_one_by_one():
     values = np.random.default_rng(1).normal(scale=10.0, size=(200, 3)).round(2)
     values[0] = 0.0, -0.0, 100.0
     values[1] = -1e-9, 120000.0, -5.0
-    expected = tuple(build.decimal(value, count) for row in values.tolist() for value, count in zip(row, digits))
+    expected = tuple(build.decimal(row[k], count) for row in values.tolist() for k, count in enumerate(digits))
     assert build.decimals(values, digits) == expected
     assert build.decimals(np.empty((3, 0)), ()) == ()
