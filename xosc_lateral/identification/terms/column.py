@@ -98,7 +98,7 @@ class ColumnTerm(Term):
         return np.asarray(response - response[coarse.valid].mean(axis=0))
 
     def sized(self, coarse: Coarse, acts: Acts, sizes: FloatArray, errors: FloatArray) -> ColumnEffect:
-        """The effect with its sizes, shrunk by how sure they are, bounded, neutral at its mean."""
+        """The effect with its sizes, shrunk by how sure they are, bounded, zero at its mean."""
         raw = coarse.fine_response(self.effect)[coarse.timeline.valid]
         usual, (low, high) = raw.mean(axis=0), self.ends(coarse)
         within = np.clip(raw, usual + low, usual + high)
