@@ -19,7 +19,7 @@ from benchmarks.simulated.assist import FLAG, OPENLKA_MAP, LaneKeepingAssist, op
 from xosc_lateral.datasets.driver_simulator import simulate_drive
 from xosc_lateral.driver.fitting import fit_profile
 from xosc_lateral.drives.cuts import all_runs
-from xosc_lateral.evaluation.sampled_snippets import sample_runs
+from xosc_lateral.evaluation.snippets import sample_runs
 from xosc_lateral.formats.drives import drives_of_table
 from xosc_lateral.formats.mapping import parse_map
 from xosc_lateral.identification.close import close_loop

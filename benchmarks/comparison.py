@@ -14,8 +14,7 @@ from numpy.typing import NDArray
 
 from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.evaluation.distances import Distances, metric_distances, wasserstein
-from xosc_lateral.evaluation.metrics import METRICS, cut_snippets, snippet_metrics
-from xosc_lateral.evaluation.movement_summary import free_runs
+from xosc_lateral.evaluation.metrics import METRICS, cut_snippets, free_runs, snippet_metrics
 
 FloatArray = NDArray[np.float64]
 

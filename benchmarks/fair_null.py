@@ -26,8 +26,7 @@ from xosc_lateral.drives.cuts import all_runs
 from xosc_lateral.drives.drive import Run
 from xosc_lateral.evaluation.classifier import TwoSampleResult, classifier_two_sample_test, context_features
 from xosc_lateral.evaluation.filters import below_half_hertz, thinned
-from xosc_lateral.evaluation.sampled_snippets import sample_runs
-from xosc_lateral.evaluation.snippets import Snippets, snippets_of
+from xosc_lateral.evaluation.snippets import Snippets, sample_runs, snippets_of
 from xosc_lateral.formats.drives import read_drives
 
 FloatArray = NDArray[np.float64]

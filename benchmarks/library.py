@@ -22,21 +22,18 @@ from numpy.typing import NDArray
 
 from benchmarks.comparison import driver_distances
 from benchmarks.refined import NOTES, refine_population, refined_profile
-from xosc_lateral.driver.beside import POPULATION as ANSWERS
 from xosc_lateral.driver.fitting import fit_population, fit_runs
-from xosc_lateral.driver.profile import DriverProfile
-from xosc_lateral.driver.provenance import Metadata, Provenance
+from xosc_lateral.driver.profile import POPULATION as ANSWERS
+from xosc_lateral.driver.profile import DriverProfile, Metadata, Provenance
 from xosc_lateral.driver.sensor.model import SensorModel
 from xosc_lateral.driver.sensor.runs import driver_runs
 from xosc_lateral.drives.cuts import all_runs
 from xosc_lateral.drives.drive import Drive, Run
 from xosc_lateral.drives.resampling import STEP
 from xosc_lateral.errors import NotEnoughDataError
-from xosc_lateral.evaluation.metrics import snippet_metrics
-from xosc_lateral.evaluation.movement_summary import summary_of
+from xosc_lateral.evaluation.metrics import snippet_metrics, summary_of
 from xosc_lateral.evaluation.record import scores_to_dict
-from xosc_lateral.evaluation.scores import score_profile
-from xosc_lateral.evaluation.snippet_scores import SNIPPET
+from xosc_lateral.evaluation.scores import SNIPPET, score_profile
 from xosc_lateral.evaluation.snippets import snippets_of
 from xosc_lateral.formats.drives import read_drives
 from xosc_lateral.formats.hashes import parsed_hash

@@ -14,7 +14,7 @@ import numpy as np
 from scipy.stats import t
 
 from xosc_lateral.formats.drives import read_drives
-from xosc_lateral.identification.held_out_gain import held_out_gain
+from xosc_lateral.identification.cross_validation import held_out_gain
 from xosc_lateral.identification.identify import identify
 from xosc_lateral.identification.regression import Coarse, fit_model
 from xosc_lateral.identification.terms.base import Term

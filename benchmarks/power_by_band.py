@@ -24,7 +24,7 @@ from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.drives.cuts import all_runs
 from xosc_lateral.drives.drive import Run
 from xosc_lateral.drives.periodogram import Detrend, periodograms
-from xosc_lateral.evaluation.sampled_snippets import sample_runs
+from xosc_lateral.evaluation.snippets import sample_runs
 from xosc_lateral.formats.drives import read_drives
 
 FloatArray = NDArray[np.float64]

@@ -1,6 +1,6 @@
-"""How well `reconstruct` does: lane changes against another reading of the tracks, residuals, round trips, twins.
+"""How well `reconstruct` does: lane changes against another reading of the tracks, residuals, round trips.
 
-    python -m benchmarks.reconstruction WHEEL [--part design|test] [--esmini PATH] [--twins]
+    python -m benchmarks.reconstruction WHEEL [--part design|test] [--esmini PATH]
     python -m benchmarks.reconstruction --round-trip SCENARIO...
 
 WHEEL is `tasi-0.15.4-py3-none-any.whl`. The windows of each part were written down before any was looked at
@@ -24,15 +24,11 @@ from numpy.typing import NDArray
 
 import xosc_lateral as xl
 from benchmarks import agreement
-from xosc_lateral.drives.drive import Run
-from xosc_lateral.evaluation.classifier import classifier_two_sample_test
-from xosc_lateral.evaluation.snippets import snippets_of
 from xosc_lateral.formats.importers import dlr_ht
 from xosc_lateral.formats.recordings import RecordedTraffic, read_recording
 from xosc_lateral.motion.nominal import Activity
 from xosc_lateral.pipeline.load import play_scenario
 from xosc_lateral.pipeline.reconstruct import Reconstructed, ReconstructSettings, drivers_table, reconstruct_recording
-from xosc_lateral.reconstruction.drivers import STEP, in_lane_offsets
 
 FloatArray = NDArray[np.float64]
 
@@ -107,7 +103,8 @@ def lane_changes(made: Reconstructed, other: OtherReading) -> tuple[int, int, in
                 continue
             left.remove(hit)
             both += 1
-            ends.append((hit.start - (one.begin - start), hit.end - (one.end - start)))
+            begin = max(one.begin, float(time[0]))  # who is seen amid a change has begun it before: nobody can say when
+            ends.append((hit.start - (begin - start), hit.end - (one.end - start)))
         unsure = [each.crossing - start for each in reading if not each.sure]
         extra += sum(not any(c.start - 2.0 <= moment <= c.end + 2.0 for moment in unsure) for c in left)
     return both, missed, extra, np.array(ends).reshape(-1, 2)
@@ -166,52 +163,6 @@ def in_other_player(traffic: RecordedTraffic, begin: float, esmini: Path, **sett
     return f"{begin:g} s {settings or ''}: {count} vehicles, {absent} absent, at most {worst:.4f} m apart"
 
 
-def twins(traffic: RecordedTraffic, begin: float, variants: int) -> list[str]:
-    """In-lane movement of twins told from the recorded one; smallest gaps of both."""
-    made = reconstruct_recording(traffic, ReconstructSettings(begin=begin, end=begin + WINDOW))
-    own = {plan.name: in_lane_offsets(plan, one) for plan, one in zip(made.plans, made.residuals, strict=True)}
-    runs, paths = list[Run](), list[list[FloatArray]]()
-    with tempfile.TemporaryDirectory() as folder:
-        scenario = write(made, Path(folder))
-        drivers = {plan.name: one.profile for plan, one in zip(made.plans, made.drivers, strict=True) if one.profile}
-        gaps = []
-        for variant in range(variants):
-            twin = xl.convert(scenario, entity=drivers, only=list(drivers), variant=variant + 1, mode="trajectory")
-            before, after = twin.smallest_gap
-            gaps.append(after)
-            rows = {str(name): one for name, one in twin.to_frame().groupby("name")}
-            for name, stretches in own.items():
-                for number, (time, offset, width) in enumerate(stretches):
-                    if name in drivers and variant == 0:
-                        runs.append(Run(name, number, time, offset, width))
-                    if name in drivers:
-                        made_up = np.interp(time, rows[name]["time"], rows[name]["deviation"])
-                        paths.append([made_up])
-    count = len(runs)
-    areas = []
-    for variant in range(variants):
-        sampled = [path[0] for path in paths[variant * count : (variant + 1) * count]]
-        cut = snippets_of(runs, 10.0, STEP)
-        result = classifier_two_sample_test(
-            cut.cut_from([run.offset for run in runs]), cut.cut_from(sampled), cut.group, cut.group, seed=variant
-        )
-        areas.append(result.auc)
-    null = []
-    rng = np.random.default_rng(0)
-    names = sorted({run.drive for run in runs})
-    cut = snippets_of(runs, 10.0, STEP)
-    real = cut.cut_from([run.offset for run in runs])
-    for seed in range(variants):
-        half = np.isin(cut.group, rng.permutation(names)[: len(names) // 2])
-        result = classifier_two_sample_test(real[half], real[~half], cut.group[half], cut.group[~half], seed=seed)
-        null.append(result.auc)
-    return [
-        f"{begin:g} s: AUC of twins {np.mean(areas):.3f} ({min(areas):.3f} to {max(areas):.3f}), "
-        f"of the recorded drivers' halves {np.mean(null):.3f} ({min(null):.3f} to {max(null):.3f})",
-        f"smallest gap: maneuvers {before:.2f} m, twins {min(gaps):.2f} to {max(gaps):.2f} m",
-    ]
-
-
 def round_trip(scenario: Path) -> str:
     """Played, reconstructed from the states, played again: share of positions within 0.2 m, lateral maneuvers."""
     played = xl.play(scenario)
@@ -238,7 +189,6 @@ def main() -> None:
     parser.add_argument("source", type=Path, nargs="?")
     parser.add_argument("--part", choices=list(PARTS), default="design")
     parser.add_argument("--esmini", type=Path)
-    parser.add_argument("--twins", type=int, default=0, metavar="VARIANTS")
     parser.add_argument("--round-trip", type=Path, nargs="+", default=[])
     args = parser.parse_args()
     for scenario in args.round_trip:
@@ -252,8 +202,6 @@ def main() -> None:
     if args.esmini is not None:
         for settings in ({}, {"relative": True}, {"exact": True}):
             print(in_other_player(traffic, PARTS[args.part][0], args.esmini, **settings), flush=True)
-    elif args.twins:
-        print("\n".join(twins(traffic, PARTS[args.part][0], args.twins)))
     else:
         print("\n".join(window_lines(traffic, OtherReading(args.source), PARTS[args.part])))
 

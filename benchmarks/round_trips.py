@@ -18,8 +18,7 @@ from benchmarks.markers import show
 from xosc_lateral.driver.models.autoregressive.fit import fit_autoregressive
 from xosc_lateral.driver.models.autoregressive.model import AutoregressiveModel
 from xosc_lateral.drives.resampling import STEP
-from xosc_lateral.formats.profile_folders import find_profile
-from xosc_lateral.formats.profiles import read_profile
+from xosc_lateral.formats.profiles import find_profile, read_profile
 
 FloatArray = NDArray[np.float64]
 KINDS = {"300 runs of a minute": (300, 60.0), "40 runs of ten minutes": (40, 600.0)}

@@ -29,7 +29,7 @@ from xosc_lateral.drives.cuts import cut_runs
 from xosc_lateral.drives.drive import Drive, Run
 from xosc_lateral.drives.resampling import resample
 from xosc_lateral.errors import NotEnoughDataError
-from xosc_lateral.evaluation.sampled_snippets import sample_runs
+from xosc_lateral.evaluation.snippets import sample_runs
 from xosc_lateral.formats.drives import read_drives
 
 SEEDS = {"design": (100, 101), "validation": (110, 111), "test": (120, 121), "report": (130, 131)}

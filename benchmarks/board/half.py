@@ -10,9 +10,14 @@ from numpy.typing import NDArray
 
 from xosc_lateral.drives.drive import Run
 from xosc_lateral.drives.resampling import STEP
-from xosc_lateral.evaluation.condition import LENGTHS, SnippetCondition
-from xosc_lateral.evaluation.measures import Features, features_of
-from xosc_lateral.evaluation.same_start import FLOOR_DRAWS, real_against_real, windows_with_the_same_start
+from xosc_lateral.evaluation.measures import (
+    FLOOR_DRAWS,
+    Features,
+    features_of,
+    real_against_real,
+    windows_with_the_same_start,
+)
+from xosc_lateral.evaluation.parts import LENGTHS, SnippetCondition
 from xosc_lateral.evaluation.snippets import Snippets, snippets_of
 
 FloatArray = NDArray[np.float64]

@@ -12,8 +12,8 @@ from benchmarks.board.half import DRAWS, ENSEMBLE, Half
 from benchmarks.board.models.base import LateralModel
 from xosc_lateral.driver.snippets import segment_of
 from xosc_lateral.drives.resampling import STEP
-from xosc_lateral.evaluation.condition import SnippetCondition
 from xosc_lateral.evaluation.measures import Features, features_of
+from xosc_lateral.evaluation.parts import SnippetCondition
 from xosc_lateral.evaluation.snippets import Snippets
 from xosc_lateral.evaluation.variance import VarianceParts, variance_parts
 

@@ -15,8 +15,7 @@ from benchmarks.board.result import Board, ModelScore, Row
 from benchmarks.board.sampled_half import SampledHalf
 from xosc_lateral.drives.drive import Run
 from xosc_lateral.drives.resampling import STEP
-from xosc_lateral.evaluation.differences import autocorrelation_of
-from xosc_lateral.evaluation.measures import LAGS, resolved_bands
+from xosc_lateral.evaluation.measures import LAGS, autocorrelation_of, resolved_bands
 from xosc_lateral.evaluation.snippets import BLOCK, FEW_DRIVES
 from xosc_lateral.evaluation.variance import variance_parts
 

@@ -19,8 +19,7 @@ import pandas as pd
 from scipy.signal import lfilter
 
 from xosc_lateral.datasets.driver_simulator import measure, sample_times
-from xosc_lateral.datasets.least_jerk import least_jerk
-from xosc_lateral.datasets.motorway import N_LANES, STEP, draw_motorway
+from xosc_lateral.datasets.motorway import N_LANES, STEP, draw_motorway, least_jerk
 from xosc_lateral.drives.filters import first_order
 
 MOVEMENT_STEP = 0.1

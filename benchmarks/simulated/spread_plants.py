@@ -6,8 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from xosc_lateral.datasets.intent import Context, Intent
-from xosc_lateral.datasets.response import SimulatedResponse
+from xosc_lateral.datasets.plants import Context, Intent, SimulatedResponse
 
 
 @dataclass(frozen=True)

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from msgspec import structs
 
 from tests.motion.made_motion import LANE_WIDTH, drive, entity, together, two_roads
 from xosc_lateral.enrich.consequences import gaps_of, lane_departures
@@ -110,7 +111,7 @@ def test_who_is_absent_is_near_nobody(network: RoadNetwork) -> None:
 
 
 def test_what_is_no_vehicle_has_no_gap(network: RoadNetwork) -> None:
-    walker = replace(entity("walker"), category=EntityCategory.PEDESTRIAN)
+    walker = structs.replace(entity("walker"), category=EntityCategory.PEDESTRIAN)
     here = drive(network, walker, start=10.0)
     assert gaps(network, here, drive(network, entity("car"), start=0.0)) == {}
     assert gaps(network, here) == {}

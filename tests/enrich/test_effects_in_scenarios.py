@@ -11,14 +11,14 @@ from tests.motion.made_motion import RADIUS, drive, entity, together, two_roads
 from tests.profiles import simulated_profile
 from xosc_lateral.driver.effects import Acts, Effect, Factor, Form, Linear, Product
 from xosc_lateral.enrich.enrich import enrich
-from xosc_lateral.enrich.neighbours import Neighbours
+from xosc_lateral.enrich.result import Neighbours
 from xosc_lateral.motion.context import STEERING
 from xosc_lateral.motion.nominal import NominalMotion, PlayedAction
 from xosc_lateral.road.network import RoadNetwork
 from xosc_lateral.scenario import Action, Place
-from xosc_lateral.scenario.actions.environment import EnvironmentAction
 from xosc_lateral.scenario.enums import VehicleCategory
 from xosc_lateral.scenario.environment import Environment, Weather
+from xosc_lateral.scenario.global_actions import EnvironmentAction
 
 PROFILE = Neighbours.PROFILE
 

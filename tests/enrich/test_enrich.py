@@ -16,7 +16,7 @@ from tests.profiles import simulated_profile
 from xosc_lateral.driver.effects import Acts, ColumnEffect
 from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.enrich.enrich import enrich
-from xosc_lateral.enrich.neighbours import Neighbours
+from xosc_lateral.enrich.result import Neighbours
 from xosc_lateral.motion.context import STEERING
 from xosc_lateral.motion.nominal import Activity
 from xosc_lateral.motion.trajectory import distance_driven

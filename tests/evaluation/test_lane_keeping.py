@@ -3,8 +3,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from xosc_lateral.evaluation.lane_keeping import INDICATORS, lane_keeping, lane_keeping_indicators
-from xosc_lateral.evaluation.line_crossing import LONGEST_TLC, time_to_line_crossing
+from xosc_lateral.evaluation.lane_keeping import (
+    INDICATORS,
+    LONGEST_TLC,
+    lane_keeping,
+    lane_keeping_indicators,
+    time_to_line_crossing,
+)
 from xosc_lateral.evaluation.variance import variance_parts
 
 STEP = 0.2

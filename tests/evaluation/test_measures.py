@@ -7,17 +7,22 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from xosc_lateral.evaluation.differences import (
+from xosc_lateral.evaluation.lane_keeping import INDICATORS
+from xosc_lateral.evaluation.measures import (
+    BANDS,
     FAMILIES,
+    LAGS,
     UNITS,
+    Features,
     autocorrelation_of,
+    band_power,
     column_distances,
     differences,
+    features_of,
     named_distances,
     named_means,
+    resolved_bands,
 )
-from xosc_lateral.evaluation.lane_keeping import INDICATORS
-from xosc_lateral.evaluation.measures import BANDS, LAGS, Features, band_power, features_of, resolved_bands
 from xosc_lateral.evaluation.metrics import METRICS
 
 STEP = 0.2

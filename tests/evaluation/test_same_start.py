@@ -4,10 +4,9 @@ import numpy as np
 import pytest
 
 from xosc_lateral.errors import NotEnoughDataError
-from xosc_lateral.evaluation.distances import metric_distances
-from xosc_lateral.evaluation.ensemble_scores import energy_score, variogram_score
+from xosc_lateral.evaluation.distances import energy_score, metric_distances, variogram_score
+from xosc_lateral.evaluation.measures import windows_with_the_same_start
 from xosc_lateral.evaluation.metrics import snippet_metrics
-from xosc_lateral.evaluation.same_start import windows_with_the_same_start
 
 
 def _paths(n: int, rng: np.random.Generator, *, keep: float = 0.995, spread: float = 0.3) -> np.ndarray:

@@ -21,12 +21,10 @@ from xosc_lateral.evaluation.distances import (
     split_groups,
     wasserstein,
 )
-from xosc_lateral.evaluation.margins import margins
-from xosc_lateral.evaluation.metrics import METRICS, cut_snippets, snippet_metrics
-from xosc_lateral.evaluation.movement_summary import free_runs, summary_of
+from xosc_lateral.evaluation.lane_keeping import margins
+from xosc_lateral.evaluation.metrics import METRICS, cut_snippets, free_runs, snippet_metrics, summary_of
 from xosc_lateral.evaluation.record import scores_to_dict
-from xosc_lateral.evaluation.scores import score_profile
-from xosc_lateral.evaluation.snippet_scores import score_snippets
+from xosc_lateral.evaluation.scores import score_profile, score_snippets
 from xosc_lateral.evaluation.snippets import snippets_of
 from xosc_lateral.evaluation.spectra import autocorrelation, spectrum
 
@@ -206,7 +204,7 @@ def test_two_levels_miss_the_differences_as_the_paper_reports(profile):
 
 
 def test_every_artificial_snippet_starts_where_the_real_one_starts(profile):
-    from xosc_lateral.evaluation.sampled_snippets import sample_snippets
+    from xosc_lateral.evaluation.snippets import sample_snippets
 
     cut = snippets_of(_swaying(6, 10), 10.0, STEP)
     np.testing.assert_allclose(sample_snippets(profile, cut, 0)[:, 0], cut.offset[:, 0], atol=1e-12)

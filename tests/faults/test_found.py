@@ -23,7 +23,7 @@ from xosc_lateral.pipeline.batch import STATE
 from xosc_lateral.pipeline.journal import Journal
 from xosc_lateral.pipeline.lock import folder_lock
 from xosc_lateral.pipeline.manifest import MANIFEST, read_manifest
-from xosc_lateral.scenario.deterministic import Deterministic, ValueSets
+from xosc_lateral.scenario.distribution import Deterministic, ValueSets
 from xosc_lateral.scenario.place import Place
 from xosc_lateral.shipped import shipped_folder
 

@@ -25,18 +25,22 @@ from tests.formats.made_scenario import (
     write_scenario,
 )
 from xosc_lateral.errors import FormatError
-from xosc_lateral.formats.openscenario import read_scenario
-from xosc_lateral.formats.openscenario.references import LEVELS_UP
-from xosc_lateral.scenario.actions.lateral import LaneChangeAction, RelativeTargetLane
-from xosc_lateral.scenario.actions.longitudinal import AbsoluteTargetSpeed, SpeedAction
-from xosc_lateral.scenario.actions.routing import AssignRouteAction, FollowTrajectoryAction
-from xosc_lateral.scenario.actions.synchronize import SynchronizeAction
-from xosc_lateral.scenario.actions.teleport import TeleportAction
-from xosc_lateral.scenario.conditions.entity import TimeHeadwayCondition
-from xosc_lateral.scenario.conditions.value import SimulationTimeCondition
+from xosc_lateral.formats.openscenario.catalogs import LEVELS_UP
+from xosc_lateral.formats.openscenario.read import read_scenario
+from xosc_lateral.scenario.conditions import SimulationTimeCondition, TimeHeadwayCondition
 from xosc_lateral.scenario.enums import ConditionEdge, DynamicsShape, Priority, Rule, VehicleCategory
 from xosc_lateral.scenario.place import Unsupported
 from xosc_lateral.scenario.position import LanePosition, Polyline
+from xosc_lateral.scenario.private_actions import (
+    AbsoluteTargetSpeed,
+    AssignRouteAction,
+    FollowTrajectoryAction,
+    LaneChangeAction,
+    RelativeTargetLane,
+    SpeedAction,
+    SynchronizeAction,
+    TeleportAction,
+)
 
 DEEP = "/".join("abcdefgh"[: LEVELS_UP + 1])
 UP = "../" * (LEVELS_UP + 1)

@@ -15,8 +15,16 @@ from xosc_lateral.driver.effects import Acts, Drift, Linear
 from xosc_lateral.driver.profile import DriverProfile, profile_schema
 from xosc_lateral.errors import DriverProfileError, FormatError
 from xosc_lateral.formats.json_text import canonical_json
-from xosc_lateral.formats.profile_folders import SHIPPED, find_profile, list_profiles
-from xosc_lateral.formats.profiles import SCHEMA, profile_bytes, profile_hash, read_profile, write_profile
+from xosc_lateral.formats.profiles import (
+    SCHEMA,
+    SHIPPED,
+    find_profile,
+    list_profiles,
+    profile_bytes,
+    profile_hash,
+    read_profile,
+    write_profile,
+)
 
 SMALLEST = """{"format": "xosc-lateral driver profile", "version": 2, "id": "old", "model": {"kind": "two-level",
 "settings": {"n_bins": 2}, "counts": [[5, 1], [1, 5]], "damping": [0.01, 0.0]}}"""
@@ -103,7 +111,7 @@ BAD = {
     "no model": (broken(model=None), "no 'model'"),
     "unknown model": (
         broken(model={"kind": "oracle"}),
-        "model: unknown kind 'oracle'; known are two-level, autoregressive",
+        "model: unknown kind 'oracle'; known are autoregressive, two-level",
     ),
     "model without counts": (broken(model={"kind": "two-level", "settings": {}}), "model: no 'counts'"),
     "unknown setting": (broken(model={"kind": "two-level", "settings": {"x": 1}}), "model.settings: unknown field 'x'"),

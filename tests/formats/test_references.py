@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from xosc_lateral.errors import FormatError
-from xosc_lateral.formats.openscenario.references import LEVELS_UP, Boundary, allowed_roots
+from xosc_lateral.formats.openscenario.catalogs import LEVELS_UP, Boundary, allowed_roots
 from xosc_lateral.scenario.place import Place
 
 PLACE = Place(path=Path("s.xosc"), line=7, element="LogicFile")

@@ -8,7 +8,7 @@ import pytest
 from lxml import etree
 
 from xosc_lateral.formats.openscenario.element import XmlElement
-from xosc_lateral.formats.openscenario.spelling import BOOLEANS, remark_spellings
+from xosc_lateral.formats.openscenario.read import BOOLEANS, remark_spellings
 from xosc_lateral.scenario.parameters import Scope
 
 

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from msgspec import structs
 
 from tests.playback.stage import Stage, after, event, lane_change, maneuvers, on_lane, speed, teleport, to_lane
 from xosc_lateral.formats.states import COLUMNS, states_csv, states_frame
@@ -49,7 +50,7 @@ def test_entities_that_are_not_there_have_no_row(tmp_path: Path) -> None:
 def test_names_with_commas_and_quotes_come_back(tmp_path: Path) -> None:
     played = Stage(tmp_path).play(last=0.1)
     ego = played.motion.entities[0]
-    odd = replace(ego, entity=replace(ego.entity, name='a "b", c'))
+    odd = replace(ego, entity=structs.replace(ego.entity, name='a "b", c'))
     assert table(replace(played.motion, entities=(odd,)), played.network)[0]["name"] == 'a "b", c'
 
 

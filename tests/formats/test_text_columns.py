@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from xosc_lateral.formats.text_columns import comma_numbers, indicators, plain_cells, seconds_of_text
+from xosc_lateral.formats.tables import comma_numbers, indicators, plain_cells, seconds_of_text
 
 
 def column(*values: object) -> pd.Series:

@@ -10,9 +10,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from xosc_lateral.formats.cells import harmless
-from xosc_lateral.formats.text_columns import comma_numbers, indicators, plain_cells, seconds_of_text
-from xosc_lateral.formats.units import UNITS, factor, is_measured, spelled
+from xosc_lateral.formats.mapping import UNITS, factor, is_measured, spelled
+from xosc_lateral.formats.output_tables import harmless
+from xosc_lateral.formats.tables import comma_numbers, indicators, plain_cells, seconds_of_text
 
 
 # ---- units -----------------------------------------------------------------------------------------------------------

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from xosc_lateral.datasets.driver_simulator import Driver, simulate_drive
-from xosc_lateral.datasets.intent import Plant
+from xosc_lateral.datasets.plants import Plant
 from xosc_lateral.drives.drive import Drive
 from xosc_lateral.formats.drives import read_drives
 

@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 from scipy.signal import butter, lfilter
 
-from xosc_lateral.identification.columns import Column, Values
+from xosc_lateral.identification.columns import Assigned, Column, Role, Values
 from xosc_lateral.identification.feedback import Feedback, find_feedback
-from xosc_lateral.identification.roles import Assigned, Role
 from xosc_lateral.identification.timeline import Timeline
 
 STEP = 0.2

@@ -52,7 +52,7 @@ from typing import ClassVar
 import numpy as np
 from scipy.stats import norm
 from xosc_lateral.driver.effects.ramp import Ramp
-from xosc_lateral.identification.regression import elapsed, fit_model
+from xosc_lateral.identification.regression import fit_model
 from xosc_lateral.identification.terms.base import Description, Outcome, Stage, Term
 
 
@@ -63,7 +63,7 @@ class RampTerm(Term):
     weight: ClassVar[float] = 1.0
 
     def mean_columns(self, coarse):
-        return elapsed(coarse)[:, None]
+        return (coarse.time / 900.0 - 0.5)[:, None]
 
     @classmethod
     def test(cls, search, fitted):

@@ -79,17 +79,3 @@ def test_runs_do_not_cross_drives_or_rows_that_are_not_used() -> None:
     used[: N // 4] = False
     runs = bare_runs(timeline(movement(), drives=2), Removal(np.zeros(N)), used)
     assert [(run.drive, len(run.offset)) for run in runs] == [("d0", N // 4), ("d1", N // 2)]
-
-
-@pytest.mark.parametrize("factor", [0.5, 2.0])
-def test_a_rate_of_return_is_taken_out_by_reading_at_the_movement_s_own_clock(factor: float) -> None:
-    """What returns twice as fast is the same movement in half the time."""
-    own_time = np.arange(0.0, N * max(factor, 1.0) + 2.0)
-    own = np.sin(2.0 * np.pi * own_time / 400.0)
-    seen = np.interp(factor * np.arange(N), own_time, own)
-    removal = Removal(np.zeros(N))
-    removal.rate = np.full(N, np.log(factor))
-    (run,) = bare_runs(timeline(seen), removal, np.ones(N, dtype=bool))
-    assert len(run.offset) == int(factor * (N - 1)) + 1
-    np.testing.assert_allclose(run.offset, own[: len(run.offset)], atol=2e-3)
-    np.testing.assert_allclose(np.diff(run.time), STEP)

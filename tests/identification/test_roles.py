@@ -7,7 +7,7 @@ import pytest
 
 from tests.identification.made_coarse import movement, timeline_of, wander
 from xosc_lateral.errors import FormatError
-from xosc_lateral.identification.roles import Role, is_clock, proposed_role, roles_of
+from xosc_lateral.identification.columns import Role, is_clock, proposed_role, roles_of
 from xosc_lateral.identification.timeline import Timeline
 
 SECONDS = 1500.0

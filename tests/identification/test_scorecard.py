@@ -7,8 +7,8 @@ import pytest
 
 from tests.identification.made_coarse import movement, timeline_of
 from xosc_lateral.evaluation.metrics import METRICS, snippet_metrics
-from xosc_lateral.identification.held_out_gain import hold_out_blocks
-from xosc_lateral.identification.scorecard import SNIPPET_ROWS, Scorecard, _starts, score_runs
+from xosc_lateral.identification.cross_validation import hold_out_blocks
+from xosc_lateral.identification.held_out import SNIPPET_ROWS, Scorecard, _starts, score_runs
 from xosc_lateral.identification.timeline import Timeline
 
 SECONDS = 1800.0

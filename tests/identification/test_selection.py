@@ -94,12 +94,6 @@ def test_a_spread_by_a_car_ahead_is_named(driven: Driven) -> None:
     assert ("scale", ("lead_distance",)) in named(selected(drives))
 
 
-def test_a_camera_that_shakes_by_a_column_is_fine_noise(driven: Driven) -> None:
-    selection = selected(driven(402, [plants.ShakyCamera("grade", 0.04)], 1500.0, driver=Driver()))
-    (one,) = [one for one in selection.accepted if one.term.columns == ("grade",)]
-    assert one.term.component == "fine_noise"
-
-
 def test_regimes_of_loudness_are_named(tmp_path: Path) -> None:
     path = tmp_path / "drive.parquet"
     record_movement(in_regimes, 2400.0, 1).to_parquet(path)
@@ -107,10 +101,10 @@ def test_regimes_of_loudness_are_named(tmp_path: Path) -> None:
 
 
 def test_a_pull_to_the_middle_by_a_column_is_blamed_on_that_column(tmp_path: Path) -> None:
-    """A stronger pull makes the slow movement smaller: to name either is right."""
+    """A stronger pull makes the movement smaller."""
     path = tmp_path / "drive.parquet"
     record_movement(held, 2400.0, 2, told_of="speed").to_parquet(path)
-    assert named(selected(read_drives([path]))) & {("dynamics", ("speed",)), ("scale", ("speed",))}
+    assert ("scale", ("speed",)) in named(selected(read_drives([path])))
 
 
 def test_steering_and_yaw_rate_are_consequences_and_never_causes(driven: Driven) -> None:

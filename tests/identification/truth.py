@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from xosc_lateral.datasets.driver_simulator import Driver, simulate_drive
-from xosc_lateral.datasets.intent import Plant
+from xosc_lateral.datasets.plants import Plant
 
 BAND_S = (8.0, 80.0)
 """A driver who lets more pass moves more within such times; what shakes the car within a second stays. [s]"""

@@ -9,7 +9,7 @@ import pytest
 
 import xosc_lateral as xl
 from xosc_lateral.cli import main
-from xosc_lateral.enrich.neighbours import Neighbours
+from xosc_lateral.enrich.result import Neighbours
 from xosc_lateral.errors import FormatError
 from xosc_lateral.pipeline.request import frame_requests
 from xosc_lateral.pipeline.settings import ConvertSettings

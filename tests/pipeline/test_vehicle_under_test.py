@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from lxml import etree
+from msgspec import structs
 
 import xosc_lateral as xl
 from tests.formats.made_scenario import (
@@ -141,7 +142,7 @@ def test_a_vehicle_whose_maneuvers_others_wait_for_keeps_them(tmp_path: Path) ->
 def test_lane_offsets_go_on_for_as_long_as_the_segment_lasts(scenario: Path, tmp_path: Path) -> None:
     xl.convert(scenario, tmp_path / "out.xosc", mode="lane-offset", seed=1)
     played = play_scenario(tmp_path / "out.xosc")
-    endless = replace(played.scenario, storyboard=replace(played.scenario.storyboard, stop_trigger=None))
+    endless = replace(played.scenario, storyboard=structs.replace(played.scenario.storyboard, stop_trigger=None))
     slower = with_speeds(endless, played.motion, ["Ego"], 0.8)
     motion = play(slower, played.network, step=0.02, time_limit=22.0)
     for one in motion.entities:

@@ -13,7 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from xosc_lateral.motion.gaps import box_distance
-from xosc_lateral.playback.actions.constraints import limits_of
+from xosc_lateral.playback.actions.speed_profile import limits_of
 from xosc_lateral.playback.boxes import (
     HEIGHT_APART,
     corners,
@@ -23,15 +23,15 @@ from xosc_lateral.playback.boxes import (
     holds_point,
     overlap,
 )
-from xosc_lateral.playback.signals import TrafficSignals
+from xosc_lateral.playback.simulation import TrafficSignals
 from xosc_lateral.playback.values import Values, holds, holds_exactly
 from xosc_lateral.road.positions import Pose
 from xosc_lateral.scenario import Parameter, Performance, Place
-from xosc_lateral.scenario.actions.values import ModifyOperation
-from xosc_lateral.scenario.dynamics import DynamicConstraints
+from xosc_lateral.scenario.entity import BoundingBox
 from xosc_lateral.scenario.enums import ParameterType, Rule
+from xosc_lateral.scenario.global_actions import ModifyOperation
+from xosc_lateral.scenario.private_actions import DynamicConstraints
 from xosc_lateral.scenario.scenario import TrafficSignalController, TrafficSignalPhase
-from xosc_lateral.scenario.vehicle import BoundingBox
 
 HERE = Place(Path("x.xosc"), 1, "X")
 

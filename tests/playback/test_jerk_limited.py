@@ -9,8 +9,7 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from xosc_lateral.playback.actions.constraints import Limits
-from xosc_lateral.playback.actions.jerk_limited import NoSolutionError, Row, SpeedTarget, follow
+from xosc_lateral.playback.actions.speed_profile import Limits, NoSolutionError, Row, SpeedTarget, follow
 
 LIMITS = Limits(100.0, 3.0, 5.0, 2.0, 4.0)
 

@@ -25,7 +25,7 @@ from tests.playback.stage import (
 )
 from tests.playback.test_driving import MIRRORED, crossing
 from xosc_lateral.errors import PlaybackError, XoscLateralError
-from xosc_lateral.playback.positions.projection import ProjectionError, project
+from xosc_lateral.playback.positions.geo import ProjectionError, project
 
 REF = teleport(on_lane(-2, 100.0)) + speed(10.0)
 BEND = map_of(road("1", arc(0.01, length=300.0), 300.0))

@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 from xosc_lateral.playback.transition import EPSILON
 from xosc_lateral.playback.values import Values, holds, holds_exactly
 from xosc_lateral.scenario import Parameter, Place
-from xosc_lateral.scenario.actions.values import ModifyOperation
 from xosc_lateral.scenario.enums import ParameterType, Rule
+from xosc_lateral.scenario.global_actions import ModifyOperation
 
 numbers = st.floats(-1e6, 1e6)
 OPPOSITE = (

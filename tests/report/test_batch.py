@@ -9,8 +9,7 @@ from xml.etree import ElementTree
 import pytest
 
 from tests.report.made_enriched import made_enriched
-from xosc_lateral.report.batch import BatchEntry, batch_page
-from xosc_lateral.report.thumbnail import thumbnail
+from xosc_lateral.report.batch import BatchEntry, batch_page, thumbnail
 
 CALM = BatchEntry("calm.xosc", "calm.xosc", "calm.html", "calm.svg", 2, 3, 40.0, 0.2, 2.0, 1.9, (), "")
 

@@ -16,12 +16,12 @@ from tests.road.places import hand_written
 from xosc_lateral.enrich.conversion import ConversionProvenance, ConvertedScenario
 from xosc_lateral.motion.nominal import Activity
 from xosc_lateral.pipeline.settings import ConvertSettings
-from xosc_lateral.report.conversion import as_text, facts
+from xosc_lateral.report.batch import BORDER, HEIGHT, WIDTH, thumbnail
 from xosc_lateral.report.figures import figure_style, new_figure
 from xosc_lateral.report.frames import conversion_frame
 from xosc_lateral.report.interactive import describe_axes, name_parts
 from xosc_lateral.report.road_drawing import edge_lines, view_along
-from xosc_lateral.report.thumbnail import BORDER, HEIGHT, WIDTH, thumbnail
+from xosc_lateral.report.scenario import as_text, facts
 
 SVG = "{http://www.w3.org/2000/svg}"
 

@@ -13,9 +13,8 @@ import pytest
 from benchmarks.library import POPULATION, SINGLE_VEHICLES, most_different
 from xosc_lateral.cli import main
 from xosc_lateral.errors import NotEnoughDataError
-from xosc_lateral.evaluation.movement_summary import free_runs, summary_of
-from xosc_lateral.formats.profile_folders import list_profiles
-from xosc_lateral.formats.profiles import read_profile
+from xosc_lateral.evaluation.metrics import free_runs, summary_of
+from xosc_lateral.formats.profiles import list_profiles, read_profile
 from xosc_lateral.report.cards import card_text
 from xosc_lateral.report.comparison import compare
 from xosc_lateral.report.violins import _density

@@ -12,8 +12,7 @@ import pandas as pd
 import pytest
 
 from xosc_lateral.report.figures import BLUE, LARGEST_SVG, figure_markup, figure_style, new_figure
-from xosc_lateral.report.render import KeyFigure, environment, inline, render_page, table
-from xosc_lateral.report.values import NOTHING, format_number
+from xosc_lateral.report.render import NOTHING, KeyFigure, environment, format_number, inline, render_page, table
 
 VOID = {"meta", "img", "br", "link", "input"}
 

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from xosc_lateral.report.values import NOTHING, format_number, format_value, is_number
+from xosc_lateral.report.render import NOTHING, format_number, format_value, is_number
 
 
 @given(st.floats(-1e12, 1e12).filter(lambda value: abs(value) > 1e-12))

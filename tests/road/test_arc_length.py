@@ -8,7 +8,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 from scipy.integrate import quad
 
-from xosc_lateral.road.arc_length import PIECES, end_parameter, parameter_pieces
+from xosc_lateral.formats.opendrive.plan_view import PIECES, end_parameter, parameter_pieces
 from xosc_lateral.road.lanes import LaneRecord, LaneSection, build_section
 from xosc_lateral.road.piecewise import Cubic, PiecewiseCubic, shift
 

@@ -8,7 +8,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from xosc_lateral.road.lookup import Lookup
+from xosc_lateral.road.piecewise import Lookup
 
 # Starts a few rounding errors apart, on a long axis: what a single searchsorted would get wrong.
 starts = st.lists(

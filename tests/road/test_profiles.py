@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from xosc_lateral.road.lanes import Lane
 from xosc_lateral.road.piecewise import PiecewiseCubic
-from xosc_lateral.road.profiles import Cubics, HeightTable
+from xosc_lateral.road.tables import Cubics, HeightTable
 
 small = st.floats(-0.01, 0.01)
 

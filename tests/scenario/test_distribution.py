@@ -10,19 +10,21 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import stats
 
-from xosc_lateral.scenario.deterministic import Deterministic, SteppedRange, ValueSets
-from xosc_lateral.scenario.place import Place
-from xosc_lateral.scenario.stochastic import (
+from xosc_lateral.scenario.distribution import (
+    Deterministic,
     DistributionError,
     Draw,
     Histogram,
     LogNormal,
     Normal,
     Poisson,
+    SteppedRange,
     Stochastic,
     Uniform,
+    ValueSets,
     Weighted,
 )
+from xosc_lateral.scenario.place import Place
 
 PLACE = Place("f.xosc", 1, "e")
 COUNT = 4000

@@ -6,12 +6,11 @@ from pathlib import Path
 
 import pytest
 
-from xosc_lateral.scenario.entity import Entity
+from xosc_lateral.scenario.entity import Axle, Axles, BoundingBox, Entity
 from xosc_lateral.scenario.enums import EntityCategory
 from xosc_lateral.scenario.place import Place
 from xosc_lateral.scenario.scenario import FileHeader, Scenario
 from xosc_lateral.scenario.storyboard import Init, Storyboard
-from xosc_lateral.scenario.vehicle import Axle, Axles, BoundingBox
 
 PLACE = Place("f.xosc", 3, "ScenarioObject 'a'")
 

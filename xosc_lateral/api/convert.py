@@ -5,8 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Unpack
 
-from xosc_lateral.api.inputs import PathLike
-from xosc_lateral.api.result import Result
+from xosc_lateral.api.result import PathLike, Result
 from xosc_lateral.errors import FormatError
 from xosc_lateral.formats.output_paths import claim, output_file
 from xosc_lateral.pipeline.convert import convert_scenario
@@ -176,7 +175,7 @@ class Conversion(Result):
         return f"{where}: {len(self.enriched)} of {len(self.entities)} entities enriched{warned}"
 
     def __str__(self) -> str:
-        from xosc_lateral.report.conversion import as_text
+        from xosc_lateral.report.scenario import as_text
 
         return as_text(self._made, self.report)
 
@@ -193,7 +192,7 @@ class Conversion(Result):
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values, as ``--json`` prints them."""
-        from xosc_lateral.report.conversion import facts
+        from xosc_lateral.report.scenario import facts
 
         return facts(self._made, self.report)
 

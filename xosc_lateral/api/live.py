@@ -7,9 +7,8 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from xosc_lateral.api.inputs import PathLike, Paths, ProfileLike, given_profile
-from xosc_lateral.api.result import Result
-from xosc_lateral.enrich.neighbours import Neighbours
+from xosc_lateral.api.result import PathLike, Paths, ProfileLike, Result, given_profile
+from xosc_lateral.enrich.result import Neighbours
 from xosc_lateral.errors import SimulationError
 
 if TYPE_CHECKING:

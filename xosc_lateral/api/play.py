@@ -6,8 +6,9 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from xosc_lateral.api.inputs import PathLike, Paths, as_paths, road_search
-from xosc_lateral.api.result import Result
+from msgspec import structs
+
+from xosc_lateral.api.result import PathLike, Paths, Result, as_paths, road_search
 from xosc_lateral.formats.hashes import parsed_hashes
 from xosc_lateral.formats.output_paths import claim, output_file
 from xosc_lateral.motion.segments import SegmentRow
@@ -183,7 +184,7 @@ class Playback(Result):
 
     def page(self) -> str:
         """A self-contained HTML page that plays the scenario."""
-        from xosc_lateral.report.view import view_page
+        from xosc_lateral.report.recording import view_page
 
         motion, network = self._played.motion, self._played.network
         return view_page(motion, network, source=self.scenario.name, provenance=self._provenance())
@@ -247,7 +248,7 @@ class Segments(Result):
         return f"{len(following)} road-following segments of {entities} entities, {seconds:.1f} s"
 
     def __str__(self) -> str:
-        from xosc_lateral.report.segments import as_text
+        from xosc_lateral.report.recording import as_text
 
         return as_text(self._rows)
 
@@ -260,7 +261,6 @@ class Segments(Result):
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values, as ``--json`` prints them."""
-        from dataclasses import asdict
 
-        rows = [asdict(row) for row in self._rows]
+        rows = [structs.asdict(row) for row in self._rows]
         return {"segments": [row | {"start": round(row["start"], 6), "end": round(row["end"], 6)} for row in rows]}

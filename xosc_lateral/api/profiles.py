@@ -6,8 +6,7 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from xosc_lateral.api.inputs import PathLike, Paths, ProfileLike, as_paths, given_profile
-from xosc_lateral.api.result import Result
+from xosc_lateral.api.result import PathLike, Paths, ProfileLike, Result, as_paths, given_profile
 from xosc_lateral.errors import FormatError
 from xosc_lateral.formats.output_paths import claim, output_file, output_folder
 
@@ -16,7 +15,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from xosc_lateral.driver.profile import DriverProfile
-    from xosc_lateral.formats.library import Entry
+    from xosc_lateral.formats.profiles import Entry
     from xosc_lateral.pipeline.derive import Derived
     from xosc_lateral.report.comparison import Compared
 
@@ -63,7 +62,7 @@ def write_profile(profile: DriverProfile, path: PathLike, *, force: bool = False
 def write_card(profile: DriverProfile, path: PathLike, *, force: bool = False) -> Path:
     """Write a profile's card as a page: what it does, where it comes from, how true it is."""
     from xosc_lateral.formats.atomic import write_atomically
-    from xosc_lateral.report.card_page import card_page
+    from xosc_lateral.report.cards import card_page
 
     output = output_file(path, f"{profile.name}.html", (".html", ".htm"))
     claim([output], force=force)
@@ -125,7 +124,7 @@ def list_profiles(
     where : mapping of str to str, optional
         List only profiles with this metadata: ``{"country": "DE"}``.
     """
-    from xosc_lateral.formats.library import matching, read_library
+    from xosc_lateral.formats.profiles import matching, read_library
 
     entries = read_library(as_paths(library))
     return ProfileList(matching(entries, tags, where or {}) if tags or where else entries)
@@ -162,7 +161,7 @@ def add_profile(
         There is a profile of that id.
     """
     from xosc_lateral.formats import profiles
-    from xosc_lateral.formats.library import described
+    from xosc_lateral.formats.profiles import described
 
     folders = [library] if Path(library).is_dir() else []
     added = described(given_profile(profile, folders), name=name, add_tags=tags, fields=metadata)
@@ -189,7 +188,7 @@ def tag_profile(
         It comes with the package, or can't be read.
     """
     from xosc_lateral.formats import profiles
-    from xosc_lateral.formats.library import described, own_path
+    from xosc_lateral.formats.profiles import described, own_path
     from xosc_lateral.formats.source import edit_in_place
 
     path = own_path(str(name), as_paths(library))

@@ -145,7 +145,7 @@ def stdio(
     import os
     import sys
 
-    from xosc_lateral.api.inputs import given_profile
+    from xosc_lateral.api.result import given_profile
     from xosc_lateral.live.stdio import Pipe
 
     pipe = Pipe(given_profile(profile, library or ()), seed=seed, road=road)
@@ -172,7 +172,7 @@ def fmu(
     quiet: Quiet = False,
 ) -> None:
     """Write a driver as a functional mock-up unit for co-simulation; it needs this package where it is simulated."""
-    from xosc_lateral.api.inputs import given_profile
+    from xosc_lateral.api.result import given_profile
     from xosc_lateral.formats.output_paths import claim
     from xosc_lateral.live.fmu import export_fmu
 

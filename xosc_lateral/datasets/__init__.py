@@ -12,9 +12,19 @@ from xosc_lateral.datasets.driver_simulator import (
     simulate_drive,
     simulate_population,
 )
-from xosc_lateral.datasets.intent import Plant
-from xosc_lateral.datasets.plants import LanePreference, ShiftBy, SideWind, curve_cutting, truck_avoidance
-from xosc_lateral.datasets.response import Shape, SimulatedResponse, linear, saturating, threshold
+from xosc_lateral.datasets.plants import (
+    LanePreference,
+    Plant,
+    Shape,
+    ShiftBy,
+    SideWind,
+    SimulatedResponse,
+    curve_cutting,
+    linear,
+    saturating,
+    threshold,
+    truck_avoidance,
+)
 
 __all__ = [
     "Driver",

@@ -23,8 +23,8 @@ from dataclasses import dataclass, field, fields
 import numpy as np
 import pandas as pd
 
-from xosc_lateral.datasets.intent import Context, Intent, Plant
 from xosc_lateral.datasets.motorway import N_LANES, STEP, draw_motorway
+from xosc_lateral.datasets.plants import Context, Intent, Plant
 from xosc_lateral.jit import njit
 
 WHEELBASE = 2.8  # [m]

@@ -4,8 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from xosc_lateral.datasets.least_jerk import least_jerk
 from xosc_lateral.drives.filters import first_order
+
+
+def least_jerk(length: int) -> np.ndarray:
+    """Share of the way that is done after each of so many steps, shape (length,): 10 u^3 - 15 u^4 + 6 u^5 [1]_. [-]"""
+    done = np.arange(1, length + 1) / length
+    return np.asarray(done**3 * (10.0 - 15.0 * done + 6.0 * done**2))
+
 
 STEP = 0.02
 """Time between two simulated states. [s]"""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from enum import StrEnum
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +16,15 @@ from xosc_lateral.motion.nominal import EntityMotion, NominalMotion
 from xosc_lateral.motion.segments import SegmentSpan
 from xosc_lateral.motion.trajectory import WorldTrajectory, leaps
 from xosc_lateral.road.network import RoadNetwork
+
+
+class Neighbours(StrEnum):
+    """What a conversion does where a profile's own answer to neighbours is not known, or whether there is any."""
+
+    PROFILE = "profile"
+    BORROW = "borrow"
+    NONE = "none"
+
 
 FloatArray = NDArray[np.float64]
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -13,11 +13,74 @@ from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.driver.sampling import sample_offsets
 from xosc_lateral.driver.seeds import child
 from xosc_lateral.drives.cuts import HALF_WIDTH
-from xosc_lateral.evaluation.line_crossing import time_to_line_crossing
-from xosc_lateral.evaluation.margins import NEAR_MARKING
 from xosc_lateral.segment import Segment
 
 FloatArray = NDArray[np.float64]
+
+NEAR_MARKING = 1.2
+"""A reference point this close to a marking counts as near: half a car (0.9 m) and 0.3 m of air. [m]"""
+
+
+@dataclass(frozen=True)
+class Margins:
+    """How a driver uses the lane's margins.
+
+    Parameters
+    ----------
+    share_near : float
+        Share of time with the reference point within `NEAR_MARKING` of a marking. [-]
+    excursions_per_hour : float
+        How often that zone is entered. [1/h]
+    largest : float
+        Largest |offset|. [m]
+    """
+
+    share_near: float
+    excursions_per_hour: float
+    largest: float
+
+
+def margins(offsets: Sequence[FloatArray], lane_widths: Sequence[FloatArray], step: float) -> Margins:
+    """Time near a marking and rate of excursions over several runs (offset and lane width [m] at an even step [s]).
+
+    Shape (n_i,) each.
+    """
+    near = [np.abs(x) > 0.5 * w - NEAR_MARKING for x, w in zip(offsets, lane_widths, strict=True)]
+    rows = sum(len(one) for one in near)
+    entries = sum(int((one[1:] & ~one[:-1]).sum()) for one in near)
+    return Margins(
+        share_near=sum(int(one.sum()) for one in near) / rows,
+        excursions_per_hour=entries / (rows * step / 3600.0),
+        largest=max(float(np.abs(x).max()) for x in offsets),
+    )
+
+
+LONGEST_TLC = 20.0
+"""Times to line crossing beyond it count as it: far above the 2 s that warning systems look at. [s]"""
+
+
+def time_to_line_crossing(
+    offset: FloatArray, lane_width: FloatArray, step: float, *, half_width: float = HALF_WIDTH
+) -> FloatArray:
+    """Time until the side that the vehicle moves towards reaches its marking, at constant lateral speed.
+
+    Parameters
+    ----------
+    offset, lane_width : array, shape (..., m)
+        [m]
+
+    Returns
+    -------
+    array, shape (..., m - 1)
+        0 where the side is beyond the marking already, at most `LONGEST_TLC`. [s]
+    """
+    speed = np.diff(offset, axis=-1) / step
+    towards = np.sign(speed) * offset[..., 1:]
+    room = np.maximum(0.5 * lane_width[..., 1:] - half_width - towards, 0.0)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        time = np.where(speed == 0.0, np.inf, room / np.abs(speed))
+    return np.minimum(time, LONGEST_TLC)
+
 
 INDICATORS = (
     "sdlp",

@@ -15,18 +15,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.driver.profile import DriverProfile
-from xosc_lateral.driver.snippets import segment_of
 from xosc_lateral.drives.drive import Run
 from xosc_lateral.evaluation.classifier import TwoSampleResult, classifier_two_sample_test, context_features
-from xosc_lateral.evaluation.condition import LENGTHS, SnippetCondition
-from xosc_lateral.evaluation.differences import UNITS, differences, named_distances, named_means
-from xosc_lateral.evaluation.distances import split_groups
-from xosc_lateral.evaluation.ensemble_scores import PROPER, proper_scores
+from xosc_lateral.evaluation.distances import PROPER, proper_scores, split_groups
 from xosc_lateral.evaluation.filters import PASSED, below_half_hertz, thinned
-from xosc_lateral.evaluation.measures import Features, features_of
-from xosc_lateral.evaluation.same_start import FLOOR_DRAWS, real_against_real, windows_with_the_same_start
-from xosc_lateral.evaluation.sampled_snippets import sample_runs, sample_snippets, sensor_noise
-from xosc_lateral.evaluation.snippets import Snippets, snippets_of
+from xosc_lateral.evaluation.measures import (
+    FLOOR_DRAWS,
+    UNITS,
+    Features,
+    differences,
+    features_of,
+    named_distances,
+    named_means,
+    real_against_real,
+    windows_with_the_same_start,
+)
+from xosc_lateral.evaluation.parts import LENGTHS, SnippetCondition
+from xosc_lateral.evaluation.snippets import Snippets, sample_runs, sample_snippets, sensor_noise, snippets_of
 from xosc_lateral.evaluation.variance import VarianceParts, variance_parts
 
 FloatArray = NDArray[np.float64]
@@ -125,7 +130,7 @@ def score_realism(profile: DriverProfile, runs: Sequence[Run], *, seed: int, cla
     """
     step = profile.model.step
     driver = sample_runs(profile, runs, seed, same_start=False)
-    noise = sensor_noise(profile, driver, [segment_of(run) for run in runs], seed)
+    noise = sensor_noise(profile, driver, seed)
     recorded = [path + error for path, error in zip(driver, noise, strict=True)]
     slow_real = [below_half_hertz(run.offset, step) for run in runs]
     slow_driver = [below_half_hertz(path, step) for path in driver]

@@ -8,11 +8,9 @@ from typing import Any
 
 from xosc_lateral.digits import all_significant
 from xosc_lateral.evaluation.filters import HIGHEST
-from xosc_lateral.evaluation.lane_keeping import UNITS
-from xosc_lateral.evaluation.margins import Margins
+from xosc_lateral.evaluation.lane_keeping import UNITS, Margins
 from xosc_lateral.evaluation.realism import Beside, ConditionScores
-from xosc_lateral.evaluation.scores import LAGS, ProfileScores
-from xosc_lateral.evaluation.snippet_scores import SnippetScores
+from xosc_lateral.evaluation.scores import LAGS, ProfileScores, SnippetScores
 from xosc_lateral.evaluation.variance import VarianceParts
 
 

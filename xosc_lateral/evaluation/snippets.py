@@ -13,6 +13,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from xosc_lateral.driver.models.base import Start
+from xosc_lateral.driver.profile import DriverProfile
+from xosc_lateral.driver.sampled_offsets import recorded, sensor_error
+from xosc_lateral.driver.sampling import OffsetSampler, sample_offsets
+from xosc_lateral.driver.seeds import child
 from xosc_lateral.driver.snippets import Snippet, cut_snippets, segment_of
 from xosc_lateral.drives.drive import Run
 from xosc_lateral.segment import Segment
@@ -104,3 +109,73 @@ def _groups(runs: Sequence[Run], items: Sequence[Snippet], seconds: float, by_bl
     block = max(BLOCK, 2.0 * seconds)
     groups = [f"{one.run.drive} {int(one.time[0] // block)}" if by_block else one.run.drive for one in items]
     return groups
+
+
+def sample_snippets(profile: DriverProfile, snippets: Snippets, seed: int, *, with_sensor: bool = False) -> FloatArray:
+    """For each snippet one of a new driver, of the same length, start and context. Shape (n, m). [m]
+
+    With the sensor, what starts there is the sum of both, as it does in what was recorded.
+    """
+    rows = sample_recorded(profile, snippets.segments, snippets.offset[:, 0], seed, with_sensor=with_sensor)
+    return np.array(rows).reshape(snippets.offset.shape)
+
+
+def sample_recorded(
+    profile: DriverProfile, segments: Sequence[Segment], starts: FloatArray, seed: int, *, with_sensor: bool = True
+) -> list[FloatArray]:
+    """For each segment one path of a new driver, as the profile's sensor would have recorded it. [m]
+
+    `starts` of the sums, shape (segments,) [m].
+    """
+    root, sensor = np.random.SeedSequence(seed), profile.sensor if with_sensor else None
+    rows = []
+    for k, (segment, start) in enumerate(zip(segments, starts.tolist(), strict=True)):
+        own = child(root, k)
+
+        def draw(begin: float, segment: Segment = segment, own: np.random.SeedSequence = own) -> FloatArray:
+            return sample_offsets(profile, segment, own, start=begin)
+
+        n = segment.lane_width[segment.inside].size
+        rows.append(recorded(sensor, draw, n, start, profile.model.step, own))
+    return rows
+
+
+def sample_parts(profile: DriverProfile, snippets: Snippets, seed: int) -> tuple[FloatArray, FloatArray]:
+    """Coarse and fine part of sampled snippets, without effects, in lane widths; shape (n, m) each. [-]"""
+    root = np.random.SeedSequence(seed)
+    relative = snippets.offset / snippets.lane_width
+    coarse, fine = np.empty_like(relative), np.empty_like(relative)
+    for k, start in enumerate(relative[:, 0].tolist()):
+        stream = profile.model.stream(child(root, k), Start(rel_offset=start))
+        coarse[k], fine[k] = stream.take(relative.shape[1])
+    return coarse, fine
+
+
+def sample_runs(profile: DriverProfile, runs: Sequence[Run], seed: int, *, same_start: bool = True) -> list[FloatArray]:
+    """For each run one of the same length and context, shape (n_i,) each. [m]
+
+    With the same start each is of a new driver. Free runs of one drive are of one driver, who drives on between them,
+    unseen: drivers are then as constant as the profile has them.
+    """
+    root = np.random.SeedSequence(seed)
+    if same_start:
+        return [
+            sample_offsets(profile, segment_of(run), child(root, k), start=float(run.offset[0]))
+            for k, run in enumerate(runs)
+        ]
+    paths, step = [np.empty(0)] * len(runs), profile.model.step
+    of_drive: dict[str, list[int]] = {}
+    for k in sorted(range(len(runs)), key=lambda k: float(runs[k].time[0])):
+        of_drive.setdefault(runs[k].drive, []).append(k)
+    for number, drive in enumerate(dict.fromkeys(run.drive for run in runs)):
+        driver, end = OffsetSampler(profile, child(root, number)), 0.0
+        for k in of_drive[drive]:
+            driver.skip(float(runs[k].time[0]) - end)
+            paths[k], end = driver.sample(segment_of(runs[k])), float(runs[k].time[-1]) + step
+    return paths
+
+
+def sensor_noise(profile: DriverProfile, paths: Sequence[FloatArray], seed: int) -> list[FloatArray]:
+    """What the profile's sensor adds to paths, shape (n_i,) each; zeros where it knows none. [m]"""
+    root, step = np.random.SeedSequence(seed), profile.model.step
+    return [sensor_error(profile.sensor, path, step, child(root, k)) for k, path in enumerate(paths)]

@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 
 from xosc_lateral.driver.plausibility import first_implausible, implausible
 from xosc_lateral.errors import FormatError
-from xosc_lateral.formats.tables import read_table
-from xosc_lateral.formats.text_columns import plain_cells
+from xosc_lateral.formats.tables import plain_cells, read_table
 from xosc_lateral.limits import TIME
 
 if TYPE_CHECKING:

@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 from xosc_lateral.formats.atomic import write_atomically
-from xosc_lateral.formats.cells import harmless
 from xosc_lateral.formats.json_text import canonical_json
 from xosc_lateral.formats.own_files import SIDECAR_SUFFIX
 from xosc_lateral.version import __version__
@@ -18,9 +17,20 @@ from xosc_lateral.version import __version__
 if TYPE_CHECKING:
     import pandas as pd
 
+
+_FORMULA = ("=", "+", "-", "@", "\t", "\r")
+
+
+def harmless(text: str) -> str:
+    """Text that no spreadsheet takes for a formula: what begins like one gets an apostrophe before it.
+
+    Reference: OWASP, "CSV Injection".
+    """
+    return f"'{text}" if text.startswith(_FORMULA) else text
+
+
 METADATA_KEY = b"xosc-lateral"
 """Key of the provenance in a Parquet file's schema metadata."""
-
 
 Encoder: TypeAlias = "Callable[[Callable[[], pd.DataFrame], Callable[[], str]], bytes]"
 """A table's bytes, from what gives it as a frame and what gives it as CSV; only one of both is asked for."""

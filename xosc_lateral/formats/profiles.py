@@ -1,24 +1,108 @@
-"""Profile files: JSON, canonical to the byte."""
+"""Profile files (JSON, canonical to the byte), where they are looked up by name, and libraries of them."""
 
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterable
+import os
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
+from msgspec.structs import replace
+
 from xosc_lateral.driver.plausibility import check_profile
-from xosc_lateral.driver.profile import DriverProfile
+from xosc_lateral.driver.profile import DriverProfile, Metadata
 from xosc_lateral.driver.records import plain
-from xosc_lateral.errors import DriverProfileError, FormatError
+from xosc_lateral.errors import DriverProfileError, FormatError, XoscLateralError
 from xosc_lateral.formats.atomic import write_atomically
+from xosc_lateral.formats.configuration import configured_libraries
 from xosc_lateral.formats.json_text import canonical_json, parse_json
-from xosc_lateral.formats.profile_folders import find_profile
+from xosc_lateral.formats.output_paths import file_name
 from xosc_lateral.formats.source import read_source
 from xosc_lateral.formats.tables import foreign_errors
 from xosc_lateral.limits import PROFILE_SIZE
+from xosc_lateral.plugins import plugins
+from xosc_lateral.shipped import shipped_folder
+
+SHIPPED = shipped_folder("driver_profiles")
+"""Profiles that come with the package."""
+
+LONGEST_NAME = 200
+"""Characters of a profile's name; file systems take 255 bytes, the suffix included."""
+
+SUFFIX = ".json"
+
+LIBRARY_VARIABLE = "XOSC_LATERAL_LIBRARY"
+"""Environment variable with folders of profiles, separated as in PATH."""
+
+GROUP = "xosc_lateral.profiles"
+"""Entry points of folders with further profiles."""
+
+
+def find_profile(name_or_path: str | Path, folders: Iterable[str | Path] = ()) -> Path:
+    """Path of a profile; see `read_profile`."""
+    text = str(name_or_path)
+    path = Path(name_or_path)
+    if isinstance(name_or_path, Path) or text.endswith(SUFFIX) or path.name != text:
+        if not path.exists() or path.is_dir():
+            raise FormatError("is a folder, not a profile" if path.is_dir() else "no such file", path=path)
+        return path
+    if len(text) > LONGEST_NAME:
+        raise DriverProfileError(f"{text[:20]!r}...: no profile has a name of {len(text)} characters")
+    for folder in (*library_folders(folders), SHIPPED):
+        found = folder / f"{text}{SUFFIX}"
+        if found.is_file():
+            return found
+    if (offered := _from_plugins().get(text)) is not None:
+        return offered
+    known = sorted({path.stem for path in list_profiles(folders)})
+    raise DriverProfileError(f"no profile {text!r}; known are {', '.join(known) or 'none'}, or give the path of a file")
+
+
+def list_profiles(folders: Iterable[str | Path] = ()) -> list[Path]:
+    """Profile files in the folders (see `library_folders`), among those shipped and of plug-ins, by name within each.
+
+    Raises `FormatError` if a folder isn't one.
+    """
+    searched = _each_once((*library_folders(folders), SHIPPED))
+    found = [path for folder in searched for path in sorted(folder.glob(f"*{SUFFIX}"))]
+    return found + [path for _, path in sorted(_from_plugins().items())]
+
+
+def library_folders(folders: Iterable[str | Path] = ()) -> tuple[Path, ...]:
+    """Folders with profiles besides those shipped: named ones, the environment's, the configuration's.
+
+    ``XOSC_LATERAL_LIBRARY`` holds folders, separated as in PATH. The configuration is ``xosc-lateral/config.toml`` in
+    ``XDG_CONFIG_HOME`` (else ``~/.config``; on Windows ``APPDATA``) with ``library = ["FOLDER", ...]``.
+
+    Raises `FormatError` if one of them isn't there.
+    """
+    from_environment = [Path(name) for name in os.environ.get(LIBRARY_VARIABLE, "").split(os.pathsep) if name]
+    found = [*map(Path, folders), *from_environment, *configured_libraries()]
+    for folder in found:
+        if not folder.is_dir():
+            raise FormatError("no such folder", path=folder)
+    return _each_once(found)
+
+
+def _each_once(folders: Iterable[Path]) -> tuple[Path, ...]:
+    """A folder that is named twice, however it is spelled, counts where it comes first."""
+    found: dict[Path, Path] = {}
+    for folder in folders:
+        found.setdefault(folder.resolve(), folder)
+    return tuple(found.values())
+
+
+def _from_plugins() -> dict[str, Path]:
+    """Profiles that other packages offer: entry points that are a folder, or a function that gives one."""
+    found: dict[str, Path] = {}
+    for offered in plugins(GROUP).values():
+        folder = Path(offered() if callable(offered) else offered)
+        found |= {path.stem: path for path in sorted(folder.glob(f"*{SUFFIX}"))}
+    return found
+
 
 SCHEMA = Path(__file__).resolve().parents[1] / "resources" / "driver_profile.schema.json"
 """JSON Schema of a profile file."""
@@ -109,3 +193,119 @@ def describe_profile(profile: DriverProfile) -> str:
             f"{100 * known.fit['no_marking']:.1f} % are left out, because both were"
         )
     return text if profile.sensor is None else f"{text}\n{profile.sensor.in_words()}"
+
+
+FIELDS = tuple(name for name in Metadata.__struct_fields__ if name != "tags")
+"""Metadata of a profile that can be set and searched for, besides its tags."""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Entry:
+    """One file of the library.
+
+    Parameters
+    ----------
+    path : Path
+    profile : DriverProfile or None
+        None: it can't be read.
+    problem : str
+        What is wrong with it, in a line; empty if nothing is.
+    hidden_by : Path or None
+        File of the same name in a folder that is looked through before.
+    """
+
+    path: Path
+    profile: DriverProfile | None
+    problem: str = ""
+    hidden_by: Path | None = None
+
+    @property
+    def name(self) -> str:
+        """What it is looked up by: the file's name without its suffix."""
+        return self.path.stem
+
+    @property
+    def is_shipped(self) -> bool:
+        """Whether it comes with the package."""
+        return self.path.parent == SHIPPED
+
+
+def read_library(folders: Iterable[Path] = ()) -> list[Entry]:
+    """Every file of the library; a broken or foreign one costs one entry, not the listing.
+
+    Raises `FormatError` if a folder isn't there.
+    """
+    first: dict[str, Path] = {}
+    entries = []
+    for path in list_profiles(folders):
+        entries.append(_entry(path, first.get(path.stem)))
+        first.setdefault(path.stem, path)
+    return entries
+
+
+def _entry(path: Path, hidden_by: Path | None) -> Entry:
+    try:
+        profile = read_profile(path)
+    except (XoscLateralError, OSError) as error:
+        return Entry(path, None, " ".join(str(error).split()), hidden_by)
+    problem = ""
+    if profile.name != path.stem:
+        problem = f"{path}: holds the profile {profile.name!r}, but is looked up as {path.stem!r}: rename one of them"
+    return Entry(path, profile, problem, hidden_by)
+
+
+def matching(entries: Iterable[Entry], tags: Collection[str], where: Mapping[str, str]) -> list[Entry]:
+    """Entries that carry all the tags and whose metadata (or `id`, or `model`) are as given, letters big or small.
+
+    Raises `XoscLateralError` if `where` names something that profiles don't have.
+    """
+    for field in where:
+        if field not in (*FIELDS, "id", "model"):
+            raise XoscLateralError(f"profiles have no field {field!r}; there are id, model, {', '.join(FIELDS)}")
+    wanted = {tag.casefold() for tag in tags}
+    return [entry for entry in entries if entry.profile is not None and _matches(entry.profile, wanted, where)]
+
+
+def _matches(profile: DriverProfile, tags: set[str], where: Mapping[str, str]) -> bool:
+    facts = facts_of(profile)
+    carried = {tag.casefold() for tag in profile.metadata.tags}
+    return tags <= carried and all(facts[field].casefold() == value.casefold() for field, value in where.items())
+
+
+def facts_of(profile: DriverProfile) -> dict[str, str]:
+    """What a profile can be searched by, besides its tags."""
+    metadata = {field: str(getattr(profile.metadata, field)) for field in FIELDS}
+    return {"id": profile.name, "model": profile.model.kind, **metadata}
+
+
+def described(
+    profile: DriverProfile,
+    *,
+    name: str | None = None,
+    add_tags: Iterable[str] = (),
+    remove_tags: Collection[str] = (),
+    fields: Mapping[str, str] | None = None,
+) -> DriverProfile:
+    """The profile under another id, with other tags and metadata; what is not mentioned stays.
+
+    Raises `XoscLateralError` for a field that there is not (`FIELDS` are known) and for an id that is no file name.
+    """
+    for field in fields or {}:
+        if field not in FIELDS:
+            raise XoscLateralError(f"profiles have no field {field!r} to set; there are {', '.join(FIELDS)}")
+    file_name(profile.name if name is None else name, "profile's id")
+    tags = tuple(tag for tag in dict.fromkeys([*profile.metadata.tags, *add_tags]) if tag not in remove_tags)
+    metadata = replace(profile.metadata, tags=tags, **(fields or {}))
+    return replace(profile, name=name or profile.name, metadata=metadata)
+
+
+def own_path(name: str, folders: Iterable[Path]) -> Path:
+    """Path of a profile that may be changed.
+
+    Raises `FormatError` if it comes with the package.
+    """
+    path = find_profile(name, folders)
+    if path.parent == SHIPPED:
+        what = f"comes with the package: profiles add {path.stem} --library FOLDER copies it to where it can be changed"
+        raise FormatError(what, path=path)
+    return path

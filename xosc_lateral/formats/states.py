@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.formats.cells import harmless
+from xosc_lateral.formats.output_tables import harmless
 from xosc_lateral.motion.nominal import Activity, EntityMotion, NominalMotion
 from xosc_lateral.road import RoadNetwork
 

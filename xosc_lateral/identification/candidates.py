@@ -37,8 +37,7 @@ from xosc_lateral.driver.effects import (
     Threshold,
     known_effects,
 )
-from xosc_lateral.identification.columns import Column, Values
-from xosc_lateral.identification.roles import Role
+from xosc_lateral.identification.columns import Column, Role, Values
 
 FloatArray = NDArray[np.float64]
 

@@ -1,23 +1,148 @@
-"""What kind of quantity each context column holds, read from its values alone, and which ones can't tell anything."""
+"""What a context column is: its role, which says whether it can be a cause, and the kind of its values.
+
+Whether a column can be a cause is a matter of what it is, not of how it correlates: a car that answers a bend before it
+comes moves as if it predicted the bend. Roles are declared, or proposed from the name; a name that says nothing leaves
+the role unknown, unless the values are a clock's.
+"""
 
 from __future__ import annotations
 
+import re
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from enum import Enum
+from enum import Enum, StrEnum
 
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.identification.roles import Role
+from xosc_lateral.errors import FormatError
 from xosc_lateral.identification.timeline import Timeline
 
 FloatArray = NDArray[np.float64]
+
+CLOCK_MINUTES, CLOCK_SHARE = 10, 0.95
+"""A clock goes on in at least half of so many minutes, and hardly ever back: share of its way that is the way from end
+to end. A random walk's is below a half. [-]"""
 
 MAX_LEVELS = 8
 """More different whole numbers than this are a number, not levels. [-]"""
 
 MIN_SHARE = 0.004
 """A level or presence on for less than this share of the road-following time (12 s of 50 min) tells nothing. [-]"""
+
+
+class Role(StrEnum):
+    """What a column is."""
+
+    ROAD = "road"
+    WEATHER = "weather"
+    TRAFFIC = "traffic"
+    TIME = "time"
+    OWN = "own"
+    DRIVER = "driver"
+    UNKNOWN = "unknown"
+
+    @property
+    def is_exogenous(self) -> bool:
+        """Whether the car cannot bring it about: never a consequence of its movement."""
+        return self in (Role.ROAD, Role.WEATHER, Role.TRAFFIC)
+
+
+@dataclass(frozen=True, slots=True)
+class Assigned:
+    """Role of a column; `source`: "declared", "name" or "data", empty for an unknown role."""
+
+    column: str
+    role: Role
+    source: str
+
+    @property
+    def declared(self) -> bool:
+        """Whether somebody said so."""
+        return self.source == "declared"
+
+
+_WORDS: tuple[tuple[Role, frozenset[str]], ...] = tuple(
+    (role, frozenset(words.split()))
+    for role, words in (
+        (Role.OWN, "steering steer handwheel yaw yawrate roll sideslip departure ldw lka lks keeping crossing heading"),
+        (Role.WEATHER, "wind crosswind gust gusts rain precipitation snow fog humidity weather visibility illuminance "
+                       "lux light daylight sun sunlight ambient air outside wet wetness"),
+        (Role.ROAD, "road curvature curve bend radius crossfall superelevation bank grade gradient slope lane lanes "
+                    "surface roughness friction bridge tunnel guardrail barrier junction exit shoulder limit"),
+        (Role.TRAFFIC, "lead leader truck trucks car cars vehicles bus neighbour neighbor oncoming traffic gap headway "
+                       "thw ttc density left right behind ahead follower collision pedestrian cyclist"),
+        (Role.OWN, "lateral"),
+        (Role.DRIVER, "driver gaze eye eyes attention phone heart hands drowsy drowsiness fatigue alertness speed "
+                      "acceleration pedal throttle brake accelerator"),
+        (Role.TIME, "time timestamp clock frame counter sequence odometer mileage soc battery fuel elapsed utc"),
+    )
+)  # fmt: skip
+"""Words of a name that say what a column is; the first that fits counts: a lane departure is no lane."""
+
+_SILENT = frozenset(["cabin", "tyre", "tire", "engine", "oil", "day"])
+"""A name with one of these says nothing: a temperature of the car itself is no weather, a time of day may act."""
+
+
+def proposed_role(column: str) -> Role:
+    """What a column's name says it is."""
+    spaced = re.sub(r"(?<=[a-z])(?=[A-Z])", "_", column)
+    words = set(re.split(r"[^a-z]+", spaced.lower()))
+    if words & _SILENT:
+        return Role.UNKNOWN
+    return next((role for role, known in _WORDS if words & known), Role.UNKNOWN)
+
+
+def roles_of(timeline: Timeline, names: Iterable[str], declared: Mapping[str, str]) -> dict[str, Assigned]:
+    """Role of each column of a table.
+
+    Parameters
+    ----------
+    declared : mapping of str to str
+        Column -> role.
+
+    Raises
+    ------
+    FormatError
+        A role that there is not, or a column that the table lacks.
+    """
+    names = list(names)
+    for column, word in declared.items():
+        if word not in set(Role):
+            raise FormatError(f"role of {column}: {word!r} is none of {', '.join(Role)}")
+        if column not in names:
+            raise FormatError(f"role of {column}: the table has no such column")
+    found = {}
+    for column in names:
+        role = Role(declared[column]) if column in declared else proposed_role(column)
+        source = "declared" if column in declared else "name" if role is not Role.UNKNOWN else ""
+        if not source.startswith("d") and not role.is_exogenous and is_clock(timeline, column):
+            role, source = Role.TIME, source if role is Role.TIME else "data"
+        found[column] = Assigned(column, role, source)
+    return found
+
+
+def is_clock(timeline: Timeline, column: str) -> bool:
+    """Whether a column goes one way as long as a drive lasts: a counter, an odometer, a state of charge.
+
+    Only drives of ten minutes and more can tell.
+    """
+    values = timeline.context.get(column, timeline.lane_width)
+    rows = round(60.0 / timeline.step)
+    long = [span for span in timeline.spans if span.stop - span.start >= (CLOCK_MINUTES + 1) * rows]
+    return bool(long) and all(_goes_one_way(values[span], rows) for span in long)
+
+
+def _goes_one_way(values: FloatArray, rows: int) -> bool:
+    minutes = len(values) // rows
+    with np.errstate(invalid="ignore"):
+        means = values[: minutes * rows].reshape(minutes, rows).mean(axis=1)
+    if not np.isfinite(means).all():
+        return False
+    change = np.diff(means)
+    way = float(np.abs(change).sum())
+    moving = np.mean(np.abs(change) > 1e-9 * max(way, 1e-300))
+    return way > 0.0 and float(moving) >= 0.5 and abs(float(means[-1] - means[0])) >= CLOCK_SHARE * way
 
 
 class Values(Enum):
@@ -36,7 +161,6 @@ class Column:
     Parameters
     ----------
     name : str
-        Column.
     values : Values
         How it can act.
     gaps : bool
@@ -46,7 +170,6 @@ class Column:
     period : float
         Full circle of an angle, else 0.
     role : Role
-        What it is.
     """
 
     name: str

@@ -2,22 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from xosc_lateral.driver.effects import Effect
 from xosc_lateral.identification.core_model import DriverVariance, SpectrumShape
-from xosc_lateral.identification.held_out_gain import Gain
+from xosc_lateral.identification.held_out import HeldOut
 from xosc_lateral.identification.refinement import Alternatives
 from xosc_lateral.identification.regression import Fitted
-from xosc_lateral.identification.selection import Accepted
-
-FloatArray = NDArray[np.float64]
-Compared = tuple[Mapping[str, FloatArray], Mapping[str, FloatArray], Mapping[str, FloatArray]]
-"""Summary statistics of measured offsets, before, after."""
+from xosc_lateral.identification.selection import Accepted, Gain
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,45 +66,32 @@ class Finding:
     gain: Gain | None = None
 
 
-def describe_finding(
-    one: Accepted, key: str, fitted: Fitted, effects: tuple[Effect, ...], compared: Compared
-) -> Finding:
+def describe_finding(one: Accepted, key: str, fitted: Fitted, effects: tuple[Effect, ...], scored: HeldOut) -> Finding:
     """Put sizes and errors to what was accepted."""
-    told = one.term.describe(fitted, effects, key)
-    before, after = _errors(compared, told.statistic)
+    size = one.term.describe(fitted, effects, key)
     return Finding(
-        told.name, one.term.kind, one.term.columns, one.alike, told.lag_s, told.response_s, told.shape, told.size,
-        told.error, one.p_value, before, after, told.measure, effects, told.statistic, one.gain,
+        size.name, one.term.kind, one.term.columns, one.alike, size.lag_s, size.response_s, size.shape, size.size,
+        size.error, one.p_value, *scored.error_of(size.statistic), size.measure, effects, size.statistic, one.gain,
     )  # fmt: skip
 
 
-def spectrum_finding(spectrum: SpectrumShape, compared: Compared) -> Finding:
+def spectrum_finding(spectrum: SpectrumShape, scored: HeldOut) -> Finding:
     """The core model is replaced: the first-order chain forgets too fast."""
     worst = int(np.argmax(np.abs(np.log(spectrum.ratio))))
-    statistic = "movement by band"
-    before, after = _errors(compared, statistic)
-    shape = f"movement within {spectrum.bands_s[worst]:g} s is {spectrum.ratio[worst]:.2f} times the measured"
+    statistic, ratio = "movement by band", float(spectrum.ratio[worst])
     return Finding(
-        "memory beyond one step", "memory", (), (), None, None, shape, float(spectrum.ratio[worst]), 0.0,
-        spectrum.p_value, before, after, "size of the movement by frequency band", (), statistic,
+        "memory beyond one step", "memory", (), (), None, None,
+        f"movement within {spectrum.bands_s[worst]:g} s is {ratio:.2f} times the measured", ratio, 0.0,
+        spectrum.p_value, *scored.error_of(statistic), "size of the movement by frequency band", (), statistic,
     )  # fmt: skip
 
 
-def population_finding(population: DriverVariance, compared: Compared) -> Finding:
+def population_finding(population: DriverVariance, scored: HeldOut) -> Finding:
     """The core model is replaced: one pooled driver can't be many."""
-    statistic = "quantiles of local spread"
-    before, after = _errors(compared, statistic)
-    shape = f"{population.drives} drives; their spreads scatter by a factor of {np.exp(population.log_spread):.2f}"
-    error = population.shift / np.sqrt(2.0 * population.drives)
+    statistic, scatter = "quantiles of local spread", float(np.exp(population.log_spread))
     return Finding(
-        "drivers that differ", "population", (), (), None, None, shape, population.shift, error,
-        population.p_value, before, after, statistic, (), statistic,
+        "drivers that differ", "population", (), (), None, None,
+        f"{population.drives} drives; their spreads scatter by a factor of {scatter:.2f}", population.shift,
+        population.shift / float(np.sqrt(2.0 * population.drives)), population.p_value, *scored.error_of(statistic),
+        statistic, (), statistic,
     )  # fmt: skip
-
-
-def _errors(compared: Compared, statistic: str) -> tuple[float, float]:
-    real, before, after = compared
-    if statistic not in real:
-        return 0.0, 0.0
-    first, second = (float(np.sqrt(np.nanmean((real[statistic] - other[statistic]) ** 2))) for other in (before, after))
-    return first, second

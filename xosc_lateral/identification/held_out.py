@@ -2,30 +2,31 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from msgspec import structs
 from numpy.typing import NDArray
 
-from xosc_lateral.driver.beside import COLUMNS
 from xosc_lateral.driver.effects import ColumnEffect, Effect, TimeSmooth
 from xosc_lateral.driver.fitting import fit_population, fit_runs
-from xosc_lateral.driver.models.kinds import ModelKind
-from xosc_lateral.driver.profile import DriverProfile
-from xosc_lateral.driver.provenance import Provenance
+from xosc_lateral.driver.models.base import ModelKind
+from xosc_lateral.driver.profile import COLUMNS, DriverProfile, Provenance
 from xosc_lateral.errors import NotEnoughDataError
+from xosc_lateral.evaluation.distances import Distances, mean_distances, metric_distances
+from xosc_lateral.evaluation.metrics import METRICS, snippet_metrics
 from xosc_lateral.identification.columns import Column
-from xosc_lateral.identification.held_out_gain import folds_of
-from xosc_lateral.identification.nested import Nested
+from xosc_lateral.identification.cross_validation import Nested, folds_of
 from xosc_lateral.identification.regression import Coarse, Fitted, fit_model
 from xosc_lateral.identification.removal import Estimates, bare_runs, estimate_all, removal_of
 from xosc_lateral.identification.residual import (
     SummaryStatistics,
     error_between,
     expected,
+    half_samples,
     simulated_runs,
+    size_of,
     statistics_of,
 )
 from xosc_lateral.identification.selection import Selection
@@ -33,10 +34,11 @@ from xosc_lateral.identification.significance import LoopSeed
 from xosc_lateral.identification.terms.base import Term
 from xosc_lateral.identification.terms.cycle import CycleTerm
 from xosc_lateral.identification.terms.time import StepTerm
-from xosc_lateral.identification.timeline import COARSE
+from xosc_lateral.identification.timeline import COARSE, Timeline
 
-FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.intp]
 
 Progress = Callable[[float, str], None]
 
@@ -46,16 +48,31 @@ class Setting:
     """What stays the same when findings are scored."""
 
     coarse: Coarse
-    blocks: NDArray[np.intp]
+    blocks: IntArray
     fixed: DriverProfile | None
     kind: ModelKind
     refined_kind: ModelKind
     root: np.random.SeedSequence
 
+    def rng(self, key: LoopSeed) -> np.random.Generator:
+        """Source of chance for one purpose."""
+        return np.random.default_rng(np.random.SeedSequence(self.root.entropy, spawn_key=(key,)))
+
 
 @dataclass(frozen=True, eq=False)
 class HeldOut:
-    """Summary statistics on held-out blocks."""
+    """Summary statistics on held-out blocks, measured and expected of both profiles.
+
+    Parameters
+    ----------
+    statistics : SummaryStatistics
+    real, before, after : mapping of str to array
+        By group. [m]
+    runs_before, runs_after : array, shape (runs, n)
+        Of the profiles. [m]
+    halves : list of mapping of str to array
+        See `residual.half_samples`. [m]
+    """
 
     statistics: SummaryStatistics
     real: dict[str, FloatArray]
@@ -63,30 +80,35 @@ class HeldOut:
     after: dict[str, FloatArray]
     runs_before: FloatArray
     runs_after: FloatArray
-
-    @property
-    def compared(self) -> tuple[Mapping[str, FloatArray], Mapping[str, FloatArray], Mapping[str, FloatArray]]:
-        """Summary statistics of measured offsets, before, after. [m]"""
-        return self.real, self.before, self.after
+    halves: list[dict[str, FloatArray]]
 
     @property
     def errors(self) -> tuple[float, float]:
         """Errors before and after. [m]"""
         return error_between(self.real, self.before), error_between(self.real, self.after)
 
+    def error_of(self, group: str) -> tuple[float, float]:
+        """Errors before and after in one group; 0 where there is none. [m]"""
+        if group not in self.real:
+            return 0.0, 0.0
+        before, after = (size_of({"": self.real[group] - side[group]}) for side in (self.before, self.after))
+        return before, after
+
 
 def score_held_out(
     setting: Setting, selection: Selection, nested: Nested | None, columns: list[Column], progress: Progress
 ) -> HeldOut:
     """Describe measured offsets and both profiles' runs; `nested` None: nothing is kept."""
-    timeline = setting.coarse.timeline
-    statistics = statistics_of(timeline, _quantities(selection, columns), _frequency(selection.final))
+    timeline, fitted = setting.coarse.timeline, selection.final
+    statistics = statistics_of(timeline, _quantities(selection, columns), _frequency(fitted))
     kept = tuple(one.term for one in selection.accepted)
     runs_before, runs_after = _held_out_runs(setting, nested, kept, selection.start, progress)
     real = statistics.describe(timeline.offset, timeline.valid)
     before = expected(statistics, runs_before, timeline.valid)
     after = before if runs_after is runs_before else expected(statistics, runs_after, timeline.valid)
-    return HeldOut(statistics, real, before, after, runs_before, runs_after)
+    unmoved = timeline.offset - removal_of(fitted, estimate_all(fitted)).location
+    halves = half_samples(statistics, unmoved, setting.blocks, setting.rng(LoopSeed.BLOCKS))
+    return HeldOut(statistics, real, before, after, runs_before, runs_after, halves)
 
 
 def _held_out_runs(
@@ -166,3 +188,64 @@ def _quantities(selection: Selection, columns: list[Column]) -> dict[str, FloatA
 
 def _frequency(fitted: Fitted) -> float | None:
     return next((term.frequency for term in fitted.terms if isinstance(term, CycleTerm)), None)
+
+
+SNIPPET_ROWS = 51
+"""10 s at 5 Hz, both ends included."""
+
+SPLITS = 6
+"""Random halves of the blocks that distances are averaged over."""
+
+
+@dataclass(frozen=True, eq=False)
+class Scorecard:
+    """Wasserstein distances per metric, in standard deviations of the measured one; None: too few snippets.
+
+    The metrics themselves, shape (snippets, 10), are for violins. [m]
+    """
+
+    before: Distances | None
+    after: Distances | None
+    floor: Distances | None
+    real: FloatArray
+    sampled_before: FloatArray
+    sampled_after: FloatArray
+
+
+def score_runs(
+    timeline: Timeline, before: FloatArray, after: FloatArray, blocks: IntArray, rng: np.random.Generator
+) -> Scorecard:
+    """Cut offsets [m], shape (n,), and runs, shape (runs, n), into the same snippets and compare."""
+    starts = _starts(timeline)
+    rows = starts[:, None] + np.arange(SNIPPET_ROWS)
+    if len(starts) < 8:
+        empty = np.zeros((0, len(METRICS)))
+        return Scorecard(None, None, None, empty, empty, empty)
+    real = snippet_metrics(timeline.offset[rows])
+    one, other = snippet_metrics(before[0][rows]), snippet_metrics(after[0][rows])
+    of_block = blocks[starts]
+    numbers = np.unique(of_block)
+    gathered: tuple[list[Distances], list[Distances], list[Distances]] = ([], [], [])
+    for split in range(SPLITS):
+        half = np.isin(of_block, rng.permutation(numbers)[: max(1, len(numbers) // 2)])
+        if half.sum() < 3 or (~half).sum() < 3:
+            continue
+        run = split % len(before)
+        sampled = (snippet_metrics(runs[run][rows[~half]]) for runs in (before, after))
+        for place, metrics in zip(gathered, (*sampled, real[~half]), strict=True):
+            place.append(metric_distances(real[half], metrics))
+    if not gathered[0]:
+        return Scorecard(None, None, None, real, one, other)
+    means = [mean_distances(several) for several in gathered]
+    return Scorecard(means[0], means[1], means[2], real, one, other)
+
+
+def _starts(timeline: Timeline) -> IntArray:
+    starts, at, n = [], 0, len(timeline)
+    sums = np.concatenate([[0], np.cumsum(timeline.valid)])
+    while at + SNIPPET_ROWS <= n:
+        inside = sums[at + SNIPPET_ROWS] - sums[at] == SNIPPET_ROWS
+        if inside:
+            starts.append(at)
+        at += SNIPPET_ROWS if inside else 1
+    return np.asarray(starts, dtype=np.intp)

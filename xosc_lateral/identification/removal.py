@@ -72,14 +72,6 @@ def _run(timeline: Timeline, removal: Removal, rows: slice, name: str, index: in
     movement = bare_movement(timeline, removal, rows)
     width = timeline.lane_width[rows]
     context = {name: timeline.context[name][rows] for name in COLUMNS if name in timeline.context}
-    rate = np.exp(removal.rate[rows])
-    if np.any(rate != 1.0):
-        # the base's own clock runs at the effect's rate: read the movement at even ticks of that clock
-        ticks = np.concatenate([[0.0], np.cumsum(0.5 * (rate[1:] + rate[:-1]))])
-        even = np.arange(int(ticks[-1]) + 1, dtype=np.float64)
-        movement, width = np.interp(even, ticks, movement), np.interp(even, ticks, width)
-        nearest = np.round(np.interp(even, ticks, np.arange(len(ticks)))).astype(np.intp)
-        context = {name: values[nearest] for name, values in context.items()}
     time = timeline.time[rows.start] + STEP * np.arange(len(movement))
     return Run(name, index, time, movement, width, context, frozenset())
 

@@ -28,9 +28,9 @@ class LoopSeed(IntEnum):
     SPECTRUM = 7
     """Runs whose spectrum is compared with the drives'."""
     BLOCKS = 9
-    """Blocks drawn for the floor, and for the error before and after."""
-    LACK_OF_FIT = 11
-    """Halves of blocks that tell the floor."""
+    """Half samples of the blocks."""
+    SNIPPETS = 11
+    """Halves of the blocks whose snippets are compared."""
 
 
 LEAST = 1e-300

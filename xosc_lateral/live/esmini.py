@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.driver.profile import DriverProfile
-from xosc_lateral.enrich.neighbours import Neighbours
+from xosc_lateral.enrich.result import Neighbours
 from xosc_lateral.errors import FormatError, SimulationError
 from xosc_lateral.formats.opendrive import read_opendrive
 from xosc_lateral.formats.openscenario.read import read_scenario
@@ -27,9 +27,13 @@ from xosc_lateral.live.traffic import LEADING_OVER, TURN, Moment, Moves, Traffic
 from xosc_lateral.motion.deviation import SETTLING_TIME, settle
 from xosc_lateral.motion.segments import MINIMUM_SPEED
 from xosc_lateral.scenario import Scenario
-from xosc_lateral.scenario.actions.lateral import LaneChangeAction, LaneOffsetAction, LateralDistanceAction
-from xosc_lateral.scenario.actions.routing import FollowTrajectoryAction
-from xosc_lateral.scenario.actions.teleport import TeleportAction
+from xosc_lateral.scenario.private_actions import (
+    FollowTrajectoryAction,
+    LaneChangeAction,
+    LaneOffsetAction,
+    LateralDistanceAction,
+    TeleportAction,
+)
 
 LATERAL = (LaneChangeAction, LaneOffsetAction, LateralDistanceAction, FollowTrajectoryAction, TeleportAction)
 """Actions that say where a vehicle is sideways."""

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.driver.profile import DriverProfile
-from xosc_lateral.enrich.neighbours import Neighbours
+from xosc_lateral.enrich.result import Neighbours
 from xosc_lateral.errors import SimulationError
 from xosc_lateral.live.surroundings import Places
 from xosc_lateral.live.traffic import Moment, Moves, Traffic

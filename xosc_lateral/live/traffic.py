@@ -16,13 +16,12 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.driver.beside import Basis
 from xosc_lateral.driver.group import OffsetGroup
 from xosc_lateral.driver.plausibility import first_implausible, implausible
-from xosc_lateral.driver.profile import DriverProfile, sampling_hash
+from xosc_lateral.driver.profile import Basis, DriverProfile, sampling_hash
 from xosc_lateral.enrich.enrich import sides_known
-from xosc_lateral.enrich.neighbours import Neighbours
-from xosc_lateral.enrich.other_hand import mirrored_context
+from xosc_lateral.enrich.give_way import mirrored_context
+from xosc_lateral.enrich.result import Neighbours
 from xosc_lateral.errors import SimulationError
 from xosc_lateral.live.surroundings import Places, Roads, give_way_now, look_around
 from xosc_lateral.motion.context import STEERING

@@ -13,7 +13,7 @@ from xosc_lateral.limits import PARAMETER_SETS
 from xosc_lateral.pipeline.document_kind import DISTRIBUTIONS, DocumentKind
 from xosc_lateral.pipeline.request import Request
 from xosc_lateral.pipeline.settings import ConvertSettings
-from xosc_lateral.scenario.deterministic import ParameterSet
+from xosc_lateral.scenario.distribution import ParameterSet
 
 
 @dataclass(frozen=True, slots=True)

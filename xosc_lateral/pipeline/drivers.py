@@ -9,8 +9,7 @@ from pathlib import Path
 from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.enrich.enrich import Drivers
 from xosc_lateral.errors import FormatError
-from xosc_lateral.formats.profile_folders import SHIPPED, find_profile
-from xosc_lateral.formats.profiles import read_profile
+from xosc_lateral.formats.profiles import SHIPPED, find_profile, read_profile
 from xosc_lateral.formats.source import check_regular, guard_input
 from xosc_lateral.pipeline.settings import AUTO, ConvertSettings
 from xosc_lateral.scenario import Entity, Scenario

@@ -12,9 +12,8 @@ from pathlib import Path
 from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.errors import FormatError, XoscLateralError
 from xosc_lateral.formats.hashes import file_hash
-from xosc_lateral.formats.openscenario.references import require_folders
-from xosc_lateral.formats.profile_folders import find_profile
-from xosc_lateral.formats.profiles import profile_hash
+from xosc_lateral.formats.openscenario.catalogs import require_folders
+from xosc_lateral.formats.profiles import find_profile, profile_hash
 from xosc_lateral.limits import BATCH_JOBS, VARIANTS
 from xosc_lateral.pipeline.concrete import concrete
 from xosc_lateral.pipeline.convert import numbered

@@ -7,16 +7,17 @@ from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from pathlib import Path
 
+from msgspec import structs
+
 from xosc_lateral.formats.opendrive import read_opendrive
-from xosc_lateral.formats.openscenario import read_scenario
-from xosc_lateral.formats.openscenario.read import NO_ROADS, RoadSearch
+from xosc_lateral.formats.openscenario.read import NO_ROADS, RoadSearch, read_scenario
 from xosc_lateral.formats.source import check_regular, guard_input
 from xosc_lateral.motion.nominal import NominalMotion
 from xosc_lateral.pipeline.settings import STEP
 from xosc_lateral.playback.player import play
 from xosc_lateral.road.network import RoadNetwork
 from xosc_lateral.scenario import Scenario
-from xosc_lateral.scenario.conditions.value import at_time
+from xosc_lateral.scenario.conditions import at_time
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -76,7 +77,7 @@ def play_scenario(
 def play_until(played: Played, end: float, *, step: float) -> Played:
     """The same run, stopped at another time. [s]"""
     storyboard = played.scenario.storyboard
-    later = replace(storyboard, stop_trigger=at_time(end, "later", storyboard.place))
+    later = structs.replace(storyboard, stop_trigger=at_time(end, "later", storyboard.place))
     scenario = replace(played.scenario, storyboard=later)
     return replace(played, motion=play(scenario, played.network, step=step, time_limit=end + 1.0))
 

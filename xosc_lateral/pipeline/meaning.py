@@ -11,16 +11,16 @@ from dataclasses import replace
 from functools import lru_cache
 from math import inf
 
-from xosc_lateral.formats.openscenario.write.replaced_maneuvers import replaced_groups
+from msgspec import structs
+
 from xosc_lateral.motion.nominal import NominalMotion
 from xosc_lateral.pipeline.load import Played
 from xosc_lateral.pipeline.shifted import Shift, shifts
 from xosc_lateral.playback.player import play
 from xosc_lateral.scenario import Action, Event, Maneuver, ManeuverGroup, Scenario, Story
-from xosc_lateral.scenario.actions.longitudinal import AbsoluteTargetSpeed, SpeedAction
-from xosc_lateral.scenario.conditions.value import at_time
-from xosc_lateral.scenario.dynamics import TransitionDynamics
+from xosc_lateral.scenario.conditions import at_time
 from xosc_lateral.scenario.enums import DynamicsDimension, DynamicsShape, Priority
+from xosc_lateral.scenario.private_actions import AbsoluteTargetSpeed, SpeedAction, TransitionDynamics
 from xosc_lateral.scenario.storyboard import Act, Actors
 
 FACTORS = (0.8, 1.2)
@@ -78,6 +78,8 @@ class Meaning:
 
     def shifts(self, again: Played, trajectories: Collection[str]) -> list[Shift]:
         """What happens otherwise in an output in which some entities follow trajectories; each event once."""
+        from xosc_lateral.formats.openscenario.write.replaced_maneuvers import replaced_groups
+
         gone = {one.path for one in replaced_groups(self._played.scenario, trajectories)}
         found: dict[str, Shift] = {}
         for before, after in zip(self._before, self._runs(again), strict=True):
@@ -107,7 +109,7 @@ def with_speeds(scenario: Scenario, motion: NominalMotion, egos: Collection[str]
             actors = Actors((entity.name,), False, place)
             groups.append(ManeuverGroup(name, actors, (Maneuver(name, (event,), place),), place))
     story = Story(STORY, (Act(STORY, tuple(groups), None, None, place),), place)
-    storyboard = replace(scenario.storyboard, stories=(*scenario.storyboard.stories, story))
+    storyboard = structs.replace(scenario.storyboard, stories=(*scenario.storyboard.stories, story))
     return replace(scenario, storyboard=storyboard)
 
 

@@ -15,8 +15,7 @@ from xosc_lateral.formats.hashes import parsed_hashes
 from xosc_lateral.formats.openscenario.write.build import Version, named
 from xosc_lateral.formats.openscenario.write.reconstructed import Triggers, reconstructed_scenario
 from xosc_lateral.formats.output_tables import write_frame
-from xosc_lateral.formats.profile_folders import find_profile, list_profiles
-from xosc_lateral.formats.profiles import profile_bytes, read_profile
+from xosc_lateral.formats.profiles import find_profile, list_profiles, profile_bytes, read_profile
 from xosc_lateral.formats.recordings import RecordedTraffic
 from xosc_lateral.pipeline.drivers import AUTO_PROFILE
 from xosc_lateral.reconstruction.drivers import ChosenDriver, WindowModel, choose_driver, drive_of, in_lane_offsets

@@ -14,7 +14,7 @@ from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, TypedDict, TypeVar, Unpack
 
-from xosc_lateral.enrich.neighbours import Neighbours
+from xosc_lateral.enrich.result import Neighbours
 from xosc_lateral.errors import FormatError
 from xosc_lateral.formats.configuration import SETTINGS, configuration
 from xosc_lateral.formats.openscenario.read import RoadSearch

@@ -11,8 +11,8 @@ from __future__ import annotations
 
 from math import copysign, cos, inf, pi, sin, sqrt
 
-from xosc_lateral.scenario.dynamics import TransitionDynamics
 from xosc_lateral.scenario.enums import DynamicsDimension, DynamicsShape
+from xosc_lateral.scenario.private_actions import TransitionDynamics
 
 EPSILON = 1e-6
 """Below this, times, lengths and speeds count as equal (the reference player's tolerance). [s], [m], [m/s]"""

@@ -7,8 +7,8 @@ from operator import eq, ge, gt, le, lt, ne
 
 from xosc_lateral.playback.transition import EPSILON
 from xosc_lateral.scenario import Parameter
-from xosc_lateral.scenario.actions.values import ModifyOperation
 from xosc_lateral.scenario.enums import ParameterType, Rule
+from xosc_lateral.scenario.global_actions import ModifyOperation
 
 Value = bool | float | int | str
 

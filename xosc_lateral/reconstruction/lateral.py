@@ -75,7 +75,7 @@ def lateral_plan(vehicle: RecordedVehicle, begin: float) -> LateralPlan:
         rough = _lane_changes(vehicle, y, base, lanes, rate)
         first = rough[0].first if rough else len(y)
         is_off = abs(y[0]) > SETTLED and first < int(np.argmax(np.append(np.abs(y) < SETTLED, True)))
-        start = float(y[0]) if is_off or (first == 0 and rough[0].cut) else 0.0
+        start = float(y[0]) if is_off or first == 0 else 0.0
     transitions = list[Transition]()
     free, before = begin, start
     for one in rough:

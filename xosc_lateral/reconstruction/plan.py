@@ -16,9 +16,9 @@ from xosc_lateral.reconstruction.speed import APART, SpeedProfile, fit_speed
 from xosc_lateral.reconstruction.transitions import Transition
 from xosc_lateral.road.network import RoadNetwork
 from xosc_lateral.scenario import Entity
+from xosc_lateral.scenario.entity import BoundingBox
 from xosc_lateral.scenario.enums import EntityCategory
 from xosc_lateral.scenario.place import Place
-from xosc_lateral.scenario.vehicle import BoundingBox
 
 FloatArray = NDArray[np.float64]
 

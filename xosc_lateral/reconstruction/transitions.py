@@ -16,10 +16,6 @@ MARGIN = 1.0
 DURATIONS = (1.0, 16.0)
 """Of lane changes; naturalistic ones last 1 to 16.5 s (T. Toledo, D. Zohar, Transportation Research Record 1999, 2007:
 mean 4.6 s). [s]"""
-SPREAD, NOISE = 0.1, 0.05
-"""Of the levels between which a driver changes lanes from where he sets off and settles, and of the path from its
-shape: nobody moves from centre to centre. [m]"""
-
 SHAPES = {
     DynamicsShape.SINUSOIDAL: lambda u: 0.5 - 0.5 * np.cos(np.pi * u),
     DynamicsShape.CUBIC: lambda u: u * u * (3.0 - 2.0 * u),
@@ -72,7 +68,7 @@ class Transition:
 
 @dataclass(frozen=True, slots=True)
 class Rough:
-    """Rows of a transition as found, and between which levels: `held` are known exactly."""
+    """Rows of a transition as found, and between which levels; `held`: no person drove it, it begins and ends there."""
 
     first: int
     last: int
@@ -95,7 +91,10 @@ def peak_acceleration(shape: DynamicsShape, change: float, duration: float) -> f
 
 
 def fit_transition(time: FloatArray, y: FloatArray, rough: Rough, free: float) -> Transition:
-    """Start, duration and shape by least squares over a grid that is made finer; not before `free` [s]."""
+    """Start, duration and shape by least squares over a grid that is made finer; not before `free` [s].
+
+    Nobody moves from centre to centre: a person is fitted between where he sets off and where he settles.
+    """
     level = rough.after
     if not rough.held and not rough.aborted:
         rough = replace(rough, before=float(y[rough.first]), after=float(y[rough.last]))
@@ -138,25 +137,10 @@ def _search(
             possible = np.ones(1, dtype=bool)
         m, d = m[possible], d[possible]
         share = SHAPES[shape](np.clip((t - (m - 0.5 * d)[:, None]) / d[:, None], 0.0, 1.0))
-        cost = _cost(t, y, share, rough)
+        cost = ((y - rough.before - (rough.after - rough.before) * share) ** 2).sum(axis=1)
         k = int(cost.argmin())
         if cost[k] < best[0]:
             best = (float(cost[k]), float(m[k] - 0.5 * d[k]), float(d[k]))
         middle, duration = best[1] + 0.5 * best[2], best[2]
         half, factor = half / 4.0, factor**0.25
     return best
-
-
-def _cost(t: FloatArray, y: FloatArray, share: FloatArray, rough: Rough) -> FloatArray:
-    """Squared distance from the shape, whose levels are held, or free at a price, shape (candidates,). [m2]"""
-    if rough.held:
-        return np.asarray(((y - rough.before - (rough.after - rough.before) * share) ** 2).sum(axis=1))
-    price = (NOISE / SPREAD) ** 2 / float(np.median(np.diff(t)))
-    p = 1.0 - share
-    a, b, c = (p * p).sum(axis=1) + price, (p * share).sum(axis=1), (share * share).sum(axis=1) + price
-    u, v = p @ y + price * rough.before, share @ y + price * rough.after
-    det = a * c - b * b
-    before, after = (c * u - b * v) / det, (a * v - b * u) / det
-    away = y - before[:, None] * p - after[:, None] * share
-    priced = price * ((before - rough.before) ** 2 + (after - rough.after) ** 2)
-    return np.asarray((away**2).sum(axis=1) + priced)

@@ -12,8 +12,16 @@ from numpy.typing import NDArray
 from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.evaluation.distances import wasserstein
 from xosc_lateral.evaluation.lane_keeping import LaneKeeping, keeping_of
-from xosc_lateral.evaluation.metrics import METRICS, cut_snippets, snippet_metrics
-from xosc_lateral.evaluation.movement_summary import DRIVERS, DURATION, MovementSummary, free_runs, summarise
+from xosc_lateral.evaluation.metrics import (
+    DRIVERS,
+    DURATION,
+    METRICS,
+    MovementSummary,
+    cut_snippets,
+    free_runs,
+    snippet_metrics,
+    summarise,
+)
 from xosc_lateral.evaluation.spectra import Spectrum, spectrum
 from xosc_lateral.formats.profiles import profile_hash
 from xosc_lateral.report.cards import keeping_record

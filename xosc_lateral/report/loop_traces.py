@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.identification.close import LoopResult
-from xosc_lateral.identification.held_out_gain import hold_out_blocks
+from xosc_lateral.identification.cross_validation import hold_out_blocks
 from xosc_lateral.identification.timeline import Timeline
 from xosc_lateral.report.figures import GRID, figure_style, new_panels
 from xosc_lateral.report.loop_figures import AFTER, BEFORE, DRIVES

@@ -1,26 +1,29 @@
-"""A played scenario as an MCAP recording with Foxglove's `SceneUpdate` messages, for viewers that people have.
-
-One channel, ``/scene``: JSON messages, one per frame. Vehicles are boxes with their names, replaced in every frame and
-deleted when they leave; the road's markings are lines, sent once. Frame of reference ``world``: the scenario's own.
-"""
+"""A played scenario as an MCAP recording with Foxglove's `SceneUpdate` messages, and as a page with a player."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from io import BytesIO
-from typing import Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.errors import XoscLateralError
-from xosc_lateral.motion.axes import axes
-from xosc_lateral.motion.nominal import Activity, EntityMotion, NominalMotion
-from xosc_lateral.report.figures import PALETTE
+from xosc_lateral.motion.nominal import Activity, EntityMotion, NominalMotion, axes
+from xosc_lateral.motion.segments import SegmentRow
+from xosc_lateral.report.figures import PALETTE, figure_style, label_of, new_figure
 from xosc_lateral.report.player.roads import mark_points
+from xosc_lateral.report.player.scene import nominal_scene
+from xosc_lateral.report.render import render_page
 from xosc_lateral.road import RoadNetwork
 from xosc_lateral.version import __version__
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
 
 FRAME = 0.1
 """Between two messages. [s]"""
@@ -31,10 +34,15 @@ MARK_THICKNESS = 0.15
 NANOSECONDS = 1_000_000_000
 
 _POINT = {"type": "object", "properties": {axis: {"type": "number"} for axis in "xyz"}}
+
 _COLOR = {"type": "object", "properties": {part: {"type": "number"} for part in "rgba"}}
+
 _TURN = {"type": "object", "properties": {part: {"type": "number"} for part in "xyzw"}}
+
 _POSE = {"type": "object", "properties": {"position": _POINT, "orientation": _TURN}}
+
 _TIME = {"type": "object", "title": "time", "properties": {part: {"type": "integer"} for part in ("sec", "nsec")}}
+
 _DURATION = {**_TIME, "title": "duration"}
 
 
@@ -52,6 +60,7 @@ _LINES = _list(
     colors={"type": "array", "items": _COLOR},
     indices={"type": "array", "items": {"type": "integer"}},
 )
+
 _TEXTS = _list(
     pose=_POSE,
     billboard={"type": "boolean"},
@@ -60,6 +69,7 @@ _TEXTS = _list(
     color=_COLOR,
     text={"type": "string"},
 )
+
 SCHEMA = {
     "title": "foxglove.SceneUpdate",
     "type": "object",
@@ -206,3 +216,64 @@ def _quaternion(heading: float, pitch: float, roll: float) -> dict[str, float]:
         "w": ch * cp * cr + sh * sp * sr,
     }
     return {name: round(float(value), 6) for name, value in parts.items()}
+
+
+ROW_STEP = 0.1
+"""Rows that are drawn. [s]"""
+
+
+@figure_style()
+def nominal_speeds(motion: NominalMotion) -> Figure:
+    """Speed of every entity over time."""
+    figure, axes = new_figure(1, 1, height=3.0)
+    ax = axes[0, 0]
+    every = max(1, round(ROW_STEP / motion.step))
+    for number, entity in enumerate(motion.entities):
+        present = (entity.activity[::every] & Activity.ACTIVE) != 0
+        speed = np.where(present, entity.speed[::every], np.nan)
+        ax.plot(entity.time[::every], speed, color=PALETTE[number % len(PALETTE)], label=label_of(entity.name))
+    ax.set_ylim(bottom=min(0.0, ax.get_ylim()[0]))
+    ax.set_xlabel("time [s]")
+    ax.set_ylabel("speed [m/s]")
+    if 0 < len(motion.entities) <= len(PALETTE):
+        figure.legend(ncols=min(6, len(motion.entities)), loc="outside upper right")
+    return figure
+
+
+def view_page(motion: NominalMotion, network: RoadNetwork, *, source: str, provenance: Mapping[str, object]) -> str:
+    """HTML page with the player, self-contained; same input, same bytes.
+
+    Parameters
+    ----------
+    motion : NominalMotion
+        As played.
+    network : RoadNetwork
+        That it was played on.
+    source : str
+        File name, for the reader.
+    provenance : mapping
+        Shown in the footer.
+    """
+    notes = [
+        {"what": note.what, "element": note.element, "file": Path(note.path).name, "line": str(note.line or "")}
+        for note in motion.notes
+    ]
+    return render_page(
+        "view.html",
+        title=Path(source).name,
+        provenance=provenance,
+        motion=motion,
+        scene=nominal_scene(motion, network),
+        speeds=nominal_speeds(motion),
+        notes=notes,
+    )
+
+
+def as_text(rows: Sequence[SegmentRow]) -> str:
+    """One line per segment."""
+    width = max((len(row.entity) for row in rows), default=0)
+    return "\n".join(
+        f"{row.entity:<{width}}  {row.start:8.2f} - {row.end:8.2f} s  "
+        + (f"road {row.road} lane {row.lane}: road-following" if row.road_following else f"no: {row.why}")
+        for row in rows
+    )

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from xosc_lateral.road.connections import Connection, Junction, RoadLink
 from xosc_lateral.road.lanes import Lane, LaneSection
 from xosc_lateral.road.positions import LaneLink
-from xosc_lateral.road.road import Road
+from xosc_lateral.road.road import Connection, Junction, Road, RoadLink
 
 End = tuple[int, int]
 """A road as entered: its index, and +1 (at its start, to go along s) or -1 (at its end)."""

@@ -17,14 +17,12 @@ from functools import cached_property
 from numpy.typing import ArrayLike
 
 from xosc_lateral.errors import PlaybackError
-from xosc_lateral.road.connections import Junction
-from xosc_lateral.road.header_offset import HeaderOffset
 from xosc_lateral.road.index import SurfaceIndex
 from xosc_lateral.road.lanes import DRIVING
 from xosc_lateral.road.links import Links
-from xosc_lateral.road.marks import road_marks
 from xosc_lateral.road.moving import Chooser, advance, straightest
 from xosc_lateral.road.onward import gone_on
+from xosc_lateral.road.piecewise import IndexLike
 from xosc_lateral.road.places import cross_section, find_lane, lane_at, lane_pose, surface_pose
 from xosc_lateral.road.positions import (
     Advance,
@@ -41,8 +39,9 @@ from xosc_lateral.road.positions import (
     RoadPath,
     RouteStep,
 )
-from xosc_lateral.road.road import Road
+from xosc_lateral.road.road import Junction, Road, road_marks
 from xosc_lateral.road.routes import path_between, route
+from xosc_lateral.road.surface import HeaderOffset
 from xosc_lateral.road.tables import NetworkTables
 
 
@@ -250,6 +249,10 @@ class RoadNetwork:
         `s`, `t` in [m].
         """
         return lane_at(self.roads[road], road, s, t, lane_types)
+
+    def section_numbers(self, road: IntArray, s: FloatArray) -> IndexLike:
+        """Numbers of lane sections, counted over all roads; road and s [m] of the same shape (n,)."""
+        return self._tables.section_of(road, s)
 
     def section_at(self, road: int, s: float) -> tuple[float, float]:
         """Start and end s of the lane section. [m]"""

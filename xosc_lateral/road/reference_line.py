@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.road.geometry import SERIES_TERMS, ClothoidPiece, ParamCubic
-from xosc_lateral.road.lookup import IndexLike, Lookup
+from xosc_lateral.road.piecewise import IndexLike, Lookup
 from xosc_lateral.road.positions import FloatArray, IntArray
 from xosc_lateral.road.road import Road
 

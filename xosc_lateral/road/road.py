@@ -5,11 +5,53 @@ from __future__ import annotations
 from bisect import bisect_right
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from math import inf, nan
 
-from xosc_lateral.road.connections import RoadLink
-from xosc_lateral.road.geometry import ReferenceElement
+from xosc_lateral.road.geometry import Line, ReferenceElement
 from xosc_lateral.road.lanes import LaneSection
+from xosc_lateral.road.positions import RoadMark
 from xosc_lateral.road.surface import Surface
+
+
+@dataclass(frozen=True, slots=True)
+class RoadLink:
+    """What a road is linked to at one of its ends.
+
+    Attributes
+    ----------
+    element_type : str
+        ``"road"`` or ``"junction"``.
+    element_id : str
+        Its id.
+    contact : str
+        Where the other road is touched: ``"start"``, ``"end"``, or empty when the file does not say (junctions).
+    """
+
+    element_type: str
+    element_id: str
+    contact: str
+
+
+@dataclass(frozen=True, slots=True)
+class Connection:
+    """A way through a junction: from an incoming road onto a connecting one.
+
+    `lanes` holds (from, to) lane ids; empty: the file gives none.
+    """
+
+    incoming_road: str
+    connecting_road: str
+    contact: str
+    lanes: tuple[tuple[int, int], ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Junction:
+    """A junction and its connections."""
+
+    id: str
+    name: str
+    connections: tuple[Connection, ...]
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -82,3 +124,33 @@ class Road:
         if i < 0:
             i = 0
         return self.elements[i].curvature_at(s - self.starts[i])
+
+    def stretch_of(self, lane: int, s: float) -> tuple[float, float, ReferenceElement, float, float]:
+        """Range around s on one element of the reference line [m], that element, its start, and t of the lane. [m]
+
+        Where the lane's middle changes along s, its t is NaN; on a line, where it does not matter, 0.
+        """
+        i = max(bisect_right(self.starts, s) - 1, 0)
+        low = self.starts[i] if i else -inf
+        high = self.starts[i + 1] if i + 1 < len(self.starts) else inf
+        element = self.elements[i]
+        if isinstance(element, Line):
+            return low, high, element, self.starts[i], 0.0
+        found = self.section_at(s).by_id.get(lane)
+        if found is None:
+            return low, high, element, self.starts[i], nan
+        j = max(bisect_right(found.starts, s) - 1, 0)
+        low = max(low, found.starts[j] if j else -inf)
+        high = min(high, (*found.starts[j + 1 :], inf)[0])
+        return low, high, element, self.starts[i], nan if any(found.centre[j][1:]) else found.centre[j][0]
+
+
+def road_marks(road: Road) -> tuple[RoadMark, ...]:
+    """Markings at the outer edges of all lanes, lane 0 included, section by section from left to right."""
+    marks: list[RoadMark] = []
+    for section in road.sections:
+        left = [lane for lane in section.lanes if lane.id > 0]
+        right = [lane for lane in section.lanes if lane.id < 0]
+        for lane in (*left, section.centre, *right):
+            marks += [mark for mark in lane.marks if mark.type != "none"]
+    return tuple(marks)

@@ -1,6 +1,6 @@
 """The storyboard as data: frozen elements under the standard's names, parameters, expressions."""
 
-from xosc_lateral.scenario.entity import Controller, Entity
+from xosc_lateral.scenario.entity import Axle, Axles, BoundingBox, Controller, Entity, Performance
 from xosc_lateral.scenario.place import Place, Unsupported
 from xosc_lateral.scenario.scenario import (
     FileHeader,
@@ -13,6 +13,8 @@ from xosc_lateral.scenario.storyboard import (
     Act,
     Action,
     Actors,
+    Condition,
+    ConditionGroup,
     Event,
     Init,
     Maneuver,
@@ -20,9 +22,9 @@ from xosc_lateral.scenario.storyboard import (
     Private,
     Story,
     Storyboard,
+    Trigger,
+    TriggeringEntities,
 )
-from xosc_lateral.scenario.trigger import Condition, ConditionGroup, Trigger, TriggeringEntities
-from xosc_lateral.scenario.vehicle import Axle, Axles, BoundingBox, Performance
 
 __all__ = [
     "Act",

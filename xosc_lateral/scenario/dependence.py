@@ -8,15 +8,15 @@ event that moves it or an action that refers to somebody. In doubt a thing depen
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator
-from dataclasses import dataclass, field, fields, is_dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
-from xosc_lateral.scenario.actions.appearance import AnimationAction, LightStateAction, VisibilityAction
-from xosc_lateral.scenario.actions.infrastructure import TrafficSignalControllerAction, TrafficSignalStateAction
-from xosc_lateral.scenario.actions.teleport import TeleportAction
-from xosc_lateral.scenario.conditions.entity import CollisionCondition, RelativeClearanceCondition
-from xosc_lateral.scenario.conditions.value import (
+from msgspec import Struct
+
+from xosc_lateral.scenario.conditions import (
+    CollisionCondition,
     ParameterCondition,
+    RelativeClearanceCondition,
     StoryboardElementStateCondition,
     TrafficSignalCondition,
     TrafficSignalControllerCondition,
@@ -24,10 +24,10 @@ from xosc_lateral.scenario.conditions.value import (
     VariableCondition,
 )
 from xosc_lateral.scenario.enums import StoryboardElementState, StoryboardElementType
-from xosc_lateral.scenario.place import Place
+from xosc_lateral.scenario.global_actions import TrafficSignalControllerAction, TrafficSignalStateAction
+from xosc_lateral.scenario.private_actions import AnimationAction, LightStateAction, TeleportAction, VisibilityAction
 from xosc_lateral.scenario.scenario import Scenario
-from xosc_lateral.scenario.storyboard import Act, Event, ManeuverGroup
-from xosc_lateral.scenario.trigger import Condition, Trigger
+from xosc_lateral.scenario.storyboard import Act, Condition, Event, ManeuverGroup, Trigger
 from xosc_lateral.scenario.under_test import controlled_entities
 
 Path = tuple[str, ...]
@@ -119,15 +119,15 @@ def entity_references(content: object) -> Iterator[str]:
     if isinstance(content, tuple):
         for item in content:
             yield from entity_references(item)
-    elif is_dataclass(content) and not isinstance(content, Place):
-        for part in fields(content):
-            value: Any = getattr(content, part.name)
+    elif isinstance(content, Struct):
+        for name in content.__struct_fields__:
+            value: Any = getattr(content, name)
             # A time to collision has an entity's name or a position.
-            if isinstance(value, str) and (part.name in _REFERENCES or part.name == "target"):
+            if isinstance(value, str) and (name in _REFERENCES or name == "target"):
                 yield value
-            elif part.name in _REFERENCES and isinstance(value, tuple):
+            elif name in _REFERENCES and isinstance(value, tuple):
                 yield from value
-            elif part.name != "properties":
+            elif name != "properties":
                 yield from entity_references(value)
 
 

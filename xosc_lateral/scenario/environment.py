@@ -2,22 +2,21 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from datetime import datetime
+
+from msgspec import Struct
 
 from xosc_lateral.scenario.place import Place
 
 
-@dataclass(frozen=True, slots=True)
-class TimeOfDay:
+class TimeOfDay(Struct, frozen=True):
     """Date and time; `animation`: it goes on with simulation time."""
 
     date_time: datetime
     animation: bool
 
 
-@dataclass(frozen=True, slots=True)
-class Weather:
+class Weather(Struct, frozen=True):
     """Parts that a file does not state are None.
 
     Parameters
@@ -52,8 +51,7 @@ class Weather:
     atmospheric_pressure: float | None = None
 
 
-@dataclass(frozen=True, slots=True)
-class Environment:
+class Environment(Struct, frozen=True):
     """A named environment; parts that a file does not state are None."""
 
     name: str

@@ -5,14 +5,13 @@ Lane `offset` and road `t` are here as written: along the road's t-axis (the roa
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from msgspec import Struct
 
 from xosc_lateral.scenario.enums import ReferenceContext, RouteStrategy
 from xosc_lateral.scenario.place import Place, Unsupported
 
 
-@dataclass(frozen=True, slots=True)
-class Orientation:
+class Orientation(Struct, frozen=True):
     """Heading, pitch, roll [rad]; None: not stated. `type` None: omitted (its default depends on the version)."""
 
     h: float | None = None
@@ -21,8 +20,7 @@ class Orientation:
     type: ReferenceContext | None = None
 
 
-@dataclass(frozen=True, slots=True)
-class WorldPosition:
+class WorldPosition(Struct, frozen=True):
     """In world coordinates [m], [rad]; None where the file has none."""
 
     x: float
@@ -34,8 +32,7 @@ class WorldPosition:
     r: float | None = None
 
 
-@dataclass(frozen=True, slots=True)
-class RelativeWorldPosition:
+class RelativeWorldPosition(Struct, frozen=True):
     """World axes, from an entity's reference point; without dz, on the road. [m]"""
 
     entity_ref: str
@@ -46,8 +43,7 @@ class RelativeWorldPosition:
     orientation: Orientation | None = None
 
 
-@dataclass(frozen=True, slots=True)
-class RelativeObjectPosition:
+class RelativeObjectPosition(Struct, frozen=True):
     """The entity's own axes, from its reference point; without dz, on the road. [m]"""
 
     entity_ref: str
@@ -58,8 +54,7 @@ class RelativeObjectPosition:
     orientation: Orientation | None = None
 
 
-@dataclass(frozen=True, slots=True)
-class RoadPosition:
+class RoadPosition(Struct, frozen=True):
     """Road coordinates. [m]"""
 
     road_id: str
@@ -69,8 +64,7 @@ class RoadPosition:
     orientation: Orientation | None = None
 
 
-@dataclass(frozen=True, slots=True)
-class RelativeRoadPosition:
+class RelativeRoadPosition(Struct, frozen=True):
     """Road coordinates from an entity's. [m]"""
 
     entity_ref: str
@@ -80,8 +74,7 @@ class RelativeRoadPosition:
     orientation: Orientation | None = None
 
 
-@dataclass(frozen=True, slots=True)
-class LanePosition:
+class LanePosition(Struct, frozen=True):
     """Lane coordinates; `offset` along +t as the standard has it. [m]"""
 
     road_id: str
@@ -92,8 +85,7 @@ class LanePosition:
     orientation: Orientation | None = None
 
 
-@dataclass(frozen=True, slots=True)
-class RelativeLanePosition:
+class RelativeLanePosition(Struct, frozen=True):
     """Lane coordinates from an entity's: `d_lane` lanes, and `ds` along the road or `ds_lane` along its lane. [m]"""
 
     entity_ref: str
@@ -105,23 +97,20 @@ class RelativeLanePosition:
     orientation: Orientation | None = None
 
 
-@dataclass(frozen=True, slots=True)
-class FromCurrentEntity:
+class FromCurrentEntity(Struct, frozen=True):
     """On the route, where that entity is."""
 
     entity_ref: str
 
 
-@dataclass(frozen=True, slots=True)
-class FromRoadCoordinates:
+class FromRoadCoordinates(Struct, frozen=True):
     """On the route, in road coordinates. [m]"""
 
     path_s: float
     t: float
 
 
-@dataclass(frozen=True, slots=True)
-class FromLaneCoordinates:
+class FromLaneCoordinates(Struct, frozen=True):
     """On the route, in lane coordinates. [m]"""
 
     path_s: float
@@ -132,8 +121,7 @@ class FromLaneCoordinates:
 InRoutePosition = FromCurrentEntity | FromRoadCoordinates | FromLaneCoordinates
 
 
-@dataclass(frozen=True, slots=True)
-class RoutePosition:
+class RoutePosition(Struct, frozen=True):
     """On a route. `route` None: the reference is missing (an error of the file that the player names)."""
 
     route: Route | None
@@ -142,8 +130,7 @@ class RoutePosition:
     orientation: Orientation | None = None
 
 
-@dataclass(frozen=True, slots=True)
-class TrajectoryPosition:
+class TrajectoryPosition(Struct, frozen=True):
     """On a trajectory. [m]"""
 
     trajectory: Trajectory
@@ -153,8 +140,7 @@ class TrajectoryPosition:
     orientation: Orientation | None = None
 
 
-@dataclass(frozen=True, slots=True)
-class GeoPosition:
+class GeoPosition(Struct, frozen=True):
     """Latitude and longitude [rad] (degree attributes of 1.2 are converted), height [m]."""
 
     latitude: float
@@ -179,16 +165,14 @@ Position = (
 )
 
 
-@dataclass(frozen=True, slots=True)
-class Waypoint:
+class Waypoint(Struct, frozen=True):
     """A place to pass, and how to come to it."""
 
     position: Position
     strategy: RouteStrategy
 
 
-@dataclass(frozen=True, slots=True)
-class Route:
+class Route(Struct, frozen=True):
     """At least two waypoints."""
 
     name: str
@@ -197,23 +181,20 @@ class Route:
     place: Place
 
 
-@dataclass(frozen=True, slots=True)
-class Vertex:
+class Vertex(Struct, frozen=True):
     """Corner of a polyline; `time` [s] or None."""
 
     position: Position
     time: float | None
 
 
-@dataclass(frozen=True, slots=True)
-class Polyline:
+class Polyline(Struct, frozen=True):
     """Straight pieces between vertices."""
 
     vertices: tuple[Vertex, ...]
 
 
-@dataclass(frozen=True, slots=True)
-class Clothoid:
+class Clothoid(Struct, frozen=True):
     """Curvature changes linearly: start [1/m], change per length [1/m2], length [m], times [s]."""
 
     position: Position
@@ -224,8 +205,7 @@ class Clothoid:
     stop_time: float | None = None
 
 
-@dataclass(frozen=True, slots=True)
-class ClothoidSplineSegment:
+class ClothoidSplineSegment(Struct, frozen=True):
     """Piece of a clothoid spline; without a position it goes on from the one before, turned by `h_offset` [rad]."""
 
     curvature_start: float
@@ -236,16 +216,14 @@ class ClothoidSplineSegment:
     position_start: Position | None = None
 
 
-@dataclass(frozen=True, slots=True)
-class ClothoidSpline:
+class ClothoidSpline(Struct, frozen=True):
     """Clothoid pieces one after another."""
 
     segments: tuple[ClothoidSplineSegment, ...]
     time_end: float | None = None
 
 
-@dataclass(frozen=True, slots=True)
-class ControlPoint:
+class ControlPoint(Struct, frozen=True):
     """Of a NURBS curve."""
 
     position: Position
@@ -253,8 +231,7 @@ class ControlPoint:
     weight: float = 1.0
 
 
-@dataclass(frozen=True, slots=True)
-class Nurbs:
+class Nurbs(Struct, frozen=True):
     """Rational B-spline; `order` is degree + 1."""
 
     order: int
@@ -265,8 +242,7 @@ class Nurbs:
 Shape = Polyline | Clothoid | ClothoidSpline | Nurbs | Unsupported
 
 
-@dataclass(frozen=True, slots=True)
-class Trajectory:
+class Trajectory(Struct, frozen=True):
     """A named path, with or without times."""
 
     name: str
@@ -275,8 +251,7 @@ class Trajectory:
     place: Place
 
 
-@dataclass(frozen=True, slots=True)
-class Timing:
+class Timing(Struct, frozen=True):
     """Trajectory times to scenario time: ``time * scale + offset`` [s], absolute or from the action's start."""
 
     domain: ReferenceContext

@@ -6,14 +6,15 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from msgspec import Struct
+
 from xosc_lateral.scenario.entity import Entity
 from xosc_lateral.scenario.enums import ParameterType
 from xosc_lateral.scenario.place import Place, Unsupported
 from xosc_lateral.scenario.storyboard import Storyboard
 
 
-@dataclass(frozen=True, slots=True)
-class FileHeader:
+class FileHeader(Struct, frozen=True):
     """Version, author, description; `date` as written."""
 
     major: int
@@ -33,8 +34,7 @@ class FileHeader:
         return self.description.lstrip().startswith("CARLA:")
 
 
-@dataclass(frozen=True, slots=True)
-class Parameter:
+class Parameter(Struct, frozen=True):
     """A declared parameter or variable with its value after overrides and expressions, as text."""
 
     name: str
@@ -43,8 +43,7 @@ class Parameter:
     place: Place
 
 
-@dataclass(frozen=True, slots=True)
-class TrafficSignalPhase:
+class TrafficSignalPhase(Struct, frozen=True):
     """States of signals during one phase; `duration` [s]"""
 
     name: str
@@ -52,8 +51,7 @@ class TrafficSignalPhase:
     states: tuple[tuple[str, str], ...]
 
 
-@dataclass(frozen=True, slots=True)
-class TrafficSignalController:
+class TrafficSignalController(Struct, frozen=True):
     """Phases one after another, for ever; `delay` [s] to the `reference` controller."""
 
     name: str

@@ -5,9 +5,41 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from xosc_lateral.scenario.enums import Priority
+from msgspec import Struct
+
+from xosc_lateral.scenario.enums import ConditionEdge, Priority, TriggeringEntitiesRule
 from xosc_lateral.scenario.place import Content, Place
-from xosc_lateral.scenario.trigger import Trigger
+
+
+class TriggeringEntities(Struct, frozen=True):
+    """Whose state a condition looks at; entity selections are already replaced by their members."""
+
+    rule: TriggeringEntitiesRule
+    entity_refs: tuple[str, ...]
+
+
+class Condition(Struct, frozen=True):
+    """One condition. `triggering_entities` is None for value conditions. `delay` [s]"""
+
+    name: str
+    delay: float
+    edge: ConditionEdge
+    content: Content
+    triggering_entities: TriggeringEntities | None
+    place: Place
+
+
+class ConditionGroup(Struct, frozen=True):
+    """True when all of its conditions are."""
+
+    conditions: tuple[Condition, ...]
+
+
+class Trigger(Struct, frozen=True):
+    """True when one of its groups is. No groups at all: see the player."""
+
+    groups: tuple[ConditionGroup, ...]
+    place: Place
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,8 +68,7 @@ class Action:
     scope: Mapping[str, str] = field(default_factory=dict, repr=False, compare=False)
 
 
-@dataclass(frozen=True, slots=True)
-class Event:
+class Event(Struct, frozen=True):
     """`start_trigger` None: starts at once. Counts from 1."""
 
     name: str
@@ -48,8 +79,7 @@ class Event:
     maximum_execution_count: int = 1
 
 
-@dataclass(frozen=True, slots=True)
-class Maneuver:
+class Maneuver(Struct, frozen=True):
     """Events side by side."""
 
     name: str
@@ -57,8 +87,7 @@ class Maneuver:
     place: Place
 
 
-@dataclass(frozen=True, slots=True)
-class Actors:
+class Actors(Struct, frozen=True):
     """Who acts; entity selections are already replaced by their members."""
 
     entity_refs: tuple[str, ...]
@@ -66,8 +95,7 @@ class Actors:
     place: Place
 
 
-@dataclass(frozen=True, slots=True)
-class ManeuverGroup:
+class ManeuverGroup(Struct, frozen=True):
     """Actors and their maneuvers (those from catalogs included, in file order)."""
 
     name: str
@@ -77,8 +105,7 @@ class ManeuverGroup:
     maximum_execution_count: int = 1
 
 
-@dataclass(frozen=True, slots=True)
-class Act:
+class Act(Struct, frozen=True):
     """`start_trigger` None: starts at once."""
 
     name: str
@@ -88,8 +115,7 @@ class Act:
     place: Place
 
 
-@dataclass(frozen=True, slots=True)
-class Story:
+class Story(Struct, frozen=True):
     """Acts side by side."""
 
     name: str
@@ -97,8 +123,7 @@ class Story:
     place: Place
 
 
-@dataclass(frozen=True, slots=True)
-class Private:
+class Private(Struct, frozen=True):
     """Init actions of one entity, in file order."""
 
     entity_ref: str
@@ -106,8 +131,7 @@ class Private:
     place: Place
 
 
-@dataclass(frozen=True, slots=True)
-class Init:
+class Init(Struct, frozen=True):
     """In the order in which they start."""
 
     global_actions: tuple[Action, ...]
@@ -115,8 +139,7 @@ class Init:
     privates: tuple[Private, ...]
 
 
-@dataclass(frozen=True, slots=True)
-class Storyboard:
+class Storyboard(Struct, frozen=True):
     """`stop_trigger` None: never stops by itself."""
 
     init: Init

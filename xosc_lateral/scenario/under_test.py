@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 
-from xosc_lateral.scenario.actions.controller import AssignControllerAction
 from xosc_lateral.scenario.entity import Controller, Entity
+from xosc_lateral.scenario.private_actions import AssignControllerAction
 from xosc_lateral.scenario.scenario import Scenario
 from xosc_lateral.scenario.storyboard import Action
 

@@ -6,16 +6,28 @@ left-hand traffic to its left; both are driven in the direction of s.
 
 from __future__ import annotations
 
+import xml.etree.ElementTree as ET
 from dataclasses import dataclass
+from datetime import datetime
 from typing import Any
 
-from xosc_lateral.templates.document import FIXED_DATE, document
+FIXED_DATE = datetime(2024, 1, 1)
+"""Written where the formats ask for a date: the same settings give the same bytes."""
+
+
+def document(root: ET.Element) -> str:
+    """An element tree as an indented document."""
+    ET.indent(root, "  ")
+    return f'<?xml version="1.0" encoding="UTF-8"?>\n{ET.tostring(root, encoding="unicode")}\n'
+
 
 ROAD = 1
 """Id of the only road."""
 
 SHOULDER = 3.0  # hard shoulder [m]; RAA 2008 (guidelines for motorways), cross-section RQ 31
+
 MEDIAN = 2.0  # paved margin beside the fast lane, and the grass beyond the shoulder [m]
+
 CROSSFALL = 0.025  # least crossfall for drainage, towards the outer edge [-]; RAA 2008
 
 

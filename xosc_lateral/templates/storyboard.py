@@ -10,8 +10,7 @@ from dataclasses import dataclass, field
 from enum import Enum
 from typing import Any
 
-from xosc_lateral.templates.document import FIXED_DATE, document
-from xosc_lateral.templates.motorway import ROAD, Motorway
+from xosc_lateral.templates.motorway import FIXED_DATE, ROAD, Motorway, document
 from xosc_lateral.templates.parameter import Number, Parameter
 from xosc_lateral.templates.settings import Settings
 from xosc_lateral.templates.surroundings import environment_action

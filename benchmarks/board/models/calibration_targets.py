@@ -13,9 +13,8 @@ from benchmarks.board.ranked import LONG, SHORT, ranked_numbers
 from xosc_lateral.drives.drive import Run
 from xosc_lateral.drives.resampling import STEP
 from xosc_lateral.errors import NotEnoughDataError
-from xosc_lateral.evaluation.condition import SnippetCondition
-from xosc_lateral.evaluation.differences import differences
-from xosc_lateral.evaluation.measures import Features, features_of
+from xosc_lateral.evaluation.measures import Features, differences, features_of
+from xosc_lateral.evaluation.parts import SnippetCondition
 from xosc_lateral.evaluation.snippets import Snippets, snippets_of
 from xosc_lateral.segment import Segment
 

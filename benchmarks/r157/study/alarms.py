@@ -15,7 +15,7 @@ from benchmarks.r157.study.encounters import Target
 from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.drives.cuts import all_runs
 from xosc_lateral.drives.resampling import STEP
-from xosc_lateral.evaluation.sampled_snippets import sample_runs
+from xosc_lateral.evaluation.snippets import sample_runs
 
 FloatArray = NDArray[np.float64]
 

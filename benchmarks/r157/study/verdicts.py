@@ -43,14 +43,14 @@ class Verdicts:
         found = {}
         for name in MODELS:
             prevented, gaps = self.prevented[name], self.smallest_gap[name]
-            limits = _limits(prevented)
+            found_limits = limits(prevented)
             flips = prevented[:, 1:] != prevented[:, :1]
             # The nearest gap that the nominal run calls preventable: what is left there, nominal and lifelike.
-            at_limit = gaps[min(int(np.searchsorted(GAPS, limits[0])), len(GAPS) - 1)]
-            close = np.abs(GAPS - limits[0]) <= 5.0
+            at_limit = gaps[min(int(np.searchsorted(GAPS, found_limits[0])), len(GAPS) - 1)]
+            close = np.abs(GAPS - found_limits[0]) <= 5.0
             found[name] = {
-                "limit_nominal": float(limits[0]),
-                "limit_range": [float(value) for value in np.quantile(limits[1:], [0.05, 0.95])],
+                "limit_nominal": float(found_limits[0]),
+                "limit_range": [float(value) for value in np.quantile(found_limits[1:], [0.05, 0.95])],
                 "flips": float(flips.mean()),
                 "flips_within_5_m_of_the_limit": float(flips[close].mean()),
                 "to_preventable": float((flips & prevented[:, 1:]).mean()),
@@ -62,7 +62,7 @@ class Verdicts:
         return found
 
 
-def _limits(prevented: BoolArray) -> FloatArray:
+def limits(prevented: BoolArray) -> FloatArray:
     """Smallest gap from which on every verdict is "preventable", for each run; half a step below it. [m]"""
     lost = ~prevented
     last = np.where(lost.any(axis=0), len(GAPS) - 1 - lost[::-1].argmax(axis=0), -1)

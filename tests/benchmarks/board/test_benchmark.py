@@ -14,8 +14,7 @@ from benchmarks.board.units import halves, units_of
 from tests.benchmarks.models.made_runs import made_run, smooth_runs
 from xosc_lateral.drives.drive import Run
 from xosc_lateral.errors import NotEnoughDataError
-from xosc_lateral.evaluation.differences import differences
-from xosc_lateral.evaluation.measures import band_power, features_of
+from xosc_lateral.evaluation.measures import band_power, differences, features_of
 from xosc_lateral.segment import Segment
 
 QUICK = ["lane-centre", "constant", "gaussian-process"]

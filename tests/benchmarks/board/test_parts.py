@@ -24,8 +24,7 @@ from tests.benchmarks.models.made_runs import made_run, smooth_runs
 from tests.profiles import simulated_profile
 from xosc_lateral.drives.drive import Run
 from xosc_lateral.errors import NotEnoughDataError, XoscLateralError
-from xosc_lateral.evaluation.differences import autocorrelation_of
-from xosc_lateral.evaluation.measures import LAGS, resolved_bands
+from xosc_lateral.evaluation.measures import LAGS, autocorrelation_of, resolved_bands
 
 RUNS = smooth_runs(24, 65.0)
 

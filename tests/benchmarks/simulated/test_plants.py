@@ -10,10 +10,17 @@ import pytest
 from benchmarks.simulated.camera_plants import CameraStep, SensorDrift
 from benchmarks.simulated.hidden_plants import Companion, CyclicTarget, Distraction, DriftingTarget, Fatigue
 from benchmarks.simulated.spread_plants import RestoringBy, SpreadBy
-from xosc_lateral.datasets.intent import Context, Intent, Plant
 from xosc_lateral.datasets.motorway import STEP, draw_motorway
-from xosc_lateral.datasets.plants import LanePreference, ShiftBy
-from xosc_lateral.datasets.response import SimulatedResponse, lagged, threshold
+from xosc_lateral.datasets.plants import (
+    Context,
+    Intent,
+    LanePreference,
+    Plant,
+    ShiftBy,
+    SimulatedResponse,
+    lagged,
+    threshold,
+)
 
 N = round(3600.0 / STEP)
 FIELDS = ("target", "tolerance", "gain", "noise", "attention", "camera")

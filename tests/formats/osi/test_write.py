@@ -15,8 +15,8 @@ from xosc_lateral.formats.osi.write import write_osi
 from xosc_lateral.motion.nominal import Activity, NominalMotion, PlayedAction
 from xosc_lateral.motion.trajectory import displace
 from xosc_lateral.road.network import RoadNetwork
-from xosc_lateral.scenario.actions.appearance import LightStateAction
 from xosc_lateral.scenario.place import Place
+from xosc_lateral.scenario.private_actions import LightStateAction
 
 osi_utilities = pytest.importorskip("osi_utilities")
 pytest.importorskip("osi3")

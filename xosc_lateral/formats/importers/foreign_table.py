@@ -13,10 +13,8 @@ from numpy.typing import NDArray
 
 from xosc_lateral.errors import FormatError
 from xosc_lateral.formats.drives import drives_of_table, translated
-from xosc_lateral.formats.mapping import MappingLike, TableMapping, as_mapping
-from xosc_lateral.formats.tables import read_table, text_encoding
-from xosc_lateral.formats.text_columns import comma_numbers
-from xosc_lateral.formats.units import factor, spelled
+from xosc_lateral.formats.mapping import MappingLike, TableMapping, as_mapping, factor, spelled
+from xosc_lateral.formats.tables import comma_numbers, read_table, text_encoding
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -28,10 +28,9 @@ from numpy.typing import NDArray
 from xosc_lateral.errors import FormatError
 from xosc_lateral.formats.importers.cuts import KEPT
 from xosc_lateral.formats.importers.table import Imported, drop_cut, guarded, make_provenance
-from xosc_lateral.formats.mapping import ColumnSource, MappingLike, as_mapping, parse_map
+from xosc_lateral.formats.mapping import ColumnSource, MappingLike, as_mapping, factor, is_measured, parse_map, spelled
 from xosc_lateral.formats.source import open_source
 from xosc_lateral.formats.tables import LONGEST_MESSAGE, foreign_errors
-from xosc_lateral.formats.units import factor, is_measured, spelled
 from xosc_lateral.limits import CLOCK_ROWS, TIME
 from xosc_lateral.segment import CONTEXT_UNITS
 

@@ -15,8 +15,7 @@ from xosc_lateral.formats.importers.esmini_log import is_esmini_log, read_esmini
 from xosc_lateral.formats.importers.placed import PlacedTracks, ground_speed, travel_heading
 from xosc_lateral.formats.mapping import MappingLike, TableMapping, as_mapping, parse_map
 from xosc_lateral.formats.states import COLUMNS
-from xosc_lateral.formats.tables import read_table
-from xosc_lateral.formats.text_columns import comma_numbers, seconds_of_text
+from xosc_lateral.formats.tables import comma_numbers, read_table, seconds_of_text
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -69,12 +68,11 @@ class Tracks:
         offset: FloatArray,
         lane_width: FloatArray,
         road: Mapping[str, FloatArray],
-        zone: NDArray[np.object_] | None = None,
     ) -> PlacedTracks:
         """These tracks with where each row lies; see `PlacedTracks`."""
         who = self.names, self.vehicle, self.time, self.step
         middle = along if self.rear is None else along + self.rear  # gaps count from there
-        return PlacedTracks(*who, piece, middle, offset, lane_width, self.speed, self.length, self.kind, road, zone)
+        return PlacedTracks(*who, piece, middle, offset, lane_width, self.speed, self.length, self.kind, road)
 
 
 def read_tracks(path: Path, columns: Sequence[str] = (), mapping: MappingLike | None = None) -> Tracks:

@@ -8,13 +8,11 @@ from os import PathLike
 from xosc_lateral.formats.opendrive.document import RoadFile, XmlElement, open_document
 from xosc_lateral.formats.opendrive.lane_sections import read_sections, speed_limit
 from xosc_lateral.formats.opendrive.plan_view import Record, finish_elements, read_plan_view
-from xosc_lateral.road.connections import Connection, Junction, RoadLink
 from xosc_lateral.road.geometry import ReferenceElement
-from xosc_lateral.road.header_offset import HeaderOffset
 from xosc_lateral.road.network import RoadNetwork
 from xosc_lateral.road.piecewise import PiecewiseCubic
-from xosc_lateral.road.road import Road
-from xosc_lateral.road.surface import Shape, Surface
+from xosc_lateral.road.road import Connection, Junction, Road, RoadLink
+from xosc_lateral.road.surface import HeaderOffset, Shape, Surface
 
 LENGTH_TOLERANCE = 0.01
 """road/@length and the end of its geometry may differ by this without a note. [m]"""

@@ -7,18 +7,21 @@ from collections.abc import Callable
 from xosc_lateral.formats.openscenario.context import Context
 from xosc_lateral.formats.openscenario.declarations import parameter_name
 from xosc_lateral.formats.openscenario.element import XmlElement
-from xosc_lateral.formats.openscenario.environment import read_environment
+from xosc_lateral.formats.openscenario.entities import read_environment
 from xosc_lateral.formats.openscenario.positions import read_position_in
 from xosc_lateral.formats.openscenario.private_actions import PRIVATE_ACTIONS
-from xosc_lateral.scenario.actions.environment import EnvironmentAction
-from xosc_lateral.scenario.actions.infrastructure import TrafficSignalControllerAction, TrafficSignalStateAction
-from xosc_lateral.scenario.actions.population import AddEntityAction, DeleteEntityAction, TrafficAction
-from xosc_lateral.scenario.actions.userdefined import UserDefinedAction
-from xosc_lateral.scenario.actions.values import (
+from xosc_lateral.scenario.global_actions import (
+    AddEntityAction,
+    DeleteEntityAction,
+    EnvironmentAction,
     ModifyOperation,
     ParameterModifyAction,
     ParameterSetAction,
     SetMonitorAction,
+    TrafficAction,
+    TrafficSignalControllerAction,
+    TrafficSignalStateAction,
+    UserDefinedAction,
     VariableModifyAction,
     VariableSetAction,
 )

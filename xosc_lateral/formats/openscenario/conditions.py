@@ -7,34 +7,32 @@ from collections.abc import Callable
 from xosc_lateral.formats.openscenario.context import Context
 from xosc_lateral.formats.openscenario.declarations import parameter_name
 from xosc_lateral.formats.openscenario.element import XmlElement
-from xosc_lateral.formats.openscenario.environment import read_date_time
+from xosc_lateral.formats.openscenario.entities import read_date_time
 from xosc_lateral.formats.openscenario.positions import read_position_in
-from xosc_lateral.scenario.conditions.entity import (
+from xosc_lateral.scenario.conditions import (
     AccelerationCondition,
     AngleCondition,
     CollisionCondition,
     DistanceCondition,
     EndOfRoadCondition,
     OffroadCondition,
+    ParameterCondition,
     ReachPositionCondition,
     RelativeAngleCondition,
     RelativeClearanceCondition,
     RelativeDistanceCondition,
     RelativeLaneRange,
     RelativeSpeedCondition,
+    SimulationTimeCondition,
     SpeedCondition,
     StandStillCondition,
-    TimeHeadwayCondition,
-    TimeToCollisionCondition,
-    TraveledDistanceCondition,
-)
-from xosc_lateral.scenario.conditions.value import (
-    ParameterCondition,
-    SimulationTimeCondition,
     StoryboardElementStateCondition,
+    TimeHeadwayCondition,
     TimeOfDayCondition,
+    TimeToCollisionCondition,
     TrafficSignalCondition,
     TrafficSignalControllerCondition,
+    TraveledDistanceCondition,
     UserDefinedValueCondition,
     VariableCondition,
 )
@@ -52,7 +50,7 @@ from xosc_lateral.scenario.enums import (
     TriggeringEntitiesRule,
 )
 from xosc_lateral.scenario.place import Content, Unsupported
-from xosc_lateral.scenario.trigger import Condition, ConditionGroup, Trigger, TriggeringEntities
+from xosc_lateral.scenario.storyboard import Condition, ConditionGroup, Trigger, TriggeringEntities
 
 # `cartesianDistance` is the name of 1.0; the misspelt one is the standard's.
 DISTANCE_TYPES = {

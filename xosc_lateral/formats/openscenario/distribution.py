@@ -13,27 +13,30 @@ from pathlib import Path
 import numpy as np
 
 from xosc_lateral.errors import FormatError
+from xosc_lateral.formats.openscenario.catalogs import Boundary, allowed_roots
 from xosc_lateral.formats.openscenario.declarations import broken_constraint, declared_values, parameter_name
 from xosc_lateral.formats.openscenario.element import XmlElement
 from xosc_lateral.formats.openscenario.read import open_scenario, read_header
-from xosc_lateral.formats.openscenario.references import Boundary, allowed_roots
 from xosc_lateral.formats.xml import read_xml
 from xosc_lateral.limits import COMBINATIONS, DECIMAL_EXPONENT, DISTRIBUTION_TIME, PARAMETER_SETS
-from xosc_lateral.scenario.deterministic import Deterministic, ParameterSet, SteppedRange, ValueSets
-from xosc_lateral.scenario.expressions import ExpressionError
-from xosc_lateral.scenario.parameters import Scope
-from xosc_lateral.scenario.place import Place
-from xosc_lateral.scenario.stochastic import (
+from xosc_lateral.scenario.distribution import (
+    Deterministic,
     DistributionError,
     Draw,
     Histogram,
     LogNormal,
     Normal,
+    ParameterSet,
     Poisson,
+    SteppedRange,
     Stochastic,
     Uniform,
+    ValueSets,
     Weighted,
 )
+from xosc_lateral.scenario.expressions import ExpressionError
+from xosc_lateral.scenario.parameters import Scope
+from xosc_lateral.scenario.place import Place
 
 MAX_REDRAWS = 1000
 """Stochastic sets in a row that violate the scenario's constraints until reading gives up."""

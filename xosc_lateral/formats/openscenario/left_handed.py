@@ -7,7 +7,7 @@ the simulator's own reader, positions relative to an object are along the world'
 
 from __future__ import annotations
 
-from dataclasses import replace
+from msgspec.structs import replace
 
 from xosc_lateral.scenario.place import Unsupported
 from xosc_lateral.scenario.position import (

@@ -13,39 +13,6 @@ from xosc_lateral.formats.openscenario.positions import (
     read_route,
     read_trajectory,
 )
-from xosc_lateral.scenario.actions.appearance import AnimationAction, LightStateAction, VisibilityAction
-from xosc_lateral.scenario.actions.controller import (
-    ActivateControllerAction,
-    AssignControllerAction,
-    OverrideControllerValueAction,
-)
-from xosc_lateral.scenario.actions.lateral import (
-    AbsoluteTargetLane,
-    AbsoluteTargetLaneOffset,
-    LaneChangeAction,
-    LaneOffsetAction,
-    LateralDistanceAction,
-    RelativeTargetLane,
-    RelativeTargetLaneOffset,
-)
-from xosc_lateral.scenario.actions.longitudinal import (
-    AbsoluteTargetSpeed,
-    LongitudinalDistanceAction,
-    RelativeTargetSpeed,
-    SpeedAction,
-    SpeedProfileAction,
-    SpeedProfileEntry,
-)
-from xosc_lateral.scenario.actions.routing import AcquirePositionAction, AssignRouteAction, FollowTrajectoryAction
-from xosc_lateral.scenario.actions.synchronize import (
-    AbsoluteSpeed,
-    RelativeSpeedToMaster,
-    SteadyState,
-    SynchronizeAction,
-)
-from xosc_lateral.scenario.actions.teleport import TeleportAction
-from xosc_lateral.scenario.actions.trailer import ConnectTrailerAction, DisconnectTrailerAction
-from xosc_lateral.scenario.dynamics import DynamicConstraints, TransitionDynamics
 from xosc_lateral.scenario.enums import (
     CoordinateSystem,
     DynamicsDimension,
@@ -58,6 +25,39 @@ from xosc_lateral.scenario.enums import (
 )
 from xosc_lateral.scenario.place import Content
 from xosc_lateral.scenario.position import Timing
+from xosc_lateral.scenario.private_actions import (
+    AbsoluteSpeed,
+    AbsoluteTargetLane,
+    AbsoluteTargetLaneOffset,
+    AbsoluteTargetSpeed,
+    AcquirePositionAction,
+    ActivateControllerAction,
+    AnimationAction,
+    AssignControllerAction,
+    AssignRouteAction,
+    ConnectTrailerAction,
+    DisconnectTrailerAction,
+    DynamicConstraints,
+    FollowTrajectoryAction,
+    LaneChangeAction,
+    LaneOffsetAction,
+    LateralDistanceAction,
+    LightStateAction,
+    LongitudinalDistanceAction,
+    OverrideControllerValueAction,
+    RelativeSpeedToMaster,
+    RelativeTargetLane,
+    RelativeTargetLaneOffset,
+    RelativeTargetSpeed,
+    SpeedAction,
+    SpeedProfileAction,
+    SpeedProfileEntry,
+    SteadyState,
+    SynchronizeAction,
+    TeleportAction,
+    TransitionDynamics,
+    VisibilityAction,
+)
 
 
 def _teleport(e: XmlElement, context: Context) -> Content:

@@ -3,20 +3,19 @@
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
 from pathlib import Path, PureWindowsPath
 
 from lxml import etree
+from msgspec import Struct
 
 from xosc_lateral.errors import FormatError
-from xosc_lateral.formats.openscenario.catalogs import Catalogs
+from xosc_lateral.formats.openscenario.catalogs import Boundary, Catalogs, allowed_roots
 from xosc_lateral.formats.openscenario.context import Context
 from xosc_lateral.formats.openscenario.declarations import read_declarations, read_variables
-from xosc_lateral.formats.openscenario.element import XmlElement, local_name
+from xosc_lateral.formats.openscenario.element import XmlElement, local_name, means_true
 from xosc_lateral.formats.openscenario.entities import read_entities
-from xosc_lateral.formats.openscenario.references import Boundary, allowed_roots
-from xosc_lateral.formats.openscenario.spelling import remark_spellings
 from xosc_lateral.formats.openscenario.storyboard import read_storyboard
 from xosc_lateral.formats.xml import read_document
 from xosc_lateral.scenario import (
@@ -29,13 +28,54 @@ from xosc_lateral.scenario import (
 from xosc_lateral.scenario.parameters import Scope
 from xosc_lateral.scenario.place import Place
 
+BOOLEANS = frozenset(
+    {
+        *("activateAnimation", "activateLateral", "activateLighting", "activateLongitudinal", "active", "alongRoute"),
+        *("animation", "closed", "continuous", "freeSpace", "freespace", "graphics", "lateral", "lighting"),
+        *("longitudinal", "loop", "oppositeLanes", "selectTriggeringEntities", "sensors", "traffic"),
+    }
+)
+"""Attributes that the standard calls Boolean, all versions."""
+
+_STANDARD = frozenset({"true", "1"})
+
+
+def remark_spellings(root: XmlElement) -> list[Unsupported]:
+    """One remark for each attribute and word such as ``freespace="True"``, at its first place."""
+    first: dict[tuple[str, str], Place] = {}
+    count: Counter[tuple[str, str]] = Counter()
+    for item in root.xml.iter("{*}*"):
+        _count(item, root, first, count)
+    return [
+        Unsupported(
+            place.element,
+            place,
+            f"{name}='{word}' is read as true{'' if count[name, word] == 1 else f' ({count[name, word]} times)'}; "
+            "the standard's word is 'true', and the reference player takes this one for false",
+        )
+        for (name, word), place in first.items()
+    ]
+
+
+def _count(
+    item: etree._Element, root: XmlElement, first: dict[tuple[str, str], Place], count: Counter[tuple[str, str]]
+) -> None:
+    """One element's attributes."""
+    is_truth = item.get("parameterType") == "boolean"
+    for name, value in item.attrib.items():
+        key = str(name), str(value).strip()
+        is_boolean = key[0] in BOOLEANS or (is_truth and key[0] == "value")
+        if is_boolean and means_true(key[1]) and key[1] not in _STANDARD:
+            count[key] += 1
+            first.setdefault(key, XmlElement(item, root.path, root.scope).place())
+
+
 NEWEST = (1, 3)
 
 LEFT_HANDED = "written for CARLA: its left-handed coordinates are mirrored, its offsets count to the right"
 
 
-@dataclass(frozen=True, slots=True)
-class RoadSearch:
+class RoadSearch(Struct, frozen=True):
     """Where a road may lie besides where the scenario says: what the user names is allowed.
 
     Raises `FormatError`: No such file, no such folder.

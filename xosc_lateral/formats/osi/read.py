@@ -16,7 +16,7 @@ from xosc_lateral.formats.importers.placed import ground_speed, travel_heading
 from xosc_lateral.formats.importers.track_table import USUAL_LENGTH, Tracks
 from xosc_lateral.formats.osi.extra import osi
 from xosc_lateral.formats.osi.trace import Trace
-from xosc_lateral.motion.axes import axes
+from xosc_lateral.motion.nominal import axes
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]

@@ -17,13 +17,12 @@ from xosc_lateral.errors import FormatError
 from xosc_lateral.formats.atomic import replace_atomically
 from xosc_lateral.formats.osi.extra import SUFFIXES, osi
 from xosc_lateral.formats.osi.lanes import RoadIds, write_lanes
-from xosc_lateral.motion.axes import axes
-from xosc_lateral.motion.nominal import Activity, EntityMotion, NominalMotion
+from xosc_lateral.motion.nominal import Activity, EntityMotion, NominalMotion, axes
 from xosc_lateral.motion.trajectory import WorldTrajectory
 from xosc_lateral.road.network import RoadNetwork
-from xosc_lateral.scenario.actions.appearance import LightStateAction
 from xosc_lateral.scenario.entity import Entity
 from xosc_lateral.scenario.enums import EntityCategory, VehicleCategory
+from xosc_lateral.scenario.private_actions import LightStateAction
 from xosc_lateral.version import __version__
 
 FloatArray = NDArray[np.float64]

@@ -17,20 +17,16 @@ from numpy.typing import NDArray
 
 from xosc_lateral.driver.effects import Acts, ColumnEffect, Effect
 from xosc_lateral.identification.column_search import SearchedTerm, likely_response
-from xosc_lateral.identification.innovations import squared_innovations
-from xosc_lateral.identification.problem import Problem, of_squares
+from xosc_lateral.identification.refinement import Problem
 from xosc_lateral.identification.regression import Coarse, Fitted
-from xosc_lateral.identification.squares import fine_squares, log_sizes
+from xosc_lateral.identification.squares import SLOW_S, fine_squares, log_sizes, of_squares, quick_squares, slow_squares
 from xosc_lateral.identification.terms.base import Stage, Term
-from xosc_lateral.identification.terms.column import ColumnTerm, columns_on_size
+from xosc_lateral.identification.terms.column import ColumnTerm, columns_on_size, of_kind
+from xosc_lateral.identification.terms.mean import MeanTerm
 
 if TYPE_CHECKING:
     from xosc_lateral.identification.search import Search
 
-
-from xosc_lateral.identification.squares import SLOW_S, slow_squares
-from xosc_lateral.identification.terms.column import columns_acting, responses
-from xosc_lateral.identification.terms.mean import MeanTerm
 
 FloatArray = NDArray[np.float64]
 
@@ -62,10 +58,7 @@ class SpreadTerm(SearchedTerm):
     @classmethod
     def problem(cls, fitted: Fitted) -> Problem:
         """Squared innovations."""
-        coarse = fitted.coarse
-        return of_squares(
-            coarse, squared_innovations(fitted.innovations, coarse.valid), coarse.valid, known_log_scale(fitted)
-        )
+        return of_squares(fitted.coarse, quick_squares(fitted), known_log_scale(fitted))
 
     @classmethod
     def barred(cls, fitted: Fitted) -> frozenset[str]:
@@ -110,45 +103,8 @@ def what_a_column_may_do(search: Search, fitted: Fitted) -> tuple[FloatArray, fl
 
 
 @dataclass(frozen=True, eq=False)
-class FineNoiseTerm(SearchedTerm):
-    """Log standard deviation of the innovations at 5 Hz by a column."""
-
-    component: ClassVar[str] = "fine_noise"
-    kind: ClassVar[str] = "scale"
-    stages: ClassVar[tuple[Stage, ...]] = (Stage.MOVEMENT,)
-    weight: ClassVar[float] = 1.0
-    seen_held_out: ClassVar[bool] = False
-    single: ClassVar[bool] = True
-    acts: ClassVar[Acts] = Acts.FINE
-    what: ClassVar[str] = "fine noise"
-
-    @classmethod
-    def problem(cls, fitted: Fitted) -> Problem:
-        """Squared innovations at 5 Hz.
-
-        An effect on the mean is followed with errors: they grow with it where its size is a little wrong, and with its
-        rate of change where its timing is.
-        """
-        squares = fine_squares(fitted)
-        moved = responses(fitted, MeanTerm)
-        known = [known_log_scale(fitted), responses(fitted, cls), np.abs(moved)]
-        if moved.shape[1]:
-            known.append(np.abs(np.gradient(moved, axis=0)))
-        return of_squares(fitted.coarse, squares.standardised, squares.valid, np.concatenate(known, axis=1))
-
-    @classmethod
-    def barred(cls, fitted: Fitted) -> frozenset[str]:
-        """What acts on anything else already: what its shape leaves of itself looks like noise."""
-        return columns_acting(fitted)
-
-    def estimate(self, fitted: Fitted) -> tuple[Effect, ...]:
-        """Log-linear regression of the squares."""
-        return (fine_twin(self, fitted),)
-
-
-@dataclass(frozen=True, eq=False)
 class SlowSpreadTerm(SearchedTerm):
-    """Log standard deviation of eight-second sums of the innovations by a column."""
+    """Log standard deviation of eight-second sums of the innovations by a column: of who lets more pass."""
 
     component: ClassVar[str] = "slow_spread"
     kind: ClassVar[str] = "scale"
@@ -166,9 +122,10 @@ class SlowSpreadTerm(SearchedTerm):
     @classmethod
     def problem(cls, fitted: Fitted) -> Problem:
         """Squares of running sums; an effect on the mean whose size is a little wrong leaves some where it is large."""
-        squares = slow_squares(fitted)
-        known = np.concatenate([known_log_scale(fitted), np.abs(responses(fitted, MeanTerm))], axis=1)
-        return of_squares(fitted.coarse, squares.standardised, squares.valid, known)
+        squares, coarse = slow_squares(fitted), fitted.coarse
+        moved = [np.abs(coarse.response(term.effect, keep=True)) for term in of_kind(fitted, MeanTerm)]
+        known = np.concatenate([known_log_scale(fitted), *moved], axis=1)
+        return of_squares(coarse, squares, known)
 
     @classmethod
     def barred(cls, fitted: Fitted) -> frozenset[str]:

@@ -12,8 +12,8 @@ from xosc_lateral.playback.paths.registry import duration, path_of
 from xosc_lateral.playback.positions.resolve import pose_of
 from xosc_lateral.playback.state import free
 from xosc_lateral.playback.transition import EPSILON
-from xosc_lateral.scenario.actions.routing import FollowTrajectoryAction
 from xosc_lateral.scenario.enums import FollowingMode, ReferenceContext
+from xosc_lateral.scenario.private_actions import FollowTrajectoryAction
 
 
 class RunningFollowTrajectory(RunningAction):

@@ -6,10 +6,10 @@ from math import atan, pi
 
 from xosc_lateral.motion.nominal import Activity
 from xosc_lateral.playback.actions.base import Domain, RunningAction
-from xosc_lateral.playback.placement import NOWHERE
+from xosc_lateral.playback.state import NOWHERE
 from xosc_lateral.playback.transition import EPSILON, Transition
-from xosc_lateral.scenario.actions.lateral import AbsoluteTargetLaneOffset, LaneOffsetAction
 from xosc_lateral.scenario.enums import DynamicsDimension, DynamicsShape
+from xosc_lateral.scenario.private_actions import AbsoluteTargetLaneOffset, LaneOffsetAction
 
 DEFAULT_LATERAL_ACCELERATION = 0.5
 """Where the file has none; the standard says as fast as can be, the reference player has this value. [m/s2]"""

@@ -1,17 +1,223 @@
-"""LateralDistanceAction: keep a lateral distance to another entity."""
+"""LateralDistanceAction: a distance beside another entity, on the road or along that entity's axes."""
 
 from __future__ import annotations
 
-from math import copysign
+from math import acos, atan2, copysign, cos, hypot, inf, pi, sin, sqrt
 
 from xosc_lateral.motion.nominal import Activity
 from xosc_lateral.playback.actions.base import Domain, RunningAction
-from xosc_lateral.playback.actions.beside_entity import BesideEntity
-from xosc_lateral.playback.actions.beside_on_road import BesideOnRoad
-from xosc_lateral.playback.distances import ahead_and_left
-from xosc_lateral.playback.placement import NOWHERE
-from xosc_lateral.scenario.actions.lateral import LateralDistanceAction
+from xosc_lateral.playback.angles import difference
+from xosc_lateral.playback.distances import ahead_and_left, road_gap, spot_of
+from xosc_lateral.playback.drive import along_reference, travel
+from xosc_lateral.playback.state import NOWHERE, EntityState, free
+from xosc_lateral.playback.transition import EPSILON
+from xosc_lateral.road import Pose
 from xosc_lateral.scenario.enums import CoordinateSystem, LateralDisplacement
+from xosc_lateral.scenario.private_actions import DynamicConstraints, LateralDistanceAction
+
+STIFFNESS = 0.4
+"""Of the spring that pulls towards the distance, per acceleration available. [1/m]"""
+
+
+class BesideOnRoad:
+    """Moves an entity sideways on the road: at once, at a limited speed, or by a critically damped spring.
+
+    The spring is for a limited acceleration. Nothing moves in the first frame. The way of a frame on the entity's own
+    track is `speed * step`: what goes sideways is missing ahead, but for an entity that moves at once.
+
+    Parameters
+    ----------
+    state, other : EntityState
+    wanted : float
+        To the left of the other entity. [m]
+    limits : DynamicConstraints or None
+    """
+
+    def __init__(
+        self, state: EntityState, other: EntityState, wanted: float, limits: DynamicConstraints | None
+    ) -> None:
+        self._state, self._other, self._wanted = state, other, wanted
+        given = limits or DynamicConstraints()
+        self._most_speed = inf if given.max_speed is None else given.max_speed
+        self._most_acceleration = inf if given.max_acceleration is None else given.max_acceleration
+        self._most_jerk = inf if given.max_acceleration_rate is None else given.max_acceleration_rate
+        self._before: Pose | None = None
+        """Where it was left in the frame before."""
+        self._speed = 0.0
+        """Along +t. [m/s]"""
+        self._acceleration = 0.0
+
+    @property
+    def is_unlimited(self) -> bool:
+        """Whether it may jump."""
+        return self._most_speed == inf and self._most_acceleration == inf
+
+    def move(self, step: float) -> float | None:
+        """One frame; returns how far the place beside the other was away; None: nothing moves yet. [m]"""
+        state = self._state
+        state.follow_lane()
+        if self._before is None:
+            self._before = state.pose
+            return None
+        rest = self._rest()
+        if self.is_unlimited:
+            self._shift(rest)
+        else:
+            rest = self._drive_across(rest, step)
+        self._turn_along_movement(self._before)
+        self._before = state.pose
+        return rest
+
+    def _drive_across(self, rest: float, step: float) -> float:
+        """Along the lane and towards the place at once, as far as its dynamics let it; what is left. [m]"""
+        state = self._state
+        across = self._speed_across(rest, step)
+        ahead = sqrt(max(state.speed * state.speed - across * across, 0.0))
+        state.take_control(Activity.LATERAL)
+        state.speed_taken = True
+        distance = copysign(ahead * step, state.speed)
+        ds = along_reference(state.network, state.road, state.lane, state.s, state.offset_t, distance)
+        travel(state, 1 if state.is_forward else -1, ds)
+        state.move_to(state.road, state.lane, state.s, state.offset_t + across * step)
+        if abs(rest) <= abs(across) * step + EPSILON and self._most_acceleration == inf:
+            rest = 0.0
+        return rest
+
+    def align(self) -> None:
+        """The last heading of the movement stays, as in the reference player, but for a jump."""
+        if self.is_unlimited:
+            self._state.turn(0.0 if self._state.is_forward else pi)
+
+    # ---- in detail ---------------------------------------------------------------------------------------------------
+    def _rest(self) -> float:
+        """How far to go along +t of the own road. [m]"""
+        state, other = self._state, self._other
+        gap = road_gap(state.network, other, spot_of(state))
+        if gap is None:
+            return 0.0
+        return (self._wanted if other.is_forward is not gap.is_turned else -self._wanted) - gap.dt
+
+    def _shift(self, rest: float) -> None:
+        """Straight across the road, to whatever lane is there."""
+        state, network = self._state, self._state.network
+        heading = state.road_heading()
+        x, y = state.pose.x - sin(heading) * rest, state.pose.y + cos(heading) * rest
+        found = network.world_to_lane_at(x, y, near=(state.road, state.s))
+        state.move_to(
+            found.road, found.lane, found.s, network.offset_from_offset_t(found.road, found.lane, found.offset)
+        )
+        state.section = (0.0, -1.0)
+
+    def _speed_across(self, rest: float, step: float) -> float:
+        """Lateral speed of the frame along +t. [m/s]"""
+        most = max(min(self._most_speed, abs(self._state.speed)) - EPSILON, 0.0)
+        if self._most_acceleration == inf:
+            self._speed = copysign(most, rest)
+            if step > 0.0 and abs(rest) < most * step:
+                self._speed = rest / step
+            return self._speed
+        stiffness = STIFFNESS * self._most_acceleration
+        its = self._other.body_frame(self._other.velocity)[1]
+        pull = stiffness * rest - 2.0 * sqrt(stiffness) * (self._speed - its)
+        jerk = self._most_jerk * step if step > 0.0 else 0.0
+        change = min(max(pull - self._acceleration, -jerk), jerk)
+        acceleration = self._acceleration + change
+        self._acceleration = min(max(acceleration, -self._most_acceleration), self._most_acceleration)
+        self._speed = min(max(self._speed + self._acceleration * step, -most), most)
+        return self._speed
+
+    def _turn_along_movement(self, before: Pose) -> None:
+        """Point the way that the entity has moved since the frame before; at rest, as it did."""
+        state = self._state
+        dx, dy = state.pose.x - before.x, state.pose.y - before.y
+        if dx or dy:
+            heading = atan2(dy, dx) + (pi if state.speed < 0.0 else 0.0)
+            state.turn(heading - state.road_heading())
+
+
+MOST_ACCELERATION = 1000.0
+"""More lateral acceleration makes no difference. [m/s2]"""
+
+LEAST_RADIUS = 0.5
+"""Of a turn towards the line. [m]"""
+
+PEAK = 1.5
+"""A turn with a smooth course has this much more curvature in its middle than a circle. [-]"""
+
+
+class BesideEntity:
+    """Moves an entity to the line, and along it.
+
+    Without a limit of acceleration it is on the line at once. With one, it heads for the line, and turns into it when
+    it is nearer than the radius of its turn.
+
+    Parameters
+    ----------
+    state, other : EntityState
+    wanted : float
+        Of the line, to the left of the other entity. [m]
+    limits : DynamicConstraints or None
+    """
+
+    def __init__(
+        self, state: EntityState, other: EntityState, wanted: float, limits: DynamicConstraints | None
+    ) -> None:
+        self._state, self._other, self._wanted = state, other, wanted
+        given = None if limits is None else limits.max_acceleration
+        self._acceleration = inf if given is None else abs(given)
+
+    @property
+    def is_unlimited(self) -> bool:
+        """Whether it may jump."""
+        return self._acceleration == inf
+
+    def move(self, step: float) -> float:
+        """One frame; returns how far the line was away. [m]"""
+        state, own, other = self._state, self._state.plane, self._other.plane
+        state.take_control(Activity.LATERAL)
+        state.speed_taken = True
+        c, s = cos(other.heading), sin(other.heading)
+        to_left = (own.y - other.y) * c - (own.x - other.x) * s
+        dx, dy = (to_left - self._wanted) * s, (self._wanted - to_left) * c
+        rest = hypot(dx, dy)
+        way = state.speed * step
+        if self.is_unlimited:
+            ahead = max(abs(way) - rest, 0.0)
+            state.put_in_world(free(own.x + dx + c * ahead, own.y + dy + s * ahead, other.heading))
+        elif rest < EPSILON:
+            state.put_in_world(free(own.x + c * way, own.y + s * way, other.heading))
+        else:
+            heading = self._heading(own.heading, other.heading, (dx, dy), rest, step)
+            state.put_in_world(free(own.x + cos(heading) * way, own.y + sin(heading) * way, heading))
+        return rest
+
+    def align(self) -> None:
+        """Nothing to put straight: it has the other entity's heading."""
+
+    def _heading(self, own: float, other: float, delta: tuple[float, float], rest: float, step: float) -> float:
+        speed = self._state.speed
+        way = speed * step
+        radius = max(LEAST_RADIUS, PEAK * speed * speed / min(self._acceleration, MOST_ACCELERATION))
+        if rest < 0.5 * way - EPSILON and 0.5 * way > radius - EPSILON:
+            return _onto_line(other, delta, way)
+        most = min(abs(speed / radius * step) * PEAK, pi - EPSILON)
+        towards = difference(atan2(delta[1], delta[0]), own)
+        if rest > radius - EPSILON:
+            turn = towards
+        else:
+            segment = way / radius
+            angle = max(acos(1.0 - rest / radius), 0.5 * segment)
+            share = (2.0 * angle - 0.5 * segment) / pi
+            share = share * share * (3.0 - 2.0 * share)
+            turn = share * towards + (1.0 - share) * difference(other, own)
+        return own + min(max(turn, -most), most)
+
+
+def _onto_line(heading: float, delta: tuple[float, float], way: float) -> float:
+    """Direction in which the frame's way ends on the line, of the two the one along the line."""
+    ahead = sqrt(max(way * way - delta[0] ** 2 - delta[1] ** 2, 0.0))
+    return atan2(delta[1] + ahead * sin(heading), delta[0] + ahead * cos(heading))
+
 
 CLOSE_ENOUGH = 0.01
 """A distance that is not kept continuously counts as reached. [m]"""
@@ -85,4 +291,6 @@ class RunningLateralDistance(RunningAction):
         return -abs(wanted) if content.displacement is LateralDisplacement.RIGHT else abs(wanted)
 
 
-RUNNING: dict[type, type[RunningAction]] = {LateralDistanceAction: RunningLateralDistance}
+RUNNING: dict[type, type[RunningAction]] = {
+    LateralDistanceAction: RunningLateralDistance,
+}

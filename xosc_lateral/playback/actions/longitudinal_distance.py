@@ -5,11 +5,11 @@ from __future__ import annotations
 from math import inf, sqrt
 
 from xosc_lateral.playback.actions.base import Domain, RunningAction
-from xosc_lateral.playback.actions.constraints import limits_of
+from xosc_lateral.playback.actions.speed_profile import limits_of
 from xosc_lateral.playback.distances import ahead_and_left, entity_distance
 from xosc_lateral.playback.drive import drive
-from xosc_lateral.scenario.actions.longitudinal import LongitudinalDistanceAction
 from xosc_lateral.scenario.enums import CoordinateSystem, LongitudinalDisplacement, RelativeDistanceType
+from xosc_lateral.scenario.private_actions import LongitudinalDistanceAction
 
 CLOSE_ENOUGH = 0.1
 """A distance that is not kept continuously counts as reached. [m]"""

@@ -3,23 +3,16 @@
 from __future__ import annotations
 
 from xosc_lateral.playback.actions import (
-    appearance,
-    controllers,
-    environment,
     follow_trajectory,
+    global_actions,
     lane_change,
     lane_offset,
     lateral_distance,
     longitudinal_distance,
-    population,
-    routing,
+    private_actions,
     speed,
     speed_profile,
     synchronize,
-    teleport,
-    trailer,
-    unsupported,
-    values,
 )
 from xosc_lateral.playback.actions.base import RunningAction
 from xosc_lateral.playback.simulation import Simulation
@@ -28,23 +21,16 @@ from xosc_lateral.playback.storyboard import ActionElement
 from xosc_lateral.scenario import Action
 
 FAMILIES = (
-    appearance,
-    controllers,
-    environment,
     follow_trajectory,
+    global_actions,
     lane_change,
     lane_offset,
     lateral_distance,
     longitudinal_distance,
-    population,
-    routing,
+    private_actions,
     speed,
     speed_profile,
     synchronize,
-    teleport,
-    trailer,
-    unsupported,
-    values,
 )
 
 RUNNING: dict[type, type[RunningAction]] = {

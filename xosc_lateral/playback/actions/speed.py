@@ -6,8 +6,8 @@ from math import copysign
 
 from xosc_lateral.playback.actions.base import Domain, RunningAction
 from xosc_lateral.playback.transition import EPSILON, Transition
-from xosc_lateral.scenario.actions.longitudinal import AbsoluteTargetSpeed, RelativeTargetSpeed, SpeedAction
 from xosc_lateral.scenario.enums import DynamicsDimension, SpeedTargetValueType
+from xosc_lateral.scenario.private_actions import AbsoluteTargetSpeed, RelativeTargetSpeed, SpeedAction
 
 
 class RunningSpeed(RunningAction):

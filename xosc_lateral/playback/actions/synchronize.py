@@ -16,9 +16,9 @@ from xosc_lateral.playback.paths.base import Path, PathProgress, nearest_s
 from xosc_lateral.playback.positions.resolve import spot_at
 from xosc_lateral.playback.state import EntityState
 from xosc_lateral.playback.transition import EPSILON
-from xosc_lateral.scenario.actions.synchronize import AbsoluteSpeed, SynchronizeAction
 from xosc_lateral.scenario.enums import SpeedTargetValueType
 from xosc_lateral.scenario.position import Position, TrajectoryPosition
+from xosc_lateral.scenario.private_actions import AbsoluteSpeed, SynchronizeAction
 
 HARD_BRAKING = 8.0
 """When the entity comes so early that it has to stop at once. [m/s2]"""

@@ -3,26 +3,13 @@
 from __future__ import annotations
 
 from xosc_lateral.playback.conditions import (
-    acceleration,
     angle,
-    collision,
     distance,
-    lasting,
-    parameter,
-    reach_position,
+    motion,
     relative_clearance,
-    relative_distance,
-    relative_speed,
-    simulation_time,
-    speed,
     storyboard_element_state,
-    time_headway,
-    time_of_day,
     time_to_collision,
-    traffic_signal,
-    traveled_distance,
-    user_defined,
-    variable,
+    value,
 )
 from xosc_lateral.playback.conditions.base import EntityCheck, EntityChecks, ValueChecks
 from xosc_lateral.playback.conditions.storyboard_element_state import StateWatch
@@ -32,33 +19,14 @@ from xosc_lateral.playback.trigger import Check, RunningCondition, RunningTrigge
 from xosc_lateral.scenario import Condition, Trigger, Unsupported
 from xosc_lateral.scenario.enums import TriggeringEntitiesRule
 
-ON_ENTITIES = (
-    acceleration,
-    angle,
-    collision,
-    distance,
-    lasting,
-    reach_position,
-    relative_clearance,
-    relative_distance,
-    relative_speed,
-    speed,
-    time_headway,
-    time_to_collision,
-    traveled_distance,
-)
-ON_VALUES = (
-    parameter,
-    simulation_time,
-    storyboard_element_state,
-    time_of_day,
-    traffic_signal,
-    user_defined,
-    variable,
-)
-
-ENTITY_CHECKS: EntityChecks = {content: check for family in ON_ENTITIES for content, check in family.CHECKS.items()}
-VALUE_CHECKS: ValueChecks = {content: check for family in ON_VALUES for content, check in family.CHECKS.items()}
+ENTITY_CHECKS: EntityChecks = {
+    content: check
+    for family in (angle, distance, motion, relative_clearance, time_to_collision)
+    for content, check in family.CHECKS.items()
+}
+VALUE_CHECKS: ValueChecks = {
+    content: check for family in (storyboard_element_state, value) for content, check in family.CHECKS.items()
+}
 
 
 def prepare_trigger(trigger: Trigger, simulation: Simulation, *, when_empty: bool) -> RunningTrigger:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from xosc_lateral.playback.conditions.base import ValueCheck, ValueChecks
 from xosc_lateral.playback.simulation import Simulation
 from xosc_lateral.playback.storyboard import ElementState, ElementTransition, StoryboardElement
-from xosc_lateral.scenario.conditions.value import StoryboardElementStateCondition
+from xosc_lateral.scenario.conditions import StoryboardElementStateCondition
 from xosc_lateral.scenario.enums import StoryboardElementState
 
 _STATES = {

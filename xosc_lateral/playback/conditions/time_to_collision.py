@@ -10,14 +10,14 @@ from __future__ import annotations
 from math import copysign, hypot
 
 from xosc_lateral.playback.conditions.base import EntityCheck, EntityChecks
-from xosc_lateral.playback.conditions.measure import measure_of
+from xosc_lateral.playback.conditions.distance import measure_of
 from xosc_lateral.playback.distances import FAR, spot_distance, train_distance
 from xosc_lateral.playback.positions.resolve import spot_at
 from xosc_lateral.playback.simulation import Simulation
 from xosc_lateral.playback.state import EntityState
 from xosc_lateral.playback.transition import EPSILON
 from xosc_lateral.playback.values import holds
-from xosc_lateral.scenario.conditions.entity import TimeToCollisionCondition
+from xosc_lateral.scenario.conditions import TimeToCollisionCondition
 
 
 def prepare(content: TimeToCollisionCondition, simulation: Simulation) -> EntityCheck:

@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from math import inf, nan
 from typing import Any
+
+from msgspec import Struct
 
 from xosc_lateral.errors import PlaybackError, UnsupportedElementError
 from xosc_lateral.playback.paths.base import Path
 from xosc_lateral.playback.paths.clothoid import ClothoidPath, TimedClothoid
 from xosc_lateral.playback.paths.nurbs import Control, NurbsPath, clamped_knots
 from xosc_lateral.playback.paths.polyline import Corner, PolylinePath, fill_times, has_gaps_in_time, merge_close
-from xosc_lateral.playback.positions.reference import reference_of
+from xosc_lateral.playback.positions.on_road import reference_of
 from xosc_lateral.playback.simulation import Simulation
 from xosc_lateral.playback.state import EntityState
 from xosc_lateral.road import Pose
@@ -37,8 +38,7 @@ VERTEX_RADIUS = 0.1
 """Vertices of a polyline nearer than this count as one. [m]"""
 
 
-@dataclass(frozen=True, slots=True)
-class Layout:
+class Layout(Struct, frozen=True):
     """What laying out a path may depend on, besides the world: who follows it, how, and how fast it comes. [m/s]"""
 
     simulation: Simulation

@@ -1,17 +1,18 @@
-"""Placements from road coordinates: what lane, road and route positions have in common."""
+"""Places on a road from road coordinates, orientations, and places relative to an entity."""
 
 from __future__ import annotations
 
 from dataclasses import replace
-from math import pi
+from math import nan, pi
 
 from xosc_lateral.errors import PlaybackError
-from xosc_lateral.playback.placement import Placement
-from xosc_lateral.playback.positions.orientation import heading_of, is_absolute, tilted
+from xosc_lateral.playback.drive import travel
 from xosc_lateral.playback.simulation import Simulation
-from xosc_lateral.playback.state import EntityState
+from xosc_lateral.playback.state import NOWHERE, EntityState, Placement, RouteGuide
+from xosc_lateral.road import Pose
 from xosc_lateral.scenario import Place
-from xosc_lateral.scenario.position import Orientation
+from xosc_lateral.scenario.enums import ReferenceContext
+from xosc_lateral.scenario.position import FromCurrentEntity, Orientation, Position, RoutePosition
 
 
 def road_index(simulation: Simulation, road_id: str, place: Place) -> int:
@@ -88,3 +89,73 @@ _SLACK = 0.01
 
 def _error(what: str, place: Place) -> PlaybackError:
     return PlaybackError(what, path=place.path, line=place.line, element=place.element)
+
+
+_RELATIVE_SINCE = (1, 3)
+"""Version from which an orientation without a type is relative; before, it was absolute."""
+
+
+def is_absolute(orientation: Orientation | None, simulation: Simulation) -> bool:
+    """Whether it is meant in the world; no orientation at all is relative (along the road, like the entity)."""
+    if orientation is None:
+        return False
+    if orientation.type is None:
+        return simulation.scenario.header.version < _RELATIVE_SINCE
+    return orientation.type is ReferenceContext.ABSOLUTE
+
+
+def tilted(orientation: Orientation | None, pitch: float, roll: float, simulation: Simulation) -> tuple[float, float]:
+    """Pitch and roll: those of the reference plus what is given, or what is given alone where it is absolute. [rad]"""
+    p, r = (0.0, 0.0) if orientation is None else (orientation.p or 0.0, orientation.r or 0.0)
+    return (p, r) if is_absolute(orientation, simulation) else (pitch + p, roll + r)
+
+
+def tilted_or_road(orientation: Orientation | None, pose: Pose, simulation: Simulation) -> tuple[float, float]:
+    """Pitch and roll beside an entity; NaN (those of the road) where none are given. [rad]"""
+    if orientation is None or (orientation.p is None and orientation.r is None):
+        return nan, nan
+    return tilted(orientation, pose.pitch, pose.roll, simulation)
+
+
+def heading_of(orientation: Orientation | None) -> float:
+    """Its heading; 0 where none is given. [rad]"""
+    return 0.0 if orientation is None or orientation.h is None else orientation.h
+
+
+def on_road(simulation: Simulation, name: str, place: Place) -> EntityState:
+    """The entity, with its road coordinates; raises `PlaybackError` if it is on no road."""
+    state = simulation.entity(name, place)
+    state.locate()
+    if state.road == NOWHERE:
+        raise PlaybackError(
+            f"'{name}' is on no road, so there is no place beside it in road coordinates",
+            path=place.path,
+            line=place.line,
+            element=place.element,
+        )
+    return state
+
+
+def reference_of(position: Position) -> str | None:
+    """Name of the entity that a position refers to; None: it is absolute."""
+    if isinstance(position, RoutePosition):
+        where = position.in_route
+        return where.entity_ref if isinstance(where, FromCurrentEntity) else None
+    name: str | None = getattr(position, "entity_ref", None)
+    return name
+
+
+def pose_at(place: Placement, simulation: Simulation) -> Pose:
+    """World pose of a place. [m], [rad]"""
+    scout = EntityState(simulation.entities[0].entity, simulation.network)
+    scout.put(place)
+    return scout.pose
+
+
+def moved_along(state: EntityState, distance: float, way: int, route: RouteGuide | None = None) -> Placement:
+    """Where an entity would be after a way along the road, on `route` or else its own; `way` +1: along s. [m]"""
+    scout = EntityState(state.entity, state.network)
+    scout.put(Placement(state.road, state.lane, state.s, state.offset_t, state.relative_heading))
+    scout.route = route or state.route
+    travel(scout, way, distance)
+    return Placement(scout.road, scout.lane, scout.s, scout.offset_t, scout.relative_heading)

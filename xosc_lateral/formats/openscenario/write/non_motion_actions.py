@@ -15,21 +15,26 @@ from xosc_lateral.formats.openscenario.write.parameters import final
 from xosc_lateral.formats.xml import read_document
 from xosc_lateral.motion.nominal import PlayedAction
 from xosc_lateral.scenario import Action, Scenario
-from xosc_lateral.scenario.actions.controller import (
-    ActivateControllerAction,
-    AssignControllerAction,
-    OverrideControllerValueAction,
-)
-from xosc_lateral.scenario.actions.lateral import LaneChangeAction, LaneOffsetAction, LateralDistanceAction
-from xosc_lateral.scenario.actions.longitudinal import LongitudinalDistanceAction, SpeedAction, SpeedProfileAction
-from xosc_lateral.scenario.actions.population import AddEntityAction
-from xosc_lateral.scenario.actions.routing import AcquirePositionAction, AssignRouteAction, FollowTrajectoryAction
-from xosc_lateral.scenario.actions.synchronize import SynchronizeAction
-from xosc_lateral.scenario.actions.teleport import TeleportAction
-from xosc_lateral.scenario.actions.values import ParameterModifyAction, ParameterSetAction
 from xosc_lateral.scenario.enums import Priority
 from xosc_lateral.scenario.expressions import ExpressionError
+from xosc_lateral.scenario.global_actions import AddEntityAction, ParameterModifyAction, ParameterSetAction
 from xosc_lateral.scenario.parameters import Scope
+from xosc_lateral.scenario.private_actions import (
+    AcquirePositionAction,
+    ActivateControllerAction,
+    AssignControllerAction,
+    AssignRouteAction,
+    FollowTrajectoryAction,
+    LaneChangeAction,
+    LaneOffsetAction,
+    LateralDistanceAction,
+    LongitudinalDistanceAction,
+    OverrideControllerValueAction,
+    SpeedAction,
+    SpeedProfileAction,
+    SynchronizeAction,
+    TeleportAction,
+)
 
 MOTION = (
     TeleportAction,

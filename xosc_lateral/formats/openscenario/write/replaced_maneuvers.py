@@ -8,9 +8,9 @@ but for conditions on the state of what is gone: they get the time at which the 
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping
-from dataclasses import dataclass
 
 from lxml import etree
+from msgspec import Struct
 
 from xosc_lateral.errors import FormatError, locate
 from xosc_lateral.formats.openscenario.element import at_node, local_name
@@ -27,14 +27,14 @@ from xosc_lateral.formats.openscenario.write.vertices import Vertices
 from xosc_lateral.formats.xml import parse_xml
 from xosc_lateral.motion.nominal import NominalMotion, PlayedAction
 from xosc_lateral.scenario import Act, ManeuverGroup, Scenario
-from xosc_lateral.scenario.actions.population import AddEntityAction, DeleteEntityAction
-from xosc_lateral.scenario.actions.trailer import ConnectTrailerAction
-from xosc_lateral.scenario.conditions.value import StoryboardElementStateCondition
+from xosc_lateral.scenario.conditions import StoryboardElementStateCondition
 from xosc_lateral.scenario.dependence import actors_of, conditions_of, refers_to
 from xosc_lateral.scenario.enums import StoryboardElementState
+from xosc_lateral.scenario.global_actions import AddEntityAction, DeleteEntityAction
 from xosc_lateral.scenario.parameters import Scope
 from xosc_lateral.scenario.place import Unsupported
-from xosc_lateral.scenario.trigger import Condition
+from xosc_lateral.scenario.private_actions import ConnectTrailerAction
+from xosc_lateral.scenario.storyboard import Condition
 
 STORY = "xosc-lateral trajectories"
 NEVER = 1e9
@@ -46,8 +46,7 @@ _ENDS = (StoryboardElementState.END_TRANSITION, StoryboardElementState.COMPLETE)
 Path = tuple[str, ...]
 
 
-@dataclass(frozen=True, slots=True)
-class Group:
+class Group(Struct, frozen=True):
     """A maneuver group with its names from the story down, and the act around it."""
 
     path: Path

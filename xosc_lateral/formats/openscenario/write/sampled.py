@@ -10,7 +10,7 @@ from xosc_lateral.formats.openscenario.write.versions import newer_than
 from xosc_lateral.formats.xml import parse_xml
 from xosc_lateral.motion.nominal import NominalMotion
 from xosc_lateral.scenario import Scenario
-from xosc_lateral.scenario.actions.trailer import ConnectTrailerAction
+from xosc_lateral.scenario.private_actions import ConnectTrailerAction
 
 
 def motion_unknown_to(

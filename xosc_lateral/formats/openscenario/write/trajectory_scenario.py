@@ -35,10 +35,10 @@ from xosc_lateral.formats.xml import parse_xml
 from xosc_lateral.motion.nominal import NominalMotion, PlayedAction
 from xosc_lateral.motion.trajectory import WorldTrajectory
 from xosc_lateral.scenario import Scenario
-from xosc_lateral.scenario.actions.trailer import ConnectTrailerAction
-from xosc_lateral.scenario.conditions.value import SimulationTimeCondition
+from xosc_lateral.scenario.conditions import SimulationTimeCondition
 from xosc_lateral.scenario.parameters import Scope
 from xosc_lateral.scenario.place import Unsupported
+from xosc_lateral.scenario.private_actions import ConnectTrailerAction
 
 FloatArray = NDArray[np.float64]
 

@@ -1,1 +1,0 @@
-"""Conditions as files have them: on an entity's state (`entity`), on values (`value`)."""
