@@ -44,8 +44,7 @@ def drawing(messages: list[Any], seconds: float) -> str:
         is_dashed = edge.classification.type == edge.classification.TYPE_DASHED_LINE
         points = [point.position for point in edge.boundary_line]
         parts.append(line(points, f"stroke='#888' stroke-width='2' {dashed if is_dashed else ''}"))
-    for lane in road.lane:
-        parts.append(line(lane.classification.centerline, "stroke='#cde' stroke-dasharray='2 6'"))
+    parts += [line(one.classification.centerline, "stroke='#cde' stroke-dasharray='2 6'") for one in road.lane]
     heights = [float(word.split(",")[1]) for part in parts for word in part.split("'")[1].split()]
     for number, one in there.items():
         before = [a for m in messages[max(0, row - 500) : row : 10] for a in m.moving_object if a.id.value == number]
@@ -68,6 +67,7 @@ def drawing(messages: list[Any], seconds: float) -> str:
 
 
 def main() -> None:
+    """Write the picture beside this file."""
     with tempfile.TemporaryDirectory() as folder:
         if len(sys.argv) > 1:
             trace = Path(sys.argv[1])

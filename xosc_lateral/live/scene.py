@@ -16,10 +16,9 @@ from xosc_lateral.errors import SimulationError
 from xosc_lateral.formats.opendrive import read_opendrive
 from xosc_lateral.motion.nominal import Activity, EntityMotion, NominalMotion
 from xosc_lateral.road.network import RoadNetwork
-from xosc_lateral.scenario.entity import Entity
+from xosc_lateral.scenario.entity import BoundingBox, Entity
 from xosc_lateral.scenario.enums import EntityCategory, VehicleCategory
 from xosc_lateral.scenario.place import Place
-from xosc_lateral.scenario.vehicle import BoundingBox
 
 KINDS = {
     "bicycle": VehicleCategory.BICYCLE, "bus": VehicleCategory.BUS, "coach": VehicleCategory.BUS,
