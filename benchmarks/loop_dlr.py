@@ -20,7 +20,7 @@ from benchmarks.markers import show
 from benchmarks.refined import refine_population
 from xosc_lateral.formats.drives import read_drives
 from xosc_lateral.identification.close import LoopResult
-from xosc_lateral.identification.lack_of_fit import LackOfFit, lack_of_fit_of
+from xosc_lateral.identification.residual import LackOfFit
 from xosc_lateral.report.figures import PAPER
 from xosc_lateral.report.loop import loop_text
 from xosc_lateral.report.loop_figures import effect_figure, residual_figure, spectrum_figure
@@ -44,14 +44,13 @@ def main() -> None:
     started = time.perf_counter()
     result = refine_population(read_drives([args.table]), args.seed)
     took = time.perf_counter() - started
-    lack_of_fit = lack_of_fit_of(result)
     show(
-        f"```\n{loop_text(result, lack_of_fit)}\n```\n\nIn {took:.0f} s.\n\n{group_table(lack_of_fit)}",
+        f"```\n{loop_text(result)}\n```\n\nIn {took:.0f} s.\n\n{group_table(result.lack_of_fit)}",
         args.write,
         "loop-dlr",
     )
     if args.figures is not None:
-        draw(result, lack_of_fit, args.figures)
+        draw(result, args.figures)
 
 
 def group_table(lack_of_fit: LackOfFit) -> str:
@@ -63,7 +62,7 @@ def group_table(lack_of_fit: LackOfFit) -> str:
     return "\n".join(rows)
 
 
-def draw(result: LoopResult, lack_of_fit: LackOfFit, folder: Path) -> None:
+def draw(result: LoopResult, folder: Path) -> None:
     """Figures on white, which light and dark pages show alike."""
     folder.mkdir(parents=True, exist_ok=True)
     for number, finding in enumerate(result.findings, 1):
@@ -74,7 +73,7 @@ def draw(result: LoopResult, lack_of_fit: LackOfFit, folder: Path) -> None:
             figure, _ = DRAWINGS[finding.kind]
             _save(figure(result, finding), folder / f"loop_dlr_{finding.kind}.png")
     _save(spectrum_figure(result), folder / "loop_dlr_spectrum.png")
-    _save(residual_figure(result, lack_of_fit, "mean"), folder / "loop_dlr_residual.png")
+    _save(residual_figure(result, "mean"), folder / "loop_dlr_residual.png")
 
 
 def _save(figure: Figure, path: Path) -> None:

@@ -16,7 +16,7 @@ from pathlib import Path
 
 from xosc_lateral.errors import XoscLateralError
 from xosc_lateral.formats.opendrive import read_opendrive
-from xosc_lateral.formats.openscenario import read_scenario
+from xosc_lateral.formats.openscenario.read import read_scenario
 from xosc_lateral.motion.nominal import NominalMotion
 from xosc_lateral.playback.player import play
 from xosc_lateral.road import RoadNetwork

@@ -185,22 +185,3 @@ def test_a_column_that_tables_lack_is_said_once_and_one_that_a_drive_never_met_i
         "drive DataFrame 1:2: left_distance not known, left without effect",
         "4 of 4 drives: wind_speed not known, left without effect",
     )
-
-
-def test_zones_of_a_profile_that_a_table_lacks_or_that_are_others_are_said(tmp_path):
-    from xosc_lateral.driver.effects import Acts, Zones
-
-    zones = Zones(acts=Acts.QUICK, zones=("a", "b"), values=(0.8, -0.8), value_errors=(0.1, 0.1))
-    bare = xl.read_profile("motorway-vehicle-1")
-    profile, time = bare.with_effects(zones), 0.2 * np.arange(200.0)
-    table = pd.DataFrame({"drive": "d", "time": time, "offset": 0.1 * np.sin(time), "lane_width": 3.5})
-    made = xl.sample(profile, context=table, seed=1)
-    assert made.warnings == ("drive d: zone not known, left without effect",)
-    pd.testing.assert_frame_equal(made.to_frame(), xl.sample(bare, context=table, seed=1).to_frame())
-    assert xl.sample(profile, duration=10.0).warnings == ()  # a free run is in no zone
-    known = xl.sample(profile, context=table.assign(zone=np.where(time < 20.0, "a", "b")), seed=1)
-    assert known.warnings == ()
-    assert not known.to_frame().equals(made.to_frame())
-    half = xl.sample(profile, context=table.assign(zone=np.where(time < 20.0, "a", "elsewhere")), seed=1)
-    assert half.warnings == ("1 of 2 zones are not the profile's (elsewhere, say), taken as the mean of all",)
-    assert xl.sample(bare, context=table.assign(zone="a"), seed=1).warnings == ()

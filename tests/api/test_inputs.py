@@ -10,7 +10,7 @@ import pandas as pd
 import pytest
 
 import xosc_lateral as xl
-from xosc_lateral.api.inputs import as_paths, frame_hash, given_drives, given_profile, naming, road_search
+from xosc_lateral.api.result import as_paths, frame_hash, given_drives, given_profile, naming, road_search
 from xosc_lateral.drives.drive import Drive
 from xosc_lateral.errors import FormatError, NotEnoughDataError, XoscLateralError
 

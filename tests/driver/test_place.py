@@ -6,21 +6,17 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from msgspec.structs import replace as msgspec_replace
 
 from tests.benchmarks.models.made_runs import made_run, smooth_runs
-from xosc_lateral.driver.effects import Acts, Linear, Zones
+from xosc_lateral.driver.answers import SCALE
+from xosc_lateral.driver.effects import Acts, Linear
 from xosc_lateral.driver.fitting import fit_population, fit_profile
 from xosc_lateral.driver.models.autoregressive.filters import split_bands
-from xosc_lateral.driver.neighbours import SCALE
-from xosc_lateral.driver.place import _shrunk, fit_place, without_place
-from xosc_lateral.driver.quick import quick_part
+from xosc_lateral.driver.place import LEAST_DRIVES, _shrunk, fit_place, without_place
 from xosc_lateral.driver.sampling import sample_offsets
 from xosc_lateral.driver.snippets import segment_of
-from xosc_lateral.driver.zone_levels import LEAST_DRIVES
 from xosc_lateral.drives.cuts import CutRules
 from xosc_lateral.drives.drive import Drive, Run
-from xosc_lateral.drives.resampling import STEP
 from xosc_lateral.errors import DriverProfileError, NotEnoughDataError
 
 
@@ -174,88 +170,3 @@ def test_the_paper_s_model_has_no_neighbours():
 
 
 MEAN_OF_HALF_A_WAVE = 2.0 / np.pi
-
-
-def zoned_population(seed: int, *, loud: float = 0.0, drivers: int = 60) -> list[Run]:
-    """Drivers who wander by decimetres, and by some centimetres quickly.
-
-    Quick movement is e^loud times as large in the middle of every second zone of 5 s as in that of the others.
-    """
-    rng = np.random.default_rng([seed, 2])
-    runs = []
-    for k, run in enumerate(smooth_runs(drivers, 60.0, seed=seed)):
-        n, first = len(run), int(rng.integers(25))
-        place = (first + np.arange(n)) / 25.0
-        number, louder = place.astype(np.int64), -0.5 * loud * np.cos(np.pi * (place - 0.5))
-        quick = quick_part(0.05 * split_bands(rng.normal(size=n), STEP)[0], STEP)
-        moved = run.offset - quick_part(run.offset, STEP) + quick * np.exp(louder)
-        names = np.array([f"zone {one}" for one in number.tolist()])
-        runs.append(replace(made_run(moved, drive=f"d{k}", speed=25.0 + 10.0 * rng.random()), zone=names))
-    return runs
-
-
-def test_louder_zones_are_found_and_taken_out():
-    runs = zoned_population(1, loud=0.8)
-    (found,) = (effect for effect in fit_place(runs) if isinstance(effect, Zones))
-    assert found.acts is Acts.QUICK
-    level = dict(zip(found.zones, found.values, strict=True))
-    loud, quiet = ([level[f"zone {k}"] for k in range(first, 12, 2)] for first in (1, 2))
-    assert np.mean(loud) - np.mean(quiet) == pytest.approx(0.8 * MEAN_OF_HALF_A_WAVE, abs=0.12)
-    left = [effect for effect in fit_place(without_place(runs, [found])) if isinstance(effect, Zones)]
-    if left:
-        rest = dict(zip(left[0].zones, left[0].values, strict=True))
-        assert abs(np.mean([rest[f"zone {k}"] for k in range(1, 12, 2)]) - np.mean(list(rest.values()))) < 0.12
-
-
-def test_zones_are_found_where_nothing_else_is_known():
-    """All at one speed in one lane, or with zones and nothing besides: the place is as loud."""
-    for constant in ({"speed": 30.0}, {}):
-        runs = [
-            replace(run, context={name: np.full(len(run), value) for name, value in constant.items()})
-            for run in zoned_population(1, loud=0.8)
-        ]
-        (found,) = fit_place(runs)
-        assert isinstance(found, Zones)
-        level = dict(zip(found.zones, found.values, strict=True))
-        loud, quiet = ([level[f"zone {k}"] for k in range(first, 12, 2)] for first in (1, 2))
-        assert np.mean(loud) - np.mean(quiet) == pytest.approx(0.8 * MEAN_OF_HALF_A_WAVE, abs=0.12)
-
-
-def test_wandering_is_left_as_it_is_where_a_zone_is_taken_out():
-    runs = zoned_population(2, loud=0.8)
-    for run, neutral in zip(runs, without_place(runs, fit_place(runs)), strict=True):
-        slow = run.offset - quick_part(run.offset, STEP)
-        np.testing.assert_allclose(neutral.offset - quick_part(neutral.offset, STEP), slow, atol=0.02)
-
-
-def test_zones_that_are_alike_are_no_effect():
-    found = [effect for seed in range(40, 60) for effect in fit_place(zoned_population(seed))]
-    assert sum(isinstance(effect, Zones) for effect in found) <= 2
-
-
-def test_zones_of_few_drives_or_unknown_ones_are_no_effect():
-    runs = zoned_population(3, loud=0.8, drivers=LEAST_DRIVES - 1)
-    assert not any(isinstance(effect, Zones) for effect in fit_place(runs))
-    bare = [replace(run, zone=None) for run in zoned_population(3, loud=0.8)]
-    assert not any(isinstance(effect, Zones) for effect in fit_place(bare))
-    unnamed = [replace(run, zone=np.full(len(run), "")) for run in zoned_population(3, loud=0.8)]
-    assert not any(isinstance(effect, Zones) for effect in fit_place(unnamed))
-
-
-def test_sampled_runs_are_loud_where_the_zones_are_and_as_before_where_they_are_not_known():
-    runs = zoned_population(4, loud=0.8)
-    profile = fit_population(runs, name="zoned")
-    plain = msgspec_replace(profile, effects=tuple(e for e in profile.effects if not isinstance(e, Zones)))
-    run, far = runs[0], np.tile(["zone 1", "zone 2", "elsewhere"], (1000, 1)).T.ravel()
-    n = len(far)
-    long = replace(made_run(np.zeros(n), speed=30.0), zone=far)
-    parts = [slice(100, 900), slice(1100, 1900), slice(2100, 2900)]
-    made = [sample_offsets(profile, segment_of(long), seed) for seed in range(20)]
-    loud, quiet, unknown = ([quick_part(path, STEP)[part].std() for path in made] for part in parts)
-    assert np.log(np.mean(loud) / np.mean(quiet)) == pytest.approx(0.8 * MEAN_OF_HALF_A_WAVE, abs=0.15)
-    assert np.mean(quiet) < np.mean(unknown) < np.mean(loud)
-    bare = replace(run, zone=None)
-    for other in (profile, plain):
-        np.testing.assert_array_equal(
-            sample_offsets(other, segment_of(bare), 5), sample_offsets(plain, segment_of(bare), 5)
-        )

@@ -12,9 +12,7 @@ from tests.driver.certified import FOLDER, MODELS, SEED
 from xosc_lateral.driver.effects import Acts, Cycle, Drift, EffectTerms, Linear, Population, Regimes
 from xosc_lateral.driver.process import DriveProcess, combine
 from xosc_lateral.driver.profile import DriverProfile
-from xosc_lateral.driver.quick import quick_part
 from xosc_lateral.driver.records import plain
-from xosc_lateral.driver.seeds import DriveSeed, child
 from xosc_lateral.formats.profiles import read_profile
 
 HIDDEN = (
@@ -110,76 +108,3 @@ def test_random_slopes_are_drawn_once_per_drive_with_the_spread_stated() -> None
     again = DriveProcess(profile, np.random.SeedSequence(7)).columned[0].coefficients
     assert again == DriveProcess(profile, np.random.SeedSequence(7)).columned[0].coefficients
     assert DriverProfile.from_dict(profile.to_dict()).effects == (slope,)
-
-
-def quickened(process: DriveProcess, blocks: list[int], factor: np.ndarray) -> np.ndarray:
-    process.begin_at(0.0)
-    taken, row = [], 0
-    for n in blocks:
-        rows = np.arange(row, row + n)
-        terms = combine([process.hidden_terms_at(rows), EffectTerms(quick=factor[rows])])
-        taken.append(process.take(terms, WIDTH[rows], 0.2 if row == 0 else None))
-        row += n
-    return np.concatenate(taken)
-
-
-@pytest.mark.parametrize("ahead", [0, 64])
-@pytest.mark.parametrize("blocks", [[1] * 200, [3, 77, 1, 119], [64, 64, 72]], ids=["singles", "odd", "ahead"])
-def test_blocks_agree_where_quick_movement_is_acted_on(profile: DriverProfile, blocks: list[int], ahead: int) -> None:
-    factor = np.exp(np.sin(np.arange(N) / 20.0))
-    whole = quickened(DriveProcess(profile, np.random.SeedSequence(SEED)), [200], factor)
-    pieces = quickened(DriveProcess(profile, np.random.SeedSequence(SEED), ahead=ahead), blocks, factor)
-    np.testing.assert_array_equal(pieces, whole)
-    assert whole[0] == pytest.approx(0.2, abs=1e-12)  # it begins where it was told to
-
-
-def test_a_factor_of_one_on_quick_movement_changes_nothing(profile: DriverProfile) -> None:
-    plain_one = offsets(DriveProcess(profile, np.random.SeedSequence(SEED)), [300])
-    np.testing.assert_array_equal(
-        quickened(DriveProcess(profile, np.random.SeedSequence(SEED)), [300], np.ones(N)), plain_one
-    )
-
-
-def test_a_saved_state_goes_on_with_quick_movement_acted_on(profile: DriverProfile) -> None:
-    factor = np.full(N, 2.0)
-    process = DriveProcess(profile, np.random.SeedSequence(3))
-    quickened(process, [100], factor)
-    saved = plain(process.state)
-    rows = np.arange(100, 180)
-    terms = combine([process.hidden_terms_at(rows), EffectTerms(quick=factor[rows])])
-    expected = process.take(terms, WIDTH[rows])
-    again = DriveProcess(profile, np.random.SeedSequence(3))
-    again.restore(saved, "state")
-    terms = combine([again.hidden_terms_at(rows), EffectTerms(quick=factor[rows])])
-    np.testing.assert_array_equal(again.take(terms, WIDTH[rows]), expected)
-
-
-def test_a_state_from_before_there_was_quick_movement_is_read(profile: DriverProfile) -> None:
-    process = DriveProcess(profile, np.random.SeedSequence(3))
-    offsets(process, [100])
-    saved = plain(process.state)
-    del saved["past"]
-    saved["terms"] = saved["terms"][:4]
-    rows = np.arange(100, 150)
-    again = DriveProcess(profile, np.random.SeedSequence(3))
-    again.restore(saved, "state")
-    expected = process.take(process.hidden_terms_at(rows), WIDTH[rows])
-    np.testing.assert_array_equal(again.take(again.hidden_terms_at(rows), WIDTH[rows]), expected)
-
-
-def test_quick_movement_grows_by_the_factor_and_the_rest_stays(profile: DriverProfile) -> None:
-    bare, n, inside = replace(profile, effects=()), 2000, slice(100, -100)
-    seed = np.random.SeedSequence(7)
-    coarse, fine = bare.model.stream(child(seed, DriveSeed.CORE)).take(n)
-    louder = DriveProcess(bare, seed).take(EffectTerms(quick=np.full(n, 2.0)), np.ones(n))
-    expected = coarse + quick_part(coarse, bare.model.step) + 2.0 * fine
-    np.testing.assert_allclose(louder[inside], expected[inside], atol=1e-12)
-
-
-def test_at_a_rate_of_mean_reversion_only_the_fine_movement_is_made_louder(profile: DriverProfile) -> None:
-    rate, both = np.full(N, 1.5), []
-    for factor in (None, np.full(N, 2.0)):
-        process = DriveProcess(replace(profile, effects=()), np.random.SeedSequence(7))
-        both.append(process.take(EffectTerms(rate=rate, quick=factor), np.ones(N)))
-    assert np.isfinite(both[1]).all() and not np.array_equal(*both)
-    assert (both[1] - both[0]).std() < 0.1  # fine movement is some centimetres

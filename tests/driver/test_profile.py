@@ -10,9 +10,15 @@ import pytest
 from msgspec.structs import replace
 
 from tests.driver.models.made_models import POPULATION
-from xosc_lateral.driver.effects import Acts, Drift, Linear, Zones
-from xosc_lateral.driver.profile import MAX_LANE_WIDTH, DriverProfile, profile_schema, sampling_hash
-from xosc_lateral.driver.provenance import Metadata, Provenance
+from xosc_lateral.driver.effects import Acts, Drift, Linear
+from xosc_lateral.driver.profile import (
+    MAX_LANE_WIDTH,
+    DriverProfile,
+    Metadata,
+    Provenance,
+    profile_schema,
+    sampling_hash,
+)
 from xosc_lateral.driver.sensor.model import SensorModel
 from xosc_lateral.errors import DriverProfileError
 
@@ -70,13 +76,6 @@ def test_columns_are_those_of_all_effects_once() -> None:
     twice = BARE.with_effects(LINE, LINE)
     assert twice.columns == ("grade",)
     assert BARE.columns == ()
-
-
-def test_zones_are_columns_that_only_a_recording_can_have() -> None:
-    zones = Zones(acts=Acts.QUICK, zones=("a",), values=(0.1,), value_errors=(0.1,))
-    placed = BARE.with_effects(LINE, zones)
-    assert placed.columns == ("grade", "zone")
-    assert placed.columns_of_any_drive == ("grade",)
 
 
 def test_effects_are_added_behind_those_there_and_the_profile_itself_stays() -> None:

@@ -25,7 +25,6 @@ from xosc_lateral.driver.effects import (
     Step,
     TimeSmooth,
     VarianceTrend,
-    Zones,
 )
 from xosc_lateral.driver.models.two_level.fit import fit_two_level
 from xosc_lateral.driver.profile import DriverProfile
@@ -285,14 +284,3 @@ def test_wrong_use_is_refused() -> None:
         stream.look({})
     with pytest.raises(ValueError, match="lane_width -1"):
         stream.step({"lane_width": -1.0})
-
-
-def test_a_stream_is_in_no_zone_and_looks_ahead_for_none() -> None:
-    profile = read_profile("motorway-vehicle-1")
-    smooth = {"lag_s": -4.0, "response_s": 0.5, "response_order": 2}
-    zones = Zones(acts=Acts.QUICK, zones=("a", "b"), values=(0.8, -0.8), value_errors=(0.1, 0.1), **smooth)
-    zoned = replace(profile, effects=(*profile.effects, zones))
-    one, other = OffsetStream(zoned, seed=3), OffsetStream(profile, seed=3)
-    assert one.preview == other.preview
-    context = {"speed": 30.0, "lane_width": 3.5}
-    assert [one.step(context) for _ in range(30)] == [other.step(context) for _ in range(30)]

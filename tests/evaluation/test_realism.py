@@ -6,11 +6,10 @@ import numpy as np
 import pytest
 from msgspec.structs import replace
 
-from tests.benchmarks.models.made_runs import made_run, smooth_runs
+from tests.benchmarks.models.made_runs import smooth_runs
 from xosc_lateral.driver.fitting import fit_runs
 from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.driver.sensor.model import SensorModel
-from xosc_lateral.driver.snippets import segment_of
 from xosc_lateral.drives.drive import Run
 from xosc_lateral.drives.resampling import STEP
 from xosc_lateral.evaluation.parts import SnippetCondition
@@ -82,9 +81,9 @@ def test_a_sensor_counts_where_all_is_compared_and_not_below_half_a_hertz(profil
     assert scores.of(SHORT).with_sensor and not scores.of(SLOW).with_sensor
     assert scores.of(SHORT).families["spectrum"].ratio > 3.0
     assert scores.of(SLOW).families["spectrum"].ratio < 2.0
-    path, segment = np.zeros(400), segment_of(made_run(np.zeros(400)))
-    assert sensor_noise(noisy, [path], [segment], 0)[0].std() == pytest.approx(np.sqrt(4e-3 * 1.5), rel=0.15)
-    assert not sensor_noise(profile, [path], [segment], 0)[0].any()
+    path = np.zeros(400)
+    assert sensor_noise(noisy, [path], 0)[0].std() == pytest.approx(np.sqrt(4e-3 * 1.5), rel=0.15)
+    assert not sensor_noise(profile, [path], 0)[0].any()
 
 
 def test_a_foreign_place_shows_in_free_runs_and_less_from_the_same_start(profile: DriverProfile, own: list[Run]):

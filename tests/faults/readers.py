@@ -19,16 +19,16 @@ from tests.faults.reader import NonsenseError, Reader, sane
 from tests.faults.recordings import RECORDINGS
 from tests.formats.made_scenario import ROAD, declarations, entity, parameter, scenario_text, vehicle
 from tests.profiles import simulated_profile
-from xosc_lateral.api.inputs import given_drives, given_profile, naming
+from xosc_lateral.api.result import given_drives, given_profile, naming
 from xosc_lateral.datasets import simulate_drive
 from xosc_lateral.driver.sampled_offsets import sample_free
 from xosc_lateral.driver.stream import OffsetStream
 from xosc_lateral.drives.cuts import all_runs
 from xosc_lateral.errors import DriverProfileError
 from xosc_lateral.formats.context_table import read_context
-from xosc_lateral.formats.openscenario import read_scenario
 from xosc_lateral.formats.openscenario.distribution import read_distribution
 from xosc_lateral.formats.openscenario.provenance import facts_in
+from xosc_lateral.formats.openscenario.read import read_scenario
 from xosc_lateral.formats.profiles import list_profiles, profile_bytes, read_profile
 from xosc_lateral.limits import context_range
 from xosc_lateral.pipeline.convert import convert_scenario

@@ -5,7 +5,7 @@ from __future__ import annotations
 import shutil
 from pathlib import Path
 
-from xosc_lateral.formats.openscenario import read_scenario
+from xosc_lateral.formats.openscenario.read import read_scenario
 from xosc_lateral.scenario import Scenario
 
 ROAD = Path(__file__).parents[1] / "data" / "xosc" / "road.xodr"

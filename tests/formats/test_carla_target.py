@@ -24,8 +24,9 @@ from tests.formats.made_scenario import (
 from tests.formats.test_openscenario_write import CUSTOM, LIGHT, STOP_AND_GO, VISIBLE, nominal, played
 from tests.formats.test_versions import ENVIRONMENT, RICH, tree, written
 from xosc_lateral.errors import FormatError
-from xosc_lateral.formats.openscenario import read_scenario
-from xosc_lateral.formats.openscenario.write import target, write_trajectory_scenario
+from xosc_lateral.formats.openscenario.read import read_scenario
+from xosc_lateral.formats.openscenario.write.target import target
+from xosc_lateral.formats.openscenario.write.trajectory_scenario import write_trajectory_scenario
 
 SIGNAL = (
     "<GlobalAction><InfrastructureAction><TrafficSignalAction>"

@@ -10,8 +10,9 @@ from tests.formats.made_scenario import action, event, speed_action, story
 from tests.formats.test_openscenario_write import played
 from tests.formats.test_versions import tree, written
 from xosc_lateral.errors import FormatError
-from xosc_lateral.formats.openscenario import read_scenario
-from xosc_lateral.formats.openscenario.write import target, write_lane_offset_scenario
+from xosc_lateral.formats.openscenario.read import read_scenario
+from xosc_lateral.formats.openscenario.write.lane_offset_scenario import write_lane_offset_scenario
+from xosc_lateral.formats.openscenario.write.target import target
 
 RANDOM = "<PrivateAction><RoutingAction><RandomRouteAction/></RoutingAction></PrivateAction>"
 ANGLE = (

@@ -265,23 +265,6 @@ def test_dlr_offsets_come_back_without_lane_geometry(dlr_csv, dlr_full):
     assert table["lane_width"].median() == pytest.approx(WIDTH, abs=0.15)
 
 
-def test_dlr_zones_are_a_hundred_metres_of_one_lane_the_same_for_all(dlr_full):
-    table = dlr_full.table
-    kept = table[table["state"] == "kept"]
-    assert (
-        kept["zone"].str.fullmatch(r"(north|south)bound lane [01], -?\d+00 m|(north|south)bound lane [01], 0 m").all()
-    )
-    assert (table.loc[table["lane_index"] < 0, "zone"] == "").all()
-    lanes = kept["zone"].str.extract(r"lane (\d),")[0].astype(int)
-    assert (lanes.to_numpy() == kept["lane_index"].to_numpy()).all()
-    ways = kept.groupby(["drive", "following_run"]).agg(
-        zones=("zone", "nunique"), speed=("speed", "mean"), n=("time", "count")
-    )
-    metres = ways["speed"] * ways["n"] * 0.05
-    assert (ways["zones"] - metres / 100.0).abs().max() <= 2.0
-    assert kept.groupby("zone")["drive"].nunique().max() > 10
-
-
 def test_dlr_cuts_lane_changes_and_long_bridges_and_says_so(dlr_csv, dlr_full):
     path, imported = dlr_csv[0], dlr_full
     rows = dict(imported.provenance.rows)

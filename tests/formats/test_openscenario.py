@@ -25,8 +25,8 @@ from tests.formats.made_scenario import (
     write_scenario,
 )
 from xosc_lateral.errors import FormatError
-from xosc_lateral.formats.openscenario import read_scenario
 from xosc_lateral.formats.openscenario.catalogs import LEVELS_UP
+from xosc_lateral.formats.openscenario.read import read_scenario
 from xosc_lateral.scenario.conditions import SimulationTimeCondition, TimeHeadwayCondition
 from xosc_lateral.scenario.enums import ConditionEdge, DynamicsShape, Priority, Rule, VehicleCategory
 from xosc_lateral.scenario.place import Unsupported

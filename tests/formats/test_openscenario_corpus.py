@@ -11,8 +11,9 @@ import pytest
 from lxml import etree
 
 from xosc_lateral.errors import FormatError
-from xosc_lateral.formats.openscenario import is_distribution, read_distribution, read_scenario
-from xosc_lateral.formats.openscenario.write import write_trajectory_scenario
+from xosc_lateral.formats.openscenario.distribution import is_distribution, read_distribution
+from xosc_lateral.formats.openscenario.read import read_scenario
+from xosc_lateral.formats.openscenario.write.trajectory_scenario import write_trajectory_scenario
 from xosc_lateral.motion.nominal import Activity, EntityMotion, NominalMotion, PlayedAction
 from xosc_lateral.motion.trajectory import WorldTrajectory
 from xosc_lateral.scenario import Scenario

@@ -6,7 +6,8 @@ import pytest
 
 from tests.formats.made_scenario import declarations, parameter, scenario_text, write_scenario
 from xosc_lateral.errors import FormatError
-from xosc_lateral.formats.openscenario import LogicalScenario, is_distribution, read_distribution, read_scenario
+from xosc_lateral.formats.openscenario.distribution import LogicalScenario, is_distribution, read_distribution
+from xosc_lateral.formats.openscenario.read import read_scenario
 
 BELOW_60 = '<ConstraintGroup><ValueConstraint rule="lessThan" value="60"/></ConstraintGroup>'
 BELOW_SPEED = '<ConstraintGroup><ValueConstraint rule="lessThan" value="${$Speed / 2}"/></ConstraintGroup>'

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from xosc_lateral.errors import FormatError
-from xosc_lateral.formats.openscenario import read_scenario
+from xosc_lateral.formats.openscenario.read import read_scenario
 
 DATA = Path(__file__).parents[1] / "data" / "xosc"
 VALID = sorted((DATA / "valid").glob("*.xosc"))

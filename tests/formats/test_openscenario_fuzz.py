@@ -29,8 +29,9 @@ from tests.formats.made_scenario import (
 )
 from xosc_lateral.errors import FormatError, XoscLateralError
 from xosc_lateral.formats.opendrive import read_opendrive
-from xosc_lateral.formats.openscenario import read_distribution, read_scenario
-from xosc_lateral.formats.openscenario.write import write_trajectory_scenario
+from xosc_lateral.formats.openscenario.distribution import read_distribution
+from xosc_lateral.formats.openscenario.read import read_scenario
+from xosc_lateral.formats.openscenario.write.trajectory_scenario import write_trajectory_scenario
 from xosc_lateral.motion.trajectory import WorldTrajectory
 from xosc_lateral.playback.player import play
 

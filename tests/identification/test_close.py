@@ -21,9 +21,7 @@ from xosc_lateral.driver.fitting import fit_profile
 from xosc_lateral.drives.drive import Drive
 from xosc_lateral.errors import NotEnoughDataError
 from xosc_lateral.formats.drives import read_drives
-from xosc_lateral.identification.close import NO_WORSE, LoopResult, close_loop
-from xosc_lateral.identification.findings import Finding
-from xosc_lateral.identification.lack_of_fit import lack_of_fit_of
+from xosc_lateral.identification.close import NO_WORSE, Finding, LoopResult, close_loop
 from xosc_lateral.report.loop_json import loop_record
 
 Driven = Callable[..., list[Drive]]
@@ -121,8 +119,7 @@ def test_what_a_missing_column_did_is_reported_as_unexplained_or_as_hidden(drive
     drives = driven(303, [plants.truck_avoidance(1.2)], 2400.0, drop=["truck_right"])
     result = close_loop(drives, seed=1)
     assert not any(finding.kind == "location" for finding in result.findings)
-    lack_of_fit = lack_of_fit_of(result)
-    record = loop_record(result, lack_of_fit, [])["unexplained"]
+    record = loop_record(result, [])["unexplained"]
     beyond = max(result.error_after**2 - result.floor**2, 0.0) ** 0.5
     assert record["size_m"] == pytest.approx(beyond)
     assert beyond > 0.01 or any(not finding.columns for finding in result.findings)

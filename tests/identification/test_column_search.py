@@ -17,7 +17,6 @@ from xosc_lateral.identification.search import Search
 from xosc_lateral.identification.selection import ERROR_BUDGET, select
 from xosc_lateral.identification.terms.base import Outcome
 from xosc_lateral.identification.terms.mean import MeanTerm
-from xosc_lateral.identification.terms.restoring import RestoringTerm
 from xosc_lateral.identification.terms.spread import SpreadTerm
 
 SECONDS = 700.0
@@ -100,11 +99,11 @@ def test_a_spread_is_found_as_a_spread_and_not_as_a_shift() -> None:
 
 
 def test_a_column_that_is_barred_is_not_taken_up() -> None:
-    """What moves the mean already is no candidate for the rate of return."""
-    coarse = drive(37, 0.15)
+    """What changes the spread already is no candidate for it."""
+    coarse = drive(37, log_spread=0.5)
     search = Search.over(coarse, COLUMNS, np.random.SeedSequence(1), ERROR_BUDGET)
-    term = MeanTerm.of(Linear(acts=Acts.LOCATION, column="x", response_s=2.0))
-    found = find_column(search, RestoringTerm, fit_model(coarse, (term,)))
+    term = SpreadTerm.of(Linear(acts=Acts.LOCATION, column="x", response_s=2.0))
+    found = find_column(search, SpreadTerm, fit_model(coarse, (term,)))
     assert found is None or "x" not in found.columns
 
 

@@ -6,15 +6,16 @@ import numpy as np
 import pytest
 
 from xosc_lateral.driver.effects import Step
+from xosc_lateral.identification.close import describe_finding, population_finding, spectrum_finding
 from xosc_lateral.identification.core_model import TIMES_S, DriverVariance, SpectrumShape
-from xosc_lateral.identification.findings import describe_finding, population_finding, spectrum_finding
+from xosc_lateral.identification.held_out import HeldOut
 from xosc_lateral.identification.selection import Accepted
 from xosc_lateral.identification.terms.time import StepTerm
 
 REAL = {"mean by effect: step 0": np.array([0.1, -0.1]), "movement by band": np.array([0.2, 0.1, np.nan])}
 BEFORE = {"mean by effect: step 0": np.array([0.0, 0.0]), "movement by band": np.array([0.2, 0.4, 0.3])}
 AFTER = {name: values.copy() for name, values in REAL.items()}
-COMPARED = (REAL, BEFORE, AFTER)
+COMPARED = HeldOut(None, REAL, BEFORE, AFTER, np.zeros(0), np.zeros(0), [])  # type: ignore[arg-type]
 
 
 def test_an_accepted_term_is_told_with_its_errors_on_held_out_rows() -> None:

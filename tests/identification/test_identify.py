@@ -13,12 +13,11 @@ from tests.identification.made_coarse import movement, timeline_of, wander
 from xosc_lateral.driver.effects import Acts, Cycle, Drift, Effect, Linear, VarianceTrend
 from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.drives.drive import Drive
-from xosc_lateral.identification.identify import CLOCK, UNSURE, _of_some_size, initial_terms, usable_columns
+from xosc_lateral.identification.identify import CLOCK, initial_terms, usable_columns
 from xosc_lateral.identification.regression import Coarse, fit_model
-from xosc_lateral.identification.selection import Accepted, Selection
 from xosc_lateral.identification.terms.between import BetweenTerm
 from xosc_lateral.identification.terms.mean import MeanTerm
-from xosc_lateral.identification.terms.spread import FineNoiseTerm, SpreadTerm
+from xosc_lateral.identification.terms.spread import SpreadTerm
 from xosc_lateral.identification.terms.time import TimeMeanTerm, TimeSpreadTerm
 from xosc_lateral.identification.timeline import Timeline, join_drives
 
@@ -116,17 +115,3 @@ def test_the_effect_of_a_vehicle_s_class_is_fitted_between_vehicles() -> None:
     # a third are trucks, levels differ by 0.1 m: 0.1 * sqrt(1 / 20 + 1 / 40) = 0.03 m
     assert effect.coefficients[0] == pytest.approx(-0.15, abs=0.09)
     assert effect.errors[0] == pytest.approx(0.03, rel=0.5)
-
-
-def test_what_would_be_shrunk_to_nothing_is_not_kept_and_told_so() -> None:
-    """Fine noise that grows with one column; another goes along with it and is all but idle beside it."""
-    rng = np.random.default_rng(144)
-    loud, idle = wander(rng, N, 40.0), wander(rng, N, 40.0)
-    own = movement(rng, SECONDS, 20.0) + 0.02 * np.exp(0.5 * loud) * rng.normal(size=N)
-    coarse = Coarse.of(timeline_of(own, {"loud": loud, "idle": idle}))
-    terms = [FineNoiseTerm.of(Linear(acts=Acts.FINE, column=name)) for name in ("loud", "idle")]
-    accepted = tuple(Accepted(term, 1e-4) for term in terms)
-    kept = _of_some_size(Selection(accepted, (), fit_model(coarse, ()), fit_model(coarse, tuple(terms))))
-    assert [one.term.columns for one in kept.accepted] == [("loud",)]
-    assert [(one.columns, one.why) for one in kept.rejected] == [(("idle",), UNSURE)]
-    assert kept.final.terms == (terms[0],)

@@ -2,23 +2,23 @@
 
 from __future__ import annotations
 
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 
 from tests.identification.made_coarse import movement, timeline_of
-from xosc_lateral.identification.lack_of_fit import (
+from xosc_lateral.identification.residual import (
     LEVEL,
     STANDS_OUT,
     GroupError,
     LackOfFit,
     _mean_of_finite,
-    _size,
+    half_samples,
     lack_of_fit_of,
+    size_of,
+    statistics_of,
 )
-from xosc_lateral.identification.residual import statistics_of
 
 SECONDS = 1800.0
 
@@ -34,7 +34,7 @@ def test_what_is_beyond_the_floor_adds_to_it_in_squares(after: float, floor: flo
 
 def test_groups_that_stand_out_are_named_the_largest_first() -> None:
     groups = (group(0.5, 0.1, "large"), group(0.19, 0.1, "near"), group(0.9, 0.1, "larger"), group(0.2, 0.2, "floor"))
-    lack = LackOfFit({}, groups, 0.1, 0.01)
+    lack = LackOfFit({}, groups, 0.1, 0.1, 0.01)
     assert [one.name for one in lack.where] == ["larger", "large"]
     assert STANDS_OUT == 2.0
 
@@ -45,12 +45,12 @@ def test_groups_that_stand_out_are_named_the_largest_first() -> None:
 def test_something_is_left_when_it_is_sure_and_beyond_the_floor(
     unexplained: float, p_value: float, clear: bool
 ) -> None:
-    assert LackOfFit({}, (), unexplained, p_value).clear is clear
+    assert LackOfFit({}, (), 0.1, unexplained, p_value).clear is clear
 
 
 def test_cells_that_nobody_drove_in_do_not_count() -> None:
-    assert _size(np.array([0.3, np.nan, -0.4])) == pytest.approx(np.sqrt(0.125))
-    assert _size(np.array([np.nan])) == 0.0
+    assert size_of({"": np.array([0.3, np.nan, -0.4])}) == pytest.approx(np.sqrt(0.125))
+    assert size_of({"": np.array([np.nan])}) == 0.0
     several = np.array([[1.0, np.nan, np.nan], [3.0, 2.0, np.nan]])
     np.testing.assert_array_equal(_mean_of_finite(several), [2.0, 2.0, np.nan])
 
@@ -62,42 +62,30 @@ def drive() -> Any:
     return timeline, statistics, statistics.describe(timeline.offset, timeline.valid)
 
 
-def closed(drive: Any, runs: np.ndarray, error: float, floor: float = 0.01) -> Any:
-    """What is read of a closed loop whose refined profile gives `runs`."""
+def left_by(drive: Any, runs: np.ndarray) -> LackOfFit:
+    """What a refined profile that gives `runs` leaves."""
     timeline, statistics, real = drive
-    after = statistics.describe(runs, timeline.valid)
-    scored = SimpleNamespace(
-        statistics=statistics,
-        real=real,
-        before={name: np.zeros_like(values) for name, values in real.items()},
-        after=after,
-    )
-    return SimpleNamespace(
-        scored=scored,
-        seed=1,
-        unmoved=timeline.offset,
-        error_after=error,
-        floor=floor,
-    )
+    blocks = np.arange(len(timeline)) // 300
+    halves = half_samples(statistics, timeline.offset, blocks, np.random.default_rng(1))
+    nothing = {name: np.zeros_like(values) for name, values in real.items()}
+    return lack_of_fit_of(real, nothing, statistics.describe(runs, timeline.valid), halves)
 
 
 def test_every_group_has_its_own_error_and_floor(drive: Any) -> None:
-    timeline, _, real = drive
-    runs = 1.5 * timeline.offset
-    lack = lack_of_fit_of(closed(drive, runs, 1.0))
-    assert [one.name for one in lack.groups] == list(real)
+    lack = left_by(drive, 1.5 * drive[0].offset)
+    assert [one.name for one in lack.groups] == list(drive[2])
     for one in lack.groups:
         np.testing.assert_allclose(one.after, 0.5 * one.before, rtol=1e-6)  # everything is half as large again
         assert one.floor > 0.0
 
 
 def test_a_profile_that_is_the_drive_leaves_nothing(drive: Any) -> None:
-    lack = lack_of_fit_of(closed(drive, drive[0].offset, 0.0))
+    lack = left_by(drive, drive[0].offset)
     assert lack.where == ()
     assert (lack.unexplained, lack.p_value, lack.clear) == (0.0, 1.0, False)
 
 
-def test_an_error_that_no_half_of_the_drives_has_is_as_rare_as_the_splits_can_say(drive: Any) -> None:
-    lack = lack_of_fit_of(closed(drive, drive[0].offset, 1e3))
+def test_an_error_that_no_half_of_the_drives_has_is_as_rare_as_the_draws_can_say(drive: Any) -> None:
+    lack = left_by(drive, 100.0 * drive[0].offset)
     assert lack.p_value == pytest.approx(1.0 / 65.0)
     assert lack.clear

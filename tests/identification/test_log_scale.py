@@ -13,7 +13,6 @@ from xosc_lateral.identification.innovations import (
     covariance_of_log_sizes,
     own_levels,
     scoring_step,
-    squared_innovations,
 )
 from xosc_lateral.identification.squares import Squares, log_sizes
 
@@ -104,7 +103,7 @@ def test_squared_innovations_are_clipped_and_standardised_over_valid_rows() -> N
     rows, valid = np.array([0.0, 1.0, 2.0, 100.0, 5.0]), np.array([True, True, True, True, False])
     squares = np.array([0.0, 1.0, 4.0, CLIP])
     expected = (squares - squares.mean()) / squares.std()
-    np.testing.assert_allclose(squared_innovations(rows, valid), [*expected, 0.0])
+    np.testing.assert_allclose(Squares(rows**2, valid).standardised, [*expected, 0.0])
 
 
 @pytest.mark.parametrize("size", [0.1, 1.0, 100.0])

@@ -19,8 +19,8 @@ from xosc_lateral.driver.profile import DriverProfile, file_type
 from xosc_lateral.driver.sampling import sample_offsets
 from xosc_lateral.formats.profiles import read_profile, write_profile
 from xosc_lateral.identification import selection, terms
+from xosc_lateral.identification.held_out import estimate_all, removal_of
 from xosc_lateral.identification.regression import Coarse
-from xosc_lateral.identification.removal import estimate_all, removal_of
 from xosc_lateral.identification.search import Search
 from xosc_lateral.identification.selection import STAGES, TERMS, in_stages, shared_among
 from xosc_lateral.identification.significance import BUDGET, MANY_DRIVES
@@ -52,7 +52,7 @@ from typing import ClassVar
 import numpy as np
 from scipy.stats import norm
 from xosc_lateral.driver.effects.ramp import Ramp
-from xosc_lateral.identification.regression import elapsed, fit_model
+from xosc_lateral.identification.regression import fit_model
 from xosc_lateral.identification.terms.base import Description, Outcome, Stage, Term
 
 
@@ -63,7 +63,7 @@ class RampTerm(Term):
     weight: ClassVar[float] = 1.0
 
     def mean_columns(self, coarse):
-        return elapsed(coarse)[:, None]
+        return (coarse.time / 900.0 - 0.5)[:, None]
 
     @classmethod
     def test(cls, search, fitted):

@@ -7,8 +7,8 @@ import pytest
 from scipy.signal import lfilter
 
 from tests.identification.made_coarse import coarse_of, movement
-from xosc_lateral.identification.problem import of_products, of_squares
 from xosc_lateral.identification.regression import Coarse, fit_model
+from xosc_lateral.identification.squares import Squares, of_squares
 from xosc_lateral.identification.terms.mean import MeanTerm
 
 SECONDS = 900.0
@@ -30,7 +30,7 @@ def test_squares_that_come_in_clusters_are_made_white(coarse: Coarse) -> None:
     rng = np.random.default_rng(2)
     loud = np.asarray(lfilter([1.0], [1.0, -0.8], rng.normal(size=len(coarse))))
     squares = np.where(coarse.valid, loud, 0.0)
-    rows = of_squares(coarse, squares, coarse.valid, np.zeros((len(coarse), 0))).observed
+    rows = of_squares(coarse, Squares(squares, coarse.valid), np.zeros((len(coarse), 0))).observed
     related = float(rows[1:] @ rows[:-1]) / float(rows @ rows)
     assert abs(related) < 4.0 / np.sqrt(len(rows))
 
@@ -39,27 +39,16 @@ def test_what_a_column_explains_is_no_cluster(coarse: Coarse) -> None:
     """A slow column in the squares looks like memory unless it is among the columns known."""
     slow = np.sin(2.0 * np.pi * np.arange(len(coarse)) / 300.0)
     squares = np.where(coarse.valid, 2.0 * slow + np.random.default_rng(3).normal(size=len(coarse)), 0.0)
-    unknown = of_squares(coarse, squares, coarse.valid, np.zeros((len(coarse), 0)))
-    known = of_squares(coarse, squares, coarse.valid, slow[:, None])
+    unknown = of_squares(coarse, Squares(squares, coarse.valid), np.zeros((len(coarse), 0)))
+    known = of_squares(coarse, Squares(squares, coarse.valid), slow[:, None])
     told = [abs(problem.whitener.process.lags[-1]).sum() for problem in (unknown, known)]
     assert told[1] < 0.5 * told[0]
-
-
-def test_products_are_taken_as_they_are_about_one_level(coarse: Coarse) -> None:
-    rng = np.random.default_rng(4)
-    rows, factor = rng.normal(size=(2, len(coarse)))
-    columns = rng.normal(size=(len(coarse), 2))
-    problem = of_products(coarse, rows, columns, factor)
-    inside = coarse.valid
-    product = (rows * factor)[inside]
-    np.testing.assert_allclose(problem.observed, product - product.mean(), atol=1e-12)
-    np.testing.assert_allclose(problem.known, columns[inside] - columns[inside].mean(axis=0), atol=1e-12)
 
 
 def test_a_size_in_the_squares_is_that_of_least_squares(coarse: Coarse) -> None:
     rng = np.random.default_rng(5)
     x = rng.normal(size=len(coarse))
     squares = np.where(coarse.valid, 0.2 * x + rng.normal(size=len(coarse)), 0.0)
-    problem = of_squares(coarse, squares, coarse.valid, x[:, None])
+    problem = of_squares(coarse, Squares(squares, coarse.valid), x[:, None])
     size = float(problem.known[:, 0] @ problem.observed) / float(problem.known[:, 0] @ problem.known[:, 0])
-    assert size == pytest.approx(0.2, abs=4.0 / np.sqrt(coarse.valid.sum()))
+    assert size * squares[coarse.valid].std() == pytest.approx(0.2, abs=4.0 / np.sqrt(coarse.valid.sum()))

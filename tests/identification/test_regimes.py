@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from xosc_lateral.identification.innovations import squared_innovations
+from xosc_lateral.identification.squares import Squares
 from xosc_lateral.identification.terms.regimes import probability_of_persistence
 
 N = 3000
@@ -30,7 +30,7 @@ def regimes(factor: float, on_s: float, off_s: float, seed: int) -> np.ndarray:
 
 
 def probability(rows: np.ndarray, valid: np.ndarray, seed: int) -> float:
-    squares = squared_innovations(rows, valid)
+    squares = Squares(rows**2, valid).standardised
     return probability_of_persistence(squares, valid, np.zeros((len(rows), 0)), np.random.default_rng(seed))
 
 
@@ -44,7 +44,7 @@ def test_seconds_that_are_cut_out_do_not_count() -> None:
 def test_regimes_that_are_known_are_not_found_again() -> None:
     rows, valid = regimes(2.5, 60.0, 120.0, 3), np.ones(N, dtype=np.bool_)
     loud = (np.convolve(rows**2, np.ones(15) / 15, "same") > 2.5).astype(float)[:, None]
-    squares = squared_innovations(rows, valid)
+    squares = Squares(rows**2, valid).standardised
     alone = probability_of_persistence(squares, valid, np.zeros((N, 0)), np.random.default_rng(1))
     beside = probability_of_persistence(squares, valid, loud, np.random.default_rng(1))
     assert alone < 1e-3 < 0.01 < beside

@@ -8,7 +8,7 @@ import pytest
 from tests.identification.made_coarse import SPREAD, coarse_of, movement, wander
 from xosc_lateral.driver.effects import Acts, Linear, Magnitude
 from xosc_lateral.identification import regression
-from xosc_lateral.identification.regression import Coarse, elapsed, fit_model
+from xosc_lateral.identification.regression import Coarse, fit_model
 from xosc_lateral.identification.terms.mean import MeanTerm
 from xosc_lateral.identification.terms.spread import SpreadTerm
 
@@ -72,15 +72,6 @@ def test_drives_are_counted_and_long_ones_known() -> None:
     assert planted(1, drives=3).drives == 3
     assert planted(1).lasts
     assert not coarse_of(np.zeros(2000)).lasts  # 400 s
-
-
-def test_time_on_the_road_goes_from_minus_a_half_to_a_half_in_every_drive() -> None:
-    coarse = planted(1, drives=2)
-    share = elapsed(coarse)
-    for drive in range(2):
-        own = share[coarse.valid & (coarse.drive == drive)]
-        np.testing.assert_allclose(own, np.linspace(-0.5, 0.5, len(own)), atol=1e-12)
-    assert np.abs(share).max() == 0.5
 
 
 # ---- sizes -----------------------------------------------------------------------------------------------------------

@@ -8,33 +8,24 @@ import numpy as np
 
 from tests.identification.made_coarse import coarse_of, movement, wander
 from xosc_lateral.identification.columns import Column, Values
-from xosc_lateral.identification.search import Recent, Search
+from xosc_lateral.identification.search import KEPT, Search
 from xosc_lateral.identification.selection import ERROR_BUDGET
 
 
-def test_the_last_few_are_kept() -> None:
+def test_what_was_worked_out_last_is_kept_beside_its_fit_and_not_in_a_part() -> None:
+    """Folds are searched side by side, in threads: each begins with a memory of its own."""
+    rng = np.random.default_rng(1)
+    coarse = coarse_of(movement(rng, 200.0), {"x": wander(rng, 1000, 12.0)})
+    search = Search.over(coarse, [Column("x", Values.NUMBER, False)], np.random.SeedSequence(1), ERROR_BUDGET)
     made: list[int] = []
 
     def make() -> int:
         made.append(len(made))
         return made[-1]
 
-    recent: Recent[int] = Recent(3)
-    fits = [object() for _ in range(5)]
-    assert [recent.of(int, fit, make) for fit in fits] == [0, 1, 2, 3, 4]
-    assert [recent.of(int, fit, make) for fit in fits[2:]] == [2, 3, 4]
-    assert recent.of(int, fits[0], make) == 5
-    assert recent.of(str, fits[4], make) == 6
-
-
-def test_the_search_of_a_part_begins_with_a_memory_of_its_own() -> None:
-    """Folds are searched side by side, in threads."""
-    rng = np.random.default_rng(1)
-    coarse = coarse_of(movement(rng, 200.0), {"x": wander(rng, 1000, 12.0)})
-    search = Search.over(coarse, [Column("x", Values.NUMBER, False)], np.random.SeedSequence(1), ERROR_BUDGET)
-    fit, kind = object(), object()
-    assert search.likeliest(kind, fit, lambda: None) is None
-    asked = []
-    replace(search, coarse=coarse).likeliest(kind, fit, lambda: asked.append(1))
-    search.likeliest(kind, fit, lambda: asked.append(2))
-    assert asked == [1]
+    fits = [object() for _ in range(KEPT + 1)]
+    assert [search.once(int, fit, make) for fit in fits] == list(range(KEPT + 1))
+    assert [search.once(int, fit, make) for fit in fits[1:]] == list(range(1, KEPT + 1))
+    assert replace(search, coarse=coarse).once(int, fits[-1], make) == KEPT + 1
+    assert search.once(int, fits[0], make) == KEPT + 2
+    assert search.once(str, fits[-1], make) == KEPT + 3

@@ -17,7 +17,7 @@ def test_every_term_is_looked_for() -> None:
     assert set(TERMS) - set(LISTED) == {TimeMeanTerm}
 
 
-def test_the_order_is_the_one_that_p_values_and_reports_of_0_1_came_from() -> None:
+def test_the_order_of_the_stages() -> None:
     """Of equally sure terms the first is taken, and what was not found is told in this order."""
     names = [[kind.component for kind in stage] for stage in STAGES]
     assert names == [
@@ -26,7 +26,7 @@ def test_the_order_is_the_one_that_p_values_and_reports_of_0_1_came_from() -> No
         ["mean"],
         ["time_spread", "spread", "slow_spread"],
         ["regimes"],
-        ["restoring", "fine_noise"],
+        ["fine_noise"],
         ["between"],
     ]
 

@@ -11,8 +11,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
+import xosc_lateral as xl
 from tests.live.esmini_stand_in import StandIn
-from xosc_lateral.api.live import live_esmini
+from xosc_lateral.api.live import LiveRun, live_esmini
 from xosc_lateral.api.profiles import read_profile
 from xosc_lateral.cli import main
 from xosc_lateral.errors import SimulationError
@@ -43,11 +44,30 @@ def test_vehicles_are_where_their_drivers_say_and_maneuvers_stay_as_written(libr
     maneuver = cut_in[~cut_in.steered]
     assert 3.5 < maneuver.time.max() - maneuver.time.min() < 4.5  # its lane change, and nothing else
     assert {cut_in.lane.iloc[0], cut_in.lane.iloc[-1]} == {-1, -2}
+    # the driver's lateral speed runs out at the maneuver's start: direction of the path there
+    start = cut_in[(cut_in.time > maneuver.time.min() - 0.1) & (cut_in.time < maneuver.time.min() + 1.0)]
+    turned = np.abs(np.diff(np.unwrap(np.arctan2(np.diff(start.y), np.diff(start.x)))))
+    assert turned.max() < TURN * 0.01
     # back to the driver without a kink: direction of the path after the maneuver
     back = cut_in[cut_in.time > maneuver.time.max() - 0.015]
     turned = np.abs(np.diff(np.unwrap(np.arctan2(np.diff(back.y), np.diff(back.x)))))
     road = np.abs(np.diff(np.unwrap(back.h)))[1:]
     assert (turned - road).max() < TURN * 0.01
+
+
+def test_a_run_is_a_trace_with_the_road_and_where_everybody_was(library: Any, tmp_path: Path) -> None:
+    pytest.importorskip("osi_utilities", reason="the extra osi is not installed")
+    run = live_esmini(CUT_IN, library, ego=["Ego"], seed=3, duration=14.0, step=0.05)
+    trace = run.write_osi(tmp_path / "run.mcap")
+    drives = xl.import_drives("osi", trace).to_frame()
+    both = run.to_frame().round({"time": 3}).merge(
+        drives.assign(name=drives.drive.str.partition("#")[0]).round({"time": 3}), on=["name", "time"]
+    )  # fmt: skip
+    assert len(both) > 0.4 * len(run.to_frame())  # ends and lane changes are cut
+    np.testing.assert_allclose(both.offset_y, both.offset_x, atol=1e-3)
+    np.testing.assert_allclose(both.speed_y, both.speed_x, atol=0.02)
+    with pytest.raises(SimulationError, match="no trace"):
+        LiveRun([], {"scenario": "x"}, []).write_osi(tmp_path / "no.mcap")
 
 
 def test_the_same_seed_gives_the_same_run_and_another_one_another(library: Any) -> None:

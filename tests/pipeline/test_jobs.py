@@ -11,7 +11,7 @@ import pandas as pd
 import pytest
 
 from xosc_lateral.errors import DriverProfileError, FormatError
-from xosc_lateral.formats.openscenario.write import Player
+from xosc_lateral.formats.openscenario.write.target import Player
 from xosc_lateral.formats.profiles import SHIPPED
 from xosc_lateral.pipeline.document_kind import DocumentKind, document_kind
 from xosc_lateral.pipeline.jobs import Batch, plan_batch

@@ -14,7 +14,7 @@ from xosc_lateral.cli.words import SHARED
 from xosc_lateral.enrich.result import Neighbours
 from xosc_lateral.errors import FormatError
 from xosc_lateral.formats.configuration import SETTINGS
-from xosc_lateral.formats.openscenario.write import Player
+from xosc_lateral.formats.openscenario.write.target import Player
 from xosc_lateral.pipeline.settings import OPTIONS, ConvertOptions, ConvertSettings, OutputMode
 
 

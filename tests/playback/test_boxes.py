@@ -23,7 +23,7 @@ from xosc_lateral.playback.boxes import (
     holds_point,
     overlap,
 )
-from xosc_lateral.playback.signals import TrafficSignals
+from xosc_lateral.playback.simulation import TrafficSignals
 from xosc_lateral.playback.values import Values, holds, holds_exactly
 from xosc_lateral.road.positions import Pose
 from xosc_lateral.scenario import Parameter, Performance, Place

@@ -30,7 +30,7 @@ from tests.playback.stage import (
 )
 from xosc_lateral.errors import PlaybackError, XoscLateralError
 from xosc_lateral.formats.opendrive import read_opendrive
-from xosc_lateral.formats.openscenario import read_scenario
+from xosc_lateral.formats.openscenario.read import read_scenario
 from xosc_lateral.motion.nominal import Activity
 from xosc_lateral.playback.player import play
 

@@ -9,8 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from xosc_lateral.playback.placement import NOWHERE, Placement
-from xosc_lateral.playback.routes import RouteGuide, guide
+from xosc_lateral.playback.state import NOWHERE, Placement, RouteGuide, guide
 from xosc_lateral.road import LaneLink, RouteStep
 
 STEPS = (RouteStep(0, 1, 20.0, 100.0), RouteStep(7, -1, 50.0, 0.0), RouteStep(3, 1, 0.0, 30.0))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import re
 from dataclasses import replace
 from pathlib import Path
@@ -33,16 +32,15 @@ from xosc_lateral.driver.effects import (
     TimeSmooth,
 )
 from xosc_lateral.formats.drives import read_drives
-from xosc_lateral.identification.close import LoopResult, close_loop
-from xosc_lateral.identification.findings import Finding
-from xosc_lateral.identification.lack_of_fit import LackOfFit, lack_of_fit_of
+from xosc_lateral.identification.close import Finding, LoopResult, close_loop
+from xosc_lateral.identification.residual import lack_of_fit_of
 from xosc_lateral.identification.selection import Rejected
 from xosc_lateral.report.loop import finding_sentence, loop_page, loop_text
-from xosc_lateral.report.loop_courses import by_drive, moving_spread
+from xosc_lateral.report.loop_courses import moving_spread
 from xosc_lateral.report.loop_curves import curve_of
 from xosc_lateral.report.loop_figures import DRIVES, draw_spectra, effect_figure, residual_figure
 from xosc_lateral.report.loop_hidden_figures import DRAWINGS
-from xosc_lateral.report.loop_json import column_record, finding_record, loop_json
+from xosc_lateral.report.loop_json import column_record, finding_record, finite, loop_record
 from xosc_lateral.report.loop_words import lack_of_fit_words, meaning, others_words, outcome, p_value_words, size_words
 
 SHIFT = 0.4  # [m]
@@ -85,13 +83,8 @@ def result(table: Path) -> LoopResult:
 
 
 @pytest.fixture(scope="module")
-def lack_of_fit(result: LoopResult) -> LackOfFit:
-    return lack_of_fit_of(result)
-
-
-@pytest.fixture(scope="module")
-def page(result: LoopResult, lack_of_fit: LackOfFit, table: Path) -> str:
-    return loop_page(result, lack_of_fit, [table])
+def page(result: LoopResult, table: Path) -> str:
+    return loop_page(result, [table])
 
 
 def hidden(result: LoopResult, effect: Effect | None, kind: str, statistic: str = "movement by band") -> Finding:
@@ -131,8 +124,8 @@ def test_the_page_has_every_part_that_a_reader_needs(page: str) -> None:
     assert "**" not in page.split("<script>")[0]
 
 
-def test_same_result_same_page(page: str, result: LoopResult, lack_of_fit: LackOfFit, table: Path) -> None:
-    assert loop_page(result, lack_of_fit, [table]) == page
+def test_same_result_same_page(page: str, result: LoopResult, table: Path) -> None:
+    assert loop_page(result, [table]) == page
 
 
 def test_the_effect_curve_goes_through_the_points_measured_without_other_effects(result: LoopResult) -> None:
@@ -153,49 +146,42 @@ def test_a_spread_effect_is_drawn_as_factors_over_measured_ones(result: LoopResu
     assert np.all(curve.measured_error > 0.0)
 
 
-def test_the_residual_stands_out_of_the_band_before_and_not_after(result: LoopResult, lack_of_fit: LackOfFit) -> None:
-    group = next(group for group in lack_of_fit.groups if group.name == "mean by grade")
+def test_the_residual_stands_out_of_the_band_before_and_not_after(result: LoopResult) -> None:
+    group = next(group for group in result.lack_of_fit.groups if group.name == "mean by grade")
     assert group.before > 1.5 * group.floor
     assert group.after < 0.6 * group.before
-    figure = residual_figure(result, lack_of_fit, "mean")
+    figure = residual_figure(result, "mean")
     assert figure.axes[0].get_title(loc="left") == "grade [%]"  # columns of the effects come first
 
 
-def test_an_error_clearly_above_the_floor_is_called_unexplained(
-    result: LoopResult, lack_of_fit: LackOfFit, table: Path
-) -> None:
+def test_an_error_clearly_above_the_floor_is_called_unexplained(result: LoopResult, table: Path) -> None:
     # the base in the place of the refined profile: the effect is in the drives, and nobody has explained it
-    worse = replace(
-        result,
-        findings=(),
-        scored=replace(result.scored, after=result.scored.before, runs_after=result.scored.runs_before),
-        floor=result.error_before / 3.0,
-    )
-    left = replace(
-        lack_of_fit_of(worse), p_value=0.01
-    )  # forty minutes' halves may differ as much: that is not asked here
+    scored = replace(result.scored, after=result.scored.before, runs_after=result.scored.runs_before)
+    # and halves of forty minutes that differ by a third of what they do
+    halves = [{name: values / 3.0 for name, values in half.items()} for half in scored.halves]
+    left = lack_of_fit_of(scored.real, scored.before, scored.after, halves)
+    assert left.unexplained == pytest.approx(np.sqrt(result.error_before**2 - left.floor**2))
+    left = replace(left, p_value=0.01)  # how rare that is is not asked here
+    worse = replace(result, findings=(), scored=scored, lack_of_fit=left)
     assert left.clear
-    assert left.unexplained == pytest.approx(np.sqrt(8.0) * worse.floor)
-    sentence = lack_of_fit_words(worse, left)
+    sentence = lack_of_fit_words(worse)
     assert sentence.startswith(f"Unexplained residual of {1000 * left.unexplained:.0f}\N{NO-BREAK SPACE}mm")
-    record = json.loads(loop_json(worse, left, [table]))
+    record = loop_record(worse, [table])
     assert record["unexplained"]["clear"] is True
     assert record["unexplained"]["size_m"] == pytest.approx(left.unexplained)
     assert record["unexplained"]["where"] == [group.name for group in left.where]
-    assert sentence in loop_text(worse, left)
+    assert sentence in loop_text(worse)
 
 
 def test_an_error_at_the_floor_is_not_called_unexplained(result: LoopResult) -> None:
-    no_worse = replace(result, floor=result.error_after)
-    at_floor = lack_of_fit_of(no_worse)
+    scored = result.scored
+    at_floor = lack_of_fit_of(scored.real, scored.before, scored.real, scored.halves)
     assert not at_floor.clear
-    assert "do not exceed the floor" in lack_of_fit_words(no_worse, at_floor)
+    assert "do not exceed the floor" in lack_of_fit_words(replace(result, lack_of_fit=at_floor))
 
 
-def test_the_json_keeps_to_the_schema_and_adds_the_meaning(
-    result: LoopResult, lack_of_fit: LackOfFit, table: Path
-) -> None:
-    record = json.loads(loop_json(result, lack_of_fit, [table]))
+def test_the_json_keeps_to_the_schema_and_adds_the_meaning(result: LoopResult, table: Path) -> None:
+    record = finite(loop_record(result, [table]))
     assert {"drives", "base_profile", "held_out", "findings", "consequences", "rejected", "error", "metrics"} <= set(
         record
     )
@@ -203,7 +189,7 @@ def test_the_json_keeps_to_the_schema_and_adds_the_meaning(
     assert finding["kind"] == "location"
     assert "grade" in finding["meaning"]
     assert {row["group"] for row in record["residual"]} == set(result.scored.real)
-    assert record["unexplained"]["clear"] is lack_of_fit.clear
+    assert record["unexplained"]["clear"] is result.lack_of_fit.clear
 
 
 @pytest.mark.parametrize("effect", HIDDEN, ids=lambda effect: effect.kind)
@@ -248,14 +234,6 @@ def test_courses_leave_out_what_is_cut(result: LoopResult) -> None:
     course = moving_spread(result, 240.0)
     assert len(course.time) == result.coarse.valid.sum()
     assert np.all(course.measured > 0.0)
-
-
-def test_drives_are_described_one_by_one(result: LoopResult) -> None:
-    means, spreads = by_drive(result, 20.0)
-    assert len(means["measured"]) == 1
-    assert len(spreads["after"]) == len(result.scored.runs_after)
-    timeline = result.scored.statistics.timeline
-    assert means["measured"][0] == pytest.approx(timeline.offset[timeline.valid].mean())
 
 
 def test_a_table_whose_runs_are_all_shorter_than_a_spectrum_s_segment_has_a_spectrum_still(result: LoopResult) -> None:

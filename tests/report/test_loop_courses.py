@@ -1,4 +1,4 @@
-"""Figures' numbers of a closed loop: moving means, spreads, hidden courses, and one number for each drive."""
+"""Figures' numbers of a closed loop: moving means, spreads, hidden courses."""
 
 from __future__ import annotations
 
@@ -13,7 +13,6 @@ from xosc_lateral.identification.regression import fit_model
 from xosc_lateral.identification.terms.regimes import RegimeFit, RegimesTerm
 from xosc_lateral.identification.terms.time import StepTerm
 from xosc_lateral.report.loop_courses import (
-    by_drive,
     hidden_mean,
     moving_mean,
     moving_spread,
@@ -96,16 +95,3 @@ def test_the_longest_drive_is_shown() -> None:
     made.scored.statistics = SimpleNamespace(timeline=made.coarse.timeline)
     found = moving_mean(made, 20.0)
     np.testing.assert_allclose(found.measured, 1.0, atol=1e-9)
-
-
-def test_every_drive_has_a_mean_and_a_spread_of_its_own_rows() -> None:
-    rng = np.random.default_rng(94)
-    offset = np.concatenate([0.1 * rng.normal(size=N // 2), 0.5 + 0.3 * rng.normal(size=N // 2)])
-    made = result(offset, np.stack([offset, -offset]), offset[None], drives=2)
-    means, spreads = by_drive(made, 60.0)
-    timeline = made.scored.statistics.timeline
-    own = [offset[timeline.valid & (timeline.drive == k)] for k in (0, 1)]
-    np.testing.assert_allclose(means["measured"], [part.mean() for part in own])
-    np.testing.assert_allclose(spreads["measured"], [part.std() for part in own])
-    assert means["before"].shape == (4,)
-    np.testing.assert_allclose(sorted(means["before"]), sorted([*means["measured"], *-means["measured"]]))

@@ -7,8 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, Unpack
 
-from xosc_lateral.api.inputs import PathLike
-from xosc_lateral.api.result import Result
+from xosc_lateral.api.result import PathLike, Result
 from xosc_lateral.errors import FormatError
 from xosc_lateral.formats.output_paths import claim, output_folder
 from xosc_lateral.limits import JOB_MEMORY, JOB_TIMEOUT

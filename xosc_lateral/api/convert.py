@@ -5,8 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Unpack
 
-from xosc_lateral.api.inputs import PathLike
-from xosc_lateral.api.result import Result
+from xosc_lateral.api.result import PathLike, Result
 from xosc_lateral.errors import FormatError
 from xosc_lateral.formats.output_paths import claim, output_file
 from xosc_lateral.pipeline.convert import convert_scenario

@@ -6,17 +6,17 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from xosc_lateral.api.convert import REPORT_SUFFIXES
-from xosc_lateral.api.inputs import (
+from xosc_lateral.api.result import (
     DrivesLike,
     GivenDrives,
     PathLike,
     Paths,
     ProfileLike,
+    Result,
     given_drives,
     given_profile,
     naming,
 )
-from xosc_lateral.api.result import Result
 from xosc_lateral.formats.mapping import MappingLike
 from xosc_lateral.formats.output_paths import claim, output_file
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from xosc_lateral.api.inputs import DrivesLike, given_drives, naming
+from xosc_lateral.api.result import DrivesLike, given_drives, naming
 
 if TYPE_CHECKING:
     from xosc_lateral.driver.profile import DriverProfile
@@ -75,7 +75,7 @@ def fit(
     from msgspec.structs import replace
 
     from xosc_lateral.driver.fitting import fit_profile
-    from xosc_lateral.driver.provenance import Provenance
+    from xosc_lateral.driver.profile import Provenance
 
     given = given_drives(drives, columns)
     known = Provenance(source=source or ", ".join(given.inputs), licence=licence, inputs=dict(given.inputs))

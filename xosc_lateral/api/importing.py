@@ -5,8 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from xosc_lateral.api.inputs import PathLike, Paths, as_paths
-from xosc_lateral.api.result import Result
+from xosc_lateral.api.result import PathLike, Paths, Result, as_paths
 from xosc_lateral.formats.importers import find_importer
 from xosc_lateral.formats.importers.table import as_imported
 from xosc_lateral.formats.output_paths import claim, output_file

@@ -6,17 +6,17 @@ from collections.abc import Callable, Collection, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from xosc_lateral.api.inputs import (
+from xosc_lateral.api.result import (
     DrivesLike,
     GivenDrives,
     PathLike,
     Paths,
     ProfileLike,
+    Result,
     given_drives,
     given_profile,
     naming,
 )
-from xosc_lateral.api.result import Result
 from xosc_lateral.formats.mapping import MappingLike
 from xosc_lateral.formats.output_paths import claim, output_folder
 
@@ -26,7 +26,6 @@ if TYPE_CHECKING:
 
     from xosc_lateral.driver.profile import DriverProfile
     from xosc_lateral.identification.close import LoopResult
-    from xosc_lateral.identification.lack_of_fit import LackOfFit
 
 
 def close_loop(
@@ -75,10 +74,9 @@ def close_loop(
 
     from msgspec.structs import replace as with_fields
 
-    from xosc_lateral.driver.provenance import Provenance
+    from xosc_lateral.driver.profile import Provenance
     from xosc_lateral.formats.mapping import as_mapping
     from xosc_lateral.identification import close
-    from xosc_lateral.identification.lack_of_fit import lack_of_fit_of
 
     base = None if profile is None else given_profile(profile, library)
     given = given_drives(drives, columns)
@@ -98,16 +96,17 @@ def close_loop(
         )
     if base is not None:
         result = replace(result, refined=with_fields(result.refined, left_hand=base.left_hand))
-    return ClosedLoop(result, lack_of_fit_of(result), given)
+    return ClosedLoop(result, given)
 
 
 class ClosedLoop(Result):
     """What was missing, how sure and how big; the refined profile; the error before and after."""
 
-    __slots__ = ("_given", "_lack_of_fit", "_result")
+    __slots__ = ("_given", "_proofs", "_result")
 
-    def __init__(self, result: LoopResult, lack_of_fit: LackOfFit, given: GivenDrives) -> None:
-        self._result, self._lack_of_fit, self._given = result, lack_of_fit, given
+    def __init__(self, result: LoopResult, given: GivenDrives) -> None:
+        self._result, self._given = result, given
+        self._proofs: tuple[str, ...] | None = None
 
     @property
     def profile(self) -> DriverProfile:
@@ -125,6 +124,16 @@ class ClosedLoop(Result):
         return tuple(finding.effect for finding in self._result.findings)
 
     @property
+    def proofs(self) -> tuple[str, ...]:
+        """For each effect on the mean that was found: a scenario converted with it and without, in words."""
+        from xosc_lateral.pipeline.proof import proofs_of
+
+        if self._proofs is None:
+            found = [effect for effect in self.profile.effects if effect not in self.base.effects]
+            self._proofs = tuple(map(str, proofs_of(self.profile, found)))
+        return self._proofs
+
+    @property
     def error_before(self) -> float:
         """On held-out stretches. [m]"""
         return self._result.error_before
@@ -136,18 +145,18 @@ class ClosedLoop(Result):
 
     @property
     def floor(self) -> float:
-        """What the measured drives differ from themselves by. [m]"""
+        """Sampling error of the measured drives: how far random halves of them are from all of them. [m]"""
         return self._result.floor
 
     def headline(self) -> str:
         """One line."""
-        found = ", ".join(self.findings) or "nothing found"
+        found = ", ".join(self.findings) or "no effect added"
         return f"{found}; error {self.error_before:.4f} -> {self.error_after:.4f} m (floor {self.floor:.4f} m)"
 
     def __str__(self) -> str:
         from xosc_lateral.report.loop import loop_text
 
-        return loop_text(self._result, self._lack_of_fit)
+        return "\n".join([loop_text(self._result), *(f"converted: {one}" for one in self.proofs)])
 
     def to_frame(self) -> pd.DataFrame:
         """One row per finding: `effect`, `kind`, `columns`, `lag_s`, `response_s`, `shape`, `size_m`, `p_value`, ..."""
@@ -160,7 +169,7 @@ class ClosedLoop(Result):
         """`report.json`: plain values, as ``--json`` prints them."""
         from xosc_lateral.report.loop_json import finite, loop_record
 
-        record: dict[str, Any] = finite(loop_record(self._result, self._lack_of_fit, self._given.files))
+        record: dict[str, Any] = finite(loop_record(self._result, self._given.files))
         record["provenance"]["inputs"] = dict(self._given.inputs)
         return record
 
@@ -168,7 +177,7 @@ class ClosedLoop(Result):
         """Residual by context, before and after."""
         from xosc_lateral.report.loop_figures import residual_figure
 
-        return residual_figure(self._result, self._lack_of_fit, "mean")
+        return residual_figure(self._result, "mean")
 
     def write_report(self, folder: PathLike, *, force: bool = False) -> Path:
         """Write `report.html` and `report.json` into a folder."""
@@ -179,7 +188,7 @@ class ClosedLoop(Result):
         output = output_folder(folder)
         claim(self.report_files(output), self._given.files, force=force)
         write_atomically(output / "report.json", canonical_json(self.to_dict()) + "\n")
-        write_atomically(output / "report.html", loop_page(self._result, self._lack_of_fit, self._given.files))
+        write_atomically(output / "report.html", loop_page(self._result, self._given.files, self.proofs))
         return output
 
     @staticmethod

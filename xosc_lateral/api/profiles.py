@@ -6,8 +6,7 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from xosc_lateral.api.inputs import PathLike, Paths, ProfileLike, as_paths, given_profile
-from xosc_lateral.api.result import Result
+from xosc_lateral.api.result import PathLike, Paths, ProfileLike, Result, as_paths, given_profile
 from xosc_lateral.errors import FormatError
 from xosc_lateral.formats.output_paths import claim, output_file, output_folder
 

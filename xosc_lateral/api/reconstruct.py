@@ -6,8 +6,7 @@ from collections.abc import Collection
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from xosc_lateral.api.inputs import PathLike, Paths, as_paths
-from xosc_lateral.api.result import Result
+from xosc_lateral.api.result import PathLike, Paths, Result, as_paths
 from xosc_lateral.formats.mapping import MappingLike
 from xosc_lateral.formats.output_paths import claim, output_folder
 from xosc_lateral.pipeline.reconstruct import (

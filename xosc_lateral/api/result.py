@@ -1,12 +1,27 @@
-"""What all results have in common."""
+"""What all results have in common, and what calls accept as their inputs."""
 
 from __future__ import annotations
 
+import hashlib
 from abc import ABC, abstractmethod
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeAlias
+
+from xosc_lateral.driver.profile import DriverProfile
+from xosc_lateral.drives.drive import Drive
+from xosc_lateral.errors import NotEnoughDataError
+from xosc_lateral.formats.hashes import parsed_hashes
+from xosc_lateral.formats.openscenario.read import RoadSearch
+from xosc_lateral.pipeline.options import PathLike, Paths, ProfileLike
+from xosc_lateral.pipeline.options import paths as as_paths
 
 if TYPE_CHECKING:
     import pandas as pd
+
+    from xosc_lateral.formats.mapping import MappingLike
 
 
 class Result(ABC):
@@ -31,3 +46,115 @@ class Result(ABC):
     @abstractmethod
     def to_dict(self) -> dict[str, Any]:
         """Plain values, as ``--json`` prints them."""
+
+
+__all__ = ["DrivesLike", "PathLike", "Paths", "ProfileLike", "as_paths", "given_drives", "given_profile", "road_search"]
+
+DrivesLike: TypeAlias = "PathLike | pd.DataFrame | Drive | Sequence[PathLike | pd.DataFrame | Drive]"
+"""A table's path, a frame, a `Drive`, or several of them."""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class GivenDrives:
+    """Drives, and what they came from.
+
+    Parameters
+    ----------
+    drives : list of Drive
+    inputs : mapping of str to str
+        Name of each table -> SHA-256 of its bytes (of a frame: of its columns' values).
+    files : tuple of Path
+        Those of them that are files.
+    """
+
+    drives: list[Drive]
+    inputs: Mapping[str, str]
+    files: tuple[Path, ...]
+
+
+@contextmanager
+def naming(given: GivenDrives) -> Iterator[None]:
+    """What finds too little in the drives does not know their files: they are named here.
+
+    Raises
+    ------
+    NotEnoughDataError
+        With the files before it.
+    """
+    try:
+        yield
+    except NotEnoughDataError as error:
+        names = [str(path) for path in given.files] or list(given.inputs)
+        if not names or any(name in str(error) for name in names):
+            raise
+        more = f" and {len(names) - 3} more" if len(names) > 3 else ""
+        raise NotEnoughDataError(f"{', '.join(names[:3])}{more}: {error}") from error
+
+
+def given_drives(drives: DrivesLike, columns: MappingLike | None = None) -> GivenDrives:
+    """Read whatever stands for measured drives.
+
+    Parameters
+    ----------
+    drives : path, DataFrame, Drive, or sequence of them
+    columns : mapping of str to str, TableMapping, or path, optional
+        Standard name -> foreign header, with a unit if need be: ``{"speed": "v_kmh:km/h"}``; or a saved mapping.
+
+    Raises
+    ------
+    FormatError, NotEnoughDataError
+        See `formats.drives.read_drives`.
+    """
+    from xosc_lateral.formats.drives import drives_of_table, read_drives, with_distinct_names
+    from xosc_lateral.formats.mapping import as_mapping
+
+    items = _listed(drives)
+    mapping = as_mapping(columns)
+    files = [Path(item) for item in items if isinstance(item, str | Path)]
+    if len(files) == len(items):
+        return GivenDrives(read_drives(files, mapping), parsed_hashes(files), tuple(files))
+    found: list[Drive] = []
+    inputs: dict[str, str] = {}
+    for number, item in enumerate(items, start=1):
+        if isinstance(item, Drive):
+            found.append(item)
+        elif isinstance(item, str | Path):
+            found += read_drives(item, mapping)
+        else:
+            name = "DataFrame" if len(items) == 1 else f"DataFrame {number}"
+            found += drives_of_table(item, mapping, name)
+            inputs[name] = frame_hash(item)
+    return GivenDrives(with_distinct_names(found), parsed_hashes(files) | inputs, tuple(files))
+
+
+def frame_hash(frame: pd.DataFrame) -> str:
+    """SHA-256 over the names and values of a frame's columns, in hexadecimal."""
+    digest = hashlib.sha256()
+    for name in frame.columns:
+        digest.update(f"\0{name}\0".encode())
+        digest.update(frame[name].to_csv(index=False, header=False).encode())
+    return digest.hexdigest()
+
+
+def given_profile(profile: ProfileLike, library: Paths = ()) -> DriverProfile:
+    """A profile as it is, or read by its path or name; see `read_profile`."""
+    from xosc_lateral.formats.profiles import read_profile
+
+    return profile if isinstance(profile, DriverProfile) else read_profile(profile, as_paths(library))
+
+
+def _listed(drives: DrivesLike) -> list[PathLike | pd.DataFrame | Drive]:
+    if isinstance(drives, str | Path | Drive) or not isinstance(drives, Sequence):
+        return [drives]
+    return list(drives)
+
+
+def road_search(road: PathLike | None, folders: Paths) -> RoadSearch:
+    """Where a road may lie, from what a user says.
+
+    Raises
+    ------
+    FormatError
+        No such file, no such folder.
+    """
+    return RoadSearch(None if road is None else Path(road), as_paths(folders))

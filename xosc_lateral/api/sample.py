@@ -6,18 +6,17 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from xosc_lateral.api.inputs import (
+from xosc_lateral.api.result import (
     DrivesLike,
     GivenDrives,
     PathLike,
     Paths,
     ProfileLike,
+    Result,
     given_drives,
     given_profile,
     naming,
 )
-from xosc_lateral.api.result import Result
-from xosc_lateral.drives.zones import ZONE
 from xosc_lateral.formats.mapping import MappingLike
 from xosc_lateral.formats.output_paths import claim, output_file
 
@@ -72,7 +71,7 @@ def sample(
     if duration is not None:
         made = list(sample_free(driver, duration, seed, speed=speed, lane_width=lane_width, with_sensor=with_sensor))
         settings: dict[str, Any] = {"duration_s": duration, "speed": speed}
-        unknown = [column for column in driver.columns_of_any_drive if column not in {"speed", "lane_width"}]
+        unknown = [column for column in driver.columns if column not in {"speed", "lane_width"}]
         return Offsets(driver, made, seed, None, settings, [_neutral("a free run", unknown)] if unknown else [])
     given = given_drives(like if like is not None else context, columns)  # type: ignore[arg-type]
     warnings = _unknown_columns(driver, given.drives)
@@ -99,23 +98,11 @@ def _unknown_columns(profile: DriverProfile, drives: Sequence[Drive]) -> list[st
         for names, columns in lacking.items()
         if names
     ]
-    return found + _unknown_zones(profile, drives)
-
-
-def _unknown_zones(profile: DriverProfile, drives: Sequence[Drive]) -> list[str]:
-    """How many zones of the tables the profile was not fitted on, in a line, if any."""
-    from xosc_lateral.driver.effects import Zones
-
-    known = {name for effect in profile.effects if isinstance(effect, Zones) for name in effect.zones}
-    there = {str(name) for drive in drives if drive.zone is not None for name in set(drive.zone.tolist()) if name}
-    strange = sorted(there - known)
-    if not known or not strange:
-        return []
-    return [f"{len(strange)} of {len(there)} zones are not the profile's ({strange[0]}, say), taken as the mean of all"]
+    return found
 
 
 def _known(drive: Drive) -> set[str]:
-    return {"lane_width", *drive.context, *drive.empty} | (set() if drive.zone is None else {ZONE})
+    return {"lane_width", *drive.context, *drive.empty}
 
 
 def _neutral(where: str, columns: Sequence[str]) -> str:

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from xosc_lateral.api.inputs import PathLike
-from xosc_lateral.api.result import Result
+from xosc_lateral.api.result import PathLike, Result
 from xosc_lateral.formats.output_paths import claim, output_folder
 from xosc_lateral.formats.own_files import template_mark
 

@@ -6,8 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from xosc_lateral.api.inputs import PathLike, Paths, as_paths
-from xosc_lateral.api.result import Result
+from xosc_lateral.api.result import PathLike, Paths, Result, as_paths
 from xosc_lateral.errors import FormatError
 from xosc_lateral.formats.output_paths import claim, output_file, output_folder
 from xosc_lateral.pipeline import verify as checks

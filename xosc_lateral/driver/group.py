@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.driver.effects import Acts, EffectTerms
-from xosc_lateral.driver.effects.acts import terms_of
+from xosc_lateral.driver.effects.base import terms_of
 from xosc_lateral.driver.effects.response import Response, ResponseState
 from xosc_lateral.driver.process import DriveProcess, Movement, combine, offsets_of
 from xosc_lateral.driver.profile import DriverProfile
@@ -29,10 +29,10 @@ BLOCK = 64
 _NEIGHBOURS = 2
 """Samples ahead that the curve between two samples needs. [-]"""
 
-_PARTS = ("coarse", "fine", "quick", *(f"hidden_{name}" for name in ("location", "spread", "rate", "fine", "quick")))
+_PARTS = ("coarse", "fine", *(f"hidden_{name}" for name in ("location", "spread", "rate", "fine")))
 """What is drawn ahead: of the movement [lane widths], then factors of hidden effects (location: [m])."""
 
-_NEUTRAL = (0.0, 0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 1.0)
+_NO_FACTORS = (0.0, 0.0, 0.0, 1.0, 1.0, 1.0)
 
 
 class OffsetGroup:
@@ -49,16 +49,13 @@ class OffsetGroup:
         self.profile, self.columns = profile, tuple(sorted(set(columns)))
         example = DriveProcess(profile, np.random.SeedSequence(0))
         columned, self._hidden = example.columned, bool(example.hidden)
-        own = [k for k, effect in enumerate(columned) if not effect.is_of_recording]
         step = profile.model.step
-        # as of a stream: who looks farthest ahead decides how much later everybody responds, whatever is known
-        self._ahead = max((columned[k].response_in_blocks(step).ahead for k in own), default=0)
-        self._which = [k for k in own if set(columned[k].columns) <= set(self.columns)]
+        # as of a stream: the longest preview decides how much later everybody responds, whatever is known
+        self._ahead = max((effect.response_in_blocks(step).ahead for effect in columned), default=0)
+        self._which = [k for k, effect in enumerate(columned) if set(effect.columns) <= set(self.columns)]
         self._effects = [columned[k] for k in self._which]
         self._responses = [self._response(k) for k in range(len(self._effects))]
         self._rated = any(effect.acts is Acts.RATE for effect in self._effects)
-        acts = [getattr(effect, "acts", None) for effect in (*self._effects, *example.hidden)]
-        self._quick = Acts.QUICK in acts and Acts.RATE not in acts
         self._drives: list[DriveProcess] = []
         self._slopes: list[FloatArray] = [np.empty((0, len(effect.reference))) for effect in self._effects]
         self._mean = np.empty(0)
@@ -171,10 +168,10 @@ class OffsetGroup:
         self._at[who] += 1
         self._left[who] -= 1
         self._row[who] += 1
-        movement = Movement(self._mean[who], parts[0], parts[1], parts[2] if self._quick else None)
-        hidden = EffectTerms(*parts[3:]) if self._hidden else EffectTerms()
+        movement = Movement(self._mean[who], parts[0], parts[1])
+        hidden = EffectTerms(*parts[2:]) if self._hidden else EffectTerms()
         terms = combine([hidden, effects])
-        return offsets_of(movement, EffectTerms(terms.location, terms.spread, None, terms.fine, terms.quick), width)
+        return offsets_of(movement, EffectTerms(terms.location, terms.spread, None, terms.fine), width)
 
     def _next_rated(self, who: NDArray[np.int64], effects: EffectTerms, width: FloatArray) -> FloatArray:
         """The same where effects act on the rate of mean reversion: nothing can be drawn ahead."""
@@ -201,10 +198,10 @@ class OffsetGroup:
         """`BLOCK` rows of a drive from `row` on, shape (BLOCK, parts)."""
         drive = self._drives[k]
         hidden = drive.hidden_terms_at(np.arange(row, row + BLOCK))
-        movement = drive.movement(BLOCK, quick=self._quick, rate=hidden.rate)
+        movement = drive.movement(BLOCK, hidden.rate)
         self._mean[k] = float(movement.mean)
-        rows = np.tile(_NEUTRAL, (BLOCK, 1))
-        for column, values in enumerate((movement.coarse, movement.fine, movement.quick, *hidden.parts)):
+        rows = np.tile(_NO_FACTORS, (BLOCK, 1))
+        for column, values in enumerate((movement.coarse, movement.fine, *hidden.parts)):
             if values is not None:
                 rows[:, column] = values
         return rows

@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 from xosc_lateral.driver.effects import ColumnEffect, EffectTerms, HiddenEffect
 from xosc_lateral.driver.models.base import CoreStream, Start
 from xosc_lateral.driver.profile import DriverProfile
-from xosc_lateral.driver.quick import quick_between, reach
 from xosc_lateral.driver.records import read_as
 from xosc_lateral.driver.seeds import DriveSeed, child, generator
 
@@ -40,9 +39,6 @@ class DriveState(msgspec.Struct, kw_only=True):
         Rows of the drive that `terms` begins and ends at.
     coarse, fine : array, shape (k,)
         Core movement drawn ahead. [lane widths]
-    past : array, shape (m,), optional
-        Last coarse movement, as far back as what is quick of it hangs on it; None before an effect acts on that.
-        [lane widths]
     """
 
     begun_at: float | None = None
@@ -53,28 +49,22 @@ class DriveState(msgspec.Struct, kw_only=True):
     drawn: int = 0
     coarse: FloatArray
     fine: FloatArray
-    past: FloatArray | None = None
 
 
 class Movement(NamedTuple):
     """What is random of offsets at some rows, before effects act on it. [lane widths]
 
-    The mean that the coarse part moves about, coarse and fine part, and what is quick of the coarse one where an effect
-    acts on that.
+    The mean that the coarse part moves about, coarse and fine part.
     """
 
     mean: FloatArray | float
     coarse: FloatArray
     fine: FloatArray
-    quick: FloatArray | None
 
 
 def offsets_of(movement: Movement, terms: EffectTerms, width: FloatArray) -> FloatArray:
     """Offsets, by the formula of `EffectTerms`; rows of one drive, or one row of many drives, shape (n,) each. [m]"""
-    mean, coarse, fine, quick = movement
-    if terms.quick is not None:
-        fine = terms.quick * fine
-        coarse = coarse if quick is None else coarse + (terms.quick - 1.0) * quick
+    mean, coarse, fine = movement
     moved = coarse if terms.spread is None else mean + terms.spread * (coarse - mean)
     moved = moved + (fine if terms.fine is None else terms.fine * fine)
     offset = moved * width
@@ -203,43 +193,24 @@ class DriveProcess:
             self.state.core = self._core.state
         elif start is not None:
             raise ValueError("a drive that continues from a state has no start")
-        acts_on_quick = (terms.quick is not None or self.state.past is not None) and terms.rate is None
-        return offsets_of(self._movement(len(width), terms.rate, quick=acts_on_quick), terms, width)
+        return offsets_of(self.movement(len(width), terms.rate), terms, width)
 
-    def movement(self, n: int, *, quick: bool, rate: FloatArray | None = None) -> Movement:
-        """Next movement of a drive that begins as chance has it, before effects act: what `take` makes offsets of.
+    def movement(self, n: int, rate: FloatArray | None = None) -> Movement:
+        """Next movement, before effects act: what `take` makes offsets of; `rate` [-] of shape (n,).
 
-        With what is quick of it where asked for, which must be from the drive's start on; `rate` [-] of shape (n,).
+        A drive that has not begun begins as chance has it.
         """
         if self._core is None:
             self._core = self._model.stream(child(self._seed, DriveSeed.CORE), None)
             self.state.core = self._core.state
-        return self._movement(n, rate, quick=quick)
+        return Movement(self._core.mean, *self._take_core(self._core, n, rate))
 
-    def _movement(self, n: int, rate: FloatArray | None, *, quick: bool) -> Movement:
-        assert self._core is not None
-        coarse, fine = self._take_core(self._core, n, rate, reach(self._model.step) if quick else 0)
-        return Movement(self._core.mean, coarse, fine, self._quick_of(coarse) if quick else None)
-
-    def _quick_of(self, coarse: FloatArray) -> FloatArray:
-        """What is quick of the coarse movement just taken, that drawn ahead being known. [lane widths]
-
-        Before the first row of the drive it is mirrored through that row's point, so that nothing of it is quick.
-        """
-        state, rows = self.state, reach(self._model.step)
-        seen = np.concatenate([coarse, state.coarse[:rows]])
-        past = 2.0 * seen[0] - seen[rows:0:-1] if state.past is None else state.past
-        state.past = np.concatenate([past, coarse])[-rows:]
-        return quick_between(np.concatenate([past, seen]), self._model.step)
-
-    def _take_core(
-        self, core: CoreStream, n: int, rate: FloatArray | None, beyond: int
-    ) -> tuple[FloatArray, FloatArray]:
-        """Next rows of the core movement; so many beyond are drawn as well."""
+    def _take_core(self, core: CoreStream, n: int, rate: FloatArray | None) -> tuple[FloatArray, FloatArray]:
+        """Next rows of the core movement."""
         state = self.state
-        if rate is not None or not (self._core_ahead or len(state.coarse) or beyond):
+        if rate is not None or not (self._core_ahead or len(state.coarse)):
             return core.take(n, rate)
-        missing = n + beyond - len(state.coarse)
+        missing = n - len(state.coarse)
         if missing > 0:
             coarse, fine = core.take(max(missing, self._core_ahead))
             state.coarse, state.fine = np.concatenate([state.coarse, coarse]), np.concatenate([state.fine, fine])
@@ -263,8 +234,6 @@ class DriveProcess:
         if state.core is not None:
             self._core = self._model.resume(read_as(self._model.State, state.core, f"{where}.core"))
             state.core = self._core.state
-        # States of older versions know of fewer terms.
-        state.terms += [None] * (len(EffectTerms().parts) - len(state.terms))
         self.state = state
 
 
@@ -277,7 +246,7 @@ def _refuse_strangers(profile: DriverProfile) -> None:
 
 def combine(terms: Sequence[EffectTerms]) -> EffectTerms:
     """What several effects do together: locations add up, factors multiply."""
-    location = spread = rate = fine = quick = None
+    location = spread = rate = fine = None
     for term in terms:
         if term.location is not None:
             location = term.location if location is None else location + term.location
@@ -287,18 +256,15 @@ def combine(terms: Sequence[EffectTerms]) -> EffectTerms:
             rate = term.rate if rate is None else rate * term.rate
         if term.fine is not None:
             fine = term.fine if fine is None else fine * term.fine
-        if term.quick is not None:
-            quick = term.quick if quick is None else quick * term.quick
-    return EffectTerms(location, spread, rate, fine, quick)
+    return EffectTerms(location, spread, rate, fine)
 
 
 def _start(offset: float | None, width: FloatArray, terms: EffectTerms) -> Start | None:
     if offset is None:
         return None
     location = 0.0 if terms.location is None else float(terms.location[0])
-    fine = [float(factor[0]) for factor in (terms.fine, terms.quick) if factor is not None]
     return Start(
         rel_offset=(offset - location) / float(width[0]),
         spread=1.0 if terms.spread is None else float(terms.spread[0]),
-        fine=float(np.prod(fine)),
+        fine=1.0 if terms.fine is None else float(terms.fine[0]),
     )

@@ -1,8 +1,8 @@
-"""Sampled offsets beside measured ones, under their context, or free."""
+"""Sampled offsets beside measured ones, under their context, or free; with what a profile's sensor adds, if asked."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,12 +11,13 @@ from numpy.typing import NDArray
 from xosc_lateral.driver.plausibility import check_offsets
 from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.driver.sampling import sample_offsets
-from xosc_lateral.driver.seeds import child
-from xosc_lateral.driver.sensor.error import known_sensor, recorded, sensor_error
-from xosc_lateral.driver.snippets import cut_snippets, segment_of, zone_of
+from xosc_lateral.driver.seeds import DriveSeed, child, generator
+from xosc_lateral.driver.sensor.model import SensorModel
+from xosc_lateral.driver.snippets import cut_snippets, segment_of
 from xosc_lateral.drives.cuts import PAPER_RULES, CutRules, all_runs, whole_run
 from xosc_lateral.drives.drive import Drive
 from xosc_lateral.drives.resampling import STEP
+from xosc_lateral.errors import DriverProfileError
 from xosc_lateral.segment import Segment
 
 FloatArray = NDArray[np.float64]
@@ -59,7 +60,7 @@ def sample_like(
         def draw(start: float, segment: Segment = segment, own: np.random.SeedSequence = own) -> FloatArray:
             return sample_offsets(profile, segment, own, start=start)
 
-        offset = recorded(sensor, draw, len(snippet.time), float(snippet.offset[0]), STEP, own, zone=zone_of(segment))
+        offset = recorded(sensor, draw, len(snippet.time), float(snippet.offset[0]), STEP, own)
         _check(offset, segment, profile, snippet.run.drive)
         yield SampledOffsets(snippet.run.drive, snippet.index, snippet.time, offset, snippet.offset)
 
@@ -74,7 +75,7 @@ def sample_context(
         run = whole_run(drive)
         own, segment = child(root, number), segment_of(run)
         offset = sample_offsets(profile, segment, own)
-        offset = offset + sensor_error(sensor, offset, STEP, own, zone=zone_of(segment))
+        offset = offset + sensor_error(sensor, offset, STEP, own)
         _check(offset, segment, profile, drive.name)
         yield SampledOffsets(drive.name, 0, run.time, offset, None)
 
@@ -115,3 +116,48 @@ def sample_free(
     offset = sample_offsets(profile, segment, own)
     offset = offset + sensor_error(known_sensor(profile) if with_sensor else None, offset, STEP, own)
     yield SampledOffsets(profile.name, 0, time, offset, None)
+
+
+def known_sensor(profile: DriverProfile) -> SensorModel:
+    """What the profile's drives were measured by.
+
+    Raises `DriverProfileError` when the profile doesn't know.
+    """
+    if profile.sensor is None:
+        raise DriverProfileError(f"profile {profile.name} holds no sensor: fit it anew, or sample the driver alone")
+    return profile.sensor
+
+
+def sensor_error(
+    sensor: SensorModel | None,
+    path: FloatArray,
+    step: float,
+    seed: np.random.SeedSequence,
+    part: int = 0,
+) -> FloatArray:
+    """Error on a drive's sampled path, shape (n,), from random numbers of its own; zeros without a sensor. [m]
+
+    `part` numbers the pieces of one drive: a sensor knows nothing of what it measured minutes ago.
+    """
+    if sensor is None:
+        return np.zeros(len(path))
+    return sensor.sample(len(path), step, generator(seed, DriveSeed.SENSOR, part))
+
+
+def recorded(
+    sensor: SensorModel | None,
+    draw: Callable[[float], FloatArray],
+    n: int,
+    start: float,
+    step: float,
+    seed: np.random.SeedSequence,
+) -> FloatArray:
+    """A sampled path of n offsets with the sensor's error on it, the sum of which begins at `start`. [m]
+
+    `draw` samples the path from a given start [m].
+    """
+    if sensor is None:
+        return draw(start)
+    rng = generator(seed, DriveSeed.SENSOR, 0)
+    noise = sensor.sample(n, step, rng)
+    return draw(start - float(noise[0])) + noise

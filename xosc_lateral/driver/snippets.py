@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 
 from xosc_lateral.drives.drive import Run
 from xosc_lateral.drives.resampling import STEP
-from xosc_lateral.drives.zones import ZONE
 from xosc_lateral.errors import NotEnoughDataError
 from xosc_lateral.segment import Segment
 
@@ -80,12 +79,7 @@ def segment_of(run: Run, rows: slice | None = None) -> Segment:
         lane_width=run.lane_width[cut],
         speed=speed,
         context={name: np.full(end - begin, np.nan) for name in run.empty}
-        | {name: values[cut] for name, values in run.context_and_zone.items()},
+        | {name: values[cut] for name, values in run.context.items()},
         before=first - begin,
         after=end - last,
     )
-
-
-def zone_of(segment: Segment) -> FloatArray | None:
-    """Codes of the zones that a segment's rows were recorded in, shape (n,); None where they are not known."""
-    return segment.context[ZONE][segment.inside] if ZONE in segment.context else None

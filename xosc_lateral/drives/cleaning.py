@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from xosc_lateral.drives.drive import Drive
 from xosc_lateral.drives.markings import both_markings
-from xosc_lateral.drives.zones import ZONE
 from xosc_lateral.errors import FormatError
 from xosc_lateral.limits import DRIVE_SPAN, TIME
 
@@ -38,7 +37,7 @@ MAX_CONTRADICTIONS = 0.01
 RUN = "following_run"
 """Column of tables that an import has cut: number of the road-following stretch. What it has cut is not cut again."""
 
-OWN = frozenset({"time", "drive", "offset", "lane_width", "distance_left", "distance_right", RUN, ZONE})
+OWN = frozenset({"time", "drive", "offset", "lane_width", "distance_left", "distance_right", RUN})
 """Columns that are no context."""
 
 
@@ -47,7 +46,6 @@ def clean_drive(
     columns: dict[str, FloatArray],
     levels: frozenset[str],
     path: Path,
-    zones: NDArray[np.object_] | None = None,
 ) -> Drive | None:
     """Rows of one drive, from whatever source, as a `Drive`.
 
@@ -58,14 +56,11 @@ def clean_drive(
     name : str
     columns : mapping of str to array, shape (n,)
         `time` [s], and `offset` and `lane_width` or `distance_left` and `distance_right` [m]; `speed` [m/s] if known;
-        `RUN` where an import has cut the drive; `ZONE` where there are `zones`; all others are context. NaN: missing,
-        or "there is none".
+        `RUN` where an import has cut the drive; all others are context. NaN: missing, or "there is none".
     levels : frozenset of str
         Columns that hold levels.
     path : Path
         What messages call the source.
-    zones : array of str, shape (k,), optional
-        Names of the zones, which the column counts from 0.
 
     Returns
     -------
@@ -91,7 +86,6 @@ def clean_drive(
     context["lane_width"] = lane_width[good]
     held = frozenset(levels & context.keys())
     run = columns[RUN][good].astype(np.int64) if RUN in columns else None
-    zone = None if zones is None else _named(columns[ZONE][good], zones)
     drive = Drive(
         name,
         columns["time"][good],
@@ -102,15 +96,8 @@ def clean_drive(
         str(path),
         run,
         empty=empty,
-        zone=zone,
     )
     return drive if run is not None else _seen_through(drive)
-
-
-def _named(numbers: FloatArray, names: NDArray[np.object_]) -> NDArray[np.object_]:
-    """Names by their numbers, empty where there is none."""
-    known = np.isfinite(numbers)
-    return np.where(known, names[np.where(known, numbers, 0.0).astype(np.int64)], "")
 
 
 def _seen_through(drive: Drive) -> Drive:
@@ -129,7 +116,6 @@ def _seen_through(drive: Drive) -> Drive:
         offset=mended.offset[kept],
         lane_width=mended.lane_width[kept],
         context=context,
-        zone=None if drive.zone is None else drive.zone[kept],
         mended=mended.shares,
         half_width=half_width[kept],
     )

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.drives.drive import Drive, Run
-from xosc_lateral.drives.resampling import STEP, column_on_grid, nearest_rows, resample
+from xosc_lateral.drives.resampling import STEP, column_on_grid, resample
 from xosc_lateral.errors import NotEnoughDataError
 
 FloatArray = NDArray[np.float64]
@@ -154,8 +154,7 @@ def _run(drive: Drive, index: int, rows: slice, grid: FloatArray) -> Run:
     }
     lane_width = column_on_grid(time, drive.lane_width[rows], grid, held=False)
     offset = resample(time, drive.offset[rows], grid)
-    zone = None if drive.zone is None else drive.zone[rows][nearest_rows(time, grid)]
-    return Run(drive.name, index, grid, offset, lane_width, context, drive.levels, drive.empty, zone)
+    return Run(drive.name, index, grid, offset, lane_width, context, drive.levels, drive.empty)
 
 
 def _uninterrupted(drive: Drive, keep: BoolArray, max_gap: float) -> list[slice]:

@@ -10,8 +10,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
-from xosc_lateral.drives.zones import ZONE, zone_codes
-
 FloatArray = NDArray[np.float64]
 
 
@@ -61,8 +59,6 @@ class Drive:
     half_width : array, shape (n,), optional
         Half the lane width as a camera recorded it, with errors of both markings, as the offset has them. None: the
         lane width comes from a map, or from elsewhere than the offset. [m]
-    zone : array of str, shape (n,), optional
-        Name of the zone that each row was recorded in (`zones`), empty where it is not known. None: the table has none.
     """
 
     name: str
@@ -76,7 +72,6 @@ class Drive:
     mended: MarkingShares | None = None
     empty: frozenset[str] = frozenset()
     half_width: FloatArray | None = None
-    zone: NDArray[np.object_] | None = None
 
     def __post_init__(self) -> None:
         """Copy and freeze; refuse unequal lengths and what readers must have taken out."""
@@ -114,8 +109,6 @@ class Run:
         As in `Drive`.
     levels, empty : frozenset of str
         As in `Drive`.
-    zone : array of str, shape (n,), optional
-        As in `Drive`.
     """
 
     drive: str
@@ -126,16 +119,10 @@ class Run:
     context: Mapping[str, FloatArray] = field(default_factory=dict)
     levels: frozenset[str] = frozenset()
     empty: frozenset[str] = frozenset()
-    zone: NDArray[np.object_] | None = None
 
     def __post_init__(self) -> None:
         """Copy and freeze; refuse unequal lengths and missing values."""
         _freeze(self)
-
-    @property
-    def context_and_zone(self) -> Mapping[str, FloatArray]:
-        """Its context, with the zones' codes where it has any, shape (n,) each."""
-        return self.context if self.zone is None else {**self.context, ZONE: zone_codes(self.zone)}
 
     def part(self, rows: slice, drive: str | None = None) -> Run:
         """Some of its rows, under its drive's name or another."""
@@ -146,7 +133,6 @@ class Run:
             offset=self.offset[rows],
             lane_width=self.lane_width[rows],
             context={name: values[rows] for name, values in self.context.items()},
-            zone=None if self.zone is None else self.zone[rows],
         )
 
     def __len__(self) -> int:
@@ -169,8 +155,6 @@ def _freeze(series: Drive | Run) -> None:
         object.__setattr__(series, "run", _frozen(series.run, len(series.time), f"drive {series.name}: run", np.int64))
     name = series.name if isinstance(series, Drive) else series.drive
     n = len(series.time)
-    if series.zone is not None:
-        object.__setattr__(series, "zone", _frozen(series.zone, n, f"drive {name}: zone", np.object_))
     half_width = ("half_width",) if isinstance(series, Drive) and series.half_width is not None else ()
     for label in ("time", "offset", "lane_width", *half_width):
         values = _frozen(getattr(series, label), n, f"drive {name}: {label}")

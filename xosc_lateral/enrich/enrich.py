@@ -10,15 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.driver.answers import basis_of
-from xosc_lateral.driver.beside import COLUMNS, SIDES, Basis
 from xosc_lateral.driver.drivability import drivable
 from xosc_lateral.driver.plausibility import check_offsets
-from xosc_lateral.driver.profile import DriverProfile
+from xosc_lateral.driver.profile import COLUMNS, SIDES, Basis, DriverProfile
+from xosc_lateral.driver.sampled_offsets import known_sensor, sensor_error
 from xosc_lateral.driver.sampling import OffsetSampler
-from xosc_lateral.driver.sensor.error import known_sensor, sensor_error
 from xosc_lateral.enrich.consequences import gaps_of, lane_departures
-from xosc_lateral.enrich.give_way import SampledVehicle, give_way
-from xosc_lateral.enrich.other_hand import mirrored, other_side
+from xosc_lateral.enrich.give_way import SampledVehicle, give_way, mirrored, other_side
 from xosc_lateral.enrich.result import Enriched, EntityResult, Neighbours, SampledSegment
 from xosc_lateral.motion.context import entity_context
 from xosc_lateral.motion.deviation import SETTLING_TIME, SampledDeviation, deviation_through
@@ -412,4 +410,4 @@ def _is_left_hand(entity: EntityMotion, network: RoadNetwork, knots: IntArray) -
 
 def _unknown(driver: DriverProfile, segment: Segment) -> set[str]:
     """Columns that the scenario could have told."""
-    return {column for column in driver.columns_of_any_drive if column not in segment.context}
+    return {column for column in driver.columns if column not in segment.context}

@@ -14,18 +14,55 @@ Our own rule: quantile mapping to gaps that were measured in DLR Highway Traffic
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.motion.context import STEERING, smooth_step
+from xosc_lateral.motion.context import CELLS, STEERING, smooth_step
 from xosc_lateral.motion.nearby import pairs_within
 from xosc_lateral.motion.nominal import Activity, EntityMotion, NominalMotion
 from xosc_lateral.road.network import RoadNetwork
+from xosc_lateral.segment import Segment
 
 FloatArray = NDArray[np.float64]
+
+OTHER_SIGN = ("curvature", "crossfall")
+"""Positive to the one side, negative to the other."""
+
+_SIDES = {"left": "right", "right": "left"}
+
+
+def mirrored(segment: Segment) -> Segment:
+    """The segment with left and right exchanged.
+
+    Columns change places whose names differ in the word `left` or `right` alone (`left_distance`, `truck_right`);
+    curvature and crossfall change their sign, the wind its side; lanes are counted from the other edge. A column of
+    another name stays.
+    """
+    return replace(segment, context=mirrored_context(segment.context))
+
+
+def mirrored_context(context: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
+    """Context columns with left and right exchanged; shapes and units as they are."""
+    found = {other_side(name): values for name, values in context.items()}
+    for name in OTHER_SIGN:
+        if name in found:
+            found[name] = -found[name]
+    if "wind_direction" in found:
+        found["wind_direction"] = -found["wind_direction"] % 360.0
+    if "lane_index" in found and "lane_count" in found:
+        found["lane_index"] = found["lane_count"] - 1.0 - found["lane_index"]
+    return found
+
+
+def other_side(name: str) -> str:
+    """The name with the words `left` and `right` exchanged."""
+    return "_".join(_SIDES.get(word, word) for word in name.split("_"))
+
+
 IntArray = NDArray[np.int64]
 
 GAPS = (
@@ -97,23 +134,34 @@ def give_way(
     count, n = len(sampled), len(rows)
     left, right = np.zeros((count, n)), np.zeros((count, n))
     frames = [Frame.of(one, rows) for one in sampled]
-    left_hand = _left_hand(network, sampled, rows)
+    left_hand = np.array(_left_hand(network, sampled, rows), dtype=bool)
     x, y = ([np.where(frame.present, getattr(frame, name), np.nan) for frame in frames] for name in ("x", "y"))
     longest = max((one.motion.entity.bounding_box.length for one in sampled), default=0.0)
-    for i, j in pairs_within(x, y, FADES + longest + MARGIN):
-        if not (sampled[i].can_move.any() or sampled[j].can_move.any()):
+    can_move = [one.can_move.any() for one in sampled]
+    meeting = [pair for pair in pairs_within(x, y, FADES + longest + MARGIN) if can_move[pair[0]] or can_move[pair[1]]]
+    names = ("x", "y", "heading", "deviation", "can_move", "present")
+    tables = [np.stack([getattr(frame, name) for frame in frames]) for name in names] if meeting else []
+    sizes = [np.array([getattr(frame, name) for frame in frames]) for name in ("length", "width")]
+    heeds, alone = (
+        [np.array([side in getattr(one, name) for one in sampled], dtype=bool) for side in ("left", "right")]
+        for name in ("heeds", "alone")
+    )
+    for pairs in _together(meeting, n):
+        near = np.flatnonzero(_near(tables, sizes[0], *pairs))
+        own, other = (who[near // n] for who in pairs)
+        at = near % n
+        first, second = (
+            Frame(*(table[who, at] for table in tables), *(size[who] for size in sizes)) for who in (own, other)
+        )
+        widening = widened(first, second, heeds[0][own], heeds[1][own])
+        if widening is None:
             continue
-        for own, other in ((i, j), (j, i)):
-            heeds = sampled[own].heeds
-            widening = widened(frames[own], frames[other], "left" in heeds, "right" in heeds)
-            if widening is None:
-                continue
-            aside, is_left, heeded = widening  # of `own`, by where `other` is
-            share = part_of(is_left == left_hand[own], heeded)
-            share = np.where(frames[other].can_move, share, 1.0) * frames[own].can_move
-            share *= np.where(is_left, "left" not in sampled[own].alone, "right" not in sampled[own].alone)
-            right[own] = np.maximum(right[own], np.where(is_left, share * aside, 0.0))
-            left[own] = np.maximum(left[own], np.where(is_left, 0.0, share * aside))
+        aside, is_left, heeded = widening  # of `own`, by where `other` is
+        share = part_of(is_left == left_hand[own], heeded)
+        share = np.where(second.can_move, share, 1.0) * first.can_move
+        share *= ~np.where(is_left, alone[0][own], alone[1][own])
+        np.maximum.at(right, (own, at), np.where(is_left, share * aside, 0.0))
+        np.maximum.at(left, (own, at), np.where(is_left, 0.0, share * aside))
     every = max(1, int(rows[1] - rows[0])) if n > 1 else 1
     width = STEERING / (motion.step * every)
     all_rows = np.arange(len(motion.entities[0].time)) if count else np.empty(0)
@@ -122,6 +170,22 @@ def give_way(
         aside = left[k] - right[k]
         result.append(np.interp(all_rows, rows, _smoothed(aside, width)) if aside.any() else None)
     return result
+
+
+def _together(meeting: Sequence[tuple[int, int]], n: int) -> Iterator[tuple[IntArray, IntArray]]:
+    """Both of each pair, each as the one who looks at the other, as many pairs as are looked at at once."""
+    pairs = np.array([pair for i, j in meeting for pair in ((i, j), (j, i))], dtype=np.int64).reshape(-1, 2)
+    step = max(1, CELLS // max(n, 1))
+    for begin in range(0, len(pairs), step):
+        yield pairs[begin : begin + step, 0], pairs[begin : begin + step, 1]
+
+
+def _near(tables: Sequence[NDArray[Any]], length: FloatArray, own: IntArray, other: IntArray) -> NDArray[np.bool_]:
+    """Where pairs of vehicles are near enough for `widened`, shape (pairs, n); `tables`: x, y ... of all vehicles."""
+    x, y, present = tables[0], tables[1], tables[-1]
+    reach = (FADES + 0.5 * (length[own] + length[other]) + MARGIN)[:, None]
+    away = (x[other] - x[own]) ** 2 + (y[other] - y[own]) ** 2
+    return np.asarray(present[own] & present[other] & (away < reach**2))
 
 
 MARGIN = 10.0

@@ -15,7 +15,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.driver.profile import DriverProfile
-from xosc_lateral.driver.snippets import segment_of
 from xosc_lateral.drives.drive import Run
 from xosc_lateral.evaluation.classifier import TwoSampleResult, classifier_two_sample_test, context_features
 from xosc_lateral.evaluation.distances import PROPER, proper_scores, split_groups
@@ -131,7 +130,7 @@ def score_realism(profile: DriverProfile, runs: Sequence[Run], *, seed: int, cla
     """
     step = profile.model.step
     driver = sample_runs(profile, runs, seed, same_start=False)
-    noise = sensor_noise(profile, driver, [segment_of(run) for run in runs], seed)
+    noise = sensor_noise(profile, driver, seed)
     recorded = [path + error for path, error in zip(driver, noise, strict=True)]
     slow_real = [below_half_hertz(run.offset, step) for run in runs]
     slow_driver = [below_half_hertz(path, step) for path in driver]

@@ -15,10 +15,10 @@ from numpy.typing import NDArray
 
 from xosc_lateral.driver.models.base import Start
 from xosc_lateral.driver.profile import DriverProfile
+from xosc_lateral.driver.sampled_offsets import recorded, sensor_error
 from xosc_lateral.driver.sampling import OffsetSampler, sample_offsets
 from xosc_lateral.driver.seeds import child
-from xosc_lateral.driver.sensor.error import recorded, sensor_error
-from xosc_lateral.driver.snippets import Snippet, cut_snippets, segment_of, zone_of
+from xosc_lateral.driver.snippets import Snippet, cut_snippets, segment_of
 from xosc_lateral.drives.drive import Run
 from xosc_lateral.segment import Segment
 
@@ -136,7 +136,7 @@ def sample_recorded(
             return sample_offsets(profile, segment, own, start=begin)
 
         n = segment.lane_width[segment.inside].size
-        rows.append(recorded(sensor, draw, n, start, profile.model.step, own, zone=zone_of(segment)))
+        rows.append(recorded(sensor, draw, n, start, profile.model.step, own))
     return rows
 
 
@@ -175,12 +175,7 @@ def sample_runs(profile: DriverProfile, runs: Sequence[Run], seed: int, *, same_
     return paths
 
 
-def sensor_noise(
-    profile: DriverProfile, paths: Sequence[FloatArray], segments: Sequence[Segment], seed: int
-) -> list[FloatArray]:
-    """What the profile's sensor adds to paths on these segments, shape (n_i,) each; zeros where it knows none. [m]"""
+def sensor_noise(profile: DriverProfile, paths: Sequence[FloatArray], seed: int) -> list[FloatArray]:
+    """What the profile's sensor adds to paths, shape (n_i,) each; zeros where it knows none. [m]"""
     root, step = np.random.SeedSequence(seed), profile.model.step
-    return [
-        sensor_error(profile.sensor, path, step, child(root, k), zone=zone_of(segment))
-        for k, (path, segment) in enumerate(zip(paths, segments, strict=True))
-    ]
+    return [sensor_error(profile.sensor, path, step, child(root, k)) for k, path in enumerate(paths)]

@@ -13,7 +13,6 @@ from xosc_lateral.driver.plausibility import first_implausible, implausible, imp
 from xosc_lateral.drives.cleaning import MAX_MEDIAN_SPEED, MAX_OUTSIDE, OWN, clean_drive
 from xosc_lateral.drives.cuts import MIN_RUN
 from xosc_lateral.drives.drive import Drive
-from xosc_lateral.drives.zones import ZONE
 from xosc_lateral.errors import FormatError, NotEnoughDataError
 from xosc_lateral.formats.mapping import MappingLike, TableMapping, as_mapping
 from xosc_lateral.formats.tables import comma_numbers, indicators, plain_cells, read_table, seconds_of_text
@@ -72,10 +71,8 @@ def drives_of_table(table: pd.DataFrame, mapping: MappingLike, path: Path | str 
     levels = frozenset(name for name, values in columns.items() if _may_hold_levels(name) and _holds_levels(values))
     _require_columns(columns, path)
     names, every = _drive_names(table, path)
-    numbers, zones = _zones(table)
-    columns |= {} if zones is None else {ZONE: numbers}
     drives = [
-        clean_drive(name, {key: values[rows] for key, values in columns.items()}, levels, path, zones)
+        clean_drive(name, {key: values[rows] for key, values in columns.items()}, levels, path)
         for name, rows in zip(names, every, strict=True)
     ]
     return _with_rows(drives, path)
@@ -127,9 +124,7 @@ def _numeric_columns(table: pd.DataFrame, path: Path) -> dict[str, FloatArray]:
     for name in table.columns:
         if name == "drive":
             continue
-        if name == ZONE:  # names, even where they are numbers
-            columns |= indicators(name, table[name], table.get("drive"), MAX_LEVELS)
-        elif name in OWN or name == "speed" or types.is_numeric_dtype(table[name]) or types.is_bool_dtype(table[name]):
+        if name in OWN or name == "speed" or types.is_numeric_dtype(table[name]) or types.is_bool_dtype(table[name]):
             columns[name] = _cleaned(table, name, path)
         elif table[name].isna().all():
             columns[name] = np.full(len(table), np.nan)
@@ -138,21 +133,6 @@ def _numeric_columns(table: pd.DataFrame, path: Path) -> dict[str, FloatArray]:
         else:
             columns |= indicators(name, table[name], table.get("drive"), MAX_LEVELS)
     return columns
-
-
-def _zones(table: pd.DataFrame) -> tuple[FloatArray, NDArray[np.object_] | None]:
-    """Number of each row's zone from 0, NaN where it has none, and the zones' names; None without any.
-
-    Whole numbers are called alike whether a table keeps them as such or, beside empty cells, as fractions.
-    """
-    from pandas.api import types
-
-    if ZONE not in table.columns or table[ZONE].isna().all():
-        return np.empty(0), None
-    codes, values = table[ZONE].factorize()
-    numeric = types.is_numeric_dtype(table[ZONE]) and not types.is_bool_dtype(table[ZONE])
-    names = np.array([f"{value:.15g}" if numeric else str(value).strip() for value in values], dtype=np.object_)
-    return np.where(codes < 0, np.nan, codes.astype(np.float64)), names
 
 
 def _cleaned(table: pd.DataFrame, name: str, path: Path) -> FloatArray:

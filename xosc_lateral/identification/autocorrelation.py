@@ -215,18 +215,11 @@ def start_factors(rows: FloatArray, valid: BoolArray, order: int) -> FloatArray:
 def unbiased(
     process: MovementProcess, valid: BoolArray, drive: IntArray, order: int, *, longest: int | None = None
 ) -> MovementProcess:
-    """Take out what free levels of short drives do to a fitted autoregression.
+    """A process fitted to `valid` rows less each drive's level, freed of what those levels do to it in short drives.
 
-    A level that is estimated takes part of the slow movement with it, so that the process looks less persistent than it
-    is (Nickell's bias: the errors of effects in runs of a minute come out an eighth too small). The same is done to
-    drives simulated from the fitted process, and the difference taken off: indirect inference for panels [3]_.
-
-    Parameters
-    ----------
-    process : MovementProcess
-        Fitted to `valid` rows less each drive's level.
-    valid, drive, order, longest
-        As it was fitted.
+    A level takes part of the slow movement with it, so that the process looks less persistent than it is (Nickell's
+    bias: the errors of effects in runs of a minute come out an eighth too small). The same is done to drives simulated
+    from the fitted process, and the difference taken off: indirect inference for panels [3]_.
 
     References
     ----------

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.driver.effects import Effect
-from xosc_lateral.driver.models.kinds import ModelKind
-from xosc_lateral.driver.profile import DriverProfile
-from xosc_lateral.driver.provenance import Provenance
+from xosc_lateral.driver.models.base import ModelKind
+from xosc_lateral.driver.profile import DriverProfile, Provenance
 from xosc_lateral.drives.drive import Drive
 from xosc_lateral.identification.core_model import (
     DriverVariance,
@@ -21,13 +21,21 @@ from xosc_lateral.identification.core_model import (
     test_population,
 )
 from xosc_lateral.identification.cross_validation import held_out_words, hold_out_blocks
-from xosc_lateral.identification.findings import Finding, describe_finding, population_finding, spectrum_finding
-from xosc_lateral.identification.held_out import HeldOut, Scorecard, Setting, fit_without, score_held_out, score_runs
+from xosc_lateral.identification.held_out import (
+    Estimates,
+    HeldOut,
+    Scorecard,
+    Setting,
+    estimate_all,
+    fit_without,
+    score_held_out,
+    score_runs,
+)
 from xosc_lateral.identification.identify import Identified, Progress, identify, initial_terms
+from xosc_lateral.identification.refinement import Alternatives
 from xosc_lateral.identification.regression import Coarse, Fitted, fit_model
-from xosc_lateral.identification.removal import Estimates, estimate_all, removal_of
-from xosc_lateral.identification.residual import floor_of, size_of, split_differences
-from xosc_lateral.identification.selection import Accepted, Selection
+from xosc_lateral.identification.residual import LackOfFit, lack_of_fit_of, size_of
+from xosc_lateral.identification.selection import Accepted, Gain, Selection
 from xosc_lateral.identification.significance import LoopSeed
 from xosc_lateral.identification.terms.base import Term
 from xosc_lateral.identification.terms.between import between_shift
@@ -35,15 +43,95 @@ from xosc_lateral.identification.timeline import join_drives
 
 FloatArray = NDArray[np.float64]
 
+
+@dataclass(frozen=True, eq=False)
+class Finding:
+    """One effect that the base lacked.
+
+    Parameters
+    ----------
+    effect : str
+        Short name.
+    kind : str
+        As in the report's schema.
+    columns : tuple of str
+        That cause it; two when it is a product.
+    alike : tuple of tuple of str
+        Columns of each other effect that the data can't tell from it.
+    lag_s, response_s : float or None
+    shape : str
+    size_m : float
+        Change of the mean between the 5 % and 95 % quantile, or amplitude [m]; factor for scale.
+    size_error : float
+        Standard error of it.
+    p_value : float
+        Family-wise over everything that its component tried.
+    error_before, error_after : float
+        On held-out blocks, by the effect's own quantity. [m]
+    measure : str
+        What that error compares.
+    effects : tuple of Effect
+        What the profile got.
+    statistic : str
+        Group of summary statistics that shows it best.
+    gain : Gain or None
+        Held-out gain, nested; None where its path can't be predicted.
+    """
+
+    effect: str
+    kind: str
+    columns: tuple[str, ...]
+    alike: Alternatives
+    lag_s: float | None
+    response_s: float | None
+    shape: str
+    size_m: float
+    size_error: float
+    p_value: float
+    error_before: float
+    error_after: float
+    measure: str
+    effects: tuple[Effect, ...]
+    statistic: str
+    gain: Gain | None = None
+
+
+def describe_finding(one: Accepted, key: str, fitted: Fitted, effects: tuple[Effect, ...], scored: HeldOut) -> Finding:
+    """Put sizes and errors to what was accepted."""
+    size = one.term.describe(fitted, effects, key)
+    return Finding(
+        size.name, one.term.kind, one.term.columns, one.alike, size.lag_s, size.response_s, size.shape, size.size,
+        size.error, one.p_value, *scored.error_of(size.statistic), size.measure, effects, size.statistic, one.gain,
+    )  # fmt: skip
+
+
+def spectrum_finding(spectrum: SpectrumShape, scored: HeldOut) -> Finding:
+    """The core model is replaced: the first-order chain forgets too fast."""
+    worst = int(np.argmax(np.abs(np.log(spectrum.ratio))))
+    statistic, ratio = "movement by band", float(spectrum.ratio[worst])
+    return Finding(
+        "memory beyond one step", "memory", (), (), None, None,
+        f"movement within {spectrum.bands_s[worst]:g} s is {ratio:.2f} times the measured", ratio, 0.0,
+        spectrum.p_value, *scored.error_of(statistic), "size of the movement by frequency band", (), statistic,
+    )  # fmt: skip
+
+
+def population_finding(population: DriverVariance, scored: HeldOut) -> Finding:
+    """The core model is replaced: one pooled driver can't be many."""
+    statistic, scatter = "quantiles of local spread", float(np.exp(population.log_spread))
+    return Finding(
+        "drivers that differ", "population", (), (), None, None,
+        f"{population.drives} drives; their spreads scatter by a factor of {scatter:.2f}", population.shift,
+        population.shift / float(np.sqrt(2.0 * population.drives)), population.p_value, *scored.error_of(statistic),
+        statistic, (), statistic,
+    )  # fmt: skip
+
+
 NO_WORSE = 1.05
 """The held-out error of a profile with more effects may be so many times the base's: 24 runs leave 2 % of noise. [-]"""
 
-
 HARMFUL = "significant, but with it held-out blocks are predicted worse by its own quantity, beyond what chance does"
 """Why an effect that does not help is taken back."""
-
-SPLITS = 16
-"""Random halves of the blocks that tell how far chance moves an effect's own error."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -60,16 +148,10 @@ class LoopResult:
     coarse : Coarse
     identified : Identified
         Terms that are kept and those that are not, and the columns.
-    spectrum : SpectrumShape
-        How the base's own runs compare with the drives from band to band.
-    population : DriverVariance or None
-        How much the drives differ; None with too few of them.
     scored : HeldOut
         Both profiles on held-out blocks.
-    unmoved : array, shape (n,)
-        Measured offsets less the effects on the mean. [m]
-    floor : float
-        What the measured drives differ from themselves by. [m]
+    lack_of_fit : LackOfFit
+        What is left.
     scores : Scorecard
         The ten metrics.
     seed : int
@@ -81,11 +163,8 @@ class LoopResult:
     findings: tuple[Finding, ...]
     coarse: Coarse
     identified: Identified
-    spectrum: SpectrumShape
-    population: DriverVariance | None
     scored: HeldOut
-    unmoved: FloatArray
-    floor: float
+    lack_of_fit: LackOfFit
     scores: Scorecard
     seed: int
 
@@ -108,6 +187,11 @@ class LoopResult:
     def error_after(self) -> float:
         """Of the refined profile. [m]"""
         return self.scored.errors[1]
+
+    @property
+    def floor(self) -> float:
+        """Sampling error of the measured drives: how far random halves of their blocks are from all of them. [m]"""
+        return self.lack_of_fit.floor
 
     @property
     def held_out(self) -> str:
@@ -141,7 +225,7 @@ def close_loop(
     provenance : Provenance, optional
         What is known about the drives.
     excluded : sequence of str
-        Columns that are not to be looked at.
+        Columns that are not to be tested.
     roles : mapping of str to str
         What columns are: column -> road, weather, traffic, time, own, driver or unknown. Those that it lacks are
         proposed from name and values.
@@ -164,14 +248,11 @@ def close_loop(
     if base is None:
         progress(0.02, "fitting the base profile")
         base = fit_without(fit_model(coarse, ()), {}, everything, kind, f"{name}-base", provenance)
-    spectrum = compare_spectrum_shapes(base, timeline, root)
     # the loop's own base knows what class, lane and speed do as `fit` has it; what acts is found, not begun with
     initial = initial_terms(base, timeline) if given else ()
     found = identify(coarse, root, initial=initial, excluded=excluded, roles=roles, progress=progress)
-    final = found.selection.final
-    population = test_population(final, between_shift(final))
-    differ = population is not None and population.found
-    refined_kind = ModelKind.AUTOREGRESSIVE if spectrum.found or differ else kind
+    lacks = _lacks_of_the_core(base, found.selection.final, root) if kind is ModelKind.TWO_LEVEL else []
+    refined_kind = ModelKind.AUTOREGRESSIVE if lacks else kind
     blocks = hold_out_blocks(timeline)
     setting = Setting(coarse, blocks, base if given else None, kind, refined_kind, root)
     found, scored = _that_helps(setting, found, progress)
@@ -179,18 +260,14 @@ def close_loop(
     progress(0.95, "refitting on everything")
     estimates = estimate_all(selection.final)
     refined = base
-    if selection.accepted or not given or kind is not refined_kind:
+    if selection.accepted or not given or lacks:
         refined = fit_without(selection.final, estimates, everything, refined_kind, name, provenance)
-    unmoved = timeline.offset - removal_of(selection.final, estimates).location
-    findings = _findings(selection, estimates, scored)
-    if kind is ModelKind.TWO_LEVEL:
-        # what the core model lacks is found once, by replacing it; the autoregressive one has both
-        compared = scored.compared
-        findings += [spectrum_finding(spectrum, compared)] if spectrum.found else []
-        findings += [population_finding(population, compared)] if population is not None and population.found else []
-    rng = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(LoopSeed.BLOCKS,)))
-    floor = floor_of(scored.statistics, unmoved, blocks, rng)
-    scores = score_runs(timeline, scored.runs_before, scored.runs_after, blocks, rng)
+    findings = [
+        describe_finding(one, key, selection.final, effects, scored)
+        for one, key, effects in _accepted(selection, estimates)
+    ]
+    findings += [describe(scored) for describe in lacks]
+    scores = score_runs(timeline, scored.runs_before, scored.runs_after, blocks, setting.rng(LoopSeed.SNIPPETS))
     progress(1.0, "done")
     return LoopResult(
         base=base,
@@ -199,14 +276,21 @@ def close_loop(
         findings=tuple(findings),
         coarse=coarse,
         identified=found,
-        spectrum=spectrum,
-        population=population,
         scored=scored,
-        unmoved=unmoved,
-        floor=floor,
+        lack_of_fit=lack_of_fit_of(scored.real, scored.before, scored.after, scored.halves),
         scores=scores,
         seed=seed,
     )
+
+
+def _lacks_of_the_core(
+    base: DriverProfile, fitted: Fitted, root: np.random.SeedSequence
+) -> list[Callable[[HeldOut], Finding]]:
+    """What the two-level model lacks, found once by replacing it: the autoregressive one has both."""
+    spectrum = compare_spectrum_shapes(base, fitted.coarse.timeline, root)
+    population = test_population(fitted, between_shift(fitted))
+    lacks: list[Callable[[HeldOut], Finding]] = [partial(spectrum_finding, spectrum)] if spectrum.found else []
+    return lacks + ([partial(population_finding, population)] if population is not None and population.found else [])
 
 
 def _that_helps(setting: Setting, found: Identified, progress: Progress) -> tuple[Identified, HeldOut]:
@@ -216,7 +300,7 @@ def _that_helps(setting: Setting, found: Identified, progress: Progress) -> tupl
         before, after = scored.errors
         if not found.selection.accepted:
             return found, scored
-        harmful = _most_harmful(setting, found, scored)
+        harmful = _most_harmful(found.selection, scored)
         if harmful is not None:
             found = found.without([harmful], HARMFUL)
         elif setting.kind is setting.refined_kind and after > NO_WORSE * before:
@@ -226,25 +310,20 @@ def _that_helps(setting: Setting, found: Identified, progress: Progress) -> tupl
             return found, scored
 
 
-def _most_harmful(setting: Setting, found: Identified, scored: HeldOut) -> Term | None:
+def _most_harmful(selection: Selection, scored: HeldOut) -> Term | None:
     """The accepted term with which held-out mean or spread by its own quantity differ most from what is measured.
 
-    Of those that are not sure to gain likelihood there, and by more than halves of the drives differ: an error grows by
-    chance as well.
+    Of those that are not sure to gain likelihood there, and by more than half samples differ: an error grows by chance
+    as well.
     """
-    fitted = found.selection.final
-    estimates = estimate_all(fitted)
-    rng = np.random.default_rng(np.random.SeedSequence(setting.root.entropy, spawn_key=(LoopSeed.BLOCKS,)))
-    offset = setting.coarse.timeline.offset - removal_of(fitted, estimates).location
-    splits = split_differences(scored.statistics, offset, setting.blocks, rng, SPLITS)
     worst: tuple[float, Term | None] = (0.0, None)
-    for one, key, effects in _accepted(found.selection, estimates):
+    for one, key, effects in _accepted(selection, estimate_all(selection.final)):
         if one.gain is not None and one.gain.interval[0] > 0.0:
             continue
         own = {f"{what} by effect: {key}" for what in ("mean", "spread")} & set(scored.real)
-        for group in own or {one.term.describe(fitted, effects, key).statistic} & set(scored.real):
-            before, after = (size_of({"": scored.real[group] - side[group]}) for side in (scored.before, scored.after))
-            chance = np.mean([size_of({"": split[group]}) ** 2 for split in splits])
+        for group in own or {one.term.describe(selection.final, effects, key).statistic} & set(scored.real):
+            before, after = scored.error_of(group)
+            chance = np.mean([size_of({"": half[group]}) ** 2 for half in scored.halves])
             loss = (after**2 - before**2) / max(float(chance), 1e-300)
             worst = max(worst, (loss, one.term), key=lambda pair: pair[0]) if loss > 1.0 else worst
     return worst[1]
@@ -254,13 +333,6 @@ def _accepted(selection: Selection, estimates: Estimates) -> list[tuple[Accepted
     """What was accepted, with its key and what the profile gets."""
     keys = {id(term): (key, effects) for key, (term, effects) in estimates.items()}
     return [(one, *keys[id(one.term)]) for one in selection.accepted]
-
-
-def _findings(selection: Selection, estimates: Estimates, scored: HeldOut) -> list[Finding]:
-    return [
-        describe_finding(one, key, selection.final, effects, scored.compared)
-        for one, key, effects in _accepted(selection, estimates)
-    ]
 
 
 def _kind_of(profile: DriverProfile) -> ModelKind:

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from xosc_lateral.driver.effects import ColumnEffect
 from xosc_lateral.identification.dictionary import (
     CROSS_BASIS,
     NULL_DRAWS,
@@ -18,10 +19,9 @@ from xosc_lateral.identification.dictionary import (
     orthonormal,
     score_entries,
 )
-from xosc_lateral.identification.problem import Problem
-from xosc_lateral.identification.refinement import Refined, Refinement
+from xosc_lateral.identification.refinement import Problem, Refined, Refinement
 from xosc_lateral.identification.regression import Fitted, fit_model
-from xosc_lateral.identification.search import Likeliest, Search
+from xosc_lateral.identification.search import Search
 from xosc_lateral.identification.significance import LoopSeed, upper_tail
 from xosc_lateral.identification.terms.base import Outcome
 from xosc_lateral.identification.terms.column import ColumnTerm
@@ -35,20 +35,12 @@ CONTENDERS = 4
 WITHIN = 12.0
 """Sets of columns that score lower than the best by more than this are not. [squared score]"""
 
-CLUSTER_S = 120
-"""Windows that count as independent where movement with and without a term is compared: longer than the memory of a
-minute and a half. [s]"""
-
-GROWN = 2.0
-"""Standard errors by which the movement must have grown. A term of the right size lowers it by as much as one of twice
-the right size leaves it the same: a true one is lost in at most 2 % of the tables, however weak it is. [-]"""
-
 ROUNDING = 1e-6
 """A term may lower the likelihood of the rows that it is fitted to by so much. More, and the model contradicts it: a
 factor on the movement that changes faster than the movement does, say, which its innovations alone allow. [nat]"""
 
 ROUNDS = 2
-"""Times that what acts is looked for beside what was found before; the first changes most."""
+"""Times that the candidates are scored beside what was found before; the first changes most."""
 
 
 class SearchedTerm(ColumnTerm):
@@ -57,7 +49,7 @@ class SearchedTerm(ColumnTerm):
     @classmethod
     @abstractmethod
     def problem(cls, fitted: Fitted) -> Problem:
-        """Regression in which a column of this kind is looked for, with the terms fitted already."""
+        """Regression in which a column of this kind is tested, with the terms fitted already."""
 
     @classmethod
     def reweighted(cls, fitted: Fitted, after: Fitted) -> Problem | None:
@@ -90,22 +82,15 @@ def find_column(search: Search, kind: type[SearchedTerm], fitted: Fitted) -> Out
     ----------
     .. [1] C. R. Rao, Proc. Camb. Phil. Soc. 44, 1948.
     """
-    problem = kind.problem(fitted)
-    dictionary = search.dictionary(kind, fitted, problem)
-    refused: set[tuple[str, ...]] = set()
-    while True:
-        scored = _score(search, kind, fitted, problem, dictionary, refused, draws=NULL_DRAWS)
-        if scored is None:
-            return Outcome(None, min(refused), 1.0) if refused else None
-        found = scored.likeliest() if refused else search.likeliest(kind, fitted, scored.likeliest)
-        assert found is not None
-        p_value = found.p_value
-        if not search.passes(kind.component, p_value, fitted.terms):  # refined, it would not be accepted either
-            return Outcome(None, found.effect.columns, p_value)
-        term, after = _best(search, kind, fitted, scored, refused)
-        if not _grows(fitted, after) and after.log_likelihood >= fitted.log_likelihood - ROUNDING:
-            return Outcome(term, term.columns, p_value, after)
-        refused.add(term.columns)
+    scored = _scored(search, kind, fitted)
+    if scored is None:
+        return None
+    found, p_value = scored.likeliest()
+    if not search.passes(kind.component, p_value, fitted.terms):  # refined, it would not be accepted either
+        return Outcome(None, found.columns, p_value)
+    term, after = _best(search, kind, fitted, scored)
+    contradicted = after.log_likelihood < fitted.log_likelihood - ROUNDING
+    return Outcome(None if contradicted else term, term.columns, p_value, after)
 
 
 def probability_of(search: Search, kind: type[SearchedTerm], fitted: Fitted, columns: tuple[str, ...]) -> float:
@@ -117,41 +102,34 @@ def probability_of(search: Search, kind: type[SearchedTerm], fitted: Fitted, col
         Without a term of these columns. Where it has a product with one of them, that product is known as it is, not
         with every shape of its factors: nothing would be left to test.
     """
-    scored = _score_all(search, kind, fitted, spared=columns)
+    problem = kind.problem(fitted)
+    dictionary = build_dictionary(search.quantities, problem.whitener)
+    scored = _score(search, kind, fitted, problem, dictionary, spared=columns)
     if scored is None:
         return 1.0
     own = [i for i, candidate in enumerate(scored.dictionary.candidates) if candidate.columns == columns]
     return upper_tail(float(scored.scores.scores[own].max()), scored.scores.maxima) if own else 1.0
 
 
-def best_probability(search: Search, kind: type[SearchedTerm], fitted: Fitted) -> float:
-    """p-value of the best candidate of all, before refinement."""
-    best = _likeliest(search, kind, fitted)
-    return 1.0 if best is None else best.p_value
-
-
 def likely_response(search: Search, kind: type[SearchedTerm], fitted: Fitted, level: float) -> tuple[FloatArray, float]:
     """Response of the best candidate and its p-value, shape (n, 1) where that is at most `level`; else (n, 0)."""
-    best = _likeliest(search, kind, fitted)
-    if best is None or best.p_value > level:
+    scored = _scored(search, kind, fitted)
+    effect, p_value = (None, 1.0) if scored is None else scored.likeliest()
+    if effect is None or p_value > level:
         return np.zeros((len(fitted.coarse), 0)), 1.0
-    return fitted.coarse.response(best.effect), best.p_value
+    return fitted.coarse.response(effect), p_value
 
 
-def _likeliest(search: Search, kind: type[SearchedTerm], fitted: Fitted) -> Likeliest | None:
-    def score() -> Likeliest | None:
-        scored = _score_all(search, kind, fitted)
-        return None if scored is None else scored.likeliest()
+def _scored(search: Search, kind: type[SearchedTerm], fitted: Fitted) -> _Scored | None:
+    """All candidates beside a fit, scored once."""
 
-    return search.likeliest(kind, fitted, score)
+    def score() -> _Scored | None:
+        problem = kind.problem(fitted)
+        dictionary = build_dictionary(search.quantities, problem.whitener)
+        return _score(search, kind, fitted, problem, dictionary)
 
-
-def _score_all(
-    search: Search, kind: type[SearchedTerm], fitted: Fitted, spared: tuple[str, ...] = ()
-) -> _Scored | None:
-    problem = kind.problem(fitted)
-    dictionary = search.dictionary(kind, fitted, problem)
-    return _score(search, kind, fitted, problem, dictionary, (), draws=NULL_DRAWS, spared=spared)
+    found: _Scored | None = search.once(kind, fitted, score)
+    return found
 
 
 @dataclass(frozen=True, eq=False)
@@ -163,10 +141,10 @@ class _Scored:
     known: FloatArray
     scores: Scores
 
-    def likeliest(self) -> Likeliest:
+    def likeliest(self) -> tuple[ColumnEffect, float]:
         """Best candidate and its p-value."""
         best = self.scores.best
-        return Likeliest(self.dictionary.timed(best), upper_tail(float(self.scores.scores[best]), self.scores.maxima))
+        return self.dictionary.timed(best), upper_tail(float(self.scores.scores[best]), self.scores.maxima)
 
 
 def _score(
@@ -175,13 +153,13 @@ def _score(
     fitted: Fitted,
     problem: Problem,
     dictionary: Dictionary,
-    refused: Collection[tuple[str, ...]],
     *,
-    draws: int,
+    draws: int = NULL_DRAWS,
     spared: tuple[str, ...] = (),
 ) -> _Scored | None:
-    """Score what is not barred or refused; None: nothing is left."""
-    barred = _barred(dictionary, kind, fitted, refused)
+    """Score what is not barred; None: nothing is left."""
+    columns = kind.barred(fitted)
+    barred = np.array([bool(columns & set(one.columns)) for one in dictionary.candidates], dtype=np.bool_)
     if len(dictionary) == 0 or barred.all():
         return None
     known = _known(problem, dictionary, [term for term in fitted.terms if isinstance(term, kind)], spared)
@@ -192,13 +170,11 @@ def _score(
     return _Scored(problem, dictionary, known, scores)
 
 
-def _best(
-    search: Search, kind: type[SearchedTerm], fitted: Fitted, scored: _Scored, refused: Collection[tuple[str, ...]]
-) -> tuple[SearchedTerm, Fitted]:
+def _best(search: Search, kind: type[SearchedTerm], fitted: Fitted, scored: _Scored) -> tuple[SearchedTerm, Fitted]:
     """The term that the best candidate becomes, and the fit with it.
 
     *That* something acts is tested with the noise that is left without it, for data and null alike. *What* acts is
-    looked for once more with the noise that is left beside what was found: a strong slow effect makes the noise look
+    chosen once more with the noise that is left beside what was found: a strong slow effect makes the noise look
     slow, and against slow noise a quicker look-alike stands out better than the effect itself.
     """
     term: SearchedTerm = kind.of(scored.dictionary.timed(scored.scores.best))
@@ -209,7 +185,7 @@ def _best(
         here: _Scored | None = scored
         if problem is not None:
             dictionary = build_dictionary(search.quantities, problem.whitener)
-            here = _score(search, kind, fitted, problem, dictionary, refused, draws=0)
+            here = _score(search, kind, fitted, problem, dictionary, draws=0)
         if here is None:
             break
         refined, other = _refined(search, kind, here)
@@ -221,25 +197,6 @@ def _best(
         if same or problem is None:
             break
     return term, after
-
-
-def _grows(before: Fitted, after: Fitted) -> bool:
-    """Whether the movement that is left is larger with a term than without it, beyond chance.
-
-    Generalised and ordinary least squares agree on a quantity that moves the driver [1]_. What was sized on a few odd
-    seconds alone, as those after a lane change, does not lie in between the rest of the time: taken out, it puts in
-    more than was there, and an autoregression close to a unit root lets it.
-
-    References
-    ----------
-    .. [1] J. Hausman, "Specification tests in econometrics", Econometrica 46, 1978.
-    """
-    coarse = before.coarse
-    rows = np.flatnonzero(coarse.valid)
-    saved = np.square(before.movement * before.scale)[rows] - np.square(after.movement * after.scale)[rows]
-    cluster = rows // CLUSTER_S
-    sums = np.bincount(cluster, saved)[np.unique(cluster)]
-    return len(sums) > 1 and float(sums.sum()) < -GROWN * float(np.std(sums, ddof=1)) * np.sqrt(len(sums))
 
 
 def _known(
@@ -264,7 +221,7 @@ def _refined(search: Search, kind: type[SearchedTerm], scored: _Scored) -> tuple
 
     candidates = scored.dictionary.candidates
     costs = {candidate.family: candidate.cost for candidate in candidates}
-    refinement = Refinement(search.coarse, scored.problem, scored.known, costs, single=kind.single)
+    refinement = Refinement(search.coarse, scored.problem, scored.known, costs)
     outcomes = [
         refinement.refine(scored.dictionary.timed(index), candidates[index].cost, search.columns)
         for index in _contenders(scored.dictionary, scored.scores)
@@ -296,18 +253,3 @@ def _contenders(dictionary: Dictionary, scores: Scores) -> list[int]:
         if dictionary.candidates[index].columns in parts:
             best.setdefault(dictionary.candidates[index].columns, int(index))
     return list(best.values())
-
-
-def _barred(
-    dictionary: Dictionary, kind: type[SearchedTerm], fitted: Fitted, refused: Collection[tuple[str, ...]]
-) -> BoolArray:
-    """Entries that this kind may not take up."""
-    columns = kind.barred(fitted)
-    most = 1 if kind.single else 2
-    return np.array(
-        [
-            bool(columns & set(one.columns)) or len(one.contrast) > most or one.columns in refused
-            for one in dictionary.candidates
-        ],
-        dtype=np.bool_,
-    )

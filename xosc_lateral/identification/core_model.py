@@ -1,4 +1,4 @@
-"""Whether a profile's own runs move as the drives do, from tenths of seconds to minutes.
+"""What a two-level base lacks, whatever its effects: memory beyond one step, and drivers that differ.
 
 References
 ----------
@@ -40,18 +40,21 @@ WORTH_ADDING = 0.05
 """A difference below this share of a band's size is no reason for another core model, however sure it is. [-]"""
 
 
+MIN_DRIVES = 8
+"""Fewer drives say nothing about a population."""
+
+MIN_SECONDS = 20
+"""Of road-following in either half of a drive that is counted. [s]"""
+
+DRIVERS_LEVEL = 0.002
+"""Probability of a false finding."""
+
+
 @dataclass(frozen=True, eq=False)
 class SpectrumShape:
-    """Comparison of the movement's size in bands of time, with its overall size divided out.
+    """Profile over drives, by bands up to `bands_s` [s], of the movement's size in each over its overall size.
 
-    Parameters
-    ----------
-    bands_s : tuple of float
-        Upper limit of each band. [s]
-    ratio : array
-        Profile over drives. [-]
-    p_value : float
-        That both have the same spectrum shape (Hotelling's test over blocks of a minute).
+    `p_value`: that both have the same spectrum shape (Hotelling's test [1]_ over blocks of a minute).
     """
 
     bands_s: tuple[float, ...]
@@ -98,30 +101,11 @@ def _shapes(offset: FloatArray, timeline: Timeline) -> FloatArray:
     return np.asarray(rows).reshape(-1, len(bands))
 
 
-MIN_DRIVES = 8
-"""Fewer drives say nothing about a population."""
-
-MIN_SECONDS = 20
-"""Of road-following in either half of a drive that is counted. [s]"""
-
-DRIVERS_LEVEL = 0.002
-"""Probability of a false finding."""
-
-
 @dataclass(frozen=True, slots=True)
 class DriverVariance:
-    """Scatter between drives, noise taken out.
+    """Scatter between drives that are long enough, noise taken out: standard deviation of their means and log spreads.
 
-    Parameters
-    ----------
-    drives : int
-        That were long enough.
-    shift : float
-        Standard deviation of the drives' mean offsets. [m]
-    log_spread : float
-        Standard deviation of the logarithm of the drives' spreads. [-]
-    p_value : float
-        That all drives are of one driver, by the stronger of both.
+    `shift` in [m], `log_spread` [-]; `p_value`: that all are of one driver, by the stronger of both.
     """
 
     drives: int

@@ -1,18 +1,16 @@
 """Feedback: columns that the car's own movement brings about are no cause, whatever they correlate with.
 
-What a column is (`roles`) comes first: what is declared to be road, weather or traffic is never a consequence, and the
-car's own movement never a cause. A name alone is overruled where both marks are strong. All others are tested for three
-marks.
+Declared road, weather and traffic are never a consequence, and the car's own movement never a cause. All other columns
+are tested for three marks.
 
-*Coherence.* A driver responds to a cause within seconds, as through a low-pass: above 0.2 Hz an offset shares next to
+*Coherence.* A driver responds to a cause as through a low-pass of seconds: above 0.2 Hz an offset shares next to
 nothing with its causes. A steering angle or a yaw rate is the movement's own derivative, and shares nearly all.
 
 *Direction of time.* Given its own past, a cause owes nothing to what the car did just before; a column that a system
-computes from the offset (a torque that keeps the lane, a filtered copy) is predicted by it [1]_.
+computes from the offset (a torque that keeps the lane, a filtered copy) is predicted by it [1]_. Both are asked of the
+offset, its size, its excess over the usual size, its speed and the size of that.
 
-Both are asked of the offset, its size, how far it is beyond its usual size, its speed and the size of that: what
-follows may follow in any of these ways. All are asked of every column: one that is computed from the offset jumps
-across its range at each lane change, and looks like an angle.
+*Function of the offset.* The column's mean given the present offset is the function that fits it best [2]_.
 
 References
 ----------
@@ -98,7 +96,7 @@ class Feedback:
     doubtful : bool
         No mark is clear.
     source : str
-        By whom it is said to be the car's own movement: "declared", "name"; empty: its values show it.
+        "declared" or "name": it is said to be the car's own movement; empty: its values show it.
     """
 
     column: str
@@ -118,40 +116,38 @@ def find_feedback(
     moved = _movement(timeline)
     spectra = {name: segments.spectra(values) for name, values in moved.items()}
     rows = _rows_with_past(timeline.valid, max(OWN_PAST, MOVED_PAST))
-    limit = CHANCE / max(1, len(segments.starts))
+    chance = CHANCE / max(1, len(segments.starts))
     found = []
     for column in columns:
-        assigned = roles.get(column.name)
-        if assigned is not None and assigned.declared and assigned.role.is_exogenous:
+        assigned = roles.get(column.name, Assigned(column.name, Role.UNKNOWN, ""))
+        if assigned.declared and assigned.role.is_exogenous:
             continue
         values = timeline.context.get(column.name, timeline.lane_width)
         known = np.isfinite(values)
         values = np.where(known, values, np.median(values[timeline.valid & known]))
-        seen = segments.spectra(values)
+        seen, size = (segments.spectra(one) for one in (values, np.abs(values - np.median(values[timeline.valid]))))
         shared = {name: segments.coherence(seen, own) for name, own in spectra.items()}
-        size = segments.spectra(np.abs(values - np.median(values[timeline.valid])))
         for name in ("size of the offset", "excess of the offset"):
             shared[name] = max(shared[name], segments.coherence(size, spectra[name]))
-        of = max(shared, key=lambda name: shared[name])
+        given = {
+            name: segments.coherence(seen, segments.spectra(_mean_given(values, moved[name], timeline)))
+            for name in ("offset", "lateral speed")
+        }
         # a switch has hardly any changes that could be predicted
         changes = column.values in (Values.NUMBER, Values.ANGLE)
-        predicted_share = _predicted_share(values, moved, rows) if changes else 0.0
-        means = {name: _mean_given(values, moved[name], timeline) for name in ("offset", "lateral speed")}
-        given = {name: segments.coherence(seen, segments.spectra(mean)) for name, mean in means.items()}
-        function = max(given.values())
-        is_function = function >= max(FUNCTION, limit)
-        clear = predicted_share >= PREDICTED or (shared[of] >= max(CLEAR, limit) and predicted_share >= HARDLY)
+        predicted = _predicted_share(values, moved, rows) if changes else 0.0
+        of, coherence, function = max(shared, key=lambda name: shared[name]), max(shared.values()), max(given.values())
+        is_function = function >= max(FUNCTION, chance)
+        clear = predicted >= PREDICTED or (coherence >= max(CLEAR, chance) and predicted >= HARDLY)
+        doubtful = coherence >= max(ALONE, chance) or predicted >= PERHAPS
         if is_function and not clear:
             of = max(given, key=lambda name: given[name])
-        strong = predicted_share >= PREDICTED and shared[of] >= max(ALONE, limit)
-        doubtful = shared[of] >= max(ALONE, limit) or predicted_share >= PERHAPS
-        if assigned is not None and assigned.role.is_exogenous:
-            clear, doubtful = strong, False
-        if assigned is not None and assigned.role is Role.OWN:
-            found.append(Feedback(column.name, shared[of], predicted_share, function, of, False, assigned.source))
-        elif clear or is_function or doubtful:
-            sure = clear or is_function
-            found.append(Feedback(column.name, shared[of], predicted_share, function, of, not sure))
+        if assigned.role.is_exogenous:  # a name alone is overruled where both marks are strong
+            clear, doubtful = predicted >= PREDICTED and coherence >= max(ALONE, chance), False
+        own = assigned.role is Role.OWN
+        if own or clear or is_function or doubtful:
+            sure, source = own or clear or is_function, assigned.source if own else ""
+            found.append(Feedback(column.name, coherence, predicted, function, of, not sure, source))
     return found
 
 

@@ -28,31 +28,16 @@ from xosc_lateral.identification.timeline import Timeline
 VETOED = "significant, but chosen and estimated on other blocks it predicts the held-out ones worse than nothing"
 """Why a term that loses on held-out rows is rejected."""
 
-UNSURE = "significant by itself, but within its error of nothing beside what else was found"
-"""Why a term whose size is shrunk to nothing is rejected."""
-
 CLOCK = "a clock: what changes with it changes with time, which is tested as such"
-"""Why a column that goes one way is not looked at."""
+"""Why a column that goes one way is not tested."""
 
 Progress = Callable[[float, str], None]
-"""Told the share that is done and what is being done."""
+"""Gets the share that is done and what is being done."""
 
 
 @dataclass(frozen=True, eq=False)
 class Usable:
-    """The columns of a table.
-
-    Parameters
-    ----------
-    columns : list of Column
-        That may act.
-    feedback : list of Feedback
-        Columns that follow from the movement.
-    unused : mapping of str to str
-        Columns that are not looked at, and why.
-    roles : mapping of str to Assigned
-        What each column of the table is.
-    """
+    """The columns of a table: that may act, that follow from the movement, that are not tested and why; all roles."""
 
     columns: list[Column]
     feedback: list[Feedback]
@@ -111,16 +96,14 @@ def identify(
 
     Parameters
     ----------
-    coarse : Coarse
     seed : SeedSequence
         Of the rotations and other nulls.
     initial : sequence of Term
         In the model already.
     excluded : sequence of str
-        Columns that are not to be looked at.
+        Columns that are not to be tested.
     roles : mapping of str to str
-        What columns are declared to be; see `roles`.
-    progress : callable
+        What columns are declared to be; see `columns.roles_of`.
     """
     from threadpoolctl import threadpool_limits
 
@@ -128,19 +111,18 @@ def identify(
     # products of small matrices gain nothing from threads, and lose a factor of ten to them where all cores are busy
     with threadpool_limits(1, user_api="blas"):
         search = Search.over(coarse, usable.columns, seed, ERROR_BUDGET, lambda what: progress(0.1, what))
-        selection = _of_some_size(select(search, initial))
+        selection = select(search, initial)
         if not selection.accepted:
             return Identified(usable, selection)
-        # what happened once, and when, can't be found without the block in which it happened: folds size it, and know
-        # of it
+        # what happened once can't be found without the block in which it happened: folds know when, and size it
         once = tuple(one.term for one in selection.accepted if one.term.component == StepTerm.component)
         there = Counter(getattr(term, "component", "") for term in selection.final.terms)
-        looked_for = {one.term.component for one in selection.accepted} - {StepTerm.component}
+        wanted = {one.term.component for one in selection.accepted} - {StepTerm.component}
         nested = nest(
             search,
             hold_out_blocks(coarse.timeline),
             (*initial, *once),
-            {component: there[component] for component in sorted(looked_for)},
+            {component: there[component] for component in sorted(wanted)},
             lambda share: progress(0.3 + 0.3 * share, "selecting without a fold"),
         )
         return _worst_first(Identified(usable, selection, nested))
@@ -149,7 +131,7 @@ def identify(
 def usable_columns(
     timeline: Timeline, excluded: Sequence[str] = (), roles: Mapping[str, str] = MappingProxyType({})
 ) -> Usable:
-    """Columns that may act, those that follow from the movement, and those that are not looked at with the reason."""
+    """Columns that may act, those that follow from the movement, and those that are not tested with the reason."""
     columns, unused = known_columns(timeline)
     assigned = roles_of(timeline, {"lane_width", *timeline.context}, roles)
     unused |= dict.fromkeys(timeline.of_one_camera, "from the camera that measured the offset: it has the same errors")
@@ -202,18 +184,6 @@ def _same_throughout(effect: ColumnEffect, timeline: Timeline) -> bool:
     values = effect.known({name: context[name] for name in effect.columns})
     inside = [values[rows][timeline.valid[rows]] for rows in timeline.spans]
     return all(np.ptp(own, axis=0).max() == 0.0 for own in inside if len(own))
-
-
-def _of_some_size(selection: Selection) -> Selection:
-    """Less what is within one standard error of nothing beside what was found with it, and would be shrunk to nothing.
-
-    Of terms that held-out rows can't judge: the others are told from nothing there.
-    """
-    for one in [one for one in selection.accepted if not one.term.predictable]:
-        effects = [effect for effect in one.term.estimate(selection.final) if isinstance(effect, ColumnEffect)]
-        if effects and not any(any(effect.coefficients) for effect in effects):
-            selection = selection.without([one.term], UNSURE)
-    return selection
 
 
 def _worst_first(found: Identified) -> Identified:

@@ -1,9 +1,4 @@
-"""What is new in each second of the movement as the table shows it: what tells how large it is just now.
-
-Providers smooth their tracks, responses to columns and all, and columns they leave as they are: a response that is
-taken out with its edges puts them *in*, where next to nothing moves, and every passing vehicle looks like a loud
-stretch. So responses are smoothed as far as the innovations show them smoothed.
-"""
+"""What is new in each second of the movement as the table shows it: what tells how large it is just now."""
 
 from __future__ import annotations
 
@@ -17,6 +12,16 @@ FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
 IntArray = NDArray[np.intp]
 
+ORDER = 12
+"""Past seconds that have a coefficient each in the movement's autoregression. [s]"""
+
+LONGEST = 96
+"""Past seconds that it sees as means over doubling times: drifts of a minute and a half. [s]"""
+
+SMOOTHING_S = (-2, -1, 1, 2)
+"""Shifts of a response that make up its smoothing: two standard deviations, to either side, of a Gaussian that leaves
+9 % at 0.5 Hz. [s]"""
+
 CLIP = 9.0
 """Squared innovations (variance 1) beyond this count as this: three standard deviations. [-]"""
 
@@ -29,13 +34,6 @@ CLUSTER_S = 60
 
 OWN_LEVEL_S = 30.0
 """A drive's level of the scale is its own as far as it lasts longer than this. [s]"""
-
-
-def squared_innovations(rows: FloatArray, valid: BoolArray) -> FloatArray:
-    """Clipped squares of white rows, standardised over the valid ones, shape (n,); 0 elsewhere. [-]"""
-    squares = np.minimum(rows**2, CLIP)
-    mean, deviation = squares[valid].mean(), squares[valid].std()
-    return np.where(valid, (squares - mean) / max(deviation, 1e-12), 0.0)
 
 
 def own_levels(squares: FloatArray, valid: BoolArray, drive: IntArray) -> FloatArray:
@@ -92,17 +90,6 @@ def covariance_of_log_sizes(scales: FloatArray, rows: FloatArray, valid: BoolArr
     return np.asarray(bread @ (sums.T @ sums) @ bread * len(sums) / max(1, len(sums) - 1))
 
 
-ORDER = 12
-"""Past seconds that have a coefficient each in the movement's autoregression. [s]"""
-
-LONGEST = 96
-"""Past seconds that it sees as means over doubling times: drifts of a minute and a half. [s]"""
-
-SMOOTHING_S = (-2, -1, 1, 2)
-"""Shifts of a response that make up its smoothing: two standard deviations, to either side, of a Gaussian that leaves
-9 % at 0.5 Hz. [s]"""
-
-
 def whitener_as_seen(movement: FloatArray, valid: BoolArray, drive: IntArray, scale: FloatArray) -> Whitener:
     """What turns the movement as it is seen into independent rows: without a floor.
 
@@ -122,16 +109,9 @@ def whitener_as_seen(movement: FloatArray, valid: BoolArray, drive: IntArray, sc
 def innovations(
     moved: FloatArray, responses: FloatArray, valid: BoolArray, drive: IntArray, scale: FloatArray
 ) -> FloatArray:
-    """Innovations without a floor, shape (n,), young runs by their own size; 0 where invalid. [own unit]
+    """Rows of `whitener_as_seen` of variance about 1, shape (n,), young runs by their own size; 0 where invalid.
 
-    Parameters
-    ----------
-    moved : array, shape (n,)
-        Offset less levels. [m]
-    responses : array, shape (n,)
-        What columns did to it. [m]
-    valid, drive, scale
-        See `whitener_as_seen`.
+    `moved`, shape (n,): offset less levels [m]; `responses`, shape (n,): what columns did to it [m].
     """
     if np.any(responses):
         responses = smoothed_as_seen(moved, responses, valid, drive, scale)
@@ -144,10 +124,10 @@ def innovations(
 def smoothed_as_seen(
     moved: FloatArray, responses: FloatArray, valid: BoolArray, drive: IntArray, scale: FloatArray
 ) -> FloatArray:
-    """Responses through the filter of five seconds and gain one that leaves least of them in the innovations.
+    """Responses, shape (n,), through the filter of five seconds and gain one that leaves least of them. [m]
 
-    Shape (n,). [m] Least squares in the innovations of the movement with the responses in: they are a per cent of its
-    variance, and beside their own edges nothing else would be seen.
+    Least squares in the innovations of the movement with the responses in: a car and a provider of tracks smooth them,
+    and taken out with their edges they would put these *in*, where next to nothing moves.
     """
     whitener = whitener_as_seen(np.where(valid, moved / scale, 0.0), valid, drive, scale)
     seconds = np.arange(len(responses))

@@ -1,4 +1,4 @@
-"""What changes over a whole drive, told at low frequencies: a smooth or a step of the mean, a smooth of the spread.
+"""Tests at low frequencies of what changes over a whole drive: a smooth or a step of the mean, a smooth of the spread.
 
 Cosine coefficients of white rows are independent and of one variance. Those of the slowest periods are compared with
 the next quicker ones, which know how much people wander and how long loud stretches last [1]_.
@@ -17,7 +17,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.driver.effects.time_smooth import half_cosines
+from xosc_lateral.driver.effects.hidden import half_cosines
 from xosc_lateral.identification.autocorrelation import Whitener, fit_autoregression
 from xosc_lateral.identification.dictionary import orthonormal
 from xosc_lateral.identification.innovations import LONGEST, ORDER
@@ -33,8 +33,8 @@ ORDERS = (1, 2, 4, 8)
 SPREAD_ORDERS = (1, 2, 4)
 """Half cosines tried for the spread: its square scatters more than an offset does."""
 
-EDGE_S, STEP_GRID_S, STEP_SHORTEST_S = 60, 15, 12.0
-"""Least time on either side of a step, between the moments that are tried, and least period that tells a step. [s]"""
+EDGE_S, STEP_GRID_S = 60, 15
+"""Least time on either side of a step, and between the moments that are tried. [s]"""
 
 SHORTEST_S = 240.0
 """Half cosines whose period is down to this say how much the slower ones are by chance; four times as long as what a
@@ -135,22 +135,6 @@ def mean_probability(rows: FloatArray, waves: FloatArray, jumps: FloatArray, rng
 
     # of the logarithm of a least p the tail is exponential, whatever the tests have in common
     return upper_tail(float(surest(rows[None])[0]), surest(rng.normal(size=(STEP_DRAWS, len(rows)))), least_excess=1.0)
-
-
-def explained(rows: FloatArray, columns: FloatArray, slow: int) -> FloatArray:
-    """Chi-square of each column alone, shape (k,), where `slow` first frequencies count by what is left there."""
-    size = (columns.T @ rows) / np.maximum(np.square(columns).sum(axis=0), 1e-12)
-    left = np.square(rows[:, None] - columns * size)
-    quick = left[slow:].mean(axis=0)
-    level = np.where(np.arange(len(rows))[:, None] < slow, np.maximum(left[:slow].mean(axis=0), quick), quick)
-    moment = (columns * rows[:, None] / level).sum(axis=0)
-    return np.asarray(np.square(moment) / np.maximum((np.square(columns) / level).sum(axis=0), 1e-12))
-
-
-def explained_jointly(rows: FloatArray, columns: FloatArray, slow: int) -> float:
-    """The same of all columns, shape (frequencies, k), together."""
-    fit = columns @ np.linalg.lstsq(columns, rows, rcond=None)[0]
-    return float(explained(rows, fit[:, None], slow)[0])
 
 
 def moment_of(rows: FloatArray, whitener: Whitener, at: int) -> int:

@@ -3,12 +3,14 @@
 References
 ----------
 .. [1] G. Schwarz, "Estimating the dimension of a model", Annals of Statistics 6, 1978.
+.. [2] A. C. Aitken, "On least squares and linear combination of observations", Proc. R. Soc. Edinburgh 55, 1936.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from msgspec import structs
@@ -16,15 +18,16 @@ from numpy.typing import NDArray
 
 from xosc_lateral.driver.effects import ColumnEffect, Product
 from xosc_lateral.driver.effects.product import Form
+from xosc_lateral.identification.autocorrelation import Whitener
 from xosc_lateral.identification.candidates import FINE_SCALES, Family, shapes_of
 from xosc_lateral.identification.columns import Column
 from xosc_lateral.identification.dictionary import orthonormal
-from xosc_lateral.identification.problem import Problem
 from xosc_lateral.identification.regression import Coarse
 from xosc_lateral.identification.timeline import COARSE
 
 FloatArray = NDArray[np.float64]
 
+BoolArray = NDArray[np.bool_]
 IntArray = NDArray[np.intp]
 
 Alternatives = tuple[tuple[str, ...], ...]
@@ -96,6 +99,44 @@ class Refined:
     price: float
 
 
+@dataclass(frozen=True, eq=False)
+class Problem:
+    """One linear regression, whitened: an ordinary one [2]_.
+
+    Parameters
+    ----------
+    whitener : Whitener
+        For series and columns.
+    series : array, shape (n,)
+        With what the model has of this component still in.
+    columns : array, shape (n, k)
+        What the model has already.
+    """
+
+    whitener: Whitener
+    series: FloatArray
+    columns: FloatArray
+
+    @property
+    def valid(self) -> BoolArray:
+        """Rows that count, shape (n,)."""
+        return self.whitener.valid
+
+    @cached_property
+    def observed(self) -> FloatArray:
+        """White series, levels out, shape (seconds,), valid ones only. [-]"""
+        return self.rows(self.series)
+
+    @cached_property
+    def known(self) -> FloatArray:
+        """White columns, shape (seconds, k). [-]"""
+        return self.rows(self.columns)
+
+    def rows(self, values: FloatArray) -> FloatArray:
+        """White rows [-] of series or columns, shape (n,) or (n, k); valid ones only."""
+        return self.whitener.compact.rows(values[self.valid])
+
+
 class Refinement:
     """Scores effects beside everything known, many at once.
 
@@ -107,8 +148,6 @@ class Refinement:
         Orthonormal; partialled out.
     costs : mapping of Family to float
         What a member of each family costs.
-    single : bool
-        Only shapes with one coefficient will do.
     """
 
     def __init__(
@@ -117,10 +156,8 @@ class Refinement:
         problem: Problem,
         known: FloatArray,
         costs: Mapping[Family, float],
-        *,
-        single: bool = False,
     ) -> None:
-        self._coarse, self._problem, self._costs, self._single = coarse, problem, costs, single
+        self._coarse, self._problem, self._costs = coarse, problem, costs
         self._basis = known.astype(np.float32)
         left = problem.observed
         left = left - known @ (known.T @ left)
@@ -209,7 +246,7 @@ class Refinement:
             return
         column = columns[effect.columns[0]]
         seen = self._coarse.context[column.name][self._coarse.timeline.valid]
-        shapes = shapes_of(column, seen, curves=not self._single)
+        shapes = shapes_of(column, seen, curves=True)
         plain = self._costs.get(Family.PLAIN, 0.0)
         bent = self._costs.get(Family.BENT, plain) + 2.0 * float(np.log(max(1.0, shapes.finer)))
         yield from ((structs.replace(shape, **timing), plain) for shape in shapes.plain)

@@ -41,8 +41,7 @@ IntArray = NDArray[np.intp]
 FLOOR = 0.03
 """White noise that the model of a drive has beside what it shows: no table knows the lane better (in the motorway
 recording the standard error of a lane's centre is 0.03 m; docs/real_data.md). Providers smooth their tracks, responses
-and all; without a floor an effect is sized where the smoothing left nothing of it. Sensitivity:
-docs/design/identification.md. [m]"""
+and all; without a floor an effect is sized where the smoothing left nothing of it. [m]"""
 
 CLUSTER_S = 60
 """Stretches of a drive that count as independent in the errors of sizes: far beyond what whitening leaves of the
@@ -218,8 +217,8 @@ class Fitted:
     def innovations(self) -> FloatArray:
         """Whitened by the movement as it is seen, without a floor: how large it is just now. Shape (n,), variance 1."""
         coarse = self.coarse
-        moved, responses = coarse.offset - self.levels[coarse.drive], self.columns @ self.sizes
-        rows = innovations(moved, responses, coarse.valid, coarse.drive, self.scale)
+        moved = coarse.offset - self.levels[coarse.drive]
+        rows = innovations(moved, self.columns @ self.sizes, coarse.valid, coarse.drive, self.scale)
         return _standardised(rows, coarse.valid, len(self.sizes))
 
     @property
@@ -281,17 +280,6 @@ def _standardised(rows: FloatArray, valid: BoolArray, sizes: int) -> FloatArray:
     """Of variance 1, with as many degrees of freedom as the rows less the sizes have."""
     variance = float(rows @ rows) / max(1, int(valid.sum()) - sizes)
     return np.asarray(rows / np.sqrt(max(variance, 1e-300)))
-
-
-def elapsed(coarse: Coarse) -> FloatArray:
-    """Time on the road [-], -0.5 at the start and 0.5 at the end of each drive's valid part; shape (n,)."""
-    share = np.zeros(len(coarse))
-    for index in range(coarse.drives):
-        rows = np.flatnonzero(coarse.drive == index)
-        inside = rows[coarse.valid[rows]]
-        if len(inside):
-            share[rows] = np.clip((rows - inside[0]) / max(1, inside[-1] - inside[0]), 0.0, 1.0) - 0.5
-    return share
 
 
 def _within(values: FloatArray, valid: BoolArray) -> FloatArray:

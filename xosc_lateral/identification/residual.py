@@ -3,21 +3,19 @@
 Both are described by the same summary statistics: the mean offset and the spread of the faster movement in each fifth
 of every context column, and where it says that there is none; the spread in each sixth of the drive, the movement's
 size in bands of frequency, and quantiles of the local spread. The error is the root mean square over them of measured
-minus expected, with the expectation taken over several runs of the profile. If none differs by more than the floor
-(what measured data differs from itself), no test of means, spreads, spectra or their dependence on context can tell the
-profile from the driver.
-
-Moments of what is measured beside moments of what is simulated, as in the method of simulated moments [1]_.
+minus expected, with the expectation taken over several runs of the profile, as in the method of simulated moments [1]_.
+It stands beside the sampling error of what is measured, by half samples of the drives' blocks [2]_.
 
 References
 ----------
 .. [1] D. McFadden, "A method of simulated moments for estimation of discrete response models without numerical
        integration", Econometrica 57, 1989.
+.. [2] P. J. McCarthy, "Pseudo-replication: half samples", Review of the International Statistical Institute 37, 1969.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -54,6 +52,15 @@ N_RUNS = 24
 
 FEW_RUNS, MANY_DRIVES = 6, 50
 """... and how many with so many drives, each of which is another sample already."""
+
+DRAWS = 64
+"""Half samples of the blocks."""
+
+LEVEL = 0.05
+"""Share of them that may be as far off as the refined profile. [-]"""
+
+STANDS_OUT = 2.0
+"""A group of summary statistics so many times its own sampling error is named when something is left. [-]"""
 
 SPARE_ROWS = 75
 """A bin with fewer rows (15 s) than this is left out. [-]"""
@@ -101,28 +108,21 @@ class SummaryStatistics:
         )
         return found
 
-    def balance(self, half: BoolArray) -> dict[str, FloatArray]:
-        """Square root of the product of both parts' shares of the rows, by statistic: 1/2 for equal halves."""
-        valid = self.timeline.valid
-        overall = float(np.sqrt(np.mean(half[valid]) * np.mean(~half[valid])))
-        found: dict[str, FloatArray] = {}
+    def shares(self, half: BoolArray) -> dict[str, FloatArray]:
+        """Share of each bin's rows that are in a part of them, shape (n,), by group of statistics. [-]"""
+        found = {}
         for name, label in self.labels.items():
-            size = int(label.max()) + 1
-            inside = valid & (label >= 0)
-            total = np.maximum(np.bincount(label[inside], minlength=size), 1)
-            share = np.bincount(label[inside & half], minlength=size) / total
-            found[f"mean by {name}"] = found[f"spread by {name}"] = np.sqrt(share * (1.0 - share))
-        found["movement by band"] = np.full(len(BANDS_S) + 1, overall)
-        if self.oscillation is not None:
-            found[OSCILLATION] = np.array([overall])
-        found["quantiles of local spread"] = np.full(len(LOCAL_QUANTILES), overall)
+            inside, size = self.timeline.valid & (label >= 0), int(label.max()) + 1
+            total = np.bincount(label[inside], minlength=size)
+            share = np.bincount(label[inside & half], minlength=size) / np.maximum(total, 1)
+            found[f"mean by {name}"] = found[f"spread by {name}"] = share
         return found
 
 
 def statistics_of(
     timeline: Timeline, quantities: Mapping[str, FloatArray], oscillation: float | None = None
 ) -> SummaryStatistics:
-    """Bins for every quantity, shape (n,) each on the grid, and for time; an oscillation's frequency [1/s], if any."""
+    """Bins for every quantity, shape (n,) each, and for time; an oscillation's frequency [1/s], if any."""
     labels, middles = {}, {}
     for name, values in quantities.items():
         none = np.isnan(values)
@@ -180,31 +180,27 @@ def error_between(first: Mapping[str, FloatArray], second: Mapping[str, FloatArr
     return size_of({name: values - second[name] for name, values in first.items()})
 
 
-def split_differences(
-    statistics: SummaryStatistics, offset: FloatArray, blocks: IntArray, rng: np.random.Generator, splits: int
+def half_samples(
+    statistics: SummaryStatistics, offset: FloatArray, blocks: IntArray, rng: np.random.Generator, draws: int = DRAWS
 ) -> list[dict[str, FloatArray]]:
-    """What measured data differs from itself: those of random halves of the blocks against each other; NaN: no rows.
-
-    Two parts of a and b rows differ by a standard deviation of sigma sqrt(1/a + 1/b); all n = a + b rows against an
-    exact expectation have sigma / sqrt(n). So every difference is scaled by sqrt(a b) / n: 1/2 for halves.
+    """Random halves of the blocks less all of them: their variance is that of all of them about the truth [2]_.
 
     Parameters
     ----------
     offset : array, shape (n,)
-        Measured, less the effects on the mean that are known: where the car should be is no chance.
+        Measured, less the effects on the mean that are known: where the car should be is no chance. [m]
     blocks : int array, shape (n,)
-        What is dealt out.
+        What is drawn: whole ones.
     """
-    numbers = np.unique(blocks[statistics.timeline.valid])
+    valid = statistics.timeline.valid
+    numbers, whole = np.unique(blocks[valid]), statistics.describe(offset, valid)
     found = []
-    for _ in range(splits):
-        half = np.isin(blocks, rng.permutation(numbers)[: len(numbers) // 2])
-        first, second, balance = (
-            statistics.describe(offset, half),
-            statistics.describe(offset, ~half),
-            statistics.balance(half),
-        )
-        found.append({name: balance[name] * (values - second[name]) for name, values in first.items()})
+    for _ in range(draws):
+        rows = np.isin(blocks, rng.permutation(numbers)[: len(numbers) // 2])
+        half, shares = statistics.describe(offset, rows), statistics.shares(rows)
+        # a share p of the rows less all of them has a variance of (1 - p) / p times that of all
+        odds = {name: share / np.maximum(1.0 - share, 1e-9) for name, share in shares.items()}
+        found.append({name: (values - whole[name]) * np.sqrt(odds.get(name, 1.0)) for name, values in half.items()})
     return found
 
 
@@ -214,11 +210,77 @@ def size_of(differences: Mapping[str, FloatArray]) -> float:
     return float(np.sqrt(np.mean(squares))) if squares else 0.0
 
 
-def floor_of(
-    statistics: SummaryStatistics, offset: FloatArray, blocks: IntArray, rng: np.random.Generator, splits: int = 8
-) -> float:
-    """Mean size of `split_differences`. [m]"""
-    return float(np.mean([size_of(split) for split in split_differences(statistics, offset, blocks, rng, splits)]))
+@dataclass(frozen=True, slots=True)
+class GroupError:
+    """Root mean square of measured minus expected over one group of statistics, and its sampling error. [m]"""
+
+    name: str
+    before: float
+    after: float
+    floor: float
+
+    @property
+    def unexplained(self) -> float:
+        """What is left beyond the sampling error. [m]"""
+        return _beyond(self.after, self.floor)
+
+
+@dataclass(frozen=True, eq=False)
+class LackOfFit:
+    """What is left after the loop, beside the sampling error of what is measured, in [m].
+
+    `floors`: standard error of every statistic; `floor`: mean distance of half samples; `unexplained`: part of the
+    error after that it does not cover; `p_value`: share of half samples that are as far off as the refined profile.
+    """
+
+    floors: Mapping[str, FloatArray]
+    groups: tuple[GroupError, ...]
+    floor: float
+    unexplained: float
+    p_value: float
+
+    @property
+    def clear(self) -> bool:
+        """Whether more is left than chance explains."""
+        return self.unexplained > 0.0 and self.p_value <= LEVEL
+
+    @property
+    def where(self) -> tuple[GroupError, ...]:
+        """Groups that stand out, the largest first."""
+        standing = [group for group in self.groups if group.after > STANDS_OUT * group.floor]
+        return tuple(sorted(standing, key=lambda group: -group.unexplained))
+
+
+def lack_of_fit_of(
+    real: Mapping[str, FloatArray],
+    before: Mapping[str, FloatArray],
+    after: Mapping[str, FloatArray],
+    halves: Sequence[Mapping[str, FloatArray]],
+) -> LackOfFit:
+    """Compare what both profiles lack with what half samples of the drives differ by; by group, shape (statistics,)."""
+    floors = {name: np.sqrt(_mean_of_finite(np.stack([half[name] for half in halves]) ** 2)) for name in real}
+    groups = tuple(
+        GroupError(
+            name,
+            size_of({name: values - before[name]}),
+            size_of({name: values - after[name]}),
+            size_of({name: floors[name]}),
+        )
+        for name, values in real.items()
+    )
+    sizes, error = np.array([size_of(half) for half in halves]), error_between(real, after)
+    p_value = float(1.0 + np.sum(sizes >= error)) / (1.0 + len(sizes))
+    floor = float(sizes.mean())
+    return LackOfFit(floors, groups, floor, _beyond(error, floor), p_value)
+
+
+def _beyond(error: float, floor: float) -> float:
+    return float(np.sqrt(max(error**2 - floor**2, 0.0)))
+
+
+def _mean_of_finite(values: FloatArray) -> FloatArray:
+    count = np.isfinite(values).sum(axis=0)
+    return np.where(count > 0, np.nansum(values, axis=0) / np.maximum(count, 1), np.nan)
 
 
 def _by_bin(values: FloatArray, label: IntArray, used: BoolArray) -> FloatArray:

@@ -1,26 +1,22 @@
-"""What stays the same while terms are looked for: columns, candidates before whitening, random streams."""
+"""What stays the same while terms are selected: columns, candidates before whitening, random streams."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Generic, TypeVar
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.driver.effects import ColumnEffect
 from xosc_lateral.identification.candidates import candidates_of
 from xosc_lateral.identification.columns import Column
 from xosc_lateral.identification.dictionary import (
     CROSS_BASIS,
     TIMINGS,
-    Dictionary,
     Quantities,
-    build_dictionary,
     orthonormal,
 )
-from xosc_lateral.identification.problem import Problem
 from xosc_lateral.identification.regression import Coarse
 from xosc_lateral.identification.significance import Budget
 
@@ -31,44 +27,13 @@ MAX_PRODUCT_COLUMNS = 24
 """Products are tried among so many columns at most, those whose role is known first: sixty more columns must not cost
 twenty times as much."""
 
-BUILT, SCORED = 2, 8
-"""Dictionaries that are kept (each of tens of megabytes), and best candidates: as many as kinds of terms, and some."""
-
-T = TypeVar("T")
-
-
-@dataclass(frozen=True, eq=False)
-class Likeliest:
-    """Best candidate of one kind of term beside one fit, before refinement, and its p-value."""
-
-    effect: ColumnEffect
-    p_value: float
-
-
-@dataclass(frozen=True, eq=False)
-class Recent(Generic[T]):
-    """What was last worked out for one kind of term beside one fit; `most` of them are kept.
-
-    For one thread: a search that is replaced, by that of a fold, say, begins with a memory of its own.
-    """
-
-    most: int
-    _kept: list[tuple[object, object, T]] = field(default_factory=list, repr=False)
-
-    def of(self, kind: object, fitted: object, make: Callable[[], T]) -> T:
-        """As it was worked out before, or else now."""
-        for known_kind, known_fit, one in self._kept:
-            if known_kind is kind and known_fit is fitted:
-                return one
-        made = make()
-        self._kept.append((kind, fitted, made))
-        del self._kept[: -self.most]
-        return made
+KEPT = 2
+"""Scored dictionaries that are kept, each of tens of megabytes: of the mean and of the spread beside the same fit."""
 
 
 @dataclass(frozen=True, eq=False)
 class Search:
-    """What stays the same.
+    """What stays the same in all tests.
 
     Parameters
     ----------
@@ -80,10 +45,10 @@ class Search:
     budget : Budget
         How surely each component has to be found.
     progress : callable
-        Told what is being done, in a few words.
+        Gets what is being done, in a few words.
     wanted : mapping of str to int, optional
         How many terms a component has in the table that this is a part of: so many are added, best first, whatever
-        their p-values, and components that have none are not looked at. None: this is the table.
+        their p-values, and components that have none are not tested. None: this is the table.
     """
 
     coarse: Coarse
@@ -93,8 +58,7 @@ class Search:
     budget: Budget
     progress: Callable[[str], None]
     wanted: Mapping[str, int] | None = None
-    _built: Recent[Dictionary] = field(default_factory=lambda: Recent(BUILT), init=False, repr=False)
-    _likeliest: Recent[Likeliest | None] = field(default_factory=lambda: Recent(SCORED), init=False, repr=False)
+    _kept: dict[tuple[object, int], tuple[object, Any]] = field(default_factory=dict, init=False, repr=False)
 
     @classmethod
     def over(
@@ -112,13 +76,17 @@ class Search:
         quantities = Quantities.of(candidates, coarse.timeline, coarse.context, coarse.valid)
         return cls(coarse, {column.name: column for column in columns}, quantities, seed, budget, progress)
 
-    def dictionary(self, kind: object, fitted: object, problem: Problem) -> Dictionary:
-        """Whitened candidates of one kind of term beside one fit."""
-        return self._built.of(kind, fitted, lambda: build_dictionary(self.quantities, problem.whitener))
+    def once(self, kind: object, fitted: object, make: Callable[[], Any]) -> Any:
+        """What is worked out for one kind of term beside one fit, as it was or else now; the last few are kept.
 
-    def likeliest(self, kind: object, fitted: object, scored: Callable[[], Likeliest | None]) -> Likeliest | None:
-        """Best candidate of one kind beside one fit, scored once; None: there is no candidate."""
-        return self._likeliest.of(kind, fitted, scored)
+        For one thread: a search that is replaced, by that of a fold, begins with a memory of its own.
+        """
+        key = (kind, id(fitted))
+        if key not in self._kept:
+            self._kept[key] = (fitted, make())  # the fit is kept with it: no other has its id meanwhile
+            for old in list(self._kept)[:-KEPT]:
+                del self._kept[old]
+        return self._kept[key][1]
 
     def cross_basis(self, columns: Collection[str]) -> FloatArray:
         """What columns can do in any shape, at any lag and response, at 1 Hz, orthonormal, shape (n, rank)."""
@@ -147,7 +115,7 @@ class Search:
         return there < self.wanted.get(component, 0)
 
     def asks(self, component: str) -> bool:
-        """Whether terms of a component are looked for."""
+        """Whether terms of a component are tested."""
         return self.wanted is None or component in self.wanted
 
     def rng(self, *key: int) -> np.random.Generator:

@@ -1,4 +1,4 @@
-"""Forward selection of terms: look, prove, add, look again, until nothing is left that chance would not produce."""
+"""Forward selection of terms: test, add, test again, until nothing is left that chance would not produce."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ TERMS: tuple[type[Term], ...] = defined_in(terms.__name__, Term)  # type: ignore
 
 
 def in_stages(kinds: tuple[type[Term], ...]) -> tuple[tuple[type[Term], ...], ...]:
-    """What is looked for at each stage, in the order in which it is asked."""
+    """Kinds of term by stage, in the order in which they are tested."""
     asked = sorted(kinds, key=lambda kind: kind.place)
     return tuple(tuple(kind for kind in asked if stage in kind.stages) for stage in Stage)
 
@@ -35,10 +35,10 @@ STAGES = in_stages(TERMS)
 """Of a stage, what has the smallest p-value is added first."""
 
 ERROR_BUDGET = shared_among(TERMS)
-"""Of all terms that are looked for."""
+"""Of all kinds of term."""
 
 MAX_TERMS = 8
-"""More terms than this in one table are not looked for."""
+"""Terms of one table, at most."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,15 +78,7 @@ class Gain:
 
 @dataclass(frozen=True, eq=False)
 class Accepted:
-    """A term that chance does not explain.
-
-    Parameters
-    ----------
-    term : Term
-    p_value : float
-    gain : Gain or None
-        On held-out rows; None: not judged, or not yet.
-    """
+    """A term that chance does not explain; `gain`: on held-out rows, None: not judged."""
 
     term: Term
     p_value: float
@@ -101,17 +93,7 @@ class Accepted:
 
 @dataclass(frozen=True, slots=True)
 class Rejected:
-    """A candidate that did not pass.
-
-    Parameters
-    ----------
-    component : str
-    columns : tuple of str
-    p_value : float
-    why : str
-    was_found : bool
-        Whether it was significant, and taken back.
-    """
+    """A candidate that did not pass; `was_found`: it was significant, and taken back."""
 
     component: str
     columns: tuple[str, ...]
@@ -122,17 +104,7 @@ class Rejected:
 
 @dataclass(frozen=True, eq=False)
 class Selection:
-    """Everything accepted, and what was not.
-
-    Parameters
-    ----------
-    accepted : tuple of Accepted
-        In the order of finding.
-    rejected : tuple of Rejected
-        Best of each component that did not pass.
-    start, final : Fitted
-        Before and after all.
-    """
+    """Everything accepted in the order of finding, the best of each component that was not, fits before and after."""
 
     accepted: tuple[Accepted, ...]
     rejected: tuple[Rejected, ...]
@@ -153,14 +125,7 @@ class Selection:
 
 
 def select(search: Search, initial: Sequence[Term] = ()) -> Selection:
-    """Add terms stage by stage.
-
-    Parameters
-    ----------
-    search : Search
-    initial : sequence of Term
-        In the model already.
-    """
+    """Add terms stage by stage to those that are in the model already."""
     start = fitted = fit_model(search.coarse, initial)
     accepted: list[Accepted] = []
     rejected: dict[str, Rejected] = {}
@@ -182,9 +147,8 @@ def select(search: Search, initial: Sequence[Term] = ()) -> Selection:
                 break
             best = min(passed, key=lambda test: test.p_value)
             assert best.term is not None
-            new = (best.term, *best.together)
-            accepted += [Accepted(term, best.p_value) for term in new]
-            fitted = best.after or fit_model(search.coarse, (*fitted.terms, *new))
+            accepted.append(Accepted(best.term, best.p_value))
+            fitted = best.after or fit_model(search.coarse, (*fitted.terms, best.term))
     selection = Selection(tuple(accepted), tuple(rejected.values()), start, fitted)
     for one in accepted:
         selection = _tested_again(search, selection, one)

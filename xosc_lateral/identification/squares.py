@@ -1,4 +1,4 @@
-"""Squares of innovations, slower and finer than a second: what tells how large the movement is just now.
+"""Squares of innovations, slower and finer than a second: how large the movement is just now.
 
 References
 ----------
@@ -12,9 +12,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.identification.autocorrelation import fit_autoregression, moving_sum
-from xosc_lateral.identification.innovations import CLIP, own_levels
-from xosc_lateral.identification.regression import Fitted
+from xosc_lateral.identification.autocorrelation import Whitener, fit_autoregression, moving_sum
+from xosc_lateral.identification.innovations import CLIP, ORDER, own_levels
+from xosc_lateral.identification.refinement import Problem
+from xosc_lateral.identification.regression import Coarse, Fitted
 from xosc_lateral.identification.timeline import COARSE, coarse_all, coarse_mean
 
 FloatArray = NDArray[np.float64]
@@ -23,20 +24,17 @@ BoolArray = NDArray[np.bool_]
 FINE_ORDER = 15
 """Past samples (3 s) that the fine movement's autoregression sees."""
 
+SQUARES_S = 12
+"""Past seconds of the squares that whitening sees: two time constants of the clusters of 6 s that are no regime. Beyond
+`ORDER`, as means. [s]"""
+
 SLOW_S = 8
 """Whitened seconds that are averaged for the slower movement: below 1/16 Hz. [s]"""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Squares:
-    """Mean squares per second, about 1; clipped where they are tested and sized.
-
-    Parameters
-    ----------
-    values : array, shape (n,)
-        0 where invalid.
-    valid : bool array, shape (n,)
-    """
+    """Mean squares per second, about 1, shape (n,), 0 where invalid; clipped where they are tested and sized."""
 
     values: FloatArray
     valid: BoolArray
@@ -49,6 +47,11 @@ class Squares:
         clipped = np.minimum(self.values, CLIP)
         inside = clipped[self.valid]
         return np.where(self.valid, (clipped - inside.mean()) / max(float(inside.std()), 1e-12), 0.0)
+
+
+def quick_squares(fitted: Fitted) -> Squares:
+    """Squared innovations."""
+    return Squares(np.square(fitted.innovations), fitted.coarse.valid)
 
 
 def fine_squares(fitted: Fitted) -> Squares:
@@ -66,18 +69,12 @@ def fine_squares(fitted: Fitted) -> Squares:
     process = fit_autoregression(moved, valid, FINE_ORDER)
     innovations, responses = moving_sum(process.polynomial, moved), moving_sum(process.polynomial, responses)
     settled = moving_sum(np.ones(process.order + 1), valid.astype(np.float64)) > process.order + 0.5
-    innovations = _without_responses(innovations, responses, settled)
-    squares = coarse_mean(np.where(settled, np.square(innovations), 0.0))
-    whole = coarse_all(settled)
-    return Squares(squares / own_levels(squares, whole, coarse.drive)[coarse.drive], whole)
-
-
-def _without_responses(innovations: FloatArray, responses: FloatArray, settled: BoolArray) -> FloatArray:
-    """Innovations less responses, shape (n,) each, as far as these are seen in them. [m]"""
     power = float(responses[settled] @ responses[settled])
     seen = float(np.clip(responses[settled] @ innovations[settled] / power, 0.0, 1.0)) if power > 0.0 else 0.0
     innovations = innovations - seen * responses
-    return innovations
+    squares = coarse_mean(np.where(settled, np.square(innovations), 0.0))
+    whole = coarse_all(settled)
+    return Squares(squares / own_levels(squares, whole, coarse.drive)[coarse.drive], whole)
 
 
 def slow_squares(fitted: Fitted) -> Squares:
@@ -87,6 +84,22 @@ def slow_squares(fitted: Fitted) -> Squares:
     whole = valid & (moving_sum(np.ones(SLOW_S), valid.astype(np.float64)) >= SLOW_S - 0.5)
     deviation = float(sums[whole].std()) if whole.any() else 1.0
     return Squares(np.where(whole, np.square(sums / max(deviation, 1e-12)), 0.0), whole)
+
+
+def of_squares(coarse: Coarse, squares: Squares, columns: FloatArray) -> Problem:
+    """Regression of squares on columns, shape (n, k), that may make them larger.
+
+    Squares come in clusters of seconds, which whitening takes out. Loud and quiet minutes it leaves: they are what a
+    slow column does (an autoregression that sees them takes half of the effect of rain for memory), and where no column
+    does it, the null keeps them too.
+    """
+    valid, series = squares.valid, squares.standardised
+    left = series
+    if columns.shape[1]:
+        design = columns - columns[valid].mean(axis=0)
+        left = series - design @ np.linalg.lstsq(design[valid], series[valid], rcond=None)[0]
+    process = fit_autoregression(np.where(valid, left, 0.0), valid, min(ORDER, SQUARES_S), longest=SQUARES_S)
+    return Problem(Whitener(process, valid, coarse.drive, np.ones(len(coarse))), series, columns)
 
 
 def log_sizes(squares: Squares, columns: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -104,14 +117,8 @@ def log_sizes(squares: Squares, columns: FloatArray) -> tuple[FloatArray, FloatA
     relative = left
     for _ in range(8):
         # clipped about what is expected there: a large effect must not clip itself
-        relative = _clipped(left, np.exp(np.clip(2.0 * design @ sizes, -6.0, 6.0)))
+        relative = left / np.exp(np.clip(2.0 * design @ sizes, -6.0, 6.0))
+        relative = np.minimum(relative / max(float(relative.mean()), 1e-300), CLIP)
+        relative = relative / max(float(relative.mean()), 1e-300)
         sizes = sizes + inverse @ (design.T @ (relative - 1.0))
     return sizes, np.sqrt(np.diag(inverse)) * float(np.std(relative)) / np.sqrt(2.0)
-
-
-def _clipped(left: FloatArray, expected: FloatArray) -> FloatArray:
-    """Squares over what is expected, shape (n,), about 1 and none of them huge. [-]"""
-    relative = left / expected
-    relative = np.minimum(relative / max(float(relative.mean()), 1e-300), CLIP)
-    relative = relative / max(float(relative.mean()), 1e-300)
-    return relative

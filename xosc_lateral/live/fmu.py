@@ -141,7 +141,7 @@ def unit_methods(fmi: str, script: str) -> dict[str, Any]:
         Unit = result = done = None
         refused = Fmi2Status.error
     own = read_profile(Path(script).with_name("profile.json"))
-    columns = ("speed", "lane_width", *sorted(set(own.columns_of_any_drive) - {"speed", "lane_width"}))
+    columns = ("speed", "lane_width", *sorted(set(own.columns) - {"speed", "lane_width"}))
 
     description = f"Driver {own.name} of xosc-lateral {__version__}: lateral offset in the lane, positive left"
 

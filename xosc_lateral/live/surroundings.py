@@ -136,10 +136,7 @@ def look_around(roads: Roads, places: Places, offset: FloatArray, is_truck: Bool
     width = np.maximum(np.fmax(road["lane_width"], places.width), 0.1)
     around = Around.nobody(n)
     for path, u, i, j in _along_paths(roads, places, on):
-        there = np.ones(len(i), dtype=np.bool_)
-        seen = see_along(
-            path, u[i], offset[i], places.road[j], places.lane[j], places.s[j], t[j], direction[j], there, roads.centre
-        )
+        seen = see_along(path, u[i], offset[i], places.road[j], places.s[j], t[j], direction[j], roads.centre)
         extents = (Extent(places.length[k], places.center_x[k]) for k in (i, j))
         around.add(i, seen, free_space(seen, *extents), width[i], places.width[j], is_truck[j])
     lanes = {side: one.astype(np.float64) for side, one in lanes_beside(road).items()}

@@ -16,12 +16,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.driver.beside import Basis
 from xosc_lateral.driver.group import OffsetGroup
 from xosc_lateral.driver.plausibility import first_implausible, implausible
-from xosc_lateral.driver.profile import DriverProfile, sampling_hash
+from xosc_lateral.driver.profile import Basis, DriverProfile, sampling_hash
 from xosc_lateral.enrich.enrich import sides_known
-from xosc_lateral.enrich.other_hand import mirrored_context
+from xosc_lateral.enrich.give_way import mirrored_context
 from xosc_lateral.enrich.result import Neighbours
 from xosc_lateral.errors import SimulationError
 from xosc_lateral.live.surroundings import Places, Roads, give_way_now, look_around
@@ -37,7 +36,7 @@ FORMAT = "xosc-lateral live traffic"
 TURN = 0.03
 """Change of heading per time that nobody takes for a kink: 0.3 mrad in a step of 0.01 s. [rad/s]"""
 
-_LEADING_OVER = 0.5
+LEADING_OVER = 0.5
 """Part of `TURN` that leading over to the driver's path may take; the driver's own movement has the rest. [-]"""
 
 _PEAK = 10.0 / np.sqrt(3.0)
@@ -457,7 +456,7 @@ def _move_aside(state: NDArray[Any], passed: FloatArray) -> None:
 
 def _lead_over(state: NDArray[Any], which: BoolArray, gap: FloatArray, rate: FloatArray, speed: FloatArray) -> None:
     """Begin to lead over from a gap [m] that changes at a rate [m/s], within what is no kink at this speed. [m/s]"""
-    bound = _LEADING_OVER * TURN * np.maximum(np.abs(speed), MINIMUM_SPEED)
+    bound = LEADING_OVER * TURN * np.maximum(np.abs(speed), MINIMUM_SPEED)
     over = np.maximum(SETTLING_TIME, np.maximum(np.sqrt(_PEAK * np.abs(gap) / bound), 4.0 * np.abs(rate) / bound))
     for name, values in (("from", gap), ("from_rate", rate), ("share", 0.0), ("over", over)):
         state[name] = np.where(which, values, state[name])

@@ -10,10 +10,10 @@ border of sections, is what the vehicle has around it: the mean over the way tha
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -190,36 +190,88 @@ def _neighbours(
     motion: NominalMotion, network: RoadNetwork, index: int, grid: IntArray, lanes: Mapping[str, FloatArray]
 ) -> dict[str, FloatArray]:
     own = motion.entities[index]
+    steps = np.diff(grid)
+    every = int(steps[0]) if len(steps) and (steps == steps[0]).all() else 1
+    traffic = _traffic(motion, network, int(grid[0]) % every, every)
+    columns = grid // every
     around = Around.nobody(len(grid))
-    groups = _own_lane_groups(own, network, grid)
+    groups = _own_lane_groups(own, network, grid, traffic.direction[index, columns])
     width = _own_lane_width(own, network, grid)
-    numbers = [k for k in _in_sight(motion)[index] if motion.entities[k].entity.is_vehicle]
+    numbers = np.array([k for k in _in_sight(motion)[index] if motion.entities[k].entity.is_vehicle], dtype=np.int64)
+    extent, box = traffic.extent, own.entity.bounding_box
+    far = REACH + 0.5 * box.length + abs(box.center_x) + np.max(0.5 * extent.length + np.abs(extent.center_x)) + 1.0
     together = max(1, CELLS // len(grid))
     for begin in range(0, len(numbers), together):
-        others = [motion.entities[k] for k in numbers[begin : begin + together]]
-        seen = _see(own, others, network, grid, groups)
-        boxes = [other.entity.bounding_box for other in others]
-        length, centre, other_width = (
-            np.repeat([getattr(box, name) for box in boxes], len(grid)) for name in ("length", "center_x", "width")
-        )
-        is_truck = np.repeat([other.entity.vehicle_category in TRUCKS for other in others], len(grid))
-        rows = np.tile(np.arange(len(grid)), len(others))
-        gap = free_space(seen, own.entity.bounding_box, Extent(length, centre))
-        around.add(rows, seen, gap, width[rows], other_width, is_truck)
+        others = numbers[begin : begin + together]
+        for members, own_u, path in groups:
+            u, offset = (np.tile(values, len(others)) for values in (own_u, own.offset[grid[members]]))
+            road, s, t, direction = traffic.of(others, columns[members])
+            seen = see_along(path, u, offset, road, s, t, direction, network.lane_centre_t)
+            k = np.flatnonzero(np.abs(seen.ahead) <= far)
+            seen = Others(seen.ahead[k], seen.left[k], seen.oncoming[k])
+            who, rows = others[k // len(members)], members[k % len(members)]
+            gap = free_space(seen, box, Extent(*(values[who] for values in extent)))
+            around.add(rows, seen, gap, width[rows], traffic.width[who], traffic.is_truck[who])
     return around.columns(lanes)
+
+
+class _Traffic(NamedTuple):
+    """Everybody on some rows of the run, shape (entities, n): road, s and t [m], way along s (0: on no lane)."""
+
+    road: IntArray
+    s: FloatArray
+    t: FloatArray
+    direction: NDArray[np.int8]
+    extent: Extent
+    width: FloatArray
+    """Of each, shape (entities,). [m]"""
+    is_truck: NDArray[np.bool_]
+
+    def of(self, others: IntArray, columns: IntArray) -> Iterator[NDArray[Any]]:
+        """What `see_along` asks of some of them on some of the rows, one entity after the other."""
+        in_a_row = columns[-1] - columns[0] + 1 == len(columns)
+        for values in (self.road, self.s, self.t, self.direction):
+            part = values[:, columns[0] : columns[-1] + 1][others] if in_a_row else values[np.ix_(others, columns)]
+            yield part.ravel()
+
+
+@lru_cache(maxsize=2)  # asked for every entity of one motion after another
+def _traffic(motion: NominalMotion, network: RoadNetwork, first: int, every: int) -> _Traffic:
+    """On every so many rows of the run."""
+    names = ("road", "lane", "s", "offset", "activity", "heading_relative")
+    shape = len(motion.entities), len(motion.entities[0].time[first::every])
+    stacked = (np.concatenate([getattr(one, name)[first::every] for one in motion.entities]) for name in names)
+    road, lane, s, offset, activity, heading = stacked
+    present = ((activity & Activity.ACTIVE) != 0) & (road >= 0) & (lane != 0)
+    t = np.full(len(s), np.nan)
+    t[present] = network.offset_to_t(road[present], lane[present], s[present], offset[present])
+    direction = np.zeros(len(s), dtype=np.int8)
+    direction[present] = network.travel_directions(road[present], lane[present])
+    direction = np.where(np.cos(heading) < 0.0, -direction, direction)
+    boxes = [one.entity.bounding_box for one in motion.entities]
+    length, centre, width = (np.array([getattr(b, name) for b in boxes]) for name in ("length", "center_x", "width"))
+    is_truck = np.array([one.entity.vehicle_category in TRUCKS for one in motion.entities])
+    return _Traffic(
+        road.reshape(shape), s.reshape(shape), t.reshape(shape), direction.reshape(shape),
+        Extent(length, centre), width, is_truck,
+    )  # fmt: skip
 
 
 @dataclass(eq=False, slots=True)
 class Around:
-    """Who is around: on each side of `ZONES`, and free space to who comes towards one, shape (n,). [m]"""
+    """Who is around: on each side of `ZONES`; free space to who comes towards one [m], and how far he is there [-].
+
+    Shape (n,).
+    """
 
     sides: Mapping[str, _Side]
     oncoming: FloatArray
+    oncoming_there: FloatArray
 
     @classmethod
     def nobody(cls, n: int) -> Around:
         """Nobody around anybody."""
-        return cls({side: _Side.nobody(n) for side in ZONES}, np.full(n, np.nan))
+        return cls({side: _Side.nobody(n) for side in ZONES}, np.full(n, np.nan), np.zeros(n))
 
     def add(
         self,
@@ -236,9 +288,12 @@ class Around:
         """
         with np.errstate(invalid="ignore"):
             there = (gap <= REACH) & ~np.isnan(seen.left)
-            towards = there & seen.oncoming & (seen.ahead > 0)
+            # he comes into sight in the last quarter of the reach, and is gone within `NEAR` once he has passed
+            share = 1.0 - smooth_step(np.where(seen.ahead > 0, 4.0 * gap / REACH - 3.0, gap / NEAR))
+            k = np.flatnonzero(there & seen.oncoming & (share > 0))
             there &= ~seen.oncoming
-        np.fmin.at(self.oncoming, rows[towards], gap[towards])
+        np.fmin.at(self.oncoming, rows[k], gap[k] - NEAR * np.log(share[k]))
+        np.maximum.at(self.oncoming_there, rows[k], share[k])
         for side, middle in ZONES.items():
             share = _share_inside(seen.left / width - middle, other_width / width)
             share = np.where(there & ((side != "lead") | (seen.ahead > 0)), share, 0.0)
@@ -249,6 +304,8 @@ class Around:
     def columns(self, lanes: Mapping[str, FloatArray], *, always_fade: bool = False) -> dict[str, FloatArray]:
         """Context columns, shape (n,) each; `lanes`: how far there is one on each side. [-]"""
         columns = {"oncoming_distance": self.oncoming}
+        if always_fade or (self.oncoming_there.max(initial=0.0) > 0.0 and self.oncoming_there.min(initial=1.0) < 1.0):
+            columns[f"oncoming_distance{FADES}"] = self.oncoming_there
         for side, found in self.sides.items():
             columns |= {f"{side}_is_truck": found.is_truck}
             lane = np.maximum(lanes[side], np.minimum(found.influence, 1.0))
@@ -344,50 +401,25 @@ def _in_sight(motion: NominalMotion) -> tuple[tuple[int, ...], ...]:
 
 
 def _own_lane_groups(
-    own: EntityMotion, network: RoadNetwork, grid: IntArray
+    own: EntityMotion, network: RoadNetwork, grid: IntArray, direction: NDArray[np.int8]
 ) -> list[tuple[IntArray, FloatArray, list[Reach]]]:
     """Rows of the grid that share one lane path: positions in the grid, own u there, and the path."""
-    groups: dict[tuple[int, int, float, int], list[int]] = {}
-    present = ((own.activity[grid] & Activity.ACTIVE) != 0) & (own.road[grid] >= 0) & (own.lane[grid] != 0)
-    direction = _travel(network, own.road[grid], own.lane[grid], own.heading_relative[grid], present)
-    for k in np.flatnonzero(present):
-        row = grid[k]
-        road, lane, s = int(own.road[row]), int(own.lane[row]), float(own.s[row])
-        groups.setdefault((road, lane, network.section_at(road, s)[0], int(direction[k])), []).append(int(k))
+    groups: dict[tuple[int, int, float, int], list[IntArray]] = {}
+    on = np.flatnonzero(direction)
+    road, lane, s = own.road[grid[on]], own.lane[grid[on]], own.s[grid[on]]
+    keys = np.stack([road, lane, network.section_numbers(road, s), direction[on]])
+    for part in np.split(np.arange(len(on)), np.flatnonzero((np.diff(keys) != 0).any(axis=0)) + 1):
+        if len(part):
+            k = int(part[0])
+            start, _ = network.section_at(int(road[k]), float(s[k]))
+            groups.setdefault((int(road[k]), int(lane[k]), start, int(keys[3, k])), []).append(on[part])
     result = []
-    for (road, lane, _, forward), members in groups.items():
-        rows = np.array(members)
+    for (number, lane_id, _, forward), members in groups.items():
+        rows = np.concatenate(members)
         along = own.s[grid[rows]]
-        path = lane_path(network, road, lane, float(along[0]), forward)
+        path = lane_path(network, number, lane_id, float(along[0]), forward)
         result.append((rows, path[0].sign * (along - along[0]), path))
     return result
-
-
-def _see(
-    own: EntityMotion,
-    others: Sequence[EntityMotion],
-    network: RoadNetwork,
-    grid: IntArray,
-    groups: list[tuple[IntArray, FloatArray, list[Reach]]],
-) -> Others:
-    """Others along the own lane, one after the other, shape (others * n,)."""
-    names = ("road", "lane", "s", "offset", "activity", "heading_relative")
-    stacked = (np.concatenate([getattr(one, name)[grid] for one in others]) for name in names)
-    road, lane, s, offset, activity, heading = stacked
-    present = ((activity & Activity.ACTIVE) != 0) & (road >= 0) & (lane != 0)
-    direction = _travel(network, road, lane, heading, present)
-    t = np.full(len(s), np.nan)
-    t[present] = network.offset_to_t(road[present], lane[present], s[present], offset[present])
-    seen = Others(np.full(len(s), np.nan), np.full(len(s), np.nan), np.zeros(len(s), dtype=bool))
-    for members, own_u, path in groups:
-        k = (np.arange(len(others))[:, None] * len(grid) + members).ravel()
-        u, beside = (np.tile(values, len(others)) for values in (own_u, own.offset[grid[members]]))
-        along = see_along(
-            path, u, beside, road[k], lane[k], s[k], t[k], direction[k], present[k], network.lane_centre_t
-        )  # fmt: skip
-        for values, found in zip(seen, along, strict=True):
-            values[k] = found
-    return seen
 
 
 def see_along(
@@ -395,11 +427,9 @@ def see_along(
     own_u: FloatArray,
     own_offset: FloatArray,
     road: NDArray[np.integer],
-    lane: NDArray[np.integer],
     s: FloatArray,
     t: FloatArray,
-    direction: IntArray,
-    there: NDArray[np.bool_],
+    direction: NDArray[np.integer],
     centre_t: Callable[[int, int, FloatArray], FloatArray],
 ) -> Others:
     """Where others are along one's lane path, row by row: other moments, or other vehicles. Shape (n,) each.
@@ -410,17 +440,15 @@ def see_along(
         What `lane_path` gives; others elsewhere are not seen (NaN).
     own_u, own_offset : array
         Where one is on it, and from its lane's centre, positive left. [m]
-    road, lane, s, t, direction : array
-        Where the other is, and which way it drives along s. [-], [-], [m], [m], [-]
-    there : array of bool
-        Whether it is anywhere.
+    road, s, t, direction : array
+        Where the other is, and which way it drives along s, +1 or -1; 0: it is on no lane. [-], [m], [m], [-]
     centre_t : callable
         t of a lane's centre, by road, lane and s. [m]
     """
     n = len(own_u)
     seen = Others(np.full(n, np.nan), np.full(n, np.nan), np.zeros(n, dtype=bool))
     for part in path:
-        on = there & (road == part.road) & (s >= part.s_low - 1e-9) & (s <= part.s_high + 1e-9)
+        on = (direction != 0) & (road == part.road) & (s >= part.s_low - 1e-9) & (s <= part.s_high + 1e-9)
         k = np.flatnonzero(on)
         if not len(k):
             continue
@@ -432,19 +460,6 @@ def see_along(
         seen.left[k] = part.sign * (t[k] - centre_t(part.road, part.lane, s[k])) - own_offset[k]
         seen.oncoming[k] = direction[k] != part.sign
     return seen
-
-
-def _travel(
-    network: RoadNetwork,
-    road: NDArray[np.integer],
-    lane: NDArray[np.integer],
-    heading: FloatArray,
-    present: NDArray[np.bool_],
-) -> NDArray[np.int64]:
-    """Which way somebody drives along s, +1 or -1, shape (n,); 0 where it is on no lane."""
-    direction = np.zeros(len(present), dtype=np.int64)
-    direction[present] = network.travel_directions(road[present], lane[present])
-    return np.where(np.cos(heading) < 0.0, -direction, direction)
 
 
 class Extent(NamedTuple):
@@ -465,14 +480,18 @@ def free_space(seen: Others, own: BoundingBox | Extent, other: BoundingBox | Ext
 def _weather(motion: NominalMotion, entity: EntityMotion, grid: IntArray) -> dict[str, FloatArray]:
     time = entity.time[grid]
     context: dict[str, FloatArray] = {}
-    for played in motion.actions:
-        content = played.action.content
-        if not isinstance(content, EnvironmentAction):
-            continue
-        since = time >= played.start - 1e-9
-        for name, values in _stated(content.environment, time, played.start, entity.heading[grid]).items():
+    for start, environment in _environments(motion):
+        since = time >= start - 1e-9
+        for name, values in _stated(environment, time, start, entity.heading[grid]).items():
             context.setdefault(name, np.full(len(grid), np.nan))[since] = values[since]
     return context
+
+
+@lru_cache(maxsize=1)  # asked for every entity of one motion after another
+def _environments(motion: NominalMotion) -> list[tuple[float, Environment]]:
+    """Environments that actions set, and when. [s]"""
+    actions = ((played.start, played.action.content) for played in motion.actions)
+    return [(start, content.environment) for start, content in actions if isinstance(content, EnvironmentAction)]
 
 
 def _stated(environment: Environment, time: FloatArray, start: float, heading: FloatArray) -> Mapping[str, FloatArray]:

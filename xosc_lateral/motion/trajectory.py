@@ -110,8 +110,8 @@ def displace(motion: EntityMotion, network: RoadNetwork, deviation: FloatArray) 
 def _pieces(motion: EntityMotion) -> list[slice]:
     """Runs of rows between which the entity was not placed anew."""
     cut = np.flatnonzero((motion.activity & Activity.TELEPORTED) != 0)
-    borders = np.unique(np.concatenate(([0], cut, [len(motion.time)])))
-    return [slice(int(a), int(b)) for a, b in pairwise(borders)]
+    borders = sorted({0, *cut.tolist(), len(motion.time)})
+    return [slice(a, b) for a, b in pairwise(borders)]
 
 
 def _overlapping(piece: slice) -> Iterator[tuple[slice, slice, slice]]:

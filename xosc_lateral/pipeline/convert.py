@@ -17,16 +17,11 @@ from xosc_lateral.errors import DriverProfileError, FormatError
 from xosc_lateral.formats.atomic import refuse_outputs
 from xosc_lateral.formats.context_table import read_context
 from xosc_lateral.formats.openscenario.provenance import PENDING
-from xosc_lateral.formats.openscenario.write import (
-    Player,
-    WrittenScenario,
-    motion_unknown_to,
-    named,
-    offset_chains,
-    write_lane_offset_scenario,
-    write_trajectory_scenario,
-)
-from xosc_lateral.formats.openscenario.write.lateral_actions import awaited, lateral_actions, overruled_until
+from xosc_lateral.formats.openscenario.write.build import named
+from xosc_lateral.formats.openscenario.write.result import WrittenScenario
+from xosc_lateral.formats.openscenario.write.sampled import motion_unknown_to
+from xosc_lateral.formats.openscenario.write.target import Player
+from xosc_lateral.formats.openscenario.write.trajectory_scenario import write_trajectory_scenario
 from xosc_lateral.formats.profiles import profile_hash
 from xosc_lateral.formats.source import edit_in_place, guarding_inputs
 from xosc_lateral.motion.nominal import Activity
@@ -320,6 +315,10 @@ def _write(
     summary += ", with sensor" if settings.with_sensor else ""
     facts = asdict(provenance)
     if not plan.is_replay:
+        from xosc_lateral.formats.openscenario.write.lane_offset_scenario import write_lane_offset_scenario
+        from xosc_lateral.formats.openscenario.write.lateral_actions import awaited, lateral_actions, overruled_until
+        from xosc_lateral.formats.openscenario.write.offset_chain import offset_chains
+
         lateral = lateral_actions(played.scenario)
         chains = [
             chain

@@ -10,8 +10,7 @@ from pathlib import Path
 from msgspec import structs
 
 from xosc_lateral.formats.opendrive import read_opendrive
-from xosc_lateral.formats.openscenario import read_scenario
-from xosc_lateral.formats.openscenario.read import NO_ROADS, RoadSearch
+from xosc_lateral.formats.openscenario.read import NO_ROADS, RoadSearch, read_scenario
 from xosc_lateral.formats.source import check_regular, guard_input
 from xosc_lateral.motion.nominal import NominalMotion
 from xosc_lateral.pipeline.settings import STEP

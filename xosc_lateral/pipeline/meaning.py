@@ -13,7 +13,6 @@ from math import inf
 
 from msgspec import structs
 
-from xosc_lateral.formats.openscenario.write.replaced_maneuvers import replaced_groups
 from xosc_lateral.motion.nominal import NominalMotion
 from xosc_lateral.pipeline.load import Played
 from xosc_lateral.pipeline.shifted import Shift, shifts
@@ -79,6 +78,8 @@ class Meaning:
 
     def shifts(self, again: Played, trajectories: Collection[str]) -> list[Shift]:
         """What happens otherwise in an output in which some entities follow trajectories; each event once."""
+        from xosc_lateral.formats.openscenario.write.replaced_maneuvers import replaced_groups
+
         gone = {one.path for one in replaced_groups(self._played.scenario, trajectories)}
         found: dict[str, Shift] = {}
         for before, after in zip(self._before, self._runs(again), strict=True):

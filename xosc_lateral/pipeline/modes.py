@@ -6,8 +6,8 @@ from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
 
 from xosc_lateral.errors import FormatError, locate
-from xosc_lateral.formats.openscenario.write import Player
 from xosc_lateral.formats.openscenario.write.replaced_maneuvers import replaced_groups, separable
+from xosc_lateral.formats.openscenario.write.target import Player
 from xosc_lateral.pipeline.settings import ConvertSettings, OutputMode
 from xosc_lateral.scenario import Scenario
 from xosc_lateral.scenario.dependence import Dependence, conditions_of

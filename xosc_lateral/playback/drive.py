@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from math import inf, pi
 
-from xosc_lateral.playback.placement import NOWHERE
-from xosc_lateral.playback.state import EntityState
+from xosc_lateral.playback.state import NOWHERE, EntityState
 from xosc_lateral.playback.transition import EPSILON
 from xosc_lateral.road import LaneLink, RoadNetwork
 from xosc_lateral.road.moving import most_turning
@@ -66,7 +65,14 @@ def along_reference(network: RoadNetwork, road: int, lane: int, s: float, offset
     curvature = network.curvature_at(road, s)
     if abs(curvature) < EPSILON:
         return distance
-    shrink = 1.0 - curvature * (network.lane_state_at(road, lane, s).centre_t + offset_t)
+    return beside_line(curvature, network.lane_state_at(road, lane, s).centre_t + offset_t, distance)
+
+
+def beside_line(curvature: float, t: float, distance: float) -> float:
+    """Length along a line of a way beside it, where that line has a curvature [1/m]. [m]"""
+    if abs(curvature) < EPSILON:
+        return distance
+    shrink = 1.0 - curvature * t
     return distance / shrink if shrink > _TIGHT else distance
 
 

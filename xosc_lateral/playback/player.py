@@ -16,10 +16,9 @@ import numpy as np
 from xosc_lateral.errors import PlaybackError
 from xosc_lateral.motion.nominal import CUT_OFF, Activity, NominalMotion, Note
 from xosc_lateral.playback.drive import drive, halt_at_road_end
-from xosc_lateral.playback.placement import NOWHERE
-from xosc_lateral.playback.recorder import NO_LANE, Rows
+from xosc_lateral.playback.recorder import NO_LANE
 from xosc_lateral.playback.simulation import Simulation
-from xosc_lateral.playback.state import EntityState
+from xosc_lateral.playback.state import NOWHERE, EntityState
 from xosc_lateral.playback.storyboard import ElementState
 from xosc_lateral.playback.storyboard_builder import build_storyboard, init_actions
 from xosc_lateral.playback.trailers import align_trailers, connect, pull_trailers
@@ -87,20 +86,23 @@ class _Player:
         self.init = init_actions(scenario.storyboard.init, simulation)
         self.root = build_storyboard(scenario.storyboard, simulation)
         self._leave_out_later_entities()
-        self.rows = [Rows(state) for state in simulation.entities]
+        self.rows = list(simulation.unwatched.awake.values())
         self.times = array("d")
 
     def play(self, time_limit: float) -> NominalMotion:
         """Run to the end."""
-        simulation = self.simulation
+        simulation, unwatched = self.simulation, self.simulation.unwatched
         going = self._begin()
         last = time_limit - 0.5 * self.step_size
         while going and simulation.time < last:
-            for state in simulation.entities:
+            unwatched.wake_due(derives_motion=simulation.derives_motion)
+            for state in unwatched.awake:
                 state.begin_frame()
             going = self._frame(self.step_size)
             if going:
                 self._write(simulation.time)
+                unwatched.rest(self.step_size)
+        unwatched.wake_all()
         ended_by = "time limit" if going else "stop trigger"
         place, cut_off = simulation.scenario.storyboard.place, None
         if going and (_has_end(simulation.scenario) or self._goes_on()):
@@ -137,17 +139,18 @@ class _Player:
         simulation.stamp = time + step
         for element in self.init:
             element.step(time, step)
+        self.init = [element for element in self.init if element.is_running]
         root.step(time, step)
         simulation.time = time + step
-        for state in simulation.entities:
+        for state in simulation.unwatched.awake:
             if not state.active:
                 continue
             if not state.longitudinal_taken and state.tow is None and abs(state.speed) > EPSILON:
                 drive(state, state.speed * step)
             halt_at_road_end(state, step)
-        pull_trailers(simulation.entities)
+        pull_trailers(simulation.unwatched.awake)
         if simulation.derives_motion:
-            for state in simulation.entities:
+            for state in simulation.unwatched.awake:
                 if state.active:  # who is taken out keeps the speed that others may refer to
                     _derive_motion(state, step, height=simulation.derives_height)
         else:
@@ -158,7 +161,7 @@ class _Player:
 
     def _speeds_of_moved(self, step: float) -> None:
         """An entity that was moved without anybody setting its speed has the speed of that movement."""
-        for state in self.simulation.entities:
+        for state in self.simulation.unwatched.awake:
             if not state.speed_taken and state.activity & _LATERAL:
                 _derive_motion(state, step)
             else:
@@ -166,7 +169,7 @@ class _Player:
 
     def _derive_states(self) -> None:
         simulation = self.simulation
-        for state in simulation.entities:
+        for state in simulation.unwatched.awake:
             standing = -STANDING < state.speed < STANDING
             state.standing_since = _since(state.standing_since, standing, simulation.time)
             state.road_end_since = _since(state.road_end_since, state.at_road_end, simulation.time)
@@ -211,8 +214,10 @@ class _Player:
 
     def _write(self, time: float) -> None:
         self.times.append(time)
-        for rows in self.rows:
+        unwatched = self.simulation.unwatched
+        for rows in unwatched.awake.values():
             rows.write(time)
+        unwatched.frames += 1
 
     def _result(self, ended_by: str, cut_off: Note | None) -> NominalMotion:
         simulation = self.simulation

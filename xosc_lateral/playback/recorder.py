@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 from xosc_lateral.errors import PlaybackError
 from xosc_lateral.mask import true_blocks
 from xosc_lateral.motion.nominal import Activity, EntityMotion, FloatArray, IntArray
-from xosc_lateral.playback.placement import NOWHERE
-from xosc_lateral.playback.state import EntityState
+from xosc_lateral.playback.state import NOWHERE, EntityState
 from xosc_lateral.road import RoadNetwork
 from xosc_lateral.road.tables import turned_in_surface
 
@@ -70,6 +69,20 @@ class Rows:
         self._relative_heading.append(state.relative_heading)
         self._speed.append(state.speed)
         self._activity.append(state.activity | _ROAD_END if state.at_road_end else state.activity)
+
+    def follow(self, s: FloatArray) -> None:
+        """Write down rows along a lane that differ in s alone, shape (n,). [m]"""
+        state, n = self.state, len(s)
+        self._s.frombytes(s.tobytes())
+        for column, value in (
+            (self._road, state.road),
+            (self._lane, state.lane),
+            (self._offset_t, state.offset_t),
+            (self._relative_heading, state.relative_heading),
+            (self._speed, state.speed),
+            (self._activity, state.activity),
+        ):
+            column.frombytes(np.full(n, value, dtype=column.typecode).tobytes())
 
     def _implausible(self, time: float, what: str) -> PlaybackError:
         place = self.state.entity.place

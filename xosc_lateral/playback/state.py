@@ -1,19 +1,112 @@
-"""What the player knows of one entity at one moment."""
+"""What the player knows of one entity at one moment: its place, its route, its motion."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass
 from math import cos, nan, pi, sin
+from typing import Protocol
 
 from xosc_lateral.motion.nominal import Activity
 from xosc_lateral.playback.angles import difference, is_forward, wrap
 from xosc_lateral.playback.paths.base import PathProgress
-from xosc_lateral.playback.placement import NOWHERE, Placement
-from xosc_lateral.playback.routes import RouteGuide
-from xosc_lateral.road import Pose, RoadNetwork
+from xosc_lateral.road import LaneLink, Pose, RoadNetwork, RouteStep
 from xosc_lateral.road.places import turn_for_heading, turned_in_surface
 from xosc_lateral.scenario import Entity
 
+NOWHERE = -1
+"""Road of what is on none."""
+
+
+@dataclass(frozen=True, slots=True)
+class Placement:
+    """A place and an orientation, in road coordinates and, where it was not given in them, in world coordinates too.
+
+    Parameters
+    ----------
+    road : int
+        Index of the road; -1 where there is none.
+    lane : int
+    s : float
+        [m]
+    offset_t : float
+        From the lane's centre along the road's t-axis. [m]
+    relative_heading : float
+        Relative to the road's s-direction (slope of the lane included). [rad]
+    pose : Pose or None
+        World pose; None: it follows from the road coordinates. NaN in z, pitch, roll: those of the road.
+    """
+
+    road: int
+    lane: int
+    s: float
+    offset_t: float
+    relative_heading: float
+    pose: Pose | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class RouteGuide:
+    """A way over roads. It decides at junctions only; between them, the lane is followed.
+
+    Parameters
+    ----------
+    network : RoadNetwork
+    steps : tuple of RouteStep
+    """
+
+    network: RoadNetwork
+    steps: tuple[RouteStep, ...]
+
+    def choose(self, road: int, options: Sequence[LaneLink]) -> LaneLink | None:
+        """The link that leads along the route, be it by another connecting road; None: the route does not say."""
+        roads = [step.road for step in self.steps]
+        for index in (index for index, other in enumerate(roads) if other == road):
+            found = self._towards(roads[index + 1 :], options)
+            if found is not None:
+                return found
+        return None
+
+    def _towards(self, ahead: Sequence[int], options: Sequence[LaneLink]) -> LaneLink | None:
+        for link in options:
+            if ahead and link.road == ahead[0]:
+                return link
+        for link in reversed(options):
+            onward = self.network.next_lanes(link.road, link.lane, link.direction)
+            if len(ahead) > 1 and any(following.road == ahead[1] for following in onward):
+                return link
+        return None
+
+    def at(self, path_s: float) -> tuple[int, float, int]:
+        """Road, s and direction after `path_s` metres of the route; its end beyond it. [m]"""
+        left = max(path_s, 0.0)
+        for step in self.steps:
+            length = abs(step.s_end - step.s_start)
+            if left <= length or step is self.steps[-1]:
+                return step.road, step.s_start + step.direction * min(left, length), step.direction
+            left -= length
+        raise AssertionError("a route has steps")
+
+
+def guide(network: RoadNetwork, stops: Sequence[Placement]) -> RouteGuide | None:
+    """The shortest way over the stops; None: there is none."""
+    if len(stops) < 2 or any(stop.road == NOWHERE for stop in stops):
+        return None
+    first, *via, last = [(stop.road, stop.lane, stop.s) for stop in stops]
+    ways = [1 if is_forward(stop.relative_heading) else -1 for stop in stops]
+    steps = network.route(first, last, via=via, ways=ways)
+    return None if steps is None else RouteGuide(network, steps)
+
+
 _ACTIVE = int(Activity.ACTIVE)  # plain: arithmetic of flags takes ten times as long
+
+
+class Running(Protocol):
+    """An action of the storyboard."""
+
+    @property
+    def is_running(self) -> bool:
+        """Whether it runs now."""
 
 
 class EntityState:
@@ -36,6 +129,7 @@ class EntityState:
         "entity",
         "event_actions",
         "init_actions",
+        "is_watched",
         "lane",
         "last_place",
         "longitudinal_taken",
@@ -100,8 +194,10 @@ class EntityState:
         self.path: PathProgress | None = None
         self.tow: EntityState | None = None
         self.trailer: EntityState | None = None
-        self.init_actions: list[object] = []
-        self.event_actions: list[object] = []
+        self.init_actions: list[Running] = []
+        self.event_actions: list[Running] = []
+        self.is_watched = False
+        """Somebody else looks at it, perhaps in every frame."""
 
     # ---- where it is -------------------------------------------------------------------------------------------------
     @property
@@ -200,6 +296,10 @@ class EntityState:
         """An action moves the entity in this frame, both ways; the default driver must not."""
         self.longitudinal_taken = True
         self.activity |= int(activity)
+
+    def acts(self) -> bool:
+        """Whether one of its actions runs."""
+        return any(action.is_running for actions in (self.init_actions, self.event_actions) for action in actions)
 
     def body_frame(self, vector: tuple[float, float, float]) -> tuple[float, float, float]:
         """A world vector along the entity's own axes (in the plane)."""

@@ -276,10 +276,17 @@ class ActionElement(StoryboardElement):
     def start(self) -> None:
         """Start to act."""
         actor = None if self.action.actor is None else self.action.actor.name
+        if self.action.actor is not None:
+            self.simulation.wake(self.action.actor)
         self._number = self.simulation.record_start(self.action.source, actor, self.path or ("Init",))
         self.count += 1
         self.change(ElementState.RUNNING, ElementTransition.START)
         self.action.start()
+
+    @property
+    def is_running(self) -> bool:
+        """Whether it acts now."""
+        return self.state is ElementState.RUNNING
 
     def step(self, time: float, step: float) -> None:
         """Act for one frame."""

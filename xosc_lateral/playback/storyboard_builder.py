@@ -33,7 +33,7 @@ def init_actions(init: Init, simulation: Simulation) -> list[ActionElement]:
         prepare_action(action, None, simulation) for action in (*init.global_actions, *init.user_defined_actions)
     ]
     for private in _in_order(init.privates):
-        state = simulation.entity(private.entity_ref, private.place)
+        state = simulation.actor(private.entity_ref, private.place)
         for action in private.actions:
             element = prepare_action(action, state, simulation)
             state.init_actions.append(element)
@@ -129,7 +129,7 @@ def _actions(action: Action, group: ManeuverGroup, simulation: Simulation) -> It
         place = group.actors.place
         simulation.note(f"maneuver group '{group.name}' has no actors: its private actions are not played", place)
     for name in group.actors.entity_refs:
-        state = simulation.entity(name, group.actors.place)
+        state = simulation.actor(name, group.actors.place)
         element = prepare_action(action, state, simulation)
         state.event_actions.append(element)
         yield element

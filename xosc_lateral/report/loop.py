@@ -9,10 +9,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from xosc_lateral.driver.effects import ColumnEffect
 from xosc_lateral.formats.hashes import parsed_hashes
 from xosc_lateral.formats.profiles import profile_hash
-from xosc_lateral.identification.close import LoopResult
-from xosc_lateral.identification.findings import Finding
+from xosc_lateral.identification.close import Finding, LoopResult
 from xosc_lateral.identification.held_out import SNIPPET_ROWS
-from xosc_lateral.identification.lack_of_fit import GroupError, LackOfFit, lack_of_fit_of
+from xosc_lateral.identification.residual import GroupError
 from xosc_lateral.identification.selection import Rejected
 from xosc_lateral.report.loop_words import (
     CERTAIN,
@@ -43,7 +42,7 @@ FAR, CLOSE = 2.0, 1.2
 """Ratios to the floor from which a number is marked bad, and up to which it is marked good. [-]"""
 
 
-def loop_text(result: LoopResult, lack_of_fit: LackOfFit | None = None) -> str:
+def loop_text(result: LoopResult) -> str:
     """The outcome in a few lines; what is left is worked out unless it is given."""
     lines = [f"{finding_sentence(finding)} (p = {finding.p_value:.1e})" for finding in result.findings]
     lines = lines or ["no effect added"]
@@ -53,7 +52,7 @@ def loop_text(result: LoopResult, lack_of_fit: LackOfFit | None = None) -> str:
         lines.append(f"{item.column}: {sure} consequence of the car's movement, not used as a cause")
     error = f"{result.error_before:.4f} m before, {result.error_after:.4f} m after (floor {result.floor:.4f} m)"
     lines.append(f"held-out error {error}")
-    lines.append(lack_of_fit_words(result, lack_of_fit or lack_of_fit_of(result)))
+    lines.append(lack_of_fit_words(result))
     return "\n".join(lines)
 
 
@@ -68,13 +67,13 @@ def finding_sentence(finding: Finding) -> str:
     return f"{finding.effect}: {finding.shape}{size}{when}{alike}"
 
 
-def loop_page(result: LoopResult, lack_of_fit: LackOfFit, tables: Sequence[Path]) -> str:
-    """HTML page; same result, same bytes."""
+def loop_page(result: LoopResult, tables: Sequence[Path], proofs: Sequence[str] = ()) -> str:
+    """HTML page; same result, same bytes. `proofs`: what findings do in a scenario, in words."""
     from xosc_lateral.report.loop_json import column_record
     from xosc_lateral.report.loop_traces import traces_figure
     from xosc_lateral.report.render import render_page
 
-    groups = sorted(lack_of_fit.groups, key=lambda group: -group.unexplained)[:LEFT_ROWS]
+    groups = sorted(result.lack_of_fit.groups, key=lambda group: -group.unexplained)[:LEFT_ROWS]
     timed = any(finding.lag_s is not None for finding in result.findings)
     return render_page(
         "loop.html",
@@ -85,16 +84,17 @@ def loop_page(result: LoopResult, lack_of_fit: LackOfFit, tables: Sequence[Path]
         certain=CERTAIN,
         trace=traces_figure(result),
         snippet_s=(SNIPPET_ROWS - 1) * result.coarse.timeline.step,
-        unexplained=lack_of_fit_words(result, lack_of_fit),
-        numbers=_numbers(result, lack_of_fit),
+        unexplained=lack_of_fit_words(result),
+        numbers=_numbers(result),
         capital=_capital,
         finding_rows=[_finding_row(finding, timed) for finding in result.findings],
+        proof_rows=[{"in a scenario": one} for one in proofs],
         findings=[(finding, meaning(finding, result), _pictures(result, finding)) for finding in result.findings],
         only_hidden=not any(finding.columns for finding in result.findings),
-        residuals=_residuals(result, lack_of_fit),
+        residuals=_residuals(result),
         group_rows=[_group_row(group, result) for group in groups],
         group_tones={k: "bad" for k, group in enumerate(groups) if group.after > FAR * group.floor},
-        n_groups=len(lack_of_fit.groups),
+        n_groups=len(result.lack_of_fit.groups),
         n_runs=len(result.scored.runs_after),
         role_rows=[column_record(column, result) for column in sorted(result.identified.usable.roles)],
         feedback_rows=[
@@ -128,16 +128,16 @@ def _title(names: Sequence[str]) -> str:
     return ", ".join(names) if len(names) <= NAMED_DRIVES else f"{len(names)} drives"
 
 
-def _numbers(result: LoopResult, lack_of_fit: LackOfFit) -> list[KeyFigure]:
+def _numbers(result: LoopResult) -> list[KeyFigure]:
     from xosc_lateral.report.render import KeyFigure
 
-    tone: Tone = "bad" if lack_of_fit.clear else "good" if result.findings else ""
+    tone: Tone = "bad" if result.lack_of_fit.clear else "good" if result.findings else ""
     errors = (result.error_before, result.error_after, result.floor)
     before, after, floor = (f"{1000 * value:.1f} mm" for value in errors)
     return [
-        KeyFigure(before, "error before", "of the profile without the effects"),
-        KeyFigure(after, "error after", "of the profile with the effects", tone=tone),
-        KeyFigure(floor, "floor", "between random halves of the measured drives"),
+        KeyFigure(before, "error before", "of the base profile"),
+        KeyFigure(after, "error after", "of the refined profile", tone=tone),
+        KeyFigure(floor, "floor", "of random halves of the drives against all of them"),
     ]
 
 
@@ -163,7 +163,7 @@ class _Picture(NamedTuple):
 
 def _pictures(result: LoopResult, finding: Finding) -> list[_Picture]:
     from xosc_lateral.report.loop_figures import effect_figure
-    from xosc_lateral.report.loop_hidden_figures import DRAWINGS, quantiles_figure
+    from xosc_lateral.report.loop_hidden_figures import DRAWINGS, QUANTILES_CAPTION, quantiles_figure
 
     effect = finding.effects[0] if finding.effects else None
     if isinstance(effect, ColumnEffect):
@@ -177,19 +177,18 @@ def _pictures(result: LoopResult, finding: Finding) -> list[_Picture]:
         )
     draw, caption = DRAWINGS[effect.kind if effect is not None else finding.kind]
     pictures = [_Picture(draw(result, finding), caption, f"{_capital(finding.effect)}: {caption}")]
-    if finding.kind in ("regime", "population"):
-        caption = "Distribution of the local spread of the movement on held-out blocks."
+    if finding.kind == "regime":
         alt = "Quantiles of the local spread, measured, before and after."
-        pictures.append(_Picture(quantiles_figure(result), caption, alt))
+        pictures.append(_Picture(quantiles_figure(result), QUANTILES_CAPTION, alt))
     return pictures
 
 
-def _residuals(result: LoopResult, lack_of_fit: LackOfFit) -> list[tuple[str, Figure]]:
+def _residuals(result: LoopResult) -> list[tuple[str, Figure]]:
     """What is drawn, in words, and its figure."""
     from xosc_lateral.report.loop_figures import residual_figure
 
     return [
-        (words, residual_figure(result, lack_of_fit, what))
+        (words, residual_figure(result, what))
         for what, words in (("mean", "mean offset"), ("spread", SPREAD))
         if any(name.startswith(f"{what} by ") and " by effect: " not in name for name in result.scored.real)
     ]

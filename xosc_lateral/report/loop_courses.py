@@ -74,23 +74,6 @@ def regime_probability(result: LoopResult) -> FloatArray:
     return np.asarray(on[_longest(result)])
 
 
-def by_drive(result: LoopResult, least_s: float) -> tuple[dict[str, FloatArray], dict[str, FloatArray]]:
-    """Mean offset, and spread about it, of every drive with so many road-following seconds.
-
-    Returns
-    -------
-    means, spreads : mapping of "measured", "before", "after" to array
-        Shape (drives,) or (runs * drives,). [m]
-    """
-    timeline = result.scored.statistics.timeline
-    rows = [np.flatnonzero(timeline.valid & (timeline.drive == index)) for index in range(len(timeline.names))]
-    rows = [own for own in rows if len(own) * timeline.step >= least_s]
-    series = {"measured": timeline.offset[None], "before": result.scored.runs_before, "after": result.scored.runs_after}
-    means = {name: np.concatenate([runs[:, own].mean(axis=1) for own in rows]) for name, runs in series.items()}
-    spreads = {name: np.concatenate([runs[:, own].std(axis=1) for own in rows]) for name, runs in series.items()}
-    return means, spreads
-
-
 def _runs(result: LoopResult) -> tuple[FloatArray, FloatArray]:
     return result.scored.runs_before, result.scored.runs_after
 

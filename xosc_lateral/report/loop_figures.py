@@ -11,11 +11,9 @@ from numpy.typing import NDArray
 from xosc_lateral.driver.effects import Acts, ColumnEffect, Product
 from xosc_lateral.evaluation.metrics import METRICS
 from xosc_lateral.evaluation.spectra import gapped_spectrum
-from xosc_lateral.identification.close import LoopResult
+from xosc_lateral.identification.close import Finding, LoopResult
 from xosc_lateral.identification.cross_validation import hold_out_blocks
-from xosc_lateral.identification.findings import Finding
 from xosc_lateral.identification.held_out import Scorecard
-from xosc_lateral.identification.lack_of_fit import LackOfFit
 from xosc_lateral.mask import true_slices
 from xosc_lateral.report.figures import BLUE, GRID, MUTED, VERMILLION, figure_style, new_figure, new_panels
 from xosc_lateral.report.loop_curves import Curve, curve_of
@@ -48,13 +46,13 @@ PANELS = 4
 
 
 @figure_style()
-def residual_figure(result: LoopResult, lack_of_fit: LackOfFit, what: str) -> Figure:
+def residual_figure(result: LoopResult, what: str) -> Figure:
     """Measured minus expected by every column's fifths, before and after; `what` is "mean" or "spread"."""
     names = _shown(result, what)
     rows = -(-len(names) // PANELS)
     figure, axes = new_panels(rows, PANELS, panel_height=0.95, between=0.55, sharey=True)
     for axis, name in zip(axes.ravel(), names, strict=False):
-        _draw_residual(axis, result, lack_of_fit, what, name)
+        _draw_residual(axis, result, what, name)
     for axis in axes.ravel()[len(names) :]:
         axis.set_visible(False)
     low, high = axes[0, 0].get_ylim()
@@ -65,11 +63,11 @@ def residual_figure(result: LoopResult, lack_of_fit: LackOfFit, what: str) -> Fi
     return figure
 
 
-def _draw_residual(axis: Axes, result: LoopResult, lack_of_fit: LackOfFit, what: str, name: str) -> None:
+def _draw_residual(axis: Axes, result: LoopResult, what: str, name: str) -> None:
     """One column's fifths, over what chance gives."""
     group = f"{what} by {name}"
     place = np.arange(len(result.scored.real[group]))
-    floor = 100.0 * TWO_ERRORS * lack_of_fit.floors[group]
+    floor = 100.0 * TWO_ERRORS * result.lack_of_fit.floors[group]
     axis.fill_between(place, -floor, floor, color=MUTED, alpha=0.2, linewidth=0, label="sampling error")
     axis.axhline(0.0, color=MUTED, linewidth=0.6)
     for values, color, label in ((result.scored.before, BEFORE, "before"), (result.scored.after, AFTER, "after")):
@@ -109,7 +107,7 @@ def _draw_held_out(axis: Axes, result: LoopResult, finding: Finding, effect: Col
 
 
 @figure_style()
-def spectrum_figure(result: LoopResult) -> Figure:
+def spectrum_figure(result: LoopResult, finding: Finding | None = None) -> Figure:
     """Power density of measured offsets and of both profiles' held-out runs."""
     figure, axes = new_figure(height=3.4)
     axis = axes[0, 0]

@@ -10,18 +10,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.driver.effects import Cycle, Regimes, Step, TimeSmooth
-from xosc_lateral.identification.close import LoopResult
-from xosc_lateral.identification.findings import Finding
+from xosc_lateral.identification.close import Finding, LoopResult
 from xosc_lateral.report.figures import MUTED, ORANGE, figure_style, new_figure
 from xosc_lateral.report.loop_courses import (
     MovingStatistic,
-    by_drive,
     hidden_mean,
     moving_mean,
     moving_spread,
     regime_probability,
 )
-from xosc_lateral.report.loop_figures import AFTER, BEFORE, DRIVES, TWO_ERRORS, draw_spectra
+from xosc_lateral.report.loop_figures import AFTER, BEFORE, DRIVES, TWO_ERRORS, draw_spectra, spectrum_figure
 from xosc_lateral.report.loop_words import SPREAD
 
 if TYPE_CHECKING:
@@ -42,8 +40,7 @@ MEAN_S, SPREAD_S, REGIME_S = 120.0, 240.0, 20.0
 GAP_S = 5.0
 """Longer gaps in a drive interrupt a line. [s]"""
 
-LEAST_S = 20.0
-"""Drives with less road-following have no mean and spread worth drawing. [s]"""
+QUANTILES_CAPTION = "Distribution of the local spread of the movement on held-out blocks."
 
 QUANTILES = (0.1, 0.3, 0.5, 0.7, 0.9)
 """As `loop.residual.LOCAL_QUANTILES`."""
@@ -149,50 +146,7 @@ def time_figure(result: LoopResult, finding: Finding) -> Figure:
 
 
 @figure_style()
-def drivers_figure(result: LoopResult, finding: Finding) -> Figure:
-    """Mean and spread of every drive, as shares of drives below a value."""
-    figure, axes = new_figure(1, 2, height=3.2, sharey=True)
-    for axis, values, label in zip(
-        axes[0],
-        by_drive(result, LEAST_S),
-        ("mean offset of a drive [m], positive to the left", "spread of a drive [m]"),
-        strict=True,
-    ):
-        for name, color in (("measured", DRIVES), ("before", BEFORE), ("after", AFTER)):
-            ordered = np.sort(values[name])
-            share = (np.arange(len(ordered)) + 0.5) / len(ordered)
-            axis.plot(ordered, 100.0 * share, color=color, label=name if name == "measured" else f"profile {name}")
-        low, high = np.quantile(np.concatenate(list(values.values())), [0.002, 0.998])
-        axis.set_xlim(float(low), float(high))
-        axis.set_xlabel(label)
-    axes[0, 0].set_ylabel("drives below [%]")
-    axes[0, 0].legend()
-    return figure
-
-
-@figure_style()
-def memory_figure(result: LoopResult, finding: Finding) -> Figure:
-    """Size of the movement in bands of time: the profiles' over the measured."""
-    figure, axes = new_figure(height=3.0)
-    axis = axes[0, 0]
-    statistic = finding.statistic
-    labels = ["< 1 s", "1-3 s", "3-8 s", "8-20 s", "20-60 s", "60-200 s", "> 200 s"]
-    place = np.arange(len(result.scored.real[statistic]))
-    for values, color, label in (
-        (result.scored.before, BEFORE, "profile before"),
-        (result.scored.after, AFTER, "profile after"),
-    ):
-        axis.plot(place, values[statistic] / result.scored.real[statistic], "o-", color=color, label=label)
-    axis.axhline(1.0, color=DRIVES, label="measured")
-    axis.set_xticks(place, labels)
-    axis.set_xlabel("averaging times that the movement lies between")
-    axis.set_ylabel("std. deviation / measured [-]")
-    axis.legend()
-    return figure
-
-
-@figure_style()
-def quantiles_figure(result: LoopResult) -> Figure:
+def quantiles_figure(result: LoopResult, finding: Finding | None = None) -> Figure:
     """Quantiles of the local spread, measured and of both profiles."""
     figure, axes = new_figure(height=2.8)
     axis = axes[0, 0]
@@ -222,13 +176,10 @@ DRAWINGS: Mapping[str, tuple[Callable[[LoopResult, Finding], Figure], str]] = Ma
         ),
         Step.kind: (mean_figure, "Mean position over the drive; orange: the fitted step."),
         "memory": (
-            memory_figure,
-            "Standard deviation of the movement by averaging time, relative to the measured one.",
+            spectrum_figure,
+            "Power spectral density of the movement, measured and of both profiles.",
         ),
-        "population": (
-            drivers_figure,
-            "Distribution over the drives of the mean offset (left) and the spread (right).",
-        ),
+        "population": (quantiles_figure, QUANTILES_CAPTION),
     }
 )
 """By kind of effect, or of finding: what draws it, and the caption."""

@@ -10,12 +10,9 @@ from typing import Any
 from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.evaluation.distances import Distances
 from xosc_lateral.formats.hashes import parsed_hashes
-from xosc_lateral.formats.json_text import canonical_json
 from xosc_lateral.formats.profiles import profile_hash
-from xosc_lateral.identification.close import LoopResult
+from xosc_lateral.identification.close import Finding, LoopResult
 from xosc_lateral.identification.feedback import Feedback
-from xosc_lateral.identification.findings import Finding
-from xosc_lateral.identification.lack_of_fit import LackOfFit
 from xosc_lateral.identification.selection import Gain
 from xosc_lateral.normal import NORMAL_95
 from xosc_lateral.report.loop_words import feedback_words, lack_of_fit_words, meaning
@@ -27,13 +24,8 @@ MEASURE = (
 )
 
 
-def loop_json(result: LoopResult, lack_of_fit: LackOfFit, tables: Sequence[Path]) -> str:
-    """`report.json`: what people and machines ask of a closed loop, and the provenance."""
-    return canonical_json(finite(loop_record(result, lack_of_fit, tables))) + "\n"
-
-
-def loop_record(result: LoopResult, lack_of_fit: LackOfFit, tables: Sequence[Path]) -> dict[str, Any]:
-    """The same as plain values."""
+def loop_record(result: LoopResult, tables: Sequence[Path]) -> dict[str, Any]:
+    """`report.json` as plain values: what people and machines ask of a closed loop, and the provenance."""
     error = {"before": result.error_before, "after": result.error_after, "floor": result.floor}
     return {
         "drives": list(result.names),
@@ -52,10 +44,10 @@ def loop_record(result: LoopResult, lack_of_fit: LackOfFit, tables: Sequence[Pat
         "error": {"measure": MEASURE, **error},
         "held_out_gain": _gain(result.identified.total),
         "returned_base": result.identified.returned_base or None,
-        "unexplained": _unexplained(result, lack_of_fit),
+        "unexplained": _unexplained(result),
         "residual": [
             {"group": group.name, "before": group.before, "after": group.after, "floor": group.floor}
-            for group in lack_of_fit.groups
+            for group in result.lack_of_fit.groups
         ],
         "metrics": {when: _metrics(getattr(result.scores, when)) for when in ("before", "after", "floor")},
         "provenance": {"package_version": __version__, "seed": result.seed, "inputs": parsed_hashes(tables)},
@@ -83,19 +75,19 @@ def _feedback(item: Feedback) -> dict[str, Any]:
         "why": feedback_words(item),
         "doubtful": item.doubtful,
         "coherence": item.coherence,
-        "foretold": item.predicted_share,
+        "predicted_share": item.predicted_share,
         "function_of_offset": item.function,
     }
 
 
-def _unexplained(result: LoopResult, lack_of_fit: LackOfFit) -> dict[str, Any]:
+def _unexplained(result: LoopResult) -> dict[str, Any]:
     return {
         "measure": "root of error after squared minus floor squared, m",
-        "size_m": lack_of_fit.unexplained,
-        "p_value": lack_of_fit.p_value,
-        "clear": lack_of_fit.clear,
-        "where": [group.name for group in lack_of_fit.where] if lack_of_fit.clear else [],
-        "sentence": lack_of_fit_words(result, lack_of_fit),
+        "size_m": result.lack_of_fit.unexplained,
+        "p_value": result.lack_of_fit.p_value,
+        "clear": result.lack_of_fit.clear,
+        "where": [group.name for group in result.lack_of_fit.where] if result.lack_of_fit.clear else [],
+        "sentence": lack_of_fit_words(result),
     }
 
 

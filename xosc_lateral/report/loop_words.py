@@ -9,16 +9,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.driver.effects import Acts, Angular, ColumnEffect, Levels, Magnitude, Product
-from xosc_lateral.identification.close import LoopResult
+from xosc_lateral.identification.close import Finding, LoopResult
 from xosc_lateral.identification.feedback import BAND, FUNCTION, Feedback
-from xosc_lateral.identification.findings import Finding
-from xosc_lateral.identification.lack_of_fit import GroupError, LackOfFit
 from xosc_lateral.identification.selection import Rejected
 from xosc_lateral.identification.timeline import LOCAL_S
 from xosc_lateral.segment import CONTEXT_UNITS
 
 CERTAIN = 1e-4
 """p-values below this are extrapolated far beyond the null's sample: "certain", and no better known. [-]"""
+
+NAMED_GROUPS = 4
+"""So many groups with the most left unexplained are named."""
 
 GAP = "\N{NO-BREAK SPACE}"
 """Between a number and its unit: they stay on one line."""
@@ -44,7 +45,6 @@ COMPONENT_WORDS: Mapping[str, str] = MappingProxyType(
         "spread": "a column that changes the spread",
         "slow_spread": "a column that changes the spread of slow movement",
         "fine_noise": "a column that changes the fine noise",
-        "restoring": "a column that changes the rate of mean reversion",
         "time_spread": "a spread that changes smoothly with time",
         "regimes": "regimes of small and large spread",
         "cycle": "a periodic oscillation",
@@ -209,37 +209,28 @@ def taken_back_words(item: Rejected) -> str:
     return f"{COMPONENT_WORDS.get(item.component, item.component)}{by}"
 
 
-def lack_of_fit_words(result: LoopResult, lack_of_fit: LackOfFit) -> str:
+def lack_of_fit_words(result: LoopResult) -> str:
     """What is left unexplained, in a sentence."""
-    if lack_of_fit.unexplained == 0.0:
+    left = result.lack_of_fit
+    if left.unexplained == 0.0:
         return (
             "Taken together, the residuals do not exceed the floor: what the profile still misses cannot be told from "
             "chance on these drives."
         )
-    if not lack_of_fit.clear:
+    if not left.clear:
         return (
-            "The remaining residual is not significant: the error after is above the floor, but in "
-            f"{100 * lack_of_fit.p_value:.0f}{GAP}% of random splits the two halves of these drives differ as much."
+            "The remaining residual is not significant: the error after is above the floor, but "
+            f"{100 * left.p_value:.0f}{GAP}% of random halves of these drives differ as much from the whole."
         )
-    most_of_it = _where(result, lack_of_fit)
-    return (
-        f"Unexplained residual of {_mm(lack_of_fit.unexplained)}: the error after ({_mm(result.error_after)}) lies "
-        f"clearly above the floor ({_mm(result.floor)}), and no effect was found that explains the rest.{most_of_it}"
-    )
-
-
-def _where(result: LoopResult, lack_of_fit: LackOfFit) -> str:
-    """Which groups it stands out in, or nothing."""
     where = ", ".join(
         f"{group_words(group.name, result)} ({_mm(group.after)}, floor {_mm(group.floor)})"
-        for group in most(lack_of_fit)
+        for group in left.where[:NAMED_GROUPS]
     )
-    return f" It stands out in: {where}." if where else ""
-
-
-def most(lack_of_fit: LackOfFit, number: int = 4) -> tuple[GroupError, ...]:
-    """The groups with the most left unexplained, a few."""
-    return lack_of_fit.where[:number]
+    return (
+        f"Unexplained residual of {_mm(left.unexplained)}: the error after ({_mm(result.error_after)}) lies "
+        f"clearly above the floor ({_mm(result.floor)}), and no effect was found that explains the rest."
+        + (f" It stands out in: {where}." if where else "")
+    )
 
 
 def group_words(name: str, result: LoopResult) -> str:
@@ -317,7 +308,6 @@ def _column_sentence(finding: Finding, effect: ColumnEffect, result: LoopResult)
         subject = {
             Acts.SPREAD: "the movement about the mean",
             Acts.FINE: "the fine noise",
-            Acts.QUICK: "the quick movement",
             Acts.RATE: "the rate of mean reversion",
         }[effect.acts]
         does = f"changes by a {size}"

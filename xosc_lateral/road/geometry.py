@@ -10,8 +10,46 @@ References
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from math import atan2, ceil, cos, hypot, sin, sqrt
+
+import numpy as np
+from msgspec import Struct
+from numpy.typing import NDArray
+
+
+def simplify(x: NDArray[np.float64], y: NDArray[np.float64], tolerance: float) -> NDArray[np.int64]:
+    """Points of a polyline to keep so that no other one is farther off than `tolerance` (Douglas and Peucker 1973).
+
+    Parameters
+    ----------
+    x, y : array, shape (n,)
+        [m]
+    tolerance : float
+        [m]
+
+    Returns
+    -------
+    array of int, shape (m,)
+        Indices, first and last included.
+    """
+    kept = {0, len(x) - 1}
+    todo = [(0, len(x) - 1)]
+    while todo:
+        first, last = todo.pop()
+        if last - first < 2:
+            continue
+        along_x, along_y = x[last] - x[first], y[last] - y[first]
+        inner = slice(first + 1, last)
+        from_x, from_y = x[inner] - x[first], y[inner] - y[first]
+        length = np.hypot(along_x, along_y)
+        off = np.abs(along_x * from_y - along_y * from_x) / length if length > 0.0 else np.hypot(from_x, from_y)
+        farthest = int(np.argmax(off))
+        if off[farthest] > tolerance:
+            middle = first + 1 + farthest
+            kept.add(middle)
+            todo += [(first, middle), (middle, last)]
+    return np.array(sorted(kept), dtype=np.int64)
+
 
 TURN_PER_PIECE = 0.5
 """A clothoid is expanded in power series over pieces that turn at most by this. [rad]"""
@@ -26,8 +64,7 @@ MAX_TURN = 2000.0
 """An element that turns more than this is refused by the reader. [rad]"""
 
 
-@dataclass(frozen=True, slots=True)
-class ClothoidPiece:
+class ClothoidPiece(Struct, frozen=True):
     """A stretch of clothoid (line and arc included) about its middle.
 
     Attributes
@@ -100,8 +137,7 @@ def _horner(series: list[complex], u: float) -> complex:
     return value
 
 
-@dataclass(frozen=True, slots=True)
-class Line:
+class Line(Struct, frozen=True):
     """A straight line from (x, y); [m], heading in [rad]."""
 
     x: float
@@ -129,8 +165,7 @@ class Line:
         return clothoid_pieces(self.x, self.y, self.heading, self.length, 0.0, 0.0)
 
 
-@dataclass(frozen=True, slots=True)
-class Arc:
+class Arc(Struct, frozen=True):
     """A circular arc from (x, y); [m], heading in [rad], curvature in [1/m]."""
 
     x: float
@@ -159,8 +194,7 @@ class Arc:
         return clothoid_pieces(self.x, self.y, self.heading, self.length, self.curvature, 0.0)
 
 
-@dataclass(frozen=True, slots=True)
-class Spiral:
+class Spiral(Struct, frozen=True):
     """A clothoid: curvature [1/m] changes linearly along it; lengths in [m], heading in [rad]."""
 
     heading: float
@@ -200,8 +234,7 @@ class Spiral:
         return self.parts
 
 
-@dataclass(frozen=True, slots=True)
-class ParamCubic:
+class ParamCubic(Struct, frozen=True):
     """A parametric cubic (paramPoly3, and poly3 as its special case) run through by arc length.
 
     Attributes

@@ -154,7 +154,7 @@ class LaneTables:
             own = np.broadcast_to(self.row_of(road, lane, s), s.shape)
             section = np.broadcast_to(self.section_of(road, s), s.shape)
             index, count = np.full(len(s), -1.0), np.zeros(len(s))
-            for which in np.unique(section):
+            for which in np.flatnonzero(np.bincount(section)):
                 here = np.flatnonzero(section == which)
                 index[here], count[here] = self._section_index(int(which), own[here], s[here])
             return index, count

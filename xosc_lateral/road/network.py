@@ -22,6 +22,7 @@ from xosc_lateral.road.lanes import DRIVING
 from xosc_lateral.road.links import Links
 from xosc_lateral.road.moving import Chooser, advance, straightest
 from xosc_lateral.road.onward import gone_on
+from xosc_lateral.road.piecewise import IndexLike
 from xosc_lateral.road.places import cross_section, find_lane, lane_at, lane_pose, surface_pose
 from xosc_lateral.road.positions import (
     Advance,
@@ -248,6 +249,10 @@ class RoadNetwork:
         `s`, `t` in [m].
         """
         return lane_at(self.roads[road], road, s, t, lane_types)
+
+    def section_numbers(self, road: IntArray, s: FloatArray) -> IndexLike:
+        """Numbers of lane sections, counted over all roads; road and s [m] of the same shape (n,)."""
+        return self._tables.section_of(road, s)
 
     def section_at(self, road: int, s: float) -> tuple[float, float]:
         """Start and end s of the lane section. [m]"""

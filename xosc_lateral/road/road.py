@@ -5,8 +5,9 @@ from __future__ import annotations
 from bisect import bisect_right
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from math import inf, nan
 
-from xosc_lateral.road.geometry import ReferenceElement
+from xosc_lateral.road.geometry import Line, ReferenceElement
 from xosc_lateral.road.lanes import LaneSection
 from xosc_lateral.road.positions import RoadMark
 from xosc_lateral.road.surface import Surface
@@ -123,6 +124,25 @@ class Road:
         if i < 0:
             i = 0
         return self.elements[i].curvature_at(s - self.starts[i])
+
+    def stretch_of(self, lane: int, s: float) -> tuple[float, float, ReferenceElement, float, float]:
+        """Range around s on one element of the reference line [m], that element, its start, and t of the lane. [m]
+
+        Where the lane's middle changes along s, its t is NaN; on a line, where it does not matter, 0.
+        """
+        i = max(bisect_right(self.starts, s) - 1, 0)
+        low = self.starts[i] if i else -inf
+        high = self.starts[i + 1] if i + 1 < len(self.starts) else inf
+        element = self.elements[i]
+        if isinstance(element, Line):
+            return low, high, element, self.starts[i], 0.0
+        found = self.section_at(s).by_id.get(lane)
+        if found is None:
+            return low, high, element, self.starts[i], nan
+        j = max(bisect_right(found.starts, s) - 1, 0)
+        low = max(low, found.starts[j] if j else -inf)
+        high = min(high, (*found.starts[j + 1 :], inf)[0])
+        return low, high, element, self.starts[i], nan if any(found.centre[j][1:]) else found.centre[j][0]
 
 
 def road_marks(road: Road) -> tuple[RoadMark, ...]:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.driver.fitting import fit_population, fit_runs
-from xosc_lateral.driver.models.kinds import ModelKind
+from xosc_lateral.driver.models.base import ModelKind
 from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.driver.sampling import sample_offsets
 from xosc_lateral.driver.seeds import child
@@ -40,7 +40,7 @@ class ProfileModel:
             return sample_recorded(self.profile, segments, starts, seed)
         root = np.random.SeedSequence(seed)
         paths = [sample_offsets(self.profile, segment, child(root, number)) for number, segment in enumerate(segments)]
-        noise = sensor_noise(self.profile, paths, segments, seed)
+        noise = sensor_noise(self.profile, paths, seed)
         return [path + error for path, error in zip(paths, noise, strict=True)]
 
     @property
@@ -111,7 +111,6 @@ def drives_of(runs: Sequence[Run]) -> list[Drive]:
                 levels=own[0].levels,
                 run=np.concatenate([np.full(len(run), number, dtype=np.int64) for number, run in enumerate(own)]),
                 empty=own[0].empty,
-                zone=None if own[0].zone is None else np.concatenate([run.zone for run in own if run.zone is not None]),
             )
         )
     return drives

@@ -30,7 +30,6 @@ from xosc_lateral.driver.effects import (
     Threshold,
     TimeSmooth,
     VarianceTrend,
-    Zones,
 )
 
 STEP = 0.2
@@ -56,16 +55,6 @@ EXAMPLES: tuple[Effect, ...] = (
         acts=Acts.RATE,
         factors=(Factor(column="x"), Factor(column="y", form=Form.SINE, at=360.0)),
         **ONE,
-    ),
-    Zones(
-        acts=Acts.QUICK,
-        column="x",
-        zones=("here", "there"),
-        values=(0.4, -0.3),
-        value_errors=(0.1, 0.1),
-        lag_s=-0.4,
-        response_s=0.2,
-        response_order=2,
     ),
     Drift(size=0.2),
     Step(size=0.2, at_s=40.0),

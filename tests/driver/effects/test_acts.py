@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from xosc_lateral.driver.effects.acts import FACTOR_LIMIT, LOG_LIMIT, Acts, terms_of
+from xosc_lateral.driver.effects.base import FACTOR_LIMIT, LOG_LIMIT, Acts, terms_of
 
-PARTS = ("location", "spread", "rate", "fine", "quick")
-FACTORS = [Acts.SPREAD, Acts.RATE, Acts.FINE, Acts.QUICK]
+PARTS = ("location", "spread", "rate", "fine")
+FACTORS = [Acts.SPREAD, Acts.RATE, Acts.FINE]
 
 
 @pytest.mark.parametrize("acts", list(Acts))

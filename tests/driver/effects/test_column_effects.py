@@ -21,12 +21,10 @@ from xosc_lateral.driver.effects import (
     Product,
     Proximity,
     Threshold,
-    Zones,
     effect_from_dict,
     missing_columns,
 )
 from xosc_lateral.driver.effects.response import respond
-from xosc_lateral.drives.zones import zone_codes
 from xosc_lateral.errors import DriverProfileError
 
 STEP = 0.2
@@ -181,7 +179,7 @@ def test_terms_are_finite_and_repeatable(effect: ColumnEffect) -> None:
         ({"kind": "saturating", "acts": "location", "column": "x", "middle": 0.0, "scale": 0.0}, "scale"),
         ({"kind": "piecewise", "acts": "location", "column": "x", "knots": [2.0, 1.0]}, "increase"),
         ({"kind": "drift", "size": -1.0}, "size"),
-        ({"kind": "weave", "amplitude": 0.1}, "period_s"),
+        ({"kind": "cycle", "amplitude": 0.1}, "period_s"),
         ({"kind": "product", "acts": "location", "factors": [{"column": "x", "form": "value", "at": 0}]}, "factors"),
     ],
 )
@@ -208,37 +206,3 @@ def test_nobody_in_sight_is_far_away_where_the_curve_levels_off_and_else_is_none
     unseen, far, none = (strength(effect, x=np.full(5, value), **there) for value in (np.inf, 1000.0, np.nan))
     curves = {"saturating", "nearness", "proximity"}
     assert unseen == pytest.approx(far, abs=0.02) if effect.kind in curves else np.array_equal(unseen, none)
-
-
-def test_zones_have_their_values_and_nothing_happens_elsewhere() -> None:
-    effect = Zones(acts=Acts.QUICK, zones=("here", "there"), values=(0.4, -0.3), value_errors=(0.1, 0.1))
-    codes = zone_codes(["here", "there", "elsewhere", ""])
-    assert strength(effect, zone=codes) == pytest.approx([0.4, -0.3, 0.0, 0.0])
-    assert effect.strength(STEP, {"speed": codes}) is None
-    assert effect.shape == "2 zones, least in 'there', most in 'here'"
-
-
-def test_between_zones_the_strength_goes_over_without_a_jump() -> None:
-    smooth = {"lag_s": -1.0, "response_s": 0.5, "response_order": 2}
-    effect = Zones(acts=Acts.QUICK, zones=("here", "there"), values=(0.4, -0.4), value_errors=(0.1, 0.1), **smooth)
-    found = strength(effect, zone=zone_codes(np.array(["here", "there"]).repeat(50)))
-    assert np.abs(np.diff(found)).max() < 0.2
-    assert found[0] == pytest.approx(0.4) and found[-1] == pytest.approx(-0.4)
-    assert abs(found[49]) < 0.2  # half of it before the border
-
-
-@pytest.mark.parametrize(
-    "wrong",
-    [
-        {"zones": ("here",)},
-        {"values": (0.1, np.nan)},
-        {"zones": ("here", "here")},
-        {"zones": ("here", "")},
-        {"zones": (), "values": (), "value_errors": ()},
-        {"value_errors": (0.1,)},
-    ],
-)
-def test_zones_that_are_none_are_refused(wrong: dict[str, object]) -> None:
-    right = {"zones": ("here", "there"), "values": (0.4, -0.3), "value_errors": (0.1, 0.1)}
-    with pytest.raises(DriverProfileError, match="effect zones"):
-        Zones(acts=Acts.QUICK, **(right | wrong))  # type: ignore[arg-type]

@@ -1,4 +1,4 @@
-"""What changes the movement's size by a column: all of it, its slow part, its fine part, or how fast it returns."""
+"""What changes the movement's size by a column."""
 
 from __future__ import annotations
 
@@ -9,10 +9,9 @@ from scipy.signal import lfilter
 from tests.identification.made_coarse import SPREAD, coarse_of, movement, wander
 from xosc_lateral.driver.effects import Acts, ColumnEffect, Linear
 from xosc_lateral.identification import regression
-from xosc_lateral.identification.regression import Coarse, Fitted, fit_model
+from xosc_lateral.identification.regression import Fitted, fit_model
 from xosc_lateral.identification.terms.column import ColumnTerm
 from xosc_lateral.identification.terms.mean import MeanTerm
-from xosc_lateral.identification.terms.restoring import MAX_FACTOR, RestoringTerm, recent_offset
 from xosc_lateral.identification.terms.spread import (
     FineNoiseTerm,
     SlowSpreadTerm,
@@ -25,8 +24,6 @@ SECONDS = 2400.0
 N = round(SECONDS / 0.2)
 LOG_SIZE = 0.4
 """Per unit of a column of variance 1: half as much again. [-]"""
-
-KINDS: tuple[type[ColumnTerm], ...] = (SpreadTerm, SlowSpreadTerm, FineNoiseTerm, RestoringTerm)
 
 
 def term(kind: type[ColumnTerm], column: str = "x") -> ColumnTerm:
@@ -86,63 +83,15 @@ def test_the_sign_of_a_spread_is_that_of_its_column() -> None:
     assert back.coefficients[0] == pytest.approx(-there.coefficients[0], rel=1e-6)
 
 
-@pytest.mark.parametrize("kind", [SpreadTerm, SlowSpreadTerm, FineNoiseTerm, RestoringTerm])
-def test_metres_or_centimetres_are_the_same_factor(kind: type[ColumnTerm], monkeypatch: pytest.MonkeyPatch) -> None:
+def test_metres_or_centimetres_are_the_same_factor(monkeypatch: pytest.MonkeyPatch) -> None:
     x = column_of(11)
     own = movement(np.random.default_rng(12), SECONDS) * np.exp(LOG_SIZE * x)
     sizes = []
     for factor in (1.0, 100.0):
         monkeypatch.setattr(regression, "FLOOR", 0.03 * factor)
-        fitted = fit_model(coarse_of(factor * own, {"x": x}), (term(kind),))
+        fitted = fit_model(coarse_of(factor * own, {"x": x}), (term(SpreadTerm),))
         sizes.append(estimate(fitted)[0].coefficients[0])
     assert sizes[0] == pytest.approx(sizes[1], rel=1e-5)
-
-
-# ---- restoring -------------------------------------------------------------------------------------------------------
-def returning(seed: int, log_rate: float) -> Coarse:
-    """Movement whose rate of return of 1 / 6 s changes with a column; the kicks stay the same."""
-    x, rng = column_of(seed), np.random.default_rng(seed + 100)
-    keep = np.exp(-0.2 / 6.0 * np.exp(log_rate * x))
-    kicks, path, last = 0.02 * rng.normal(size=N), np.empty(N), 0.0
-    for row in range(N):
-        last = keep[row] * last + kicks[row]
-        path[row] = last
-    return coarse_of(path, {"x": x})
-
-
-def test_a_stronger_return_has_the_sign_of_its_column_and_narrows_the_spread_by_its_square_root() -> None:
-    fitted = fit_model(returning(13, 0.6), (term(RestoringTerm),))
-    rate, spread = estimate(fitted)
-    assert (rate.acts, spread.acts) == (Acts.RATE, Acts.SPREAD)
-    assert rate.coefficients[0] > 0.0
-    assert spread.coefficients[0] == pytest.approx(-0.5 * rate.coefficients[0])
-    mirrored = estimate(fit_model(returning(13, -0.6), (term(RestoringTerm),)))
-    assert mirrored[0].coefficients[0] < 0.0
-
-
-def test_a_return_that_stays_the_same_is_of_no_size_that_chance_does_not_give() -> None:
-    sizes, errors = [], []
-    for seed in (14, 15, 16):
-        rate, _ = estimate(fit_model(returning(seed, 0.0), (term(RestoringTerm),)))
-        sizes.append(rate.coefficients[0])
-        errors.append(rate.errors[0])
-    assert np.abs(sizes).max() < 4.0 * max(errors)
-
-
-def test_no_return_is_believed_to_change_by_more_than_the_limit() -> None:
-    rate, _ = estimate(fit_model(returning(17, 3.0), (term(RestoringTerm),)))
-    low, high = np.quantile(column_of(17), [0.05, 0.95])
-    assert abs(rate.coefficients[0]) * (high - low) <= np.log(MAX_FACTOR) * 1.05
-
-
-def test_the_recent_offset_is_the_past_alone() -> None:
-    fitted = fit_model(returning(18, 0.0), ())
-    recent = recent_offset(fitted)
-    assert recent[fitted.coarse.valid].std() == pytest.approx(1.0)
-    assert (recent[~fitted.coarse.valid] == 0.0).all()
-    weights = np.exp(-np.arange(60) / 3.0)
-    expected = np.array([weights @ fitted.movement[row - 1 : row - 61 : -1] for row in range(200, 400)])
-    assert np.corrcoef(recent[200:400], expected)[0, 1] > 1.0 - 1e-9
 
 
 # ---- what each may take up -------------------------------------------------------------------------------------------
@@ -156,13 +105,11 @@ def acting() -> Fitted:
 
 
 def test_a_column_acts_on_the_size_once(acting: Fitted) -> None:
-    for kind in (SpreadTerm, SlowSpreadTerm):
-        assert kind.barred(acting) == {"s"}
+    assert SpreadTerm.barred(acting) == SlowSpreadTerm.barred(acting) == {"s"}
 
 
-def test_what_acts_on_anything_is_no_fine_noise_and_no_return(acting: Fitted) -> None:
-    for kind in (FineNoiseTerm, RestoringTerm):
-        assert kind.barred(acting) == {"m", "s"}
+def test_what_acts_on_anything_is_no_fine_noise(acting: Fitted) -> None:
+    assert FineNoiseTerm.barred(acting) == {"m", "s"}
 
 
 def test_what_is_known_of_the_size_is_a_column_for_every_term_of_it(acting: Fitted) -> None:
@@ -176,9 +123,8 @@ def test_a_twin_acts_on_the_fine_noise_by_the_same_quantity(acting: Fitted) -> N
     assert (twin.acts, twin.columns) == (Acts.FINE, ("s",))
 
 
-@pytest.mark.parametrize("kind", KINDS)
-def test_problems_have_a_row_for_each_second_and_finite_numbers(acting: Fitted, kind: type[ColumnTerm]) -> None:
-    problem = kind.problem(acting)
+def test_problems_have_a_row_for_each_second_and_finite_numbers(acting: Fitted) -> None:
+    problem = SpreadTerm.problem(acting)
     assert len(problem.observed) == problem.valid.sum() == len(problem.known)
     assert np.isfinite(problem.observed).all()
     assert np.isfinite(problem.known).all()

@@ -16,7 +16,7 @@ from xosc_lateral.motion.trajectory import WorldTrajectory
 from xosc_lateral.report.player.packing import pack, unpack
 from xosc_lateral.report.player.scene import enriched_scene, nominal_scene, track_of
 from xosc_lateral.report.scenario import scenario_page
-from xosc_lateral.road.simplify import simplify
+from xosc_lateral.road.geometry import simplify
 
 
 @pytest.fixture(scope="module")

@@ -4,6 +4,8 @@ References
 ----------
 .. [1] N. Neis, J. Beyerer, "A two-level stochastic model for the lateral movement of vehicles within their lane", IEEE
        ITSC 2023, pp. 1896-1903, arXiv:2405.17080: coarse and fine part, which effects change.
+.. [2] A. C. Harvey, "Estimating regression models with multiplicative heteroscedasticity", Econometrica 44, 1976:
+       log-linear factors.
 """
 
 from __future__ import annotations
@@ -11,6 +13,7 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
+from enum import StrEnum
 from typing import Any, ClassVar
 
 import numpy as np
@@ -27,9 +30,7 @@ class EffectTerms:
 
     The offset of a profile with effects is, with m the base model's mean and kappa, phi its coarse and fine part [m]::
 
-        offset = location + m + spread * (kappa(tau) - m + (quick - 1) * h) + fine * quick * phi,    d tau / dt = rate
-
-    where h is what is quick of kappa (`quick`).
+        offset = location + m + spread * (kappa(tau) - m) + fine * phi,    d tau / dt = rate
 
     Parameters
     ----------
@@ -41,15 +42,12 @@ class EffectTerms:
         Rate of the coarse movement's mean reversion, > 0: 2 means that it restores twice as fast. [-]
     fine : array, shape (n,), optional
         Factor on the fine movement, > 0. [-]
-    quick : array, shape (n,), optional
-        Factor on the quick movement, coarse or fine, > 0. On the coarse one it does not act where a rate does. [-]
     """
 
     location: FloatArray | None = None
     spread: FloatArray | None = None
     rate: FloatArray | None = None
     fine: FloatArray | None = None
-    quick: FloatArray | None = None
 
     def rows(self, rows: slice | NDArray[np.int64]) -> EffectTerms:
         """The same at some rows. Shape of `rows` each. [m], [-]"""
@@ -58,33 +56,21 @@ class EffectTerms:
     @property
     def parts(self) -> tuple[FloatArray | None, ...]:
         """All of them, in the order of the fields. [m], [-]"""
-        return self.location, self.spread, self.rate, self.fine, self.quick
+        return self.location, self.spread, self.rate, self.fine
 
 
-FILE_WORDS = {"Cycle": "weave", "VarianceTrend": "growing-spread"}
-"""Effects whose kind in files is not their name: what version 0.1 called them."""
-
-
-def kind_of(name: str) -> str:
-    """Kind in files of an effect's class."""
-    return FILE_WORDS.get(name) or kebab(name)
-
-
-class Effect(Record, frozen=True, kw_only=True, tag_field="kind", tag=kind_of):
-    """One effect. Frozen, small, one file each; parameters and their uncertainty are its fields.
+class Effect(Record, frozen=True, kw_only=True, tag_field="kind", tag=kebab):
+    """One effect, frozen; parameters and their uncertainty are its fields.
 
     `ColumnEffect` and `HiddenEffect` are what effects are made from.
     """
 
     kind: ClassVar[str]
-    """Name in the profile file: the class's, in lower case with hyphens, or its word of `FILE_WORDS`."""
-
-    is_of_recording: ClassVar[bool] = False
-    """Whether its columns are of one recording alone: no other drive lacks them, or looks out for them."""
+    """Name in the profile file: the class's, in lower case with hyphens."""
 
     def __init_subclass__(cls, **settings: Any) -> None:
         super().__init_subclass__(**settings)
-        cls.kind = kind_of(cls.__name__)
+        cls.kind = kebab(cls.__name__)
 
     @property
     @abstractmethod
@@ -116,3 +102,30 @@ class Effect(Record, frozen=True, kw_only=True, tag_field="kind", tag=kind_of):
 def step_of(time: FloatArray) -> float:
     """Step [s] of an even time grid [s], shape (n,); of a single row 1 s."""
     return float(time[1] - time[0]) if len(time) > 1 else 1.0
+
+
+FACTOR_LIMIT = 5.0
+"""A factor on spread, rate of mean reversion or fine noise stays within 1/5..5: beyond the fitted range
+of its column a log-linear effect would run away. [-]"""
+
+LOG_LIMIT = float(np.log(FACTOR_LIMIT))
+"""[-]"""
+
+
+class Acts(StrEnum):
+    """Part of the movement that an effect changes; its strength is [m] for location, else a natural logarithm."""
+
+    LOCATION = "location"
+    SPREAD = "spread"
+    RATE = "rate"
+    FINE = "fine"
+
+
+def terms_of(acts: Acts, strength: FloatArray) -> EffectTerms:
+    """Terms of an effect of the given strength, shape (n,): added [m] for location, its exponential [-] for factors."""
+    if acts is Acts.LOCATION:
+        return EffectTerms(location=strength)
+    factor = np.exp(np.minimum(np.maximum(strength, -LOG_LIMIT), LOG_LIMIT))  # np.clip takes five times as long
+    if acts is Acts.SPREAD:
+        return EffectTerms(spread=factor)
+    return EffectTerms(rate=factor) if acts is Acts.RATE else EffectTerms(fine=factor)

@@ -11,10 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.driver.models.autoregressive.fit import fit_autoregressive
 from xosc_lateral.driver.models.autoregressive.model import AutoregressiveModel
 from xosc_lateral.driver.models.base import CoreModel
-from xosc_lateral.driver.models.two_level.fit import fit_two_level
 from xosc_lateral.driver.models.two_level.model import TwoLevelModel
 from xosc_lateral.errors import DriverProfileError
 from xosc_lateral.plugins import entry_points
@@ -44,10 +42,19 @@ class KnownModel:
     fit: Callable[[Sequence[FloatArray], Sequence[str]], CoreModel]
 
 
-CORE_MODELS = (
-    KnownModel(TwoLevelModel, lambda rel_offsets, drives: fit_two_level(rel_offsets)),
-    KnownModel(AutoregressiveModel, fit_autoregressive),
-)
+def _fit_two_level(rel_offsets: Sequence[FloatArray], drives: Sequence[str]) -> CoreModel:
+    from xosc_lateral.driver.models.two_level.fit import fit_two_level  # who samples does not fit
+
+    return fit_two_level(rel_offsets)
+
+
+def _fit_autoregressive(rel_offsets: Sequence[FloatArray], drives: Sequence[str]) -> CoreModel:
+    from xosc_lateral.driver.models.autoregressive.fit import fit_autoregressive
+
+    return fit_autoregressive(rel_offsets, drives)
+
+
+CORE_MODELS = (KnownModel(TwoLevelModel, _fit_two_level), KnownModel(AutoregressiveModel, _fit_autoregressive))
 """The models of this package; a profile file names them by their `kind`."""
 
 

@@ -60,9 +60,8 @@ def explanations(
     view: SecondView | None = None,
     *,
     only_view: bool = False,
-    only_white: bool = False,
 ) -> list[Explanation]:
-    """All that were tried; of a second view, also or only what it shows; or only white noise.
+    """All that were tried; of a second view, also or only what it shows.
 
     Other arguments as for `solve`.
     """
@@ -71,8 +70,6 @@ def explanations(
     if found and only_view:
         return found
     found.append(_explanation(data, Colour(), base, known))
-    if only_white:
-        return found
     for order in ORDERS:
         for alone in (False, True):
             found += _of_family(data, order, alone, base, known)

@@ -1,4 +1,4 @@
-"""What a sensor adds to the offset: white noise, low-passed noise, rounding, slope jumps, as a profile keeps it.
+"""What a sensor adds to the offset: white noise, low-passed noise, rounding, as a profile keeps it.
 
 References
 ----------
@@ -8,31 +8,18 @@ References
 
 from __future__ import annotations
 
-from itertools import pairwise
-from math import inf, isfinite
+from math import isfinite
 from typing import Any
 
-import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.driver.records import Record, plain
-from xosc_lateral.driver.sensor.by_zone import ByZone
 from xosc_lateral.driver.sensor.likelihood import Colour
-from xosc_lateral.driver.sensor.slope_jumps import CROSSING, SlopeJumps
-from xosc_lateral.driver.sensor.texture import amplitude_factor, smooth_level
 from xosc_lateral.drives.filters import scale_frequencies
-from xosc_lateral.drives.resampling import passed
 from xosc_lateral.errors import DriverProfileError
 
 FloatArray = NDArray[np.float64]
-
-FAINTEST = 1e-16
-"""Added to measured densities, so that none at all has a logarithm. [m2/Hz]"""
-
-WIDE = 0.6
-"""Steps of more standard deviations of the movement are wide; narrower ones do no harm as noise
-(docs/design/sensor.md). [-]"""
 
 HIGHEST = 1.5
 """Runs are low-passed here on being resampled to 5 Hz, and so is what is sampled. [Hz]"""
@@ -56,20 +43,9 @@ class SensorModel(Record, frozen=True):
     rounding : float
         Step that values come in; 0 where none was found. [m]
     driver_variance, sensor_variance : float
-        Of the measured rows, whose sum is the measured variance; where values come in wide steps, which hang on the
-        driver, the latter is the rows' mean square error. [m2]
+        Of the measured rows, whose sum is the measured variance. [m2]
     driver_share : tuple of float
         Share of the driver: 95 % interval. [-]
-
-    frequencies, densities : tuple of float
-        Density of the error as it was measured in runs, see `texture`; empty: as the parts above have it, as it is
-        beside slope jumps. [Hz], [m2/Hz]
-    level_variance, level_duration : float
-        Variance of the log of the density over time [-], and how long a level lasts [s]; in files `wanders`, `lasts`.
-    slope_jumps : SlopeJumps or None
-        Of tracks that were smoothed piece by piece; in files `kinks`.
-    by_zone : ByZone or None
-        Level of the noise in each zone, where the recording has zones and no slope jumps, which have their own.
     second_view : float
         Power of the error over that of half the lane width, beside the white part, where it was estimated so
         (`second_view`); else 0. [-]
@@ -83,23 +59,13 @@ class SensorModel(Record, frozen=True):
     driver_variance: float = 0.0
     sensor_variance: float = 0.0
     driver_share: tuple[float, float] = (0.0, 1.0)
-    frequencies: tuple[float, ...] = ()
-    densities: tuple[float, ...] = ()
-    level_variance: float = msgspec.field(default=0.0, name="wanders")
-    level_duration: float = msgspec.field(default=60.0, name="lasts")
-    slope_jumps: SlopeJumps | None = msgspec.field(default=None, name="kinks")
     second_view: float = 0.0
-    by_zone: ByZone | None = None
 
     def __post_init__(self) -> None:
         """Check."""
         levels = (self.white, self.coloured, self.rounding, self.second_view)
         parts = (*levels, self.driver_variance, self.sensor_variance)
-        numbers = (*parts, self.level_variance, *self.frequencies, *self.densities)
-        if not all(map(isfinite, numbers)) or min(numbers) < 0 or self.order < 0 or not self.corner > 0:
-            raise DriverProfileError(f"sensor: {self}")
-        rising = all(low < high for low, high in pairwise(self.frequencies))
-        if len(self.frequencies) != len(self.densities) or not rising or not 0.0 < self.level_duration < inf:
+        if not all(map(isfinite, parts)) or min(parts) < 0 or self.order < 0 or not self.corner > 0:
             raise DriverProfileError(f"sensor: {self}")
 
     @property
@@ -113,10 +79,6 @@ class SensorModel(Record, frozen=True):
         values: dict[str, Any] = plain(self)
         if not self.second_view:
             del values["second_view"]  # as files had it before there were second views
-        if self.by_zone is None:
-            del values["by_zone"]
-        if self.slope_jumps is not None and self.slope_jumps.by_zone is None:
-            del values["kinks"]["by_zone"]
         return values
 
     def in_words(self) -> str:
@@ -128,63 +90,27 @@ class SensorModel(Record, frozen=True):
         )
         if self.second_view:
             words = f"{words}, estimated by the lane width, which the same camera measured"
-        if self.slope_jumps is not None:
-            fastest = CROSSING[1] * self.slope_jumps.highest
-            words = (
-                f"{words}; tracks are made of pieces of {self.slope_jumps.every:g} s, and jumps of the slope between "
-                f"them are all that they show above {fastest:.2g} Hz"
-            )
-        zones = self.by_zone if self.slope_jumps is None else self.slope_jumps.by_zone
-        return words if zones is None else f"{words}; {zones.in_words()}"
+        return words
 
     def density(self, frequency: FloatArray) -> FloatArray:
-        """One-sided power density of noise and slope jumps, without rounding. [m2/Hz] Shape as `frequency` [Hz]."""
-        noise = self.noise_density(frequency)
-        return noise if self.slope_jumps is None else noise + self.slope_jumps.density(frequency)
-
-    def noise_density(self, frequency: FloatArray) -> FloatArray:
-        """The same without slope jumps. [m2/Hz] Shape as `frequency` [Hz]."""
+        """One-sided power density without rounding. [m2/Hz] Shape as `frequency` [Hz]."""
         total: FloatArray = np.full(np.shape(frequency), self.white)
         if self.order:
             total = total + self.coloured * Colour(self.order, self.corner).shape(frequency)
         return total
 
-    def error_on(
-        self, path: FloatArray, step: float, rng: np.random.Generator, zone: FloatArray | None = None
-    ) -> FloatArray:
-        """What the sensor adds to a sampled path, shape (n,) [m]; `zone` has the codes of its zones, if known."""
-        noise = self.sample(len(path), step, rng, zone)
-        return (
-            noise
-            if self.slope_jumps is None or not len(path)
-            else noise + self.slope_jumps.sample(path, step, rng, zone)
-        )
+    def sample(self, n: int, step: float, rng: np.random.Generator) -> FloatArray:
+        """Noise as it is in measured runs at this step, shape (n,). [m]
 
-    def sample(self, n: int, step: float, rng: np.random.Generator, zone: FloatArray | None = None) -> FloatArray:
-        """Noise as it is in measured runs at this step, without slope jumps, shape (n,). [m]
-
-        Without a measured density, what rounding adds is left out: runs are low-passed, and lie on its lattice no more.
+        What rounding adds is left out: runs are low-passed, and lie on its lattice no more.
         """
         if not n:
             return np.empty(0)
         padded = n + round(30.0 / step)  # a low-passed part must not come round to its own beginning
         frequency: FloatArray = np.asarray(np.fft.rfftfreq(padded, step), dtype=np.float64)
         gain = np.sqrt(self.in_runs(frequency) / (2.0 * step))
-        error = scale_frequencies(rng.normal(size=padded), gain)[:n]
-        known = self.by_zone if zone is not None else None
-        level = self if known is None else known
-        if level.level_variance:
-            error = error * amplitude_factor(level.level_variance, level.level_duration, n, step, rng)
-        if known is not None and zone is not None:
-            error = error * np.exp(0.5 * smooth_level(known.at(zone), step))
-        return error
+        return scale_frequencies(rng.normal(size=padded), gain)[:n]
 
     def in_runs(self, frequency: FloatArray) -> FloatArray:
         """One-sided power density of the noise in runs at 5 Hz. [m2/Hz] Shape as `frequency` [Hz]."""
-        if self.slope_jumps is not None:
-            return np.asarray(self.noise_density(frequency) * passed(frequency) ** 2)
-        if not self.frequencies:
-            return np.asarray(self.noise_density(frequency) * (frequency <= HIGHEST))
-        table = np.log(np.array(self.densities) + FAINTEST)
-        log = np.interp(np.log(np.maximum(frequency, 1e-9)), np.log(self.frequencies), table)
-        return np.asarray(np.exp(log))
+        return np.asarray(self.density(frequency) * (frequency <= HIGHEST))

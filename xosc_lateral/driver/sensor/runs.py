@@ -8,7 +8,6 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.driver.sensor.by_zone import ZonedRows
 from xosc_lateral.driver.sensor.model import SensorModel
 from xosc_lateral.driver.sensor.periodogram import WINDOWS
 from xosc_lateral.driver.sensor.separation import separate
@@ -49,7 +48,6 @@ def driver_runs(
         sensor_noise=sensor_noise,
         half_widths=half_widths_of(runs, drives),
         one_camera=all(drive.mended is not None for drive in drives),
-        zoned=zones_of(runs, drives),
     )
     return [replace(run, offset=found.driver_part(run.offset, STEP)) for run in runs], found.sensor
 
@@ -78,15 +76,6 @@ def half_widths_of(runs: Sequence[Run], drives: Sequence[Drive]) -> list[FloatAr
         resample(drive.time[rows], np.asarray(drive.half_width)[rows], run.time)
         for run, (drive, rows) in zip(runs, cut, strict=True)
     ]
-
-
-def zones_of(runs: Sequence[Run], drives: Sequence[Drive]) -> ZonedRows | None:
-    """Zones of the runs, and of their rows as recorded; None where not all drives are there, or any knows none."""
-    cut, zones = _recorded(runs, drives), [run.zone for run in runs]
-    if cut is None or any(zone is None for zone in zones):
-        return None
-    rows = [np.asarray(drive.zone)[those] for drive, those in cut]
-    return ZonedRows(rows, [zone for zone in zones if zone is not None], [run.drive for run in runs])
 
 
 def _recorded(runs: Sequence[Run], drives: Sequence[Drive]) -> list[tuple[Drive, slice]] | None:

@@ -13,30 +13,16 @@ from dataclasses import replace as replaced
 from functools import partial
 
 import numpy as np
-from msgspec.structs import replace
 from numpy.typing import NDArray
 
 from xosc_lateral.digits import all_significant
-from xosc_lateral.driver.sensor.by_zone import ZonedRows
 from xosc_lateral.driver.sensor.explanations import Explanation, explanations
-from xosc_lateral.driver.sensor.hidden_path import HiddenPath
 from xosc_lateral.driver.sensor.likelihood import Colour, Known, Solution, solve
 from xosc_lateral.driver.sensor.model import SensorModel
 from xosc_lateral.driver.sensor.periodogram import Periodogram, periodogram, windows_of
-from xosc_lateral.driver.sensor.quantisation import quantisation_step, rounding_density, uniform_variance
+from xosc_lateral.driver.sensor.quantisation import COARSEST, quantisation_step, rounding_density, uniform_variance
 from xosc_lateral.driver.sensor.second_view import LEVEL_SD, SecondView, second_view
-from xosc_lateral.driver.sensor.slope_jumps import SlopeJumps
-from xosc_lateral.driver.sensor.slope_jumps_fit import find_slope_jumps
-from xosc_lateral.driver.sensor.texture import (
-    FAST,
-    LEAST_SHARE,
-    MANY,
-    level_by_zone,
-    level_variation,
-    measured_density,
-)
 from xosc_lateral.driver.sensor.vehicle_bound import density
-from xosc_lateral.driver.sensor.wide_steps import MOST_NOISE, WideSteps, split_wide_steps
 from xosc_lateral.drives.filters import scale_frequencies
 from xosc_lateral.errors import DriverProfileError
 from xosc_lateral.normal import NORMAL_95
@@ -49,10 +35,13 @@ PLAUSIBLE = 6.0
 BLOCKS = 8
 """Of windows, of which each is left out in turn for the interval. [-]"""
 
-ROUNDING_ROUNDS = 3
-
 LEAST_LEVELS = 3
 """How often two levels are left is one number, and what lies behind them has two, mean and spread. [-]"""
+
+ROUNDING_ROUNDS = 3
+
+MOST_NOISE = 0.9
+"""Share of what is rounded that noise may have: the rest is the driver's. [-]"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,26 +55,18 @@ class Separation:
     sensor : SensorModel
     beside : callable
         Density of what the sensor's numbers don't hold: of rounding, and of errors seen in a second view. [m2/Hz]
-    is_too_coarse : bool
-        Whether values come in steps too coarse for the split to mean anything.
-    hidden : HiddenPath, optional
-        Where values come in wide steps: what could lie behind them.
     """
 
     knots: FloatArray
     sensor: SensorModel
     beside: Callable[[FloatArray], FloatArray]
-    is_too_coarse: bool = False
-    hidden: HiddenPath | None = None
 
     def driver_part(self, offset: FloatArray, step: float) -> FloatArray:
         """The offset with every frequency scaled down to the driver's share of the power, about its own mean.
 
         Keeps the driver's spectrum (Wiener's filter would not: it leaves less than the driver's power), and the path
-        itself wherever the sensor is good. Of values in wide steps: a path that they may hide.
+        itself wherever the sensor is good.
         """
-        if self.hidden is not None:
-            return self.hidden.draw(offset, step)
         n = len(offset)
         if n < 2:
             return offset
@@ -101,7 +82,7 @@ class Separation:
         driver = density(self.knots, frequency)
         share = driver / (driver + self.sensor.density(frequency) + self.beside(frequency))
         share[0] = 1.0
-        return share if self.sensor.slope_jumps is None else share * self.sensor.slope_jumps.left_to_driver(frequency)
+        return share
 
 
 def separate(
@@ -114,7 +95,6 @@ def separate(
     sensor_noise: float | None = None,
     half_widths: Sequence[FloatArray] | None = None,
     one_camera: bool = False,
-    zoned: ZonedRows | None = None,
 ) -> Separation:
     """Separate driver and sensor.
 
@@ -140,8 +120,6 @@ def separate(
     one_camera : bool
         Whether that is known to be the camera that measured the offset; else what the width shows is taken where it is
         plausible.
-    zoned : ZonedRows, optional
-        Where the rows and runs were recorded: what their sensor's level hangs on.
     """
     measured = list(rows) if rows is not None else list(runs)
     variance = _variance(measured, durations)
@@ -155,41 +133,29 @@ def separate(
             f"a sensor error of {sensor_noise:g} m is more than all that was measured: offsets vary by "
             f"{np.sqrt(variance):.2g} m (standard deviation)"
         )
-    two_levels = len(np.unique(np.concatenate(measured))) < LEAST_LEVELS
-    if grain and not two_levels:
-        wide = split_wide_steps(data, windows, measured, grain, per_second, sensor_noise)
-        if wide is not None:
-            return _textured(_seen_through(wide, per_second), runs, frequency, windows, step, zoned)
-    pieces = None if rows is None or rate is None else find_slope_jumps(rows, rate, runs, zoned)
-    slope_jumps, noise = pieces or (None, 0.0)
-    about_pieces = slope_jumps is not None and known is None
-    if about_pieces:  # where nothing slower than a piece is left
-        known = Known(noise, per_second)
+    too_coarse = grain > COARSEST * np.sqrt(variance) or len(np.unique(np.concatenate(measured))) < LEAST_LEVELS
     rounding: Callable[[FloatArray], FloatArray] = _no_density
-    if grain and not two_levels:
+    if grain and not too_coarse:
         rounding = _rounding(data, grain, variance, per_second)
         known = known and replaced(known, rounding=uniform_variance(grain))
     base = rounding(data.frequency)
-    if slope_jumps is not None:
-        base = base + slope_jumps.density(data.frequency)
     view = second_view(half_widths, step) if half_widths else None
-    found = explanations(data, base, known, view, only_view=one_camera, only_white=about_pieces)
+    found = explanations(data, base, known, view, only_view=one_camera)
     least = _taken(found)
     best, colour = least.solution, least.colour
     beside = _with_view(rounding, best, colour)
-    result = Separation(best.knots, replace(_sensor(best, colour, grain), slope_jumps=slope_jumps), beside)
+    result = Separation(best.knots, _sensor(best, colour, grain), beside)
     driver = float(np.concatenate([result.driver_part(run, step) for run in runs]).var())
-    error = _in_band(best, colour, data, slope_jumps)
+    error = _in_band(best, colour, data)
     share = min(driver, max(variance - error, 0.0)) / variance if variance > 0.0 else 1.0
     plausible = [(one.solution, one.colour) for one in found if one.criterion < least.criterion + PLAUSIBLE]
     if colour.view is not None:
         plausible += [(solve(data, one, base, known, best), one) for one in _other_views(colour, colour.view)]
     interval = (
-        (0.0, 1.0) if two_levels else _interval(frequency, windows, best, colour, base, known, plausible, share, data)
+        (0.0, 1.0) if too_coarse else _interval(frequency, windows, best, colour, base, known, plausible, share, data)
     )
     sensor = _sensor(best, colour, grain, share * variance, (1.0 - share) * variance, interval)
-    sensor = replace(sensor, slope_jumps=slope_jumps)
-    return _textured(Separation(best.knots, sensor, beside, two_levels), runs, frequency, windows, step, zoned)
+    return Separation(best.knots, sensor, beside)
 
 
 def _taken(found: Sequence[Explanation]) -> Explanation:
@@ -222,40 +188,6 @@ def _other_views(colour: Colour, view: SecondView) -> list[Colour]:
     shift = NORMAL_95 * LEVEL_SD
     others = [replaced(view, slowest=0.0), view.scaled(np.exp(-shift)), view.scaled(np.exp(shift))]
     return [replaced(colour, view=other) for other in others]
-
-
-def _seen_through(wide: WideSteps, rate: float) -> Separation:
-    """What was estimated through steps, as a split."""
-    numbers = (2.0 * wide.noise / rate, wide.path.grain, *wide.variances(), *wide.interval())
-    white, grain, driver, rest, low, high = rounded(numbers)
-    sensor = SensorModel(white, rounding=grain, driver_variance=driver, sensor_variance=rest, driver_share=(low, high))
-    return Separation(wide.knots, sensor, wide.rounding, (low, high) == (0.0, 1.0), wide.path)
-
-
-def _textured(
-    split: Separation,
-    runs: Sequence[FloatArray],
-    frequency: FloatArray,
-    windows: FloatArray,
-    step: float,
-    zoned: ZonedRows | None,
-) -> Separation:
-    """With the error's density as measured, and how its level varies where the sensor outweighs the driver."""
-    if (
-        split.sensor.slope_jumps is not None
-    ):  # what varies in level is theirs, and what they leave is as the parts have it
-        return split
-    share = 1.0 - split.driver_share_of(frequency)
-    frequencies, densities = measured_density(frequency, windows, share)
-    sensor = replace(split.sensor, frequencies=rounded(frequencies), densities=rounded(densities))
-    fast = frequency > FAST
-    if (windows.mean(axis=0) * share)[fast].sum() > LEAST_SHARE * windows.mean(axis=0)[fast].sum():
-        steady = sensor.sample(MANY, step, np.random.default_rng(0))
-        variance, duration = level_variation(runs, steady, step)
-        sensor = replace(sensor, level_variance=rounded((variance,))[0], level_duration=rounded((duration,))[0])
-        if zoned is not None:
-            sensor = replace(sensor, by_zone=level_by_zone(runs, steady, step, zoned))
-    return replaced(split, sensor=sensor)
 
 
 def _sensor(
@@ -308,7 +240,7 @@ def _chance(found: Solution, colour: Colour, data: Periodogram) -> float:
     return float(np.sqrt((2.0 * power**2 / data.weight).sum()))
 
 
-def _in_band(found: Solution, colour: Colour, data: Periodogram, slope_jumps: SlopeJumps | None = None) -> float:
+def _in_band(found: Solution, colour: Colour, data: Periodogram) -> float:
     """Sensor's power among what was seen. [m2]"""
     from scipy.integrate import trapezoid
 
@@ -316,8 +248,6 @@ def _in_band(found: Solution, colour: Colour, data: Periodogram, slope_jumps: Sl
     total = np.full(len(frequency), np.exp(found.white))
     if colour.is_there:
         total += found.coloured(colour, frequency)
-    if slope_jumps is not None:
-        total += slope_jumps.density(frequency)
     return float(trapezoid(total, frequency))
 
 

@@ -9,7 +9,8 @@ What a reader of the table has to know:
 - `offset` is counted from the middle of the *traffic* of that lane at that place, not from the middle between painted
   markings, which nobody measured. The mean offset of a lane is therefore about zero by construction.
 - The lane width is the distance between the traffic's centres of the two lanes of that direction.
-- The provider smoothed the tracks: nothing is left above about 0.3 Hz.
+- The provider smoothed the tracks by cubics of one second, whose slopes jump where two of them meet. Above 0.5 Hz, half
+  a jump a period, tracks show hardly anything else: what is faster is taken out here, once, before lanes are found.
 - Between two cameras the provider interpolated. Bridges up to `max_gap` are kept (0.3 Hz content hardly changes in
   that time), longer ones are cut.
 """
@@ -26,7 +27,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.drives.cleaning import RUN
-from xosc_lateral.drives.zones import ZONE, zones_along
+from xosc_lateral.drives.filters import filtered, low_pass_between
 from xosc_lateral.errors import FormatError, NotEnoughDataError
 from xosc_lateral.formats.importers.cuts import (
     DEFAULT_CUTS,
@@ -56,6 +57,10 @@ COLUMNS = (
     *("acceleration_signed", "dimension_length", "dimension_height", "interpolated"),
     *(f"classifications_{name}" for name in CLASSES),
 )
+PIECES = (0.5, 0.6)
+"""Frequencies below which movement across the road is kept, and above which none is: half a jump a period. [Hz]"""
+ATTENUATION = 40.0
+"""Of what is faster; a third of a millimetre of its 3 cm is left. [dB]"""
 WIDTH = "dimension_width"
 """Read where it is there: nothing of an import needs it."""
 LICENCE = (
@@ -81,10 +86,9 @@ def import_dlr_ht(source: Path, settings: CutSettings = DEFAULT_CUTS, *, keep_cu
     placed, lanes, gap = found.placed, found.lanes, found.gap
     s = np.where(forward, s_road, reference.length - s_road)
     table = _context(tracks, placed, s, forward)
-    table[ZONE] = zones_along(_strands(forward, placed.lane), s_road)
     table["curvature"] = reference.curvature(s_road) * np.where(forward, 1.0, -1.0)
     # 0.1 mm, 0.1 per km: below any measurement, above what linear algebra does differently from machine to machine.
-    table = table.round({"curvature": 7, **dict.fromkeys(table.columns.drop(["curvature", "drive", "time", ZONE]), 4)})
+    table = table.round({"curvature": 7, **dict.fromkeys(table.columns.drop(["curvature", "drive", "time"]), 4)})
     reasons = {"no lane": placed.lane < 0, "lane change": placed.changing, "gap": gap}
     vehicle, frame = tracks["vehicle"].to_numpy(), np.round(tracks["time"].to_numpy() / STEP).astype(np.int64)
     table["state"] = name_states(reasons, placed.lane, vehicle, frame, STEP, settings)
@@ -215,6 +219,7 @@ def find_lanes(tracks: pd.DataFrame, settings: CutSettings = DEFAULT_CUTS) -> Ca
     """Lanes out of nothing but the tracks; "northbound" ones along the reference line, "southbound" ones against it."""
     forward = travels_north(tracks)
     reference, s_road, d_road = fit_reference_line(tracks[["center_easting", "center_northing"]].to_numpy(), forward)
+    d_road = _slow(d_road, tracks)
     # From here on every carriageway has its own s and d: s grows with travel, d is positive to the left of it.
     s = np.where(forward, s_road, reference.length - s_road)
     d = np.where(forward, d_road, -d_road)
@@ -227,6 +232,14 @@ def find_lanes(tracks: pd.DataFrame, settings: CutSettings = DEFAULT_CUTS) -> Ca
         part, lanes[name] = _place_in_lanes(s[rows], d[rows], height[rows], vehicle[rows], gap[rows], settings)
         placed.put(rows, part)
     return Carriageways(reference, forward, s_road, gap, placed, lanes)
+
+
+def _slow(d: FloatArray, tracks: pd.DataFrame) -> FloatArray:
+    """Lateral positions, shape (n,) [m], without what is faster than `PIECES`; nothing is filtered across a gap."""
+    kernel = low_pass_between(*PIECES, STEP, ATTENUATION)
+    vehicle, time = tracks["vehicle"].to_numpy(), tracks["time"].to_numpy()
+    ends = np.flatnonzero((np.diff(vehicle) != 0) | (np.diff(time) > 1.5 * STEP)) + 1
+    return np.concatenate([filtered(part, kernel) for part in np.split(d, ends)])
 
 
 def _place_in_lanes(
@@ -330,14 +343,6 @@ def _context(tracks: pd.DataFrame, placed: _Placed, s: FloatArray, forward: NDAr
             "is_truck": (kind == "truck").astype(np.float64),
         }
     )
-
-
-def _strands(forward: NDArray[np.bool_], lane: IntArray) -> NDArray[np.object_]:
-    """Carriageway and lane of each row, empty in no lane."""
-    names = np.array(
-        [f"{name} lane {index}" for name in ("southbound", "northbound") for index in range(LANES)], dtype=np.object_
-    )
-    return np.where(lane >= 0, names[forward * LANES + np.clip(lane, 0, LANES - 1)], "")
 
 
 def vehicle_classes(tracks: pd.DataFrame) -> NDArray[np.str_]:

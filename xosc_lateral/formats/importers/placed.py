@@ -12,7 +12,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.drives.cleaning import RUN
-from xosc_lateral.drives.zones import ZONE
 from xosc_lateral.errors import NotEnoughDataError
 from xosc_lateral.formats.importers.cuts import CutSettings, lane_changes, name_states, number_runs
 from xosc_lateral.formats.importers.lane_graph import LaneGraph
@@ -59,8 +58,6 @@ class PlacedTracks:
         Class of the vehicle in lower case; empty where not known.
     road : mapping of str to array, shape (n,)
         What the road is like there: curvature, lane_index ...
-    zone : array of str, shape (n,), optional
-        Names of the stretches of lane that they were recorded in; empty in no lane.
     """
 
     names: Sequence[str]
@@ -75,7 +72,6 @@ class PlacedTracks:
     length: FloatArray
     kind: NDArray[np.str_]
     road: Mapping[str, FloatArray] = field(default_factory=dict)
-    zone: NDArray[np.object_] | None = None
 
 
 def import_placed(
@@ -183,7 +179,6 @@ def placed_table(tracks: PlacedTracks, graph: LaneGraph, settings: CutSettings) 
             **asdict(near),
             "vehicle_class": tracks.kind,
             "is_truck": is_truck.astype(np.float64),
-            **({} if tracks.zone is None else {ZONE: tracks.zone}),
             RUN: number_runs(state, lane, tracks.vehicle, instant),
             "state": state,
         }

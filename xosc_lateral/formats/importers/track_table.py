@@ -68,12 +68,11 @@ class Tracks:
         offset: FloatArray,
         lane_width: FloatArray,
         road: Mapping[str, FloatArray],
-        zone: NDArray[np.object_] | None = None,
     ) -> PlacedTracks:
         """These tracks with where each row lies; see `PlacedTracks`."""
         who = self.names, self.vehicle, self.time, self.step
         middle = along if self.rear is None else along + self.rear  # gaps count from there
-        return PlacedTracks(*who, piece, middle, offset, lane_width, self.speed, self.length, self.kind, road, zone)
+        return PlacedTracks(*who, piece, middle, offset, lane_width, self.speed, self.length, self.kind, road)
 
 
 def read_tracks(path: Path, columns: Sequence[str] = (), mapping: MappingLike | None = None) -> Tracks:

@@ -12,7 +12,6 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.drives.zones import zones_along
 from xosc_lateral.errors import FormatError
 from xosc_lateral.formats.importers.cuts import DEFAULT_CUTS, CutSettings
 from xosc_lateral.formats.importers.lane_graph import LaneGraph
@@ -122,10 +121,8 @@ def place(tracks: Tracks, network: RoadNetwork, pieces: dict[Piece, int]) -> Pla
     for name, known in values.items():
         columns[name][there] = known
     width = columns.pop("lane_width")
-    strand = np.full(len(road), "", dtype=np.object_)
-    strand[there] = [f"road {network.roads[index].id} lane {name}" for index, name in zip(*where[:2], strict=True)]
     offset = np.where(piece >= 0, found.offset, np.nan)
-    return tracks.placed(piece, along, offset, width, columns, zones_along(strand, s))
+    return tracks.placed(piece, along, offset, width, columns)
 
 
 def lane_graph(network: RoadNetwork) -> tuple[dict[Piece, int], LaneGraph]:

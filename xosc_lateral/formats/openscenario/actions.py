@@ -7,7 +7,7 @@ from collections.abc import Callable
 from xosc_lateral.formats.openscenario.context import Context
 from xosc_lateral.formats.openscenario.declarations import parameter_name
 from xosc_lateral.formats.openscenario.element import XmlElement
-from xosc_lateral.formats.openscenario.environment import read_environment
+from xosc_lateral.formats.openscenario.entities import read_environment
 from xosc_lateral.formats.openscenario.positions import read_position_in
 from xosc_lateral.formats.openscenario.private_actions import PRIVATE_ACTIONS
 from xosc_lateral.scenario.global_actions import (

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from xosc_lateral.formats.openscenario.context import Context
 from xosc_lateral.formats.openscenario.declarations import parameter_name
 from xosc_lateral.formats.openscenario.element import XmlElement
-from xosc_lateral.formats.openscenario.environment import read_date_time
+from xosc_lateral.formats.openscenario.entities import read_date_time
 from xosc_lateral.formats.openscenario.positions import read_position_in
 from xosc_lateral.scenario.conditions import (
     AccelerationCondition,

@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.formats.osi.extra import osi
+from xosc_lateral.road.geometry import simplify
 from xosc_lateral.road.lanes import DRIVING, Lane, LaneSection
 from xosc_lateral.road.network import RoadNetwork
 from xosc_lateral.road.positions import RoadMark
-from xosc_lateral.road.simplify import simplify
 
 FloatArray = NDArray[np.float64]
 

@@ -21,7 +21,7 @@ FloatArray = NDArray[np.float64]
 
 
 class Stage(IntEnum):
-    """When a term is looked for. The mean comes first: a mean that is not known looks like a spread.
+    """When a term is tested. The mean comes first: a mean that is not known looks like a spread.
 
     Regimes come after the spread, because they explain whatever comes in clusters, and before what a regime's loud
     stretches might be taken for.
@@ -32,7 +32,7 @@ class Stage(IntEnum):
     MEAN_AGAIN = 3
     SPREAD = 4
     REGIMES = 5
-    MOVEMENT = 6
+    FINE_NOISE = 6
     BETWEEN_DRIVES = 7
 
 
@@ -74,18 +74,17 @@ class Removal:
     ----------
     location : array
         [m]
-    spread, fine, rate : array
+    spread, fine : array
         Natural logarithm of a factor.
     """
 
     location: FloatArray
     spread: FloatArray = field(init=False)
     fine: FloatArray = field(init=False)
-    rate: FloatArray = field(init=False)
 
     def __post_init__(self) -> None:
         """Nothing but the location so far."""
-        self.spread, self.fine, self.rate = (np.zeros(len(self.location)) for _ in range(3))
+        self.spread, self.fine = np.zeros(len(self.location)), np.zeros(len(self.location))
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,20 +96,16 @@ class Outcome:
     term : Term or None
         To be added, or None: nothing that could be.
     columns : tuple of str
-        What was looked at.
     p_value : float
         Family-wise over everything that the test tried.
     after : Fitted, optional
         Fit with the term, where the test has made it.
-    together : tuple of Term
-        Found with it, as one finding.
     """
 
     term: Term | None
     columns: tuple[str, ...]
     p_value: float
     after: Fitted | None = None
-    together: tuple[Term, ...] = ()
 
 
 class Term(ABC):
@@ -121,13 +116,13 @@ class Term(ABC):
     kind: ClassVar[str]
     """As in the report's schema."""
     stages: ClassVar[tuple[Stage, ...]] = ()
-    """At which it is looked for; none: with another term, which it competes with."""
+    """At which it is tested; none: with another term, which it competes with."""
     place: ClassVar[int] = 0
     """Among those of a stage: smaller ones are asked first, and first where two are equally sure; then by name. [-]"""
     weight: ClassVar[float]
     """Of its component in the error budget; one for each kind of hidden effect. [-]"""
     least_drives: ClassVar[int] = 1
-    """In a table that it is looked for in."""
+    """In a table in which it is tested."""
     seen_held_out: ClassVar[bool] = True
     """Whether the mean or the innovations' scale follow terms of this class on held-out rows: not the latent path of a
     cycle, nor what changes the slow movement alone."""
@@ -174,7 +169,7 @@ class Term(ABC):
     @classmethod
     @abstractmethod
     def test(cls, search: Search, fitted: Fitted) -> Outcome | None:
-        """Look for one more term of this kind beside those fitted; None: there is nothing to look at."""
+        """Test for one more term of this kind beside those fitted; None: there is no candidate."""
 
     def probability_beside(self, search: Search, fitted: Fitted) -> float:
         """p-value of this very finding beside the terms fitted, which it is not one of."""

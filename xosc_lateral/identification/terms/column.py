@@ -1,9 +1,9 @@
-"""What all terms of a context column share: one search for mean, spread, slow spread, fine noise and restoring."""
+"""What all terms of a context column share."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, ClassVar, Self
+from typing import ClassVar, Self
 
 import numpy as np
 from msgspec import structs
@@ -14,9 +14,6 @@ from xosc_lateral.identification.refinement import Alternatives
 from xosc_lateral.identification.regression import Coarse, Fitted
 from xosc_lateral.identification.terms.base import Description, Removal, Term
 from xosc_lateral.identification.timing import span
-
-if TYPE_CHECKING:
-    pass
 
 FloatArray = NDArray[np.float64]
 
@@ -41,8 +38,6 @@ class ColumnTerm(Term):
     """What it acts on, in words."""
     group: ClassVar[str] = "spread"
     """Mean or spread: which summary statistics show it."""
-    single: ClassVar[bool] = False
-    """Only effects with one coefficient will do."""
     effect: ColumnEffect
     alike: Alternatives = ()
 
@@ -58,18 +53,10 @@ class ColumnTerm(Term):
 
     def remove(self, fitted: Fitted, effects: tuple[Effect, ...], removal: Removal) -> None:
         """Evaluate the sized effects."""
-        coarse = fitted.coarse
         for effect in effects:
             assert isinstance(effect, ColumnEffect)
-            strength = coarse.strength(effect)
-            if effect.acts is Acts.LOCATION:
-                removal.location += strength
-            elif effect.acts is Acts.SPREAD:
-                removal.spread += strength
-            elif effect.acts is Acts.FINE:
-                removal.fine += strength
-            else:
-                removal.rate += strength
+            part = {Acts.LOCATION: removal.location, Acts.SPREAD: removal.spread, Acts.FINE: removal.fine}[effect.acts]
+            part += fitted.coarse.strength(effect)
 
     def describe(self, fitted: Fitted, effects: tuple[Effect, ...], key: str) -> Description:
         """Change between the 5 % and 95 % quantile of what drives it."""
@@ -111,7 +98,7 @@ class ColumnTerm(Term):
         return np.asarray(response - response[coarse.valid].mean(axis=0))
 
     def sized(self, coarse: Coarse, acts: Acts, sizes: FloatArray, errors: FloatArray) -> ColumnEffect:
-        """The effect with its sizes, shrunk by how sure they are, bounded, neutral at its mean."""
+        """The effect with its sizes, shrunk by how sure they are, bounded, zero at its mean."""
         raw = coarse.fine_response(self.effect)[coarse.timeline.valid]
         usual, (low, high) = raw.mean(axis=0), self.ends(coarse)
         within = np.clip(raw, usual + low, usual + high)
@@ -136,19 +123,7 @@ def of_kind(fitted: Fitted, kind: type[ColumnTerm]) -> list[ColumnTerm]:
     return [term for term in fitted.terms if isinstance(term, kind)]
 
 
-def responses(fitted: Fitted, kind: type[ColumnTerm]) -> FloatArray:
-    """Responses of all terms of one kind, side by side, shape (n, k)."""
-    own = [fitted.coarse.response(term.effect, keep=True) for term in of_kind(fitted, kind)]
-    return np.concatenate(own, axis=1) if own else np.zeros((len(fitted.coarse), 0))
-
-
 def columns_on_size(fitted: Fitted) -> frozenset[str]:
-    """Columns that act on the movement's size in any way: spread, slow spread, fine noise, restoring."""
-    terms = [term for term in fitted.terms if isinstance(term, ColumnTerm) and term.group == "spread"]
-    return frozenset(name for term in terms for name in term.columns)
-
-
-def columns_acting(fitted: Fitted) -> frozenset[str]:
-    """Columns of all terms within drives: what a shape leaves of itself looks like noise and restoring."""
-    terms = [term for term in fitted.terms if isinstance(term, ColumnTerm) and term.component != "between"]
+    """Columns that act on the movement's size."""
+    terms = [term for term in fitted.terms if isinstance(term, ColumnTerm) and term.acts is Acts.SPREAD]
     return frozenset(name for term in terms for name in term.columns)

@@ -11,49 +11,13 @@ from numpy.typing import NDArray
 
 from xosc_lateral.driver.effects import Acts, Effect
 from xosc_lateral.identification.column_search import SearchedTerm
-from xosc_lateral.identification.innovations import whitener_as_seen
-from xosc_lateral.identification.problem import Problem
-from xosc_lateral.identification.regression import Coarse, Fitted, ModelTerm
-from xosc_lateral.identification.significance import MANY_DRIVES
+from xosc_lateral.identification.refinement import Problem
+from xosc_lateral.identification.regression import Coarse, Fitted
 from xosc_lateral.identification.terms.base import Stage, Term
 from xosc_lateral.identification.timeline import coarse_mean
 from xosc_lateral.identification.timing import widening
 
 FloatArray = NDArray[np.float64]
-
-LEVEL = 0.01
-"""Probability of taking noise for drivers that differ; drivers that are alike are the simpler profile. [-]"""
-
-
-def slope_deviation(fitted: Fitted, term: ModelTerm) -> float:
-    """Standard deviation between drives of the only coefficient of a term of the mean; 0: none is seen. [m per unit]"""
-    part = fitted.mean_part(term)
-    coarse = fitted.coarse
-    if part.stop - part.start != 1 or coarse.drives < MANY_DRIVES:
-        return 0.0
-    # independent rows, which a floor does not leave: what they have in common would look like drivers that differ
-    whitener = whitener_as_seen(fitted.movement, coarse.valid, coarse.drive, fitted.scale)
-    column = whitener.rows(fitted.columns[:, part])[:, 0]
-    rows = whitener.rows(fitted.movement * fitted.scale)
-    rows = rows / max(float(np.sqrt(np.mean(rows[coarse.valid] ** 2))), 1e-300)
-    power = np.asarray(np.bincount(coarse.drive, column**2, minlength=coarse.drives), dtype=np.float64)
-    told = power > 1e-3 * float(power.mean())
-    if told.sum() < MANY_DRIVES:
-        return 0.0
-    off = np.bincount(coarse.drive, column * rows, minlength=coarse.drives)[told] / power[told]
-    return _beyond_chance(power[told], off)
-
-
-def _beyond_chance(weight: FloatArray, off: FloatArray) -> float:
-    """Standard deviation between drives of slopes, shape (k,), known with precisions `weight`; 0: within chance."""
-    from scipy.stats import chi2
-
-    off = off - float(weight @ off) / float(weight.sum())
-    scatter, freedom = float(weight @ off**2), len(off) - 1
-    if chi2.sf(scatter, freedom) > LEVEL:
-        return 0.0
-    spread = (scatter - freedom) / (weight.sum() - float(weight @ weight) / weight.sum())
-    return float(np.sqrt(max(spread, 0.0)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,6 +60,4 @@ class MeanTerm(SearchedTerm):
         part = fitted.mean_part(self)
         errors = np.sqrt(np.maximum(np.diag(fitted.covariance)[part], 0.0))
         effect = self.sized(fitted.coarse, Acts.LOCATION, fitted.sizes[part], errors)
-        effect = structs.replace(effect, errors=tuple(widening(fitted, effect, part) * errors))
-        deviation = slope_deviation(fitted, self)
-        return (structs.replace(effect, between_drivers=(deviation,)) if deviation else effect,)
+        return (structs.replace(effect, errors=tuple(widening(fitted, effect, part) * errors)),)

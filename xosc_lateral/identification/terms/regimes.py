@@ -22,10 +22,9 @@ from numpy.typing import NDArray
 
 from xosc_lateral.driver.effects import Effect, Regimes
 from xosc_lateral.identification.dictionary import in_another_order
-from xosc_lateral.identification.innovations import squared_innovations
 from xosc_lateral.identification.regression import Coarse, Fitted
 from xosc_lateral.identification.significance import HEAVY_TAIL_SHARE, LoopSeed, upper_tail
-from xosc_lateral.identification.squares import SLOW_S, fine_squares, log_sizes, slow_squares
+from xosc_lateral.identification.squares import SLOW_S, fine_squares, log_sizes, quick_squares, slow_squares
 from xosc_lateral.identification.terms.base import Description, Outcome, Removal, Stage, Term
 from xosc_lateral.identification.terms.spread import known_log_scale, what_a_column_may_do, what_columns_do
 
@@ -133,20 +132,17 @@ def _fit(
 
 
 MEMORIES_S = (6.0, 15.0, 40.0)
-"""Lengths of regimes that are looked for. [s]"""
+"""Lengths of regimes that are tested. [s]"""
 
 CLUSTER_S = 15
 """Loudness that persists for up to this is how people steer, by a correction now and then and what it takes to settle,
-and no regime. Sensitivity: docs/design/identification.md. [s]"""
+and no regime. [s]"""
 
 SHORTEST_S = 12
 """Lags are compared from here on. [s]"""
 
-DRAWS = (400, 3600)
-"""Orders of the blocks that are the null; the second lot where the first leaves it open."""
-
-UNSURE = 0.05
-"""Larger p-values of the first lot are large enough, whatever the second would say. [-]"""
+DRAWS = 2000
+"""Orders of the blocks that are the null."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -166,7 +162,7 @@ class RegimesTerm(Term):
     fit: RegimeFit = field(repr=False)
 
     def known_scale(self, coarse: Coarse) -> FloatArray | None:
-        """As far as the regimes can be told, about its mean, shape (n,). [-]"""
+        """As far as the regimes are known, about its mean, shape (n,). [-]"""
         scale = self.fit.on * np.log(self.fit.factor)
         return np.asarray(scale - scale[coarse.valid].mean())
 
@@ -183,7 +179,7 @@ class RegimesTerm(Term):
             what_a_column_may_do(search, fitted)[0],
         ]
         p_value = probability_of_persistence(
-            squared_innovations(fitted.innovations, coarse.valid),
+            quick_squares(fitted).standardised,
             coarse.valid,
             np.concatenate(known, axis=1),
             search.rng(LoopSeed.REGIMES),
@@ -191,7 +187,7 @@ class RegimesTerm(Term):
         return Outcome(cls(fit_regimes(fitted.innovations, coarse.valid)), (), p_value)
 
     def estimate(self, fitted: Fitted) -> tuple[Effect, ...]:
-        """Regimes are told by the innovations; what they do to the movement itself may be more."""
+        """Regimes are found in the innovations; what they do to the movement itself may be more."""
         on = self.fit.on[:, None]
         # the fit holds the regimes' scale already; squares of its innovations say what is left of them
         fine = float(log_sizes(fine_squares(fitted), on)[0][0])
@@ -236,18 +232,12 @@ def probability_of_persistence(
     if known.shape[1]:
         basis = np.linalg.qr((known - known[valid].mean(axis=0)) * valid[:, None])[0]
         squares = squares - basis @ (basis.T @ squares)
-    inside, drawn = np.flatnonzero(valid), np.zeros(len(squares))
-    observed, null, p_value = float(_scores(squares, valid).max()), np.zeros(0), 1.0
-    for draws in DRAWS:
-        own = np.zeros(draws)
-        for draw in range(draws):
-            drawn[inside] = in_another_order(np.roll(squares[inside], rng.integers(CLUSTER_S)), CLUSTER_S, rng)
-            own[draw] = _scores(drawn, valid).max()
-        null = np.concatenate([null, own])
-        p_value = upper_tail(observed, null, tail_share=HEAVY_TAIL_SHARE, least_excess=0.0)
-        if p_value > UNSURE:
-            break
-    return p_value
+    inside, drawn, null = np.flatnonzero(valid), np.zeros(len(squares)), np.zeros(DRAWS)
+    for draw in range(DRAWS):
+        drawn[inside] = in_another_order(np.roll(squares[inside], rng.integers(CLUSTER_S)), CLUSTER_S, rng)
+        null[draw] = _scores(drawn, valid).max()
+    observed = float(_scores(squares, valid).max())
+    return upper_tail(observed, null, tail_share=HEAVY_TAIL_SHARE, least_excess=0.0)
 
 
 def _products(series: FloatArray, lags: NDArray[np.intp]) -> FloatArray:

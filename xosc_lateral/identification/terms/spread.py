@@ -17,20 +17,16 @@ from numpy.typing import NDArray
 
 from xosc_lateral.driver.effects import Acts, ColumnEffect, Effect
 from xosc_lateral.identification.column_search import SearchedTerm, likely_response
-from xosc_lateral.identification.innovations import squared_innovations
-from xosc_lateral.identification.problem import Problem, of_squares
+from xosc_lateral.identification.refinement import Problem
 from xosc_lateral.identification.regression import Coarse, Fitted
-from xosc_lateral.identification.squares import fine_squares, log_sizes
+from xosc_lateral.identification.squares import SLOW_S, fine_squares, log_sizes, of_squares, quick_squares, slow_squares
 from xosc_lateral.identification.terms.base import Stage, Term
-from xosc_lateral.identification.terms.column import ColumnTerm, columns_on_size
+from xosc_lateral.identification.terms.column import ColumnTerm, columns_on_size, of_kind
+from xosc_lateral.identification.terms.mean import MeanTerm
 
 if TYPE_CHECKING:
     from xosc_lateral.identification.search import Search
 
-
-from xosc_lateral.identification.squares import SLOW_S, slow_squares
-from xosc_lateral.identification.terms.column import columns_acting, responses
-from xosc_lateral.identification.terms.mean import MeanTerm
 
 FloatArray = NDArray[np.float64]
 
@@ -62,10 +58,7 @@ class SpreadTerm(SearchedTerm):
     @classmethod
     def problem(cls, fitted: Fitted) -> Problem:
         """Squared innovations."""
-        coarse = fitted.coarse
-        return of_squares(
-            coarse, squared_innovations(fitted.innovations, coarse.valid), coarse.valid, known_log_scale(fitted)
-        )
+        return of_squares(fitted.coarse, quick_squares(fitted), known_log_scale(fitted))
 
     @classmethod
     def barred(cls, fitted: Fitted) -> frozenset[str]:
@@ -110,15 +103,45 @@ def what_a_column_may_do(search: Search, fitted: Fitted) -> tuple[FloatArray, fl
 
 
 @dataclass(frozen=True, eq=False)
+class SlowSpreadTerm(SpreadTerm):
+    """Log standard deviation of eight-second sums of the innovations by a column: of who lets more pass."""
+
+    component: ClassVar[str] = "slow_spread"
+    place: ClassVar[int] = 2
+    weight: ClassVar[float] = 2.0
+    seen_held_out: ClassVar[bool] = False
+
+    def scale_columns(self, coarse: Coarse) -> FloatArray:
+        """None: the innovations' own scale does not follow it."""
+        return np.zeros((len(coarse), 0))
+
+    def size_columns(self, coarse: Coarse) -> FloatArray:
+        """The bounded response, shape (n, k). [unit of the quantity]"""
+        return self.bounded(coarse)
+
+    @classmethod
+    def problem(cls, fitted: Fitted) -> Problem:
+        """Squares of running sums; an effect on the mean whose size is a little wrong leaves some where it is large."""
+        squares, coarse = slow_squares(fitted), fitted.coarse
+        moved = [np.abs(coarse.response(term.effect, keep=True)) for term in of_kind(fitted, MeanTerm)]
+        known = np.concatenate([known_log_scale(fitted), *moved], axis=1)
+        return of_squares(coarse, squares, known)
+
+    def estimate(self, fitted: Fitted) -> tuple[Effect, ...]:
+        """Neighbouring sums overlap, so errors are wider."""
+        sizes, errors = log_sizes(slow_squares(fitted), self.bounded(fitted.coarse))
+        return (self.sized(fitted.coarse, Acts.SPREAD, sizes, errors * np.sqrt(SLOW_S)),)
+
+
+@dataclass(frozen=True, eq=False)
 class FineNoiseTerm(SearchedTerm):
-    """Log standard deviation of the innovations at 5 Hz by a column."""
+    """Log standard deviation of the innovations at 5 Hz by a column: five times as many squares as by the second."""
 
     component: ClassVar[str] = "fine_noise"
     kind: ClassVar[str] = "scale"
-    stages: ClassVar[tuple[Stage, ...]] = (Stage.MOVEMENT,)
+    stages: ClassVar[tuple[Stage, ...]] = (Stage.FINE_NOISE,)
     weight: ClassVar[float] = 1.0
     seen_held_out: ClassVar[bool] = False
-    single: ClassVar[bool] = True
     acts: ClassVar[Acts] = Acts.FINE
     what: ClassVar[str] = "fine noise"
 
@@ -129,53 +152,19 @@ class FineNoiseTerm(SearchedTerm):
         An effect on the mean is followed with errors: they grow with it where its size is a little wrong, and with its
         rate of change where its timing is.
         """
-        squares = fine_squares(fitted)
-        moved = responses(fitted, MeanTerm)
-        known = [known_log_scale(fitted), responses(fitted, cls), np.abs(moved)]
-        if moved.shape[1]:
-            known.append(np.abs(np.gradient(moved, axis=0)))
-        return of_squares(fitted.coarse, squares.standardised, squares.valid, np.concatenate(known, axis=1))
+        coarse = fitted.coarse
+        own = [coarse.response(term.effect, keep=True) for term in of_kind(fitted, cls)]
+        moved = [coarse.response(term.effect, keep=True) for term in of_kind(fitted, MeanTerm)]
+        errors = [np.abs(one) for shift in moved for one in (shift, np.gradient(shift, axis=0))]
+        known = np.concatenate([known_log_scale(fitted), *own, *errors], axis=1)
+        return of_squares(coarse, fine_squares(fitted), known)
 
     @classmethod
     def barred(cls, fitted: Fitted) -> frozenset[str]:
-        """What acts on anything else already: what its shape leaves of itself looks like noise."""
-        return columns_acting(fitted)
+        """What acts within drives already: what its shape leaves of itself looks like noise."""
+        terms = [term for term in fitted.terms if isinstance(term, ColumnTerm) and term.component != "between"]
+        return frozenset(name for term in terms for name in term.columns)
 
     def estimate(self, fitted: Fitted) -> tuple[Effect, ...]:
         """Log-linear regression of the squares."""
         return (fine_twin(self, fitted),)
-
-
-@dataclass(frozen=True, eq=False)
-class SlowSpreadTerm(SearchedTerm):
-    """Log standard deviation of eight-second sums of the innovations by a column."""
-
-    component: ClassVar[str] = "slow_spread"
-    kind: ClassVar[str] = "scale"
-    stages: ClassVar[tuple[Stage, ...]] = (Stage.SPREAD,)
-    place: ClassVar[int] = 2
-    weight: ClassVar[float] = 2.0
-    seen_held_out: ClassVar[bool] = False
-    acts: ClassVar[Acts] = Acts.SPREAD
-    what: ClassVar[str] = "spread"
-
-    def size_columns(self, coarse: Coarse) -> FloatArray:
-        """The bounded response, although the innovations' own scale does not follow it."""
-        return self.bounded(coarse)
-
-    @classmethod
-    def problem(cls, fitted: Fitted) -> Problem:
-        """Squares of running sums; an effect on the mean whose size is a little wrong leaves some where it is large."""
-        squares = slow_squares(fitted)
-        known = np.concatenate([known_log_scale(fitted), np.abs(responses(fitted, MeanTerm))], axis=1)
-        return of_squares(fitted.coarse, squares.standardised, squares.valid, known)
-
-    @classmethod
-    def barred(cls, fitted: Fitted) -> frozenset[str]:
-        """Columns that act on the movement's size already."""
-        return columns_on_size(fitted)
-
-    def estimate(self, fitted: Fitted) -> tuple[Effect, ...]:
-        """Neighbouring sums overlap, so errors are wider."""
-        sizes, errors = log_sizes(slow_squares(fitted), self.bounded(fitted.coarse))
-        return (self.sized(fitted.coarse, Acts.SPREAD, sizes, errors * np.sqrt(SLOW_S)),)

@@ -18,17 +18,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.driver.effects import Effect, Step, TimeSmooth
-from xosc_lateral.identification.innovations import squared_innovations
 from xosc_lateral.identification.low_frequencies import (
     MEAN_SHORTEST_S,
     ORDERS,
     SAME_S,
     SHORTEST_S,
     SPREAD_ORDERS,
-    STEP_SHORTEST_S,
     clock_range,
-    explained,
-    explained_jointly,
     half_cosines_of,
     low_frequencies,
     mean_probability,
@@ -38,9 +34,9 @@ from xosc_lateral.identification.low_frequencies import (
     step_moments,
     without_known,
 )
-from xosc_lateral.identification.regression import Coarse, Fitted
-from xosc_lateral.identification.significance import LoopSeed, as_one_degree
-from xosc_lateral.identification.squares import SLOW_S, fine_squares, log_sizes, slow_squares
+from xosc_lateral.identification.regression import Coarse, Fitted, fit_model
+from xosc_lateral.identification.significance import LoopSeed
+from xosc_lateral.identification.squares import SLOW_S, fine_squares, log_sizes, quick_squares, slow_squares
 from xosc_lateral.identification.terms.base import Description, Outcome, Removal, Stage, Term, centred
 from xosc_lateral.identification.terms.cycle import latent_path
 from xosc_lateral.identification.terms.spread import what_a_column_may_do, what_columns_do
@@ -53,13 +49,8 @@ FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
 
 
-STEP_COST = 5.0
-"""A step has a free moment. [chi-square]"""
-
-
-STEP_LEVEL = 1e-3
-"""A step is told from a smooth where it explains so improbably much beside it, among as many moments as the mean's
-shortest period is contained in the drive. [-]"""
+STEP_PARAMETERS = 2
+"""Of a step: its height and its moment."""
 
 SURER = 0.01
 """Where it is surer than the best column by this factor, what that column may do is left to time. [-]"""
@@ -88,9 +79,7 @@ class StepTerm(Term):
 
     @classmethod
     def test(cls, search: Search, fitted: Fitted) -> Outcome | None:
-        """Step or smooth, whichever explains more, beyond what an ordinary drift continues to."""
-        from scipy.stats import chi2
-
+        """Step or smooth, whichever is likelier."""
         coarse = fitted.coarse
         if not coarse.lasts or any(isinstance(term, StepTerm | TimeMeanTerm) for term in fitted.terms):
             return None
@@ -98,23 +87,17 @@ class StepTerm(Term):
         moments = step_moments(coarse)
         jumps = whitener.rows((np.arange(len(coarse))[:, None] >= moments).astype(np.float64))
         waves = whitener.rows(half_cosines_of(coarse, max(ORDERS)))
-        slow = [low_frequencies(one, coarse, coarse.valid, MEAN_SHORTEST_S) for one in (rows[:, None], waves, jumps)]
-        smooth = smooth_probabilities(slow[0][:, 0], slow[1], ORDERS)
-        order = min(smooth, key=lambda one: smooth[one])
-        p_value = mean_probability(slow[0][:, 0], slow[1], slow[2], search.rng(LoopSeed.LOW_FREQUENCY))
+        slow, waves, jumps = (
+            low_frequencies(one, coarse, coarse.valid, MEAN_SHORTEST_S) for one in (rows[:, None], waves, jumps)
+        )
+        p_value = mean_probability(slow[:, 0], waves, jumps, search.rng(LoopSeed.LOW_FREQUENCY))
         if not len(moments):
             return Outcome(TimeMeanTerm(), (), p_value)
-        # which of the two it is, quicker movement tells as well, once the step is at its second
-        unit = slow[2] / np.maximum(np.linalg.norm(slow[2], axis=0), 1e-12)
-        at = moment_of(rows, whitener, int(moments[np.argmax(np.abs(unit.T @ slow[0][:, 0]))]))
-        jump = whitener.rows((np.arange(len(coarse)) >= at).astype(np.float64)[:, None])
-        quick = [low_frequencies(one, coarse, coarse.valid, STEP_SHORTEST_S) for one in (rows[:, None], waves, jump)]
-        step = float(explained(quick[0][:, 0], quick[2], len(slow[0]))[0])
-        gain = explained_jointly(quick[0][:, 0], quick[1][:, :order], len(slow[0]))
-        both = explained_jointly(quick[0][:, 0], np.column_stack([quick[1][:, :order], quick[2]]), len(slow[0]))
-        beside = float(chi2.isf(STEP_LEVEL * MEAN_SHORTEST_S / max(int(coarse.valid.sum()), 1), 1))
-        is_step = step - STEP_COST > float(as_one_degree(gain, order)) or both - gain > beside
-        return Outcome(cls(at) if is_step else TimeMeanTerm(), (), p_value)
+        unit = jumps / np.maximum(np.linalg.norm(jumps, axis=0), 1e-12)
+        step = cls(moment_of(rows, whitener, int(moments[np.argmax(np.abs(unit.T @ slow[:, 0]))])))
+        smooth = smooth_probabilities(slow[:, 0], waves, ORDERS)
+        order = min(smooth, key=lambda one: smooth[one])
+        return Outcome(step if _is_step(fitted, step, order) else TimeMeanTerm(), (), p_value)
 
     def probability_beside(self, search: Search, fitted: Fitted) -> float:
         """p-value of the mean by time, whichever of the two it looks like beside the terms fitted."""
@@ -170,7 +153,7 @@ class TimeMeanTerm(Term):
 
     @classmethod
     def test(cls, search: Search, fitted: Fitted) -> Outcome | None:
-        """Nothing of its own: a step is looked for at the same time."""
+        """Nothing of its own: a step is tested at the same time."""
         return None
 
     def probability_beside(self, search: Search, fitted: Fitted) -> float:
@@ -239,19 +222,14 @@ class TimeSpreadTerm(Term):
             return None
         # what a column does to the size of any part of the movement is not time's doing, slow as the column may be
         known = what_columns_do(search, fitted)
-        own = slow_squares(fitted)
-        looked_at = (
-            (squared_innovations(fitted.innovations, fitted.coarse.valid), fitted.coarse.valid),
-            (own.standardised, own.valid),
-        )
         may_act, p_column = what_a_column_may_do(search, fitted)
         columns = half_cosines_of(fitted.coarse, max(SPREAD_ORDERS))
 
         def best_beside(known: FloatArray) -> tuple[float, bool] | None:
             found = []
-            for slow, (squares, valid) in enumerate(looked_at):
-                own, basis = without_known(known, squares, columns, valid)
-                own, basis = (low_frequencies(one, fitted.coarse, valid, SHORTEST_S) for one in (own, basis))
+            for slow, squares in enumerate((quick_squares(fitted), slow_squares(fitted))):
+                own, basis = without_known(known, squares.standardised, columns, squares.valid)
+                own, basis = (low_frequencies(one, fitted.coarse, squares.valid, SHORTEST_S) for one in (own, basis))
                 tests = smooth_probabilities(own[:, 0], basis, SPREAD_ORDERS)
                 found += [(p_value, bool(slow)) for p_value in tests.values()]
             return (min(1.0, min(found)[0] * len(found)), min(found)[1]) if found else None
@@ -296,8 +274,21 @@ class TimeSpreadTerm(Term):
         return Description("spread by time", shape, factor, factor * error, statistic, statistic)
 
 
+def _is_step(fitted: Fitted, step: StepTerm, order: int) -> bool:
+    """Whether a step is likelier than a smooth of so many half cosines, each parameter at Schwarz's price [1]_.
+
+    References
+    ----------
+    .. [1] G. Schwarz, "Estimating the dimension of a model", Annals of Statistics 6, 1978.
+    """
+    coarse = fitted.coarse
+    likelihoods = [fit_model(coarse, (*fitted.terms, one)).log_likelihood for one in (step, TimeMeanTerm(order))]
+    price = 0.5 * (STEP_PARAMETERS - order) * float(np.log(coarse.valid.sum()))
+    return likelihoods[0] - likelihoods[1] > price
+
+
 def probability_of_mean(search: Search, fitted: Fitted) -> float:
-    """p-value of a smooth or a step of the mean; 1 where none is looked for."""
+    """p-value of a smooth or a step of the mean; 1 where none is tested."""
     test = StepTerm.test(search, fitted)
     return 1.0 if test is None else test.p_value
 

@@ -7,9 +7,8 @@ from math import atan, atan2, copysign, inf, pi, sqrt
 from xosc_lateral.motion.nominal import Activity
 from xosc_lateral.playback.actions.base import Domain, RunningAction
 from xosc_lateral.playback.drive import along_reference, travel
-from xosc_lateral.playback.placement import NOWHERE, Placement
 from xosc_lateral.playback.positions.resolve import beside
-from xosc_lateral.playback.state import EntityState
+from xosc_lateral.playback.state import NOWHERE, EntityState, Placement
 from xosc_lateral.playback.transition import EPSILON, Transition
 from xosc_lateral.scenario.enums import DynamicsDimension, DynamicsShape
 from xosc_lateral.scenario.private_actions import AbsoluteTargetLane, LaneChangeAction

@@ -6,7 +6,7 @@ from math import atan, pi
 
 from xosc_lateral.motion.nominal import Activity
 from xosc_lateral.playback.actions.base import Domain, RunningAction
-from xosc_lateral.playback.placement import NOWHERE
+from xosc_lateral.playback.state import NOWHERE
 from xosc_lateral.playback.transition import EPSILON, Transition
 from xosc_lateral.scenario.enums import DynamicsDimension, DynamicsShape
 from xosc_lateral.scenario.private_actions import AbsoluteTargetLaneOffset, LaneOffsetAction

@@ -9,8 +9,7 @@ from xosc_lateral.playback.actions.base import Domain, RunningAction
 from xosc_lateral.playback.angles import difference
 from xosc_lateral.playback.distances import ahead_and_left, road_gap, spot_of
 from xosc_lateral.playback.drive import along_reference, travel
-from xosc_lateral.playback.placement import NOWHERE
-from xosc_lateral.playback.state import EntityState, free
+from xosc_lateral.playback.state import NOWHERE, EntityState, free
 from xosc_lateral.playback.transition import EPSILON
 from xosc_lateral.road import Pose
 from xosc_lateral.scenario.enums import CoordinateSystem, LateralDisplacement

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from xosc_lateral.motion.nominal import Activity
 from xosc_lateral.playback.actions.base import Domain, RunningAction
-from xosc_lateral.playback.placement import Placement
 from xosc_lateral.playback.positions.resolve import resolve, route_guide
-from xosc_lateral.playback.routes import guide
+from xosc_lateral.playback.state import Placement, guide
 from xosc_lateral.playback.trailers import align_trailers, connect, disconnect
 from xosc_lateral.scenario.enums import RouteStrategy
 from xosc_lateral.scenario.global_actions import SetMonitorAction, UserDefinedAction

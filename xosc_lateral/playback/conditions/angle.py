@@ -6,9 +6,8 @@ from math import pi
 
 from xosc_lateral.playback.angles import difference
 from xosc_lateral.playback.conditions.base import EntityCheck, EntityChecks
-from xosc_lateral.playback.placement import NOWHERE
 from xosc_lateral.playback.simulation import Simulation
-from xosc_lateral.playback.state import EntityState
+from xosc_lateral.playback.state import NOWHERE, EntityState
 from xosc_lateral.playback.transition import EPSILON
 from xosc_lateral.road import Pose
 from xosc_lateral.scenario.conditions import AngleCondition, RelativeAngleCondition

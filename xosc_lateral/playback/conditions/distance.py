@@ -155,7 +155,7 @@ def prepare_collision(content: CollisionCondition, simulation: Simulation) -> En
         others = (simulation.entity(content.entity_ref, content.place),)
     else:
         others = tuple(
-            o for o in simulation.entities if content.by_type is None or o.entity.category is content.by_type
+            o for o in simulation.everybody() if content.by_type is None or o.entity.category is content.by_type
         )
 
     def check(state: EntityState) -> bool:

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from xosc_lateral.playback.conditions.base import EntityCheck, EntityChecks
 from xosc_lateral.playback.distances import free_road_gap, road_gap, spot_of
-from xosc_lateral.playback.placement import NOWHERE
 from xosc_lateral.playback.simulation import Simulation
-from xosc_lateral.playback.state import EntityState
+from xosc_lateral.playback.state import NOWHERE, EntityState
 from xosc_lateral.road.network import DRIVING
 from xosc_lateral.scenario.conditions import RelativeClearanceCondition
 
@@ -27,7 +26,7 @@ def prepare(content: RelativeClearanceCondition, simulation: Simulation) -> Enti
         for lanes in content.lane_ranges
     ) or ((-_MANY_LANES, _MANY_LANES),)
     names = content.entity_refs
-    others = tuple(simulation.entity(name, content.place) for name in names) if names else simulation.entities
+    others = tuple(simulation.entity(name, content.place) for name in names) if names else simulation.everybody()
     reach = max(content.distance_forward, content.distance_backward)
 
     def in_range(lanes: int) -> bool:

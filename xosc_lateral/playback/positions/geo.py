@@ -5,10 +5,9 @@ from __future__ import annotations
 from math import asinh, atan2, atanh, cos, cosh, hypot, log, nan, pi, radians, sin, sinh, sqrt, tan
 
 from xosc_lateral.errors import PlaybackError
-from xosc_lateral.playback.placement import Placement
 from xosc_lateral.playback.positions.on_road import heading_of
 from xosc_lateral.playback.simulation import Simulation
-from xosc_lateral.playback.state import free, locate
+from xosc_lateral.playback.state import Placement, free, locate
 from xosc_lateral.scenario.position import GeoPosition
 
 

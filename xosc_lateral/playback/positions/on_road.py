@@ -7,10 +7,8 @@ from math import nan, pi
 
 from xosc_lateral.errors import PlaybackError
 from xosc_lateral.playback.drive import travel
-from xosc_lateral.playback.placement import NOWHERE, Placement
-from xosc_lateral.playback.routes import RouteGuide
 from xosc_lateral.playback.simulation import Simulation
-from xosc_lateral.playback.state import EntityState
+from xosc_lateral.playback.state import NOWHERE, EntityState, Placement, RouteGuide
 from xosc_lateral.road import Pose
 from xosc_lateral.scenario import Place
 from xosc_lateral.scenario.enums import ReferenceContext

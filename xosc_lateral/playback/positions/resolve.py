@@ -9,7 +9,6 @@ from typing import Any
 from xosc_lateral.errors import UnsupportedElementError
 from xosc_lateral.playback.distances import Spot
 from xosc_lateral.playback.paths.registry import path_of
-from xosc_lateral.playback.placement import NOWHERE, Placement
 from xosc_lateral.playback.positions.geo import geo_position
 from xosc_lateral.playback.positions.on_road import (
     heading_of,
@@ -23,9 +22,8 @@ from xosc_lateral.playback.positions.on_road import (
     tilted_or_road,
 )
 from xosc_lateral.playback.positions.route import route_position
-from xosc_lateral.playback.routes import RouteGuide, guide
 from xosc_lateral.playback.simulation import Simulation
-from xosc_lateral.playback.state import EntityState, free, locate
+from xosc_lateral.playback.state import NOWHERE, EntityState, Placement, RouteGuide, free, guide, locate
 from xosc_lateral.road import Pose
 from xosc_lateral.scenario import Unsupported
 from xosc_lateral.scenario.position import (

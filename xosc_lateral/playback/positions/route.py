@@ -7,10 +7,9 @@ from dataclasses import replace
 from math import pi
 
 from xosc_lateral.errors import PlaybackError
-from xosc_lateral.playback.placement import NOWHERE, Placement
 from xosc_lateral.playback.positions.on_road import lane_placement, road_placement
-from xosc_lateral.playback.routes import RouteGuide
 from xosc_lateral.playback.simulation import Simulation
+from xosc_lateral.playback.state import NOWHERE, Placement, RouteGuide
 from xosc_lateral.scenario.position import (
     FromCurrentEntity,
     FromLaneCoordinates,

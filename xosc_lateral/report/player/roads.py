@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from xosc_lateral.report.player.packing import pack
 from xosc_lateral.road import RoadNetwork
+from xosc_lateral.road.geometry import simplify
 from xosc_lateral.road.network import DRIVING
 from xosc_lateral.road.positions import RoadMark
-from xosc_lateral.road.simplify import simplify
 
 FloatArray = NDArray[np.float64]
 

@@ -18,7 +18,7 @@ from xosc_lateral.report.path_dynamics import lateral_dynamics
 from xosc_lateral.report.player.packing import CENTIMETRE_PER_SECOND, MILLIMETRE, MILLIRADIAN_TENTH, pack
 from xosc_lateral.report.player.roads import road_shapes
 from xosc_lateral.road import RoadNetwork
-from xosc_lateral.road.simplify import simplify
+from xosc_lateral.road.geometry import simplify
 
 FloatArray = NDArray[np.float64]
 RowArray = NDArray[np.int64]

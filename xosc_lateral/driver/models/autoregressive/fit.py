@@ -25,9 +25,9 @@ from xosc_lateral.driver.models.autoregressive.autoregression import FREQUENCIES
 from xosc_lateral.driver.models.autoregressive.filters import split_bands
 from xosc_lateral.driver.models.autoregressive.fit_coarse import fit_coarse
 from xosc_lateral.driver.models.autoregressive.fit_matching import matched, with_volatility
-from xosc_lateral.driver.models.autoregressive.fit_settings import DEFAULT_SETTINGS, FitSettings
 from xosc_lateral.driver.models.autoregressive.fit_spectrum import fit_spectrum
 from xosc_lateral.driver.models.autoregressive.model import AutoregressiveModel
+from xosc_lateral.driver.models.autoregressive.parameters import DEFAULT_SETTINGS, FitSettings
 from xosc_lateral.driver.models.autoregressive.volatility import Volatility
 from xosc_lateral.errors import NotEnoughDataError
 

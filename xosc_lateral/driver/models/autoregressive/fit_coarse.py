@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from xosc_lateral.driver.models.autoregressive.autoregression import FREQUENCIES, GRID, Autoregression, stabilise
 from xosc_lateral.driver.models.autoregressive.filters import COARSE_EVERY, measuring_low_pass
-from xosc_lateral.driver.models.autoregressive.fit_settings import FitSettings
+from xosc_lateral.driver.models.autoregressive.parameters import FitSettings
 
 FloatArray = NDArray[np.float64]
 

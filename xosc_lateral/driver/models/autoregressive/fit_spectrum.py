@@ -15,9 +15,8 @@ from numpy.typing import NDArray
 
 from xosc_lateral.driver.models.autoregressive.autoregression import Autoregression
 from xosc_lateral.driver.models.autoregressive.filters import COARSE_EVERY, building_low_pass
-from xosc_lateral.driver.models.autoregressive.fit_settings import FitSettings
-from xosc_lateral.driver.models.fit_noise import NOISE_VARIANCE
-from xosc_lateral.driver.models.noise import ShapedNoise
+from xosc_lateral.driver.models.autoregressive.parameters import FitSettings
+from xosc_lateral.driver.models.noise import NOISE_VARIANCE, ShapedNoise
 from xosc_lateral.drives.periodogram import Detrend, periodograms
 
 FloatArray = NDArray[np.float64]

@@ -6,7 +6,11 @@ it writes whole documents of one version where we change a few elements of someb
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
+import numpy as np
 from lxml import etree
+from numpy.typing import NDArray
 
 from xosc_lateral.scenario.enums import Priority
 
@@ -26,11 +30,14 @@ def decimal(value: float, digits: int) -> str:
     return "0" if text in ("-0", "") else text
 
 
-def shortened(text: str) -> str:
-    """Attributes that are numbers with a point all of them, as `decimal` writes each."""
+def decimals(values: NDArray[np.float64], digits: Sequence[int]) -> tuple[str, ...]:
+    """Text of each number, as `decimal` has it, row by row; values of shape (n, len(digits))."""
+    if not values.size:
+        return ()
+    text = "".join(f'"%.{count}f' for count in digits) * len(values) % tuple(values.ravel().tolist()) + '"'
     while '0"' in text:  # as often as numbers have decimals; a pattern takes three times as long
         text = text.replace('0"', '"')
-    return text.replace('."', '"').replace('="-0"', '="0"')
+    return tuple(text.replace('."', '"').replace('"-0"', '"0"')[1:-1].split('"'))
 
 
 def sub(parent: etree._Element, tag: str, **attributes: str) -> etree._Element:

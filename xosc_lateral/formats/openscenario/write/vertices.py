@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from lxml import etree
+from msgspec import Struct
 from numpy.typing import NDArray
 
 from xosc_lateral.formats.openscenario.write import build
@@ -17,13 +17,12 @@ FloatArray = NDArray[np.float64]
 BLOCK = 1000
 """Vertices that are text at a time."""
 
-_POSE = (("x", 5), ("y", 5), ("z", 5), ("h", 6), ("p", 6), ("r", 6))
-"""Attributes and their decimals."""
-_MOTION = (("speed_longitudinal", 4), ("acceleration_longitudinal", 4))
+_POSE, _MOTION = ("x", "y", "z", "h", "p", "r"), ("speed_longitudinal", "acceleration_longitudinal")
+_DIGITS = (6, 5, 5, 5, 6, 6, 6, 4, 4)
+"""Decimals of the time and of these."""
 
 
-@dataclass(frozen=True, eq=False, slots=True)
-class TimedVertices:
+class TimedVertices(Struct, frozen=True, eq=False):
     """Vertices of one trajectory.
 
     Parameters
@@ -42,19 +41,25 @@ class TimedVertices:
 
     def text(self, indent: str, unit: str) -> Iterator[str]:
         """XML of the vertices, set out at `indent`, each level below by `unit` more; the first without its indent."""
-        columns = np.stack((self.times, *self.pose, *(self.motion or ())), axis=1)
+        columns = np.stack((self.times, *self.pose, *(self.motion or ())))
         inner, innermost = f"\n{indent}{unit}", f"\n{indent}{unit}{unit}"
-        position = f"{inner}<Position>{innermost}<WorldPosition{_attributes(_POSE)}/>{inner}</Position>"
-        motion = f"{inner}<Motion{_attributes(_MOTION)}/>" if self.motion else ""
-        vertex = f'<Vertex time="%.6f">{position}{motion}\n{indent}</Vertex>'
         for begin in range(0, len(self.times), BLOCK):
-            block = columns[begin : begin + BLOCK]
-            text = f"\n{indent}".join([vertex] * len(block)) % tuple(block.ravel().tolist())
-            yield (f"\n{indent}" if begin else "") + build.shortened(text)
-
-
-def _attributes(names: Sequence[tuple[str, int]]) -> str:
-    return "".join(f' {name}="%.{digits}f"' for name, digits in names)
+            block = columns[:, begin : begin + BLOCK]
+            varies = np.ptp(block, axis=1) != 0.0
+            digits = _DIGITS[: len(block)]
+            time, *values = ("%s" if varies[k] else build.decimal(block[k, 0], count) for k, count in enumerate(digits))
+            pose, motion = (
+                "".join(f' {name}="{value}"' for name, value in zip(names, part, strict=True))
+                for names, part in ((_POSE, values[:6]), (_MOTION[: len(values) - 6], values[6:]))
+            )
+            vertex = (
+                f'<Vertex time="{time}">{inner}<Position>{innermost}<WorldPosition{pose}/>{inner}</Position>'
+                + (f"{inner}<Motion{motion}/>" if motion else "")
+                + f"\n{indent}</Vertex>"
+            )
+            numbers = build.decimals(block[varies].T, [_DIGITS[k] for k in np.flatnonzero(varies)])
+            text = f"\n{indent}".join([vertex] * block.shape[1]) % numbers
+            yield (f"\n{indent}" if begin else "") + text
 
 
 class Vertices:
