@@ -217,6 +217,25 @@ def test_bad_vehicles_are_named_and_left_out(tracks, road, tmp_path):
     placed(tmp_path / "out/bad.xosc")
 
 
+def test_numbers_that_no_vehicle_has_are_named_or_passed_over(tracks, road, tmp_path):
+    table = pd.read_csv(tracks)
+    rows = table[table["id"].isin(["A", "B", "C"]) & (table["time"] < 12.0)].assign(length=4.5, width=1.8)
+    rows.loc[rows["id"] == "B", "length"] = -3.0
+    rows.loc[rows["id"] == "C", "width"] = np.nan
+    for row, column, value in ((20, "x", np.inf), (30, "y", 1e300), (40, "time", -np.inf), (50, "psi_deg", np.nan)):
+        rows.iloc[row, rows.columns.get_loc(column)] = value
+    path = tmp_path / "odd.csv"
+    rows.to_csv(path, index=False)
+    made = xl.reconstruct(path, tmp_path / "out", road=road, columns=COLUMNS)
+    said = "\n".join(made.to_dict()["not_expressed"])
+    assert "B: no vehicle has -3 m x 1.8 m" in said
+    assert "C: no vehicle has 4.5 m x nan m" in said
+    assert set(placed(tmp_path / "out/odd.xosc")) == {"A", "B", "C"}
+    rows.assign(time=1e6 * rows["time"]).to_csv(path, index=False)
+    with pytest.raises(FormatError, match="--from and --to"):
+        xl.reconstruct(path, road=road, columns=COLUMNS)
+
+
 @pytest.mark.parametrize(
     ("options", "error", "message"),
     [

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from xosc_lateral.errors import FormatError
 from xosc_lateral.formats.importers import dlr_ht, levelx
-from xosc_lateral.formats.importers.track_table import Tracks, read_tracks, tracks_of
+from xosc_lateral.formats.importers.track_table import USUAL_LENGTH, Tracks, read_tracks, tracks_of
 from xosc_lateral.formats.mapping import MappingLike, TableMapping, as_mapping
 from xosc_lateral.formats.opendrive import read_opendrive
 from xosc_lateral.formats.opendrive.write import SHOULDER, WIDTH_PIECE, WrittenLane, WrittenRoad, curved_plan
@@ -25,6 +25,10 @@ STEP = 0.1
 """Rows are thinned to this: lane changes and braking last seconds. [s]"""
 REAR_AXLE = 0.3
 """Middle of a vehicle ahead of its rear axle, as a share of its length: 1.4 m of a car of 4.6 m. [-]"""
+LONGEST = 60.0
+"""Of vehicles with all that they pull: road trains have 53.5 m. [m]"""
+WIDEST = 6.0
+"""Of what drives on roads, heavy transports included. [m]"""
 AROUND = 50.0
 """A made road goes on so far beyond its traffic. [m]"""
 USUAL_WIDTH = {"truck": 2.5, "bus": 2.5, "trailer": 2.5, "van": 2.0, "motorcycle": 0.8, "motorbike": 0.8}
@@ -119,7 +123,8 @@ def _osi(source: Path, road: Path | None, columns: TableMapping) -> RecordedTraf
     from xosc_lateral.formats.osi.read import read_osi
 
     recorded = read_osi(source)
-    return replace(_on_road(recorded.tracks, source, road), notes=tuple(recorded.notes))
+    traffic = _on_road(recorded.tracks, source, road)
+    return replace(traffic, notes=(*recorded.notes, *traffic.notes))
 
 
 def _commonroad(source: Path, road: Path | None, columns: TableMapping) -> RecordedTraffic:
@@ -136,30 +141,24 @@ def _on_road(tracks: Tracks, source: Path, road: Path | None) -> RecordedTraffic
     network = read_opendrive(road)
     x, y = network.header_offset.undo(tracks.x, tracks.y)
     heading = tracks.heading - network.header_offset.heading
-    found = []
+    found, notes = [], []
     for k, rows in enumerate(_rows_of(tracks.vehicle)):
         rows = rows[_thinned(tracks.time[rows])]
-        kind, length = str(tracks.kind[rows[0]]), float(tracks.length[rows[0]])
+        name, kind = tracks.names[k], str(tracks.kind[rows[0]])
+        length, width = float(tracks.length[rows[0]]), USUAL_WIDTH.get(kind, 1.8)
+        given = width if tracks.width is None else float(tracks.width[rows[0]])
+        if 0.0 < length <= LONGEST and 0.0 < given <= WIDEST:
+            width = given
+        else:
+            usual = USUAL_LENGTH.get(kind, 4.6)
+            notes.append(f"{name}: no vehicle has {length:g} m x {given:g} m, {usual:g} m x {width:g} m are taken")
+            length = usual
         middle = REAR_AXLE * length if tracks.rear is None else float(tracks.rear[rows[0]])
-        width = USUAL_WIDTH.get(kind, 1.8) if tracks.width is None else float(tracks.width[rows[0]])
-        found.append(
-            Track(
-                tracks.names[k],
-                kind,
-                length,
-                width,
-                USUAL_HEIGHT.get(kind, 1.5),
-                0.0 if tracks.is_reference or tracks.rear is not None else middle,
-                middle,
-                tracks.time[rows],
-                x[rows],
-                y[rows],
-                heading[rows],
-            )
-        )
-    return RecordedTraffic(
-        source.name.split(".")[0], tuple(found), network, road.read_bytes(), road.name, (source, road)
-    )
+        ahead = 0.0 if tracks.is_reference or tracks.rear is not None else middle
+        at = tracks.time[rows], x[rows], y[rows], heading[rows]
+        found.append(Track(name, kind, length, width, USUAL_HEIGHT.get(kind, 1.5), ahead, middle, *at))
+    files = road.read_bytes(), road.name, (source, road), tuple(notes)
+    return RecordedTraffic(source.name.split(".")[0], tuple(found), network, *files)
 
 
 def _rows_of(vehicle: NDArray[np.int64]) -> list[NDArray[np.int64]]:

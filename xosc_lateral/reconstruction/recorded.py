@@ -21,6 +21,10 @@ BESIDE = 1.0
 """So far beside every driving lane a vehicle still keeps to one: it drives on its marking. [m]"""
 LONGEST_GAP = 1.0
 """Rows farther apart than this are not of one passage, as in `formats.importers.cuts`. [s]"""
+FARTHEST = 1e8
+"""No map projection gives such a position: the Earth's circumference is 4e7 m. [m]"""
+SHORTEST_STEP = 1e-4
+"""Rows that follow sooner are of the same moment: no sensor has 10 kHz. [s]"""
 SHORTEST = 2.0
 """Passages below this are left out: a speed and its change can't be told in less. [s]"""
 LEAP = 1.5
@@ -148,9 +152,11 @@ def place_tracks(tracks: Sequence[Track], network: RoadNetwork, start: float, en
     """
     vehicles, left_out = list[RecordedVehicle](), list[str]()
     for track in tracks:
-        inside = (track.time >= start - 1e-9) & (track.time <= end + 1e-9)
-        if inside.any():
-            found = _place(track, inside, network, left_out)
+        inside = (np.hypot(track.x, track.y) < FARTHEST) & np.isfinite(track.heading)
+        rows = np.flatnonzero(inside & (track.time >= start - 1e-9) & (track.time <= end + 1e-9))
+        if len(rows):
+            rows = rows[np.r_[True, np.diff(track.time[rows]) > SHORTEST_STEP]]
+            found = _place(track, rows, network, left_out)
             if found is not None:
                 vehicles.append(replace(found, time=found.time - start))
     if not vehicles:
@@ -159,11 +165,9 @@ def place_tracks(tracks: Sequence[Track], network: RoadNetwork, start: float, en
     return Recording(tuple(vehicles), tuple(left_out), start, end)
 
 
-def _place(
-    track: Track, inside: NDArray[np.bool_], network: RoadNetwork, left_out: list[str]
-) -> RecordedVehicle | None:
-    time, x, y = track.time[inside], track.x[inside], track.y[inside]
-    heading = _held(time, x, y, track.heading[inside])
+def _place(track: Track, rows: NDArray[np.intp], network: RoadNetwork, left_out: list[str]) -> RecordedVehicle | None:
+    time, x, y = track.time[rows], track.x[rows], track.y[rows]
+    heading = _held(time, x, y, track.heading[rows])
     x, y = x - track.ahead * np.cos(heading), y - track.ahead * np.sin(heading)
     found = network.world_to_lane(x, y, heading=heading)
     on_lane = (found.distance <= BESIDE) & (found.lane != 0)
