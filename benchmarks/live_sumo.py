@@ -82,7 +82,7 @@ def measures(parts: list[pd.DataFrame], column: str) -> str:
     power = []
     for part in parts:
         values = part[column].to_numpy()[:100] - part[column].to_numpy()[:100].mean()
-        if np.isnan(values).any():
+        if len(values) < 100 or np.isnan(values).any():
             continue
         density = np.abs(np.fft.rfft(values * np.hanning(len(values)))) ** 2
         frequency = np.fft.rfftfreq(len(values), STEP)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -113,6 +114,42 @@ def test_the_same_over_traci(tmp_path: Path) -> None:
     assert len(found[0]) > 2 and found[0].keys() == found[1].keys()
     for name, (offset, steered) in found[0].items():
         assert found[1][name] == (pytest.approx(offset, abs=1e-9), steered)
+
+
+class Lying:
+    """SUMO, of whose vehicles one says nonsense and another vanishes."""
+
+    def __init__(self, connection: Any) -> None:
+        self.connection, self.vehicle = connection, self
+        self.nonsense: set[str] = set()
+        self.gone: set[str] = set()
+
+    def __getattr__(self, name: str) -> Any:
+        whole = self.connection if hasattr(self.connection, name) else self.connection.vehicle
+        return getattr(whole, name)
+
+    def getIDList(self) -> list[str]:
+        return [name for name in self.connection.vehicle.getIDList() if name not in self.gone]
+
+    def getPosition(self, name: str) -> tuple[float, float]:
+        x, y = self.connection.vehicle.getPosition(name)
+        return (float("nan"), y) if name in self.nonsense else (x, y)
+
+
+def test_a_vehicle_that_says_nonsense_or_vanishes_is_left_alone_and_the_others_drive_on(run: Path) -> None:
+    from xosc_lateral.live.sumo import start
+
+    lying = Lying(start(["-c", str(run / "run.sumocfg")]))
+    traffic = xl.SumoTraffic(lying, xl.read_profile("motorway"), seed=1)
+    for step in range(120):
+        if step == 100:
+            lying.nonsense, lying.gone = {"cars.0"}, {"cars.1"}
+        traffic.steer()
+        lying.connection.simulationStep()
+    lying.connection.close()
+    assert traffic.warnings == ["vehicle 'cars.0': a number that is none; it is left alone"]
+    assert len(traffic.moves) > 2 and not {"cars.0", "cars.1"} & traffic.moves.keys()
+    assert all(np.isfinite(offset) for offset, _ in traffic.moves.values())
 
 
 def test_nobody_collides_and_drivers_differ(run: Path, capsys: pytest.CaptureFixture[str]) -> None:

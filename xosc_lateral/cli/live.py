@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from enum import StrEnum
-from inspect import Parameter, signature
+from inspect import Parameter, Signature, signature
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -33,14 +33,7 @@ HELP = {
 def register(app: typer.Typer) -> None:
     """Add the verb to the command line."""
     live = typer.Typer(help="Drivers in a simulation that runs.", no_args_is_help=True)
-    shared = [one.replace(kind=Parameter.KEYWORD_ONLY) for one in signature(_run, eval_str=True).parameters.values()][
-        2:
-    ]
-    verbs: tuple[Any, ...] = (esmini, sumo, stdio)
-    for verb in verbs[:2]:
-        spelled = signature(verb, eval_str=True)
-        verb.__signature__ = spelled.replace(parameters=[*list(spelled.parameters.values())[:-1], *shared])
-    for verb in verbs:
+    for verb in (esmini, sumo, stdio):
         short, epilog = HELP[verb.__name__]
         live.command(verb.__name__, short_help=short, epilog=epilog)(verb)
     app.add_typer(live, name="live", short_help="Drivers in a simulation that runs.")
@@ -181,3 +174,14 @@ def fmu(
     export_fmu(chosen, output, fmi=fmi)
     if not quiet:
         typer.echo(f"{chosen.name} as FMI {fmi} in {output}", err=True)
+
+
+def _spelled_out(verb: Any) -> Signature:
+    """A verb's signature, with the options of both simulators in place of `**shared`."""
+    own, both = (list(signature(one, eval_str=True).parameters.values()) for one in (verb, _run))
+    return Signature([*own[:-1], *(one.replace(kind=Parameter.KEYWORD_ONLY) for one in both[2:])])
+
+
+_BOTH: tuple[Any, ...] = (esmini, sumo)
+for _verb in _BOTH:
+    _verb.__signature__ = _spelled_out(_verb)

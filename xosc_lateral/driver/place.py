@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from xosc_lateral.digits import all_significant
 from xosc_lateral.driver.answers import NEIGHBOURS, SCALE, most_beside, neighbour_shapes
 from xosc_lateral.driver.effects import Acts, ColumnEffect, Levels, Linear, Piecewise, Proximity
-from xosc_lateral.driver.models.autoregressive.filters import split_bands
+from xosc_lateral.driver.models.autoregressive.coarse import split_bands
 from xosc_lateral.drives.drive import Run
 from xosc_lateral.drives.resampling import STEP
 from xosc_lateral.errors import NotEnoughDataError

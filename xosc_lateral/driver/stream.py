@@ -251,18 +251,18 @@ class OffsetStream:
         ----------
         profile : DriverProfile
         state : mapping
-            Of this version of the package or an older one.
+            Of `to_dict`.
 
         Raises
         ------
         DriverProfileError
-            If the state is none, damaged, of a newer version, or of another profile.
+            If the state is none, damaged, of another version, or of another profile.
         """
         try:
             return cls._restored(profile, state)
         except DriverProfileError:
             raise
-        except (ArithmeticError, LookupError, TypeError, ValueError) as error:  # of 0.1, whose states had no hash
+        except (ArithmeticError, LookupError, TypeError, ValueError) as error:  # sealed anew by hand
             raise DriverProfileError(f"the state of an offset stream is damaged: {error!r}") from error
 
     @classmethod

@@ -313,12 +313,12 @@ class Traffic:
         if moment.places is None or self._neighbours is not Neighbours.BORROW:
             return np.zeros(len(moment.names))
         known = {f"{word}_{side}": np.zeros(len(moment.names), dtype=np.bool_)
-                 for word in ("heeds", "alone") for side in ("left", "right")}  # fmt: skip
+                 for word in ("responds", "alone") for side in ("left", "right")}  # fmt: skip
         for key, (_, members) in self._groups.items():
             profile = self._profiles[key]
             other_hand = profile.left_hand != self._left_hand
             rows = there[np.isin(who, [self._index[name] for name in members])]
-            for word, basis in (("heeds", {Basis.POPULATION}), ("alone", {Basis.MEASURED, Basis.DECLARED})):
+            for word, basis in (("responds", {Basis.POPULATION}), ("alone", {Basis.MEASURED, Basis.DECLARED})):
                 for side in sides_known(profile, basis, other_hand=other_hand):
                     known[f"{word}_{side}"][rows] = True
         lateral = np.where(moment.following, moment.offset - moment.nominal, 0.0)

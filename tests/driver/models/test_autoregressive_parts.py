@@ -7,7 +7,7 @@ import pytest
 from msgspec.structs import replace
 from scipy import signal, stats
 
-from xosc_lateral.driver.models.autoregressive.filters import (
+from xosc_lateral.driver.models.autoregressive.coarse import (
     BORDER,
     COARSE_EVERY,
     TICKS,

@@ -6,8 +6,14 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from xosc_lateral.driver.models.autoregressive.autoregression import GRID, Autoregression
-from xosc_lateral.driver.models.autoregressive.filters import BORDER, COARSE_EVERY, measuring_low_pass, split_bands
+from xosc_lateral.driver.models.autoregressive.coarse import (
+    BORDER,
+    COARSE_EVERY,
+    GRID,
+    Autoregression,
+    measuring_low_pass,
+    split_bands,
+)
 from xosc_lateral.driver.models.autoregressive.fit_coarse import _far_covariance, _restored, fit_coarse
 from xosc_lateral.driver.models.autoregressive.parameters import DEFAULT_SETTINGS
 

@@ -7,7 +7,7 @@ import pytest
 from msgspec.structs import replace
 
 from tests.driver.models.made_models import POPULATION, STEADY
-from xosc_lateral.driver.models.autoregressive.autoregression import GRID, Autoregression
+from xosc_lateral.driver.models.autoregressive.coarse import GRID, Autoregression
 from xosc_lateral.driver.models.autoregressive.fit_coarse import scaled_spectrum
 from xosc_lateral.driver.models.autoregressive.fit_matching import (
     LARGEST_STEP,

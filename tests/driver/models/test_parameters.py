@@ -11,7 +11,7 @@ from msgspec.structs import replace
 from scipy.linalg import toeplitz
 
 from tests.driver.models.made_models import POPULATION, STEADY
-from xosc_lateral.driver.models.autoregressive.filters import COARSE_EVERY, interpolate
+from xosc_lateral.driver.models.autoregressive.coarse import COARSE_EVERY, interpolate
 from xosc_lateral.driver.models.autoregressive.model import AutoregressiveModel
 from xosc_lateral.driver.models.autoregressive.parameters import START_LAGS
 from xosc_lateral.driver.models.noise import NOISE_VARIANCE

@@ -8,7 +8,7 @@ from msgspec.structs import replace
 from scipy.signal import lfilter
 
 from tests.driver.models.made_models import POPULATION, STEADY
-from xosc_lateral.driver.models.autoregressive.filters import COARSE_EVERY, TICKS, interpolate
+from xosc_lateral.driver.models.autoregressive.coarse import COARSE_EVERY, TICKS, interpolate
 from xosc_lateral.driver.models.autoregressive.model import AutoregressiveModel
 from xosc_lateral.driver.models.autoregressive.parts import (
     COARSE,

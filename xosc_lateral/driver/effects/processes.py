@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from xosc_lateral.driver.effects.base import EffectTerms
 from xosc_lateral.driver.effects.hidden import HiddenEffect
-from xosc_lateral.driver.recursion import recur
+from xosc_lateral.driver.linear_filters import recur
 
 FloatArray = NDArray[np.float64]
 

@@ -13,7 +13,7 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.driver.recursion import recur
+from xosc_lateral.driver.linear_filters import recur
 
 FloatArray = NDArray[np.float64]
 

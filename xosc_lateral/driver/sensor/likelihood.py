@@ -12,8 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.driver.sensor.ascent import climb
-from xosc_lateral.driver.sensor.periodogram import Periodogram
+from xosc_lateral.driver.sensor.periodogram import Periodogram, climb
 from xosc_lateral.driver.sensor.second_view import LEVEL_SD, SecondView
 from xosc_lateral.driver.sensor.vehicle_bound import KNOTS, N_KNOTS, N_STATE, interpolation, prior
 

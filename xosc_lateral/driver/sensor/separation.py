@@ -126,7 +126,6 @@ def separate(
     frequency, windows = windows_of(runs, step)
     data = periodogram(frequency, windows)
     per_second = rate or sum(map(len, measured)) / (step * sum(map(len, runs)))
-    known = None if sensor_noise is None else Known(sensor_noise, per_second)
     grain = quantisation_step(np.concatenate(measured))
     if sensor_noise is not None and 0.0 < variance <= sensor_noise**2 - uniform_variance(grain):
         raise DriverProfileError(
@@ -134,10 +133,10 @@ def separate(
             f"{np.sqrt(variance):.2g} m (standard deviation)"
         )
     too_coarse = grain > COARSEST * np.sqrt(variance) or len(np.unique(np.concatenate(measured))) < LEAST_LEVELS
-    rounding: Callable[[FloatArray], FloatArray] = _no_density
-    if grain and not too_coarse:
-        rounding = _rounding(data, grain, variance, per_second)
-        known = known and replaced(known, rounding=uniform_variance(grain))
+    is_rounded = grain > 0.0 and not too_coarse
+    rounding = _rounding(data, grain, variance, per_second) if is_rounded else _no_density
+    rounded_off = uniform_variance(grain) if is_rounded else 0.0
+    known = None if sensor_noise is None else Known(sensor_noise, per_second, rounded_off)
     base = rounding(data.frequency)
     view = second_view(half_widths, step) if half_widths else None
     found = explanations(data, base, known, view, only_view=one_camera)

@@ -125,5 +125,5 @@ def of_kind(fitted: Fitted, kind: type[ColumnTerm]) -> list[ColumnTerm]:
 
 def columns_on_size(fitted: Fitted) -> frozenset[str]:
     """Columns that act on the movement's size."""
-    terms = [term for term in fitted.terms if isinstance(term, ColumnTerm) and term.acts is Acts.SPREAD]
+    terms = [term for term in fitted.terms if isinstance(term, ColumnTerm) and term.acts is not Acts.LOCATION]
     return frozenset(name for term in terms for name in term.columns)

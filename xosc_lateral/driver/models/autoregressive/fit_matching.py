@@ -18,10 +18,14 @@ import numpy as np
 from msgspec.structs import replace
 from numpy.typing import NDArray
 
-from xosc_lateral.driver.models.autoregressive.autoregression import FREQUENCIES, Autoregression
-from xosc_lateral.driver.models.autoregressive.filters import BORDER, COARSE_EVERY, split_bands
-from xosc_lateral.driver.models.autoregressive.fit_coarse import scaled_spectrum
-from xosc_lateral.driver.models.autoregressive.fit_spectrum import rise, window_of
+from xosc_lateral.driver.models.autoregressive.coarse import (
+    BORDER,
+    COARSE_EVERY,
+    FREQUENCIES,
+    Autoregression,
+    split_bands,
+)
+from xosc_lateral.driver.models.autoregressive.fit_coarse import rise, scaled_spectrum, window_of
 from xosc_lateral.driver.models.autoregressive.model import AutoregressiveModel
 from xosc_lateral.driver.models.autoregressive.parameters import FitSettings
 from xosc_lateral.driver.models.autoregressive.volatility import Volatility, averaged_covariance

@@ -21,7 +21,7 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.driver.models.autoregressive.filters import COARSE_EVERY, TICKS
+from xosc_lateral.driver.models.autoregressive.coarse import COARSE_EVERY, TICKS
 from xosc_lateral.driver.models.autoregressive.parameters import AutoregressiveParameters
 from xosc_lateral.driver.models.autoregressive.parts import (
     CoarsePart,

@@ -13,8 +13,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.driver.models.autoregressive.autoregression import Autoregression
-from xosc_lateral.driver.models.autoregressive.filters import COARSE_EVERY, building_low_pass
+from xosc_lateral.driver.models.autoregressive.coarse import COARSE_EVERY, Autoregression, building_low_pass
 from xosc_lateral.driver.models.autoregressive.volatility import Volatility
 from xosc_lateral.driver.models.base import CoreModel
 from xosc_lateral.driver.models.noise import NOISE_VARIANCE, ShapedNoise

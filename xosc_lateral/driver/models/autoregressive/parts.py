@@ -14,12 +14,11 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.driver.convolution import convolve
-from xosc_lateral.driver.models.autoregressive.filters import COARSE_EVERY, TICKS, interpolate
+from xosc_lateral.driver.linear_filters import convolve, recur
+from xosc_lateral.driver.models.autoregressive.coarse import COARSE_EVERY, TICKS, interpolate
 from xosc_lateral.driver.models.autoregressive.parameters import AutoregressiveParameters
 from xosc_lateral.driver.models.autoregressive.volatility import SLOW_CORRELATION_TIME
 from xosc_lateral.driver.models.base import Start
-from xosc_lateral.driver.recursion import recur
 from xosc_lateral.driver.seeds import AutoregressiveSeed, generator
 
 FloatArray = NDArray[np.float64]

@@ -16,8 +16,8 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.driver.convolution import convolve
 from xosc_lateral.driver.jit_kernel import JitKernel
+from xosc_lateral.driver.linear_filters import convolve
 from xosc_lateral.driver.models.base import Start
 from xosc_lateral.driver.models.mean_reversion import ClockState, take_at_rate
 from xosc_lateral.driver.models.two_level.markov import AliasTable, bin_of
