@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
 from benchmarks.identification_cases import as_provided
-from benchmarks.identification_drives import parts_of, quantity, responded, unit, with_mean
+from benchmarks.identification_drives import parts_of, unit, with_mean
 from xosc_lateral.formats.drives import drives_of_table
 from xosc_lateral.identification.dictionary import LEAST_SHIFT_S
 from xosc_lateral.identification.regression import Coarse, fit_model
 from xosc_lateral.identification.significance import MANY_DRIVES
-from xosc_lateral.identification.terms.mean import MeanTerm
-from xosc_lateral.identification.timeline import coarse_mean, join_drives
+from xosc_lateral.identification.timeline import join_drives
 
 Values = np.ndarray
 
@@ -68,33 +66,3 @@ def oracle_between(case: dict[str, Any], table: pd.DataFrame) -> dict[str, float
     left = means["offset"] - design @ sizes
     error = float(np.sqrt(left @ left / (len(means) - 3) * np.linalg.inv(design.T @ design)[0, 0]))
     return {"oracle_z": float(sizes[0]) / error, "oracle_size": float(sizes[0]), "oracle_error": error}
-
-
-def told_regression(case: dict[str, Any], table: pd.DataFrame, coarse: Coarse, seed: int) -> dict[str, float]:
-    """Size, error and z by the loop's own regression, which is told the quantity and its timing.
-
-    `table`: before anything was planted. What a provider's smoothing does to the effect it isn't told.
-    """
-
-    time_, values = table["time"].to_numpy(), unit(quantity(case["name"], table))
-    if "drive" in table:
-        names, drives = table["drive"].to_numpy(), coarse.timeline.names
-        rows = [np.flatnonzero(names == name) for name in drives]
-    else:
-        rows = [np.arange(len(table))]
-    fine = np.zeros(len(coarse.timeline))
-    for span, own in zip(coarse.timeline.spans, rows, strict=True):
-        response = responded(values[own], time_[own], np.random.default_rng([7, seed]))
-        grid = time_[own][0] + coarse.timeline.step * (np.arange(span.stop - span.start) - 75)
-        fine[span] = np.interp(grid, time_[own], response)
-    told = coarse_mean(fine)
-    told = told - told[coarse.valid].mean()
-
-    @dataclass(frozen=True, eq=False)
-    class Told(MeanTerm):
-        def mean_columns(self, coarse: Coarse) -> np.ndarray:
-            return told[:, None]
-
-    fitted = fit_model(coarse, (Told(None),))  # type: ignore[arg-type]
-    error = float(np.sqrt(fitted.covariance[0, 0]))
-    return {"z": float(fitted.sizes[0]) / error, "size": float(fitted.sizes[0]), "error": error}

@@ -17,13 +17,13 @@ from unittest.mock import patch
 import numpy as np
 import pandas as pd
 from threadpoolctl import threadpool_limits
-from xosc_lateral.identification.terms.restoring import RestoringTerm
 
 from benchmarks import simulated as plants
 from benchmarks.identification_cases import PROTOCOL, cases, planted_drive
 from benchmarks.simulated import preview_driver
 from xosc_lateral.formats.drives import drives_of_table
 from xosc_lateral.identification import (
+    candidates,
     column_search,
     dictionary,
     feedback,
@@ -31,20 +31,18 @@ from xosc_lateral.identification import (
     refinement,
     regression,
     selection,
-    significance,
 )
 from xosc_lateral.identification.identify import usable_columns
 from xosc_lateral.identification.regression import Coarse
 from xosc_lateral.identification.search import Search
-from xosc_lateral.identification.terms import between, spread
-from xosc_lateral.identification.terms.spread import FineNoiseTerm, SlowSpreadTerm
+from xosc_lateral.identification.terms import spread
+from xosc_lateral.identification.terms.spread import SlowSpreadTerm
 from xosc_lateral.identification.timeline import join_drives
 
 Named = tuple[frozenset[str], ...]
 Drive = tuple[str, pd.DataFrame, Named, bool]
 """Name, table, sets of columns that count as right (no columns: by time), and whether it is a table of short drives."""
 BENDS = frozenset({"curvature", "crossfall", "speed"})
-BY_TIME = (frozenset[str](),)
 SKIPPED = 2
 """Of the protocol's design set every so many-th long drive is left out."""
 
@@ -54,7 +52,8 @@ def drives() -> Iterator[Drive]:
     for kind in ("wind", "lead_in_lane", "rain", "fatigue", "two_drivers", "bends"):
         if kind in preview_driver.DESIGN:
             one = preview_driver.simulate(kind, preview_driver.DESIGN[kind])
-            yield f"preview {kind}", one.table, (frozenset(one.act.columns),), False
+            right = () if kind == "bends" else (frozenset(one.act.columns),)
+        yield f"preview {kind}", one.table, right, False
     own = {"truck": plants.truck_avoidance(0.25), "tired": plants.Fatigue(3.0), "weave": plants.CyclicTarget(0.2, 12.0)}
     for number, (name, plant) in enumerate(own.items()):
         table = plants.simulate_drive(3000.0, 700 + number, effects=[plant]).table
@@ -70,51 +69,33 @@ def drives() -> Iterator[Drive]:
 
 
 def without_kinds(*kinds: type) -> list[Any]:
-    """No term of some kinds is asked for."""
+    """No term of some kinds is tested."""
     stages = tuple(tuple(one for one in stage if one not in kinds) for stage in selection.STAGES)
     return [patch.object(selection, "STAGES", stages)]
 
 
-def white(fitted: regression.Fitted) -> np.ndarray:
-    """Innovations as the rows of the fit."""
-    return fitted.rows
-
-
 PARTS: dict[str, Callable[[], list[Any]]] = {
     "the whole": lambda: [],
-    "3 cm of noise, responses smoothed as seen": lambda: [
-        patch.object(regression, "FLOOR", 0.0),
-        patch.object(regression.Fitted, "innovations", property(white)),
-    ],
+    "3 cm of noise": lambda: [patch.object(regression, "FLOOR", 0.0)],
     "responses smoothed as seen": lambda: [
         patch.object(innovations, "smoothed_as_seen", lambda moved, seen, *rest: seen)
     ],
     "slow spread": lambda: without_kinds(SlowSpreadTerm),
-    "fine noise and restoring": lambda: without_kinds(FineNoiseTerm, RestoringTerm),
-    "second look at what acts, movement must not grow": lambda: [
-        patch.object(column_search, "ROUNDS", 1),
-        patch.object(column_search, "_grows", lambda before, after: False),
-    ],
+    "second look at what acts": lambda: [patch.object(column_search, "ROUNDS", 1)],
     "tested again": lambda: [patch.object(selection, "_tested_again", lambda search, found, one: found)],
     "loudness of own rows": lambda: [patch.object(dictionary, "_beside_loud_stretches", lambda scores, *rest: scores)],
-    "first rows of runs, effective number of draws": lambda: [
-        patch.object(regression, "start_factors", lambda rows, valid, order: np.ones(order + 1)),
-        patch.object(innovations, "start_factors", lambda rows, valid, order: np.ones(order + 1)),
-        patch.object(significance, "effective_number", lambda draws: float(len(draws))),
-    ],
     "scales and centres of products, curves": lambda: [
         patch.object(refinement, "other_scales", lambda effect, shares: ()),
         patch.object(refinement, "other_centres", lambda effect, coarse: ()),
-        patch("xosc_lateral.identification.candidates._curves", lambda column, values: []),
+        patch.object(candidates, "_curves", lambda column, values: []),
     ],
     "what a column may do, beside time": lambda: [patch.object(spread, "MAY_ACT", 0.0)],
     "direction of time": lambda: [patch.object(feedback, "_predicted_share", lambda values, moved, rows: 0.0)],
-    "bias of short drives, pairs between drives": lambda: [
+    "bias of short drives": lambda: [
         patch.object(regression, "unbiased", lambda process, *rest, **more: process),
-        patch.object(between._Pairs, "scores", lambda self, z: np.full(len(z), -np.inf)),
     ],
 }
-SHORT_ONLY = frozenset({"bias of short drives, pairs between drives"})
+SHORT_ONLY = frozenset({"bias of short drives"})
 
 
 def named(table: pd.DataFrame, right: Named) -> tuple[bool, list[str]]:

@@ -21,8 +21,7 @@ from xosc_lateral.driver.fitting import fit_profile
 from xosc_lateral.drives.drive import Drive
 from xosc_lateral.errors import NotEnoughDataError
 from xosc_lateral.formats.drives import read_drives
-from xosc_lateral.identification.close import NO_WORSE, LoopResult, close_loop
-from xosc_lateral.identification.findings import Finding
+from xosc_lateral.identification.close import NO_WORSE, Finding, LoopResult, close_loop
 from xosc_lateral.report.loop_json import loop_record
 
 Driven = Callable[..., list[Drive]]

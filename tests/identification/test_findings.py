@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from xosc_lateral.driver.effects import Step
+from xosc_lateral.identification.close import describe_finding, population_finding, spectrum_finding
 from xosc_lateral.identification.core_model import TIMES_S, DriverVariance, SpectrumShape
-from xosc_lateral.identification.findings import describe_finding, population_finding, spectrum_finding
 from xosc_lateral.identification.held_out import HeldOut
 from xosc_lateral.identification.selection import Accepted
 from xosc_lateral.identification.terms.time import StepTerm

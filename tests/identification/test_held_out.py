@@ -12,9 +12,8 @@ from xosc_lateral.driver.profile import Provenance
 from xosc_lateral.errors import NotEnoughDataError
 from xosc_lateral.identification.columns import Column, Values
 from xosc_lateral.identification.cross_validation import Nested, _over_blocks
-from xosc_lateral.identification.held_out import _frequency, _quantities, fit_without
+from xosc_lateral.identification.held_out import _frequency, _quantities, estimate_all, fit_without
 from xosc_lateral.identification.regression import Coarse, fit_model
-from xosc_lateral.identification.removal import estimate_all
 from xosc_lateral.identification.selection import Accepted, Gain, Selection
 from xosc_lateral.identification.terms.base import Term
 from xosc_lateral.identification.terms.cycle import CycleTerm

@@ -19,8 +19,8 @@ from xosc_lateral.driver.profile import DriverProfile, file_type
 from xosc_lateral.driver.sampling import sample_offsets
 from xosc_lateral.formats.profiles import read_profile, write_profile
 from xosc_lateral.identification import selection, terms
+from xosc_lateral.identification.held_out import estimate_all, removal_of
 from xosc_lateral.identification.regression import Coarse
-from xosc_lateral.identification.removal import estimate_all, removal_of
 from xosc_lateral.identification.search import Search
 from xosc_lateral.identification.selection import STAGES, TERMS, in_stages, shared_among
 from xosc_lateral.identification.significance import BUDGET, MANY_DRIVES

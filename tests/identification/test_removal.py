@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from xosc_lateral.identification.removal import bare_movement, bare_runs
+from xosc_lateral.identification.held_out import movement_without, runs_without
 from xosc_lateral.identification.terms.base import Removal
 from xosc_lateral.identification.timeline import Timeline
 
@@ -30,14 +30,14 @@ def movement(seed: int = 1, seconds: float = 6.0) -> np.ndarray:
 
 def test_without_effects_nothing_is_taken_out() -> None:
     offset = 0.3 + movement()
-    left = bare_movement(timeline(offset), Removal(np.zeros(N)), slice(0, N))
+    left = movement_without(timeline(offset), Removal(np.zeros(N)), slice(0, N))
     np.testing.assert_allclose(left, offset, atol=1e-12)
 
 
 def test_a_shift_is_taken_out_in_full() -> None:
     own = movement()
     shift = 0.25 * (np.arange(N) % 500 > 300)
-    left = bare_movement(timeline(own + shift), Removal(shift), slice(0, N))
+    left = movement_without(timeline(own + shift), Removal(shift), slice(0, N))
     np.testing.assert_allclose(left, own, atol=1e-12)
 
 
@@ -46,9 +46,9 @@ def test_a_spread_is_taken_out_about_the_mean() -> None:
     removal = Removal(np.zeros(N))
     removal.spread = np.full(N, np.log(1.7))
     removal.fine = np.full(N, np.log(1.7))
-    left = bare_movement(timeline(0.3 + 1.7 * (own - own.mean())), removal, slice(0, N))
+    left = movement_without(timeline(0.3 + 1.7 * (own - own.mean())), removal, slice(0, N))
     np.testing.assert_allclose(left, 0.3 + own - own.mean(), atol=1e-12)
-    about = bare_movement(timeline(0.3 + 1.7 * own), removal, slice(0, N), mean=0.3)
+    about = movement_without(timeline(0.3 + 1.7 * own), removal, slice(0, N), mean=0.3)
     np.testing.assert_allclose(about, 0.3 + own, atol=1e-12)
 
 
@@ -58,7 +58,7 @@ def test_fine_movement_has_a_factor_of_its_own() -> None:
     fine = 0.01 * np.random.default_rng(2).normal(size=N)
     removal = Removal(np.zeros(N))
     removal.fine = np.full(N, np.log(3.0))
-    left = bare_movement(timeline(slow + 3.0 * fine), removal, slice(0, N))
+    left = movement_without(timeline(slow + 3.0 * fine), removal, slice(0, N))
     inside = slice(20, -20)
     roughness = np.diff(left[inside], 2).std() / np.diff(slow + fine, 2)[inside].std()
     assert roughness == pytest.approx(1.0, abs=0.1)
@@ -68,7 +68,7 @@ def test_fine_movement_has_a_factor_of_its_own() -> None:
 def test_runs_are_the_stretches_that_are_long_enough() -> None:
     valid = np.ones(N, dtype=bool)
     valid[1000:1050] = valid[1055:1100] = False  # a second between two gaps is no run
-    runs = bare_runs(timeline(movement(), valid), Removal(np.zeros(N)), np.ones(N, dtype=bool))
+    runs = runs_without(timeline(movement(), valid), Removal(np.zeros(N)), np.ones(N, dtype=bool))
     assert [len(run.offset) for run in runs] == [1000, N - 1100]
     assert runs[1].time[0] == pytest.approx(1100 * STEP)
     assert {run.drive for run in runs} == {"d0"}
@@ -77,5 +77,5 @@ def test_runs_are_the_stretches_that_are_long_enough() -> None:
 def test_runs_do_not_cross_drives_or_rows_that_are_not_used() -> None:
     used = np.ones(N, dtype=bool)
     used[: N // 4] = False
-    runs = bare_runs(timeline(movement(), drives=2), Removal(np.zeros(N)), used)
+    runs = runs_without(timeline(movement(), drives=2), Removal(np.zeros(N)), used)
     assert [(run.drive, len(run.offset)) for run in runs] == [("d0", N // 4), ("d1", N // 2)]

@@ -94,6 +94,12 @@ def test_a_spread_by_a_car_ahead_is_named(driven: Driven) -> None:
     assert ("scale", ("lead_distance",)) in named(selected(drives))
 
 
+def test_a_camera_that_shakes_by_a_column_is_fine_noise(driven: Driven) -> None:
+    selection = selected(driven(402, [plants.ShakyCamera("grade", 0.04)], 1500.0, driver=Driver()))
+    (one,) = [one for one in selection.accepted if one.term.columns == ("grade",)]
+    assert one.term.component == "fine_noise"
+
+
 def test_regimes_of_loudness_are_named(tmp_path: Path) -> None:
     path = tmp_path / "drive.parquet"
     record_movement(in_regimes, 2400.0, 1).to_parquet(path)

@@ -26,6 +26,7 @@ def test_the_order_of_the_stages() -> None:
         ["mean"],
         ["time_spread", "spread", "slow_spread"],
         ["regimes"],
+        ["fine_noise"],
         ["between"],
     ]
 

@@ -32,8 +32,7 @@ from xosc_lateral.driver.effects import (
     TimeSmooth,
 )
 from xosc_lateral.formats.drives import read_drives
-from xosc_lateral.identification.close import LoopResult, close_loop
-from xosc_lateral.identification.findings import Finding
+from xosc_lateral.identification.close import Finding, LoopResult, close_loop
 from xosc_lateral.identification.residual import lack_of_fit_of
 from xosc_lateral.identification.selection import Rejected
 from xosc_lateral.report.loop import finding_sentence, loop_page, loop_text

@@ -97,7 +97,7 @@ class Candidate:
         return self.effect.columns
 
     def values(self, context: Mapping[str, FloatArray]) -> FloatArray:
-        """Quantity before lag and response, shape (n,); NaN: neutral."""
+        """Quantity before lag and response, shape (n,); NaN: as usual."""
         return np.asarray(self.effect.seen(context) @ np.asarray(self.contrast))
 
 

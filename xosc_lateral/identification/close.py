@@ -14,21 +14,118 @@ from xosc_lateral.driver.effects import Effect
 from xosc_lateral.driver.models.base import ModelKind
 from xosc_lateral.driver.profile import DriverProfile, Provenance
 from xosc_lateral.drives.drive import Drive
-from xosc_lateral.identification.core_model import compare_spectrum_shapes, test_population
+from xosc_lateral.identification.core_model import (
+    DriverVariance,
+    SpectrumShape,
+    compare_spectrum_shapes,
+    test_population,
+)
 from xosc_lateral.identification.cross_validation import held_out_words, hold_out_blocks
-from xosc_lateral.identification.findings import Finding, describe_finding, population_finding, spectrum_finding
-from xosc_lateral.identification.held_out import HeldOut, Scorecard, Setting, fit_without, score_held_out, score_runs
+from xosc_lateral.identification.held_out import (
+    Estimates,
+    HeldOut,
+    Scorecard,
+    Setting,
+    estimate_all,
+    fit_without,
+    score_held_out,
+    score_runs,
+)
 from xosc_lateral.identification.identify import Identified, Progress, identify, initial_terms
+from xosc_lateral.identification.refinement import Alternatives
 from xosc_lateral.identification.regression import Coarse, Fitted, fit_model
-from xosc_lateral.identification.removal import Estimates, estimate_all
 from xosc_lateral.identification.residual import LackOfFit, lack_of_fit_of, size_of
-from xosc_lateral.identification.selection import Accepted, Selection
+from xosc_lateral.identification.selection import Accepted, Gain, Selection
 from xosc_lateral.identification.significance import LoopSeed
 from xosc_lateral.identification.terms.base import Term
 from xosc_lateral.identification.terms.between import between_shift
 from xosc_lateral.identification.timeline import join_drives
 
 FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Finding:
+    """One effect that the base lacked.
+
+    Parameters
+    ----------
+    effect : str
+        Short name.
+    kind : str
+        As in the report's schema.
+    columns : tuple of str
+        That cause it; two when it is a product.
+    alike : tuple of tuple of str
+        Columns of each other effect that the data can't tell from it.
+    lag_s, response_s : float or None
+    shape : str
+    size_m : float
+        Change of the mean between the 5 % and 95 % quantile, or amplitude [m]; factor for scale.
+    size_error : float
+        Standard error of it.
+    p_value : float
+        Family-wise over everything that its component tried.
+    error_before, error_after : float
+        On held-out blocks, by the effect's own quantity. [m]
+    measure : str
+        What that error compares.
+    effects : tuple of Effect
+        What the profile got.
+    statistic : str
+        Group of summary statistics that shows it best.
+    gain : Gain or None
+        Held-out gain, nested; None where its path can't be predicted.
+    """
+
+    effect: str
+    kind: str
+    columns: tuple[str, ...]
+    alike: Alternatives
+    lag_s: float | None
+    response_s: float | None
+    shape: str
+    size_m: float
+    size_error: float
+    p_value: float
+    error_before: float
+    error_after: float
+    measure: str
+    effects: tuple[Effect, ...]
+    statistic: str
+    gain: Gain | None = None
+
+
+def describe_finding(one: Accepted, key: str, fitted: Fitted, effects: tuple[Effect, ...], scored: HeldOut) -> Finding:
+    """Put sizes and errors to what was accepted."""
+    size = one.term.describe(fitted, effects, key)
+    return Finding(
+        size.name, one.term.kind, one.term.columns, one.alike, size.lag_s, size.response_s, size.shape, size.size,
+        size.error, one.p_value, *scored.error_of(size.statistic), size.measure, effects, size.statistic, one.gain,
+    )  # fmt: skip
+
+
+def spectrum_finding(spectrum: SpectrumShape, scored: HeldOut) -> Finding:
+    """The core model is replaced: the first-order chain forgets too fast."""
+    worst = int(np.argmax(np.abs(np.log(spectrum.ratio))))
+    statistic, ratio = "movement by band", float(spectrum.ratio[worst])
+    return Finding(
+        "memory beyond one step", "memory", (), (), None, None,
+        f"movement within {spectrum.bands_s[worst]:g} s is {ratio:.2f} times the measured", ratio, 0.0,
+        spectrum.p_value, *scored.error_of(statistic), "size of the movement by frequency band", (), statistic,
+    )  # fmt: skip
+
+
+def population_finding(population: DriverVariance, scored: HeldOut) -> Finding:
+    """The core model is replaced: one pooled driver can't be many."""
+    statistic, scatter = "quantiles of local spread", float(np.exp(population.log_spread))
+    return Finding(
+        "drivers that differ", "population", (), (), None, None,
+        f"{population.drives} drives; their spreads scatter by a factor of {scatter:.2f}", population.shift,
+        population.shift / float(np.sqrt(2.0 * population.drives)), population.p_value, *scored.error_of(statistic),
+        statistic, (), statistic,
+    )  # fmt: skip
+
 
 NO_WORSE = 1.05
 """The held-out error of a profile with more effects may be so many times the base's: 24 runs leave 2 % of noise. [-]"""
@@ -128,7 +225,7 @@ def close_loop(
     provenance : Provenance, optional
         What is known about the drives.
     excluded : sequence of str
-        Columns that are not to be looked at.
+        Columns that are not to be tested.
     roles : mapping of str to str
         What columns are: column -> road, weather, traffic, time, own, driver or unknown. Those that it lacks are
         proposed from name and values.

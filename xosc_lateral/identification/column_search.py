@@ -40,7 +40,7 @@ ROUNDING = 1e-6
 factor on the movement that changes faster than the movement does, say, which its innovations alone allow. [nat]"""
 
 ROUNDS = 2
-"""Times that what acts is looked for beside what was found before; the first changes most."""
+"""Times that the candidates are scored beside what was found before; the first changes most."""
 
 
 class SearchedTerm(ColumnTerm):
@@ -49,7 +49,7 @@ class SearchedTerm(ColumnTerm):
     @classmethod
     @abstractmethod
     def problem(cls, fitted: Fitted) -> Problem:
-        """Regression in which a column of this kind is looked for, with the terms fitted already."""
+        """Regression in which a column of this kind is tested, with the terms fitted already."""
 
     @classmethod
     def reweighted(cls, fitted: Fitted, after: Fitted) -> Problem | None:
@@ -109,12 +109,6 @@ def probability_of(search: Search, kind: type[SearchedTerm], fitted: Fitted, col
         return 1.0
     own = [i for i, candidate in enumerate(scored.dictionary.candidates) if candidate.columns == columns]
     return upper_tail(float(scored.scores.scores[own].max()), scored.scores.maxima) if own else 1.0
-
-
-def best_probability(search: Search, kind: type[SearchedTerm], fitted: Fitted) -> float:
-    """p-value of the best candidate of all, before refinement."""
-    scored = _scored(search, kind, fitted)
-    return 1.0 if scored is None else scored.likeliest()[1]
 
 
 def likely_response(search: Search, kind: type[SearchedTerm], fitted: Fitted, level: float) -> tuple[FloatArray, float]:
@@ -180,7 +174,7 @@ def _best(search: Search, kind: type[SearchedTerm], fitted: Fitted, scored: _Sco
     """The term that the best candidate becomes, and the fit with it.
 
     *That* something acts is tested with the noise that is left without it, for data and null alike. *What* acts is
-    looked for once more with the noise that is left beside what was found: a strong slow effect makes the noise look
+    chosen once more with the noise that is left beside what was found: a strong slow effect makes the noise look
     slow, and against slow noise a quicker look-alike stands out better than the effect itself.
     """
     term: SearchedTerm = kind.of(scored.dictionary.timed(scored.scores.best))

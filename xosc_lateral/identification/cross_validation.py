@@ -89,13 +89,13 @@ def _log_likelihood(fitted: Fitted, noise: Fitted, coarse: Coarse, held: BoolArr
     columns = joined([term.mean_columns(fitted.coarse) for term in fitted.terms], len(coarse))
     scales = joined([term.scale_columns(fitted.coarse) for term in fitted.terms], len(coarse))
     scale = np.exp(scales @ fitted.log_sizes + known_scale_of(coarse, fitted.terms))
-    bare = Whitener(noise.whitener.process, rows, coarse.drive, scale)
-    squares = np.square(bare.rows(np.where(rows, coarse.offset - columns @ fitted.sizes, 0.0)))
+    whitener = Whitener(noise.whitener.process, rows, coarse.drive, scale)
+    squares = np.square(whitener.rows(np.where(rows, coarse.offset - columns @ fitted.sizes, 0.0)))
     typical = max(float(squares[rows].mean()), 1e-300) if rows.any() else 1.0
     level = own_levels(np.minimum(squares, CLIP * typical), rows, coarse.drive) * typical
     own = level[coarse.drive]
-    factor = bare.by_position(noise.starts)
-    deviation = np.sqrt(own) * factor * bare.deviations
+    factor = whitener.by_position(noise.starts)
+    deviation = np.sqrt(own) * factor * whitener.deviations
     return np.where(rows, -0.5 * np.minimum(squares / (own * factor**2), CLIP) - np.log(deviation), 0.0)
 
 

@@ -21,7 +21,7 @@ from xosc_lateral.driver.effects import ColumnEffect
 from xosc_lateral.identification.autocorrelation import Whitener
 from xosc_lateral.identification.candidates import Candidate
 from xosc_lateral.identification.significance import MANY_DRIVES
-from xosc_lateral.identification.timeline import COARSE, Timeline, coarse_mean, coarse_middle, start_anew
+from xosc_lateral.identification.timeline import Timeline, coarse_mean, coarse_middle, start_anew
 
 FloatArray = NDArray[np.float64]
 SingleArray = NDArray[np.float32]
@@ -30,8 +30,8 @@ BoolArray = NDArray[np.bool_]
 IntArray = NDArray[np.intp]
 
 TIMINGS: Mapping[float, tuple[int, ...]] = {1.0: (-3, -2, -1, 0, 1, 2), 4.0: (-4, -2, 0, 2)}
-"""Lags looked at first, by time constant; refined later. What is smoothed by 4 s differs little from one second to the
-next. Sensitivity: docs/design/identification.md. [s]"""
+"""Lags tried first, by time constant; refined later. What is smoothed by 4 s differs little from one second to the
+next. [s]"""
 
 PRODUCT_TIMINGS: Mapping[float, tuple[int, ...]] = {2.0: (-2, -1, 0, 1)}
 """The same for products, of which there are many more. [s]"""
@@ -43,14 +43,13 @@ LEAST_SHIFT_S = 60
 """No rotation is shorter: a driver's response must be out of reach. [s]"""
 
 BLOCK_S = 300
-"""Length of the blocks that are dealt in random order: three times the memory that whitening sees. Sensitivity:
-docs/design/identification.md. [s]"""
+"""Length of the blocks that are dealt in random order: three times the memory that whitening sees. [s]"""
 
 MIN_SUPPORT_S = 45.0
-"""A quantity that rests on fewer seconds than this is not looked at: anything may have happened just then. [s]"""
+"""A quantity that rests on fewer seconds than this is not tested: anything may have happened just then. [s]"""
 
 LEFT_OVER = 0.05
-"""A candidate of which less than this share is left beside what is known is not looked at. [-]"""
+"""A candidate of which less than this share is left beside what is known is not tested. [-]"""
 
 CROSS_BASIS = 0.01
 """Directions of a column's cross-basis with less than this share of the largest variance are left in. [-]"""
@@ -70,15 +69,7 @@ TINY = 1e-30
 
 @dataclass(frozen=True, eq=False)
 class Quantities:
-    """Candidates on the 1 Hz grid before lag and response, standardised, in single precision.
-
-    Parameters
-    ----------
-    candidates : list of Candidate
-    values : array, shape (candidates, n)
-    drive : int array, shape (n,)
-        Of each row.
-    """
+    """Candidates on the 1 Hz grid before lag and response, standardised, shape (candidates, n); `drive`, shape (n,)."""
 
     candidates: list[Candidate]
     values: SingleArray
@@ -149,13 +140,7 @@ def _without_gaps(values: FloatArray, valid: BoolArray) -> FloatArray:
 
 
 def build_dictionary(quantities: Quantities, whitener: Whitener) -> Dictionary:
-    """Pass every candidate through every response and lag, and whiten it.
-
-    Parameters
-    ----------
-    quantities : Quantities
-    whitener : Whitener
-    """
+    """Pass every candidate through every response and lag, and whiten it."""
     seconds, compact = np.flatnonzero(whitener.valid), whitener.compact
     entries: list[tuple[Candidate, float, float]] = []
     blocks: list[SingleArray] = []
@@ -350,15 +335,3 @@ def orthonormal(columns: FloatArray, share: float = 1e-6) -> FloatArray:
     powers, directions = np.linalg.eigh(columns.T @ columns)
     kept = powers > share * max(float(powers[-1]), 1e-300)
     return np.asarray(columns @ (directions[:, kept] / np.sqrt(powers[kept])))
-
-
-__all__ = [
-    "COARSE",
-    "Dictionary",
-    "Quantities",
-    "Scores",
-    "build_dictionary",
-    "draw_null",
-    "orthonormal",
-    "score_entries",
-]

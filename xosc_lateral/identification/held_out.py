@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,14 +12,18 @@ from numpy.typing import NDArray
 from xosc_lateral.driver.effects import ColumnEffect, Effect, TimeSmooth
 from xosc_lateral.driver.fitting import fit_population, fit_runs
 from xosc_lateral.driver.models.base import ModelKind
+from xosc_lateral.driver.place import COLUMNS as KNOWN_TO_THE_BASE
 from xosc_lateral.driver.profile import COLUMNS, DriverProfile, Provenance
+from xosc_lateral.drives.cuts import MIN_RUN
+from xosc_lateral.drives.drive import Run
+from xosc_lateral.drives.filters import filtered
+from xosc_lateral.drives.resampling import STEP
 from xosc_lateral.errors import NotEnoughDataError
 from xosc_lateral.evaluation.distances import Distances, mean_distances, metric_distances
 from xosc_lateral.evaluation.metrics import METRICS, snippet_metrics
 from xosc_lateral.identification.columns import Column
 from xosc_lateral.identification.cross_validation import Nested, folds_of
 from xosc_lateral.identification.regression import Coarse, Fitted, fit_model
-from xosc_lateral.identification.removal import Estimates, bare_runs, estimate_all, removal_of
 from xosc_lateral.identification.residual import (
     SummaryStatistics,
     error_between,
@@ -31,14 +35,75 @@ from xosc_lateral.identification.residual import (
 )
 from xosc_lateral.identification.selection import Selection
 from xosc_lateral.identification.significance import LoopSeed
-from xosc_lateral.identification.terms.base import Term
+from xosc_lateral.identification.terms.base import Removal, Term
 from xosc_lateral.identification.terms.cycle import CycleTerm
 from xosc_lateral.identification.terms.time import StepTerm
 from xosc_lateral.identification.timeline import COARSE, Timeline
+from xosc_lateral.mask import true_slices
 
 BoolArray = NDArray[np.bool_]
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.intp]
+
+FINE_S = 1.0
+"""Movement within this time counts as fine when a spread is taken out. [s]"""
+
+Estimates = Mapping[str, tuple[Term, tuple[Effect, ...]]]
+"""By key ("mean 0", "step 0"): a term and what the profile gets for it."""
+
+
+def estimate_all(fitted: Fitted) -> Estimates:
+    """Sizes of everything in the model; the key counts terms of one component."""
+    found: dict[str, tuple[Term, tuple[Effect, ...]]] = {}
+    for term in fitted.terms:
+        assert isinstance(term, Term)
+        number = sum(1 for key in found if key.rpartition(" ")[0] == term.kind_key)
+        found[f"{term.kind_key} {number}"] = (term, term.estimate(fitted))
+    return found
+
+
+def removal_of(fitted: Fitted, estimates: Estimates) -> Removal:
+    """What all terms did to the measured offsets."""
+    removal = Removal(np.zeros(len(fitted.coarse.timeline)))
+    for term, effects in estimates.values():
+        term.remove(fitted, effects, removal)
+    return removal
+
+
+def runs_without(timeline: Timeline, removal: Removal, used: BoolArray) -> list[Run]:
+    """Runs of the movement [m] without effects, from the valid rows in `used`, shape (n,); at least `MIN_RUN` long.
+
+    They know class, lane and speed, as far as the table does: what these do to a population is fitted with its base.
+    """
+    runs: list[Run] = []
+    for index, name in enumerate(timeline.names):
+        for rows in true_slices(timeline.valid & used & (timeline.drive == index)):
+            if (rows.stop - rows.start) * STEP >= MIN_RUN:
+                runs.append(_run(timeline, removal, rows, name, len(runs)))
+    return runs
+
+
+def movement_without(timeline: Timeline, removal: Removal, rows: slice, mean: float | None = None) -> FloatArray:
+    """Offsets of one uninterrupted stretch without the effects, about their own mean or a given one. [m] Shape (k,)."""
+    left = timeline.offset[rows] - removal.location[rows]
+    mean = float(left.mean()) if mean is None else mean
+    slow = _smooth(left)
+    spread, fine = np.exp(-removal.spread[rows]), np.exp(-removal.fine[rows])
+    return np.asarray(mean + (slow - mean) * spread + (left - slow) * fine)
+
+
+def _run(timeline: Timeline, removal: Removal, rows: slice, name: str, index: int) -> Run:
+    movement = movement_without(timeline, removal, rows)
+    width = timeline.lane_width[rows]
+    context = {name: timeline.context[name][rows] for name in KNOWN_TO_THE_BASE if name in timeline.context}
+    time = timeline.time[rows.start] + STEP * np.arange(len(movement))
+    return Run(name, index, time, movement, width, context, frozenset())
+
+
+def _smooth(values: FloatArray) -> FloatArray:
+    width = 2 * round(0.5 * FINE_S / STEP) + 1
+    return filtered(values, np.ones(width) / width)
+
 
 Progress = Callable[[float, str], None]
 
@@ -125,11 +190,11 @@ def _held_out_runs(
         held = blocks % folds == fold
         used = ~held if folds > 1 else np.ones(len(held), dtype=np.bool_)
         part = coarse.only(used[COARSE // 2 :: COARSE][: len(coarse)])
-        bare = fit_model(part, start.terms)
-        before = setting.fixed or fit_without(bare, estimate_all(bare), used, setting.kind, "before", None)
+        without = fit_model(part, start.terms)
+        before = setting.fixed or fit_without(without, estimate_all(without), used, setting.kind, "before", None)
         profiles = [before]
         if not same:
-            fitted = bare if own is None else own.selections[fold].final
+            fitted = without if own is None else own.selections[fold].final
             profiles.append(fit_without(fitted, estimate_all(fitted), used, setting.refined_kind, "after", None))
         for side, profile in enumerate(profiles):
             # the same luck for both sides and all folds: what differs is the profile, and runs go on from fold to fold
@@ -152,7 +217,7 @@ def fit_without(
     Of a population the base holds what class, lane and speed do to the rest, as `fit` has it; the paper's has not.
     What neighbours do is for the loop to find.
     """
-    runs = bare_runs(fitted.coarse.timeline, removal_of(fitted, estimates), used)
+    runs = runs_without(fitted.coarse.timeline, removal_of(fitted, estimates), used)
     if not runs:
         raise NotEnoughDataError("closing the loop: no run of 10 s is left to fit the base model on")
     if kind is ModelKind.TWO_LEVEL:

@@ -131,7 +131,7 @@ def identify(
 def usable_columns(
     timeline: Timeline, excluded: Sequence[str] = (), roles: Mapping[str, str] = MappingProxyType({})
 ) -> Usable:
-    """Columns that may act, those that follow from the movement, and those that are not looked at with the reason."""
+    """Columns that may act, those that follow from the movement, and those that are not tested with the reason."""
     columns, unused = known_columns(timeline)
     assigned = roles_of(timeline, {"lane_width", *timeline.context}, roles)
     unused |= dict.fromkeys(timeline.of_one_camera, "from the camera that measured the offset: it has the same errors")

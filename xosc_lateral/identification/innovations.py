@@ -18,6 +18,10 @@ ORDER = 12
 LONGEST = 96
 """Past seconds that it sees as means over doubling times: drifts of a minute and a half. [s]"""
 
+SMOOTHING_S = (-2, -1, 1, 2)
+"""Shifts of a response that make up its smoothing: two standard deviations, to either side, of a Gaussian that leaves
+9 % at 0.5 Hz. [s]"""
+
 CLIP = 9.0
 """Squared innovations (variance 1) beyond this count as this: three standard deviations. [-]"""
 
@@ -102,8 +106,32 @@ def whitener_as_seen(movement: FloatArray, valid: BoolArray, drive: IntArray, sc
     return Whitener(process, valid, drive, scale)
 
 
-def innovations(movement: FloatArray, valid: BoolArray, drive: IntArray, scale: FloatArray) -> FloatArray:
-    """Rows of `whitener_as_seen` of variance about 1, shape (n,), young runs by their own size; 0 where invalid."""
-    whitener = whitener_as_seen(movement, valid, drive, scale)
-    rows = whitener.rows(np.where(valid, movement * scale, 0.0))
+def innovations(
+    moved: FloatArray, responses: FloatArray, valid: BoolArray, drive: IntArray, scale: FloatArray
+) -> FloatArray:
+    """Rows of `whitener_as_seen` of variance about 1, shape (n,), young runs by their own size; 0 where invalid.
+
+    `moved`, shape (n,): offset less levels [m]; `responses`, shape (n,): what columns did to it [m].
+    """
+    if np.any(responses):
+        responses = smoothed_as_seen(moved, responses, valid, drive, scale)
+    left = np.where(valid, moved - responses, 0.0)
+    whitener = whitener_as_seen(left / scale, valid, drive, scale)
+    rows = whitener.rows(left)
     return np.asarray(rows / whitener.by_position(start_factors(rows, valid, whitener.process.order)))
+
+
+def smoothed_as_seen(
+    moved: FloatArray, responses: FloatArray, valid: BoolArray, drive: IntArray, scale: FloatArray
+) -> FloatArray:
+    """Responses, shape (n,), through the filter of five seconds and gain one that leaves least of them. [m]
+
+    Least squares in the innovations of the movement with the responses in: a car and a provider of tracks smooth them,
+    and taken out with their edges they would put these *in*, where next to nothing moves.
+    """
+    whitener = whitener_as_seen(np.where(valid, moved / scale, 0.0), valid, drive, scale)
+    seconds = np.arange(len(responses))
+    shifted = [responses[np.clip(seconds - shift, 0, len(seconds) - 1)] for shift in SMOOTHING_S]
+    changes = np.stack(shifted, axis=1) - responses[:, None]
+    weights = np.linalg.lstsq(whitener.rows(changes), whitener.rows(moved - responses), rcond=None)[0]
+    return np.asarray(responses + changes @ weights)

@@ -41,8 +41,7 @@ IntArray = NDArray[np.intp]
 FLOOR = 0.03
 """White noise that the model of a drive has beside what it shows: no table knows the lane better (in the motorway
 recording the standard error of a lane's centre is 0.03 m; docs/real_data.md). Providers smooth their tracks, responses
-and all; without a floor an effect is sized where the smoothing left nothing of it. Sensitivity:
-docs/design/identification.md. [m]"""
+and all; without a floor an effect is sized where the smoothing left nothing of it. [m]"""
 
 CLUSTER_S = 60
 """Stretches of a drive that count as independent in the errors of sizes: far beyond what whitening leaves of the
@@ -218,7 +217,8 @@ class Fitted:
     def innovations(self) -> FloatArray:
         """Whitened by the movement as it is seen, without a floor: how large it is just now. Shape (n,), variance 1."""
         coarse = self.coarse
-        rows = innovations(self.movement, coarse.valid, coarse.drive, self.scale)
+        moved = coarse.offset - self.levels[coarse.drive]
+        rows = innovations(moved, self.columns @ self.sizes, coarse.valid, coarse.drive, self.scale)
         return _standardised(rows, coarse.valid, len(self.sizes))
 
     @property

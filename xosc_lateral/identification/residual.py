@@ -227,20 +227,10 @@ class GroupError:
 
 @dataclass(frozen=True, eq=False)
 class LackOfFit:
-    """What is left after the loop, beside the sampling error of what is measured.
+    """What is left after the loop, beside the sampling error of what is measured, in [m].
 
-    Parameters
-    ----------
-    floors : mapping of str to array
-        Standard error of every statistic. [m]
-    groups : tuple of GroupError
-        In the order of the statistics.
-    floor : float
-        Mean distance of half samples. [m]
-    unexplained : float
-        Part of the error after that the sampling error does not cover. [m]
-    p_value : float
-        Share of half samples that are as far off as the refined profile.
+    `floors`: standard error of every statistic; `floor`: mean distance of half samples; `unexplained`: part of the
+    error after that it does not cover; `p_value`: share of half samples that are as far off as the refined profile.
     """
 
     floors: Mapping[str, FloatArray]

@@ -1,4 +1,4 @@
-"""What stays the same while terms are looked for: columns, candidates before whitening, random streams."""
+"""What stays the same while terms are selected: columns, candidates before whitening, random streams."""
 
 from __future__ import annotations
 
@@ -45,10 +45,10 @@ class Search:
     budget : Budget
         How surely each component has to be found.
     progress : callable
-        Told what is being done, in a few words.
+        Gets what is being done, in a few words.
     wanted : mapping of str to int, optional
         How many terms a component has in the table that this is a part of: so many are added, best first, whatever
-        their p-values, and components that have none are not looked at. None: this is the table.
+        their p-values, and components that have none are not tested. None: this is the table.
     """
 
     coarse: Coarse
@@ -115,7 +115,7 @@ class Search:
         return there < self.wanted.get(component, 0)
 
     def asks(self, component: str) -> bool:
-        """Whether terms of a component are looked for."""
+        """Whether terms of a component are tested."""
         return self.wanted is None or component in self.wanted
 
     def rng(self, *key: int) -> np.random.Generator:

@@ -26,7 +26,7 @@ FINE_ORDER = 15
 
 SQUARES_S = 12
 """Past seconds of the squares that whitening sees: two time constants of the clusters of 6 s that are no regime. Beyond
-`ORDER`, as means. Sensitivity: docs/design/identification.md. [s]"""
+`ORDER`, as means. [s]"""
 
 SLOW_S = 8
 """Whitened seconds that are averaged for the slower movement: below 1/16 Hz. [s]"""

@@ -28,7 +28,7 @@ BoolArray = NDArray[np.bool_]
 IntArray = NDArray[np.intp]
 
 COARSE = 5
-"""Samples of the 0.2 s grid per sample of the coarse one: effects take seconds, so they are looked for at 1 Hz. [-]"""
+"""Samples of the 0.2 s grid per sample of the coarse one: effects take seconds, so they are tested at 1 Hz. [-]"""
 
 PAD = 75
 """Samples before and after each drive in which the context holds its outermost value: 15 s. [-]"""

@@ -64,10 +64,10 @@ def _ends(values: FloatArray) -> FloatArray:
 
 
 NEAR_S = 2.0
-"""Lags that differ from the estimate by up to this are looked at. [s]"""
+"""Lags that differ from the estimate by up to this are compared. [s]"""
 
 NEAR_SCALES = tuple(np.geomspace(0.5, 2.0, 21).tolist())
-"""Scales that are looked at, as shares of the estimate, 7 % apart: between two that refinement tries, 40 % apart, the
+"""Scales that are compared, as shares of the estimate, 7 % apart: between two that refinement tries, 40 % apart, the
 change from the usual to the near end differs by a third."""
 
 CHI_SQUARE = 3.84
@@ -79,7 +79,7 @@ def widening(fitted: Fitted, effect: ColumnEffect, part: slice) -> float:
 
     How far the profile-likelihood interval [1]_ of the change over the driving range reaches from the estimate with
     lag and time constant free, or the shape of its column, or the distances over which its product fades, over how far
-    it reaches with all of them told. The likelihood is that of independent rows, scaled to the variance that stretches
+    it reaches with all of them known. The likelihood is that of independent rows, scaled to the variance that stretches
     of a minute show [2]_.
 
     Parameters
@@ -103,8 +103,8 @@ def widening(fitted: Fitted, effect: ColumnEffect, part: slice) -> float:
     others, _ = np.linalg.qr(white(np.delete(fitted.columns, np.r_[part], axis=1)))
     left = _beside(others, white(fitted.coarse.offset))
     own = _beside(others, white(fitted.columns[:, part]))
-    told = _profile(own, left, contrast)
-    found = [told]
+    estimated = _profile(own, left, contrast)
+    found = [estimated]
     for response in _timed(fitted, effect):
         rows = _beside(others, white(response.reshape(len(response), -1)))
         width = len(contrast)
@@ -117,10 +117,10 @@ def widening(fitted: Fitted, effect: ColumnEffect, part: slice) -> float:
     gain, size, variance = np.asarray(found).T
     noise = float(left @ left - gain.max()) / max(1, int(fitted.coarse.valid.sum()))
     clustered = float(contrast @ fitted.covariance[part, part] @ contrast)
-    room = CHI_SQUARE * clustered / max(noise * told[2], 1e-300) - (gain.max() - gain) / noise
+    room = CHI_SQUARE * clustered / max(noise * estimated[2], 1e-300) - (gain.max() - gain) / noise
     inside = room > 0.0
     half = np.sqrt(noise * variance[inside] * room[inside])
-    reach = float(np.max(np.abs(size[inside] - told[1]) + half))
+    reach = float(np.max(np.abs(size[inside] - estimated[1]) + half))
     return float(max(1.0, reach / max(np.sqrt(CHI_SQUARE * clustered), 1e-300)))
 
 
@@ -153,8 +153,8 @@ def _timed(fitted: Fitted, effect: ColumnEffect) -> list[FloatArray]:
     step, finest = fitted.coarse.timeline.step, LAG_STEPS[-1]
     lags = effect.lag_s + np.arange(-NEAR_S, NEAR_S + 0.5 * finest, finest)
     late = [round(float(lag) / step) for lag in lags[np.abs(lags) <= LAG_LIMIT]]
-    bare = structs.replace(effect, lag_s=0.0, response_s=0.0, response_range=())
-    quantity = fitted.coarse.fine_response(bare)
+    still = structs.replace(effect, lag_s=0.0, response_s=0.0, response_range=())
+    quantity = fitted.coarse.fine_response(still)
     responses = []
     for response_s in FINE_RESPONSES:
         response = fitted.coarse.timeline.respond(quantity, 0.0, response_s)

@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from xosc_lateral.driver.effects import ColumnEffect
 from xosc_lateral.formats.hashes import parsed_hashes
 from xosc_lateral.formats.profiles import profile_hash
-from xosc_lateral.identification.close import LoopResult
-from xosc_lateral.identification.findings import Finding
+from xosc_lateral.identification.close import Finding, LoopResult
 from xosc_lateral.identification.held_out import SNIPPET_ROWS
 from xosc_lateral.identification.residual import GroupError
 from xosc_lateral.identification.selection import Rejected

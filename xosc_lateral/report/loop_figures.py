@@ -11,9 +11,8 @@ from numpy.typing import NDArray
 from xosc_lateral.driver.effects import Acts, ColumnEffect, Product
 from xosc_lateral.evaluation.metrics import METRICS
 from xosc_lateral.evaluation.spectra import gapped_spectrum
-from xosc_lateral.identification.close import LoopResult
+from xosc_lateral.identification.close import Finding, LoopResult
 from xosc_lateral.identification.cross_validation import hold_out_blocks
-from xosc_lateral.identification.findings import Finding
 from xosc_lateral.identification.held_out import Scorecard
 from xosc_lateral.mask import true_slices
 from xosc_lateral.report.figures import BLUE, GRID, MUTED, VERMILLION, figure_style, new_figure, new_panels

@@ -10,8 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.driver.effects import Cycle, Regimes, Step, TimeSmooth
-from xosc_lateral.identification.close import LoopResult
-from xosc_lateral.identification.findings import Finding
+from xosc_lateral.identification.close import Finding, LoopResult
 from xosc_lateral.report.figures import MUTED, ORANGE, figure_style, new_figure
 from xosc_lateral.report.loop_courses import (
     MovingStatistic,

@@ -11,9 +11,8 @@ from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.evaluation.distances import Distances
 from xosc_lateral.formats.hashes import parsed_hashes
 from xosc_lateral.formats.profiles import profile_hash
-from xosc_lateral.identification.close import LoopResult
+from xosc_lateral.identification.close import Finding, LoopResult
 from xosc_lateral.identification.feedback import Feedback
-from xosc_lateral.identification.findings import Finding
 from xosc_lateral.identification.selection import Gain
 from xosc_lateral.normal import NORMAL_95
 from xosc_lateral.report.loop_words import feedback_words, lack_of_fit_words, meaning
@@ -76,7 +75,7 @@ def _feedback(item: Feedback) -> dict[str, Any]:
         "why": feedback_words(item),
         "doubtful": item.doubtful,
         "coherence": item.coherence,
-        "foretold": item.predicted_share,
+        "predicted_share": item.predicted_share,
         "function_of_offset": item.function,
     }
 

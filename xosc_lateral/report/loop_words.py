@@ -9,9 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.driver.effects import Acts, Angular, ColumnEffect, Levels, Magnitude, Product
-from xosc_lateral.identification.close import LoopResult
+from xosc_lateral.identification.close import Finding, LoopResult
 from xosc_lateral.identification.feedback import BAND, FUNCTION, Feedback
-from xosc_lateral.identification.findings import Finding
 from xosc_lateral.identification.selection import Rejected
 from xosc_lateral.identification.timeline import LOCAL_S
 from xosc_lateral.segment import CONTEXT_UNITS
@@ -45,6 +44,7 @@ COMPONENT_WORDS: Mapping[str, str] = MappingProxyType(
         "between": "a column that goes with the mean offset of whole drives",
         "spread": "a column that changes the spread",
         "slow_spread": "a column that changes the spread of slow movement",
+        "fine_noise": "a column that changes the fine noise",
         "time_spread": "a spread that changes smoothly with time",
         "regimes": "regimes of small and large spread",
         "cycle": "a periodic oscillation",

@@ -7,8 +7,8 @@ import pytest
 
 from tests.identification.made_coarse import coarse_of, movement, wander
 from xosc_lateral.driver.effects import Acts, Linear
+from xosc_lateral.identification.held_out import estimate_all, removal_of
 from xosc_lateral.identification.regression import Coarse, fit_model
-from xosc_lateral.identification.removal import estimate_all, removal_of
 from xosc_lateral.identification.terms.base import Removal, centred
 from xosc_lateral.identification.terms.column import columns_on_size, of_kind, shrunk
 from xosc_lateral.identification.terms.mean import MeanTerm

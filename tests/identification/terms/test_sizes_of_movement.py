@@ -13,6 +13,7 @@ from xosc_lateral.identification.regression import Fitted, fit_model
 from xosc_lateral.identification.terms.column import ColumnTerm
 from xosc_lateral.identification.terms.mean import MeanTerm
 from xosc_lateral.identification.terms.spread import (
+    FineNoiseTerm,
     SlowSpreadTerm,
     SpreadTerm,
     fine_twin,
@@ -56,6 +57,14 @@ def test_fine_noise_that_stays_the_same_has_no_effect_of_its_own() -> None:
     assert len(found) == 1
 
 
+def test_a_camera_that_shakes_is_fine_noise_of_the_size_planted() -> None:
+    x, rng = column_of(5), np.random.default_rng(6)
+    offset = movement(rng, SECONDS, 8.0) + 0.1 * rng.normal(size=N) * np.exp(LOG_SIZE * x)
+    (fine,) = estimate(fit_model(coarse_of(offset, {"x": x}), (term(FineNoiseTerm),)))
+    assert fine.acts is Acts.FINE
+    assert fine.coefficients[0] == pytest.approx(LOG_SIZE, rel=0.2)  # the movement's own innovations dilute it a little
+
+
 def test_slow_movement_that_grows_is_sized_beside_quick_that_does_not() -> None:
     x, rng = column_of(7), np.random.default_rng(8)
     slow = lfilter(np.ones(40) / 40.0, [1.0], rng.normal(size=N)) * np.exp(LOG_SIZE * x)
@@ -97,6 +106,10 @@ def acting() -> Fitted:
 
 def test_a_column_acts_on_the_size_once(acting: Fitted) -> None:
     assert SpreadTerm.barred(acting) == SlowSpreadTerm.barred(acting) == {"s"}
+
+
+def test_what_acts_on_anything_is_no_fine_noise(acting: Fitted) -> None:
+    assert FineNoiseTerm.barred(acting) == {"m", "s"}
 
 
 def test_what_is_known_of_the_size_is_a_column_for_every_term_of_it(acting: Fitted) -> None:

@@ -23,7 +23,8 @@ FloatArray = NDArray[np.float64]
 class Stage(IntEnum):
     """When a term is tested. The mean comes first: a mean that is not known looks like a spread.
 
-    Regimes come after the spread, because they explain whatever comes in clusters.
+    Regimes come after the spread, because they explain whatever comes in clusters, and before what a regime's loud
+    stretches might be taken for.
     """
 
     MEAN = 1
@@ -31,7 +32,8 @@ class Stage(IntEnum):
     MEAN_AGAIN = 3
     SPREAD = 4
     REGIMES = 5
-    BETWEEN_DRIVES = 6
+    FINE_NOISE = 6
+    BETWEEN_DRIVES = 7
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,15 +100,12 @@ class Outcome:
         Family-wise over everything that the test tried.
     after : Fitted, optional
         Fit with the term, where the test has made it.
-    together : tuple of Term
-        Found with it, as one finding.
     """
 
     term: Term | None
     columns: tuple[str, ...]
     p_value: float
     after: Fitted | None = None
-    together: tuple[Term, ...] = ()
 
 
 class Term(ABC):

@@ -98,7 +98,7 @@ class ColumnTerm(Term):
         return np.asarray(response - response[coarse.valid].mean(axis=0))
 
     def sized(self, coarse: Coarse, acts: Acts, sizes: FloatArray, errors: FloatArray) -> ColumnEffect:
-        """The effect with its sizes, shrunk by how sure they are, bounded, neutral at its mean."""
+        """The effect with its sizes, shrunk by how sure they are, bounded, zero at its mean."""
         raw = coarse.fine_response(self.effect)[coarse.timeline.valid]
         usual, (low, high) = raw.mean(axis=0), self.ends(coarse)
         within = np.clip(raw, usual + low, usual + high)
@@ -125,5 +125,5 @@ def of_kind(fitted: Fitted, kind: type[ColumnTerm]) -> list[ColumnTerm]:
 
 def columns_on_size(fitted: Fitted) -> frozenset[str]:
     """Columns that act on the movement's size."""
-    terms = [term for term in fitted.terms if isinstance(term, ColumnTerm) and term.acts is Acts.SPREAD]
+    terms = [term for term in fitted.terms if isinstance(term, ColumnTerm) and term.acts is not Acts.LOCATION]
     return frozenset(name for term in terms for name in term.columns)

@@ -25,7 +25,7 @@ from xosc_lateral.identification.timeline import on_fine_grid
 FloatArray = NDArray[np.float64]
 
 PERIODS_S = (4.0, 60.0)
-"""Cycles that are looked for. [s]"""
+"""Periods that are tested. [s]"""
 
 WIDTHS = (1, 3, 7)
 """Neighbouring frequencies taken together: a cycle keeps its phase for the whole drive, or for a part. [-]"""

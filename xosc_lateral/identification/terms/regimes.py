@@ -132,20 +132,17 @@ def _fit(
 
 
 MEMORIES_S = (6.0, 15.0, 40.0)
-"""Lengths of regimes that are looked for. [s]"""
+"""Lengths of regimes that are tested. [s]"""
 
 CLUSTER_S = 15
 """Loudness that persists for up to this is how people steer, by a correction now and then and what it takes to settle,
-and no regime. Sensitivity: docs/design/identification.md. [s]"""
+and no regime. [s]"""
 
 SHORTEST_S = 12
 """Lags are compared from here on. [s]"""
 
-DRAWS = (400, 3600)
-"""Orders of the blocks that are the null; the second lot where the first leaves it open."""
-
-UNSURE = 0.05
-"""Larger p-values of the first lot are large enough, whatever the second would say. [-]"""
+DRAWS = 2000
+"""Orders of the blocks that are the null."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -165,7 +162,7 @@ class RegimesTerm(Term):
     fit: RegimeFit = field(repr=False)
 
     def known_scale(self, coarse: Coarse) -> FloatArray | None:
-        """As far as the regimes can be told, about its mean, shape (n,). [-]"""
+        """As far as the regimes are known, about its mean, shape (n,). [-]"""
         scale = self.fit.on * np.log(self.fit.factor)
         return np.asarray(scale - scale[coarse.valid].mean())
 
@@ -190,7 +187,7 @@ class RegimesTerm(Term):
         return Outcome(cls(fit_regimes(fitted.innovations, coarse.valid)), (), p_value)
 
     def estimate(self, fitted: Fitted) -> tuple[Effect, ...]:
-        """Regimes are told by the innovations; what they do to the movement itself may be more."""
+        """Regimes are found in the innovations; what they do to the movement itself may be more."""
         on = self.fit.on[:, None]
         # the fit holds the regimes' scale already; squares of its innovations say what is left of them
         fine = float(log_sizes(fine_squares(fitted), on)[0][0])
@@ -235,18 +232,12 @@ def probability_of_persistence(
     if known.shape[1]:
         basis = np.linalg.qr((known - known[valid].mean(axis=0)) * valid[:, None])[0]
         squares = squares - basis @ (basis.T @ squares)
-    inside, drawn = np.flatnonzero(valid), np.zeros(len(squares))
-    observed, null, p_value = float(_scores(squares, valid).max()), np.zeros(0), 1.0
-    for draws in DRAWS:
-        own = np.zeros(draws)
-        for draw in range(draws):
-            drawn[inside] = in_another_order(np.roll(squares[inside], rng.integers(CLUSTER_S)), CLUSTER_S, rng)
-            own[draw] = _scores(drawn, valid).max()
-        null = np.concatenate([null, own])
-        p_value = upper_tail(observed, null, tail_share=HEAVY_TAIL_SHARE, least_excess=0.0)
-        if p_value > UNSURE:
-            break
-    return p_value
+    inside, drawn, null = np.flatnonzero(valid), np.zeros(len(squares)), np.zeros(DRAWS)
+    for draw in range(DRAWS):
+        drawn[inside] = in_another_order(np.roll(squares[inside], rng.integers(CLUSTER_S)), CLUSTER_S, rng)
+        null[draw] = _scores(drawn, valid).max()
+    observed = float(_scores(squares, valid).max())
+    return upper_tail(observed, null, tail_share=HEAVY_TAIL_SHARE, least_excess=0.0)
 
 
 def _products(series: FloatArray, lags: NDArray[np.intp]) -> FloatArray:

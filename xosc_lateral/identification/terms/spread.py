@@ -103,20 +103,20 @@ def what_a_column_may_do(search: Search, fitted: Fitted) -> tuple[FloatArray, fl
 
 
 @dataclass(frozen=True, eq=False)
-class SlowSpreadTerm(SearchedTerm):
+class SlowSpreadTerm(SpreadTerm):
     """Log standard deviation of eight-second sums of the innovations by a column: of who lets more pass."""
 
     component: ClassVar[str] = "slow_spread"
-    kind: ClassVar[str] = "scale"
-    stages: ClassVar[tuple[Stage, ...]] = (Stage.SPREAD,)
     place: ClassVar[int] = 2
     weight: ClassVar[float] = 2.0
     seen_held_out: ClassVar[bool] = False
-    acts: ClassVar[Acts] = Acts.SPREAD
-    what: ClassVar[str] = "spread"
+
+    def scale_columns(self, coarse: Coarse) -> FloatArray:
+        """None: the innovations' own scale does not follow it."""
+        return np.zeros((len(coarse), 0))
 
     def size_columns(self, coarse: Coarse) -> FloatArray:
-        """The bounded response, although the innovations' own scale does not follow it."""
+        """The bounded response, shape (n, k). [unit of the quantity]"""
         return self.bounded(coarse)
 
     @classmethod
@@ -127,12 +127,44 @@ class SlowSpreadTerm(SearchedTerm):
         known = np.concatenate([known_log_scale(fitted), *moved], axis=1)
         return of_squares(coarse, squares, known)
 
-    @classmethod
-    def barred(cls, fitted: Fitted) -> frozenset[str]:
-        """Columns that act on the movement's size already."""
-        return columns_on_size(fitted)
-
     def estimate(self, fitted: Fitted) -> tuple[Effect, ...]:
         """Neighbouring sums overlap, so errors are wider."""
         sizes, errors = log_sizes(slow_squares(fitted), self.bounded(fitted.coarse))
         return (self.sized(fitted.coarse, Acts.SPREAD, sizes, errors * np.sqrt(SLOW_S)),)
+
+
+@dataclass(frozen=True, eq=False)
+class FineNoiseTerm(SearchedTerm):
+    """Log standard deviation of the innovations at 5 Hz by a column: five times as many squares as by the second."""
+
+    component: ClassVar[str] = "fine_noise"
+    kind: ClassVar[str] = "scale"
+    stages: ClassVar[tuple[Stage, ...]] = (Stage.FINE_NOISE,)
+    weight: ClassVar[float] = 1.0
+    seen_held_out: ClassVar[bool] = False
+    acts: ClassVar[Acts] = Acts.FINE
+    what: ClassVar[str] = "fine noise"
+
+    @classmethod
+    def problem(cls, fitted: Fitted) -> Problem:
+        """Squared innovations at 5 Hz.
+
+        An effect on the mean is followed with errors: they grow with it where its size is a little wrong, and with its
+        rate of change where its timing is.
+        """
+        coarse = fitted.coarse
+        own = [coarse.response(term.effect, keep=True) for term in of_kind(fitted, cls)]
+        moved = [coarse.response(term.effect, keep=True) for term in of_kind(fitted, MeanTerm)]
+        errors = [np.abs(one) for shift in moved for one in (shift, np.gradient(shift, axis=0))]
+        known = np.concatenate([known_log_scale(fitted), *own, *errors], axis=1)
+        return of_squares(coarse, fine_squares(fitted), known)
+
+    @classmethod
+    def barred(cls, fitted: Fitted) -> frozenset[str]:
+        """What acts within drives already: what its shape leaves of itself looks like noise."""
+        terms = [term for term in fitted.terms if isinstance(term, ColumnTerm) and term.component != "between"]
+        return frozenset(name for term in terms for name in term.columns)
+
+    def estimate(self, fitted: Fitted) -> tuple[Effect, ...]:
+        """Log-linear regression of the squares."""
+        return (fine_twin(self, fitted),)

@@ -153,7 +153,7 @@ class TimeMeanTerm(Term):
 
     @classmethod
     def test(cls, search: Search, fitted: Fitted) -> Outcome | None:
-        """Nothing of its own: a step is looked for at the same time."""
+        """Nothing of its own: a step is tested at the same time."""
         return None
 
     def probability_beside(self, search: Search, fitted: Fitted) -> float:
@@ -288,7 +288,7 @@ def _is_step(fitted: Fitted, step: StepTerm, order: int) -> bool:
 
 
 def probability_of_mean(search: Search, fitted: Fitted) -> float:
-    """p-value of a smooth or a step of the mean; 1 where none is looked for."""
+    """p-value of a smooth or a step of the mean; 1 where none is tested."""
     test = StepTerm.test(search, fitted)
     return 1.0 if test is None else test.p_value
 
