@@ -85,6 +85,7 @@ refined: $(STAMP) $(WHEEL)
 # The README's picture, and CONTRIBUTING's map of the imports.
 picture: $(STAMP)
 	$(BIN)/python docs/figures/lifelike.py
+	$(BIN)/python docs/figures/osi.py
 
 map: $(DEV_STAMP)
 	PYTHONPATH=. $(BIN)/python docs/figures/map.py

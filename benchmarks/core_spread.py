@@ -23,7 +23,7 @@ from tests.profiles import as_drive
 from xosc_lateral.datasets import simulate_drive
 from xosc_lateral.driver.models.autoregressive import fit as fitting
 from xosc_lateral.driver.models.autoregressive import fit_coarse
-from xosc_lateral.driver.models.autoregressive.autoregression import Autoregression, stabilise
+from xosc_lateral.driver.models.autoregressive.coarse import Autoregression, stabilise
 from xosc_lateral.driver.models.autoregressive.fit_coarse import fit_autoregression
 from xosc_lateral.driver.models.autoregressive.fit_matching import simulate
 from xosc_lateral.driver.models.autoregressive.model import AutoregressiveModel

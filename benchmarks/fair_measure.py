@@ -18,7 +18,7 @@ import numpy as np
 
 from benchmarks.markers import show
 from xosc_lateral.driver.fitting import fit_profile
-from xosc_lateral.driver.models.kinds import ModelKind
+from xosc_lateral.driver.models.base import ModelKind
 from xosc_lateral.drives.cuts import all_runs
 from xosc_lateral.drives.drive import Drive
 from xosc_lateral.evaluation.realism import ConditionScores, Realism, score_realism

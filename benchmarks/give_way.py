@@ -2,8 +2,8 @@
 
     python -m benchmarks.give_way WHEEL [--profile motorway motorway-refined] [--seeds 12] [--write PAGE.md]
 
-Then those that profiles leave which are sampled under the context of the same vehicles, nobody giving way (`HEEDED`, of
-`motorway`), and with the law by which `convert` makes them.
+Then those that profiles leave which are sampled under the context of the same vehicles, nobody giving way
+(`RESPONDING`, of `motorway`), and with the law by which `convert` makes them.
 """
 
 from __future__ import annotations
@@ -101,8 +101,11 @@ def main() -> None:
     for name in args.profile:
         profile = read_profile(name)
         gaps = sampled_gaps(profile, args.wheel, pairs, args.seeds).ravel()
-        heeded = bool(NEIGHBOURS & set(profile.columns))
-        columns |= {f"`{profile.name}`": gaps, f"`{profile.name}`, giving way": gaps + wider(gaps, heeded=heeded)}
+        responding = bool(NEIGHBOURS & set(profile.columns))
+        columns |= {
+            f"`{profile.name}`": gaps,
+            f"`{profile.name}`, giving way": gaps + wider(gaps, responding=responding),
+        }
     encounters = real.groupby([pairs["vehicle"], pairs["vehicle_left"]]).min()
     lines = [f"| quantile | {' | '.join(columns)} |", "|---" * (1 + len(columns)) + "|"]
     for quantile in QUANTILES:

@@ -22,10 +22,9 @@ from numpy.typing import NDArray
 
 from benchmarks.comparison import driver_distances
 from benchmarks.refined import NOTES, refine_population, refined_profile
-from xosc_lateral.driver.beside import POPULATION as ANSWERS
 from xosc_lateral.driver.fitting import fit_population, fit_runs
-from xosc_lateral.driver.profile import DriverProfile
-from xosc_lateral.driver.provenance import Metadata, Provenance
+from xosc_lateral.driver.profile import POPULATION as ANSWERS
+from xosc_lateral.driver.profile import DriverProfile, Metadata, Provenance
 from xosc_lateral.driver.sensor.model import SensorModel
 from xosc_lateral.driver.sensor.runs import driver_runs
 from xosc_lateral.drives.cuts import all_runs

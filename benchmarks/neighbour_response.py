@@ -17,8 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.markers import show
+from xosc_lateral.driver.answers import NEIGHBOURS
 from xosc_lateral.driver.effects import Acts, Proximity
-from xosc_lateral.driver.neighbours import NEIGHBOURS
 from xosc_lateral.drives.cuts import all_runs
 from xosc_lateral.drives.drive import Run
 from xosc_lateral.drives.resampling import STEP

@@ -26,7 +26,7 @@ import xosc_lateral as xl
 from benchmarks import agreement
 from xosc_lateral.formats.importers import dlr_ht
 from xosc_lateral.formats.recordings import RecordedTraffic, read_recording
-from xosc_lateral.motion.nominal import Activity
+from xosc_lateral.motion.nominal import Activity, NominalMotion
 from xosc_lateral.pipeline.load import play_scenario
 from xosc_lateral.pipeline.reconstruct import Reconstructed, ReconstructSettings, drivers_table, reconstruct_recording
 
@@ -172,16 +172,42 @@ def round_trip(scenario: Path) -> str:
         made = xl.reconstruct(states, Path(folder) / "again", road=road)
         again = xl.play(Path(folder) / "again/states.xosc")
     rows, others = played.to_frame(), again.to_frame()
-    names = {row["recorded_as"]: row["entity"] for row in made.to_dict()["vehicles"]}
-    away = []
+    facts = made.to_dict()
+    names = {row["recorded_as"]: row["entity"] for row in facts["vehicles"]}
+    worst, away = ("", 1.0), []
     for name, entity in names.items():
         one, other = rows[rows["name"] == name], others[others["name"] == entity]
         both = one.merge(other, on="time", suffixes=("", "_again"))
-        away.append(np.hypot(both["x"] - both["x_again"], both["y"] - both["y_again"]))
-    within = float((np.concatenate(away) <= 0.2).mean())
-    kinds = [type(one.action.content).__name__ for one in played._played.motion.actions if one.path != ("Init",)]
-    wanted = sum(kind in ("LaneChangeAction", "LaneOffsetAction") for kind in kinds)
-    return f"| {scenario.stem} | {len(names)} | {within:.3f} | {wanted} | {len(made.to_dict()['maneuvers'])} |"
+        near = np.hypot(both["x"] - both["x_again"], both["y"] - both["y_again"]).to_numpy() <= 0.2
+        worst = min(worst, (name, float(near.mean())), key=lambda each: each[1])
+        away.append(near)
+    wanted = {name: word for name in names if (word := _moved(played._played.motion, name))}
+    found = dict[str, str]()
+    for row in facts["maneuvers"]:
+        name = next(name for name, entity in names.items() if entity == row["entity"])
+        found[name] = found.get(name, "") + ("c" if row["kind"] == "lane change" else "o")
+    within = float(np.concatenate(away).mean())
+    good = "yes" if within >= 0.95 and wanted == found else "no"
+    left = len(set(rows["name"])) - len(names)
+    return (
+        f"| {scenario.stem} | {good} | {len(names)} (+{left}) | {within:.3f} | {worst[0]} {worst[1]:.2f} | "
+        f"{wanted or ''} | {found or ''} |"
+    )
+
+
+def _moved(motion: NominalMotion, name: str) -> str:
+    """Lane changes and offsets of an entity that move it, in order: c and o."""
+    entity = next(one for one in motion.entities if one.name == name)
+    word = ""
+    for one in sorted((each for each in motion.actions if each.actor == name), key=lambda each: each.start):
+        kind = type(one.action.content).__name__
+        if kind in ("LaneChangeAction", "LaneOffsetAction") and one.path != ("Init",):
+            end = motion.end_time if one.end is None else one.end
+            first, last = (int(np.searchsorted(entity.time, time - 1e-6)) for time in (one.start, end))
+            offset = entity.offset[first : min(last, len(entity.time) - 1) + 1]
+            if np.ptp(offset) > 0.02:
+                word += "c" if kind == "LaneChangeAction" else "o"
+    return word
 
 
 def main() -> None:
@@ -195,7 +221,7 @@ def main() -> None:
         try:
             print(round_trip(scenario), flush=True)
         except xl.XoscLateralError as error:
-            print(f"| {scenario.stem} | {' '.join(str(error).split())[:100]} | | | |", flush=True)
+            print(f"| {scenario.stem} | {' '.join(str(error).split())[:150]} | | | | | |", flush=True)
     if args.source is None:
         return
     traffic = read_recording(args.source)

@@ -8,9 +8,8 @@ from msgspec.structs import replace
 
 from benchmarks.rounding import rounded_effect, rounded_number
 from xosc_lateral.driver.fitting import fit_profile
-from xosc_lateral.driver.models.kinds import ModelKind
-from xosc_lateral.driver.profile import DriverProfile
-from xosc_lateral.driver.provenance import Provenance
+from xosc_lateral.driver.models.base import ModelKind
+from xosc_lateral.driver.profile import DriverProfile, Provenance
 from xosc_lateral.drives.drive import Drive
 from xosc_lateral.identification.close import LoopResult, close_loop
 

@@ -32,7 +32,7 @@ from xosc_lateral.enrich.enrich import enrich
 from xosc_lateral.enrich.result import Enriched
 from xosc_lateral.evaluation.filters import below_half_hertz
 from xosc_lateral.evaluation.snippets import Snippets, snippets_of
-from xosc_lateral.formats.profiles import find_profile, read_profile
+from xosc_lateral.formats.profiles import read_profile
 from xosc_lateral.formats.recordings import read_recording
 from xosc_lateral.motion.nominal import Activity
 from xosc_lateral.pipeline.load import Played, play_scenario
@@ -64,7 +64,7 @@ def twins_of(source: Path, begin: float, variants: int) -> Twins:
     with tempfile.TemporaryDirectory() as folder:
         played = play_scenario(write(made, Path(folder)))
     chosen = {plan.name: one.profile for plan, one in zip(made.plans, made.drivers, strict=True) if one.profile}
-    profiles = {name: read_profile(find_profile(name, ())) for name in set(chosen.values())}
+    profiles = {name: read_profile(name) for name in set(chosen.values())}
     drivers = {name: profiles[profile] for name, profile in chosen.items()}
     made_up = [enrich(played.motion, played.network, drivers, seed=1, variant=k) for k in range(variants)]
     return Twins(made, played, made_up)

@@ -28,6 +28,7 @@ def main(folder: Path) -> None:
         # your ego: SE_ReportObjectRoadPos, SE_ReportObjectSpeed
         traffic.steer(0.01)
         esmini.SE_StepDT(0.01)
+        traffic.settle(0.01)
     for name, state in traffic.states().items():
         print(f"{name}: {traffic.offset_of(state):+.3f} m from the lane's centre")
     esmini.SE_Close()

@@ -30,7 +30,7 @@ def main(folder: Path) -> None:
     program = Path(sumo.SUMO_HOME) / "bin" / "netconvert"
     subprocess.run([program, "-n", "road.nod.xml", "-e", "road.edg.xml", "-o", "road.net.xml"], cwd=folder, check=True)
     words = ["-n", str(folder / "road.net.xml"), "-r", str(folder / "road.rou.xml"), "--step-length", "0.1"]
-    libsumo.start(["sumo", *words, "--lateral-resolution", "0.25", "--no-step-log"])
+    libsumo.start(["sumo", *words, "--lateral-resolution", "4", "--no-step-log"])
     traffic = xl.SumoTraffic(libsumo, xl.read_profile("motorway"), seed=1)
     for _ in range(200):
         traffic.steer()

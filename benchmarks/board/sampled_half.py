@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from benchmarks.board.half import DRAWS, ENSEMBLE, Half
 from benchmarks.board.models.base import LateralModel
-from xosc_lateral.driver.snippets import segment_of
+from xosc_lateral.driver.sampled_offsets import segment_of
 from xosc_lateral.drives.resampling import STEP
 from xosc_lateral.evaluation.measures import Features, features_of
 from xosc_lateral.evaluation.parts import SnippetCondition

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import warnings
 from pathlib import Path
 
 import numpy as np
@@ -11,9 +12,10 @@ import pytest
 from lxml import etree
 
 import xosc_lateral as xl
-from tests.formats.test_importers_tracks import WIDTH, driven, two_lanes_each_way, world
+from tests.formats.test_importers_tracks import WIDTH, commonroad_scenario, driven, two_lanes_each_way, world
 from xosc_lateral.cli import main
 from xosc_lateral.errors import FormatError, NotEnoughDataError
+from xosc_lateral.formats.opendrive.write import WrittenLane, WrittenRoad
 
 XSD = Path(__file__).resolve().parents[1] / "data/xsd/OpenSCENARIO-1.2.0.xsd"
 
@@ -47,7 +49,7 @@ def tracks(folder: Path) -> Path:
     return path
 
 
-COLUMNS = ("heading=psi_deg:deg",)
+COLUMNS = {"heading": "psi_deg:deg"}
 
 
 def placed(scenario: Path, step: float = 0.02) -> dict[str, pd.DataFrame]:
@@ -191,16 +193,47 @@ def test_bad_vehicles_are_named_and_left_out(tracks, road, tmp_path):
     gap = table[(table["id"] == "C") & ((table["time"] < 10.0) | (table["time"] > 15.0))].assign(id="gap")
     leap = table[table["id"] == "B"].assign(id="leap")
     leap.loc[leap["time"] > 30.0, "x"] += 300.0
+    a = table[table["id"] == "A"]
+    x, y = world(np.full(len(a), 500.0), -8.0 + 0.5 * a["time"].to_numpy())
+    on_foot = a.assign(id="on_foot", x=x, y=y)
+    s = 900.0 + 10.0 * np.minimum(a["time"], 20.0) - 5.0 * np.maximum(a["time"] - 20.0, 0.0)
+    x, y = world(s.to_numpy(), np.full(len(a), -0.5 * WIDTH))
+    back = a.assign(id="back", x=x, y=y)
+    x, y = world(28.0 * a["time"].to_numpy(), np.where(a["time"] < 12.0, -0.5, -1.5) * WIDTH)
+    aside = a.assign(id="aside", x=x, y=y)
+    x, y = world(np.where(a["time"] < 20.0, 600.0, 604.0), np.full(len(a), -0.5 * WIDTH))
+    stood = a.assign(id="stood", x=x, y=y)
     path = tmp_path / "bad.csv"
-    pd.concat([table[table["id"] == "A"], one, beside, gap, leap]).to_csv(path, index=False)
+    pd.concat([a, one, beside, gap, leap, on_foot, back, aside, stood]).to_csv(path, index=False)
     made = xl.reconstruct(path, tmp_path / "out", road=road, columns=COLUMNS)
     said = "\n".join(made.left_out)
-    assert all(f"{name}:" in said for name in ("once", "beside", "gap", "leap"))
+    assert all(f"{name}:" in said for name in ("once", "beside", "gap", "leap", "on_foot", "back", "aside", "stood"))
     rows = {row["entity"]: row for row in made.to_dict()["vehicles"]}
-    assert set(rows) == {"A", "gap", "leap"}
+    assert set(rows) == {"A", "gap", "leap", "back", "aside", "stood"}
+    assert rows["back"]["to"] == pytest.approx(20.1, abs=0.11)
+    assert (rows["aside"]["from"], rows["aside"]["lane_changes"]) == (12.0, 0)
     assert rows["gap"]["from"] >= 15.0
     assert rows["leap"]["to"] <= 30.1
     placed(tmp_path / "out/bad.xosc")
+
+
+def test_numbers_that_no_vehicle_has_are_named_or_passed_over(tracks, road, tmp_path):
+    table = pd.read_csv(tracks)
+    rows = table[table["id"].isin(["A", "B", "C"]) & (table["time"] < 12.0)].assign(length=4.5, width=1.8)
+    rows.loc[rows["id"] == "B", "length"] = -3.0
+    rows.loc[rows["id"] == "C", "width"] = np.nan
+    for row, column, value in ((20, "x", np.inf), (30, "y", 1e300), (40, "time", -np.inf), (50, "psi_deg", np.nan)):
+        rows.iloc[row, rows.columns.get_loc(column)] = value
+    path = tmp_path / "odd.csv"
+    rows.to_csv(path, index=False)
+    made = xl.reconstruct(path, tmp_path / "out", road=road, columns=COLUMNS)
+    said = "\n".join(made.to_dict()["not_expressed"])
+    assert "B: no vehicle has -3 m x 1.8 m" in said
+    assert "C: no vehicle has 4.5 m x nan m" in said
+    assert set(placed(tmp_path / "out/odd.xosc")) == {"A", "B", "C"}
+    rows.assign(time=1e6 * rows["time"]).to_csv(path, index=False)
+    with pytest.raises(FormatError, match="--from and --to"):
+        xl.reconstruct(path, road=road, columns=COLUMNS)
 
 
 @pytest.mark.parametrize(
@@ -235,7 +268,7 @@ def test_the_verb_refuses_in_one_line_and_writes_nothing(tracks, tmp_path, capsy
 def test_json_is_what_its_schema_says(tracks, road, tmp_path, capsys):
     from jsonschema import Draft202012Validator
 
-    words = ["--road", str(road), "--map", COLUMNS[0], "--to", "20", "-o", str(tmp_path), "--json"]
+    words = ["--road", str(road), "--map", "heading=psi_deg:deg", "--to", "20", "-o", str(tmp_path), "--json"]
     assert main(["reconstruct", str(tracks), *words]) == 0
     schema = json.loads((XSD.parents[3] / "docs/schemas/reconstruct.json").read_text())
     Draft202012Validator(schema).validate(json.loads(capsys.readouterr().out))
@@ -259,3 +292,70 @@ def test_highd_gets_its_road_from_its_markings(tmp_path):
     assert one["y"].to_numpy() == pytest.approx(-25.6, abs=1e-3)  # 0.4 m to the left of y = 26, which points down
     assert other["y"].to_numpy() == pytest.approx(-9.7, abs=1e-3)  # 0.3 m to the right, driving towards -x
     assert (one["x"].iloc[-1] - one["x"].iloc[0]) > 500 > 0 > (other["x"].iloc[-1] - other["x"].iloc[0])
+
+
+def test_a_saved_mapping_says_the_same_as_its_words(tracks, road, tmp_path):
+    saved = tmp_path / "company.toml"
+    saved.write_text('[columns]\nheading = "psi_deg:deg"\n')
+    for word, options in (("file", ["--mapping", str(saved)]), ("words", ["--map", "heading=psi_deg:deg"])):
+        out = ["-o", str(tmp_path / word), "--to", "10", "-q"]
+        assert main(["reconstruct", str(tracks), "--road", str(road), *options, *out]) == 0
+    one, other = (tmp_path / word / "tracks.xosc" for word in ("file", "words"))
+    assert one.read_bytes() == other.read_bytes()
+
+
+def test_an_osi_trace_of_a_played_scenario_gives_it_back(tmp_path):
+    pytest.importorskip("osi_utilities", reason="extra `osi` is not installed")
+    scenario, road = xl.write_template("cut-in", tmp_path / "first")
+    trace = tmp_path / "trace.osi"
+    assert main(["play", str(scenario), "--osi", str(trace), "-q"]) == 0
+    made = xl.reconstruct(trace, tmp_path / "again", road=road)
+    assert [(row["entity"], row["kind"], row["side"]) for row in made.to_dict()["maneuvers"]] == [
+        ("CutIn", "lane change", "right")
+    ]
+    before, after = placed(scenario), placed(tmp_path / "again/trace.xosc")
+    for name, rows in before.items():
+        away = np.hypot(rows["x"] - after[name]["x"], rows["y"] - after[name]["y"])
+        assert away.max() < 0.01, name
+
+
+@pytest.mark.filterwarnings("default")
+def test_commonroad_obstacles_drive_on_a_given_road(tmp_path):
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        pytest.importorskip("commonroad", reason="extra `commonroad` is not installed")
+    path = commonroad_scenario(tmp_path)
+    road = bent_road(tmp_path, 0.0, 2 * WIDTH, WIDTH)
+    made = xl.reconstruct(path, tmp_path / "out", road=road, host="32")
+    vehicles = {row["recorded_as"]: (row["class"], row["lane_changes"]) for row in made.to_dict()["vehicles"]}
+    assert vehicles == {"31": ("car", 0), "32": ("truck", 0)}
+    rows = placed(tmp_path / "out/made.xosc")
+    assert {name: int(one["lane"].iloc[0]) for name, one in rows.items()} == {"V31": -2, "V32": -1}
+    assert rows["V32"]["x"].iloc[-1] - rows["V32"]["x"].iloc[0] == pytest.approx(30.0 * 39.9, abs=0.5)
+
+
+def test_exid_drives_on_the_road_that_is_given_with_it(tmp_path):
+    from tests.formats.test_importers import _exid
+
+    _exid(tmp_path, True)
+    with pytest.raises(FormatError, match="--road"):
+        xl.reconstruct(tmp_path)
+    road = bent_road(tmp_path, 1.0 / (1500.0 - 5.4), 5.4, 3.6)
+    made = xl.reconstruct(tmp_path, tmp_path / "out", road=road)
+    facts = made.to_dict()
+    assert {row["recorded_as"]: row["class"] for row in facts["vehicles"]} == {"5": "car", "9": "truck"}
+    (change,) = facts["maneuvers"]
+    assert (change["entity"], change["side"], change["lanes"]) == ("V5", "left", 1)
+    # a logistic of scale 0.8 s about 22 s has done 10 and 90 % of its way within 1.76 s
+    assert change["start"] < 22.0 - 1.76 < 22.0 + 1.76 < change["start"] + change["duration"]
+    assert facts["summary"]["along_p95"] < 0.2
+
+
+def bent_road(folder: Path, curvature: float, y: float, width: float) -> Path:
+    """Two lanes to the right of a line from (0, y) on."""
+    lanes = [WrittenLane.even("driving", width), WrittenLane.even("driving", width)]
+    plan = np.array([[0.0, 0.0, y, 0.0, 1600.0]])
+    text = WrittenRoad("bent", plan, [], lanes).to_xml()
+    path = folder / "bent.xodr"
+    path.write_text(text.replace("<line/>", f'<arc curvature="{curvature!r}"/>') if curvature else text)
+    return path

@@ -37,6 +37,7 @@ RUN = (
     "how_to/importer.md",
     "how_to/carla.md",
     "how_to/esmini.md",
+    "how_to/from_a_recording.md",
     "how_to/osi.md",
     "pipeline.md",
     "api.md",

@@ -9,11 +9,10 @@ import pytest
 
 from tests.motion.made_motion import LANE_WIDTH, drive, entity, together, two_roads
 from tests.profiles import simulated_profile
-from xosc_lateral.driver.answers import basis_of, measure_beside
-from xosc_lateral.driver.beside import Basis, Beside
+from xosc_lateral.driver.answers import LAG, ORDER, RESPONSE, SCALE, basis_of, measure_beside
 from xosc_lateral.driver.effects import Acts, Proximity
 from xosc_lateral.driver.fitting import fit_population
-from xosc_lateral.driver.neighbours import LAG, ORDER, RESPONSE, SCALE
+from xosc_lateral.driver.profile import Basis, Beside
 from xosc_lateral.drives.drive import Run
 from xosc_lateral.enrich.enrich import enrich
 from xosc_lateral.enrich.result import Neighbours

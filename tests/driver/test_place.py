@@ -6,16 +6,15 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from xosc_lateral.driver.zone_levels import LEAST_DRIVES
 
 from tests.benchmarks.models.made_runs import made_run, smooth_runs
+from xosc_lateral.driver.answers import SCALE
 from xosc_lateral.driver.effects import Acts, Linear
 from xosc_lateral.driver.fitting import fit_population, fit_profile
-from xosc_lateral.driver.models.autoregressive.filters import split_bands
-from xosc_lateral.driver.neighbours import SCALE
-from xosc_lateral.driver.place import _shrunk, fit_place, without_place
+from xosc_lateral.driver.models.autoregressive.coarse import split_bands
+from xosc_lateral.driver.place import LEAST_DRIVES, _shrunk, fit_place, without_place
+from xosc_lateral.driver.sampled_offsets import segment_of
 from xosc_lateral.driver.sampling import sample_offsets
-from xosc_lateral.driver.snippets import segment_of
 from xosc_lateral.drives.cuts import CutRules
 from xosc_lateral.drives.drive import Drive, Run
 from xosc_lateral.errors import DriverProfileError, NotEnoughDataError

@@ -165,12 +165,12 @@ def test_without_the_plug_in_its_kinds_are_unknown(installed: dict[str, list[Ent
         points.clear()
     forget()
     with pytest.raises(
-        FormatError, match=r"p\.json: model: unknown kind 'white'; known are two-level, autoregressive$"
+        FormatError, match=r"p\.json: model: unknown kind 'white'; known are autoregressive, two-level$"
     ):
         read_profile(tmp_path / "p.json")
     write_profile(replace(make_profile(), name="x"), tmp_path / "x.json")
     assert read_profile(tmp_path / "x.json").name == "x"
-    with pytest.raises(DriverProfileError, match="no core model 'white'; known are two-level, autoregressive"):
+    with pytest.raises(DriverProfileError, match="no core model 'white'; known are autoregressive, two-level"):
         fit_core([np.zeros(100)], ["a"], model="white")
 
 

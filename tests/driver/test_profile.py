@@ -11,8 +11,14 @@ from msgspec.structs import replace
 
 from tests.driver.models.made_models import POPULATION
 from xosc_lateral.driver.effects import Acts, Drift, Linear
-from xosc_lateral.driver.profile import MAX_LANE_WIDTH, DriverProfile, profile_schema, sampling_hash
-from xosc_lateral.driver.provenance import Metadata, Provenance
+from xosc_lateral.driver.profile import (
+    MAX_LANE_WIDTH,
+    DriverProfile,
+    Metadata,
+    Provenance,
+    profile_schema,
+    sampling_hash,
+)
 from xosc_lateral.driver.sensor.model import SensorModel
 from xosc_lateral.errors import DriverProfileError
 

@@ -7,8 +7,7 @@ import pytest
 
 from tests.profiles import as_drive, simulated_profile
 from xosc_lateral.datasets import simulate_drive
-from xosc_lateral.driver.sampled_offsets import sample_context, sample_free, sample_like
-from xosc_lateral.driver.snippets import cut_snippets
+from xosc_lateral.driver.sampled_offsets import cut_snippets, sample_context, sample_free, sample_like
 from xosc_lateral.drives.cuts import all_runs
 from xosc_lateral.drives.drive import Drive
 from xosc_lateral.errors import NotEnoughDataError

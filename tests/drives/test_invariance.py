@@ -10,7 +10,7 @@ import pytest
 from tests.drives.test_drives import drive, jittered
 from xosc_lateral.drives.cuts import cut_runs
 from xosc_lateral.drives.drive import Drive, Run
-from xosc_lateral.drives.resampling import STEP, average, nearest, passed, resample
+from xosc_lateral.drives.resampling import STEP, average, nearest, resample
 
 
 @pytest.fixture(scope="module")
@@ -85,15 +85,6 @@ def test_a_path_driven_backwards_in_time_is_resampled_backwards():
     forth = resample(time, values, grid)
     back = resample(-time[::-1], values[::-1], -grid[::-1])[::-1]
     assert back == pytest.approx(forth, abs=1e-9)
-
-
-@pytest.mark.parametrize("frequency", [0.3, 1.2, 1.8, 2.2])
-def test_the_gain_that_is_stated_is_the_gain_that_a_wave_gets(frequency):
-    time, grid = np.arange(0.0, 200.0, 0.025), np.arange(10.0, 190.0, STEP)
-    found = resample(time, np.cos(2.0 * np.pi * frequency * time), grid)
-    gain = 2.0 * np.mean(found * np.cos(2.0 * np.pi * frequency * grid))
-    assert gain == pytest.approx(float(passed(np.array([frequency]))[0]), abs=0.01)
-    assert passed(np.array([2.6])).tolist() == [0.0]
 
 
 def test_averages_of_a_context_lie_between_its_values_and_are_linear():

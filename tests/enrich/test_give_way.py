@@ -10,7 +10,7 @@ import pytest
 from tests.motion.made_motion import LANE_WIDTH, drive, entity, together, two_roads
 from tests.profiles import simulated_profile
 from xosc_lateral.enrich.enrich import enrich
-from xosc_lateral.enrich.give_way import GAPS, HEEDED, OVERTAKING_SHARE, SampledVehicle, give_way
+from xosc_lateral.enrich.give_way import GAPS, OVERTAKING_SHARE, RESPONDING, SampledVehicle, give_way
 
 ROWS = np.arange(0, 501, 10)
 
@@ -65,7 +65,7 @@ def test_whoever_can_not_move_leaves_it_to_the_other(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("side", ["left", "right"])
 @pytest.mark.parametrize("gap", [0.3, 1.5])
-def test_where_a_profile_heeds_somebody_by_itself_the_law_adds_what_that_leaves(
+def test_where_a_profile_responds_to_somebody_by_itself_the_law_adds_what_that_leaves(
     tmp_path: Path, side: str, gap: float
 ) -> None:
     network = two_roads(tmp_path)
@@ -78,7 +78,7 @@ def test_where_a_profile_heeds_somebody_by_itself_the_law_adds_what_that_leaves(
         )
     ]
     right, left = give_way(together(*(one.motion for one in sampled)), network, sampled, ROWS)
-    by_law, after = (float(np.interp(gap, known, GAPS[1])) - gap for known in (GAPS[0], HEEDED))
+    by_law, after = (float(np.interp(gap, known, GAPS[1])) - gap for known in (GAPS[0], RESPONDING))
     assert 0.0 < after < by_law
     assert left is not None
     if side == "left":  # who is overtaken has done its part

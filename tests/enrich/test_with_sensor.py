@@ -12,7 +12,7 @@ from msgspec.structs import replace
 from xosc_lateral.api.convert import convert
 from xosc_lateral.cli import main
 from xosc_lateral.driver.profile import DriverProfile
-from xosc_lateral.driver.sensor.error import known_sensor, sensor_error
+from xosc_lateral.driver.sampled_offsets import known_sensor, sensor_error
 from xosc_lateral.driver.sensor.model import SensorModel
 from xosc_lateral.errors import DriverProfileError
 from xosc_lateral.formats.openscenario.provenance import MARK

@@ -36,3 +36,13 @@ def test_the_text_is_what_elements_would_be(motion: bool) -> None:
     again = etree.fromstring(whole)
     etree.indent(again, "   ")
     assert build.document(again) == whole
+
+
+def test_many_numbers_become_the_same_text_as_one_by_one():
+    digits = (6, 5, 4)
+    values = np.random.default_rng(1).normal(scale=10.0, size=(200, 3)).round(2)
+    values[0] = 0.0, -0.0, 100.0
+    values[1] = -1e-9, 120000.0, -5.0
+    expected = tuple(build.decimal(row[k], count) for row in values.tolist() for k, count in enumerate(digits))
+    assert build.decimals(values, digits) == expected
+    assert build.decimals(np.empty((3, 0)), ()) == ()

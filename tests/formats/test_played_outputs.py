@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 import pytest
 from lxml import etree
+from msgspec import structs
 
 from tests.formats.made_scenario import action, event, made, time_condition
 from tests.formats.test_openscenario_write import LANE_CHANGE, STEP, nominal, played, provenance
@@ -65,7 +65,7 @@ def test_after_a_flip_of_the_t_axis_a_chain_goes_on_from_the_other_side() -> Non
 def _worst(found: list[Ramp], time: np.ndarray, side: np.ndarray) -> float:
     """Error against the sine above once it has settled: on the side of +t on which each of the transitions begins."""
     way = np.interp([ramp.start for ramp in found], time, side)
-    turned = [replace(r, origin=w * r.origin, target=w * r.target) for r, w in zip(found, way, strict=True)]
+    turned = [structs.replace(r, origin=w * r.origin, target=w * r.target) for r, w in zip(found, way, strict=True)]
     return float(np.abs(_followed(turned, time) - 0.2 * np.sin(0.8 * time))[time > found[0].end].max())
 
 

@@ -111,7 +111,7 @@ BAD = {
     "no model": (broken(model=None), "no 'model'"),
     "unknown model": (
         broken(model={"kind": "oracle"}),
-        "model: unknown kind 'oracle'; known are two-level, autoregressive",
+        "model: unknown kind 'oracle'; known are autoregressive, two-level",
     ),
     "model without counts": (broken(model={"kind": "two-level", "settings": {}}), "model: no 'counts'"),
     "unknown setting": (broken(model={"kind": "two-level", "settings": {"x": 1}}), "model.settings: unknown field 'x'"),

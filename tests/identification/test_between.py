@@ -7,7 +7,7 @@ import pytest
 
 from xosc_lateral.driver.effects import Linear
 from xosc_lateral.driver.fitting import fit_profile
-from xosc_lateral.driver.models.kinds import ModelKind
+from xosc_lateral.driver.models.base import ModelKind
 from xosc_lateral.drives.drive import Drive
 from xosc_lateral.identification.close import close_loop
 from xosc_lateral.identification.identify import usable_columns

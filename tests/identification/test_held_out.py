@@ -7,8 +7,8 @@ import pytest
 
 from tests.identification.made_coarse import SPREAD, coarse_of, movement, wander
 from xosc_lateral.driver.effects import Acts, Linear
-from xosc_lateral.driver.models.kinds import ModelKind
-from xosc_lateral.driver.provenance import Provenance
+from xosc_lateral.driver.models.base import ModelKind
+from xosc_lateral.driver.profile import Provenance
 from xosc_lateral.errors import NotEnoughDataError
 from xosc_lateral.identification.columns import Column, Values
 from xosc_lateral.identification.cross_validation import Nested, _over_blocks

@@ -27,6 +27,7 @@ class StandIn:
         self.offset: dict[str, float] = {}
         self.broken: dict[str, dict[str, float]] = {}
         self.gone: set[str] = set()
+        self.shown: dict[str, float] = {}
         self.closed = False
         self.callback: Callable[..., None] = lambda *_: None
 
@@ -48,6 +49,7 @@ class StandIn:
         return None
 
     def SE_StepDT(self, dt: float) -> int:
+        self.shown.clear()
         steps = round(dt / STEP)
         for _ in range(steps):
             for name in self.names:
@@ -90,7 +92,7 @@ class StandIn:
         if name in self.gone or not one.activity[row] & Activity.ACTIVE:
             return -1
         road, lane, s = int(one.road[row]), int(one.lane[row]), float(one.s[row])
-        offset = float(one.offset[row]) + self.offset.get(name, 0.0)
+        offset = float(one.offset[row]) + self.shown.get(name, self.offset.get(name, 0.0))
         pose = self.network.pose_at(road, lane, s, offset)
         t = float(self.network.offset_to_t(road, lane, s, offset))
         direction = self.network.travel_direction(road, lane)
@@ -108,7 +110,9 @@ class StandIn:
     def SE_ReportObjectLateralPosition(self, number: int, t: float) -> int:
         one, row = self.motion.entities[number - 10], self.row
         road, lane, s = int(one.road[row]), int(one.lane[row]), float(one.s[row])
-        self.offset[one.name] = float(self.network.t_to_offset(road, lane, s, t)) - float(one.offset[row])
+        # while an action runs, it says anew in every step where the vehicle is
+        to = self.offset if self._lateral(one.name, row) is None else self.shown
+        to[one.name] = float(self.network.t_to_offset(road, lane, s, t)) - float(one.offset[row])
         return 0
 
     def SE_RegisterStoryBoardElementStateChangeCallback(self, callback: Callable[..., None]) -> None:

@@ -16,7 +16,7 @@ CONFIG = """<configuration><input><net-file value="run.net.xml"/><route-files va
 <processing><lateral-resolution value="{sublane}"/><collision.action value="warn"/></processing></configuration>"""
 
 
-def write_run(folder: Path, *, end: float = 40.0, cars: int = 1200, trucks: int = 240, sublane: float = 0.25) -> Path:
+def write_run(folder: Path, *, end: float = 40.0, cars: int = 1200, trucks: int = 240, sublane: float = 4.0) -> Path:
     """Its configuration."""
     import sumo
 

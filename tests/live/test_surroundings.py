@@ -83,8 +83,8 @@ def test_neighbours_give_way_as_in_a_conversion(tmp_path: Path, rule: str) -> No
     free = rng.random(len(offset)) < 0.8
     rows = len(motion.entities[0].time)
     sampled = [
-        SampledVehicle(one, np.full(rows, by), np.full(rows, can), heeds, known)
-        for one, by, can, heeds, known in zip(motion.entities, offset, free, sides, alone, strict=True)
+        SampledVehicle(one, np.full(rows, by), np.full(rows, can), responds, known)
+        for one, by, can, responds, known in zip(motion.entities, offset, free, sides, alone, strict=True)
     ]
     wanted = [0.0 if one is None else one[0] for one in give_way(motion, network, sampled, np.arange(rows))]
     nominal = places_of(motion, 0)
@@ -93,7 +93,7 @@ def test_neighbours_give_way_as_in_a_conversion(tmp_path: Path, rule: str) -> No
     places = Places(x, y, *(getattr(nominal, name) for name in Places.__dataclass_fields__ if name not in ("x", "y")))
     known = {
         f"{word}_{side}": np.array([side in one for one in ones])
-        for word, ones in (("heeds", sides), ("alone", alone))
+        for word, ones in (("responds", sides), ("alone", alone))
         for side in ("left", "right")
     }
     found = give_way_now(places, offset, offset, free, known, left_hand=rule == "LHT")

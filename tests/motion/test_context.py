@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from tests.motion.made_motion import LANE_WIDTH, RADIUS, drive, entity, together, two_roads
+from xosc_lateral.driver.effects import ColumnEffect, effect_from_dict
 from xosc_lateral.motion.context import NEAR, STEERING, entity_context
 from xosc_lateral.motion.nominal import EntityMotion, PlayedAction
 from xosc_lateral.road.network import RoadNetwork
@@ -86,15 +87,36 @@ def test_a_lane_with_nobody_in_it_is_told_from_no_lane(tmp_path: Path, rule: str
         assert np.isposinf(context[f"{inner}_distance"]).all()
 
 
-def test_oncoming_traffic_is_seen_ahead_only(tmp_path: Path) -> None:
+def test_oncoming_traffic_comes_into_sight_and_is_gone_within_forty_metres(tmp_path: Path) -> None:
     network = two_roads(tmp_path)
     own = drive(network, entity("own"), lane=-1, start=100.0)
     other = drive(network, entity("other"), lane=1, start=800.0)
     context = entity_context(together(own, other), network, 0, GRID)
-    between = 200.0 - 60.0 * own.time[GRID] - 2 * 1.4 - 5.0
-    ahead = 200.0 - 60.0 * own.time[GRID] > 0
-    np.testing.assert_allclose(context["oncoming_distance"][ahead], np.maximum(between[ahead], 0.0), atol=1e-6)
-    assert np.isnan(context["oncoming_distance"][~ahead]).all()
+    apart = 200.0 - 60.0 * own.time[GRID] - 2 * 1.4
+    near, distance = (apart > -5.0) & (apart < 155.0), context["oncoming_distance"]
+    np.testing.assert_allclose(distance[near], np.maximum(apart[near] - 5.0, 0.0), atol=1e-6)
+    np.testing.assert_array_equal(context["oncoming_distance_fades"][near], 1.0)
+    assert np.isnan(distance[apart < -45.0]).all() and not context["oncoming_distance_fades"][apart < -45.0].any()
+
+
+@pytest.mark.parametrize(
+    "shape", [{"kind": "linear"}, {"kind": "proximity", "scale": 40.0}, {"kind": "nearness", "scale": 40.0}]
+)
+def test_who_responds_to_oncoming_traffic_does_not_jump(tmp_path: Path, shape: dict[str, object]) -> None:
+    """Two of them at 5 m/s against 5 m/s, half a second between rows: 5 m, of distances up to 200 m in all."""
+    network = two_roads(tmp_path)
+    own = drive(network, entity("own"), lane=-1, start=100.0, speed=5.0, duration=60.0)
+    others = [
+        drive(network, entity(f"other {k}"), lane=1, start=start, speed=5.0, duration=60.0)
+        for k, start in enumerate((740.0, 660.0))
+    ]
+    values = {**shape, "acts": "location", "column": "oncoming_distance"}
+    effect = effect_from_dict({**values, "coefficients": [1.0], "errors": [0.0], "reference": [0.0]})
+    assert isinstance(effect, ColumnEffect)
+    grid = np.arange(0, len(own.time), 5)
+    found = effect.known(entity_context(together(own, *others), network, 0, grid))[:, 0]
+    assert np.abs(np.diff(found)).max() < 0.3 * np.ptp(found)
+    assert found[-1] == pytest.approx(0.0), "both have passed"
 
 
 def test_against_the_lanes_traffic_everything_is_seen_the_other_way_round(tmp_path: Path) -> None:

@@ -5,11 +5,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from xosc_lateral.motion.gaps import BoxPath, box_distance, smallest_gaps
+from xosc_lateral.motion.gaps import BoxPath, box_distance, corners, smallest_gaps
 
 
 def _box(x: float, y: float, heading: float = 0.0, length: float = 5.0, width: float = 2.0) -> BoxPath:
     return BoxPath("car", np.array([x]), np.array([y]), np.array([heading]), length, width, 0.0)
+
+
+def _corners(box: BoxPath) -> np.ndarray:
+    return corners([(box, np.arange(len(box.x)))])
 
 
 def _edge_points(corners: np.ndarray, share: np.ndarray) -> np.ndarray:
@@ -30,7 +34,7 @@ def _edge_points(corners: np.ndarray, share: np.ndarray) -> np.ndarray:
     ids=["ahead", "beside", "diagonal", "across", "overlapping corners", "one inside the other", "crossing"],
 )
 def test_distance_of_hand_made_boxes(other: BoxPath, expected: float) -> None:
-    assert box_distance(_box(0.0, 0.0).corners(), other.corners())[0] == pytest.approx(expected, abs=1e-9)
+    assert box_distance(_corners(_box(0.0, 0.0)), _corners(other))[0] == pytest.approx(expected, abs=1e-9)
 
 
 def test_distance_of_random_boxes_is_that_between_points_on_their_edges() -> None:
@@ -39,9 +43,9 @@ def test_distance_of_random_boxes_is_that_between_points_on_their_edges() -> Non
     for _ in range(30):
         a = _box(0.0, 0.0, rng.uniform(0, 6), rng.uniform(2, 18), rng.uniform(1, 3))
         b = _box(rng.uniform(12, 20), rng.uniform(12, 20), rng.uniform(0, 6), rng.uniform(2, 8), rng.uniform(1, 3))
-        edges = [_edge_points(box.corners()[0], share) for box in (a, b)]
+        edges = [_edge_points(_corners(box)[0], share) for box in (a, b)]
         brute = np.linalg.norm(edges[0][:, None] - edges[1][None], axis=-1).min()
-        assert box_distance(a.corners(), b.corners())[0] == pytest.approx(brute, abs=2e-3)
+        assert box_distance(_corners(a), _corners(b))[0] == pytest.approx(brute, abs=2e-3)
 
 
 def test_the_smallest_gap_names_pair_and_moment_and_absent_vehicles_do_not_count() -> None:

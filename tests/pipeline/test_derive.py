@@ -49,6 +49,14 @@ def test_share_near_a_line_counts_the_vehicles_sides(base: DriverProfile) -> Non
     assert (np.abs(_hours(made, 70, 40)) > limit).mean() == pytest.approx(0.05, rel=0.06)
 
 
+def test_most_of_the_time_near_a_line_with_little_movement_is_had_beside_it(base: DriverProfile) -> None:
+    made = derive(base, Asked(near_line=0.9, sdlp=0.1), "x")
+    limit = 0.5 * base.lane_width - 0.9 - 0.2
+    assert abs(made.reached.mean) > limit and made.reached.sdlp == pytest.approx(0.1, rel=0.02)
+    side = "left" if made.reached.mean > 0 else "right"
+    assert f"for which he drives {abs(made.reached.mean):.2f} m {side} of the lane's middle" in str(made)
+
+
 def test_a_memory_slows_the_movement_down(base: DriverProfile) -> None:
     known = derive(base, Asked(), "x").reached
     made = derive(base, Asked(memory=1.3 * known.memory, sdlp=known.sdlp), "x")

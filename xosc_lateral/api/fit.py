@@ -75,7 +75,7 @@ def fit(
     from msgspec.structs import replace
 
     from xosc_lateral.driver.fitting import fit_profile
-    from xosc_lateral.driver.provenance import Provenance
+    from xosc_lateral.driver.profile import Provenance
 
     given = given_drives(drives, columns)
     known = Provenance(source=source or ", ".join(given.inputs), licence=licence, inputs=dict(given.inputs))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,8 +14,14 @@ from xosc_lateral.errors import SimulationError
 if TYPE_CHECKING:
     import pandas as pd
 
+    from xosc_lateral.live.scene import Scene
+    from xosc_lateral.scenario.entity import Entity
+
 STATES = ("time", "name", "x", "y", "h", "speed", "road", "lane", "s", "offset", "driver", "steered")
-"""Columns of a run: where vehicles are; offset from the lane's centre, positive left; the driver's; if it counts."""
+"""Columns of a run: where vehicles are; offset from the lane's centre, positive left; the driver's; if it counts. A
+row goes on with z, pitch and roll, which only a trace has."""
+
+_STEERED = STATES.index("steered")
 
 
 def live_esmini(
@@ -55,6 +62,7 @@ def live_esmini(
         In one line.
     """
     from xosc_lateral.live.esmini import EsminiTraffic, open_player
+    from xosc_lateral.live.scene import Scene
 
     chosen = given_profile(profile, folders)
     others = {name: given_profile(one, folders) for name, one in (profiles or {}).items()}
@@ -78,16 +86,19 @@ def live_esmini(
             for name, state in traffic.states().items():
                 wanted, steered = traffic.moves.get(name, (float("nan"), False))
                 place = (state.road, state.lane, state.s, traffic.offset_of(state))
-                rows.append((time, name, state.x, state.y, state.h, state.speed, *place, wanted, steered))
+                pose = (state.z, state.p, state.r)
+                rows.append((time, name, state.x, state.y, state.h, state.speed, *place, wanted, steered, *pose))
             if player.SE_GetQuitFlag() == 1 or k == round(duration / step):
                 break
             traffic.steer(step)
             if player.SE_StepDT(step) != 0:
                 raise SimulationError(f"{scenario}: {player.where} stopped at {time:g} s")
+            traffic.settle(step)
     finally:
         player.SE_Close()
     settings = {"scenario": Path(scenario).name, "profile": chosen.name, "seed": seed}
-    return LiveRun(rows, settings, traffic.warnings, events)
+    scene = Scene(traffic.entities, lambda: traffic.network, ego)
+    return LiveRun(rows, settings, traffic.warnings, events, scene)
 
 
 def live_sumo(
@@ -121,6 +132,7 @@ def live_sumo(
     SimulationError
         In one line.
     """
+    from xosc_lateral.live.scene import Scene, sumo_entity, sumo_network
     from xosc_lateral.live.sumo import SumoTraffic, start
 
     chosen = given_profile(profile, folders)
@@ -130,12 +142,18 @@ def live_sumo(
     sublane = [] if lateral_resolution is None else ["--lateral-resolution", f"{lateral_resolution:g}"]
     connection = start(["-c", str(config), *sublane, *options])
     rows: list[tuple[Any, ...]] = []
+    entities: dict[str, Entity] = {}
     collisions = teleports = 0
     try:
+        net = str(connection.simulation.getOption("net-file"))
         traffic = SumoTraffic(
             connection, chosen, ego=ego, seed=seed, profiles=others, neighbours=Neighbours(neighbours)
         )
         end = float(connection.simulation.getTime()) + duration
+        if (
+            configured := float(connection.simulation.getEndTime())
+        ) > 0.0:  # of which SUMO makes nothing by itself here
+            end = min(end, configured)
         while connection.simulation.getMinExpectedNumber() > 0 and connection.simulation.getTime() < end - 1e-9:
             traffic.steer()
             connection.simulationStep()
@@ -145,19 +163,23 @@ def live_sumo(
             for name, x, y, h, speed, lane, s, offset in traffic.states():
                 wanted, steered = traffic.moves.get(name, (float("nan"), False))
                 edge, _, index = lane.rpartition("_")
-                rows.append((time, name, x, y, h, speed, edge, int(index), s, offset, wanted, steered))
+                z = float(connection.vehicle.getPosition3D(name)[2])
+                rows.append((time, name, x, y, h, speed, edge, int(index), s, offset, wanted, steered, z, 0.0, 0.0))
+                if name not in entities:
+                    entities[name] = sumo_entity(connection.vehicle, name)
     finally:
         connection.close()
     settings = {"scenario": Path(config).name, "profile": chosen.name, "seed": seed}
     warnings = [f"SUMO reports {count} {what}" for count, what in ((collisions, "collisions"), (teleports, "teleports"))
                 if count]  # fmt: skip
-    return LiveRun(rows, settings, [*traffic.warnings, *warnings])
+    scene = Scene(tuple(entities.values()), partial(sumo_network, net), ego, is_road=False)
+    return LiveRun(rows, settings, [*traffic.warnings, *warnings], scene=scene)
 
 
 class LiveRun(Result):
     """A run of a simulation with drivers in it."""
 
-    __slots__ = ("_rows", "_settings", "events", "warnings")
+    __slots__ = ("_rows", "_scene", "_settings", "events", "warnings")
 
     def __init__(
         self,
@@ -165,8 +187,9 @@ class LiveRun(Result):
         settings: Mapping[str, Any],
         warnings: Sequence[str],
         events: Sequence[tuple[float, str, int]] = (),
+        scene: Scene | None = None,
     ) -> None:
-        self._rows, self._settings = rows, dict(settings)
+        self._rows, self._settings, self._scene = rows, dict(settings), scene
         self.warnings = tuple(warnings)
         """What a user has to know, a line each."""
         self.events = tuple(events)
@@ -175,7 +198,7 @@ class LiveRun(Result):
     def headline(self) -> str:
         """One line."""
         names = {row[1] for row in self._rows}
-        steered = {row[1] for row in self._rows if row[-1]}
+        steered = {row[1] for row in self._rows if row[_STEERED]}
         time = self._rows[-1][0] if self._rows else 0.0
         source, profile, seed = (self._settings[key] for key in ("scenario", "profile", "seed"))
         return f"{source}: {time:g} s, {len(steered)} of {len(names)} vehicles driven by {profile}, seed {seed}"
@@ -187,7 +210,7 @@ class LiveRun(Result):
         """One row per vehicle and step, see `STATES`; SI units, offsets positive left of travel."""
         import pandas as pd
 
-        return pd.DataFrame(self._rows, columns=list(STATES))
+        return pd.DataFrame([row[: len(STATES)] for row in self._rows], columns=list(STATES))
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values, as ``--json`` prints them: what ran, without its rows."""
@@ -202,3 +225,24 @@ class LiveRun(Result):
         claim([output], force=force)
         write_frame(self.to_frame(), output, self._settings)
         return output
+
+    def write_osi(self, path: PathLike, *, force: bool = False) -> Path:
+        """Write an ASAM OSI trace (extra `osi`): ``.mcap`` or ``.osi``, one `GroundTruth` per step.
+
+        Raises
+        ------
+        SimulationError
+            If the run says nothing of its vehicles, or SUMO's network can't be made a road.
+        """
+        from xosc_lateral.formats.osi.extra import SUFFIXES
+        from xosc_lateral.formats.osi.write import host_of, write_osi
+        from xosc_lateral.formats.output_paths import claim, output_file
+        from xosc_lateral.live.scene import motion_of
+
+        if self._scene is None:
+            raise SimulationError("the run says nothing of its vehicles and its road: there is no trace of it")
+        output = output_file(path, f"{Path(self._settings['scenario']).stem}_gt.mcap", SUFFIXES)
+        claim([output], force=force)
+        network = self._scene.network()
+        motion = motion_of(self._rows, self._scene, network)
+        return write_osi(output, motion, network, host=host_of(motion, self._scene.ego), description=self.headline())

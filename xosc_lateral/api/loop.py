@@ -74,7 +74,7 @@ def close_loop(
 
     from msgspec.structs import replace as with_fields
 
-    from xosc_lateral.driver.provenance import Provenance
+    from xosc_lateral.driver.profile import Provenance
     from xosc_lateral.formats.mapping import as_mapping
     from xosc_lateral.identification import close
 
@@ -102,10 +102,11 @@ def close_loop(
 class ClosedLoop(Result):
     """What was missing, how sure and how big; the refined profile; the error before and after."""
 
-    __slots__ = ("_given", "_result")
+    __slots__ = ("_given", "_proofs", "_result")
 
     def __init__(self, result: LoopResult, given: GivenDrives) -> None:
         self._result, self._given = result, given
+        self._proofs: tuple[str, ...] | None = None
 
     @property
     def profile(self) -> DriverProfile:
@@ -121,6 +122,16 @@ class ClosedLoop(Result):
     def findings(self) -> tuple[str, ...]:
         """Names of the effects that were found."""
         return tuple(finding.effect for finding in self._result.findings)
+
+    @property
+    def proofs(self) -> tuple[str, ...]:
+        """For each effect on the mean that was found: a scenario converted with it and without, in words."""
+        from xosc_lateral.pipeline.proof import proofs_of
+
+        if self._proofs is None:
+            found = [effect for effect in self.profile.effects if effect not in self.base.effects]
+            self._proofs = tuple(map(str, proofs_of(self.profile, found)))
+        return self._proofs
 
     @property
     def error_before(self) -> float:
@@ -145,7 +156,7 @@ class ClosedLoop(Result):
     def __str__(self) -> str:
         from xosc_lateral.report.loop import loop_text
 
-        return loop_text(self._result)
+        return "\n".join([loop_text(self._result), *(f"converted: {one}" for one in self.proofs)])
 
     def to_frame(self) -> pd.DataFrame:
         """One row per finding: `effect`, `kind`, `columns`, `lag_s`, `response_s`, `shape`, `size_m`, `p_value`, ..."""
@@ -177,7 +188,7 @@ class ClosedLoop(Result):
         output = output_folder(folder)
         claim(self.report_files(output), self._given.files, force=force)
         write_atomically(output / "report.json", canonical_json(self.to_dict()) + "\n")
-        write_atomically(output / "report.html", loop_page(self._result, self._given.files))
+        write_atomically(output / "report.html", loop_page(self._result, self._given.files, self.proofs))
         return output
 
     @staticmethod

@@ -6,6 +6,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from msgspec import structs
+
 from xosc_lateral.api.result import PathLike, Paths, Result, as_paths, road_search
 from xosc_lateral.formats.hashes import parsed_hashes
 from xosc_lateral.formats.output_paths import claim, output_file
@@ -259,7 +261,6 @@ class Segments(Result):
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values, as ``--json`` prints them."""
-        from dataclasses import asdict
 
-        rows = [asdict(row) for row in self._rows]
+        rows = [structs.asdict(row) for row in self._rows]
         return {"segments": [row | {"start": round(row["start"], 6), "end": round(row["end"], 6)} for row in rows]}

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from xosc_lateral.api.result import PathLike, Paths, Result, as_paths
+from xosc_lateral.formats.mapping import MappingLike
 from xosc_lateral.formats.output_paths import claim, output_folder
 from xosc_lateral.pipeline.reconstruct import (
     Reconstructed,
@@ -27,7 +28,7 @@ def reconstruct(
     *,
     format: str | None = None,  # noqa: A002 (as in `import_drives`)
     road: PathLike | None = None,
-    columns: Sequence[str] = (),
+    columns: MappingLike | None = None,
     begin: float | None = None,
     end: float | None = None,
     vehicles: Collection[str] | None = None,
@@ -54,8 +55,8 @@ def reconstruct(
         "dlr-ht", "levelx", "osi", "commonroad" or "tracks"; without it, told from the file's name.
     road : str or Path, optional
         OpenDRIVE file, for recordings that come without their lanes.
-    columns : sequence of str
-        ``NAME=COLUMN[:UNIT]`` for tables of tracks.
+    columns : dict, path or TableMapping, optional
+        Name -> ``COLUMN[:UNIT]`` for tables of tracks, or a saved mapping's file.
     begin, end : float, optional
         Part of the recording. [s]
     vehicles : collection of str, optional

@@ -3,28 +3,16 @@
 from __future__ import annotations
 
 from enum import StrEnum
+from inspect import Parameter, Signature, signature
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated, Any
 
 import typer
 
-from xosc_lateral.cli.words import AsJson, Force, Library, Quiet, Seed, examples, pairs, say, warn
+from xosc_lateral.cli.words import AsJson, Force, Library, Osi, Profile, Quiet, Seed, examples, pairs, say, warn
 
-if TYPE_CHECKING:
-    from xosc_lateral.api.live import LiveRun
-
-Profile = Annotated[str, typer.Option("--profile", "-p", metavar="NAME|PATH", help="Driver profile.")]
-PerVehicle = Annotated[
-    list[str] | None,
-    typer.Option("--vehicle", metavar="NAME=PROFILE", help="Another profile for one vehicle; may be repeated."),
-]
-Ego = Annotated[list[str] | None, typer.Option(metavar="NAME", help="Vehicle under test: not driven; may be repeated.")]
 FCD = "x,y,angle,type,speed,pos,posLat,lane"
 """What `import fcd` reads; SUMO leaves `posLat` out unless told."""
-
-States = Annotated[
-    str | None, typer.Option("--states", metavar="OUT", help="Table of where everybody was: .csv, .csv.gz, .parquet.")
-]
 
 HELP = {
     "esmini": (
@@ -33,7 +21,7 @@ HELP = {
     ),
     "sumo": (
         "Run a SUMO simulation (extra sumo).",
-        examples("live sumo run.sumocfg -p motorway --seed 1 --lateral-resolution 0.25 --states states.parquet"),
+        examples("live sumo run.sumocfg -p motorway --seed 1 --lateral-resolution 4 --states states.parquet"),
     ),
     "stdio": (
         "Answer over a pipe: one line of JSON in, one out.",
@@ -60,37 +48,25 @@ def esmini(
     player_library: Annotated[
         Path, typer.Option(help="libesminiLib.so or esminiLib.dll of esmini 3.", show_default=False)
     ],
-    profile: Profile = "motorway",
-    vehicle: PerVehicle = None,
-    ego: Ego = None,
-    seed: Seed = 0,
     duration: Annotated[float, typer.Option(help="Ends here, if not before. [s]", min=0.01, max=86_400)] = 3600.0,
     step: Annotated[float, typer.Option(help="Length of a step. [s]", min=0.001, max=0.2)] = 0.01,
     window: Annotated[bool, typer.Option("--window", help="Open esmini's window.")] = False,
-    states: States = None,
-    library: Library = None,
-    force: Force = False,
-    quiet: Quiet = False,
-    as_json: AsJson = False,
+    **shared: Any,
 ) -> None:
     """Play a scenario in esmini with drivers in its vehicles; its triggers and maneuvers stay as written."""
     from xosc_lateral.api.live import live_esmini
 
-    _claim(states, [scenario], force=force)
-    run = live_esmini(
-        scenario, player_library, profile=profile, profiles=pairs(vehicle, "--vehicle"), ego=ego or (), seed=seed,
-        duration=duration, step=step, window=window, folders=library or (),
+    _run(
+        lambda **who: live_esmini(scenario, player_library, duration=duration, step=step, window=window, **who),
+        scenario, **shared,
     )  # fmt: skip
-    _finish(run, states, force=force, quiet=quiet, as_json=as_json)
 
 
 def sumo(
     config: Annotated[Path, typer.Argument(help="Configuration (.sumocfg).", show_default=False)],
-    profile: Profile = "motorway",
-    vehicle: PerVehicle = None,
-    ego: Ego = None,
-    seed: Seed = 0,
-    duration: Annotated[float, typer.Option(help="Ends here, if not before. [s]", min=0.01, max=1e7)] = 86_400.0,
+    duration: Annotated[
+        float, typer.Option(help="Ends here, if not before or as configured. [s]", min=0.01, max=1e7)
+    ] = 86_400.0,
     lateral_resolution: Annotated[
         float | None,
         typer.Option(help="Switch the sublane model on [m]; default: as configured.", min=0.01, max=5.0),
@@ -98,22 +74,58 @@ def sumo(
     fcd_output: Annotated[
         Path | None, typer.Option(metavar="FCD.xml", help="SUMO's own output of where everybody was.")
     ] = None,
-    states: States = None,
+    **shared: Any,
+) -> None:
+    """Run a SUMO simulation with the sublane model and drivers in its vehicles; lane changes stay SUMO's."""
+    from xosc_lateral.api.live import live_sumo
+
+    options = () if fcd_output is None else ("--fcd-output", str(fcd_output), "--fcd-output.attributes", FCD)
+    _run(
+        lambda **who: live_sumo(
+            config, duration=duration, lateral_resolution=lateral_resolution, options=options, **who
+        ),
+        config, **shared,
+    )  # fmt: skip
+
+
+def _run(
+    live: Any,
+    source: Path,
+    profile: Profile = "motorway",
+    vehicle: Annotated[
+        list[str] | None,
+        typer.Option("--vehicle", metavar="NAME=PROFILE", help="Another profile for one vehicle; may be repeated."),
+    ] = None,
+    ego: Annotated[
+        list[str] | None, typer.Option(metavar="NAME", help="Vehicle under test: not driven; may be repeated.")
+    ] = None,
+    seed: Seed = 0,
+    states: Annotated[
+        str | None,
+        typer.Option("--states", metavar="OUT", help="Table of where everybody was: .csv, .csv.gz, .parquet."),
+    ] = None,
+    osi: Osi = None,
     library: Library = None,
     force: Force = False,
     quiet: Quiet = False,
     as_json: AsJson = False,
 ) -> None:
-    """Run a SUMO simulation with the sublane model and drivers in its vehicles; lane changes stay SUMO's."""
-    from xosc_lateral.api.live import live_sumo
+    """Options of both simulators, and what is done with what `live` gives."""
+    from xosc_lateral.formats.osi.extra import SUFFIXES, osi_wanted
+    from xosc_lateral.formats.output_paths import claim, output_file
+    from xosc_lateral.formats.tables import TABLE_SUFFIXES
 
-    _claim(states, [config], force=force)
-    run = live_sumo(
-        config, profile=profile, profiles=pairs(vehicle, "--vehicle"), ego=ego or (), seed=seed, duration=duration,
-        lateral_resolution=lateral_resolution, folders=library or (),
-        options=() if fcd_output is None else ("--fcd-output", str(fcd_output), "--fcd-output.attributes", FCD),
-    )  # fmt: skip
-    _finish(run, states, force=force, quiet=quiet, as_json=as_json)
+    table = None if states is None else output_file(states, "states.csv", TABLE_SUFFIXES)
+    trace = None if osi is None else output_file(osi, f"{source.stem}_gt.mcap", SUFFIXES)
+    claim([table, trace], [source], force=force)
+    osi_wanted(trace)
+    run = live(profile=profile, profiles=pairs(vehicle, "--vehicle"), ego=ego or (), seed=seed, folders=library or ())
+    if table is not None:
+        run.write(table, force=force)
+    if trace is not None:
+        run.write_osi(trace, force=force)
+    warn(run.warnings)
+    say(run, as_json=as_json, quiet=quiet)
 
 
 def stdio(
@@ -164,16 +176,12 @@ def fmu(
         typer.echo(f"{chosen.name} as FMI {fmi} in {output}", err=True)
 
 
-def _claim(states: str | None, inputs: list[Path], *, force: bool) -> None:
-    from xosc_lateral.formats.output_paths import claim, output_file
-    from xosc_lateral.formats.tables import TABLE_SUFFIXES
-
-    if states is not None:
-        claim([output_file(states, "states.csv", TABLE_SUFFIXES)], inputs, force=force)
+def _spelled_out(verb: Any) -> Signature:
+    """A verb's signature, with the options of both simulators in place of `**shared`."""
+    own, both = (list(signature(one, eval_str=True).parameters.values()) for one in (verb, _run))
+    return Signature([*own[:-1], *(one.replace(kind=Parameter.KEYWORD_ONLY) for one in both[2:])])
 
 
-def _finish(run: LiveRun, states: str | None, *, force: bool, quiet: bool, as_json: bool) -> None:
-    if states is not None:
-        run.write(states, force=force)
-    warn(run.warnings)
-    say(run, as_json=as_json, quiet=quiet)
+_BOTH: tuple[Any, ...] = (esmini, sumo)
+for _verb in _BOTH:
+    _verb.__signature__ = _spelled_out(_verb)

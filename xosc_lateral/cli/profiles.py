@@ -87,6 +87,8 @@ def show(
     """A profile's card: what it does, where it comes from, how realistic it is."""
     from xosc_lateral import read_profile
     from xosc_lateral.api.profiles import write_card
+    from xosc_lateral.enrich.enrich import NEIGHBOURS
+    from xosc_lateral.pipeline.proof import proofs_of
     from xosc_lateral.report.cards import card, card_text
 
     profile = read_profile(name, library or ())
@@ -95,7 +97,8 @@ def show(
     if as_json:
         say_json(card(profile))
     elif not quiet:
-        typer.echo(card_text(profile))
+        beside = [effect for effect in profile.effects if NEIGHBOURS.intersection(effect.columns)]
+        typer.echo("\n".join([card_text(profile), *(f"  converted  {one}" for one in proofs_of(profile, beside))]))
 
 
 def compare(

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from xosc_lateral.cli.words import AsJson, Columns, Force, Library, Quiet, examples, say
+from xosc_lateral.cli.words import AsJson, Columns, Force, Library, MappingFile, Quiet, examples, mapped, say
 
 EXAMPLES = examples(
     "reconstruct tasi-0.15.4-py3-none-any.whl -o a39/ --from 60 --to 120",
@@ -36,6 +36,7 @@ def reconstruct(
         Path | None, typer.Option("--road", help="OpenDRIVE file that it was recorded on.", show_default=False)
     ] = None,
     columns: Columns = None,
+    mapping_file: MappingFile = None,
     begin: Annotated[float | None, typer.Option("--from", help="Begin there [s].", show_default=False)] = None,
     end: Annotated[float | None, typer.Option("--to", help="End there [s].", show_default=False)] = None,
     vehicles: Annotated[
@@ -70,7 +71,7 @@ def reconstruct(
             output,
             format=format_,
             road=road,
-            columns=columns or (),
+            columns=mapped(columns, mapping_file),
             begin=begin,
             end=end,
             vehicles=vehicles or None,

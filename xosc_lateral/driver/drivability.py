@@ -21,8 +21,7 @@ from numpy.typing import NDArray
 
 from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.driver.sampling import sample_offsets
-from xosc_lateral.driver.sensor.model import WIDE
-from xosc_lateral.driver.sensor.quantisation import uniform_variance
+from xosc_lateral.driver.sensor.quantisation import COARSEST, uniform_variance
 from xosc_lateral.drives.filters import filtered
 from xosc_lateral.segment import Segment
 
@@ -184,7 +183,7 @@ def _coarse_steps(profile: DriverProfile) -> list[str]:
     sensor = profile.sensor
     if sensor is None or sensor.driver_share != (0.0, 1.0):
         return []
-    if sensor.rounding <= WIDE * np.sqrt(sensor.driver_variance):  # little data, not its steps
+    if sensor.rounding <= COARSEST * np.sqrt(sensor.driver_variance + sensor.sensor_variance):  # little data, not steps
         return []
     return [
         f"the offsets are rounded to {sensor.rounding:.3g} m, too coarse to show how far the driver of {profile.name} "

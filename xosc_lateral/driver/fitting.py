@@ -11,12 +11,10 @@ from numpy.typing import NDArray
 
 from xosc_lateral.driver.answers import answer_effects, measure_beside
 from xosc_lateral.driver.effects import ColumnEffect
-from xosc_lateral.driver.models.base import CoreModel
-from xosc_lateral.driver.models.kinds import ModelKind
+from xosc_lateral.driver.models.base import CoreModel, ModelKind
 from xosc_lateral.driver.models.registry import model_named
 from xosc_lateral.driver.place import LEAST_DRIVES, fit_place, without_place
-from xosc_lateral.driver.profile import DriverProfile
-from xosc_lateral.driver.provenance import Provenance
+from xosc_lateral.driver.profile import DriverProfile, Provenance
 from xosc_lateral.driver.sensor.model import SensorModel
 from xosc_lateral.driver.sensor.runs import driver_runs
 from xosc_lateral.drives.cuts import PAPER_RULES, CutRules, all_runs

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.driver.effects import Acts, EffectTerms
-from xosc_lateral.driver.effects.acts import terms_of
+from xosc_lateral.driver.effects.base import terms_of
 from xosc_lateral.driver.effects.response import Response, ResponseState
 from xosc_lateral.driver.process import DriveProcess, Movement, combine, offsets_of
 from xosc_lateral.driver.profile import DriverProfile
@@ -32,7 +32,7 @@ _NEIGHBOURS = 2
 _PARTS = ("coarse", "fine", *(f"hidden_{name}" for name in ("location", "spread", "rate", "fine")))
 """What is drawn ahead: of the movement [lane widths], then factors of hidden effects (location: [m])."""
 
-_NEUTRAL = (0.0, 0.0, 0.0, 1.0, 1.0, 1.0)
+_NO_FACTORS = (0.0, 0.0, 0.0, 1.0, 1.0, 1.0)
 
 
 class OffsetGroup:
@@ -50,7 +50,7 @@ class OffsetGroup:
         example = DriveProcess(profile, np.random.SeedSequence(0))
         columned, self._hidden = example.columned, bool(example.hidden)
         step = profile.model.step
-        # as of a stream: who looks farthest ahead decides how much later everybody responds, whatever is known
+        # as of a stream: the longest preview decides how much later everybody responds, whatever is known
         self._ahead = max((effect.response_in_blocks(step).ahead for effect in columned), default=0)
         self._which = [k for k, effect in enumerate(columned) if set(effect.columns) <= set(self.columns)]
         self._effects = [columned[k] for k in self._which]
@@ -200,7 +200,7 @@ class OffsetGroup:
         hidden = drive.hidden_terms_at(np.arange(row, row + BLOCK))
         movement = drive.movement(BLOCK, hidden.rate)
         self._mean[k] = float(movement.mean)
-        rows = np.tile(_NEUTRAL, (BLOCK, 1))
+        rows = np.tile(_NO_FACTORS, (BLOCK, 1))
         for column, values in enumerate((movement.coarse, movement.fine, *hidden.parts)):
             if values is not None:
                 rows[:, column] = values

@@ -14,9 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.digits import all_significant
+from xosc_lateral.driver.answers import NEIGHBOURS, SCALE, most_beside, neighbour_shapes
 from xosc_lateral.driver.effects import Acts, ColumnEffect, Levels, Linear, Piecewise, Proximity
-from xosc_lateral.driver.models.autoregressive.filters import split_bands
-from xosc_lateral.driver.neighbours import NEIGHBOURS, SCALE, most_beside, neighbour_shapes
+from xosc_lateral.driver.models.autoregressive.coarse import split_bands
 from xosc_lateral.drives.drive import Run
 from xosc_lateral.drives.resampling import STEP
 from xosc_lateral.errors import NotEnoughDataError
@@ -119,10 +119,10 @@ def without_place(runs: Sequence[Run], effects: Sequence[ColumnEffect]) -> list[
     """Runs as they would be with every column at its reference."""
     if not effects:
         return list(runs)
-    return [_neutral(run, effects) for run in runs]
+    return [_at_reference(run, effects) for run in runs]
 
 
-def _neutral(run: Run, effects: Sequence[ColumnEffect]) -> Run:
+def _at_reference(run: Run, effects: Sequence[ColumnEffect]) -> Run:
     strength = {acts: np.zeros(len(run)) for acts in (Acts.LOCATION, Acts.SPREAD, Acts.FINE)}
     for effect in effects:
         own = effect.strength(STEP, run.context)

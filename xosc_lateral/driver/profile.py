@@ -1,24 +1,132 @@
-"""Driver profile: a core model, the effects added to it, and where both come from."""
+"""Driver profile: a core model, the effects added to it, where both come from, and what it says of itself."""
 
 from __future__ import annotations
 
 import hashlib
 import json
 from collections.abc import Mapping
+from enum import StrEnum
 from functools import lru_cache
-from typing import Any
+from typing import Annotated, Any
 
 import msgspec
-from msgspec import defstruct, field, structs
+from msgspec import Meta, defstruct, field, structs
 
-from xosc_lateral.driver.beside import SIDES, Beside
 from xosc_lateral.driver.effects import Effect, any_effect
 from xosc_lateral.driver.models.base import CoreModel
 from xosc_lateral.driver.models.registry import CORE_MODELS, any_model
-from xosc_lateral.driver.provenance import Metadata, Provenance
 from xosc_lateral.driver.records import Record, plain, read_as, schema_hook, set_once
 from xosc_lateral.driver.sensor.model import SensorModel
 from xosc_lateral.errors import DriverProfileError
+
+SIDES = ("left", "right")
+
+COLUMNS = {side: (f"{side}_distance", f"{side}_is_truck", f"truck_{side}", f"car_{side}") for side in SIDES}
+"""Context columns by which a profile answers to vehicles on a side by itself."""
+
+
+class Basis(StrEnum):
+    """Where it is known from how a driver answers to neighbours on one side."""
+
+    MEASURED = "measured"
+    DECLARED = "declared"
+    POPULATION = "population"
+    UNKNOWN = "unknown"
+
+
+class Beside(Record, frozen=True):
+    """What is known of a driver's answer to vehicles on one side.
+
+    Parameters
+    ----------
+    basis : Basis
+        `population`: measured on many drivers, pair by pair: `convert` spreads their gaps as that recording has them.
+    seconds : float
+        Driving with somebody within `SCALE` on that side. [s]
+    shift, error : float
+        Mean shift with somebody alongside, positive left, and its standard error. [m]
+    """
+
+    basis: Basis
+    seconds: Annotated[float, Meta(ge=0, description="Driving with somebody there. [s]")] = 0.0
+    shift: Annotated[float, Meta(description="With somebody alongside, positive left. [m]")] = 0.0
+    error: Annotated[float, Meta(ge=0, description="Standard error. [m]")] = 0.0
+
+
+POPULATION = {side: Beside(Basis.POPULATION) for side in SIDES}
+"""Of profiles whose effects are of the recording that the law of `enrich.give_way` was measured in."""
+
+
+class Provenance(Record, frozen=True):
+    """Where a profile comes from.
+
+    Parameters
+    ----------
+    source : str
+        The drives in words.
+    licence : str
+        Of the drives, and what it asks of who passes the profile on.
+    hours : float
+        Driving that was fitted, after cutting. [h]
+    drives, runs : int
+        How many.
+    inputs : mapping of str to str
+        File name -> SHA-256 of every table.
+    fit : mapping
+        Model and settings of the fit.
+    evaluation : mapping
+        Results on held-out drives, if there are any.
+    package_version : str
+        That wrote it.
+    notes : str
+    """
+
+    source: Annotated[str, Meta(description="The drives in words.")] = ""
+    licence: Annotated[str, Meta(description="Of the drives.")] = ""
+    hours: Annotated[float, Meta(ge=0, description="Driving fitted, after cutting. [h]")] = 0.0
+    drives: Annotated[int, Meta(ge=0)] = 0
+    runs: Annotated[int, Meta(ge=0)] = 0
+    inputs: Annotated[Mapping[str, str], Meta(description="File name to SHA-256.")] = field(default_factory=dict)
+    fit: Annotated[Mapping[str, Any], Meta(description="Model and settings of the fit.")] = field(default_factory=dict)
+    evaluation: Annotated[Mapping[str, Any], Meta(description="Results on held-out drives.")] = field(
+        default_factory=dict
+    )
+    package_version: str = ""
+    notes: str = ""
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain JSON values."""
+        values: dict[str, Any] = plain(self)
+        return values
+
+
+class Metadata(Record, frozen=True):
+    """What a profile is of, to be searched by; all of it is optional.
+
+    Parameters
+    ----------
+    version : str
+        Of the profile itself, as its owners count: "2", "1.3".
+    driver, vehicle, road : str
+        Whom and what was measured, and where: "professional", "truck", "motorway".
+    country : str
+        ISO 3166-1 alpha-2: "DE".
+    date : str
+        When the drives were recorded, ISO 8601: "2026-05", "2026-05-03/2026-06-01".
+    licence : str
+        Of the profile.
+    tags : tuple of str
+    """
+
+    version: str = ""
+    driver: str = ""
+    vehicle: str = ""
+    road: str = ""
+    country: str = ""
+    date: str = ""
+    licence: str = ""
+    tags: tuple[str, ...] = ()
+
 
 FORMAT = "xosc-lateral driver profile"
 

@@ -122,7 +122,7 @@ def _in_words(text: str, where: str, kind: object) -> str:
     what, path = (found[1], found[2] or "$") if found else (text, "$")
     path = (where + path.removeprefix("$")).lstrip(".")
     if path.endswith(".kind") and what.startswith("Invalid value"):
-        what = what.replace("Invalid value", "unknown kind") + f"; known are {', '.join(_kinds(kind, path))}"
+        what = what.replace("Invalid value", "unknown kind") + f"; known are {', '.join(sorted(_kinds(kind, path)))}"
         path = path.removesuffix(".kind")
     for theirs, ours in (("Object contains unknown field", "unknown field"), ("Object missing required field", "no")):
         what = what.replace(theirs, ours)

@@ -1,8 +1,13 @@
-"""Sampled offsets beside measured ones, under their context, or free."""
+"""Snippets of measured runs, and sampled offsets beside them, under their context, or free.
+
+References
+----------
+.. [1] N. Neis, J. Beyerer, arXiv:2405.17080, 2024: offsets are compared in snippets of equal length.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,12 +16,12 @@ from numpy.typing import NDArray
 from xosc_lateral.driver.plausibility import check_offsets
 from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.driver.sampling import sample_offsets
-from xosc_lateral.driver.seeds import child
-from xosc_lateral.driver.sensor.error import known_sensor, recorded, sensor_error
-from xosc_lateral.driver.snippets import cut_snippets, segment_of
+from xosc_lateral.driver.seeds import DriveSeed, child, generator
+from xosc_lateral.driver.sensor.model import SensorModel
 from xosc_lateral.drives.cuts import PAPER_RULES, CutRules, all_runs, whole_run
-from xosc_lateral.drives.drive import Drive
+from xosc_lateral.drives.drive import Drive, Run
 from xosc_lateral.drives.resampling import STEP
+from xosc_lateral.errors import DriverProfileError, NotEnoughDataError
 from xosc_lateral.segment import Segment
 
 FloatArray = NDArray[np.float64]
@@ -115,3 +120,113 @@ def sample_free(
     offset = sample_offsets(profile, segment, own)
     offset = offset + sensor_error(known_sensor(profile) if with_sensor else None, offset, STEP, own)
     yield SampledOffsets(profile.name, 0, time, offset, None)
+
+
+def known_sensor(profile: DriverProfile) -> SensorModel:
+    """What the profile's drives were measured by.
+
+    Raises `DriverProfileError` when the profile doesn't know.
+    """
+    if profile.sensor is None:
+        raise DriverProfileError(f"profile {profile.name} holds no sensor: fit it anew, or sample the driver alone")
+    return profile.sensor
+
+
+def sensor_error(
+    sensor: SensorModel | None,
+    path: FloatArray,
+    step: float,
+    seed: np.random.SeedSequence,
+    part: int = 0,
+) -> FloatArray:
+    """Error on a drive's sampled path, shape (n,), from random numbers of its own; zeros without a sensor. [m]
+
+    `part` numbers the pieces of one drive: a sensor knows nothing of what it measured minutes ago.
+    """
+    if sensor is None:
+        return np.zeros(len(path))
+    return sensor.sample(len(path), step, generator(seed, DriveSeed.SENSOR, part))
+
+
+def recorded(
+    sensor: SensorModel | None,
+    draw: Callable[[float], FloatArray],
+    n: int,
+    start: float,
+    step: float,
+    seed: np.random.SeedSequence,
+) -> FloatArray:
+    """A sampled path of n offsets with the sensor's error on it, the sum of which begins at `start`. [m]
+
+    `draw` samples the path from a given start [m].
+    """
+    if sensor is None:
+        return draw(start)
+    rng = generator(seed, DriveSeed.SENSOR, 0)
+    noise = sensor.sample(n, step, rng)
+    return draw(start - float(noise[0])) + noise
+
+
+PAST, FUTURE = 30.0, 10.0
+"""Context before and after a snippet that effects may look at. [s]"""
+
+
+@dataclass(frozen=True, slots=True)
+class Snippet:
+    """A stretch of a run: `rows` of `run`, the `index`-th of its drive."""
+
+    run: Run
+    index: int
+    rows: slice
+
+    @property
+    def time(self) -> FloatArray:
+        """Shape (n,). [s]"""
+        return self.run.time[self.rows]
+
+    @property
+    def offset(self) -> FloatArray:
+        """As measured, positive left, shape (n,). [m]"""
+        return self.run.offset[self.rows]
+
+
+def cut_snippets(runs: Sequence[Run], seconds: float, step: float = STEP) -> list[Snippet]:
+    """Successive snippets without overlap; each has ``seconds / step + 1`` rows and lies in one run.
+
+    Raises `NotEnoughDataError` when no run is as long.
+    """
+    length = round(seconds / step) + 1
+    if length < 2:
+        raise ValueError(f"a snippet of {seconds} s holds no two steps of {step} s")
+    snippets: list[Snippet] = []
+    count: dict[str, int] = {}
+    for run in runs:
+        for first in range(0, len(run) - length + 1, length):
+            index = count.get(run.drive, 0)
+            snippets.append(Snippet(run, index, slice(first, first + length)))
+            count[run.drive] = index + 1
+    if not snippets:
+        longest = max((len(run) for run in runs), default=0) * step
+        raise NotEnoughDataError(f"the longest run lasts {longest:.1f} s, a snippet needs {seconds:g} s")
+    return snippets
+
+
+def segment_of(run: Run, rows: slice | None = None) -> Segment:
+    """A run, or rows of it with the context around them, as the segment that is sampled on.
+
+    Columns that are empty all along stay in the context: there is none, which is not the same as not being known.
+    """
+    first, last = (0, len(run)) if rows is None else (rows.start, rows.stop)
+    begin = max(0, first - round(PAST / STEP))
+    end = min(len(run), last + round(FUTURE / STEP))
+    cut = slice(begin, end)
+    speed = np.full(end - begin, np.nan) if run.speed is None else run.speed[cut]
+    return Segment(
+        time=run.time[cut],
+        lane_width=run.lane_width[cut],
+        speed=speed,
+        context={name: np.full(end - begin, np.nan) for name in run.empty}
+        | {name: values[cut] for name, values in run.context.items()},
+        before=first - begin,
+        after=end - last,
+    )

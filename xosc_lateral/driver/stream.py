@@ -13,13 +13,12 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.driver.effects import Acts
+from xosc_lateral.driver.effects import Acts, ColumnEffect, EffectTerms
 from xosc_lateral.driver.plausibility import check_context
 from xosc_lateral.driver.process import DriveProcess, combine
 from xosc_lateral.driver.profile import DriverProfile, sampling_hash
 from xosc_lateral.driver.records import plain, read_as
-from xosc_lateral.driver.response_stream import ResponseStream
-from xosc_lateral.driver.stream_state import SeedState, StreamState, sealed, unsealed
+from xosc_lateral.driver.stream_state import ResponseStreamState, SeedState, StreamState, sealed, unsealed
 from xosc_lateral.driver.upsampling import extrapolate, piece
 from xosc_lateral.errors import DriverProfileError
 
@@ -36,7 +35,7 @@ class OffsetStream:
     """One driver on one drive, step by step.
 
     The offsets are those that `OffsetSampler.sample` gives for the same profile, seed and context, and, at a higher
-    rate, those that `upsample` makes of them. A driver who looks ahead, and a curve between samples, need to know what
+    rate, those that `upsample` makes of them. A driver with preview, and a curve between samples, need to know what
     comes: `step` is therefore given the context `preview` seconds ahead of the offset that it returns, and `look`
     the context before that. A bench that doesn't know the future gives `step` the present context without a `look`:
     then the driver responds to it `preview` seconds later; what is random is the same.
@@ -252,18 +251,18 @@ class OffsetStream:
         ----------
         profile : DriverProfile
         state : mapping
-            Of this version of the package or an older one.
+            Of `to_dict`.
 
         Raises
         ------
         DriverProfileError
-            If the state is none, damaged, of a newer version, or of another profile.
+            If the state is none, damaged, of another version, or of another profile.
         """
         try:
             return cls._restored(profile, state)
         except DriverProfileError:
             raise
-        except (ArithmeticError, LookupError, TypeError, ValueError) as error:  # of 0.1, whose states had no hash
+        except (ArithmeticError, LookupError, TypeError, ValueError) as error:  # sealed anew by hand
             raise DriverProfileError(f"the state of an offset stream is damaged: {error!r}") from error
 
     @classmethod
@@ -292,3 +291,40 @@ def _steps_per_model_step(rate: float | None, step: float) -> int:
     if rate is not None and (factor < 1 or abs(rate * step - factor) > 1e-9 * factor):
         raise ValueError(f"rate {rate:g} Hz, expected a whole multiple of the model's {1.0 / step:g} Hz")
     return factor
+
+
+class ResponseStream:
+    """A driver's response to one effect's columns, row by row."""
+
+    def __init__(self, effect: ColumnEffect, step: float) -> None:
+        self.effect = effect
+        self._response = effect.response_in_blocks(step)
+        self._ready: deque[FloatArray] = deque()
+        self._drop = 0
+
+    @property
+    def ahead(self) -> int:
+        """Rows of preview."""
+        return self._response.ahead
+
+    def take(self, row: Mapping[str, FloatArray], *, before: bool) -> None:
+        """One more row of context, each column of shape (1,); what responds to a row before the drive is not given."""
+        self._drop += before
+        self._ready.extend(self._response.take(self.effect.known(row)))
+        while self._drop and self._ready:
+            self._ready.popleft()
+            self._drop -= 1
+
+    def next(self) -> EffectTerms:
+        """Terms at the next row, each of shape (1,)."""
+        return self.effect.acting(self._ready.popleft()[None, :])
+
+    def state(self) -> ResponseStreamState:
+        """Its state."""
+        return ResponseStreamState(self._response.state, tuple(tuple(row.tolist()) for row in self._ready), self._drop)
+
+    def restore(self, state: ResponseStreamState) -> None:
+        """Back to a state."""
+        self._response.state = state.response
+        self._ready.extend(np.array(row) for row in state.ready)
+        self._drop = state.drop

@@ -51,7 +51,7 @@ class StreamState(Record, frozen=True, kw_only=True):
     known : tuple of str, optional
         Context columns that count; None before the first context.
     widths : tuple of float
-        Lane widths of rows that were looked at. [m]
+        Lane widths of rows ahead. [m]
     recalled, looked, row, phase : int
         Rows before the drive, steps looked ahead, next model step, step within it.
     samples, curve : tuple of float

@@ -12,8 +12,6 @@ References
 
 from __future__ import annotations
 
-from functools import lru_cache
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -35,9 +33,6 @@ ATTENUATION = 50.0
 
 CUTOFF, TRANSITION = 0.8, 0.4
 """Middle and width of the low-pass's transition, as shares of half the final rate: from 1.5 Hz to 2.5 Hz. [-]"""
-
-GAINS = 501
-"""Frequencies, 5 mHz apart, between which the gain is interpolated. [-]"""
 
 
 def resample(time: FloatArray, values: FloatArray, grid: FloatArray, *, oversampling: int = OVERSAMPLING) -> FloatArray:
@@ -117,21 +112,6 @@ def in_digits(values: FloatArray) -> FloatArray:
     """Twelve digits of the largest: averages of equal numbers are equal, whatever their errors."""
     largest = float(np.max(np.abs(values), initial=0.0, where=np.isfinite(values)))
     return np.round(values, 12 - int(np.ceil(np.log10(largest)))) if largest > 0.0 else values
-
-
-def passed(frequency: FloatArray) -> FloatArray:
-    """What the low-pass of `resample` leaves of the amplitude at the model's step. Shape as `frequency` [Hz]. [-]"""
-    return np.asarray(np.interp(frequency, *_gains(), right=0.0))
-
-
-@lru_cache(maxsize=1)
-def _gains() -> tuple[FloatArray, FloatArray]:
-    """Frequencies [Hz], and the low-pass's gain at them. [-]"""
-    kernel = _low_pass(OVERSAMPLING)
-    half = len(kernel) // 2
-    lags = STEP / OVERSAMPLING * np.arange(1, half + 1)
-    known = np.linspace(0.0, 0.5 / STEP, GAINS)
-    return known, np.asarray(kernel[half] + 2.0 * np.cos(2.0 * np.pi * np.outer(known, lags)) @ kernel[half + 1 :])
 
 
 def _fine_grid(grid: FloatArray, oversampling: int) -> FloatArray:

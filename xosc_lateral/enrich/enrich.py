@@ -10,12 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.driver.answers import basis_of
-from xosc_lateral.driver.beside import COLUMNS, SIDES, Basis
 from xosc_lateral.driver.drivability import drivable
 from xosc_lateral.driver.plausibility import check_offsets
-from xosc_lateral.driver.profile import DriverProfile
+from xosc_lateral.driver.profile import COLUMNS, SIDES, Basis, DriverProfile
+from xosc_lateral.driver.sampled_offsets import known_sensor, sensor_error
 from xosc_lateral.driver.sampling import OffsetSampler
-from xosc_lateral.driver.sensor.error import known_sensor, sensor_error
 from xosc_lateral.enrich.consequences import gaps_of, lane_departures
 from xosc_lateral.enrich.give_way import SampledVehicle, give_way, mirrored, other_side
 from xosc_lateral.enrich.result import Enriched, EntityResult, Neighbours, SampledSegment
@@ -177,7 +176,7 @@ class _Drawn:
         What a sensor adds to each segment's offsets; zeros unless asked for. [m]
     beyond : tuple of array
         How each would go on after its end. [m]
-    heeds : frozenset of str
+    responds : frozenset of str
         Sides on which the profile responds to neighbours by itself, as its population does.
     alone : frozenset of str
         Sides on which that is known of the driver himself: nothing is borrowed.
@@ -190,7 +189,7 @@ class _Drawn:
     segments: tuple[tuple[SegmentSpan, IntArray, FloatArray], ...] = ()
     neutral: tuple[str, ...] = ()
     errors: tuple[FloatArray, ...] = ()
-    heeds: frozenset[str] = frozenset()
+    responds: frozenset[str] = frozenset()
     alone: frozenset[str] = frozenset()
     beyond: tuple[FloatArray, ...] = ()
 
@@ -225,7 +224,7 @@ def _draw(
     segments: list[tuple[SegmentSpan, IntArray, FloatArray]] = []
     errors: list[FloatArray] = []
     beyond: list[FloatArray] = []
-    neutral, heeds, alone = set[str](), set[str](), set[str]()
+    neutral, responds, alone = set[str](), set[str](), set[str]()
     for span in spans:
         knots = np.arange(span.first, span.last + 1, every)
         if not span.is_road_following or len(knots) < 2:
@@ -235,7 +234,7 @@ def _draw(
             segment = _with_nobody_beside(segment)
         neutral |= _unknown(driver, segment)
         other_hand = _is_left_hand(entity, network, knots) != driver.left_hand
-        heeds |= sides_known(driver, {Basis.POPULATION}, other_hand=other_hand)
+        responds |= sides_known(driver, {Basis.POPULATION}, other_hand=other_hand)
         alone |= sides_known(driver, {Basis.MEASURED, Basis.DECLARED}, other_hand=other_hand)
         seen, side = (mirrored(segment), -1.0) if other_hand else (segment, 1.0)
         wanted = side * sampler.sample(seen)
@@ -250,7 +249,7 @@ def _draw(
         return _Drawn(entity, spans, None, "no road-following segment")
     unknown = tuple(sorted(neutral))
     return _Drawn(
-        entity, spans, driver, "", tuple(segments), unknown, tuple(errors), frozenset(heeds), frozenset(alone),
+        entity, spans, driver, "", tuple(segments), unknown, tuple(errors), frozenset(responds), frozenset(alone),
         tuple(beyond),
     )  # fmt: skip
 
@@ -298,7 +297,7 @@ def _sampled(one: _Drawn) -> SampledVehicle:
         deviation = one.deviation(distance_driven(one.motion))
         for span, _, _ in one.segments:
             can_move[span.first : span.last + 1] = True
-    return SampledVehicle(one.motion, deviation, can_move, one.heeds, one.alone)
+    return SampledVehicle(one.motion, deviation, can_move, one.responds, one.alone)
 
 
 def _result(drawn: _Drawn, network: RoadNetwork) -> EntityResult:

@@ -1,26 +1,27 @@
 """Vehicles side by side give way to each other: sampled paths, moved apart as real neighbours are.
 
-Every vehicle's path is sampled by itself first. Where two drive side by side, the lateral gap that this leaves between
-them is mapped to the gap that real neighbours leave at the same quantile: gaps between vehicles side by side beside
-those between any two vehicles of the two lanes (`GAPS`), or beside those that profiles leave which keep away from
-neighbours by themselves, in the mean (`HEEDED`). The narrower the gap would be, the more it is widened; both vehicles
-take their part, the one in the overtaking lane the larger one, as measured. The mapping fades with the free space
-lengthwise. Of what profiles leave, all is the overtaking one's: the other keeps as far away as real ones do, by itself.
-All displacements follow from the paths as first sampled, so nobody's depends on the order of
-entities, and a vehicle far away changes nobody's.
+Every vehicle's path is sampled by itself first. Where two drive side by side, the lateral gap that this leaves
+between them is mapped to the gap that real neighbours leave at the same quantile: gaps between vehicles side by side
+beside those between any two vehicles of the two lanes (`GAPS`), or beside those that profiles leave which keep away
+from neighbours by themselves, in the mean (`RESPONDING`). The narrower the gap would be, the more it is widened; both
+vehicles take their part, the one in the overtaking lane the larger one, as measured. The mapping fades with the free
+space lengthwise. Of what profiles leave, all is the overtaking one's: the other keeps as far away as real ones do, by
+itself. All displacements follow from the paths as first sampled, so nobody's depends on the order of entities, and a
+vehicle far away changes nobody's.
 
 Our own rule: quantile mapping to gaps that were measured in DLR Highway Traffic v1.1.0 (benchmarks/give_way.py).
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.motion.context import STEERING, smooth_step
+from xosc_lateral.motion.context import CELLS, STEERING, smooth_step
 from xosc_lateral.motion.nearby import pairs_within
 from xosc_lateral.motion.nominal import Activity, EntityMotion, NominalMotion
 from xosc_lateral.road.network import RoadNetwork
@@ -72,7 +73,7 @@ GAPS = (
 least, 0.1, 1, 5, 25 and 50 %): DLR Highway Traffic, 744 encounters (`benchmarks/give_way.py`). From 3 m on nobody
 gives way, which is assumed. [m]"""
 
-HEEDED = np.array([0.04, 0.26, 0.56, 0.95, 1.43, 1.75, 3.0])
+RESPONDING = np.array([0.04, 0.26, 0.56, 0.95, 1.43, 1.75, 3.0])
 """Lateral gap that vehicles leave by themselves whose profiles know what neighbours do, at the quantiles of `GAPS`:
 those side by side in the same recording, sampled from `motorway` under its context, 12 seeds
 (`benchmarks/give_way.py`; `motorway-refined` is within 0.03 m of it). [m]"""
@@ -81,10 +82,10 @@ OVERTAKING_SHARE = 0.84
 """Part of the one in the overtaking lane, by the law alone: it moves 0.239 m, the other 0.045 m (same recording,
 alongside; `benchmarks/clearance.py`). [-]"""
 
-FADES, HEEDED_FADES = 60.0, 20.0
-"""Free space lengthwise within which neighbours matter less and less, to profiles that don't heed them and beyond what
-profiles do that do: `motorway` leaves 0.030 m of what real vehicles move from whom they overtake alongside, 0.002 m of
-it at up to 20 m of free space, and nothing farther away (same recording). [m]"""
+FADES, RESPONDING_FADES = 60.0, 20.0
+"""Free space lengthwise within which neighbours matter less and less, to profiles that do not respond to them, and
+beyond what profiles do that respond: `motorway` leaves 0.030 m of what real vehicles move from whom they overtake
+alongside, 0.002 m of it at up to 20 m of free space, and nothing farther away (same recording). [m]"""
 
 ENTERING = 0.5
 """Nominal lateral gap over which a vehicle that crosses into a lane becomes its neighbour. [m]"""
@@ -102,7 +103,7 @@ class SampledVehicle:
         From it, positive left. [m]
     can_move : array of bool, shape (rows,)
         Where its path is sampled and may be moved.
-    heeds : frozenset of str
+    responds : frozenset of str
         Sides, "left" and "right", on which its profile responds to neighbours by itself: there, gaps are widened by
         what that leaves to be widened.
     alone : frozenset of str
@@ -112,7 +113,7 @@ class SampledVehicle:
     motion: EntityMotion
     deviation: FloatArray
     can_move: NDArray[np.bool_]
-    heeds: frozenset[str] = frozenset()
+    responds: frozenset[str] = frozenset()
     alone: frozenset[str] = frozenset()
 
 
@@ -133,23 +134,34 @@ def give_way(
     count, n = len(sampled), len(rows)
     left, right = np.zeros((count, n)), np.zeros((count, n))
     frames = [Frame.of(one, rows) for one in sampled]
-    left_hand = _left_hand(network, sampled, rows)
+    left_hand = np.array(_left_hand(network, sampled, rows), dtype=bool)
     x, y = ([np.where(frame.present, getattr(frame, name), np.nan) for frame in frames] for name in ("x", "y"))
     longest = max((one.motion.entity.bounding_box.length for one in sampled), default=0.0)
-    for i, j in pairs_within(x, y, FADES + longest + MARGIN):
-        if not (sampled[i].can_move.any() or sampled[j].can_move.any()):
+    can_move = [one.can_move.any() for one in sampled]
+    meeting = [pair for pair in pairs_within(x, y, FADES + longest + MARGIN) if can_move[pair[0]] or can_move[pair[1]]]
+    names = ("x", "y", "heading", "deviation", "can_move", "present")
+    tables = [np.stack([getattr(frame, name) for frame in frames]) for name in names] if meeting else []
+    sizes = [np.array([getattr(frame, name) for frame in frames]) for name in ("length", "width")]
+    responds, alone = (
+        [np.array([side in getattr(one, name) for one in sampled], dtype=bool) for side in ("left", "right")]
+        for name in ("responds", "alone")
+    )
+    for pairs in _together(meeting, n):
+        near = np.flatnonzero(_near(tables, sizes[0], *pairs))
+        own, other = (who[near // n] for who in pairs)
+        at = near % n
+        first, second = (
+            Frame(*(table[who, at] for table in tables), *(size[who] for size in sizes)) for who in (own, other)
+        )
+        widening = widened(first, second, responds[0][own], responds[1][own])
+        if widening is None:
             continue
-        for own, other in ((i, j), (j, i)):
-            heeds = sampled[own].heeds
-            widening = widened(frames[own], frames[other], "left" in heeds, "right" in heeds)
-            if widening is None:
-                continue
-            aside, is_left, heeded = widening  # of `own`, by where `other` is
-            share = part_of(is_left == left_hand[own], heeded)
-            share = np.where(frames[other].can_move, share, 1.0) * frames[own].can_move
-            share *= np.where(is_left, "left" not in sampled[own].alone, "right" not in sampled[own].alone)
-            right[own] = np.maximum(right[own], np.where(is_left, share * aside, 0.0))
-            left[own] = np.maximum(left[own], np.where(is_left, 0.0, share * aside))
+        aside, is_left, responding = widening  # of `own`, by where `other` is
+        share = part_of(is_left == left_hand[own], responding)
+        share = np.where(second.can_move, share, 1.0) * first.can_move
+        share *= ~np.where(is_left, alone[0][own], alone[1][own])
+        np.maximum.at(right, (own, at), np.where(is_left, share * aside, 0.0))
+        np.maximum.at(left, (own, at), np.where(is_left, 0.0, share * aside))
     every = max(1, int(rows[1] - rows[0])) if n > 1 else 1
     width = STEERING / (motion.step * every)
     all_rows = np.arange(len(motion.entities[0].time)) if count else np.empty(0)
@@ -158,6 +170,22 @@ def give_way(
         aside = left[k] - right[k]
         result.append(np.interp(all_rows, rows, _smoothed(aside, width)) if aside.any() else None)
     return result
+
+
+def _together(meeting: Sequence[tuple[int, int]], n: int) -> Iterator[tuple[IntArray, IntArray]]:
+    """Both of each pair, each as the one who looks at the other, as many pairs as are looked at at once."""
+    pairs = np.array([pair for i, j in meeting for pair in ((i, j), (j, i))], dtype=np.int64).reshape(-1, 2)
+    step = max(1, CELLS // max(n, 1))
+    for begin in range(0, len(pairs), step):
+        yield pairs[begin : begin + step, 0], pairs[begin : begin + step, 1]
+
+
+def _near(tables: Sequence[NDArray[Any]], length: FloatArray, own: IntArray, other: IntArray) -> NDArray[np.bool_]:
+    """Where pairs of vehicles are near enough for `widened`, shape (pairs, n); `tables`: x, y ... of all vehicles."""
+    x, y, present = tables[0], tables[1], tables[-1]
+    reach = (FADES + 0.5 * (length[own] + length[other]) + MARGIN)[:, None]
+    away = (x[other] - x[own]) ** 2 + (y[other] - y[own]) ** 2
+    return np.asarray(present[own] & present[other] & (away < reach**2))
 
 
 MARGIN = 10.0
@@ -200,9 +228,9 @@ class Frame:
 
 
 def widened(
-    own: Frame, other: Frame, heeds_left: bool | NDArray[np.bool_], heeds_right: bool | NDArray[np.bool_]
+    own: Frame, other: Frame, responds_left: bool | NDArray[np.bool_], responds_right: bool | NDArray[np.bool_]
 ) -> tuple[FloatArray, NDArray[np.bool_], NDArray[np.bool_]] | None:
-    """By how much the gap to the other is widened, whether the other is to the left, and whether its profile heeds it.
+    """By how much the gap to the other is widened, whether it is to the left, and whether the profile responds to it.
 
     None if the other never is near.
     """
@@ -219,26 +247,26 @@ def widened(
     nominal = np.abs(aside) - half
     gap = nominal + np.where(is_left, 1.0, -1.0) * (other.deviation - own.deviation)
     free = np.maximum(np.abs(along) - 0.5 * (own.length + other.length), 0.0)
-    heeded = np.where(is_left, heeds_left, heeds_right)
-    weight = 1.0 - smooth_step(free / np.where(heeded, HEEDED_FADES, FADES))
+    responding = np.where(is_left, responds_left, responds_right)
+    weight = 1.0 - smooth_step(free / np.where(responding, RESPONDING_FADES, FADES))
     weight *= smooth_step(nominal / ENTERING) * (near & same_way)
-    return weight * np.where(heeded, wider(gap, heeded=True), wider(gap, heeded=False)), is_left, heeded
+    return weight * np.where(responding, wider(gap, responding=True), wider(gap, responding=False)), is_left, responding
 
 
-def part_of(overtakes: NDArray[np.bool_], heeded: NDArray[np.bool_]) -> FloatArray:
-    """What a vehicle takes of a widening, by whether it is the overtaking one and heeds the other, shape (n,). [-]
+def part_of(overtakes: NDArray[np.bool_], responding: NDArray[np.bool_]) -> FloatArray:
+    """Share of a widening, by whether the vehicle is the overtaking one and responds to the other, shape (n,). [-]
 
     By itself `motorway` moves 0.209 m from whom it overtakes and 0.083 m from who overtakes it, where real vehicles
     move 0.239 and 0.045 m: the second has done more than its part already.
     """
-    share = np.where(heeded, 1.0, OVERTAKING_SHARE)
+    share = np.where(responding, 1.0, OVERTAKING_SHARE)
     return np.asarray(np.where(overtakes, share, 1.0 - share))
 
 
-def wider(gap: FloatArray, *, heeded: bool) -> FloatArray:
-    """What gaps to somebody are widened by, whom the profile heeds by itself or not, shape (n,). [m]"""
+def wider(gap: FloatArray, *, responding: bool) -> FloatArray:
+    """What gaps to somebody are widened by, to whom the profile responds by itself or not, shape (n,). [m]"""
     free, side_by_side = GAPS
-    free = HEEDED if heeded else free
+    free = RESPONDING if responding else free
     wanted = np.interp(gap, free, side_by_side)
     wanted = np.where(gap < free[0], side_by_side[0], wanted)
     return np.asarray(np.maximum(wanted - gap, 0.0) * (gap < free[-1]))

@@ -15,10 +15,9 @@ from numpy.typing import NDArray
 
 from xosc_lateral.driver.models.base import Start
 from xosc_lateral.driver.profile import DriverProfile
+from xosc_lateral.driver.sampled_offsets import Snippet, cut_snippets, recorded, segment_of, sensor_error
 from xosc_lateral.driver.sampling import OffsetSampler, sample_offsets
 from xosc_lateral.driver.seeds import child
-from xosc_lateral.driver.sensor.error import recorded, sensor_error
-from xosc_lateral.driver.snippets import Snippet, cut_snippets, segment_of
 from xosc_lateral.drives.drive import Run
 from xosc_lateral.segment import Segment
 

@@ -13,8 +13,7 @@ from typing import Any
 from msgspec.structs import replace
 
 from xosc_lateral.driver.plausibility import check_profile
-from xosc_lateral.driver.profile import DriverProfile
-from xosc_lateral.driver.provenance import Metadata
+from xosc_lateral.driver.profile import DriverProfile, Metadata
 from xosc_lateral.driver.records import plain
 from xosc_lateral.errors import DriverProfileError, FormatError, XoscLateralError
 from xosc_lateral.formats.atomic import write_atomically

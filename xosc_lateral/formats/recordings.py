@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 from xosc_lateral.errors import FormatError
 from xosc_lateral.formats.importers import dlr_ht, levelx
-from xosc_lateral.formats.importers.track_table import Tracks, read_tracks, tracks_of
+from xosc_lateral.formats.importers.track_table import USUAL_LENGTH, Tracks, read_tracks, tracks_of
+from xosc_lateral.formats.mapping import MappingLike, TableMapping, as_mapping
 from xosc_lateral.formats.opendrive import read_opendrive
 from xosc_lateral.formats.opendrive.write import SHOULDER, WIDTH_PIECE, WrittenLane, WrittenRoad, curved_plan
 from xosc_lateral.formats.tables import foreign_errors
@@ -24,6 +25,10 @@ STEP = 0.1
 """Rows are thinned to this: lane changes and braking last seconds. [s]"""
 REAR_AXLE = 0.3
 """Middle of a vehicle ahead of its rear axle, as a share of its length: 1.4 m of a car of 4.6 m. [-]"""
+LONGEST = 60.0
+"""Of vehicles with all that they pull: road trains have 53.5 m. [m]"""
+WIDEST = 6.0
+"""Of what drives on roads, heavy transports included. [m]"""
 AROUND = 50.0
 """A made road goes on so far beyond its traffic. [m]"""
 USUAL_WIDTH = {"truck": 2.5, "bus": 2.5, "trailer": 2.5, "van": 2.0, "motorcycle": 0.8, "motorbike": 0.8}
@@ -70,7 +75,7 @@ def read_recording(
     *,
     kind: str | None = None,
     road: Path | None = None,
-    columns: Sequence[str] = (),
+    columns: MappingLike | None = None,
 ) -> RecordedTraffic:
     """Read a recording.
 
@@ -81,8 +86,8 @@ def read_recording(
         Its format, one of `READERS`; without it, told from the name.
     road : path, optional
         OpenDRIVE file, for formats that come without one.
-    columns : sequence of str
-        ``NAME=COLUMN[:UNIT]``, see `import_tracks`.
+    columns : TableMapping, mapping of str to str, or path, optional
+        Name -> ``COLUMN[:UNIT]``, of tables.
 
     Raises
     ------
@@ -94,7 +99,7 @@ def read_recording(
     if not source.exists():
         raise FormatError("no such file or folder", path=source)
     with foreign_errors(source, "can't be read as a recording"), np.errstate(all="ignore"):
-        return READERS[kind](source, road, columns)
+        return READERS[kind](source, road, as_mapping(columns))
 
 
 def format_of(source: Path) -> str:
@@ -110,22 +115,24 @@ def format_of(source: Path) -> str:
 
 
 # ---- tracks on a known road ------------------------------------------------------------------------------------------
-def _tracks(source: Path, road: Path | None, columns: Sequence[str]) -> RecordedTraffic:
-    tracks = read_tracks(source, columns)
-    return _on_road(tracks, source, road)
+def _tracks(source: Path, road: Path | None, columns: TableMapping) -> RecordedTraffic:
+    return _on_road(read_tracks(source, mapping=columns), source, road)
 
 
-def _osi(source: Path, road: Path | None, columns: Sequence[str]) -> RecordedTraffic:
+def _osi(source: Path, road: Path | None, columns: TableMapping) -> RecordedTraffic:
     from xosc_lateral.formats.osi.read import read_osi
 
     recorded = read_osi(source)
-    return replace(_on_road(recorded.tracks, source, road), notes=tuple(recorded.notes))
+    traffic = _on_road(recorded.tracks, source, road)
+    return replace(traffic, notes=(*recorded.notes, *traffic.notes))
 
 
-def _commonroad(source: Path, road: Path | None, columns: Sequence[str]) -> RecordedTraffic:
+def _commonroad(source: Path, road: Path | None, columns: TableMapping) -> RecordedTraffic:
     from xosc_lateral.formats.importers.commonroad import read_obstacles
 
-    return _on_road(read_obstacles(source), source, road)
+    tracks = read_obstacles(source)
+    own = tuple(name.removeprefix(f"{source.stem}:") for name in tracks.names)
+    return _on_road(replace(tracks, names=own), source, road)
 
 
 def _on_road(tracks: Tracks, source: Path, road: Path | None) -> RecordedTraffic:
@@ -134,30 +141,24 @@ def _on_road(tracks: Tracks, source: Path, road: Path | None) -> RecordedTraffic
     network = read_opendrive(road)
     x, y = network.header_offset.undo(tracks.x, tracks.y)
     heading = tracks.heading - network.header_offset.heading
-    found = []
+    found, notes = [], []
     for k, rows in enumerate(_rows_of(tracks.vehicle)):
         rows = rows[_thinned(tracks.time[rows])]
-        kind, length = str(tracks.kind[rows[0]]), float(tracks.length[rows[0]])
+        name, kind = tracks.names[k], str(tracks.kind[rows[0]])
+        length, width = float(tracks.length[rows[0]]), USUAL_WIDTH.get(kind, 1.8)
+        given = width if tracks.width is None else float(tracks.width[rows[0]])
+        if 0.0 < length <= LONGEST and 0.0 < given <= WIDEST:
+            width = given
+        else:
+            usual = USUAL_LENGTH.get(kind, 4.6)
+            notes.append(f"{name}: no vehicle has {length:g} m x {given:g} m, {usual:g} m x {width:g} m are taken")
+            length = usual
         middle = REAR_AXLE * length if tracks.rear is None else float(tracks.rear[rows[0]])
-        width = USUAL_WIDTH.get(kind, 1.8) if tracks.width is None else float(tracks.width[rows[0]])
-        found.append(
-            Track(
-                tracks.names[k],
-                kind,
-                length,
-                width,
-                USUAL_HEIGHT.get(kind, 1.5),
-                0.0 if tracks.is_reference or tracks.rear is not None else middle,
-                middle,
-                tracks.time[rows],
-                x[rows],
-                y[rows],
-                heading[rows],
-            )
-        )
-    return RecordedTraffic(
-        source.name.split(".")[0], tuple(found), network, road.read_bytes(), road.name, (source, road)
-    )
+        ahead = 0.0 if tracks.is_reference or tracks.rear is not None else middle
+        at = tracks.time[rows], x[rows], y[rows], heading[rows]
+        found.append(Track(name, kind, length, width, USUAL_HEIGHT.get(kind, 1.5), ahead, middle, *at))
+    files = road.read_bytes(), road.name, (source, road), tuple(notes)
+    return RecordedTraffic(source.name.split(".")[0], tuple(found), network, *files)
 
 
 def _rows_of(vehicle: NDArray[np.int64]) -> list[NDArray[np.int64]]:
@@ -186,7 +187,7 @@ def _made(road: WrittenRoad, tracks: Sequence[Track], sources: Sequence[Path], n
     return RecordedTraffic(road.name, tuple(tracks), network, *road_file, tuple(sources), tuple(notes))
 
 
-def _dlr(source: Path, road: Path | None, columns: Sequence[str]) -> RecordedTraffic:
+def _dlr(source: Path, road: Path | None, columns: TableMapping) -> RecordedTraffic:
     table = dlr_ht.read_tracks(source)
     lanes = dlr_ht.find_lanes(table)
     made = dlr_road(lanes)
@@ -224,7 +225,7 @@ def _dlr(source: Path, road: Path | None, columns: Sequence[str]) -> RecordedTra
     return _made(made, tracks, [source], [note])
 
 
-def _levelx(source: Path, road: Path | None, columns: Sequence[str]) -> RecordedTraffic:
+def _levelx(source: Path, road: Path | None, columns: TableMapping) -> RecordedTraffic:
     """One recording of highD, whose road is straight and has its markings in the meta file; exiD comes with a road."""
     files = sorted(source.glob("*_tracks.csv")) if source.is_dir() else [source]
     if len(files) != 1:
@@ -234,7 +235,7 @@ def _levelx(source: Path, road: Path | None, columns: Sequence[str]) -> Recorded
     if "latLaneCenterOffset" in table.columns:
         kinds = meta.set_index("trackId").reindex(table["trackId"])["class"].astype(str).to_numpy()
         named = table.assign(time=table["frame"] / rate, heading=np.radians(table["heading"]), vehicle_class=kinds)
-        return _on_road(tracks_of(named, files[0], columns), files[0], road)
+        return _on_road(tracks_of(named, files[0], saved=columns), files[0], road)
     levelx.require(table, levelx.HIGHD_COLUMNS, files[0])
     lower, upper = (np.sort(levelx.markings(about, side, files[0])) for side in ("lower", "upper"))
     middle = 0.5 * (upper[-1] + lower[0])
@@ -299,7 +300,7 @@ def dlr_road(found: dlr_ht.Carriageways) -> WrittenRoad:
     return WrittenRoad("dlr-ht", curved_plan(line, origin), sides[0], sides[1], origin)
 
 
-Reader = Callable[[Path, "Path | None", Sequence[str]], RecordedTraffic]
+Reader = Callable[[Path, "Path | None", TableMapping], RecordedTraffic]
 READERS: dict[str, Reader] = {
     "dlr-ht": _dlr,
     "levelx": _levelx,

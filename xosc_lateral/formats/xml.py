@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import os
 import re
-from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
 from lxml import etree
+from msgspec import Struct
 
 from xosc_lateral.errors import FormatError
 from xosc_lateral.formats.source import check_regular, guard_input, read_source
@@ -29,8 +29,7 @@ _DSL = re.compile(
 _BYTES_PER_TAG, _BYTES_PER_ATTRIBUTE = 150, 250
 
 
-@dataclass(frozen=True, slots=True)
-class XmlDocument:
+class XmlDocument(Struct, frozen=True):
     """A parsed file: root element, the bytes that it was parsed from, and their SHA-256."""
 
     root: etree._Element

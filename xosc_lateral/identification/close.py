@@ -11,9 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.driver.effects import Effect
-from xosc_lateral.driver.models.kinds import ModelKind
-from xosc_lateral.driver.profile import DriverProfile
-from xosc_lateral.driver.provenance import Provenance
+from xosc_lateral.driver.models.base import ModelKind
+from xosc_lateral.driver.profile import DriverProfile, Provenance
 from xosc_lateral.drives.drive import Drive
 from xosc_lateral.identification.core_model import (
     DriverVariance,

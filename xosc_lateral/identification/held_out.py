@@ -9,13 +9,11 @@ import numpy as np
 from msgspec import structs
 from numpy.typing import NDArray
 
-from xosc_lateral.driver.beside import COLUMNS
 from xosc_lateral.driver.effects import ColumnEffect, Effect, TimeSmooth
 from xosc_lateral.driver.fitting import fit_population, fit_runs
-from xosc_lateral.driver.models.kinds import ModelKind
+from xosc_lateral.driver.models.base import ModelKind
 from xosc_lateral.driver.place import COLUMNS as KNOWN_TO_THE_BASE
-from xosc_lateral.driver.profile import DriverProfile
-from xosc_lateral.driver.provenance import Provenance
+from xosc_lateral.driver.profile import COLUMNS, DriverProfile, Provenance
 from xosc_lateral.drives.cuts import MIN_RUN
 from xosc_lateral.drives.drive import Run
 from xosc_lateral.drives.filters import filtered

@@ -17,7 +17,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.driver.effects.time_smooth import half_cosines
+from xosc_lateral.driver.effects.hidden import half_cosines
 from xosc_lateral.identification.autocorrelation import Whitener, fit_autoregression
 from xosc_lateral.identification.dictionary import orthonormal
 from xosc_lateral.identification.innovations import LONGEST, ORDER

@@ -10,6 +10,7 @@ from __future__ import annotations
 import ctypes as c
 from collections import Counter
 from collections.abc import Callable, Iterable
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
@@ -22,7 +23,9 @@ from xosc_lateral.errors import FormatError, SimulationError
 from xosc_lateral.formats.opendrive import read_opendrive
 from xosc_lateral.formats.openscenario.read import read_scenario
 from xosc_lateral.live.surroundings import OpenDriveRoads, Places
-from xosc_lateral.live.traffic import Moment, Moves, Traffic
+from xosc_lateral.live.traffic import LEADING_OVER, TURN, Moment, Moves, Traffic
+from xosc_lateral.motion.deviation import SETTLING_TIME, settle
+from xosc_lateral.motion.segments import MINIMUM_SPEED
 from xosc_lateral.scenario import Scenario
 from xosc_lateral.scenario.private_actions import (
     FollowTrajectoryAction,
@@ -159,10 +162,31 @@ class _Lane(NamedTuple):
     heading: float
 
 
+@dataclass(slots=True)
+class _Rest:
+    """Lateral speed at a maneuver's start [m/s] that runs out over a time [s]; way beside the maneuver so far [m]."""
+
+    rate: float
+    over: float
+    passed: float = 0.0
+    way: float = 0.0
+
+    def on(self, dt: float) -> float:
+        """So much later [s]: the way. [m]"""
+        self.passed += dt
+        self.way = float(settle(np.array([self.passed]), self.over, self.rate, 0.0)[0])
+        return self.way
+
+
+_SAME_PLACE = 0.05
+"""A maneuver that moves a vehicle further in its first step puts it elsewhere, as a teleport does. [m]"""
+
+
 class EsminiTraffic:
     """Drivers of the vehicles of a scenario that esmini has opened.
 
-    Call `steer` before every ``SE_StepDT``; all else stays with the caller: opening, stepping, an external ego.
+    Call `steer` before every ``SE_StepDT``, and `settle` after it; all else stays with the caller: opening, stepping,
+    an external ego.
 
     Parameters
     ----------
@@ -198,11 +222,14 @@ class EsminiTraffic:
     ) -> None:
         self.player = library if isinstance(library, Player) else Player(library)
         model = scenario if isinstance(scenario, Scenario) else read_scenario(scenario)
+        self.entities = model.entities
         self._ego = {ego} if isinstance(ego, str) else set(ego)
         self._moved_by = lateral_actions(model)
         self._running: Counter[str] = Counter()
         self._touched: set[str] = set()
         self._base: dict[str, float] = {}
+        self._rates: dict[str, float] = {}  # of who is driven, lateral [m/s]
+        self._rests: dict[str, _Rest] = {}
         self._lane_of: dict[str, _Lane] = {}
         self._also = on_element
         self.warnings: list[str] = []
@@ -243,7 +270,34 @@ class EsminiTraffic:
                 self.player.SE_ReportObjectLateralPosition(state.id, t)
         steered = zip(moment.names, moves.offset.tolist(), moves.steered.tolist(), strict=True)
         self.moves = {name: (offset, own) for name, offset, own in steered}
+        self._rates = dict(zip(moment.names, moves.rate.tolist(), strict=True))
         return moves
+
+    def settle(self, dt: float) -> None:
+        """Let the lateral speed that a maneuver has cut off at its start run out; after ``SE_StepDT(dt)``.
+
+        A lateral action begins with no lateral speed, and says anew in every step where its vehicle is. What is
+        reported after a step is seen in the vehicle's state until the next one, and changes nothing of the action.
+        """
+        busy = self._busy()
+        for name, state in self._objects():
+            offset, steered = self.moves.get(name, (0.0, False))
+            if name in busy and steered:  # begun in this step, in which the driver's place still counts
+                if abs(self.offset_of(state) - offset) > _SAME_PLACE:
+                    continue
+                bound = LEADING_OVER * TURN * max(abs(state.speed), MINIMUM_SPEED)
+                over = max(SETTLING_TIME, 4.0 * abs(self._rates[name]) / bound)
+                self._rests[name] = _Rest(self._rates[name], over)
+            elif name not in busy or self._road(state) < 0:
+                self._rests.pop(name, None)
+            elif name in self._rests:
+                direction = self.network.travel_direction(self._road(state), state.lane)
+                way = self._rests[name].on(dt)
+                self.player.SE_ReportObjectLateralPosition(state.id, state.t + direction * way)
+
+    def _busy(self) -> set[str]:
+        """Whom a lateral action moves now."""
+        return {name for action, count in self._running.items() if count > 0 for name in self._moved_by[action]}
 
     def states(self) -> dict[str, ObjectState]:
         """Of all objects, by name."""
@@ -295,11 +349,11 @@ class EsminiTraffic:
         width = np.array([one.width for one in lanes])
         pulled = np.array([state.category in _PULLED for _, state in seen], dtype=np.bool_)
         ours = np.array([state.ctrl_type == 0 and name not in self._ego for name, state in seen], dtype=np.bool_)
-        busy = {name for action, count in self._running.items() if count > 0 for name in self._moved_by[action]}
+        busy = self._busy()
         in_maneuver = np.array([name in busy or name in self._touched for name in names], dtype=np.bool_)
         for row, name in enumerate(names):
             if in_maneuver[row] or name not in self._base:
-                self._base[name] = float(offset[row])
+                self._base[name] = float(offset[row]) - (self._rests[name].way if name in self._rests else 0.0)
         self._touched.clear()
         return Moment(
             names, column["speed"], width, offset, is_lane & ~in_maneuver, ours & ~pulled,

@@ -1,15 +1,15 @@
 """Drivers in SUMO, through libsumo or TraCI, with the sublane model: SUMO chooses lanes, drivers their places in them.
 
-``changeSublane`` moves a vehicle sideways within what SUMO finds safe, and keeps SUMO from changing lanes while it is
-asked for. So a vehicle is left alone as long as SUMO wants another lane for it and nobody is in the way there, and
-until SUMO has moved it. (``setLateralAlignment`` with a number leaves lane changes alone, too, but vehicles reach their
-places by decimetres only.)
+``changeSublane`` moves a vehicle sideways within what SUMO finds safe. It keeps SUMO from changing lanes while it is
+asked for, and also afterwards by what is left of the way. So it is taken back, and the vehicle left alone, as soon as
+SUMO wants another lane for it and nobody is in the way there, until SUMO has moved it and it lies still in one lane.
+(``setLateralAlignment`` with a number leaves lane changes alone, too, but vehicles reach their places by decimetres
+only.)
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
@@ -29,19 +29,11 @@ IntArray = NDArray[np.int64]
 HOLD = 0.5
 """A lane change is over when SUMO has wanted none for so long, and moves the vehicle no more. [s]"""
 
-PATIENCE = 8.0
-"""Longest time that a vehicle is left to SUMO for one lane change: at 1 m/s, SUMO's lateral speed, one takes 4 s, and
-some wishes are never acted on. [s]"""
-
-AGAIN = 20.0
-"""Shortest time from one lane change to the next: SUMO's reasons gather while its changes are held back, and would
-give more of them than without drivers (tried with two seeds of 200 s). [s]"""
-
 ELSEWHERE = 0.3
 """A vehicle this far from where its driver wants it was moved by SUMO: its driver goes on from there. [m]"""
 
 _STILL = 0.05
-"""Lateral speed of a vehicle that SUMO does not move. [m/s]"""
+"""Lateral speed of a vehicle that SUMO does not move [m/s], and how far it may stick out of its lane then. [m]"""
 
 _REASONS, _SIDES, _BLOCKED = 8 | 16 | 32 | 64, 2 | 4, 512 | 1024 | 2048 | 4096
 """Bits of a lane change state (`LaneChangeAction`): strategic, cooperative, for speed, keeping right; left or right;
@@ -211,15 +203,22 @@ class SumoTraffic:
         neighbours: Neighbours = Neighbours.BORROW,
     ) -> None:
         self.connection = connection
-        if float(connection.simulation.getOption("lateral-resolution")) <= 0.0:
-            raise SimulationError("SUMO's sublane model is off: start it with --lateral-resolution 0.25, say")
+        sublane = float(connection.simulation.getOption("lateral-resolution"))
+        if sublane <= 0.0:
+            raise SimulationError("SUMO's sublane model is off: start it with --lateral-resolution 4, say")
         self.roads = SumoRoads(connection)
         self._ego = {ego} if isinstance(ego, str) else set(ego)
         self.traffic = Traffic(profile, profiles=profiles, seed=seed, roads=self.roads, neighbours=neighbours)
         self._kinds: dict[str, tuple[str, float, float]] = {}
-        self._changes: dict[str, _Change] = {}
+        self._lanes: dict[str, str] = {}
+        self._busy: dict[str, float] = {}  # until when at least they are SUMO's [s]
         self.moves: dict[str, tuple[float, bool]] = {}
         self.warnings: list[str] = []
+        if sublane < (widest := max(self.roads.width.values(), default=0.0)):
+            self.warnings.append(
+                f"sublanes of {sublane:g} m in lanes of {widest:g} m: SUMO changes lanes more often when vehicles "
+                f"leave the middle; with --lateral-resolution {np.ceil(widest):g} it does as without drivers"
+            )
 
     def steer(self) -> Moves:
         """Say where everybody is sideways after the next step.
@@ -236,6 +235,8 @@ class SumoTraffic:
         for row, name in enumerate(moment.names):
             if moves.steered[row]:
                 vehicles.changeSublane(name, float(moves.offset[row] - moment.offset[row]))
+            elif self.moves.get(name, (0.0, False))[1]:  # what is left of the last way would hold SUMO's own back
+                vehicles.changeSublane(name, 0.0)
         steered = zip(moment.names, moves.offset.tolist(), moves.steered.tolist(), strict=True)
         self.moves = {name: (offset, own) for name, offset, own in steered}
         return moves
@@ -262,7 +263,8 @@ class SumoTraffic:
         names = tuple(row[0] for row in seen)
         for gone in self._kinds.keys() - set(names):
             del self._kinds[gone]
-            self._changes.pop(gone, None)
+            self._lanes.pop(gone, None)
+            self._busy.pop(gone, None)
         for name in names:
             if name not in self._kinds:
                 vehicles = self.connection.vehicle
@@ -285,38 +287,22 @@ class SumoTraffic:
         )  # fmt: skip
 
     def _follows(self, name: str, lane: str, offset: float, now: float) -> bool:
-        """Whether a vehicle keeps its lane, as far as SUMO is concerned."""
-        vehicles, change = self.connection.vehicle, self._changes.setdefault(name, _Change(lane))
+        """Whether a vehicle keeps its lane, as far as SUMO is concerned: it wants no other, and lies still in this."""
+        vehicles, before = self.connection.vehicle, self._lanes.get(name, lane)
+        self._lanes[name] = lane
         wishes = [int(vehicles.getLaneChangeState(name, side)[0]) for side in (1, -1)]
         wants = any(wish & _REASONS and wish & _SIDES and not wish & _BLOCKED for wish in wishes)
-        flipped = change.lane != lane and change.lane.rpartition("_")[0] == lane.rpartition("_")[0]
+        changed = before != lane and before.rpartition("_")[0] == lane.rpartition("_")[0]
         wanted, steered = self.moves.get(name, (offset, False))
-        pushed = steered and abs(wanted - offset) > ELSEWHERE
-        change.lane = lane
-        if (wants and now >= change.not_before) or flipped or pushed:
-            if change.since is None:
-                change.since = now
-            change.until = now + HOLD
-        if change.since is None:
+        if wants or changed or (steered and abs(wanted - offset) > ELSEWHERE):
+            self._busy[name] = now + HOLD
+        if name not in self._busy:
             return True
-        if flipped or now - change.since > PATIENCE:  # changed, or wanted in vain
-            change.not_before = now + AGAIN
-        if now < change.until and now - change.since <= PATIENCE:
+        sticks_out = abs(offset) + 0.5 * self._kinds[name][2] > 0.5 * self.roads.width[self.roads.place[lane]] + _STILL
+        if now < self._busy[name] or sticks_out or abs(float(vehicles.getLateralSpeed(name))) > _STILL:
             return False
-        if abs(float(vehicles.getLateralSpeed(name))) > _STILL and now - change.since <= PATIENCE:
-            return False
-        change.since = None
+        del self._busy[name]
         return True
-
-
-@dataclass(slots=True)
-class _Change:
-    """A vehicle's lane, since when SUMO has it for a change, until when at least, and no sooner than when again. [s]"""
-
-    lane: str
-    since: float | None = None
-    until: float = -1.0
-    not_before: float = -1.0
 
 
 _INVALID = 1e6

@@ -186,7 +186,7 @@ def give_way_now(
     can_move : array of bool, shape (n,)
         Who has a driver that follows the road.
     known : mapping of str to array of bool, shape (n,)
-        ``heeds_left``, ``heeds_right``, ``alone_left``, ``alone_right``: see `enrich.give_way.SampledVehicle`.
+        ``responds_left``, ``responds_right``, ``alone_left``, ``alone_right``: see `enrich.give_way.SampledVehicle`.
     """
     n = len(places.x)
     cos, sin = np.cos(places.heading), np.sin(places.heading)
@@ -205,13 +205,13 @@ def give_way_now(
     found = widened(
         Frame(*(column[own] for column in columns)),
         Frame(*(column[other] for column in columns)),
-        known["heeds_left"][own],
-        known["heeds_right"][own],
+        known["responds_left"][own],
+        known["responds_right"][own],
     )
     if found is None:
         return left
-    aside, is_left, heeded = found
-    share = np.where(can_move[other], part_of(is_left == left_hand, heeded), 1.0)
+    aside, is_left, responding = found
+    share = np.where(can_move[other], part_of(is_left == left_hand, responding), 1.0)
     share *= np.where(is_left, ~known["alone_left"][own], ~known["alone_right"][own])
     np.maximum.at(right, own, np.where(is_left, share * aside, 0.0))
     np.maximum.at(left, own, np.where(is_left, 0.0, share * aside))

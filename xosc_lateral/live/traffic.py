@@ -16,10 +16,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.driver.beside import Basis
 from xosc_lateral.driver.group import OffsetGroup
 from xosc_lateral.driver.plausibility import first_implausible, implausible
-from xosc_lateral.driver.profile import DriverProfile, sampling_hash
+from xosc_lateral.driver.profile import Basis, DriverProfile, sampling_hash
 from xosc_lateral.enrich.enrich import sides_known
 from xosc_lateral.enrich.give_way import mirrored_context
 from xosc_lateral.enrich.result import Neighbours
@@ -37,7 +36,7 @@ FORMAT = "xosc-lateral live traffic"
 TURN = 0.03
 """Change of heading per time that nobody takes for a kink: 0.3 mrad in a step of 0.01 s. [rad/s]"""
 
-_LEADING_OVER = 0.5
+LEADING_OVER = 0.5
 """Part of `TURN` that leading over to the driver's path may take; the driver's own movement has the rest. [-]"""
 
 _PEAK = 10.0 / np.sqrt(3.0)
@@ -314,12 +313,12 @@ class Traffic:
         if moment.places is None or self._neighbours is not Neighbours.BORROW:
             return np.zeros(len(moment.names))
         known = {f"{word}_{side}": np.zeros(len(moment.names), dtype=np.bool_)
-                 for word in ("heeds", "alone") for side in ("left", "right")}  # fmt: skip
+                 for word in ("responds", "alone") for side in ("left", "right")}  # fmt: skip
         for key, (_, members) in self._groups.items():
             profile = self._profiles[key]
             other_hand = profile.left_hand != self._left_hand
             rows = there[np.isin(who, [self._index[name] for name in members])]
-            for word, basis in (("heeds", {Basis.POPULATION}), ("alone", {Basis.MEASURED, Basis.DECLARED})):
+            for word, basis in (("responds", {Basis.POPULATION}), ("alone", {Basis.MEASURED, Basis.DECLARED})):
                 for side in sides_known(profile, basis, other_hand=other_hand):
                     known[f"{word}_{side}"][rows] = True
         lateral = np.where(moment.following, moment.offset - moment.nominal, 0.0)
@@ -457,7 +456,7 @@ def _move_aside(state: NDArray[Any], passed: FloatArray) -> None:
 
 def _lead_over(state: NDArray[Any], which: BoolArray, gap: FloatArray, rate: FloatArray, speed: FloatArray) -> None:
     """Begin to lead over from a gap [m] that changes at a rate [m/s], within what is no kink at this speed. [m/s]"""
-    bound = _LEADING_OVER * TURN * np.maximum(np.abs(speed), MINIMUM_SPEED)
+    bound = LEADING_OVER * TURN * np.maximum(np.abs(speed), MINIMUM_SPEED)
     over = np.maximum(SETTLING_TIME, np.maximum(np.sqrt(_PEAK * np.abs(gap) / bound), 4.0 * np.abs(rate) / bound))
     for name, values in (("from", gap), ("from_rate", rate), ("share", 0.0), ("over", over)):
         state[name] = np.where(which, values, state[name])

@@ -259,15 +259,19 @@ def _traffic(motion: NominalMotion, network: RoadNetwork, first: int, every: int
 
 @dataclass(eq=False, slots=True)
 class Around:
-    """Who is around: on each side of `ZONES`, and free space to who comes towards one, shape (n,). [m]"""
+    """Who is around: on each side of `ZONES`; free space to who comes towards one [m], and how far he is there [-].
+
+    Shape (n,).
+    """
 
     sides: Mapping[str, _Side]
     oncoming: FloatArray
+    oncoming_there: FloatArray
 
     @classmethod
     def nobody(cls, n: int) -> Around:
         """Nobody around anybody."""
-        return cls({side: _Side.nobody(n) for side in ZONES}, np.full(n, np.nan))
+        return cls({side: _Side.nobody(n) for side in ZONES}, np.full(n, np.nan), np.zeros(n))
 
     def add(
         self,
@@ -284,9 +288,12 @@ class Around:
         """
         with np.errstate(invalid="ignore"):
             there = (gap <= REACH) & ~np.isnan(seen.left)
-            towards = there & seen.oncoming & (seen.ahead > 0)
+            # he comes into sight in the last quarter of the reach, and is gone within `NEAR` once he has passed
+            share = 1.0 - smooth_step(np.where(seen.ahead > 0, 4.0 * gap / REACH - 3.0, gap / NEAR))
+            k = np.flatnonzero(there & seen.oncoming & (share > 0))
             there &= ~seen.oncoming
-        np.fmin.at(self.oncoming, rows[towards], gap[towards])
+        np.fmin.at(self.oncoming, rows[k], gap[k] - NEAR * np.log(share[k]))
+        np.maximum.at(self.oncoming_there, rows[k], share[k])
         for side, middle in ZONES.items():
             share = _share_inside(seen.left / width - middle, other_width / width)
             share = np.where(there & ((side != "lead") | (seen.ahead > 0)), share, 0.0)
@@ -297,6 +304,8 @@ class Around:
     def columns(self, lanes: Mapping[str, FloatArray], *, always_fade: bool = False) -> dict[str, FloatArray]:
         """Context columns, shape (n,) each; `lanes`: how far there is one on each side. [-]"""
         columns = {"oncoming_distance": self.oncoming}
+        if always_fade or (self.oncoming_there.max(initial=0.0) > 0.0 and self.oncoming_there.min(initial=1.0) < 1.0):
+            columns[f"oncoming_distance{FADES}"] = self.oncoming_there
         for side, found in self.sides.items():
             columns |= {f"{side}_is_truck": found.is_truck}
             lane = np.maximum(lanes[side], np.minimum(found.influence, 1.0))

@@ -8,16 +8,15 @@ sideways, and the path's heading and curvature stay continuous even where a mane
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
+from msgspec import Struct
 from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]
 
 
-@dataclass(frozen=True, eq=False, slots=True)
-class NaturalSpline:
+class NaturalSpline(Struct, frozen=True, eq=False):
     """Natural cubic spline: values and second derivatives (`bends`) at its knots.
 
     Our own dozen lines since scipy.interpolate alone takes a third of `convert`'s time.
@@ -81,8 +80,7 @@ SETTLING_TIME = 3.0
 """Lateral speed and acceleration left over at a segment's border die out within this time at the border's speed. [s]"""
 
 
-@dataclass(frozen=True, eq=False, slots=True)
-class SampledDeviation:
+class SampledDeviation(Struct, frozen=True, eq=False):
     """Offsets sampled on one road-following segment.
 
     Parameters
@@ -100,8 +98,7 @@ class SampledDeviation:
     settling: tuple[float, float]
 
 
-@dataclass(frozen=True, eq=False, slots=True)
-class Deviation:
+class Deviation(Struct, frozen=True, eq=False):
     """Deviation from nominal motion, twice continuously differentiable in the distance driven.
 
     Parameters

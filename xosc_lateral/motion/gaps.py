@@ -9,9 +9,9 @@ References
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
+from msgspec import Struct
 from numpy.typing import NDArray
 
 from xosc_lateral.motion.nearby import pairs_within
@@ -29,8 +29,7 @@ TOGETHER = 256
 """Pairs whose boxes are compared at once: a numpy call costs as much as some hundred boxes. [-]"""
 
 
-@dataclass(frozen=True, eq=False, slots=True)
-class BoxPath:
+class BoxPath(Struct, frozen=True, eq=False):
     """A vehicle's bounding box along its path.
 
     Parameters
@@ -52,18 +51,8 @@ class BoxPath:
     width: float
     centre: float
 
-    def corners(self, rows: NDArray[np.bool_] | slice = slice(None)) -> FloatArray:
-        """Corners counter-clockwise, shape (n, 4, 2). [m]"""
-        ahead = self.centre + 0.5 * self.length * np.array([1.0, -1.0, -1.0, 1.0])
-        left = 0.5 * self.width * np.array([1.0, 1.0, -1.0, -1.0])
-        cos, sin = np.cos(self.heading[rows])[:, None], np.sin(self.heading[rows])[:, None]
-        x = self.x[rows][:, None] + ahead * cos - left * sin
-        y = self.y[rows][:, None] + ahead * sin + left * cos
-        return np.stack([x, y], axis=-1)
 
-
-@dataclass(frozen=True, slots=True)
-class Gap:
+class Gap(Struct, frozen=True):
     """Smallest free space between two vehicles over a run; 0: they touch.
 
     Parameters
@@ -97,31 +86,42 @@ def smallest_gaps(time: FloatArray, paths: Sequence[BoxPath], *, reach: float = 
     reach : float
         [m]
     """
-    near_pairs: list[tuple[BoxPath, BoxPath, NDArray[np.bool_]]] = []
+    near_pairs: list[tuple[BoxPath, BoxPath, NDArray[np.intp]]] = []
     extent = max((np.hypot(path.length, path.width) / 2 + abs(path.centre) for path in paths), default=0.0)
     for first, second in pairs_within([path.x for path in paths], [path.y for path in paths], reach + 2 * extent):
         a, b = paths[first], paths[second]
         half_diagonals = 0.5 * (np.hypot(a.length, a.width) + np.hypot(b.length, b.width))
-        apart = np.hypot(a.x - b.x, a.y - b.y) - half_diagonals - abs(a.centre) - abs(b.centre)
-        near = np.isfinite(apart) & (apart <= reach)
-        if not near.any():
-            continue
-        # the exact distance is only needed where a lower bound of it undercuts the best upper bound
-        upper = np.min(np.hypot(a.x - b.x, a.y - b.y)[near] + abs(a.centre) + abs(b.centre))
-        near_pairs.append((a, b, near & (apart <= upper)))
+        between = np.hypot(a.x - b.x, a.y - b.y)
+        apart = between - half_diagonals - abs(a.centre) - abs(b.centre)
+        near = np.flatnonzero(apart <= reach)
+        if len(near):
+            # the exact distance is only needed where a lower bound of it undercuts the best upper bound
+            upper = np.min(between[near]) + abs(a.centre) + abs(b.centre)
+            near_pairs.append((a, b, near[apart[near] <= upper]))
     gaps = []
     for begin in range(0, len(near_pairs), TOGETHER):
         part = near_pairs[begin : begin + TOGETHER]
-        corners = [
-            np.concatenate([path.corners(near) for path, near in side])
-            for side in ([(a, near) for a, _, near in part], [(b, near) for _, b, near in part])
-        ]
-        ends = np.cumsum([np.count_nonzero(near) for _, _, near in part])
-        for (a, b, near), distance in zip(part, np.split(box_distance(*corners), ends[:-1]), strict=True):
+        boxes = corners([(a, near) for a, _, near in part]), corners([(b, near) for _, b, near in part])
+        ends = np.cumsum([len(near) for _, _, near in part])
+        for (a, b, near), distance in zip(part, np.split(box_distance(*boxes), ends[:-1]), strict=True):
             best = int(np.argmin(distance))
             if distance[best] <= reach:
-                gaps.append(Gap((a.name, b.name), float(distance[best]), float(time[near][best])))
+                gaps.append(Gap((a.name, b.name), float(distance[best]), float(time[near[best]])))
     return tuple(gaps)
+
+
+def corners(boxes: Sequence[tuple[BoxPath, NDArray[np.intp]]]) -> FloatArray:
+    """Corners of boxes on some rows each, counter-clockwise, one box after the other, shape (n, 4, 2). [m]"""
+    x, y, heading = (np.concatenate([getattr(box, name)[rows] for box, rows in boxes])[:, None] for name in _POSE)
+    counts = [len(rows) for _, rows in boxes]
+    length, width, centre = (np.repeat([getattr(box, name) for box, _ in boxes], counts)[:, None] for name in _SIZE)
+    ahead = centre + 0.5 * length * np.array([1.0, -1.0, -1.0, 1.0])
+    left = 0.5 * width * np.array([1.0, 1.0, -1.0, -1.0])
+    cos, sin = np.cos(heading), np.sin(heading)
+    return np.stack([x + ahead * cos - left * sin, y + ahead * sin + left * cos], axis=-1)
+
+
+_POSE, _SIZE = ("x", "y", "heading"), ("length", "width", "centre")
 
 
 def box_distance(a: FloatArray, b: FloatArray) -> FloatArray:

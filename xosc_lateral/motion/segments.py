@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from enum import Enum
 
 import numpy as np
+from msgspec import Struct
 from numpy.typing import NDArray
 
 from xosc_lateral.motion.nominal import Activity, EntityMotion
@@ -40,8 +40,7 @@ class SegmentKind(Enum):
 _KINDS = tuple(SegmentKind)
 
 
-@dataclass(frozen=True, slots=True)
-class SegmentSpan:
+class SegmentSpan(Struct, frozen=True):
     """A segment as the rows ``first`` to ``last`` (both included) of one entity, of one kind throughout.
 
     Parameters
@@ -65,8 +64,7 @@ class SegmentSpan:
         return self.kind is SegmentKind.ROAD_FOLLOWING
 
 
-@dataclass(frozen=True, slots=True)
-class SegmentRow:
+class SegmentRow(Struct, frozen=True):
     """One segment of one entity.
 
     Parameters

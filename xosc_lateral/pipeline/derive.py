@@ -19,10 +19,9 @@ from numpy.typing import NDArray
 
 from xosc_lateral.driver.drivability import SELDOM, strain
 from xosc_lateral.driver.effects import Acts, Adapted, ColumnEffect, Population
-from xosc_lateral.driver.effects.acts import FACTOR_LIMIT
+from xosc_lateral.driver.effects.base import FACTOR_LIMIT
 from xosc_lateral.driver.models.autoregressive.model import AutoregressiveModel
-from xosc_lateral.driver.profile import DriverProfile
-from xosc_lateral.driver.provenance import Metadata, Provenance
+from xosc_lateral.driver.profile import DriverProfile, Metadata, Provenance
 from xosc_lateral.errors import DriverProfileError
 from xosc_lateral.evaluation.lane_keeping import HIGHWAY_SPEED, LaneKeeping, highway_drives, lane_keeping
 from xosc_lateral.motion.segments import MINIMUM_SPEED
@@ -162,6 +161,9 @@ class Derived(NamedTuple):
 
     def __str__(self) -> str:
         had = [f"{name} {value:g}, reached {getattr(self.reached, name):.4g}" for name, value in _targets(self).items()]
+        if self.asked.near_line is not None and self.asked.mean is None and size_is_given(self.asked):
+            side = "left" if self.reached.mean > 0 else "right"
+            had.append(f"for which he drives {abs(self.reached.mean):.2f} m {side} of the lane's middle")
         return f"{self.profile.name}: " + ("; ".join(had) or "as its base")
 
 

@@ -27,6 +27,8 @@ VERSIONS: tuple[Version, ...] = ((1, 0), (1, 1), (1, 2), (1, 3))
 """Of the standard that can be written."""
 LONG_DRIVE = 100.0
 """Of road-following, for a profile of one vehicle: ten windows that the evaluation compares drivers by. [s]"""
+LONGEST_WINDOW = 3600.0
+"""A scenario of more can't be looked at, and times in ms or us instead of s give it. [s]"""
 AROUND = 100.0
 """Who comes as near as this to the vehicle in question, along or across, belongs to its surroundings. [m]"""
 
@@ -250,6 +252,10 @@ def chosen(traffic: RecordedTraffic, settings: ReconstructSettings) -> tuple[lis
     if end - begin < 1.0:
         raise FormatError(
             f"from {begin:g} to {end:g} s is no second; it lasts from {first:g} to {last:g} s", path=source
+        )
+    if end - begin > LONGEST_WINDOW:
+        raise FormatError(
+            f"{end - begin:g} s are more than {LONGEST_WINDOW:g} s: take a part with --from and --to", path=source
         )
     return tracks, begin, end
 

@@ -6,8 +6,10 @@ that the entity points; without a road, the entity's own heading (as in the refe
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
 from math import copysign, cos, hypot, inf, sin
+
+from msgspec import Struct
+from msgspec.structs import replace
 
 from xosc_lateral.playback import boxes
 from xosc_lateral.playback.paths.base import nearest_s
@@ -22,8 +24,7 @@ FAR = 1e10
 """Distance where there is no way from one to the other. [m]"""
 
 
-@dataclass(frozen=True, slots=True)
-class Spot:
+class Spot(Struct, frozen=True):
     """A place that distances are measured to. `lane` is 0 and `road` -1 where it is on no road. [m]"""
 
     x: float
@@ -34,8 +35,7 @@ class Spot:
     t: float
 
 
-@dataclass(frozen=True, slots=True)
-class RoadGap:
+class RoadGap(Struct, frozen=True):
     """From one place to another along the roads, seen there.
 
     [m], lanes (positive to +t, lane 0 not counted), whether on the other side of lane 0, whether s runs the other way.

@@ -78,6 +78,8 @@ class Transition:
         if self.shape is DynamicsShape.STEP or limit == inf:
             return 0.0
         change = abs(self.target - self.start)
+        if limit <= 0.0:
+            return 0.0 if change == 0.0 else inf  # it never gets there
         if self.shape is DynamicsShape.SINUSOIDAL:
             return pi * sqrt(change / (2.0 * limit))
         return sqrt(6.0 * change / limit)

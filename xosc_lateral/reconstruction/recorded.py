@@ -21,10 +21,17 @@ BESIDE = 1.0
 """So far beside every driving lane a vehicle still keeps to one: it drives on its marking. [m]"""
 LONGEST_GAP = 1.0
 """Rows farther apart than this are not of one passage, as in `formats.importers.cuts`. [s]"""
+FARTHEST = 1e8
+"""No map projection gives such a position: the Earth's circumference is 4e7 m. [m]"""
+SHORTEST_STEP = 1e-4
+"""Rows that follow sooner are of the same moment: no sensor has 10 kHz. [s]"""
 SHORTEST = 2.0
 """Passages below this are left out: a speed and its change can't be told in less. [s]"""
-LEAP = 3.0
-"""Farther than twice what it drives in a step, and by this much: an identifier that has gone to another vehicle. [m]"""
+LEAP = 1.5
+"""Farther than it can have driven by this much (half a narrow lane): an identifier that has gone to another vehicle.
+[m]"""
+BACKWARDS = 0.5
+"""Who falls back so far drives backwards; less is an error of standing vehicles' positions. [m]"""
 SLOW = 0.5
 """Below this speed the direction of movement is none: that of the row before holds. [m/s]"""
 
@@ -145,9 +152,11 @@ def place_tracks(tracks: Sequence[Track], network: RoadNetwork, start: float, en
     """
     vehicles, left_out = list[RecordedVehicle](), list[str]()
     for track in tracks:
-        inside = (track.time >= start - 1e-9) & (track.time <= end + 1e-9)
-        if inside.any():
-            found = _place(track, inside, network, left_out)
+        inside = (np.hypot(track.x, track.y) < FARTHEST) & np.isfinite(track.heading)
+        rows = np.flatnonzero(inside & (track.time >= start - 1e-9) & (track.time <= end + 1e-9))
+        if len(rows):
+            rows = rows[np.r_[True, np.diff(track.time[rows]) > SHORTEST_STEP]]
+            found = _place(track, rows, network, left_out)
             if found is not None:
                 vehicles.append(replace(found, time=found.time - start))
     if not vehicles:
@@ -156,11 +165,9 @@ def place_tracks(tracks: Sequence[Track], network: RoadNetwork, start: float, en
     return Recording(tuple(vehicles), tuple(left_out), start, end)
 
 
-def _place(
-    track: Track, inside: NDArray[np.bool_], network: RoadNetwork, left_out: list[str]
-) -> RecordedVehicle | None:
-    time, x, y = track.time[inside], track.x[inside], track.y[inside]
-    heading = _held(time, x, y, track.heading[inside])
+def _place(track: Track, rows: NDArray[np.intp], network: RoadNetwork, left_out: list[str]) -> RecordedVehicle | None:
+    time, x, y = track.time[rows], track.x[rows], track.y[rows]
+    heading = _held(time, x, y, track.heading[rows])
     x, y = x - track.ahead * np.cos(heading), y - track.ahead * np.sin(heading)
     found = network.world_to_lane(x, y, heading=heading)
     on_lane = (found.distance <= BESIDE) & (found.lane != 0)
@@ -174,14 +181,19 @@ def _place(
     width = np.full(len(x), np.nan)
     width[there] = network.lane_width(*place)
     way = np.where(np.cos(heading - lane_heading) < 0.0, -1, 1)
-    passages = _passages(time, x, y, on_lane)
+    elsewhere = on_lane & _elsewhere(time, x, y, heading, lane_heading)
+    passages = _passages(time, x, y, on_lane & ~elsewhere)
+    reasons = {"off the lanes": int((~on_lane).sum()), "across a lane or backwards": int(elsewhere.sum())}
     if not passages:
-        left_out.append(f"{track.name}: no {SHORTEST:g} s along a driving lane without a gap")
+        said = "".join(f", {rows} of {len(time)} rows {why}" for why, rows in reasons.items() if rows)
+        left_out.append(f"{track.name}: no {SHORTEST:g} s along a driving lane without a gap{said}")
         return None
     best = max(passages, key=lambda part: time[part.stop - 1] - time[part.start])
     lost = len(time) - (best.stop - best.start)
     if lost:
-        left_out.append(f"{track.name}: {lost} of {len(time)} rows (off the lanes, or beyond a gap or a leap)")
+        reasons["beyond them, a gap or a leap"] = lost - sum(reasons.values())
+        said = ", ".join(f"{rows} {why}" for why, rows in reasons.items() if rows > 0)
+        left_out.append(f"{track.name}: {lost} of {len(time)} rows: {said}")
     size = track.length, track.width, track.height, track.middle
     road, lane = (each.astype(np.int64)[best] for each in (found.road, found.lane))
     where = road, lane, found.s[best], (way * found.offset)[best]
@@ -201,11 +213,35 @@ def _held(time: FloatArray, x: FloatArray, y: FloatArray, heading: FloatArray) -
     return np.asarray(heading[np.where(last >= 0, last, int(np.argmax(moving)))])
 
 
+def _elsewhere(
+    time: FloatArray, x: FloatArray, y: FloatArray, heading: FloatArray, lane_heading: FloatArray
+) -> NDArray[np.bool_]:
+    """Rows that do not follow a lane: it moves across it, as a person on foot, or drives backwards."""
+    if len(time) < 2:
+        return np.zeros(len(time), dtype=np.bool_)
+    dx, dy = np.gradient(x), np.gradient(y)
+    along, across = (
+        np.abs(dx * np.cos(lane_heading + turn) + dy * np.sin(lane_heading + turn)) for turn in (0, np.pi / 2)
+    )
+    driven = np.cumsum(np.r_[0.0, np.diff(x) * np.cos(heading[1:]) + np.diff(y) * np.sin(heading[1:])])
+    moves = np.hypot(dx, dy) >= SLOW * np.gradient(time)
+    return np.asarray((moves & (across > along)) | (driven < np.maximum.accumulate(driven) - BACKWARDS))
+
+
 def _passages(time: FloatArray, x: FloatArray, y: FloatArray, on_lane: NDArray[np.bool_]) -> list[slice]:
     """Stretches of rows on a lane without a gap or a leap, `SHORTEST` at least."""
-    step, moved = np.diff(time), np.hypot(np.diff(x), np.diff(y))
-    speed = np.median(moved / np.maximum(step, 1e-9)) if len(step) else 0.0
-    broken = (step > LONGEST_GAP) | (moved > 2.0 * max(float(speed), 1.0) * step + LEAP)
+    from scipy.ndimage import median_filter
+
+    step = np.maximum(np.diff(time), 1e-9)
+    broken = step > LONGEST_GAP
+    if len(step):
+        moved = np.diff(x), np.diff(y)
+        vx, vy = (median_filter(each / step, 5, mode="nearest") for each in moved)
+        about = np.maximum(np.hypot(vx, vy), 1.0)
+        across = (moved[1] * vx - moved[0] * vy) / about
+        # twice as far as about that time, or turned by more than 30 degrees
+        broken |= np.hypot(*moved) > 2.0 * about * step + LEAP
+        broken |= np.abs(across) > 0.5 * about * step + LEAP
     parts = []
     for part in true_slices(on_lane):
         cuts = part.start + 1 + np.flatnonzero(broken[part.start : part.stop - 1])

@@ -10,10 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.driver.answers import basis_of, beside_line
-from xosc_lateral.driver.beside import SIDES
 from xosc_lateral.driver.effects import Acts, ColumnEffect, Effect
-from xosc_lateral.driver.profile import DriverProfile
-from xosc_lateral.driver.provenance import Provenance
+from xosc_lateral.driver.profile import SIDES, DriverProfile, Provenance
 from xosc_lateral.evaluation.lane_keeping import LaneKeeping, keeping_of
 from xosc_lateral.evaluation.metrics import DURATION, MovementSummary, free_runs, summarise, summary_of
 from xosc_lateral.evaluation.spectra import Spectrum, spectrum

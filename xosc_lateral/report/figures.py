@@ -205,11 +205,15 @@ def _variable(color: str) -> str:
 
 def _svg(figure: Figure, key: str) -> str:
     import matplotlib as mpl
+    from matplotlib.backends.backend_svg import FigureCanvasSVG
 
     buffer = io.StringIO()
     # Ids in the SVG are salted hashes and its metadata hold the date: both are fixed, for the same bytes each time.
     with mpl.rc_context({**_STYLE, "svg.hashsalt": key}), _names_as_they_are(figure):
-        figure.savefig(buffer, format="svg", metadata={"Date": None, "Creator": None}, dpi=_RASTER_DPI)
+        figure.set_dpi(_RASTER_DPI)  # of what is a picture in it
+        # `savefig` would draw everything twice, the first time for nothing but the layout, which drawing does itself.
+        canvas = FigureCanvasSVG(figure)
+        canvas.print_svg(buffer, metadata={"Date": None, "Creator": None})  # type: ignore[no-untyped-call]
     return buffer.getvalue()
 
 

@@ -67,8 +67,8 @@ def finding_sentence(finding: Finding) -> str:
     return f"{finding.effect}: {finding.shape}{size}{when}{alike}"
 
 
-def loop_page(result: LoopResult, tables: Sequence[Path]) -> str:
-    """HTML page; same result, same bytes."""
+def loop_page(result: LoopResult, tables: Sequence[Path], proofs: Sequence[str] = ()) -> str:
+    """HTML page; same result, same bytes. `proofs`: what findings do in a scenario, in words."""
     from xosc_lateral.report.loop_json import column_record
     from xosc_lateral.report.loop_traces import traces_figure
     from xosc_lateral.report.render import render_page
@@ -88,6 +88,7 @@ def loop_page(result: LoopResult, tables: Sequence[Path]) -> str:
         numbers=_numbers(result),
         capital=_capital,
         finding_rows=[_finding_row(finding, timed) for finding in result.findings],
+        proof_rows=[{"in a scenario": one} for one in proofs],
         findings=[(finding, meaning(finding, result), _pictures(result, finding)) for finding in result.findings],
         only_hidden=not any(finding.columns for finding in result.findings),
         residuals=_residuals(result),

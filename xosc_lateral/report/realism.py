@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from xosc_lateral.driver.models.kinds import ModelKind
+from xosc_lateral.driver.models.base import ModelKind
 from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.evaluation.classifier import TwoSampleResult
 from xosc_lateral.evaluation.lane_keeping import INDICATORS, UNITS

@@ -10,8 +10,7 @@ from typing import Any
 import numpy as np
 
 from xosc_lateral.driver.answers import basis_of, beside_line, borrows
-from xosc_lateral.driver.beside import SIDES
-from xosc_lateral.driver.profile import DriverProfile
+from xosc_lateral.driver.profile import SIDES, DriverProfile
 from xosc_lateral.enrich.conversion import ConversionProvenance, ConvertedScenario
 from xosc_lateral.enrich.result import Enriched, EntityResult, Neighbours
 from xosc_lateral.motion.gaps import REACH, Gap

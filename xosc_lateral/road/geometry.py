@@ -10,10 +10,10 @@ References
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from math import atan2, ceil, cos, hypot, sin, sqrt
 
 import numpy as np
+from msgspec import Struct
 from numpy.typing import NDArray
 
 
@@ -64,8 +64,7 @@ MAX_TURN = 2000.0
 """An element that turns more than this is refused by the reader. [rad]"""
 
 
-@dataclass(frozen=True, slots=True)
-class ClothoidPiece:
+class ClothoidPiece(Struct, frozen=True):
     """A stretch of clothoid (line and arc included) about its middle.
 
     Attributes
@@ -138,8 +137,7 @@ def _horner(series: list[complex], u: float) -> complex:
     return value
 
 
-@dataclass(frozen=True, slots=True)
-class Line:
+class Line(Struct, frozen=True):
     """A straight line from (x, y); [m], heading in [rad]."""
 
     x: float
@@ -167,8 +165,7 @@ class Line:
         return clothoid_pieces(self.x, self.y, self.heading, self.length, 0.0, 0.0)
 
 
-@dataclass(frozen=True, slots=True)
-class Arc:
+class Arc(Struct, frozen=True):
     """A circular arc from (x, y); [m], heading in [rad], curvature in [1/m]."""
 
     x: float
@@ -197,8 +194,7 @@ class Arc:
         return clothoid_pieces(self.x, self.y, self.heading, self.length, self.curvature, 0.0)
 
 
-@dataclass(frozen=True, slots=True)
-class Spiral:
+class Spiral(Struct, frozen=True):
     """A clothoid: curvature [1/m] changes linearly along it; lengths in [m], heading in [rad]."""
 
     heading: float
@@ -238,8 +234,7 @@ class Spiral:
         return self.parts
 
 
-@dataclass(frozen=True, slots=True)
-class ParamCubic:
+class ParamCubic(Struct, frozen=True):
     """A parametric cubic (paramPoly3, and poly3 as its special case) run through by arc length.
 
     Attributes

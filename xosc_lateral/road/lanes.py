@@ -11,6 +11,8 @@ from bisect import bisect_right
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
+from msgspec import Struct
+
 from xosc_lateral.road.piecewise import ZERO, Cubic, PiecewiseCubic
 from xosc_lateral.road.positions import LaneState, RoadMark
 
@@ -26,8 +28,7 @@ NARROW = 0.1
 """A lane narrower than this at some s does not count as one there (it opens or closes). [m]"""
 
 
-@dataclass(frozen=True, slots=True)
-class LaneRecord:
+class LaneRecord(Struct, frozen=True):
     """A lane as written in the file; starts are s of the road, not of the section. [m], [m/s]"""
 
     id: int
@@ -42,8 +43,7 @@ class LaneRecord:
     successors: tuple[int, ...]
 
 
-@dataclass(frozen=True, slots=True)
-class Lane:
+class Lane(Struct, frozen=True):
     """A lane of one section, evaluated.
 
     Attributes

@@ -9,9 +9,9 @@ from __future__ import annotations
 
 from bisect import bisect_right
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 
 import numpy as np
+from msgspec import Struct
 
 from xosc_lateral.road.positions import FloatArray, IntArray
 
@@ -29,8 +29,7 @@ def shift(cubic: Cubic, ds: float) -> Cubic:
     return (a + ds * (b + ds * (c + ds * d)), b + ds * (2.0 * c + ds * 3.0 * d), c + 3.0 * d * ds, d)
 
 
-@dataclass(frozen=True, slots=True)
-class PiecewiseCubic:
+class PiecewiseCubic(Struct, frozen=True):
     """A function of s that is one cubic from each start to the next, about that start.
 
     Parameters

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from bisect import bisect_right
-from dataclasses import dataclass
 from math import asin, atan, cos, sin, sqrt, tan
 from typing import TypeVar
 
 import numpy as np
+from msgspec import Struct
 from numpy.typing import NDArray
 
 from xosc_lateral.road.piecewise import PiecewiseCubic
@@ -16,8 +16,7 @@ BEND_STEP = 1e-3
 """Step of differences of the grade. [m]"""
 
 
-@dataclass(frozen=True, slots=True)
-class Shape:
+class Shape(Struct, frozen=True):
     """Lateral profile over t at a few stations (``lateralProfile/shape``), linear in s between them.
 
     Attributes
@@ -47,8 +46,7 @@ class Shape:
         )
 
 
-@dataclass(frozen=True, slots=True)
-class Surface:
+class Surface(Struct, frozen=True):
     """Elevation and lean of one road.
 
     Attributes
@@ -139,8 +137,7 @@ FloatArray = NDArray[np.float64]
 Place = TypeVar("Place", float, NDArray[np.float64])
 
 
-@dataclass(frozen=True, slots=True)
-class HeaderOffset:
+class HeaderOffset(Struct, frozen=True):
     """From the coordinates that road and scenario are written in to the inertial frame.
 
     First moved, then turned about the inertial origin (OpenDRIVE 1.7, 8.2). Everything is worked out in the coordinates

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.driver.fitting import fit_population, fit_runs
-from xosc_lateral.driver.models.kinds import ModelKind
+from xosc_lateral.driver.models.base import ModelKind
 from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.driver.sampling import sample_offsets
 from xosc_lateral.driver.seeds import child

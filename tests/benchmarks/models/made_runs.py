@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from xosc_lateral.driver.snippets import segment_of
+from xosc_lateral.driver.sampled_offsets import segment_of
 from xosc_lateral.drives.drive import Run
 from xosc_lateral.segment import Segment
 

@@ -13,7 +13,7 @@ from benchmarks.board.models.calibration_targets import distance_to, targets_of
 from benchmarks.board.models.catalogue import MODELS
 from benchmarks.board.models.profiles import drives_of
 from tests.benchmarks.models.made_runs import smooth_runs
-from xosc_lateral.driver.snippets import cut_snippets, segment_of
+from xosc_lateral.driver.sampled_offsets import cut_snippets, segment_of
 from xosc_lateral.drives.cuts import all_runs
 from xosc_lateral.errors import NotEnoughDataError
 

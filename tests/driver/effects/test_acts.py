@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from xosc_lateral.driver.effects.acts import FACTOR_LIMIT, LOG_LIMIT, Acts, terms_of
+from xosc_lateral.driver.effects.base import FACTOR_LIMIT, LOG_LIMIT, Acts, terms_of
 
 PARTS = ("location", "spread", "rate", "fine")
 FACTORS = [Acts.SPREAD, Acts.RATE, Acts.FINE]

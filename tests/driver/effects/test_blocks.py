@@ -40,7 +40,7 @@ def cut(values: np.ndarray) -> list[np.ndarray]:
 
 
 def same(one: EffectTerms, other: EffectTerms) -> None:
-    for name in ("location", "spread", "rate", "fine", "quick"):
+    for name in ("location", "spread", "rate", "fine"):
         a, b = getattr(one, name), getattr(other, name)
         assert (a is None) == (b is None)
         if a is not None:
@@ -48,7 +48,7 @@ def same(one: EffectTerms, other: EffectTerms) -> None:
 
 
 def joined(parts: list[EffectTerms]) -> EffectTerms:
-    columns = ([getattr(part, name) for part in parts] for name in ("location", "spread", "rate", "fine", "quick"))
+    columns = ([getattr(part, name) for part in parts] for name in ("location", "spread", "rate", "fine"))
     return EffectTerms(*(None if own[0] is None else np.concatenate(own) for own in columns))
 
 
@@ -72,7 +72,7 @@ def test_hidden_effects_go_on_from_their_state_and_from_a_saved_one(kind: str) -
     elif kind == "time-smooth":  # a sum over half cosines is rounded by how many rows there are
         for name in ("location", "spread", "fine"):
             np.testing.assert_allclose(getattr(pieces, name), getattr(whole, name), rtol=0, atol=1e-15)
-    elif kind == "weave":
+    elif kind == "cycle":
         np.testing.assert_allclose(pieces.location, whole.location, rtol=0, atol=1e-9)  # type: ignore[arg-type]
     else:
         same(pieces, whole)

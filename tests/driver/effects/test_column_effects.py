@@ -179,7 +179,7 @@ def test_terms_are_finite_and_repeatable(effect: ColumnEffect) -> None:
         ({"kind": "saturating", "acts": "location", "column": "x", "middle": 0.0, "scale": 0.0}, "scale"),
         ({"kind": "piecewise", "acts": "location", "column": "x", "knots": [2.0, 1.0]}, "increase"),
         ({"kind": "drift", "size": -1.0}, "size"),
-        ({"kind": "weave", "amplitude": 0.1}, "period_s"),
+        ({"kind": "cycle", "amplitude": 0.1}, "period_s"),
         ({"kind": "product", "acts": "location", "factors": [{"column": "x", "form": "value", "at": 0}]}, "factors"),
     ],
 )

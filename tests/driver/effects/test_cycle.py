@@ -51,5 +51,5 @@ def test_twice_the_amplitude_is_twice_the_path() -> None:
 
 @pytest.mark.parametrize("field", ["amplitude", "period_s", "coherence_s"])
 def test_sizes_and_times_are_above_nothing(field: str) -> None:
-    with pytest.raises(DriverProfileError, match=f"weave: {field} = "):
+    with pytest.raises(DriverProfileError, match=f"cycle: {field} = "):
         Cycle(**{"amplitude": 0.1, "period_s": 9.0} | {field: 0.0})

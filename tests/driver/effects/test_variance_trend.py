@@ -46,5 +46,5 @@ def test_nothing_is_added_and_nothing_made_faster() -> None:
 
 @pytest.mark.parametrize("field", ["factor", "fine_factor"])
 def test_factors_are_above_nothing(field: str) -> None:
-    with pytest.raises(DriverProfileError, match=f"growing-spread: {field} = 0"):
+    with pytest.raises(DriverProfileError, match=f"variance-trend: {field} = 0"):
         VarianceTrend(**{"factor": 2.0} | {field: 0.0})

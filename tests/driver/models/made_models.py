@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from msgspec.structs import replace
 
-from xosc_lateral.driver.models.autoregressive.autoregression import Autoregression
+from xosc_lateral.driver.models.autoregressive.coarse import Autoregression
 from xosc_lateral.driver.models.autoregressive.model import AutoregressiveModel
 from xosc_lateral.driver.models.autoregressive.volatility import Volatility
 from xosc_lateral.driver.models.noise import ShapedNoise

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from xosc_lateral.driver.models.autoregressive.autoregression import Autoregression, stabilise
+from xosc_lateral.driver.linear_filters import recur
+from xosc_lateral.driver.models.autoregressive.coarse import Autoregression, stabilise
 from xosc_lateral.driver.models.autoregressive.fit_coarse import fit_autoregression
-from xosc_lateral.driver.recursion import recur
 from xosc_lateral.errors import DriverProfileError
 
 SECOND_ORDER = np.array([1.6, -0.8])

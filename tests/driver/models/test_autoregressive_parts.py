@@ -7,8 +7,7 @@ import pytest
 from msgspec.structs import replace
 from scipy import signal, stats
 
-from xosc_lateral.driver.models.autoregressive.driver import draw_drivers
-from xosc_lateral.driver.models.autoregressive.filters import (
+from xosc_lateral.driver.models.autoregressive.coarse import (
     BORDER,
     COARSE_EVERY,
     TICKS,
@@ -19,8 +18,8 @@ from xosc_lateral.driver.models.autoregressive.filters import (
     split_bands,
 )
 from xosc_lateral.driver.models.autoregressive.parameters import AutoregressiveParameters
+from xosc_lateral.driver.models.autoregressive.parts import COARSE, FINE, Factors, begin_factors, draw_drivers
 from xosc_lateral.driver.models.autoregressive.volatility import Volatility
-from xosc_lateral.driver.models.autoregressive.volatility_stream import COARSE, FINE, Factors, begin_factors
 from xosc_lateral.driver.models.base import Start
 from xosc_lateral.formats.profiles import read_profile
 from xosc_lateral.shipped import shipped_folder

@@ -9,8 +9,8 @@ import pytest
 from msgspec.structs import replace
 
 from tests.driver.models.made_models import POPULATION, STEADY
-from xosc_lateral.driver.models.autoregressive.autoregression import Autoregression
-from xosc_lateral.driver.models.autoregressive.stream import HEADROOM, KNEE, AutoregressiveState, _bends
+from xosc_lateral.driver.models.autoregressive.coarse import Autoregression
+from xosc_lateral.driver.models.autoregressive.model import HEADROOM, KNEE, AutoregressiveState, _bends
 from xosc_lateral.driver.models.base import Start
 from xosc_lateral.driver.records import plain, read_as
 

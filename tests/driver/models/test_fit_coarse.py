@@ -6,10 +6,16 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from xosc_lateral.driver.models.autoregressive.autoregression import GRID, Autoregression
-from xosc_lateral.driver.models.autoregressive.filters import BORDER, COARSE_EVERY, measuring_low_pass, split_bands
+from xosc_lateral.driver.models.autoregressive.coarse import (
+    BORDER,
+    COARSE_EVERY,
+    GRID,
+    Autoregression,
+    measuring_low_pass,
+    split_bands,
+)
 from xosc_lateral.driver.models.autoregressive.fit_coarse import _far_covariance, _restored, fit_coarse
-from xosc_lateral.driver.models.autoregressive.fit_settings import DEFAULT_SETTINGS
+from xosc_lateral.driver.models.autoregressive.parameters import DEFAULT_SETTINGS
 
 STEP = 0.2
 MEMORY = 6.0

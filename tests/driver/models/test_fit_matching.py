@@ -7,7 +7,7 @@ import pytest
 from msgspec.structs import replace
 
 from tests.driver.models.made_models import POPULATION, STEADY
-from xosc_lateral.driver.models.autoregressive.autoregression import GRID, Autoregression
+from xosc_lateral.driver.models.autoregressive.coarse import GRID, Autoregression
 from xosc_lateral.driver.models.autoregressive.fit_coarse import scaled_spectrum
 from xosc_lateral.driver.models.autoregressive.fit_matching import (
     LARGEST_STEP,
@@ -27,7 +27,7 @@ from xosc_lateral.driver.models.autoregressive.fit_matching import (
     matched,
     simulate,
 )
-from xosc_lateral.driver.models.autoregressive.fit_settings import DEFAULT_SETTINGS
+from xosc_lateral.driver.models.autoregressive.parameters import DEFAULT_SETTINGS
 
 NOTHING, SLOPES = np.zeros(7), np.ones(2)
 

@@ -5,10 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from xosc_lateral.driver.models.two_level.alias_table import AliasTable
 from xosc_lateral.driver.models.two_level.fit import fit_markov_chain
-from xosc_lateral.driver.models.two_level.markov import MarkovChain, bin_of, open_traps
-from xosc_lateral.driver.models.two_level.stream import walk
+from xosc_lateral.driver.models.two_level.markov import AliasTable, MarkovChain, bin_of, open_traps
+from xosc_lateral.driver.models.two_level.model import walk
 from xosc_lateral.errors import DriverProfileError, NotEnoughDataError
 
 

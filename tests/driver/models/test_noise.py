@@ -5,10 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from xosc_lateral.driver.convolution import _convolve_compiled, convolve
 from xosc_lateral.driver.jit_kernel import JitKernel
-from xosc_lateral.driver.models.fit_noise import NOISE_VARIANCE, fit_shaped_noise, mean_power
-from xosc_lateral.driver.models.noise import ShapedNoise
+from xosc_lateral.driver.linear_filters import _convolve_compiled, convolve
+from xosc_lateral.driver.models.noise import NOISE_VARIANCE, ShapedNoise, fit_shaped_noise, mean_power
 from xosc_lateral.errors import DriverProfileError, NotEnoughDataError
 
 

@@ -11,10 +11,10 @@ from msgspec.structs import replace
 from scipy.linalg import toeplitz
 
 from tests.driver.models.made_models import POPULATION, STEADY
-from xosc_lateral.driver.models.autoregressive.filters import COARSE_EVERY, interpolate
+from xosc_lateral.driver.models.autoregressive.coarse import COARSE_EVERY, interpolate
 from xosc_lateral.driver.models.autoregressive.model import AutoregressiveModel
 from xosc_lateral.driver.models.autoregressive.parameters import START_LAGS
-from xosc_lateral.driver.models.fit_noise import NOISE_VARIANCE
+from xosc_lateral.driver.models.noise import NOISE_VARIANCE
 from xosc_lateral.driver.records import plain, read_as
 from xosc_lateral.errors import DriverProfileError
 

@@ -8,11 +8,19 @@ from msgspec.structs import replace
 from scipy.signal import lfilter
 
 from tests.driver.models.made_models import POPULATION, STEADY
-from xosc_lateral.driver.models.autoregressive.driver import DriverState
-from xosc_lateral.driver.models.autoregressive.filters import COARSE_EVERY, TICKS, interpolate
+from xosc_lateral.driver.models.autoregressive.coarse import COARSE_EVERY, TICKS, interpolate
 from xosc_lateral.driver.models.autoregressive.model import AutoregressiveModel
-from xosc_lateral.driver.models.autoregressive.parts import CoarsePart, CoarseState, FinePart, FineState
-from xosc_lateral.driver.models.autoregressive.volatility_stream import COARSE, FINE, Factors, begin_factors
+from xosc_lateral.driver.models.autoregressive.parts import (
+    COARSE,
+    FINE,
+    CoarsePart,
+    CoarseState,
+    DriverState,
+    Factors,
+    FinePart,
+    FineState,
+    begin_factors,
+)
 
 N = 203
 SEED = np.random.SeedSequence(3)

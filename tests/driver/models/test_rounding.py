@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from msgspec.structs import replace
 
 from tests.driver.models.made_models import POPULATION
-from xosc_lateral.driver.models.autoregressive.autoregression import Autoregression
+from xosc_lateral.driver.models.autoregressive.coarse import Autoregression
 from xosc_lateral.driver.models.autoregressive.fit import DIGITS, _tidy, rounded
 from xosc_lateral.driver.records import plain
 

@@ -9,9 +9,8 @@ import pytest
 
 from xosc_lateral.driver.models.base import Start
 from xosc_lateral.driver.models.two_level.fit import fit_two_level
-from xosc_lateral.driver.models.two_level.model import TwoLevelModel
+from xosc_lateral.driver.models.two_level.model import TwoLevelModel, TwoLevelState, _fade_out, _first_bins
 from xosc_lateral.driver.models.two_level.settings import TwoLevelSettings
-from xosc_lateral.driver.models.two_level.stream import TwoLevelState, _fade_out, _first_bins
 from xosc_lateral.driver.records import plain, read_as
 from xosc_lateral.driver.seeds import TwoLevelSeed, generator
 from xosc_lateral.errors import DriverProfileError

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from xosc_lateral.driver.models.autoregressive.fit_volatility import autocovariance, fit_volatility, log_power
+from xosc_lateral.driver.models.autoregressive.fit_matching import autocovariance, fit_volatility, log_power
 from xosc_lateral.driver.models.autoregressive.volatility import Volatility, averaged_covariance
 from xosc_lateral.errors import DriverProfileError
 

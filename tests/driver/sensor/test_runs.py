@@ -8,7 +8,7 @@ import pytest
 from tests.benchmarks.models.made_runs import made_run
 from tests.driver.models.made_models import POPULATION
 from xosc_lateral.driver.profile import DriverProfile
-from xosc_lateral.driver.sensor.error import known_sensor, sensor_error
+from xosc_lateral.driver.sampled_offsets import known_sensor, sensor_error
 from xosc_lateral.driver.sensor.model import SensorModel
 from xosc_lateral.driver.sensor.periodogram import WINDOWS
 from xosc_lateral.driver.sensor.runs import driver_runs, durations_of, rows_of

@@ -1,4 +1,4 @@
-"""Effects that a profile can hold, one per file: whatever a file here defines is known, without a list."""
+"""Effects that a profile can hold: whatever a module here defines is known, without a list."""
 
 from __future__ import annotations
 
@@ -8,28 +8,22 @@ from operator import or_
 from typing import Any
 
 from xosc_lateral.discovery import defined_in
-from xosc_lateral.driver.effects.acts import Acts
-from xosc_lateral.driver.effects.adapted import Adapted
-from xosc_lateral.driver.effects.angular import Angular
-from xosc_lateral.driver.effects.base import Effect, EffectTerms
+from xosc_lateral.driver.effects.base import Acts, Effect, EffectTerms
 from xosc_lateral.driver.effects.column import ColumnEffect
-from xosc_lateral.driver.effects.cycle import Cycle
-from xosc_lateral.driver.effects.drift import Drift
-from xosc_lateral.driver.effects.hidden import HiddenEffect
-from xosc_lateral.driver.effects.levels import Levels
-from xosc_lateral.driver.effects.linear import Linear
-from xosc_lateral.driver.effects.magnitude import Magnitude
-from xosc_lateral.driver.effects.nearness import Nearness
-from xosc_lateral.driver.effects.piecewise import Piecewise
-from xosc_lateral.driver.effects.population import Population
+from xosc_lateral.driver.effects.hidden import Adapted, HiddenEffect, Population, Step, TimeSmooth, VarianceTrend
+from xosc_lateral.driver.effects.processes import Cycle, Drift, Regimes
 from xosc_lateral.driver.effects.product import Factor, Form, Product
-from xosc_lateral.driver.effects.proximity import Proximity
-from xosc_lateral.driver.effects.regimes import Regimes
-from xosc_lateral.driver.effects.saturating import Saturating
-from xosc_lateral.driver.effects.step import Step
-from xosc_lateral.driver.effects.threshold import Threshold
-from xosc_lateral.driver.effects.time_smooth import TimeSmooth
-from xosc_lateral.driver.effects.variance_trend import VarianceTrend
+from xosc_lateral.driver.effects.shapes import (
+    Angular,
+    Levels,
+    Linear,
+    Magnitude,
+    Nearness,
+    Piecewise,
+    Proximity,
+    Saturating,
+    Threshold,
+)
 from xosc_lateral.driver.records import read_as
 from xosc_lateral.errors import DriverProfileError
 from xosc_lateral.plugins import entry_points

@@ -4,6 +4,8 @@ References
 ----------
 .. [1] N. Neis, J. Beyerer, "A two-level stochastic model for the lateral movement of vehicles within their lane", IEEE
        ITSC 2023, pp. 1896-1903, arXiv:2405.17080: coarse and fine part, which effects change.
+.. [2] A. C. Harvey, "Estimating regression models with multiplicative heteroscedasticity", Econometrica 44, 1976:
+       log-linear factors.
 """
 
 from __future__ import annotations
@@ -11,6 +13,7 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
+from enum import StrEnum
 from typing import Any, ClassVar
 
 import numpy as np
@@ -56,27 +59,18 @@ class EffectTerms:
         return self.location, self.spread, self.rate, self.fine
 
 
-FILE_WORDS = {"Cycle": "weave", "VarianceTrend": "growing-spread"}
-"""Effects whose kind in files is not their name: what version 0.1 called them."""
-
-
-def kind_of(name: str) -> str:
-    """Kind in files of an effect's class."""
-    return FILE_WORDS.get(name) or kebab(name)
-
-
-class Effect(Record, frozen=True, kw_only=True, tag_field="kind", tag=kind_of):
-    """One effect. Frozen, small, one file each; parameters and their uncertainty are its fields.
+class Effect(Record, frozen=True, kw_only=True, tag_field="kind", tag=kebab):
+    """One effect, frozen; parameters and their uncertainty are its fields.
 
     `ColumnEffect` and `HiddenEffect` are what effects are made from.
     """
 
     kind: ClassVar[str]
-    """Name in the profile file: the class's, in lower case with hyphens, or its word of `FILE_WORDS`."""
+    """Name in the profile file: the class's, in lower case with hyphens."""
 
     def __init_subclass__(cls, **settings: Any) -> None:
         super().__init_subclass__(**settings)
-        cls.kind = kind_of(cls.__name__)
+        cls.kind = kebab(cls.__name__)
 
     @property
     @abstractmethod
@@ -108,3 +102,30 @@ class Effect(Record, frozen=True, kw_only=True, tag_field="kind", tag=kind_of):
 def step_of(time: FloatArray) -> float:
     """Step [s] of an even time grid [s], shape (n,); of a single row 1 s."""
     return float(time[1] - time[0]) if len(time) > 1 else 1.0
+
+
+FACTOR_LIMIT = 5.0
+"""A factor on spread, rate of mean reversion or fine noise stays within 1/5..5: beyond the fitted range
+of its column a log-linear effect would run away. [-]"""
+
+LOG_LIMIT = float(np.log(FACTOR_LIMIT))
+"""[-]"""
+
+
+class Acts(StrEnum):
+    """Part of the movement that an effect changes; its strength is [m] for location, else a natural logarithm."""
+
+    LOCATION = "location"
+    SPREAD = "spread"
+    RATE = "rate"
+    FINE = "fine"
+
+
+def terms_of(acts: Acts, strength: FloatArray) -> EffectTerms:
+    """Terms of an effect of the given strength, shape (n,): added [m] for location, its exponential [-] for factors."""
+    if acts is Acts.LOCATION:
+        return EffectTerms(location=strength)
+    factor = np.exp(np.minimum(np.maximum(strength, -LOG_LIMIT), LOG_LIMIT))  # np.clip takes five times as long
+    if acts is Acts.SPREAD:
+        return EffectTerms(spread=factor)
+    return EffectTerms(rate=factor) if acts is Acts.RATE else EffectTerms(fine=factor)

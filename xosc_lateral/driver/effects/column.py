@@ -22,8 +22,7 @@ import numpy as np
 from msgspec.structs import replace
 from numpy.typing import NDArray
 
-from xosc_lateral.driver.effects.acts import Acts, terms_of
-from xosc_lateral.driver.effects.base import Effect, EffectTerms, step_of
+from xosc_lateral.driver.effects.base import Acts, Effect, EffectTerms, step_of, terms_of
 from xosc_lateral.driver.effects.response import Response, ResponseState, respond
 from xosc_lateral.driver.records import plain, set_once
 from xosc_lateral.errors import DriverProfileError
@@ -50,7 +49,7 @@ class ColumnEffect(Effect, frozen=True, kw_only=True):
     errors : tuple of float
         Standard errors of the coefficients.
     lag_s, response_s : float
-        Delay (negative: looks ahead) and first-order lag of the response. [s]
+        Delay (negative: preview) and first-order lag of the response. [s]
     response_order : int
         Count of such lags one after the other: after one, a jump of the quantity is a corner of the path, after two a
         bend.

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.driver.effects.column import ColumnEffect
-from xosc_lateral.driver.effects.levels import level_share
+from xosc_lateral.driver.effects.shapes import level_share
 from xosc_lateral.driver.records import Record
 
 FloatArray = NDArray[np.float64]

@@ -13,7 +13,7 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.driver.recursion import recur
+from xosc_lateral.driver.linear_filters import recur
 
 FloatArray = NDArray[np.float64]
 
@@ -40,7 +40,7 @@ class ResponseState(msgspec.Struct):
 class Response:
     """A shift in time, then equal first-order lags of gain 1 one after the other, of a quantity given block by block.
 
-    Row i of the response is due once all rows that it looks ahead to were given; before the first row and, at the end,
+    Row i of the response is due once all rows of its preview were given; before the first row and, at the end,
     beyond the last one, the outermost row holds. The lag starts settled.
 
     Parameters
@@ -48,7 +48,7 @@ class Response:
     step : float
         Of the even time grid. [s]
     lag_s : float
-        Delay; negative: the driver looks ahead. [s]
+        Delay; negative: preview. [s]
     response_s : float
         Time constant of each first-order lag; 0 for none. [s]
     state : ResponseState, optional
@@ -75,7 +75,7 @@ class Response:
         self._whole = whole - delay
         self._keep = float(np.exp(-step / response_s)) if response_s > 0 else None
         self.ahead = max(0, self._whole + (1 if self._share else 0))
-        """Rows that it looks ahead."""
+        """Rows of preview."""
 
     def take(self, values: FloatArray) -> FloatArray:
         """What is due of the response after more rows of the quantity, shape (n, k); (m, k). [unit of the quantity]"""

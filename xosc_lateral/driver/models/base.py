@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from dataclasses import dataclass
+from enum import StrEnum
 from typing import Any, ClassVar, Protocol
 
 import numpy as np
@@ -110,3 +111,12 @@ class CoreModel(Record, frozen=True, tag_field="kind", tag=kebab, eq=False):
     @abstractmethod
     def resume(self, state: Any) -> CoreStream:
         """Go on from a stream's state (which is not copied)."""
+
+
+class ModelKind(StrEnum):
+    """Core models of this package; `registry` knows those of plug-ins too, and older names."""
+
+    TWO_LEVEL = "two-level"
+    """The paper's, to the letter."""
+    AUTOREGRESSIVE = "autoregressive"
+    """Ours."""

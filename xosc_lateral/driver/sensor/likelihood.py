@@ -12,8 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.driver.sensor.ascent import climb
-from xosc_lateral.driver.sensor.periodogram import Periodogram
+from xosc_lateral.driver.sensor.periodogram import Periodogram, climb
 from xosc_lateral.driver.sensor.second_view import LEVEL_SD, SecondView
 from xosc_lateral.driver.sensor.vehicle_bound import KNOTS, N_KNOTS, N_STATE, interpolation, prior
 
@@ -22,7 +21,7 @@ FloatArray = NDArray[np.float64]
 ABOVE = 1.0
 """No driver is seen above this in a sensor worth splitting: where white noise is estimated at first. [Hz]"""
 
-FLOOR_SD = 3.0
+WHITE_SD = 3.0
 COLOUR_SD = 4.0
 """Of weak priors that keep parts that are not there from running off: of log density. [-]"""
 
@@ -180,8 +179,8 @@ class _Problem:
     def _priors(self, point: FloatArray) -> list[tuple[FloatArray, float]]:
         """Weak priors of the sensor's levels, and the level that is known, linearised where it is looked at."""
         white = np.zeros(self.size)
-        white[N_STATE] = 1.0 / FLOOR_SD
-        rows = [(white, (NO_WHITE if self.alone else self.top - 1.0) / FLOOR_SD)]
+        white[N_STATE] = 1.0 / WHITE_SD
+        rows = [(white, (NO_WHITE if self.alone else self.top - 1.0) / WHITE_SD)]
         if self.is_seen:
             level = np.zeros(self.size)
             level[N_STATE + 1] = 1.0 / LEVEL_SD

@@ -8,28 +8,18 @@ References
 
 from __future__ import annotations
 
-from itertools import pairwise
-from math import inf, isfinite
+from math import isfinite
 from typing import Any
 
-import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.driver.records import Record, plain
 from xosc_lateral.driver.sensor.likelihood import Colour
-from xosc_lateral.driver.sensor.texture import amplitude_factor
 from xosc_lateral.drives.filters import scale_frequencies
 from xosc_lateral.errors import DriverProfileError
 
 FloatArray = NDArray[np.float64]
-
-FAINTEST = 1e-16
-"""Added to measured densities, so that none at all has a logarithm. [m2/Hz]"""
-
-WIDE = 0.6
-"""Steps of more standard deviations of the movement are wide; narrower ones do no harm as noise
-(docs/design/sensor.md). [-]"""
 
 HIGHEST = 1.5
 """Runs are low-passed here on being resampled to 5 Hz, and so is what is sampled. [Hz]"""
@@ -53,15 +43,9 @@ class SensorModel(Record, frozen=True):
     rounding : float
         Step that values come in; 0 where none was found. [m]
     driver_variance, sensor_variance : float
-        Of the measured rows, whose sum is the measured variance; where values come in wide steps, which hang on the
-        driver, the latter is the rows' mean square error. [m2]
+        Of the measured rows, whose sum is the measured variance. [m2]
     driver_share : tuple of float
         Share of the driver: 95 % interval. [-]
-
-    frequencies, densities : tuple of float
-        Density of the error as it was measured in runs, see `texture`; empty: as the parts above have it. [Hz], [m2/Hz]
-    level_variance, level_duration : float
-        Variance of the log of the density over time [-], and how long a level lasts [s]; in files `wanders`, `lasts`.
     second_view : float
         Power of the error over that of half the lane width, beside the white part, where it was estimated so
         (`second_view`); else 0. [-]
@@ -75,21 +59,13 @@ class SensorModel(Record, frozen=True):
     driver_variance: float = 0.0
     sensor_variance: float = 0.0
     driver_share: tuple[float, float] = (0.0, 1.0)
-    frequencies: tuple[float, ...] = ()
-    densities: tuple[float, ...] = ()
-    level_variance: float = msgspec.field(default=0.0, name="wanders")
-    level_duration: float = msgspec.field(default=60.0, name="lasts")
     second_view: float = 0.0
 
     def __post_init__(self) -> None:
         """Check."""
         levels = (self.white, self.coloured, self.rounding, self.second_view)
         parts = (*levels, self.driver_variance, self.sensor_variance)
-        numbers = (*parts, self.level_variance, *self.frequencies, *self.densities)
-        if not all(map(isfinite, numbers)) or min(numbers) < 0 or self.order < 0 or not self.corner > 0:
-            raise DriverProfileError(f"sensor: {self}")
-        rising = all(low < high for low, high in pairwise(self.frequencies))
-        if len(self.frequencies) != len(self.densities) or not rising or not 0.0 < self.level_duration < inf:
+        if not all(map(isfinite, parts)) or min(parts) < 0 or self.order < 0 or not self.corner > 0:
             raise DriverProfileError(f"sensor: {self}")
 
     @property
@@ -126,22 +102,15 @@ class SensorModel(Record, frozen=True):
     def sample(self, n: int, step: float, rng: np.random.Generator) -> FloatArray:
         """Noise as it is in measured runs at this step, shape (n,). [m]
 
-        Without a measured density, what rounding adds is left out: runs are low-passed, and lie on its lattice no more.
+        What rounding adds is left out: runs are low-passed, and lie on its lattice no more.
         """
         if not n:
             return np.empty(0)
         padded = n + round(30.0 / step)  # a low-passed part must not come round to its own beginning
         frequency: FloatArray = np.asarray(np.fft.rfftfreq(padded, step), dtype=np.float64)
         gain = np.sqrt(self.in_runs(frequency) / (2.0 * step))
-        error = scale_frequencies(rng.normal(size=padded), gain)[:n]
-        if self.level_variance:
-            error = error * amplitude_factor(self.level_variance, self.level_duration, n, step, rng)
-        return error
+        return scale_frequencies(rng.normal(size=padded), gain)[:n]
 
     def in_runs(self, frequency: FloatArray) -> FloatArray:
         """One-sided power density of the noise in runs at 5 Hz. [m2/Hz] Shape as `frequency` [Hz]."""
-        if not self.frequencies:
-            return np.asarray(self.density(frequency) * (frequency <= HIGHEST))
-        table = np.log(np.array(self.densities) + FAINTEST)
-        log = np.interp(np.log(np.maximum(frequency, 1e-9)), np.log(self.frequencies), table)
-        return np.asarray(np.exp(log))
+        return np.asarray(self.density(frequency) * (frequency <= HIGHEST))

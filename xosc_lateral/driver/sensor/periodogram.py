@@ -1,4 +1,5 @@
-"""Power density of runs as a Whittle likelihood wants it: mean periodograms in bins, and what they weigh.
+"""Power density of runs as a Whittle likelihood wants it: mean periodograms in bins, what they weigh, and the climb to
+the likelihood's maximum by Fisher scoring.
 
 References
 ----------
@@ -9,7 +10,7 @@ References
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -102,3 +103,31 @@ def periodogram(frequency: FloatArray, windows: FloatArray) -> Periodogram:
         (INDEPENDENT * len(windows) + 0.5) * count,
         1.0 / float(frequency[1]),
     )
+
+
+ROUNDS = 60
+LEAST_GAIN = 1e-3
+LONGEST_STEP = 1.5
+
+
+def climb(
+    at: Callable[[FloatArray], tuple[float, FloatArray, FloatArray]], point: FloatArray
+) -> tuple[FloatArray, float]:
+    """The least loss and where it is, by Fisher scoring from a point; `at` gives loss, gradient and information."""
+    loss, gradient, information = at(point)
+    for _ in range(ROUNDS):
+        step = np.linalg.solve(information + 1e-6 * np.eye(len(point)), -gradient)
+        step = np.clip(step, -LONGEST_STEP, LONGEST_STEP)
+        length = 1.0
+        tried = at(point + step)
+        while tried[0] >= loss and length > 1e-3:
+            length *= 0.4
+            tried = at(point + length * step)
+        if tried[0] >= loss:
+            break
+        gained = loss - tried[0]
+        point = point + length * step
+        loss, gradient, information = tried
+        if gained < LEAST_GAIN:
+            break
+    return point, loss

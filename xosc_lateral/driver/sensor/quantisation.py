@@ -12,6 +12,10 @@ FloatArray = NDArray[np.float64]
 LEAST_STEP = 0.004
 """Finer steps add less than 2e-6 m2, below any sensor's own noise. [m]"""
 
+COARSEST = 2.0
+"""Steps of so many standard deviations of the rows show the driver's variance within 10 %, wider ones do not: where
+values come in such, driver and rounding are not separated (docs/design/sensor.md). [-]"""
+
 
 def quantisation_step(values: FloatArray) -> float:
     """Step of the lattice that all values lie on, 0 if there is none of at least `LEAST_STEP`. [m]

@@ -23,8 +23,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.driver.sensor.ascent import climb
-from xosc_lateral.driver.sensor.periodogram import Periodogram, periodogram, windows_of
+from xosc_lateral.driver.sensor.periodogram import Periodogram, climb, periodogram, windows_of
 
 FloatArray = NDArray[np.float64]
 

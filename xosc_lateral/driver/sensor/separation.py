@@ -13,26 +13,16 @@ from dataclasses import replace as replaced
 from functools import partial
 
 import numpy as np
-from msgspec.structs import replace
 from numpy.typing import NDArray
 
 from xosc_lateral.digits import all_significant
 from xosc_lateral.driver.sensor.explanations import Explanation, explanations
-from xosc_lateral.driver.sensor.hidden_path import HiddenPath
 from xosc_lateral.driver.sensor.likelihood import Colour, Known, Solution, solve
 from xosc_lateral.driver.sensor.model import SensorModel
 from xosc_lateral.driver.sensor.periodogram import Periodogram, periodogram, windows_of
-from xosc_lateral.driver.sensor.quantisation import quantisation_step, rounding_density, uniform_variance
+from xosc_lateral.driver.sensor.quantisation import COARSEST, quantisation_step, rounding_density, uniform_variance
 from xosc_lateral.driver.sensor.second_view import LEVEL_SD, SecondView, second_view
-from xosc_lateral.driver.sensor.texture import (
-    FAST,
-    LEAST_SHARE,
-    MANY,
-    level_variation,
-    measured_density,
-)
 from xosc_lateral.driver.sensor.vehicle_bound import density
-from xosc_lateral.driver.sensor.wide_steps import MOST_NOISE, WideSteps, split_wide_steps
 from xosc_lateral.drives.filters import scale_frequencies
 from xosc_lateral.errors import DriverProfileError
 from xosc_lateral.normal import NORMAL_95
@@ -45,10 +35,13 @@ PLAUSIBLE = 6.0
 BLOCKS = 8
 """Of windows, of which each is left out in turn for the interval. [-]"""
 
-ROUNDING_ROUNDS = 3
-
 LEAST_LEVELS = 3
 """How often two levels are left is one number, and what lies behind them has two, mean and spread. [-]"""
+
+ROUNDING_ROUNDS = 3
+
+MOST_NOISE = 0.9
+"""Share of what is rounded that noise may have: the rest is the driver's. [-]"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,26 +55,18 @@ class Separation:
     sensor : SensorModel
     beside : callable
         Density of what the sensor's numbers don't hold: of rounding, and of errors seen in a second view. [m2/Hz]
-    is_too_coarse : bool
-        Whether values come in steps too coarse for the split to mean anything.
-    hidden : HiddenPath, optional
-        Where values come in wide steps: what could lie behind them.
     """
 
     knots: FloatArray
     sensor: SensorModel
     beside: Callable[[FloatArray], FloatArray]
-    is_too_coarse: bool = False
-    hidden: HiddenPath | None = None
 
     def driver_part(self, offset: FloatArray, step: float) -> FloatArray:
         """The offset with every frequency scaled down to the driver's share of the power, about its own mean.
 
         Keeps the driver's spectrum (Wiener's filter would not: it leaves less than the driver's power), and the path
-        itself wherever the sensor is good. Of values in wide steps: a path that they may hide.
+        itself wherever the sensor is good.
         """
-        if self.hidden is not None:
-            return self.hidden.draw(offset, step)
         n = len(offset)
         if n < 2:
             return offset
@@ -141,22 +126,17 @@ def separate(
     frequency, windows = windows_of(runs, step)
     data = periodogram(frequency, windows)
     per_second = rate or sum(map(len, measured)) / (step * sum(map(len, runs)))
-    known = None if sensor_noise is None else Known(sensor_noise, per_second)
     grain = quantisation_step(np.concatenate(measured))
     if sensor_noise is not None and 0.0 < variance <= sensor_noise**2 - uniform_variance(grain):
         raise DriverProfileError(
             f"a sensor error of {sensor_noise:g} m is more than all that was measured: offsets vary by "
             f"{np.sqrt(variance):.2g} m (standard deviation)"
         )
-    two_levels = len(np.unique(np.concatenate(measured))) < LEAST_LEVELS
-    if grain and not two_levels:
-        wide = split_wide_steps(data, windows, measured, grain, per_second, sensor_noise)
-        if wide is not None:
-            return _textured(_seen_through(wide, per_second), runs, frequency, windows, step)
-    rounding: Callable[[FloatArray], FloatArray] = _no_density
-    if grain and not two_levels:
-        rounding = _rounding(data, grain, variance, per_second)
-        known = known and replaced(known, rounding=uniform_variance(grain))
+    too_coarse = grain > COARSEST * np.sqrt(variance) or len(np.unique(np.concatenate(measured))) < LEAST_LEVELS
+    is_rounded = grain > 0.0 and not too_coarse
+    rounding = _rounding(data, grain, variance, per_second) if is_rounded else _no_density
+    rounded_off = uniform_variance(grain) if is_rounded else 0.0
+    known = None if sensor_noise is None else Known(sensor_noise, per_second, rounded_off)
     base = rounding(data.frequency)
     view = second_view(half_widths, step) if half_widths else None
     found = explanations(data, base, known, view, only_view=one_camera)
@@ -171,10 +151,10 @@ def separate(
     if colour.view is not None:
         plausible += [(solve(data, one, base, known, best), one) for one in _other_views(colour, colour.view)]
     interval = (
-        (0.0, 1.0) if two_levels else _interval(frequency, windows, best, colour, base, known, plausible, share, data)
+        (0.0, 1.0) if too_coarse else _interval(frequency, windows, best, colour, base, known, plausible, share, data)
     )
     sensor = _sensor(best, colour, grain, share * variance, (1.0 - share) * variance, interval)
-    return _textured(Separation(best.knots, sensor, beside, two_levels), runs, frequency, windows, step)
+    return Separation(best.knots, sensor, beside)
 
 
 def _taken(found: Sequence[Explanation]) -> Explanation:
@@ -207,33 +187,6 @@ def _other_views(colour: Colour, view: SecondView) -> list[Colour]:
     shift = NORMAL_95 * LEVEL_SD
     others = [replaced(view, slowest=0.0), view.scaled(np.exp(-shift)), view.scaled(np.exp(shift))]
     return [replaced(colour, view=other) for other in others]
-
-
-def _seen_through(wide: WideSteps, rate: float) -> Separation:
-    """What was estimated through steps, as a split."""
-    numbers = (2.0 * wide.noise / rate, wide.path.grain, *wide.variances(), *wide.interval())
-    white, grain, driver, rest, low, high = rounded(numbers)
-    sensor = SensorModel(white, rounding=grain, driver_variance=driver, sensor_variance=rest, driver_share=(low, high))
-    return Separation(wide.knots, sensor, wide.rounding, (low, high) == (0.0, 1.0), wide.path)
-
-
-def _textured(
-    split: Separation,
-    runs: Sequence[FloatArray],
-    frequency: FloatArray,
-    windows: FloatArray,
-    step: float,
-) -> Separation:
-    """With the error's density as measured, and how its level varies where the sensor outweighs the driver."""
-    share = 1.0 - split.driver_share_of(frequency)
-    frequencies, densities = measured_density(frequency, windows, share)
-    sensor = replace(split.sensor, frequencies=rounded(frequencies), densities=rounded(densities))
-    fast = frequency > FAST
-    if (windows.mean(axis=0) * share)[fast].sum() > LEAST_SHARE * windows.mean(axis=0)[fast].sum():
-        steady = sensor.sample(MANY, step, np.random.default_rng(0))
-        variance, duration = level_variation(runs, steady, step)
-        sensor = replace(sensor, level_variance=rounded((variance,))[0], level_duration=rounded((duration,))[0])
-    return replaced(split, sensor=sensor)
 
 
 def _sensor(

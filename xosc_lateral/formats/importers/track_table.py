@@ -167,7 +167,7 @@ def _columns(table: pd.DataFrame, path: Path, saved: TableMapping, words: Sequen
             found[name] = column
         else:
             found[name] = _numbers(column, name, path) * (1.0 if source is None else source.factor)
-    made = pd.DataFrame(found)
+    made = pd.DataFrame(found).replace([np.inf, -np.inf], np.nan)
     return made.dropna(subset=["vehicle", "time", "x", "y"])
 
 

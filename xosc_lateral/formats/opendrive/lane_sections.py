@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+
+from msgspec import Struct, structs
 
 from xosc_lateral.formats.opendrive.document import RoadFile, XmlElement
 from xosc_lateral.road.lanes import LaneRecord, LaneSection, build_section
@@ -19,8 +20,7 @@ WIDEST = 1000.0
 SPEED_UNITS = {"m/s": 1.0, "km/h": 1.0 / 3.6, "mph": 0.44704}
 
 
-@dataclass(frozen=True, slots=True)
-class _Written:
+class _Written(Struct, frozen=True):
     """A section as written; a side is None where the section says nothing about it (``singleSide``)."""
 
     start: float
@@ -66,7 +66,7 @@ def _read_all(road: XmlElement, length: float, source: RoadFile) -> list[_Writte
     sections = list(by_start.values())
     if sections[0].start > 0.0:
         source.note(f"first lane section starts at s={sections[0].start:g} m: taken to start at 0", elements[0])
-    sections[0] = replace(sections[0], start=0.0)
+    sections[0] = structs.replace(sections[0], start=0.0)
     return sections
 
 
@@ -178,9 +178,9 @@ def _merge_sides(
         for side, lanes in (("left", section.left), ("right", section.right)):
             if lanes is None:
                 before = parts[-1][side] if parts else ()
-                part[side] = tuple(replace(lane, predecessors=(lane.id,)) for lane in before)
+                part[side] = tuple(structs.replace(lane, predecessors=(lane.id,)) for lane in before)
                 if i:
-                    parts[-1][side] = tuple(replace(lane, successors=(lane.id,)) for lane in before)
+                    parts[-1][side] = tuple(structs.replace(lane, successors=(lane.id,)) for lane in before)
             else:
                 part[side] = lanes
         parts.append(part)
@@ -201,7 +201,7 @@ def _spans(written: Sequence[_Written], length: float) -> tuple[list[float], lis
 
 def _clip(lane: LaneRecord, start: float, end: float) -> LaneRecord:
     marks = tuple(m._replace(s_start=max(m.s_start, start)) for m in _until(lane.marks, end) if m.s_end > start)
-    return replace(lane, marks=marks)
+    return structs.replace(lane, marks=marks)
 
 
 def _check_lanes(road: XmlElement, sections: Sequence[LaneSection], source: RoadFile) -> None:

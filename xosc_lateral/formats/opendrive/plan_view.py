@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 from math import cos, sin
 
 import numpy as np
+from msgspec import Struct
 
 from xosc_lateral.errors import FormatError
 from xosc_lateral.formats.opendrive.document import RoadFile, XmlElement
@@ -126,8 +126,7 @@ def end_parameter(v: tuple[float, float, float, float], length: float) -> float:
 SHORTEST = 1e-9
 
 
-@dataclass(frozen=True, slots=True)
-class CubicRecord:
+class CubicRecord(Struct, frozen=True):
     """A paramPoly3 or poly3, before its arc length is known."""
 
     x: float

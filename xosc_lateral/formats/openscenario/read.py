@@ -5,10 +5,10 @@ from __future__ import annotations
 import re
 from collections import Counter
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
 from pathlib import Path, PureWindowsPath
 
 from lxml import etree
+from msgspec import Struct
 
 from xosc_lateral.errors import FormatError
 from xosc_lateral.formats.openscenario.catalogs import Boundary, Catalogs, allowed_roots
@@ -75,8 +75,7 @@ NEWEST = (1, 3)
 LEFT_HANDED = "written for CARLA: its left-handed coordinates are mirrored, its offsets count to the right"
 
 
-@dataclass(frozen=True, slots=True)
-class RoadSearch:
+class RoadSearch(Struct, frozen=True):
     """Where a road may lie besides where the scenario says: what the user names is allowed.
 
     Raises `FormatError`: No such file, no such folder.

@@ -9,10 +9,10 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Sequence
-from dataclasses import dataclass
 from math import hypot, nan
 
 import numpy as np
+from msgspec import Struct
 from numpy.typing import NDArray
 
 from xosc_lateral.playback.angles import wrap
@@ -32,8 +32,7 @@ _TANGENT_STEP = 0.001
 """Step in the curve's parameter that its direction is taken over. [-]"""
 
 
-@dataclass(frozen=True, slots=True)
-class Control:
+class Control(Struct, frozen=True):
     """A control point: [m], [-], [s]; NaN in `time`: none."""
 
     x: float

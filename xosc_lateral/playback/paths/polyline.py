@@ -13,8 +13,10 @@ from __future__ import annotations
 import itertools
 from bisect import bisect_left
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
 from math import atan2, hypot, nan
+
+from msgspec import Struct
+from msgspec.structs import replace
 
 from xosc_lateral.playback.angles import difference, wrap
 from xosc_lateral.playback.paths.base import PathPoint
@@ -30,8 +32,7 @@ STOP = 1.0
 """A stop that is shorter is driven through where its vertices are merged. [s]"""
 
 
-@dataclass(frozen=True, slots=True)
-class Corner:
+class Corner(Struct, frozen=True):
     """A vertex: [m], [rad], [s].
 
     NaN in `heading` and `pitch`: the pieces'; in `z` and `roll`: the road's; in `time`: none.

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from math import inf, nan
 from typing import Any
+
+from msgspec import Struct
 
 from xosc_lateral.errors import PlaybackError, UnsupportedElementError
 from xosc_lateral.playback.paths.base import Path
@@ -37,8 +38,7 @@ VERTEX_RADIUS = 0.1
 """Vertices of a polyline nearer than this count as one. [m]"""
 
 
-@dataclass(frozen=True, slots=True)
-class Layout:
+class Layout(Struct, frozen=True):
     """What laying out a path may depend on, besides the world: who follows it, how, and how fast it comes. [m/s]"""
 
     simulation: Simulation

@@ -21,13 +21,11 @@ from msgspec.structs import replace
 from numpy.typing import NDArray
 
 from xosc_lateral.digits import all_significant, significant
-from xosc_lateral.driver.models.autoregressive.autoregression import FREQUENCIES, Autoregression, largest_root
-from xosc_lateral.driver.models.autoregressive.filters import split_bands
-from xosc_lateral.driver.models.autoregressive.fit_coarse import fit_coarse
+from xosc_lateral.driver.models.autoregressive.coarse import FREQUENCIES, Autoregression, largest_root, split_bands
+from xosc_lateral.driver.models.autoregressive.fit_coarse import fit_coarse, fit_spectrum
 from xosc_lateral.driver.models.autoregressive.fit_matching import matched, with_volatility
-from xosc_lateral.driver.models.autoregressive.fit_settings import DEFAULT_SETTINGS, FitSettings
-from xosc_lateral.driver.models.autoregressive.fit_spectrum import fit_spectrum
 from xosc_lateral.driver.models.autoregressive.model import AutoregressiveModel
+from xosc_lateral.driver.models.autoregressive.parameters import DEFAULT_SETTINGS, FitSettings
 from xosc_lateral.driver.models.autoregressive.volatility import Volatility
 from xosc_lateral.errors import NotEnoughDataError
 

@@ -7,17 +7,16 @@ References
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.driver.models.autoregressive.autoregression import Autoregression
-from xosc_lateral.driver.models.autoregressive.filters import COARSE_EVERY, building_low_pass
+from xosc_lateral.driver.models.autoregressive.coarse import COARSE_EVERY, Autoregression, building_low_pass
 from xosc_lateral.driver.models.autoregressive.volatility import Volatility
 from xosc_lateral.driver.models.base import CoreModel
-from xosc_lateral.driver.models.fit_noise import NOISE_VARIANCE
-from xosc_lateral.driver.models.noise import ShapedNoise
+from xosc_lateral.driver.models.noise import NOISE_VARIANCE, ShapedNoise
 from xosc_lateral.drives.resampling import STEP
 from xosc_lateral.errors import DriverProfileError
 
@@ -108,3 +107,59 @@ class AutoregressiveParameters(CoreModel, frozen=True, eq=False, dict=True):
             return np.zeros((order, order))
         matrix = covariance[np.abs(np.subtract.outer(np.arange(order), np.arange(order)))]
         return np.asarray(np.linalg.cholesky(matrix + 1e-9 * covariance[0] * np.eye(order)))
+
+
+@dataclass(frozen=True, slots=True)
+class FitSettings:
+    """Constants of the fit.
+
+    Parameters
+    ----------
+    order : int
+        Memory of the coarse movement. [s]
+    n_knots : int
+        Knots of the fine noise's damping.
+    n_taps, taper : int, float
+        Of its kernel: measured noise falls by five decades between 0.3 and 2.5 Hz, so nothing may leak.
+    scale_band : tuple of float
+        Frequencies at which all power is taken to be coarse. [Hz]
+    fine_from : tuple of float
+        The fine noise has nothing below the first frequency, all that the coarse movement lacks above the second. [Hz]
+    spectrum_windows : tuple of float
+        Lengths of spectral windows, the first that enough runs are as long as. [s]
+    compared_windows : tuple of float
+        Lengths of the windows whose spectra are compared, likewise. The power falls by 14 dB from 0.3 to 0.5 Hz, which
+        windows of 10 s can't show: each of their frequencies is 0.4 Hz wide. [s]
+    fine_window, coarse_window : float
+        Windows that volatility is seen by. [s]
+    far : tuple of float
+        Two moments are far apart when this share of the typical run (by time) is between them, up to `farthest`.
+    farthest : float
+        [s]
+    snippet : float
+        Length of the snippets that are compared. [s]
+    rounds : int
+        Of simulating and comparing: more change nothing beyond the standard error of held-out drives.
+    seed : int
+        Of the simulations.
+    """
+
+    order: int = 16
+    n_knots: int = 51
+    n_taps: int = 71
+    taper: float = 5.0
+    scale_band: tuple[float, float] = (0.1, 0.3)
+    fine_from: tuple[float, float] = (0.2, 0.33)
+    spectrum_windows: tuple[float, ...] = (20.0, 10.0, 5.0)
+    compared_windows: tuple[float, ...] = (30.0, 20.0, 10.0)
+    fine_window: float = 2.0
+    coarse_window: float = 5.0
+    far: tuple[float, float] = (0.5, 1.0)
+    farthest: float = 120.0
+    snippet: float = 10.0
+    rounds: int = 3
+    seed: int = 20240517
+    step: float = STEP
+
+
+DEFAULT_SETTINGS = FitSettings()

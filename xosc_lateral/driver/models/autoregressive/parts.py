@@ -1,4 +1,10 @@
-"""The two parts of the movement, made in blocks of one coarse step and taken in any number."""
+"""The two parts of the movement, made in blocks of one coarse step and taken in any number, and drivers drawn from the
+population that a model stands for.
+
+References
+----------
+.. [1] D. B. Rubin, "Using the SIR algorithm to simulate posterior distributions", Bayesian Statistics 3, 1988.
+"""
 
 from __future__ import annotations
 
@@ -8,15 +14,114 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.driver.convolution import convolve
-from xosc_lateral.driver.models.autoregressive.driver import DriverState
-from xosc_lateral.driver.models.autoregressive.filters import COARSE_EVERY, TICKS, interpolate
+from xosc_lateral.driver.linear_filters import convolve, recur
+from xosc_lateral.driver.models.autoregressive.coarse import COARSE_EVERY, TICKS, interpolate
 from xosc_lateral.driver.models.autoregressive.parameters import AutoregressiveParameters
-from xosc_lateral.driver.models.autoregressive.volatility_stream import COARSE, FINE, Factors, FactorState
-from xosc_lateral.driver.recursion import recur
+from xosc_lateral.driver.models.autoregressive.volatility import SLOW_CORRELATION_TIME
+from xosc_lateral.driver.models.base import Start
+from xosc_lateral.driver.seeds import AutoregressiveSeed, generator
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
+
+
+COARSE, FINE = 0, 1
+"""Index of a part wherever both stand side by side."""
+
+
+class PairState(msgspec.Struct):
+    """Two correlated first-order autoregressions: generator, and last values of shape (2, drivers). [-]"""
+
+    rng: np.random.Generator
+    values: FloatArray
+
+
+class FactorState(msgspec.Struct):
+    """Both logarithms' varying parts, and the factors drawn ahead of one part while the other was asked for.
+
+    Parameters
+    ----------
+    quick, slow : PairState
+        What varies within seconds, and within minutes.
+    coarse, fine : array, shape (k, drivers)
+        Factors that are drawn and not yet taken. [-]
+    """
+
+    quick: PairState
+    slow: PairState
+    coarse: FloatArray
+    fine: FloatArray
+
+
+class Factors:
+    """Factors with a mean square of 1; each part takes its own in pieces of its own."""
+
+    def __init__(self, model: AutoregressiveParameters, state: FactorState) -> None:
+        self.state = state
+        step = model.step * COARSE_EVERY
+        parts = (model.coarse_volatility, model.fine_volatility)
+        within, slow = (np.array([getattr(part, name) for part in parts]) for name in ("within", "slow"))
+        self._offsets = (within + slow)[:, None, None]
+        time = np.array([part.correlation_time for part in parts])
+        self._quick = _Pair(state.quick, within, np.exp(-step / time), model.correlation)
+        self._slow = _Pair(state.slow, slow, np.exp(-step / np.full(2, SLOW_CORRELATION_TIME)), model.correlation)
+        self._varies_slowly = bool((slow > 0.0).any())
+
+    def take(self, part: int, n: int) -> FloatArray:
+        """Next n factors of a part, shape (n, drivers), > 0. [-]"""
+        state = self.state
+        missing = n - len(state.fine if part else state.coarse)
+        if missing > 0:
+            coarse, fine = self._next(missing)
+            state.coarse = np.concatenate([state.coarse, coarse])
+            state.fine = np.concatenate([state.fine, fine])
+        if part == COARSE:
+            taken, state.coarse = state.coarse[:n], state.coarse[n:]
+        else:
+            taken, state.fine = state.fine[:n], state.fine[n:]
+        return taken
+
+    def _next(self, n: int) -> tuple[FloatArray, FloatArray]:
+        logs = self._quick.take(n)
+        if self._varies_slowly:
+            logs = logs + self._slow.take(n)
+        factors = np.exp(logs - self._offsets)
+        return factors[COARSE], factors[FINE]
+
+
+class _Pair:
+    def __init__(self, state: PairState, variance: FloatArray, keep: FloatArray, correlation: float) -> None:
+        self._state, self._keep, self._correlation = state, keep, correlation
+        self._gain = np.sqrt(variance * (1.0 - keep**2))[:, None, None]
+
+    def take(self, n: int) -> FloatArray:
+        """Next n values of both, shape (2, n, drivers). [-]"""
+        state = self._state
+        noise = _correlated(state.rng, n, state.values.shape[1], self._correlation) * self._gain
+        series = np.stack([recur(state.values[k : k + 1], noise[k], self._keep[k : k + 1]) for k in range(2)])
+        if n:
+            state.values = series[:, -1].copy()
+        return np.asarray(series[:, 1:])
+
+
+def begin_factors(model: AutoregressiveParameters, seed: np.random.SeedSequence, drivers: int) -> FactorState:
+    """Stationary from the start."""
+
+    def begin(key: int, name: str) -> PairState:
+        rng = generator(seed, AutoregressiveSeed.VOLATILITY, key)
+        spread = np.sqrt([getattr(part, name) for part in (model.coarse_volatility, model.fine_volatility)])
+        first = _correlated(rng, 1, drivers, model.correlation)[:, 0]
+        return PairState(rng, first * spread[:, None])
+
+    nothing = np.empty((0, drivers))
+    return FactorState(begin(0, "within"), begin(1, "slow"), nothing, nothing)
+
+
+def _correlated(rng: np.random.Generator, n: int, drivers: int, correlation: float) -> FloatArray:
+    """Pairs of correlated standard normal values, drawn step by step, shape (2, n, drivers)."""
+    normal = rng.standard_normal((n, 2, drivers)).swapaxes(0, 1).copy()
+    normal[FINE] = correlation * normal[COARSE] + np.sqrt(1.0 - correlation**2) * normal[FINE]
+    return normal
 
 
 class QueueState(msgspec.Struct):
@@ -153,3 +258,57 @@ class FinePart(_Part):
         noise = np.concatenate([state.noise, self._volatile_noise(-(-lacks // COARSE_EVERY))])
         state.noise = noise[n:]
         return convolve(noise[: n + len(self._kernel) - 1], self._kernel) * self._driver.fine
+
+
+CANDIDATES = 64
+"""Drivers that one is chosen from, by how likely each is at the offset to start at. [-]"""
+
+
+class DriverState(msgspec.Struct):
+    """What drivers keep for a whole drive, each of shape (drivers,).
+
+    Parameters
+    ----------
+    mean : array
+        What the coarse movement is about. [lane widths]
+    coarse, fine : array
+        Factors on the coarse and on the fine movement. [-]
+    """
+
+    mean: FloatArray
+    coarse: FloatArray
+    fine: FloatArray
+
+
+def draw_drivers(model: AutoregressiveParameters, start: Start | None, rng: np.random.Generator, n: int) -> DriverState:
+    """Draw n drivers from the population; given a start, each from those found there."""
+    coarse_normal, fine_normal = rng.standard_normal((2, n, CANDIDATES))
+    coarse = _factor(model.coarse_volatility.between, coarse_normal)
+    mixed = model.correlation * coarse_normal + np.sqrt(1.0 - model.correlation**2) * fine_normal
+    fine = _factor(model.fine_volatility.between, mixed)
+    mean_normal, choice = rng.standard_normal(n), rng.random(n)
+    if start is None:
+        return DriverState(model.mean + model.between_drivers * mean_normal, coarse[:, 0].copy(), fine[:, 0].copy())
+    between = model.between_drivers**2
+    coarse_variance = (start.spread * coarse) ** 2 * model.coarse_covariance[0]
+    moving = coarse_variance + (start.fine * fine) ** 2 * model.fine_covariance[0]
+    away = np.broadcast_to(np.asarray(start.rel_offset) - model.mean, n)
+    weight = np.cumsum(_likelihood(away[:, None], between + moving), axis=1)
+    k = np.sum(weight < weight[:, -1:] * choice[:, None], axis=1)
+    rows = np.arange(n)
+    share = between / (between + moving[rows, k]) if between > 0.0 else np.zeros(n)
+    mean = model.mean + share * away + np.sqrt(between * (1.0 - share)) * mean_normal
+    return DriverState(mean, coarse[rows, k], fine[rows, k])
+
+
+def _likelihood(away: FloatArray, variance: FloatArray) -> FloatArray:
+    """Of a normal variable, relative to the likeliest candidate's; shape of `variance`."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        log_weight = -0.5 * np.log(variance) - 0.5 * away**2 / variance
+        relative = np.nan_to_num(log_weight - log_weight.max(axis=1, keepdims=True), nan=0.0)
+    return np.asarray(np.exp(relative))
+
+
+def _factor(variance: float, normal: FloatArray) -> FloatArray:
+    """Log-normal factors of mean square 1."""
+    return np.asarray(np.exp(np.sqrt(variance) * normal - variance))

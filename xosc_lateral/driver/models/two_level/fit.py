@@ -13,8 +13,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.driver.convolution import convolve
-from xosc_lateral.driver.models.fit_noise import fit_shaped_noise
+from xosc_lateral.driver.linear_filters import convolve
+from xosc_lateral.driver.models.noise import fit_shaped_noise
 from xosc_lateral.driver.models.two_level.markov import N_BINS, MarkovChain, bin_of
 from xosc_lateral.driver.models.two_level.model import TwoLevelModel
 from xosc_lateral.driver.models.two_level.settings import PAPER_SETTINGS, TwoLevelSettings

@@ -1,6 +1,13 @@
-"""Coarse movement of the paper's model: a first-order Markov chain over bins of the relative offset, smoothed.
+"""Coarse movement of the paper's model: a first-order Markov chain over bins of the relative offset, smoothed; and the
+chain made ready for sampling, one uniform number and two look-ups per step.
 
-Reference: N. Neis, J. Beyerer, arXiv:2405.17080, section III: coarse part kappa of x = kappa + phi.
+References
+----------
+.. [1] N. Neis, J. Beyerer, arXiv:2405.17080, section III: coarse part kappa of x = kappa + phi.
+.. [2] A. J. Walker, "An efficient method for generating discrete random variables with general distributions", ACM
+       Trans. Mathematical Software 3, 1977.
+.. [3] M. D. Vose, "A linear algorithm for generating random numbers with a given distribution", IEEE Trans. Software
+       Engineering 17, 1991.
 """
 
 from __future__ import annotations
@@ -11,7 +18,6 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.driver.models.two_level.alias_table import AliasTable
 from xosc_lateral.errors import DriverProfileError
 
 FloatArray = NDArray[np.float64]
@@ -132,3 +138,56 @@ class MarkovChain:
 def bin_of(rel_offset: FloatArray, n_bins: int = N_BINS) -> IntArray:
     """Bin, 0 to n_bins - 1, of each relative offset [-], any shape; beyond the markings the outermost."""
     return np.clip(np.floor((rel_offset + 0.5) * n_bins), 0, n_bins - 1).astype(np.int64)
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class AliasTable:
+    """A chain made ready for sampling: one uniform number and two look-ups per step [1]_.
+
+    Parameters
+    ----------
+    keep : array, shape (n_bins * n_bins,)
+        Column k of row i stands for bin k below this fraction of its width ...
+    other : array of int, shape (n_bins * n_bins,)
+        ... and for this bin above it.
+    """
+
+    n_bins: int
+    keep: FloatArray
+    other: IntArray
+
+    @classmethod
+    def of(cls, transition: FloatArray) -> AliasTable:
+        """Build from rows of probabilities [-], shape (n_bins, n_bins), each summing to 1."""
+        rows = [_alias_row(row) for row in transition]
+        keep = np.concatenate([row[0] for row in rows])
+        other = np.concatenate([row[1] for row in rows])
+        return cls(len(transition), keep, other)
+
+
+def _alias_row(probabilities: FloatArray) -> tuple[FloatArray, IntArray]:
+    n = len(probabilities)
+    keep, other = (probabilities * n).tolist(), list(range(n))
+    _paired(keep, other)
+    # A bin of probability 0 that rounding left alone must not be drawn.
+    likely = int(np.argmax(probabilities))
+    for k in range(n):
+        if probabilities[k] == 0.0:
+            other[k] = likely if other[k] == k else other[k]
+            keep[k] = 0.0
+    return np.array(keep), np.array(other, dtype=np.int64)
+
+
+def _paired(keep: list[float], other: list[int]) -> None:
+    """Fill what each bin lacks of 1 from one that has more: Vose's algorithm [2]_, in place."""
+    n = len(keep)
+    small = [k for k in range(n) if keep[k] < 1.0]
+    large = [k for k in range(n) if keep[k] >= 1.0]
+    while small and large:
+        less, more = small.pop(), large[-1]
+        other[less] = more
+        keep[more] -= 1.0 - keep[less]
+        if keep[more] < 1.0:
+            small.append(large.pop())
+    for k in small + large:  # what is left differs from 1 by rounding
+        keep[k] = 1.0

@@ -1,13 +1,16 @@
-"""The paper's constants, and others in their place."""
+"""Parameters of the two-level model, the paper's constants, and others in their place."""
 
 from __future__ import annotations
+
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.driver.models.noise import KERNEL_TAPS, N_KNOTS
-from xosc_lateral.driver.models.two_level.markov import N_BINS
-from xosc_lateral.driver.records import Record
+from xosc_lateral.driver.models.base import CoreModel
+from xosc_lateral.driver.models.noise import KERNEL_TAPS, N_KNOTS, ShapedNoise
+from xosc_lateral.driver.models.two_level.markov import N_BINS, MarkovChain
+from xosc_lateral.driver.records import Record, frozen_array, set_once
 from xosc_lateral.drives.resampling import STEP
 from xosc_lateral.errors import DriverProfileError
 
@@ -64,3 +67,52 @@ class TwoLevelSettings(Record, frozen=True):
 
 
 PAPER_SETTINGS = TwoLevelSettings()
+
+
+IntArray = NDArray[np.int64]
+
+
+class TwoLevelParameters(CoreModel, frozen=True, eq=False, dict=True):
+    """Fitted two-level model: x = kappa + phi.
+
+    Raises `DriverProfileError` if counts and settings disagree, or counts or damping are none.
+
+    Parameters
+    ----------
+    settings : TwoLevelSettings
+    counts : array of int, shape (n_bins, n_bins)
+        Transitions of the coarse part before smoothing, from the row's bin to the column's in one step.
+    damping : array, shape (n_knots,)
+        Of the fine part's noise, at frequencies evenly spaced from 0 to half the sampling rate. [lane widths]
+    """
+
+    settings: TwoLevelSettings
+    counts: IntArray
+    damping: FloatArray
+
+    def __post_init__(self) -> None:
+        """Check."""
+        set_once(self, counts=frozen_array(self.counts, np.int64), damping=frozen_array(self.damping))
+        if self.chain.n_bins != self.settings.n_bins:
+            raise DriverProfileError(f"counts of {self.chain.n_bins} bins, settings of {self.settings.n_bins}")
+        assert self.noise
+
+    @cached_property
+    def chain(self) -> MarkovChain:
+        """Coarse part, before smoothing."""
+        return MarkovChain(self.counts)
+
+    @cached_property
+    def noise(self) -> ShapedNoise:
+        """Fine part."""
+        return ShapedNoise(self.damping, self.settings.n_taps)
+
+    @property
+    def step(self) -> float:
+        """[s]"""
+        return self.settings.step
+
+    @property
+    def mean(self) -> float:
+        """Mean of the coarse part in the long run. [-]"""
+        return self.chain.mean

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Collection, Iterator, Mapping
-from dataclasses import dataclass, replace
 from math import inf
+
+from msgspec import Struct
+from msgspec.structs import replace
 
 from xosc_lateral.motion.nominal import NominalMotion
 from xosc_lateral.scenario import Action, Event, Scenario
@@ -20,8 +22,7 @@ from xosc_lateral.scenario.private_actions import (
 LATERAL = (LaneChangeAction, LaneOffsetAction, LateralDistanceAction, FollowTrajectoryAction)
 
 
-@dataclass(frozen=True, slots=True)
-class LateralAction:
+class LateralAction(Struct, frozen=True):
     """A lateral action: its names from the story down, and the type and name that a condition refers to it by.
 
     `repeats`: it may run more than once.

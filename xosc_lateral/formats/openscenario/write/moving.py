@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 from lxml import etree
+from msgspec import structs
 from numpy.typing import NDArray
 
 from xosc_lateral.formats.openscenario.write import build
@@ -93,7 +94,7 @@ def _stopping_in_time(path: WorldTrajectory, pieces: Sequence[PathPiece]) -> tup
         share = (VERTEX_SPACING - _way(path, last)) / _way(path, last - 1)
         for name in ("x", "y", "z"):
             arrays[name][last - 1] += share * (arrays[name][last - 2] - arrays[name][last - 1])
-    ends = [replace(piece, last=piece.last - 1, stops=True) if piece in early else piece for piece in pieces]
+    ends = [structs.replace(piece, last=piece.last - 1, stops=True) if piece in early else piece for piece in pieces]
     return replace(path, **arrays), ends
 
 

@@ -12,11 +12,12 @@ vehicle under test decides when, no transition is so fast that the turn would be
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from math import inf
 
 import numpy as np
+from msgspec import Struct, field
+from msgspec.structs import replace
 from numpy.typing import NDArray
 
 from xosc_lateral.formats.openscenario.write.ramp_targets import Ramp, acceleration, fitted, largest_change, slowing
@@ -63,8 +64,7 @@ _SLOW = 3.0
 """A car that is slower is treated as this fast: it hardly turns by a lateral speed. [m/s]"""
 
 
-@dataclass(frozen=True, eq=False, slots=True)
-class OffsetChain:
+class OffsetChain(Struct, frozen=True, eq=False):
     """Offsets of one entity on one segment.
 
     Parameters

@@ -10,10 +10,10 @@ enough, at a sudden change of speed, a vertex is added.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
+from msgspec import Struct
 from numpy.typing import NDArray
 
 from xosc_lateral.mask import true_slices
@@ -45,8 +45,7 @@ STANDSTILL_TIME = 0.3
 """A shorter stop is driven through, unless the piece begins or ends with it. [s]"""
 
 
-@dataclass(frozen=True, slots=True)
-class PathPiece:
+class PathPiece(Struct, frozen=True):
     """A stretch of rows without a stop.
 
     Parameters

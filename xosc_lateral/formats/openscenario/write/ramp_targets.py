@@ -14,10 +14,10 @@ References
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from msgspec import Struct
 from numpy.typing import ArrayLike, NDArray
 
 if TYPE_CHECKING:
@@ -29,8 +29,7 @@ FRAME = 0.01
 """A lane offset action stands still in the first frame of the reference player. [s]"""
 
 
-@dataclass(frozen=True, slots=True)
-class Ramp:
+class Ramp(Struct, frozen=True):
     """One lane offset action: from `origin` to `target` between two times, along half a cosine. [s], [m]"""
 
     start: float

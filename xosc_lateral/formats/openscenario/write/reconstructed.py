@@ -311,7 +311,7 @@ def _transition(
     else:
         action = sub(lateral, "LaneOffsetAction", continuous="false")
         limit = peak_acceleration(one.shape, one.change, one.duration)
-        sub(action, "LaneOffsetActionDynamics", dynamicsShape=one.shape.value, maxLateralAcc=decimal(limit, 6))
+        sub(action, "LaneOffsetActionDynamics", dynamicsShape=one.shape.value, maxLateralAcc=decimal(limit, 9))
         wanted = declared.value(f"{name}_offset", offset_t, 4)
         sub(sub(action, "LaneOffsetTarget"), "AbsoluteTargetLaneOffset", value=wanted)
     if relative is not None:

@@ -8,9 +8,9 @@ but for conditions on the state of what is gone: they get the time at which the 
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping
-from dataclasses import dataclass
 
 from lxml import etree
+from msgspec import Struct
 
 from xosc_lateral.errors import FormatError, locate
 from xosc_lateral.formats.openscenario.element import at_node, local_name
@@ -46,8 +46,7 @@ _ENDS = (StoryboardElementState.END_TRANSITION, StoryboardElementState.COMPLETE)
 Path = tuple[str, ...]
 
 
-@dataclass(frozen=True, slots=True)
-class Group:
+class Group(Struct, frozen=True):
     """A maneuver group with its names from the story down, and the act around it."""
 
     path: Path

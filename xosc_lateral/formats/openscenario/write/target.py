@@ -6,8 +6,9 @@ lack is in `additions`, and how they are told apart in `versions`.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from enum import StrEnum
+
+from msgspec import Struct
 
 from xosc_lateral.formats.openscenario.write.build import Version, named
 from xosc_lateral.scenario import Scenario
@@ -24,8 +25,7 @@ class Player(StrEnum):
     CARLA = "carla"
 
 
-@dataclass(frozen=True, slots=True)
-class TargetPlayer:
+class TargetPlayer(Struct, frozen=True):
     """Player and version.
 
     Parameters

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from lxml import etree
+from msgspec import Struct
 from numpy.typing import NDArray
 
 from xosc_lateral.formats.openscenario.write import build
@@ -22,8 +22,7 @@ _DIGITS = (6, 5, 5, 5, 6, 6, 6, 4, 4)
 """Decimals of the time and of these."""
 
 
-@dataclass(frozen=True, eq=False, slots=True)
-class TimedVertices:
+class TimedVertices(Struct, frozen=True, eq=False):
     """Vertices of one trajectory.
 
     Parameters

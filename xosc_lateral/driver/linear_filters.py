@@ -1,4 +1,4 @@
-"""Linear recursions, step by step or side by side: the same sums in the same order."""
+"""Linear recursions and symmetric kernels: the same sums in the same order, however a series is cut."""
 
 from __future__ import annotations
 
@@ -72,3 +72,64 @@ def _recur_side_by_side(past: FloatArray, noise: FloatArray, coefficients: Float
         for k in range(order):
             series[t] += coefficients[k] * series[t - 1 - k]
     return series
+
+
+def _convolve_body(values, kernel, result):  # type: ignore[no-untyped-def]
+    taps = len(kernel)
+    half = taps // 2
+    block = 512  # stays in the first-level cache through all taps
+    for first in range(0, len(result), block):
+        last = min(first + block, len(result))
+        out = result[first:last]
+        middle = values[first + half : last + half]
+        for i in range(last - first):
+            out[i] = kernel[half] * middle[i]
+        k = 0
+        while k + 4 <= half:  # four taps a pass spare three quarters of the stores
+            w0, w1, w2, w3 = kernel[k], kernel[k + 1], kernel[k + 2], kernel[k + 3]
+            before = values[first + k : last + k + 3]
+            behind = values[first + taps - 4 - k : last + taps - 1 - k]
+            for i in range(last - first):  # slices, so that the compiler sees plain indices and vectorises
+                total = out[i] + w0 * (before[i] + behind[i + 3])
+                total += w1 * (before[i + 1] + behind[i + 2])
+                total += w2 * (before[i + 2] + behind[i + 1])
+                out[i] = total + w3 * (before[i + 3] + behind[i])
+            k += 4
+        while k < half:
+            weight = kernel[k]
+            before = values[first + k : last + k]
+            behind = values[first + taps - 1 - k : last + taps - 1 - k]
+            for i in range(last - first):
+                out[i] += weight * (before[i] + behind[i])
+            k += 1
+
+
+_convolve_compiled = JitKernel(_convolve_body).compiled
+
+
+def convolve(values: FloatArray, kernel: FloatArray) -> FloatArray:
+    """Values seen through a symmetric kernel of odd length.
+
+    Every result is the same sum in the same order, however the values are cut into pieces.
+
+    Parameters
+    ----------
+    values : array, shape (n,) or (n, k)
+        [any unit]
+    kernel : array, shape (taps,)
+        [-]
+
+    Returns
+    -------
+    array, shape (n - taps + 1,) or (n - taps + 1, k)
+    """
+    n = len(values) - len(kernel) + 1
+    if values.size == len(values) and worth_compiling(n):
+        result = np.empty(n)
+        _convolve_compiled()(values.ravel(), kernel, result)
+        return result.reshape(n, *values.shape[1:])
+    half = len(kernel) // 2
+    result = kernel[half] * values[half : half + n]
+    for k in range(half):
+        result += kernel[k] * (values[k : k + n] + values[len(kernel) - 1 - k :][:n])
+    return np.asarray(result)

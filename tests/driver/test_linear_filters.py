@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from xosc_lateral.driver import recursion
-from xosc_lateral.driver.convolution import convolve
-from xosc_lateral.driver.recursion import recur
+from xosc_lateral.driver import linear_filters
+from xosc_lateral.driver.linear_filters import convolve, recur
 from xosc_lateral.driver.seeds import AutoregressiveSeed, DriveSeed, TwoLevelSeed, child, generator
 
 COEFFICIENTS = np.array([1.2, -0.5, 0.1])
@@ -17,7 +16,7 @@ COEFFICIENTS = np.array([1.2, -0.5, 0.1])
 @pytest.mark.parametrize("paths", [1, 3, 40])
 @pytest.mark.parametrize("compiled", [False, True], ids=["plain", "compiled"])
 def test_recursions_side_by_side_are_scipys_filter(paths: int, compiled: bool, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(recursion, "worth_compiling", lambda steps: compiled)
+    monkeypatch.setattr(linear_filters, "worth_compiling", lambda steps: compiled)
     rng = np.random.default_rng(paths)
     past, noise = rng.normal(size=(3, paths)), rng.normal(size=(60, paths))
     series = recur(past, noise, COEFFICIENTS)

@@ -1,0 +1,179 @@
+"""Hidden effects that are random processes: drift, a cycle with a phase of its own, regimes that switch.
+
+References
+----------
+.. [1] D. T. Gillespie, "Exact numerical simulation of the Ornstein-Uhlenbeck process and its integral", Physical Review
+       E 54, 1996: `Drift`.
+.. [2] A. Demir, A. Mehrotra, J. Roychowdhury, "Phase noise in oscillators: a unifying theory", IEEE Trans. Circuits
+       and Systems I 47, 2000: a phase in Brownian motion, `Cycle`.
+.. [3] J. R. Norris, "Markov Chains", 1997, section 2.6: a chain in continuous time stays exponentially long, `Regimes`.
+"""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+import msgspec
+import numpy as np
+from numpy.typing import NDArray
+
+from xosc_lateral.driver.effects.base import EffectTerms
+from xosc_lateral.driver.effects.hidden import HiddenEffect
+from xosc_lateral.driver.linear_filters import recur
+
+FloatArray = NDArray[np.float64]
+
+
+class DriftState(msgspec.Struct):
+    """Generator, and the last value. [m]"""
+
+    rng: np.random.Generator
+    value: float = 0.0
+    begun: bool = False
+
+
+class Drift(HiddenEffect, frozen=True, kw_only=True):
+    """Ornstein-Uhlenbeck process of the mean offset.
+
+    Parameters
+    ----------
+    size : float
+        Standard deviation. [m]
+    size_error : float
+        Its standard error. [m]
+    correlation_s : float
+        Correlation time. [s]
+    """
+
+    positive: ClassVar[tuple[str, ...]] = ("size", "correlation_s")
+    size: float
+    size_error: float = 0.0
+    correlation_s: float = 300.0
+
+    State: ClassVar[type[msgspec.Struct]] = DriftState
+
+    def begin(self, rng: np.random.Generator, step: float) -> DriftState:
+        """Stationary from the start; terms have shape (n,). `step` in [s]."""
+        return DriftState(rng)
+
+    def advance(self, state: DriftState, time: FloatArray, step: float) -> EffectTerms:
+        """A path of its own for every drive, shape (n,) [m]: the Ornstein-Uhlenbeck process, sampled exactly."""
+        keep = float(np.exp(-step / self.correlation_s))
+        noise = state.rng.standard_normal(len(time))
+        noise *= self.size
+        noise *= np.sqrt(1.0 - keep**2)
+        if not state.begun:
+            noise[0] /= np.sqrt(1.0 - keep**2)
+        location = recur(np.array([state.value]), noise, np.array([keep]))[1:]
+        state.value, state.begun = float(location[-1]), True
+        return EffectTerms(location=location)
+
+
+class CycleState(msgspec.Struct):
+    """Generator, first phase [turns], sum of the normal kicks so far [-], when the drive began [s]."""
+
+    rng: np.random.Generator
+    phase: float
+    kicks: float = 0.0
+    begun_at: float | None = None
+
+
+class Cycle(HiddenEffect, frozen=True, kw_only=True):
+    """A sine of constant amplitude whose phase starts anywhere and drifts.
+
+    Parameters
+    ----------
+    amplitude : float
+        [m]
+    amplitude_error : float
+        Standard error. [m]
+    period_s : float
+        [s]
+    coherence_s : float
+        Time after which the phase has drifted by one radian (standard deviation). [s]
+    """
+
+    positive: ClassVar[tuple[str, ...]] = ("amplitude", "period_s", "coherence_s")
+    amplitude: float
+    amplitude_error: float = 0.0
+    period_s: float
+    coherence_s: float = 1e6
+
+    State: ClassVar[type[msgspec.Struct]] = CycleState
+
+    def begin(self, rng: np.random.Generator, step: float) -> CycleState:
+        """Any phase; terms have shape (n,). `step` in [s]."""
+        return CycleState(rng, float(rng.random()))
+
+    def advance(self, state: CycleState, time: FloatArray, step: float) -> EffectTerms:
+        """A sine [m], shape (n,), whose phase drifts as Brownian motion does."""
+        if state.begun_at is None:
+            state.begun_at = float(time[0])
+        kicks = np.cumsum(np.concatenate([[state.kicks], state.rng.normal(size=len(time))]))[1:]
+        state.kicks = float(kicks[-1])
+        drift = kicks * np.sqrt(step / self.coherence_s)
+        phase = 2.0 * np.pi * (state.phase + (time - state.begun_at) / self.period_s) + drift
+        return EffectTerms(location=self.amplitude * np.sin(phase))
+
+
+class RegimesState(msgspec.Struct):
+    """Generator, whether the regime is on, when it ends and when the drive began. [s]"""
+
+    rng: np.random.Generator
+    on: bool
+    end: float
+    begun_at: float | None = None
+
+
+class Regimes(HiddenEffect, frozen=True, kw_only=True):
+    """A two-state Markov process multiplies the spread while it is on.
+
+    Parameters
+    ----------
+    factor : float
+        Spread in the on regime over spread in the off regime. [-]
+    factor_error : float
+        Standard error. [-]
+    fine_factor : float
+        The same for the fine noise. [-]
+    on_s, off_s : float
+        Mean length of either regime. [s]
+    """
+
+    positive: ClassVar[tuple[str, ...]] = ("factor", "fine_factor", "on_s", "off_s")
+    factor: float
+    factor_error: float = 0.0
+    fine_factor: float = 1.0
+    on_s: float
+    off_s: float
+
+    State: ClassVar[type[msgspec.Struct]] = RegimesState
+
+    def begin(self, rng: np.random.Generator, step: float) -> RegimesState:
+        """The first regime is drawn from the long-run share; terms have shape (n,). `step` in [s]."""
+        on = bool(rng.random() < self.on_s / (self.on_s + self.off_s))
+        return RegimesState(rng, on, self._length(rng, on))
+
+    def advance(self, state: RegimesState, time: FloatArray, step: float) -> EffectTerms:
+        """Regimes with exponential lengths, on an even grid [s] of shape (n,)."""
+        return self.terms_where(self.states(state, time))
+
+    def states(self, state: RegimesState, time: FloatArray) -> NDArray[np.bool_]:
+        """Whether the regime is on, shape of `time` [s], (n,)."""
+        if state.begun_at is None:
+            state.begun_at = float(time[0])
+        elapsed = time - state.begun_at
+        first, ends = state.on, [state.end]
+        while ends[-1] <= elapsed[-1]:
+            state.on = not state.on
+            ends.append(ends[-1] + self._length(state.rng, state.on))
+        state.end = ends[-1]
+        switched = np.searchsorted(np.asarray(ends), elapsed, side="right") % 2 == 1
+        return np.asarray(switched ^ first)
+
+    def terms_where(self, on: NDArray[np.bool_]) -> EffectTerms:
+        """Terms for given regimes, shape of `on`."""
+        return EffectTerms(spread=np.where(on, self.factor, 1.0), fine=np.where(on, self.fine_factor, 1.0))
+
+    def _length(self, rng: np.random.Generator, on: bool) -> float:
+        return float(rng.exponential(self.on_s if on else self.off_s))

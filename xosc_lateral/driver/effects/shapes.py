@@ -1,0 +1,295 @@
+"""Effects of one context column: how strength follows from its value.
+
+References
+----------
+.. [1] C. de Boor, "A Practical Guide to Splines", 1978, chapter VIII: truncated powers, of first degree in `Piecewise`.
+.. [2] K. V. Mardia, P. E. Jupp, "Directional Statistics", 2000: regression on sine and cosine of an angle, `Angular`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from xosc_lateral.driver.effects.column import ColumnEffect
+from xosc_lateral.driver.records import set_once
+from xosc_lateral.errors import DriverProfileError
+
+
+class SingleColumnEffect(ColumnEffect, frozen=True, kw_only=True):
+    """An effect of one column.
+
+    Parameters
+    ----------
+    column : str
+        Its name among the context columns.
+    """
+
+    column: str
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """The one column."""
+        return (self.column,)
+
+
+FloatArray = NDArray[np.float64]
+
+
+class Linear(SingleColumnEffect, frozen=True, kw_only=True):
+    """As much as the column says; where it is NaN ("there is none"), nothing changes."""
+
+    @property
+    def shape(self) -> str:
+        """Word for the report."""
+        return "linear"
+
+    def quantity(self, context: Mapping[str, FloatArray]) -> FloatArray:
+        """The column, shape (n, 1). [its own unit]"""
+        return np.asarray(context[self.column], dtype=np.float64)[:, None]
+
+
+class Magnitude(SingleColumnEffect, frozen=True, kw_only=True):
+    """|column|: to the left as to the right; where it is NaN ("there is none"), nothing changes."""
+
+    @property
+    def shape(self) -> str:
+        """Word for the report."""
+        return "linear in its size, to either side alike"
+
+    def quantity(self, context: Mapping[str, FloatArray]) -> FloatArray:
+        """Size of the column, shape (n, 1), >= 0. [its own unit]"""
+        return np.abs(np.asarray(context[self.column], dtype=np.float64))[:, None]
+
+
+class Saturating(SingleColumnEffect, frozen=True, kw_only=True):
+    """tanh((column - middle) / scale).
+
+    Parameters
+    ----------
+    column : str
+        Where it is NaN ("there is none"), nothing changes; infinity is the far end of the curve.
+    middle, scale : float
+        scale > 0. [unit of the column]
+    """
+
+    middle: float
+    scale: float
+
+    def __post_init__(self) -> None:
+        """Refuse a scale that is not positive."""
+        super().__post_init__()
+        if not self.scale > 0:
+            raise DriverProfileError(f"effect saturating of {self.column}: scale {self.scale} must be above 0")
+
+    @property
+    def levels_off(self) -> bool:
+        """At both ends."""
+        return True
+
+    @property
+    def shape(self) -> str:
+        """Word for the report."""
+        return f"saturating (beyond {self.middle:.4g} +- {self.scale:.3g})"
+
+    def quantity(self, context: Mapping[str, FloatArray]) -> FloatArray:
+        """Between -1 and 1, shape (n, 1). [-]"""
+        return np.asarray(np.tanh((context[self.column] - self.middle) / self.scale))[:, None]
+
+
+class Threshold(SingleColumnEffect, frozen=True, kw_only=True):
+    """Acts beyond a limit only.
+
+    Parameters
+    ----------
+    column : str
+        Where it is NaN ("there is none"), it counts as on the side that does not act.
+    at : float
+        The limit. [unit of the column]
+    above : bool
+        Whether it acts above the limit, or below.
+    jump : bool
+        True: as a whole at once; False: in proportion to the distance from the limit.
+    """
+
+    at: float
+    above: bool = True
+    jump: bool = True
+
+    @property
+    def levels_off(self) -> bool:
+        """A step does."""
+        return self.jump
+
+    @property
+    def shape(self) -> str:
+        """Word for the report."""
+        return f"threshold ({'step' if self.jump else 'hinge'} {'above' if self.above else 'below'} {self.at:.4g})"
+
+    def quantity(self, context: Mapping[str, FloatArray]) -> FloatArray:
+        """0 on the quiet side, 1 [-] or the distance from the limit [column's unit] on the other; shape (n, 1)."""
+        beyond = (context[self.column] - self.at) * (1.0 if self.above else -1.0)
+        with np.errstate(invalid="ignore"):
+            return np.where(beyond > 0, 1.0 if self.jump else beyond, 0.0)[:, None]
+
+
+class Piecewise(SingleColumnEffect, frozen=True, kw_only=True):
+    """The first coefficient is the slope up to the first knot, each further one the change of slope at a knot.
+
+    Parameters
+    ----------
+    column : str
+        Where it is NaN ("there is none"), nothing changes.
+    knots : tuple of float
+        Increasing. [unit of the column]
+    """
+
+    knots: tuple[float, ...]
+
+    def __post_init__(self) -> None:
+        """Refuse knots that don't increase."""
+        super().__post_init__()
+        set_once(self, knots=tuple(float(knot) for knot in self.knots))
+        if not self.knots or not all(low < high for low, high in pairwise(self.knots)):
+            raise DriverProfileError(f"effect piecewise of {self.column}: knots {self.knots} must increase")
+
+    @property
+    def shape(self) -> str:
+        """Word for the report."""
+        return f"curve (bends at {', '.join(f'{knot:.4g}' for knot in self.knots)})"
+
+    def quantity(self, context: Mapping[str, FloatArray]) -> FloatArray:
+        """The column, and how far it is beyond each knot, shape (n, number of knots + 1). [the column's unit]"""
+        values = np.asarray(context[self.column], dtype=np.float64)
+        return np.stack(
+            [values, *(np.where(values > knot, values - knot, 0.0 * values) for knot in self.knots)], axis=1
+        )
+
+
+class Levels(SingleColumnEffect, frozen=True, kw_only=True):
+    """One coefficient for each named level; every other level is the base. Between levels, as near as it is.
+
+    Parameters
+    ----------
+    column : str
+        Column of whole numbers, or between them while it changes.
+    levels : tuple of float
+        Those that differ from the rest. [unit of the column]
+
+    Raises
+    ------
+    DriverProfileError
+        No level, or not a coefficient for each.
+    """
+
+    levels: tuple[float, ...]
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if not self.levels or len(self.coefficients) not in (0, len(self.levels)):
+            raise DriverProfileError(
+                f"effect {self.kind} by {self.column}: {len(self.levels)} levels, {len(self.coefficients)} coefficients"
+            )
+
+    @property
+    def shape(self) -> str:
+        """Word for the report."""
+        return f"levels ({', '.join(f'{level:g}' for level in self.levels)})"
+
+    def quantity(self, context: Mapping[str, FloatArray]) -> FloatArray:
+        """1 where the column is at the level, 0 from 1 away on, shape (n, number of levels). [-]"""
+        values = np.asarray(context[self.column], dtype=np.float64)
+        return np.stack([level_share(values, level) for level in self.levels], axis=1)
+
+
+def level_share(values: FloatArray, level: float) -> FloatArray:
+    """How far whole numbers are at a level, shape (n,): between two, as a scenario's lanes come and go. [-]"""
+    return np.nan_to_num(np.clip(1.0 - np.abs(values - level), 0.0, 1.0), nan=0.0)
+
+
+class Nearness(SingleColumnEffect, frozen=True, kw_only=True):
+    """scale / max(|distance|, scale): 1 from touching up to `scale`, fading beyond, 0 where there is none (NaN).
+
+    Parameters
+    ----------
+    column : str
+        A distance; NaN: there is none.
+    scale : float
+        In the column's unit. Infinite is not allowed; a very large one makes it "there is one" (see `presence`).
+        [unit of the column]
+    presence : bool
+        True: 1 wherever there is one, at whatever distance.
+    """
+
+    scale: float = 1.0
+    presence: bool = False
+
+    @property
+    def shape(self) -> str:
+        """Word for the report."""
+        return "presence" if self.presence else "nearness (1 / distance)"
+
+    def quantity(self, context: Mapping[str, FloatArray]) -> FloatArray:
+        """From 0 (none) to 1, shape (n, 1). [-]"""
+        distance = np.abs(context[self.column])
+        there = np.isfinite(distance)
+        if self.presence:
+            return there.astype(np.float64)[:, None]
+        near = self.scale / np.maximum(np.where(there, distance, 1.0), self.scale)
+        return np.where(there, near, 0.0)[:, None]
+
+
+class Proximity(SingleColumnEffect, frozen=True, kw_only=True):
+    """exp(-|distance| / scale): 1 alongside, 0 far away and where there is none (NaN).
+
+    Parameters
+    ----------
+    column : str
+        A distance, of either sign; NaN: there is none.
+    scale : float
+        Distance over which the influence falls to 37 %; > 0. [unit of the column]
+    """
+
+    scale: float
+
+    def __post_init__(self) -> None:
+        """Refuse a scale that is not positive."""
+        super().__post_init__()
+        if not self.scale > 0:
+            raise DriverProfileError(f"effect proximity of {self.column}: scale {self.scale} must be above 0")
+
+    @property
+    def shape(self) -> str:
+        """Word for the report."""
+        return f"proximity (fades over {self.scale:.3g})"
+
+    def quantity(self, context: Mapping[str, FloatArray]) -> FloatArray:
+        """From 0 (none) to 1 (alongside), shape (n, 1)."""
+        return np.nan_to_num(np.exp(-np.abs(np.asarray(context[self.column])) / self.scale), nan=0.0)[:, None]
+
+
+class Angular(SingleColumnEffect, frozen=True, kw_only=True):
+    """Sine and cosine of an angle, a coefficient each.
+
+    Parameters
+    ----------
+    column : str
+        Where it is NaN ("there is none"), nothing changes.
+    period : float
+        Full circle in the column's unit: 360 deg or 2 pi rad.
+    """
+
+    period: float = 360.0
+
+    @property
+    def shape(self) -> str:
+        """Word for the report."""
+        return "angular"
+
+    def quantity(self, context: Mapping[str, FloatArray]) -> FloatArray:
+        """Sine and cosine, shape (n, 2), within -1..1. [-]"""
+        angle = 2.0 * np.pi / self.period * context[self.column]
+        return np.stack([np.sin(angle), np.cos(angle)], axis=1)

@@ -1,0 +1,125 @@
+"""What an effect does in a scenario: one stretch converted with it and without it, and the shift measured there."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+from msgspec.structs import replace
+from numpy.typing import NDArray
+
+from xosc_lateral.driver.effects import Acts, ColumnEffect, Effect
+from xosc_lateral.driver.profile import DriverProfile
+from xosc_lateral.enrich.enrich import SAMPLE_STEP, enrich
+from xosc_lateral.enrich.result import Neighbours
+from xosc_lateral.motion.context import entity_context
+from xosc_lateral.pipeline.load import Played, play_scenario
+from xosc_lateral.templates import find_template
+
+FloatArray = NDArray[np.float64]
+
+SCENARIOS = ("overtake-truck", "cut-in", "curves")
+"""Shipped templates in which an effect is looked for, in this order: neighbours, vehicles ahead, roads."""
+
+SEEDS = range(4)
+
+LEAST = 0.02
+"""A stretch on which an effect moves its driver by less is none. [m]"""
+
+
+@dataclass(frozen=True, slots=True)
+class Proof:
+    """A shift by one effect, measured between two conversions of a scenario with the same seeds.
+
+    Parameters
+    ----------
+    columns : tuple of str
+        What the effect goes by.
+    scenario : str
+        The template.
+    vehicle : str
+        Who shows it most.
+    start, end : float
+        Of the stretch: from its first to its last moment with half of the largest shift or more. [s]
+    shift, error : float
+        Mean over the stretch and over seeds, positive left, and its standard error over seeds. [m]
+    """
+
+    columns: tuple[str, ...]
+    scenario: str
+    vehicle: str
+    start: float
+    end: float
+    shift: float
+    error: float
+
+    def __str__(self) -> str:
+        """In words."""
+        side = "left" if self.shift > 0 else "right"
+        return (
+            f"{' and '.join(self.columns)}: in `{self.scenario}` {self.vehicle} drives {abs(self.shift):.2f} "
+            f"+- {self.error:.2f} m further {side} with it than without it, {self.start:.0f} to {self.end:.0f} s"
+        )
+
+
+def proofs_of(profile: DriverProfile, effects: Iterable[Effect] | None = None) -> list[Proof]:
+    """Of those effects of a profile (all by default) that move the mean and act in one of the `SCENARIOS`."""
+    chosen = profile.effects if effects is None else tuple(effects)
+    moving = [one for one in chosen if isinstance(one, ColumnEffect) and one.acts is Acts.LOCATION]
+    return [found for effect in moving if (found := _proof(profile, effect)) is not None]
+
+
+def _proof(profile: DriverProfile, effect: ColumnEffect) -> Proof | None:
+    without = replace(profile, effects=tuple(one for one in profile.effects if one != effect))
+    for name in SCENARIOS:
+        played = _played(name)
+        stretches = list(_stretches(played, effect))
+        if not stretches:
+            continue
+        vehicle, rows, _ = max(stretches, key=lambda one: one[2])
+        paths = [[_deviation(one, played, vehicle, seed)[rows] for one in (without, profile)] for seed in SEEDS]
+        shifts = np.array([(after - before).mean() for before, after in paths])
+        time = played.motion.entities[vehicle].time[rows]
+        return Proof(
+            effect.columns,
+            name,
+            played.motion.entities[vehicle].name,
+            float(time[0]),
+            float(time[-1]),
+            float(shifts.mean()),
+            float(shifts.std(ddof=1) / np.sqrt(len(shifts))),
+        )
+    return None
+
+
+@cache
+def _played(name: str) -> Played:
+    """A template with its own settings, played."""
+    with tempfile.TemporaryDirectory() as folder:
+        for file, text in find_template(name).files({}).items():
+            (Path(folder) / file).write_text(text, encoding="utf-8")
+        return play_scenario(next(Path(folder).glob("*.xosc")))
+
+
+def _stretches(played: Played, effect: ColumnEffect) -> Iterator[tuple[int, NDArray[np.int64], float]]:
+    """Vehicles that an effect moves: number, rows on which it does by half of its most or more, and how far. [m]"""
+    every = round(SAMPLE_STEP / played.motion.step)
+    for number, entity in enumerate(played.motion.entities):
+        grid = np.arange(0, len(entity.time), every)
+        strength = effect.strength(SAMPLE_STEP, entity_context(played.motion, played.network, number, grid))
+        if strength is None or not np.isfinite(strength).any():
+            continue
+        most = float(np.nanmax(np.abs(strength)))
+        if most >= LEAST:
+            yield number, grid[np.abs(strength) >= 0.5 * most], most
+
+
+def _deviation(profile: DriverProfile, played: Played, vehicle: int, seed: int) -> FloatArray:
+    """How far from the nominal path one vehicle drives in a conversion, shape (rows,). [m]"""
+    drivers = {played.motion.entities[vehicle].name: profile}
+    found = enrich(played.motion, played.network, drivers, seed=seed, neighbours=Neighbours.PROFILE)
+    return found.entities[vehicle].deviation
