@@ -47,12 +47,12 @@ def drawing(messages: list[Any], seconds: float) -> str:
     parts += [line(one.classification.centerline, "stroke='#cde' stroke-dasharray='2 6'") for one in road.lane]
     heights = [float(word.split(",")[1]) for part in parts for word in part.split("'")[1].split()]
     for number, one in there.items():
-        before = [a for m in messages[max(0, row - 500) : row : 10] for a in m.moving_object if a.id.value == number]
-        parts.append(line([a.base.position for a in before], "stroke='#c40'"))
         base = one.base
         x, y = turn @ (np.array([base.position.x, base.position.y]) - middle)
         if abs(x) > REACH:
             continue
+        before = [a for m in messages[max(0, row - 500) : row : 10] for a in m.moving_object if a.id.value == number]
+        parts.append(line([a.base.position for a in before], "stroke='#c40'"))
         wide, high = ALONG * base.dimension.length, ACROSS * base.dimension.width
         left, top = ALONG * (x + REACH) - 0.5 * wide, -ACROSS * y - 0.5 * high
         name = one.source_reference[0].identifier[-1]
