@@ -7,7 +7,7 @@ Without a trace that of a converted cut-in. Across is drawn four times as large 
 
 from __future__ import annotations
 
-import sys
+import argparse
 import tempfile
 from pathlib import Path
 from typing import Any
@@ -68,14 +68,17 @@ def drawing(messages: list[Any], seconds: float) -> str:
 
 def main() -> None:
     """Write the picture beside this file."""
+    parser = argparse.ArgumentParser()
+    parser.add_argument("trace", nargs="?", type=Path)
+    parser.add_argument("seconds", nargs="?", type=float, default=12.5)
+    asked = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
-        if len(sys.argv) > 1:
-            trace = Path(sys.argv[1])
-        else:
+        trace = asked.trace
+        if trace is None:
             scenario = write_template("cut-in", folder)[0]
             trace = convert(scenario, Path(folder) / "out.xosc", seed=1).write_osi(Path(folder) / "out_gt.mcap")[0]
         with Trace(trace) as messages:
-            made = drawing(list(messages), float(sys.argv[2]) if len(sys.argv) > 2 else 12.5)
+            made = drawing(list(messages), asked.seconds)
     Path(__file__).with_suffix(".svg").write_text(made, encoding="utf-8")
 
 
