@@ -92,3 +92,11 @@ def test_a_step_has_no_range_whatever_value_it_comes_with() -> None:
     transition.begin(10.0, 12.0)
     assert transition.value() == 12.0
     assert transition.is_done
+
+
+def test_without_lateral_acceleration_nobody_moves_aside():
+    transition = Transition(DynamicsShape.SINUSOIDAL, DynamicsDimension.TIME, 0.0)
+    transition.begin(0.0, 2.0)
+    assert transition.range_for_curvature(0.0) == np.inf
+    transition.begin(2.0, 2.0)
+    assert transition.range_for_curvature(0.0) == 0.0

@@ -206,21 +206,8 @@ def _dlr(source: Path, road: Path | None, columns: TableMapping) -> RecordedTraf
         first = rows[0]
         length, wide, high = (float(size[first]) for size in sizes)
         heading = np.arctan2(np.gradient(y[rows]), np.gradient(x[rows])) if len(rows) > 1 else np.zeros(1)
-        tracks.append(
-            Track(
-                short[names[first]],
-                str(kinds[first]),
-                length,
-                wide,
-                high,
-                REAR_AXLE * length,
-                REAR_AXLE * length,
-                time[rows],
-                x[rows],
-                y[rows],
-                heading,
-            )
-        )
+        box = length, wide, high, REAR_AXLE * length, REAR_AXLE * length
+        tracks.append(Track(short[names[first]], str(kinds[first]), *box, time[rows], x[rows], y[rows], heading))
     note = "the road is that of the traffic: lane centres are those of its vehicles, nobody measured markings"
     return _made(made, tracks, [source], [note])
 
