@@ -156,7 +156,7 @@ class ClosedLoop(Result):
     def __str__(self) -> str:
         from xosc_lateral.report.loop import loop_text
 
-        return "\n".join([loop_text(self._result), *(f"converted: {one}" for one in self.proofs)])
+        return loop_text(self._result)
 
     def to_frame(self) -> pd.DataFrame:
         """One row per finding: `effect`, `kind`, `columns`, `lag_s`, `response_s`, `shape`, `size_m`, `p_value`, ..."""

@@ -23,7 +23,7 @@ from xosc_lateral.templates import find_template
 FloatArray = NDArray[np.float64]
 
 SCENARIOS = ("overtake-truck", "cut-in", "curves")
-"""Shipped templates in which an effect is looked for, in this order: neighbours, vehicles ahead, roads."""
+"""Shipped templates, of which the one in which an effect moves somebody most is taken."""
 
 SEEDS = range(4)
 
@@ -75,25 +75,23 @@ def proofs_of(profile: DriverProfile, effects: Iterable[Effect] | None = None) -
 
 def _proof(profile: DriverProfile, effect: ColumnEffect) -> Proof | None:
     without = replace(profile, effects=tuple(one for one in profile.effects if one != effect))
-    for name in SCENARIOS:
-        played = _played(name)
-        stretches = list(_stretches(played, effect))
-        if not stretches:
-            continue
-        vehicle, rows, _ = max(stretches, key=lambda one: one[2])
-        paths = [[_deviation(one, played, vehicle, seed)[rows] for one in (without, profile)] for seed in SEEDS]
-        shifts = np.array([(after - before).mean() for before, after in paths])
-        time = played.motion.entities[vehicle].time[rows]
-        return Proof(
-            effect.columns,
-            name,
-            played.motion.entities[vehicle].name,
-            float(time[0]),
-            float(time[-1]),
-            float(shifts.mean()),
-            float(shifts.std(ddof=1) / np.sqrt(len(shifts))),
-        )
-    return None
+    stretches = [(name, *one) for name in SCENARIOS for one in _stretches(_played(name), effect)]
+    if not stretches:
+        return None
+    name, vehicle, rows, _ = max(stretches, key=lambda one: one[-1])
+    played = _played(name)
+    paths = [[_deviation(one, played, vehicle, seed)[rows] for one in (without, profile)] for seed in SEEDS]
+    shifts = np.array([(after - before).mean() for before, after in paths])
+    driven = played.motion.entities[vehicle]
+    return Proof(
+        effect.columns,
+        name,
+        driven.name,
+        float(driven.time[rows[0]]),
+        float(driven.time[rows[-1]]),
+        float(shifts.mean()),
+        float(shifts.std(ddof=1) / np.sqrt(len(shifts))),
+    )
 
 
 @cache
