@@ -7,7 +7,7 @@ Without a trace that of a converted cut-in. Across is drawn four times as large 
 
 from __future__ import annotations
 
-import sys
+import argparse
 import tempfile
 from pathlib import Path
 from typing import Any
@@ -47,12 +47,12 @@ def drawing(messages: list[Any], seconds: float) -> str:
     parts += [line(one.classification.centerline, "stroke='#cde' stroke-dasharray='2 6'") for one in road.lane]
     heights = [float(word.split(",")[1]) for part in parts for word in part.split("'")[1].split()]
     for number, one in there.items():
-        before = [a for m in messages[max(0, row - 500) : row : 10] for a in m.moving_object if a.id.value == number]
-        parts.append(line([a.base.position for a in before], "stroke='#c40'"))
         base = one.base
         x, y = turn @ (np.array([base.position.x, base.position.y]) - middle)
         if abs(x) > REACH:
             continue
+        before = [a for m in messages[max(0, row - 500) : row : 10] for a in m.moving_object if a.id.value == number]
+        parts.append(line([a.base.position for a in before], "stroke='#c40'"))
         wide, high = ALONG * base.dimension.length, ACROSS * base.dimension.width
         left, top = ALONG * (x + REACH) - 0.5 * wide, -ACROSS * y - 0.5 * high
         name = one.source_reference[0].identifier[-1]
@@ -68,14 +68,17 @@ def drawing(messages: list[Any], seconds: float) -> str:
 
 def main() -> None:
     """Write the picture beside this file."""
+    parser = argparse.ArgumentParser()
+    parser.add_argument("trace", nargs="?", type=Path)
+    parser.add_argument("seconds", nargs="?", type=float, default=12.5)
+    asked = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
-        if len(sys.argv) > 1:
-            trace = Path(sys.argv[1])
-        else:
+        trace = asked.trace
+        if trace is None:
             scenario = write_template("cut-in", folder)[0]
             trace = convert(scenario, Path(folder) / "out.xosc", seed=1).write_osi(Path(folder) / "out_gt.mcap")[0]
         with Trace(trace) as messages:
-            made = drawing(list(messages), float(sys.argv[2]) if len(sys.argv) > 2 else 12.5)
+            made = drawing(list(messages), asked.seconds)
     Path(__file__).with_suffix(".svg").write_text(made, encoding="utf-8")
 
 

@@ -170,7 +170,7 @@ def test_without_the_plug_in_its_kinds_are_unknown(installed: dict[str, list[Ent
         read_profile(tmp_path / "p.json")
     write_profile(replace(make_profile(), name="x"), tmp_path / "x.json")
     assert read_profile(tmp_path / "x.json").name == "x"
-    with pytest.raises(DriverProfileError, match="no core model 'white'; known are autoregressive, two-level"):
+    with pytest.raises(DriverProfileError, match="no core model 'white'; known are two-level, autoregressive"):
         fit_core([np.zeros(100)], ["a"], model="white")
 
 
