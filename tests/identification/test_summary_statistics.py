@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.stats import chi2
 
 from xosc_lateral.identification.residual import (
     OSCILLATION,
@@ -15,6 +16,7 @@ from xosc_lateral.identification.residual import (
     size_of,
     statistics_of,
 )
+from xosc_lateral.identification.significance import as_one_degree
 from xosc_lateral.identification.timeline import Timeline
 
 STEP = 0.2
@@ -136,3 +138,11 @@ def test_what_is_beyond_a_floor_is_what_adds_to_it_in_squares() -> None:
     np.testing.assert_array_equal(
         _mean_of_finite(np.array([[1.0, np.nan, np.nan], [3.0, 5.0, np.nan]])), [2.0, 5.0, np.nan]
     )
+
+
+# ---- low frequencies -------------------------------------------------------------------------------------------------
+@pytest.mark.parametrize("degrees", [1, 2, 8])
+def test_a_score_of_several_degrees_becomes_one_of_one_degree_as_rare(degrees: int) -> None:
+    for p_value in (0.5, 1e-2, 1e-8):
+        score = float(chi2.isf(p_value, degrees))
+        assert chi2.sf(as_one_degree(score, degrees), 1) == pytest.approx(p_value, rel=1e-6)

@@ -147,8 +147,9 @@ def select(search: Search, initial: Sequence[Term] = ()) -> Selection:
                 break
             best = min(passed, key=lambda test: test.p_value)
             assert best.term is not None
-            accepted.append(Accepted(best.term, best.p_value))
-            fitted = best.after or fit_model(search.coarse, (*fitted.terms, best.term))
+            new = (best.term, *best.together)
+            accepted += [Accepted(term, best.p_value) for term in new]
+            fitted = best.after or fit_model(search.coarse, (*fitted.terms, *new))
     selection = Selection(tuple(accepted), tuple(rejected.values()), start, fitted)
     for one in accepted:
         selection = _tested_again(search, selection, one)

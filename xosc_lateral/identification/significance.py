@@ -146,3 +146,10 @@ def effective_number(draws: FloatArray) -> float:
     ends = np.flatnonzero(pairs <= 0.0)
     time = 2.0 * float(pairs[: ends[0] if len(ends) else len(pairs)].sum()) - 1.0
     return float(np.clip(n / max(time, 1.0), 1.0, n))
+
+
+def as_one_degree(chi_square: FloatArray | float, degrees: int) -> FloatArray:
+    """Chi-square with one degree of freedom that is as rare as one with `degrees`, of the same shape."""
+    from scipy.stats import chi2
+
+    return np.asarray(chi2.isf(np.maximum(chi2.sf(chi_square, degrees), LEAST), 1))

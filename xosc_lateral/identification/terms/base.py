@@ -100,12 +100,15 @@ class Outcome:
         Family-wise over everything that the test tried.
     after : Fitted, optional
         Fit with the term, where the test has made it.
+    together : tuple of Term
+        Found with it, as one finding.
     """
 
     term: Term | None
     columns: tuple[str, ...]
     p_value: float
     after: Fitted | None = None
+    together: tuple[Term, ...] = ()
 
 
 class Term(ABC):

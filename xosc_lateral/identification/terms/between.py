@@ -2,7 +2,9 @@
 
 Every drive has a level of its own, so what hardly changes within drives can't act on the mean there. Here the levels
 themselves are regressed on what each drive usually meets, weighted by how well each is known beside how much drives
-differ anyway. The null deals the drives anew, which is exact: drives know nothing of one another.
+differ anyway. The null deals the drives anew, which is exact: drives know nothing of one another. Columns of whole
+drives go along with each other (the left lane is the fast one), and two may act against each other and show together
+only: so pairs are tested, too.
 """
 
 from __future__ import annotations
@@ -15,9 +17,8 @@ from msgspec import structs
 from numpy.typing import NDArray
 
 from xosc_lateral.driver.effects import Acts, ColumnEffect, Effect, Linear
-from xosc_lateral.identification.dictionary import NULL_DRAWS
 from xosc_lateral.identification.regression import Fitted
-from xosc_lateral.identification.significance import MANY_DRIVES, LoopSeed, upper_tail
+from xosc_lateral.identification.significance import MANY_DRIVES, LoopSeed
 from xosc_lateral.identification.terms.base import Description, Outcome, Stage
 from xosc_lateral.identification.terms.column import ColumnTerm, of_kind
 
@@ -25,8 +26,12 @@ if TYPE_CHECKING:
     from xosc_lateral.identification.search import Search
 
 
+from collections.abc import Sequence
+
+from xosc_lateral.identification.dictionary import NULL_DRAWS
+from xosc_lateral.identification.significance import as_one_degree, upper_tail
+
 FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
 
 USUAL_S = 60.0
 """Response time of an effect between drives: what a drive usually meets, as far as a run can know it. [s]"""
@@ -58,7 +63,7 @@ class BetweenTerm(ColumnTerm):
 
     @classmethod
     def test(cls, search: Search, fitted: Fitted) -> Outcome | None:
-        """Best candidate over all columns and shapes, against drives dealt anew."""
+        """Best candidate, or pair of candidates, over all columns and shapes, against drives dealt anew."""
         coarse, places = fitted.coarse, _Places.of(fitted)
         if np.count_nonzero(places.weight) < MANY_DRIVES:
             return None
@@ -77,15 +82,19 @@ class BetweenTerm(ColumnTerm):
                 usual.append(mean / np.sqrt(power))
         if not candidates:
             return None
-        index, p_value = best_of_drives(
+        best = best_of_drives(
             places.left(places.place),
             places.weight > 0.0,
             np.stack(usual, axis=1),
             np.array([candidate.cost for candidate in candidates]),
+            [candidate.columns[0] for candidate in candidates],
             search.rng(LoopSeed.BETWEEN),
         )
-        term = cls.of(structs.replace(candidates[index].effect, lag_s=0.0, response_s=USUAL_S))
-        return Outcome(term, term.columns, p_value)
+        terms = [
+            cls.of(structs.replace(candidates[index].effect, lag_s=0.0, response_s=USUAL_S)) for index in best.members
+        ]
+        columns = tuple(term.columns[0] for term in terms)
+        return Outcome(terms[0], columns, best.p_value, together=tuple(terms[1:]))
 
     def matches(self, other: Self) -> bool:
         """Any other: columns that go along with each other from drive to drive stand in for one another."""
@@ -176,10 +185,37 @@ class _Places:
         return (inverse @ (weighed.T @ self.place))[1:], np.sqrt(np.diag(inverse))[1:]
 
 
+BoolArray = NDArray[np.bool_]
+
+LEAST_APART = 0.1
+"""Share of either member's variance that the other must leave: below, the two are one quantity twice. [-]"""
+
+
+@dataclass(frozen=True, slots=True)
+class Best:
+    """What explains most.
+
+    Parameters
+    ----------
+    members : tuple of int
+        One candidate, or two.
+    p_value : float
+        Family-wise over all candidates and pairs.
+    """
+
+    members: tuple[int, ...]
+    p_value: float
+
+
 def best_of_drives(
-    left: FloatArray, counted: BoolArray, quantities: FloatArray, costs: FloatArray, rng: np.random.Generator
-) -> tuple[int, float]:
-    """Candidate with the largest gain in chi-square less its cost, and its p-value against drives dealt anew.
+    left: FloatArray,
+    counted: BoolArray,
+    quantities: FloatArray,
+    costs: FloatArray,
+    columns: Sequence[str],
+    rng: np.random.Generator,
+) -> Best:
+    """Largest gain in chi-square less what its choice costs, against drives that are dealt anew.
 
     Parameters
     ----------
@@ -191,12 +227,62 @@ def best_of_drives(
         Candidates, free of what is known, of length 1.
     costs : array, shape (k,)
         Of choosing each among its family.
+    columns : sequence of str
+        Each candidate's; the two of a pair are of different columns.
+    rng : Generator
     """
     rows = np.flatnonzero(counted)
     draws = np.zeros((NULL_DRAWS + 1, len(left)))
     draws[0] = left
     for drawn in draws[1:]:
         drawn[rows] = left[rng.permutation(rows)]
-    scores = np.square(draws @ quantities) - costs
-    maxima = scores.max(axis=1)
-    return int(np.argmax(scores[0])), upper_tail(float(maxima[0]), maxima[1:])
+    z = draws @ quantities
+    singles = np.square(z) - costs
+    pairs = _Pairs.of(quantities, columns)
+    scores = np.maximum(singles.max(axis=1), pairs.scores(z))
+    p_value = upper_tail(float(scores[0]), scores[1:])
+    alone = int(np.argmax(singles[0]))
+    return Best((alone,) if singles[0, alone] >= scores[0] else pairs.best(z[0]), p_value)
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class _Pairs:
+    """Pairs of candidates that are two quantities.
+
+    Parameters
+    ----------
+    first, second : int array, shape (pairs,)
+    product : array, shape (pairs,)
+        Cosine of the angle between the two.
+    """
+
+    first: NDArray[np.intp]
+    second: NDArray[np.intp]
+    product: FloatArray
+
+    @classmethod
+    def of(cls, quantities: FloatArray, columns: Sequence[str]) -> _Pairs:
+        names = np.array(columns)
+        products = quantities.T @ quantities
+        apart = (names[:, None] != names) & (1.0 - np.square(products) >= LEAST_APART)
+        first, second = np.nonzero(np.triu(apart, 1))
+        return cls(first, second, products[first, second])
+
+    def best(self, z: FloatArray) -> tuple[int, int]:
+        """The pair that gains most, of the scores of one draw, shape (k,)."""
+        index = int(np.argmax(self._gained(z)))
+        return int(self.first[index]), int(self.second[index])
+
+    def scores(self, z: FloatArray) -> FloatArray:
+        """Largest gain of a pair, as that of one candidate: chi-square that is as rare with one degree of freedom, less
+        the choice among all pairs; shape (draws,) of `z`, shape (draws, k)."""
+        if not len(self.first):
+            return np.full(len(z), -np.inf)
+        gained = np.array([self._gained(drawn).max() for drawn in z])  # one by one: a table of all would fill gigabytes
+        return np.asarray(as_one_degree(gained, 2) - 2.0 * np.log(len(self.first)))
+
+    def _gained(self, z: FloatArray) -> FloatArray:
+        """Chi-square of two degrees, shape (pairs,)."""
+        one, other = z[self.first], z[self.second]
+        power = np.square(one) + np.square(other) - 2.0 * self.product * one * other
+        return np.asarray(power / (1.0 - np.square(self.product)))
