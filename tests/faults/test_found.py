@@ -20,8 +20,7 @@ from xosc_lateral.datasets import simulate_drive
 from xosc_lateral.driver.stream import OffsetStream
 from xosc_lateral.formats.profiles import profile_bytes
 from xosc_lateral.pipeline.batch import STATE
-from xosc_lateral.pipeline.journal import Journal
-from xosc_lateral.pipeline.lock import folder_lock
+from xosc_lateral.pipeline.journal import Journal, folder_lock
 from xosc_lateral.pipeline.manifest import MANIFEST, read_manifest
 from xosc_lateral.scenario.distribution import Deterministic, ValueSets
 from xosc_lateral.scenario.place import Place

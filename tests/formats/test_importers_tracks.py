@@ -11,7 +11,7 @@ import pytest
 
 from xosc_lateral.cli import main
 from xosc_lateral.errors import FormatError
-from xosc_lateral.formats.importers.lane_graph import LaneGraph
+from xosc_lateral.formats.importers.placed import LaneGraph
 from xosc_lateral.formats.importers.tracks import import_tracks
 
 WIDTH = 3.5

@@ -21,7 +21,7 @@ from xosc_lateral.formats.hashes import file_hash
 from xosc_lateral.pipeline.batch import STATE, BatchStoppedError, JobOutcome, JobState, convert_many
 from xosc_lateral.pipeline.guard import JobLimits
 from xosc_lateral.pipeline.jobs import Job, plan_batch
-from xosc_lateral.pipeline.lock import FolderInUseError, folder_lock
+from xosc_lateral.pipeline.journal import FolderInUseError, folder_lock
 from xosc_lateral.pipeline.manifest import MANIFEST, TIMINGS, ManifestRow, read_manifest
 from xosc_lateral.pipeline.settings import ConvertSettings
 

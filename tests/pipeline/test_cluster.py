@@ -12,7 +12,7 @@ import pytest
 
 from tests.pipeline.fake_converter import convert, convert_and_log
 from tests.pipeline.test_batch import make_inputs, run, states, tree
-from xosc_lateral.pipeline import cluster as dask_cluster
+from xosc_lateral.pipeline import workers as dask_cluster
 from xosc_lateral.pipeline.batch import JobState, convert_many
 from xosc_lateral.pipeline.jobs import plan_batch
 from xosc_lateral.pipeline.tasks import ClusterError

@@ -13,9 +13,8 @@ import pytest
 from xosc_lateral.errors import DriverProfileError, FormatError
 from xosc_lateral.formats.openscenario.write.target import Player
 from xosc_lateral.formats.profiles import SHIPPED
-from xosc_lateral.pipeline.document_kind import DocumentKind, document_kind
 from xosc_lateral.pipeline.jobs import Batch, plan_batch
-from xosc_lateral.pipeline.request import Request
+from xosc_lateral.pipeline.request import DocumentKind, Request, document_kind
 from xosc_lateral.pipeline.settings import ConvertSettings
 
 SCENARIO = "<OpenSCENARIO><FileHeader/><RoadNetwork/><Entities/><Storyboard/></OpenSCENARIO>"

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from tests.playback.stage import Stage, after, event, lane_change, maneuvers, speed, state_of, to_lane, when
-from xosc_lateral.pipeline.shifted import shifted_events
+from xosc_lateral.pipeline.meaning import shifted_events
 
 
 def test_an_event_that_comes_later_or_not_at_all_is_named(tmp_path: Path) -> None:

@@ -13,11 +13,11 @@ from xosc_lateral.formats.output_paths import claim, output_folder
 from xosc_lateral.limits import JOB_MEMORY, JOB_TIMEOUT
 from xosc_lateral.pipeline.batch import JobOutcome, JobState
 from xosc_lateral.pipeline.batch import convert_many as outcomes_of
+from xosc_lateral.pipeline.convert_job import write_batch_index
 from xosc_lateral.pipeline.guard import JobLimits
 from xosc_lateral.pipeline.jobs import Batch, plan_batch
 from xosc_lateral.pipeline.manifest import MANIFEST, ManifestRow, read_manifest
 from xosc_lateral.pipeline.progress import Display, Summary, follow
-from xosc_lateral.pipeline.reports import write_batch_index
 from xosc_lateral.pipeline.request import frame_requests
 from xosc_lateral.pipeline.settings import ConvertOptions, ConvertSettings, spelled_out
 

@@ -17,8 +17,7 @@ from xosc_lateral.errors import FormatError, XoscLateralError
 from xosc_lateral.formats.hashes import file_hash
 from xosc_lateral.pipeline.guard import JobLimitError, JobLimits, within_limits
 from xosc_lateral.pipeline.jobs import Batch, Job
-from xosc_lateral.pipeline.journal import Journal
-from xosc_lateral.pipeline.lock import folder_lock
+from xosc_lateral.pipeline.journal import Journal, folder_lock
 from xosc_lateral.pipeline.manifest import ManifestRow
 from xosc_lateral.pipeline.tasks import WorkerDiedError, run_tasks
 from xosc_lateral.pipeline.workers import open_pool

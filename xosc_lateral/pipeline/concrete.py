@@ -10,8 +10,7 @@ from pathlib import Path
 from xosc_lateral.errors import FormatError, XoscLateralError
 from xosc_lateral.formats.openscenario.distribution import read_distribution
 from xosc_lateral.limits import PARAMETER_SETS
-from xosc_lateral.pipeline.document_kind import DISTRIBUTIONS, DocumentKind
-from xosc_lateral.pipeline.request import Request
+from xosc_lateral.pipeline.request import DISTRIBUTIONS, DocumentKind, Request
 from xosc_lateral.pipeline.settings import ConvertSettings
 from xosc_lateral.scenario.distribution import ParameterSet
 

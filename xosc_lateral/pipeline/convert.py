@@ -27,10 +27,9 @@ from xosc_lateral.formats.source import edit_in_place, guarding_inputs
 from xosc_lateral.motion.nominal import Activity
 from xosc_lateral.pipeline.drivers import choose_drivers
 from xosc_lateral.pipeline.load import Played, input_hashes, play_scenario, play_until
-from xosc_lateral.pipeline.meaning import keep_meaning, meaning_of
+from xosc_lateral.pipeline.meaning import Shift, keep_meaning, meaning_of
 from xosc_lateral.pipeline.modes import WritingPlan, chosen_egos, is_replay, writing_plan
 from xosc_lateral.pipeline.settings import ConvertSettings, OutputMode, relative
-from xosc_lateral.pipeline.shifted import Shift
 from xosc_lateral.scenario import Scenario
 from xosc_lateral.scenario.dependence import Dependence, dependence
 from xosc_lateral.version import BEHAVIOUR, __version__

@@ -9,17 +9,52 @@ from __future__ import annotations
 
 import ctypes
 import os
+import sys
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TypeVar
 
 from xosc_lateral.errors import XoscLateralError
 from xosc_lateral.limits import JOB_MEMORY, JOB_TIMEOUT
-from xosc_lateral.pipeline.memory import address_space, resident
+
+
+@contextmanager
+def address_space(megabytes: float) -> Iterator[None]:
+    """Let this process map so much more memory; without effect where the system has no such limit, or in a thread."""
+    size = _status_bytes(0)
+    if size == 0 or threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    import resource
+
+    soft, hard = resource.getrlimit(resource.RLIMIT_AS)
+    allowed = size + int(1e6 * megabytes)
+    if hard != resource.RLIM_INFINITY:
+        allowed = min(allowed, hard)
+    resource.setrlimit(resource.RLIMIT_AS, (allowed, hard))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_AS, (soft, hard))
+
+
+def resident() -> int:
+    """Memory that this process holds. [byte]; 0 where the system does not say."""
+    return _status_bytes(1)
+
+
+def _status_bytes(column: int) -> int:
+    if not sys.platform.startswith("linux"):
+        return 0
+    return int(Path("/proc/self/statm").read_bytes().split()[column]) * os.sysconf("SC_PAGE_SIZE")
+
 
 Task = TypeVar("Task")
+
 Result = TypeVar("Result")
 
 POLL = 0.2

@@ -17,10 +17,9 @@ from xosc_lateral.formats.profiles import find_profile, profile_hash
 from xosc_lateral.limits import BATCH_JOBS, VARIANTS
 from xosc_lateral.pipeline.concrete import concrete
 from xosc_lateral.pipeline.convert import numbered
-from xosc_lateral.pipeline.document_kind import DocumentKind, document_kind
 from xosc_lateral.pipeline.drivers import auto_profile, hidden_by_libraries, uses_auto
 from xosc_lateral.pipeline.manifest import ManifestRow, printable
-from xosc_lateral.pipeline.request import Request, find_requests
+from xosc_lateral.pipeline.request import DocumentKind, Request, document_kind, find_requests
 from xosc_lateral.pipeline.settings import AUTO, ConvertSettings
 from xosc_lateral.version import BEHAVIOUR, __version__
 

@@ -8,13 +8,19 @@ import os
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from enum import Enum
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import IO, TYPE_CHECKING
+
+from lxml import etree
 
 from xosc_lateral.errors import FormatError
+from xosc_lateral.formats.openscenario.element import local_name
+from xosc_lateral.formats.openscenario.provenance import HEADER_MARK
 from xosc_lateral.formats.output_paths import file_name
+from xosc_lateral.formats.source import open_source
 from xosc_lateral.formats.tables import TABLE_SUFFIXES, as_text, read_text_table
-from xosc_lateral.pipeline.document_kind import DISTRIBUTIONS, document_kind
+from xosc_lateral.limits import XML_TREE
 from xosc_lateral.pipeline.manifest import MANIFEST
 from xosc_lateral.pipeline.options import Option, as_it_is, whole
 from xosc_lateral.pipeline.settings import OPTIONS, ConvertSettings
@@ -22,9 +28,57 @@ from xosc_lateral.pipeline.settings import OPTIONS, ConvertSettings
 if TYPE_CHECKING:
     import pandas as pd
 
+
+class DocumentKind(Enum):
+    """What an OpenSCENARIO file holds."""
+
+    SCENARIO = "scenario"
+    CATALOG = "catalog"
+    DISTRIBUTION = "parameter value distribution"
+    CONVERTED = "converted scenario"
+    VARIANTS = "set of converted variants"
+
+
+DISTRIBUTIONS = frozenset({DocumentKind.DISTRIBUTION, DocumentKind.VARIANTS})
+"""Files that stand for several scenarios."""
+
+_KINDS = {"Catalog": DocumentKind.CATALOG, "ParameterValueDistribution": DocumentKind.DISTRIBUTION}
+
+_SCENARIO_PARTS = frozenset({"CatalogLocations", "RoadNetwork", "Entities", "Storyboard"})
+
+
+def document_kind(path: Path) -> DocumentKind:
+    """What a file holds, from its first elements; what can't be read counts as a scenario (its reader says why)."""
+    try:
+        with open_source(path, XML_TREE) as source:
+            return _kind_from(source.file)
+    except (etree.XMLSyntaxError, FormatError, OSError, ValueError, LookupError):
+        return DocumentKind.SCENARIO
+
+
+def _kind_from(file: IO[bytes]) -> DocumentKind:
+    events = etree.iterparse(
+        file, events=("start",), resolve_entities=False, no_network=True, load_dtd=False, remove_comments=True
+    )
+    is_ours = False
+    for _, element in events:
+        parent = element.getparent()
+        if parent is not None and parent.getparent() is None and isinstance(element.tag, str):
+            name = local_name(element)
+            if name == "FileHeader" and HEADER_MARK in (element.get("description") or ""):
+                is_ours = True
+            elif is_ours:
+                is_set = name == "ParameterValueDistribution"
+                return DocumentKind.VARIANTS if is_set else DocumentKind.CONVERTED
+            if name in _KINDS or name in _SCENARIO_PARTS:
+                return _KINDS.get(name, DocumentKind.SCENARIO)
+    return DocumentKind.CONVERTED if is_ours else DocumentKind.SCENARIO
+
+
 SCENARIO_SUFFIX = ".xosc"
 
 COLUMNS = ("scenario", *(name for name, option in OPTIONS.items() if option.cell is not None), "variants", "name")
+
 PREFIXES = (*(option.prefix for option in OPTIONS.values() if option.prefix), "user:")
 """What a table of scenarios may hold."""
 

@@ -2,13 +2,205 @@
 
 from __future__ import annotations
 
+import ctypes
+import os
+import signal
+import sys
+import threading
+import time
 from collections.abc import Callable
-from concurrent.futures import Future
+from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future
 from types import TracebackType
-from typing import Self
+from typing import Any, Self
 
-from xosc_lateral.pipeline.local_processes import LocalProcesses
-from xosc_lateral.pipeline.tasks import TRIES_ALONE, Pool, Result, Task
+from xosc_lateral.pipeline.guard import let_worker_die
+from xosc_lateral.pipeline.tasks import AHEAD, TRIES_ALONE, ClusterError, Pool, Result, Task
+from xosc_lateral.version import __version__
+
+PARENT_CHECK = 0.5
+"""How often a worker looks whether its run is still there. [s]"""
+
+PR_SET_PDEATHSIG = 1
+"""Of Linux's prctl(2), from <linux/prctl.h>: the signal that this process gets when its parent ends."""
+
+
+class LocalProcesses:
+    """Worker processes of joblib's executor (loky).
+
+    Parameters
+    ----------
+    count : int
+        How many.
+    """
+
+    tries_alone = TRIES_ALONE
+
+    def __init__(self, count: int) -> None:
+        self._count = count
+        self._executor = self._start()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._executor.shutdown(wait=True, kill_workers=error is not None)
+
+    def capacity(self) -> int:
+        """A few per worker."""
+        return AHEAD * self._count
+
+    def submit(self, work: Callable[[Task], Result], task: Task) -> Future[Result]:
+        """Hand out a task."""
+        future: Future[Result] = self._executor.submit(work, task)
+        return future
+
+    def recover(self) -> None:
+        """Start anew."""
+        self._executor.shutdown(wait=True, kill_workers=True)
+        self._executor = self._start()
+
+    def lost(self, error: BaseException) -> bool:
+        """Whether the pool broke."""
+        return isinstance(error, BrokenExecutor)
+
+    def check(self) -> None:
+        """The executor sees by itself when a process is gone."""
+
+    def _start(self) -> Any:
+        from joblib.externals.loky import ProcessPoolExecutor
+
+        # One thread each for numpy's and numba's libraries: as many workers as cores are busy already.
+        threads = dict.fromkeys(
+            ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"), "1"
+        )
+        return ProcessPoolExecutor(
+            max_workers=self._count, env=threads, initializer=_end_with_parent, initargs=(os.getpid(),)
+        )
+
+
+def _end_with_parent(parent: int) -> None:
+    """End this worker with the run that it works for, even if that was killed and could not say so.
+
+    On Linux the kernel sees to it at once: nothing is left that could still write when the next run begins. Elsewhere,
+    and if the run was gone before this was said, a thread looks every `PARENT_CHECK`.
+    """
+    let_worker_die()
+    if sys.platform.startswith("linux"):
+        ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
+
+    def watch() -> None:
+        while os.getppid() == parent:
+            time.sleep(PARENT_CHECK)
+        os._exit(1)
+
+    threading.Thread(target=watch, daemon=True, name="watch parent").start()
+
+
+CONNECT_TIMEOUT = 10.0
+"""A scheduler that has not answered after this is not there. [s]"""
+
+WORKERLESS = 120.0
+"""A cluster without workers for so long is given up; restarting one takes seconds. [s]"""
+
+
+class Cluster:
+    """Workers of a running dask.distributed cluster.
+
+    They have to see the same files under the same paths, and have the same version of this package. The scheduler
+    itself gives a dead worker's tasks to another. Whoever can talk to the scheduler can run code on the workers and
+    here: it has to be trusted.
+
+    Parameters
+    ----------
+    address : str
+        Of the scheduler, as in ``tcp://10.0.0.1:8786``.
+
+    Raises
+    ------
+    ClusterError
+        The extra ``cluster`` is not installed, nobody answers, or a worker has another version of this package.
+    """
+
+    tries_alone = 1
+
+    def __init__(self, address: str) -> None:
+        try:
+            import distributed
+        except ImportError as error:
+            raise ClusterError("dask.distributed is not installed: pip install 'xosc-lateral[cluster]'") from error
+        try:
+            library: Any = distributed
+            self._client: Any = library.Client(address, set_as_default=False, timeout=CONNECT_TIMEOUT)
+        except (OSError, ValueError, TimeoutError) as error:
+            raise ClusterError(f"no dask scheduler answers at {address}: {error}") from error
+        self._address, self._had_workers = address, time.monotonic()
+        self._check_versions()
+        # pure=False: the key of a task must not come from its arguments, a repeated task has to run again
+        self._executor: Executor = self._client.get_executor(pure=False)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._executor.shutdown(wait=error is None)
+        self._client.close()
+
+    def capacity(self) -> int:
+        """A few per thread of the workers that there are now; workers may come and go."""
+        return AHEAD * max(1, sum(map(int, self._client.nthreads().values())))
+
+    def submit(self, work: Callable[[Task], Result], task: Task) -> Future[Result]:
+        """Hand out a task."""
+        self._check()
+        return self._executor.submit(work, task)
+
+    def recover(self) -> None:
+        """The scheduler sees to it, if it is still there."""
+        self._check()
+
+    def lost(self, error: BaseException) -> bool:
+        """Whether the scheduler has given the task up, rather than that it is gone."""
+        from distributed import KilledWorker
+
+        self._check()
+        return isinstance(error, KilledWorker | CancelledError)
+
+    def check(self) -> None:
+        """Whether scheduler and workers are there; a worker that is being restarted has its time."""
+        self._check()
+        if self._client.nthreads():
+            self._had_workers = time.monotonic()
+        elif time.monotonic() - self._had_workers > WORKERLESS:
+            raise ClusterError(f"the dask scheduler at {self._address} has no workers left; run it again with some")
+
+    def _check_versions(self) -> None:
+        """Before the first job: afterwards every one of them would fail."""
+        try:
+            found: dict[str, str] = self._client.run(installed_version)
+        except Exception as error:  # what a worker without this package raises, dask hands on
+            self._client.close()
+            raise ClusterError(f"the workers at {self._address} can't run xosc-lateral: {error}") from error
+        wrong = {worker: version for worker, version in found.items() if version != __version__}
+        if wrong:
+            self._client.close()
+            worker, version = min(wrong.items())
+            raise ClusterError(
+                f"{len(wrong)} of {len(found)} workers at {self._address} have another version of xosc-lateral "
+                f"({worker}: {version}, here: {__version__}); nothing was converted"
+            )
+
+    def _check(self) -> None:
+        if self._client.status != "running":
+            raise ClusterError(f"the dask scheduler at {self._address} is gone; what is finished is kept, run it again")
+
+
+def installed_version() -> str:
+    """Version of this package where the call is run."""
+    return __version__
 
 
 class ThisProcess:
@@ -56,7 +248,7 @@ def open_pool(workers: int, cluster: str | None) -> Pool:
         Fewer than none.
     """
     if cluster is not None:
-        from xosc_lateral.pipeline.cluster import Cluster
+        from xosc_lateral.pipeline.workers import Cluster
 
         return Cluster(cluster)
     if workers == -1:

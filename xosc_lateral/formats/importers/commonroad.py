@@ -19,9 +19,9 @@ from numpy.typing import NDArray
 
 from xosc_lateral.errors import FormatError, NotEnoughDataError
 from xosc_lateral.formats.importers.cuts import DEFAULT_CUTS, CutSettings
-from xosc_lateral.formats.importers.lane_graph import LaneGraph
 from xosc_lateral.formats.importers.lane_shapes import curvature_along, place_in_shapes
 from xosc_lateral.formats.importers.placed import (
+    LaneGraph,
     ground_speed,
     import_each,
     import_placed,

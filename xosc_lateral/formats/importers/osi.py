@@ -17,9 +17,8 @@ from tempfile import TemporaryDirectory
 
 from xosc_lateral.errors import FormatError
 from xosc_lateral.formats.importers.cuts import DEFAULT_CUTS, CutSettings
-from xosc_lateral.formats.importers.lane_graph import LaneGraph
 from xosc_lateral.formats.importers.lane_shapes import place_in_shapes
-from xosc_lateral.formats.importers.placed import PlacedTracks, import_each, import_placed
+from xosc_lateral.formats.importers.placed import LaneGraph, PlacedTracks, import_each, import_placed
 from xosc_lateral.formats.importers.table import Imported, guarded
 from xosc_lateral.formats.importers.tracks import lane_graph, place
 from xosc_lateral.formats.opendrive import read_opendrive

@@ -2,25 +2,30 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import IO, TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.errors import FormatError, NotEnoughDataError
-from xosc_lateral.formats.importers.esmini_log import is_esmini_log, read_esmini_log
 from xosc_lateral.formats.importers.placed import PlacedTracks, ground_speed, travel_heading
 from xosc_lateral.formats.mapping import MappingLike, TableMapping, as_mapping, parse_map
+from xosc_lateral.formats.source import open_source
 from xosc_lateral.formats.states import COLUMNS
-from xosc_lateral.formats.tables import comma_numbers, read_table, seconds_of_text
+from xosc_lateral.formats.tables import comma_numbers, foreign_errors, read_table, seconds_of_text, unpacked_text
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     import pandas as pd
 
+
 FloatArray = NDArray[np.float64]
+
 IntArray = NDArray[np.int64]
 
 HEADERS: Mapping[str, tuple[str, ...]] = {
@@ -195,3 +200,71 @@ def _refuse_words(numbers: pd.Series, column: pd.Series, path: Path) -> None:
         raise FormatError(
             f"{column.iloc[row]!r} is not a number", path=path, line=row + 2, element=f"column {column.name!r}"
         )
+
+
+FIRST = b"esmini "
+"""Begins the lines before the table, which name the player's version."""
+
+HEAD = "Index [-]"
+
+MOST_LINES = 50
+"""Before the table's head; a player writes seven."""
+
+_LOGGED = {
+    "vehicle": "Entity_Name",
+    "x": "World_Position_X",
+    "y": "World_Position_Y",
+    "heading": "World_Heading_Angle",
+    "speed": "Current_Speed",
+    "length": "bb_length",
+    "width": "bb_width",
+    "rear": "bb_x",
+}
+"""Column of a table of tracks -> the log's. Positions are those of the rear axle, `bb_x` behind the box's middle."""
+
+_NAME = re.compile(r"\s*#(\d+)\s+(\w+)")
+
+
+def is_esmini_log(path: Path) -> bool:
+    """Whether a file begins like one."""
+    with open_source(path) as source:
+        return unpacked_text(source).read(len(FIRST)) == FIRST
+
+
+def read_esmini_log(path: Path) -> pd.DataFrame:
+    """Rows of all vehicles, one below the other: the columns of `_LOGGED`, and `time`.
+
+    Raises
+    ------
+    FormatError
+        A column is missing, or the table is damaged.
+    """
+    import pandas as pd
+
+    with open_source(path) as source, foreign_errors(path, "can't be read as a log of esmini"):
+        text = unpacked_text(source)
+        names = _head(text, path)
+        table = pd.read_csv(text, header=None, names=range(len(names)), skipinitialspace=True, index_col=False)
+    places: dict[str, dict[str, int]] = {}
+    for column, name in enumerate(names):
+        if found := _NAME.match(name):
+            places.setdefault(found[1], {})[found[2]] = column
+    frames = []
+    for number, mine in places.items():
+        if missing := sorted(set(_LOGGED.values()) - mine.keys()):
+            raise FormatError(f"vehicle #{number}: no column {missing[0]}", path=path)
+        frame = pd.DataFrame({name: table[mine[theirs]] for name, theirs in _LOGGED.items()})
+        frames.append(frame.assign(time=table[1]).dropna(subset=["vehicle"]))  # one that has not come yet is empty
+    if not frames:
+        raise FormatError("no vehicle in the table's head", path=path)
+    rows = pd.concat(frames, ignore_index=True)
+    rows["vehicle"] = rows["vehicle"].astype(str).str.strip()
+    return rows
+
+
+def _head(text: IO[bytes], path: Path) -> list[str]:
+    for _ in range(MOST_LINES):
+        line = text.readline().decode("utf-8", "replace")
+        if line.startswith(HEAD):
+            return line.rstrip().rstrip(",").split(",")
+    raise FormatError(f"a log of esmini without a line that begins with '{HEAD}'", path=path)

@@ -14,8 +14,7 @@ from numpy.typing import NDArray
 
 from xosc_lateral.errors import FormatError
 from xosc_lateral.formats.importers.cuts import DEFAULT_CUTS, CutSettings
-from xosc_lateral.formats.importers.lane_graph import LaneGraph
-from xosc_lateral.formats.importers.placed import PlacedTracks, import_placed
+from xosc_lateral.formats.importers.placed import LaneGraph, PlacedTracks, import_placed
 from xosc_lateral.formats.importers.table import Imported, guarded
 from xosc_lateral.formats.importers.track_table import Tracks, read_tracks
 from xosc_lateral.formats.mapping import MappingLike

@@ -24,19 +24,21 @@ from msgspec.structs import replace
 from xosc_lateral.formats.openscenario.element import local_name
 from xosc_lateral.formats.openscenario.provenance import mark, write_sealed
 from xosc_lateral.formats.openscenario.write import build
-from xosc_lateral.formats.openscenario.write.checks import check_convertible
 from xosc_lateral.formats.openscenario.write.fit import fit
 from xosc_lateral.formats.openscenario.write.lateral_actions import LATERAL, LateralAction, awaited, lateral_actions
 from xosc_lateral.formats.openscenario.write.literal import inline_maneuvers, name_literally
 from xosc_lateral.formats.openscenario.write.moving import Moving
 from xosc_lateral.formats.openscenario.write.offset_chain import LEAST_CHANGE, SLACK, OffsetChain, leading, ramps
-from xosc_lateral.formats.openscenario.write.parameters import global_scope, override_parameters
 from xosc_lateral.formats.openscenario.write.ramp_targets import Ramp, acceleration
-from xosc_lateral.formats.openscenario.write.relative_paths import rewrite_paths
 from xosc_lateral.formats.openscenario.write.replaced_maneuvers import ReplacedManeuvers, put_last
-from xosc_lateral.formats.openscenario.write.result import WrittenScenario
+from xosc_lateral.formats.openscenario.write.result import (
+    WrittenScenario,
+    check_convertible,
+    global_scope,
+    override_parameters,
+)
 from xosc_lateral.formats.openscenario.write.target import STANDARD, TargetPlayer
-from xosc_lateral.formats.openscenario.write.vertices import Vertices
+from xosc_lateral.formats.openscenario.write.vertices import Vertices, rewrite_paths
 from xosc_lateral.formats.xml import parse_xml
 from xosc_lateral.motion.nominal import NominalMotion, PlayedAction
 from xosc_lateral.motion.segments import MINIMUM_SPEED

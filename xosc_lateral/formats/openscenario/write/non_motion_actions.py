@@ -11,7 +11,7 @@ from lxml import etree
 from xosc_lateral.errors import FormatError
 from xosc_lateral.formats.openscenario.element import at_node, local_name
 from xosc_lateral.formats.openscenario.write import build
-from xosc_lateral.formats.openscenario.write.parameters import final
+from xosc_lateral.formats.openscenario.write.result import final
 from xosc_lateral.formats.xml import read_document
 from xosc_lateral.motion.nominal import PlayedAction
 from xosc_lateral.scenario import Action, Scenario

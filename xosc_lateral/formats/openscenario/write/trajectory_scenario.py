@@ -15,7 +15,6 @@ from xosc_lateral.formats.openscenario.element import local_name
 from xosc_lateral.formats.openscenario.provenance import mark, write_sealed
 from xosc_lateral.formats.openscenario.write import build
 from xosc_lateral.formats.openscenario.write.carla import add_drives, start_of
-from xosc_lateral.formats.openscenario.write.checks import check_convertible
 from xosc_lateral.formats.openscenario.write.entities import remove_controllers, rewrite_init
 from xosc_lateral.formats.openscenario.write.fit import fit
 from xosc_lateral.formats.openscenario.write.moving import Moving, add_trajectories
@@ -26,11 +25,14 @@ from xosc_lateral.formats.openscenario.write.non_motion_actions import (
     is_placing,
     is_replaced,
 )
-from xosc_lateral.formats.openscenario.write.parameters import global_scope, override_parameters
-from xosc_lateral.formats.openscenario.write.relative_paths import rewrite_paths
-from xosc_lateral.formats.openscenario.write.result import WrittenScenario
+from xosc_lateral.formats.openscenario.write.result import (
+    WrittenScenario,
+    check_convertible,
+    global_scope,
+    override_parameters,
+)
 from xosc_lateral.formats.openscenario.write.target import STANDARD, Player, TargetPlayer
-from xosc_lateral.formats.openscenario.write.vertices import Vertices
+from xosc_lateral.formats.openscenario.write.vertices import Vertices, rewrite_paths
 from xosc_lateral.formats.xml import parse_xml
 from xosc_lateral.motion.nominal import NominalMotion, PlayedAction
 from xosc_lateral.motion.trajectory import WorldTrajectory
