@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from xosc_lateral.templates.motorway import Bend, Motorway, Straight
-from xosc_lateral.templates.settings import Settings
+from xosc_lateral.templates.parameter import Settings
 from xosc_lateral.templates.storyboard import Actor, PlannedEvent, Plot, Vehicle, at_time, lane_change
 from xosc_lateral.templates.template import Template
 

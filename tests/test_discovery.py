@@ -10,11 +10,11 @@ from types import ModuleType
 
 import pytest
 
-import xosc_lateral.discovery as discovery
-from xosc_lateral.discovery import defined_in
+import xosc_lateral.plugins as discovery
 from xosc_lateral.driver import effects
 from xosc_lateral.driver.effects import ColumnEffect, Effect, HiddenEffect
 from xosc_lateral.identification.selection import TERMS, shared_among
+from xosc_lateral.plugins import defined_in
 
 NAME = "made_for_discovery"
 

@@ -10,7 +10,7 @@ from xosc_lateral.version import __version__
 
 if TYPE_CHECKING:
     from benchmarks.board.result import Board, ModelScore, Row
-    from xosc_lateral.evaluation.variance import VarianceParts
+    from xosc_lateral.evaluation.realism import VarianceParts
 from benchmarks.board.text import method_text
 
 

@@ -14,8 +14,8 @@ from xosc_lateral.driver.sampled_offsets import segment_of
 from xosc_lateral.drives.resampling import STEP
 from xosc_lateral.evaluation.measures import Features, features_of
 from xosc_lateral.evaluation.parts import SnippetCondition
+from xosc_lateral.evaluation.realism import VarianceParts, variance_parts
 from xosc_lateral.evaluation.snippets import Snippets
-from xosc_lateral.evaluation.variance import VarianceParts, variance_parts
 
 FloatArray = NDArray[np.float64]
 

@@ -16,8 +16,8 @@ from benchmarks.board.sampled_half import SampledHalf
 from xosc_lateral.drives.drive import Run
 from xosc_lateral.drives.resampling import STEP
 from xosc_lateral.evaluation.measures import LAGS, autocorrelation_of, resolved_bands
+from xosc_lateral.evaluation.realism import variance_parts
 from xosc_lateral.evaluation.snippets import BLOCK, FEW_DRIVES
-from xosc_lateral.evaluation.variance import variance_parts
 
 FloatArray = NDArray[np.float64]
 Parts = Sequence[tuple[Half, Mapping[str, SampledHalf]]]

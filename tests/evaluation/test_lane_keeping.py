@@ -10,7 +10,7 @@ from xosc_lateral.evaluation.lane_keeping import (
     lane_keeping_indicators,
     time_to_line_crossing,
 )
-from xosc_lateral.evaluation.variance import variance_parts
+from xosc_lateral.evaluation.realism import variance_parts
 
 STEP = 0.2
 

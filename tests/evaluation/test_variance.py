@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.stats import f_oneway
 
-from xosc_lateral.evaluation.variance import variance_parts
+from xosc_lateral.evaluation.realism import variance_parts
 
 
 def windows(

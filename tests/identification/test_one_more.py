@@ -12,7 +12,6 @@ import pytest
 
 from tests.driver.test_stream import make_profile
 from tests.identification.made_coarse import coarse_of, movement
-from xosc_lateral.discovery import defined_in
 from xosc_lateral.driver import effects
 from xosc_lateral.driver.effects import Effect, known_effects
 from xosc_lateral.driver.profile import DriverProfile, file_type
@@ -25,6 +24,7 @@ from xosc_lateral.identification.search import Search
 from xosc_lateral.identification.selection import STAGES, TERMS, in_stages, shared_among
 from xosc_lateral.identification.significance import BUDGET, MANY_DRIVES
 from xosc_lateral.identification.terms.base import Stage, Term
+from xosc_lateral.plugins import defined_in
 from xosc_lateral.segment import Segment
 
 EFFECT = '''

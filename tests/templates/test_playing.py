@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from xosc_lateral.api.play import scenario_segments
 from xosc_lateral.enrich.enrich import enrich
 from xosc_lateral.errors import XoscLateralError
 from xosc_lateral.motion.nominal import Activity
 from xosc_lateral.pipeline.load import Played, play_scenario
-from xosc_lateral.pipeline.segments import scenario_segments
 from xosc_lateral.templates import TEMPLATES, find_template
 
 

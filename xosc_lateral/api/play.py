@@ -11,16 +11,17 @@ from msgspec import structs
 from xosc_lateral.api.result import PathLike, Paths, Result, as_paths, road_search
 from xosc_lateral.formats.hashes import parsed_hashes
 from xosc_lateral.formats.output_paths import claim, output_file
-from xosc_lateral.motion.segments import SegmentRow
+from xosc_lateral.motion.segments import SegmentRow, cut_segments
 from xosc_lateral.pipeline.load import Played, play_scenario
-from xosc_lateral.pipeline.segments import scenario_segments
 from xosc_lateral.pipeline.settings import STEP
 
 if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import Figure
 
+
 PAGE_SUFFIXES = (".html", ".htm")
+
 RECORDING_SUFFIX = ".mcap"
 
 
@@ -264,3 +265,23 @@ class Segments(Result):
 
         rows = [structs.asdict(row) for row in self._rows]
         return {"segments": [row | {"start": round(row["start"], 6), "end": round(row["end"], 6)} for row in rows]}
+
+
+def scenario_segments(played: Played) -> tuple[SegmentRow, ...]:
+    """All segments of all entities, in the scenario's order and in order of time."""
+    rows = []
+    for motion in played.motion.entities:
+        for span in cut_segments(motion, played.network, is_trailer=motion.name in played.trailers):
+            index = int(motion.road[span.first])
+            rows.append(
+                SegmentRow(
+                    entity=motion.name,
+                    start=span.start,
+                    end=span.end,
+                    road_following=span.is_road_following,
+                    why="" if span.is_road_following else span.kind.value,
+                    road=played.network.road_ids[index] if index >= 0 else "",
+                    lane=int(motion.lane[span.first]) if index >= 0 else 0,
+                )
+            )
+    return tuple(rows)

@@ -1,7 +1,10 @@
-"""`xosc-lateral close-loop`: what a profile fails to reproduce, traced, added and scored."""
+"""`xosc-lateral close-loop`: find and add what a profile lacks; how far it is."""
 
 from __future__ import annotations
 
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated
 
@@ -21,6 +24,27 @@ from xosc_lateral.cli.words import (
     pairs,
     say,
 )
+
+
+@contextmanager
+def shown_progress(title: str) -> Iterator[Callable[[float, str], None]]:
+    """Give a function that takes the share done (0..1) and what is being done; silent when stderr is no terminal."""
+    if not sys.stderr.isatty():
+        yield lambda share, what: None
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+    columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.fields[what]}"), TimeElapsedColumn())
+    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task(title, total=1.0, what="")
+        yield lambda share, what: bar.update(task, completed=share, what=what)
+
+
+@contextmanager
+def no_progress() -> Iterator[Callable[[float, str], None]]:
+    """The same for who does not want to see any."""
+    yield lambda share, what: None
 
 
 def register(app: typer.Typer) -> None:
@@ -62,8 +86,8 @@ def close_loop(
     from xosc_lateral import close_loop, write_profile
     from xosc_lateral.api.loop import ClosedLoop
     from xosc_lateral.api.profiles import PROFILE_SUFFIXES
+    from xosc_lateral.cli.close_loop import no_progress, shown_progress
     from xosc_lateral.formats.output_paths import claim, output_file, output_folder
-    from xosc_lateral.report.progress import no_progress, shown_progress
 
     written = output_file(output, "refined.json", PROFILE_SUFFIXES)
     claim([written, *ClosedLoop.report_files(output_folder(report))], tables, force=force)

@@ -9,9 +9,8 @@ from typing import Any
 from xosc_lateral.digits import all_significant
 from xosc_lateral.evaluation.filters import HIGHEST
 from xosc_lateral.evaluation.lane_keeping import UNITS, Margins
-from xosc_lateral.evaluation.realism import Beside, ConditionScores
+from xosc_lateral.evaluation.realism import Beside, ConditionScores, VarianceParts
 from xosc_lateral.evaluation.scores import LAGS, ProfileScores, SnippetScores
-from xosc_lateral.evaluation.variance import VarianceParts
 
 
 def scores_to_dict(scores: ProfileScores) -> dict[str, Any]:

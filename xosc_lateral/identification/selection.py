@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from xosc_lateral.discovery import defined_in
 from xosc_lateral.identification import terms
 from xosc_lateral.identification.refinement import Alternatives
 from xosc_lateral.identification.regression import Fitted, fit_model
@@ -13,6 +12,7 @@ from xosc_lateral.identification.search import Search
 from xosc_lateral.identification.significance import Budget
 from xosc_lateral.identification.terms.base import Outcome, Stage, Term
 from xosc_lateral.normal import NORMAL_95
+from xosc_lateral.plugins import defined_in
 
 TERMS: tuple[type[Term], ...] = defined_in(terms.__name__, Term)  # type: ignore[type-abstract]
 """Every term that a file of `terms` defines, by the file's name."""

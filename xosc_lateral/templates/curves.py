@@ -5,8 +5,7 @@ from __future__ import annotations
 import math
 
 from xosc_lateral.templates.motorway import Bend, Motorway, Straight
-from xosc_lateral.templates.parameter import Number
-from xosc_lateral.templates.settings import Settings
+from xosc_lateral.templates.parameter import Number, Settings
 from xosc_lateral.templates.storyboard import Actor, Plot, Vehicle
 from xosc_lateral.templates.surroundings import is_left_hand
 from xosc_lateral.templates.template import Template

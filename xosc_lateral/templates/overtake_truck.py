@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from xosc_lateral.templates.motorway import Bend, Motorway, Straight
-from xosc_lateral.templates.parameter import Number
-from xosc_lateral.templates.settings import Settings
+from xosc_lateral.templates.parameter import Number, Settings
 from xosc_lateral.templates.storyboard import Actor, PlannedEvent, Plot, Vehicle, headway, lane_change
 from xosc_lateral.templates.surroundings import is_left_hand
 from xosc_lateral.templates.template import Template

@@ -11,8 +11,7 @@ from enum import Enum
 from typing import Any
 
 from xosc_lateral.templates.motorway import FIXED_DATE, ROAD, Motorway, document
-from xosc_lateral.templates.parameter import Number, Parameter
-from xosc_lateral.templates.settings import Settings
+from xosc_lateral.templates.parameter import Number, Parameter, Settings
 from xosc_lateral.templates.surroundings import environment_action
 
 Value = float | str

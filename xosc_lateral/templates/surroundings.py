@@ -5,8 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from xosc_lateral.templates.parameter import Choice, Number, Parameter
-from xosc_lateral.templates.settings import Settings
+from xosc_lateral.templates.parameter import Choice, Number, Parameter, Settings
 
 COMMON: tuple[Parameter, ...] = (
     Choice("traffic", "right", ("right", "left"), "Side of the road that traffic keeps to."),

@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
-from xosc_lateral.templates.parameter import Parameter
-from xosc_lateral.templates.settings import Settings
+from xosc_lateral.templates.parameter import Parameter, Settings
 from xosc_lateral.templates.storyboard import Plot
 from xosc_lateral.templates.surroundings import COMMON
 

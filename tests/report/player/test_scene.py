@@ -13,7 +13,7 @@ from tests.motion.made_motion import drive, entity, together, two_roads
 from tests.report.made_enriched import made_enriched
 from xosc_lateral.motion.nominal import Activity
 from xosc_lateral.motion.trajectory import WorldTrajectory
-from xosc_lateral.report.player.packing import pack, unpack
+from xosc_lateral.report.player.roads import pack, unpack
 from xosc_lateral.report.player.scene import enriched_scene, nominal_scene, track_of
 from xosc_lateral.report.scenario import scenario_page
 from xosc_lateral.road.geometry import simplify

@@ -7,7 +7,6 @@ from functools import cache, reduce
 from operator import or_
 from typing import Any
 
-from xosc_lateral.discovery import defined_in
 from xosc_lateral.driver.effects.base import Acts, Effect, EffectTerms
 from xosc_lateral.driver.effects.column import ColumnEffect
 from xosc_lateral.driver.effects.hidden import Adapted, HiddenEffect, Population, Step, TimeSmooth, VarianceTrend
@@ -26,7 +25,7 @@ from xosc_lateral.driver.effects.shapes import (
 )
 from xosc_lateral.driver.records import read_as
 from xosc_lateral.errors import DriverProfileError
-from xosc_lateral.plugins import entry_points
+from xosc_lateral.plugins import defined_in, entry_points
 
 EFFECTS: tuple[type[Effect], ...] = defined_in(__name__, Effect)  # type: ignore[type-abstract]
 """The effects of this package; a profile file names them by their `kind`."""

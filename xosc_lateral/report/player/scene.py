@@ -15,8 +15,7 @@ from xosc_lateral.mask import true_slices
 from xosc_lateral.motion.nominal import Activity, EntityMotion, NominalMotion
 from xosc_lateral.motion.trajectory import WorldTrajectory
 from xosc_lateral.report.path_dynamics import lateral_dynamics
-from xosc_lateral.report.player.packing import CENTIMETRE_PER_SECOND, MILLIMETRE, MILLIRADIAN_TENTH, pack
-from xosc_lateral.report.player.roads import road_shapes
+from xosc_lateral.report.player.roads import CENTIMETRE_PER_SECOND, MILLIMETRE, MILLIRADIAN_TENTH, pack, road_shapes
 from xosc_lateral.road import RoadNetwork
 from xosc_lateral.road.geometry import simplify
 
