@@ -10,6 +10,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
 
+import numpy as np
+
 from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.drives.drive import Drive
 from xosc_lateral.errors import NotEnoughDataError
@@ -128,11 +130,15 @@ def given_drives(drives: DrivesLike, columns: MappingLike | None = None) -> Give
 
 
 def frame_hash(frame: pd.DataFrame) -> str:
-    """SHA-256 over the names and values of a frame's columns, in hexadecimal."""
+    """SHA-256 over the names, kinds and values of a frame's columns, in hexadecimal."""
     digest = hashlib.sha256()
     for name in frame.columns:
-        digest.update(f"\0{name}\0".encode())
-        digest.update(frame[name].to_csv(index=False, header=False).encode())
+        values = frame[name]
+        digest.update(f"\0{name}\0{values.dtype}\0".encode())
+        if isinstance(values.dtype, np.dtype) and values.dtype.kind in "biuf":
+            digest.update(values.to_numpy().astype(values.dtype.newbyteorder("<")).tobytes())
+        else:  # texts, times, categories
+            digest.update(values.to_csv(index=False, header=False).encode())
     return digest.hexdigest()
 
 
