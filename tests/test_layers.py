@@ -13,7 +13,6 @@ LAYERS = {
     "errors": 0,
     "version": 0,
     "plugins": 0,
-    "discovery": 0,
     "shipped": 0,
     "segment": 0,
     "limits": 0,

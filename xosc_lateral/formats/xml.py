@@ -18,7 +18,7 @@ from xosc_lateral.limits import XML_TREE
 MAX_CACHED_BYTES = 1_000_000
 """Larger files are read anew each time: catalogs are small, and 16 trees are kept."""
 
-_LATE_DECLARATION = re.compile(rb"(?:\xef\xbb\xbf)?(?:\s|<!--(?:(?!-->).)*+-->)++(<\?xml\s[^<>\r\n]*\?>)", re.DOTALL)
+_BLANKS, _DECLARATION = re.compile(rb"\s*"), re.compile(rb"<\?xml\s[^<>\r\n]*\?>")
 
 _DSL = re.compile(
     rb"\A(?:\xef\xbb\xbf)?(?:\s*#[^\n]*\n|\s*\n)*\s*(?:import|scenario|struct|actor|action|enum|type)\s+[\w.\"]"
@@ -74,11 +74,18 @@ def _declared_late(data: bytes) -> bytes:
 
     Not allowed, yet in the field; places in the file stay the same.
     """
-    found = _LATE_DECLARATION.match(data)
-    if found is None:
+    begin = at = 3 if data.startswith(b"\xef\xbb\xbf") else 0
+    while True:
+        at = _BLANKS.match(data, at).end()  # type: ignore[union-attr]  # matches nothing, too
+        if not data.startswith(b"<!--", at):
+            break
+        at = data.find(b"-->", at + 4) + 3
+        if at < 3:
+            return data
+    found = _DECLARATION.match(data, at)
+    if found is None or at == begin:
         return data
-    start, end = found.span(1)
-    return data[:start] + b" " * (end - start) + data[end:]
+    return data[:at] + b" " * (found.end() - at) + data[found.end() :]
 
 
 def read_xml(path: Path) -> tuple[etree._Element, bytes]:
