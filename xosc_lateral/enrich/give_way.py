@@ -9,6 +9,10 @@ space lengthwise. Of what profiles leave, all is the overtaking one's: the other
 itself. All displacements follow from the paths as first sampled, so nobody's depends on the order of entities, and a
 vehicle far away changes nobody's.
 
+A driver of right-hand traffic does to the left, in left-hand traffic, what he does to the right at home: the overtaking
+lane, the hard shoulder and the seat have changed sides. So his context is mirrored, the profile sampled in it, and its
+offsets are mirrored back.
+
 Our own rule: quantile mapping to gaps that were measured in DLR Highway Traffic v1.1.0 (benchmarks/give_way.py).
 """
 

@@ -1,5 +1,10 @@
 """What is compared in a set of windows, computed once and then for any choice of rows.
 
+A sampled window that starts where its real one starts knows something that a random real window does not: comparing
+both with the real windows would let every model with a good start look better than real driving. So such windows stand
+beside real windows of *other* drivers whose start is the same, and windows that know no start beside any windows of
+other drivers.
+
 References
 ----------
 .. [1] A. Ramdas, N. García Trillos, M. Cuturi, "On Wasserstein two-sample testing and related families of

@@ -19,9 +19,10 @@ from numpy.typing import NDArray
 from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.enrich.result import Neighbours
 from xosc_lateral.errors import SimulationError
+from xosc_lateral.live.scene import KINDS
 from xosc_lateral.live.surroundings import Places
 from xosc_lateral.live.traffic import Moment, Moves, Traffic
-from xosc_lateral.motion.context import REACH, Reach
+from xosc_lateral.motion.context import REACH, TRUCKS, Reach
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -38,9 +39,6 @@ _STILL = 0.05
 _REASONS, _SIDES, _BLOCKED = 8 | 16 | 32 | 64, 2 | 4, 512 | 1024 | 2048 | 4096
 """Bits of a lane change state (`LaneChangeAction`): strategic, cooperative, for speed, keeping right; left or right;
 blocked by a leader or follower there."""
-
-TRUCKS = frozenset({"truck", "trailer", "bus", "coach"})
-"""Vehicle classes that a profile knows as trucks."""
 
 OTHERS = frozenset(
     {"bicycle", "moped", "motorcycle", "scooter", "pedestrian", "wheelchair", "tram", "rail", "rail_urban", "rail_fast",
@@ -282,7 +280,7 @@ class SumoTraffic:
             names, speed, np.array([self.roads.width[place] for place in where]), offset, following,
             np.array([kind[0] not in OTHERS and name not in self._ego for name, kind in zip(names, kinds, strict=True)],
                      dtype=np.bool_),
-            np.array([kind[0] in TRUCKS for kind in kinds], dtype=np.bool_),
+            np.array([KINDS.get(kind[0]) in TRUCKS for kind in kinds], dtype=np.bool_),
             places=Places(x, y, heading, road, lane, s, length, width, -0.5 * length),
         )  # fmt: skip
 

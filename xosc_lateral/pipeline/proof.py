@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 
 import numpy as np
@@ -21,6 +21,9 @@ from xosc_lateral.pipeline.load import Played, play_scenario
 from xosc_lateral.templates import find_template
 
 FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+Converted = Callable[[str, int, int], FloatArray]
+"""Template, number of the vehicle, seed -> deviation."""
 
 SCENARIOS = ("overtake-truck", "cut-in", "curves")
 """Shipped templates, of which the one in which an effect moves somebody most is taken."""
@@ -70,19 +73,19 @@ def proofs_of(profile: DriverProfile, effects: Iterable[Effect] | None = None) -
     """Of those effects of a profile (all by default) that move the mean and act in one of the `SCENARIOS`."""
     chosen = profile.effects if effects is None else tuple(effects)
     moving = [one for one in chosen if isinstance(one, ColumnEffect) and one.acts is Acts.LOCATION]
-    return [found for effect in moving if (found := _proof(profile, effect)) is not None]
+    converted: Converted = cache(partial(_deviation, profile))  # the same for every effect
+    return [found for effect in moving if (found := _proof(profile, effect, converted)) is not None]
 
 
-def _proof(profile: DriverProfile, effect: ColumnEffect) -> Proof | None:
+def _proof(profile: DriverProfile, effect: ColumnEffect, converted: Converted) -> Proof | None:
     without = replace(profile, effects=tuple(one for one in profile.effects if one != effect))
-    stretches = [(name, *one) for name in SCENARIOS for one in _stretches(_played(name), effect)]
+    stretches = [(name, *one) for name in SCENARIOS for one in _stretches(name, effect)]
     if not stretches:
         return None
     name, vehicle, rows, _ = max(stretches, key=lambda one: one[-1])
-    played = _played(name)
-    paths = [[_deviation(one, played, vehicle, seed)[rows] for one in (without, profile)] for seed in SEEDS]
-    shifts = np.array([(after - before).mean() for before, after in paths])
-    driven = played.motion.entities[vehicle]
+    paths = [(_deviation(without, name, vehicle, seed), converted(name, vehicle, seed)) for seed in SEEDS]
+    shifts = np.array([(after[rows] - before[rows]).mean() for before, after in paths])
+    driven = _played(name).motion.entities[vehicle]
     return Proof(
         effect.columns,
         name,
@@ -103,12 +106,19 @@ def _played(name: str) -> Played:
         return play_scenario(next(Path(folder).glob("*.xosc")))
 
 
-def _stretches(played: Played, effect: ColumnEffect) -> Iterator[tuple[int, NDArray[np.int64], float]]:
-    """Vehicles that an effect moves: number, rows on which it does by half of its most or more, and how far. [m]"""
+@cache
+def _contexts(name: str) -> tuple[tuple[IntArray, Mapping[str, FloatArray]], ...]:
+    """Of each of its vehicles: rows `SAMPLE_STEP` apart, and what the driver knows there."""
+    played = _played(name)
     every = round(SAMPLE_STEP / played.motion.step)
-    for number, entity in enumerate(played.motion.entities):
-        grid = np.arange(0, len(entity.time), every)
-        strength = effect.strength(SAMPLE_STEP, entity_context(played.motion, played.network, number, grid))
+    grids = [np.arange(0, len(entity.time), every) for entity in played.motion.entities]
+    return tuple((grid, entity_context(played.motion, played.network, k, grid)) for k, grid in enumerate(grids))
+
+
+def _stretches(name: str, effect: ColumnEffect) -> Iterator[tuple[int, IntArray, float]]:
+    """Vehicles that an effect moves: number, rows on which it does by half of its most or more, and how far. [m]"""
+    for number, (grid, context) in enumerate(_contexts(name)):
+        strength = effect.strength(SAMPLE_STEP, context)
         if strength is None or not np.isfinite(strength).any():
             continue
         most = float(np.nanmax(np.abs(strength)))
@@ -116,8 +126,9 @@ def _stretches(played: Played, effect: ColumnEffect) -> Iterator[tuple[int, NDAr
             yield number, grid[np.abs(strength) >= 0.5 * most], most
 
 
-def _deviation(profile: DriverProfile, played: Played, vehicle: int, seed: int) -> FloatArray:
+def _deviation(profile: DriverProfile, name: str, vehicle: int, seed: int) -> FloatArray:
     """How far from the nominal path one vehicle drives in a conversion, shape (rows,). [m]"""
+    played = _played(name)
     drivers = {played.motion.entities[vehicle].name: profile}
     found = enrich(played.motion, played.network, drivers, seed=seed, neighbours=Neighbours.PROFILE)
     return found.entities[vehicle].deviation

@@ -64,7 +64,7 @@ class Unwatched:
         first, values, rows = self._ahead.pop(state)
         if done := self.frames - first:
             rows.follow(values[:done])
-            state.s, state._pose = float(values[done - 1]), None
+            state.move_to(state.road, state.lane, float(values[done - 1]), state.offset_t)
         state.last_place = state.road, state.s, state.offset_t
         state.begin_frame()
         state.previous = state.plane if derives_motion else None

@@ -5,7 +5,8 @@ a stretch turns by is the same, its length is (1 - k t) of the reference line's.
 
 References
 ----------
-.. [1] ASAM OpenDRIVE 1.8, 2023: road reference line, lane sections, elevation and superelevation.
+.. [1] ASAM OpenDRIVE 1.8, 2023: road reference line, lane sections, elevation and superelevation (section 10.5),
+       height of lanes (section 11.6).
 """
 
 from __future__ import annotations

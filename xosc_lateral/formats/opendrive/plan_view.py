@@ -1,4 +1,10 @@
-"""``planView``: the elements of a reference line."""
+"""``planView``: the elements of a reference line; of parametric cubics, from metres along the road to the parameter.
+
+References
+----------
+.. [1] ASAM OpenDRIVE 1.8, chapter 9, "Parametric cubic curve": p runs with the arc length, or from 0 to 1.
+.. [2] M. Abramowitz, I. A. Stegun, "Handbook of Mathematical Functions", 1964, table 25.4: Gauss-Legendre nodes.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,14 @@
-"""Files that a scenario names: which may be read, and catalogs, an entry by name in the scope of its own parameters."""
+"""Files that a scenario names: which may be read, and catalogs, an entry by name in the scope of its own parameters.
+
+A scenario comes from somewhere else; what it names is read by us. So a reference (road, catalog, scenario of a
+distribution) has to stay inside the folders that the user gave: the scenario's own folder, those up to three levels
+above it (field layouts are ``xosc/``, ``xodr/`` and ``xosc/Catalogs`` side by side, sometimes deeper), and folders
+allowed explicitly. The file system's root is never among them, and its direct children only for a scenario one level
+below. Symbolic links are followed before the check. Absolute paths are fine inside these folders, and refused outside.
+
+A scenario that we wrote into another folder names its road and catalogs where they are; reading it there takes the
+explicit permission as well. What it states about its inputs could be forged: it opens nothing.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,8 @@
-"""LateralDistanceAction: a distance beside another entity, on the road or along that entity's axes."""
+"""LateralDistanceAction: a distance beside another entity, on the road or along that entity's axes.
+
+On the road, derived here: x" = k (target - x) - 2 sqrt(k) x' has the double root -sqrt(k), which is the fastest return
+without overshoot.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,14 @@
-"""SpeedProfileAction: speeds at times, within limits of acceleration and jerk."""
+"""SpeedProfileAction: speeds at times, within limits of acceleration and jerk.
+
+With a limited jerk, the straight lines of a profile have rounded corners: a line of constant acceleration runs through
+each two targets; between two lines, a piece of constant jerk leads from one acceleration to the other, touching both. A
+single target is reached with zero acceleration: one piece of jerk at either end, and a line between them where there is
+time for it.
+
+References
+----------
+.. [1] L. Biagiotti, C. Melchiorri, "Trajectory Planning for Automatic Machines and Robots", 2008, section 3.4.
+"""
 
 from __future__ import annotations
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from xosc_lateral.playback.conditions.base import ValueCheck, ValueChecks
 from xosc_lateral.playback.simulation import Simulation
-from xosc_lateral.playback.values import holds
+from xosc_lateral.playback.values import Values, holds
 from xosc_lateral.scenario.conditions import (
     ParameterCondition,
     SimulationTimeCondition,
@@ -39,28 +39,22 @@ def prepare_time_of_day(content: TimeOfDayCondition, simulation: Simulation) -> 
 
 def prepare_parameter(content: ParameterCondition, simulation: Simulation) -> ValueCheck:
     """Compare in the parameter's own type; false for a parameter that is not declared globally."""
-
-    def check() -> bool:
-        if content.parameter_ref not in simulation.parameters:
-            simulation.note(
-                f"parameter '{content.parameter_ref}' is not declared: the condition stays false", content.place
-            )
-            return False
-        return simulation.parameters.compare(content.parameter_ref, content.rule, content.value)
-
-    return check
+    return _declared(content, content.parameter_ref, "parameter", simulation.parameters, simulation)
 
 
 def prepare_variable(content: VariableCondition, simulation: Simulation) -> ValueCheck:
     """Compare in the variable's own type; false for a variable that is not declared."""
+    return _declared(content, content.variable_ref, "variable", simulation.variables, simulation)
 
+
+def _declared(
+    content: ParameterCondition | VariableCondition, name: str, kind: str, values: Values, simulation: Simulation
+) -> ValueCheck:
     def check() -> bool:
-        if content.variable_ref not in simulation.variables:
-            simulation.note(
-                f"variable '{content.variable_ref}' is not declared: the condition stays false", content.place
-            )
+        if name not in values:
+            simulation.note(f"{kind} '{name}' is not declared: the condition stays false", content.place)
             return False
-        return simulation.variables.compare(content.variable_ref, content.rule, content.value)
+        return values.compare(name, content.rule, content.value)
 
     return check
 

@@ -22,7 +22,10 @@ MILLIRADIAN_TENTH = 1e-4
 
 
 def pack(values: ArrayLike, resolution: float) -> dict[str, Any]:
-    """Pack one column.
+    """Pack one column: rounded, stored as differences, a fraction of the size of decimal text.
+
+    ``{"r": resolution, "b": first, "w": 2 or 4, "d": base64}``: `d` holds the differences between successive values in
+    units of the resolution, as little-endian integers of `w` bytes. ``static/player.js`` unpacks it.
 
     Parameters
     ----------
