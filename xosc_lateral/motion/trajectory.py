@@ -96,12 +96,10 @@ def displace(motion: EntityMotion, network: RoadNetwork, deviation: FloatArray) 
         # a vehicle that meets its lane's traffic head-on has its left on the lane's right
         along_lane = np.where(np.cos(motion.heading_relative[rows]) >= 0.0, 1.0, -1.0)
         road, lane, s, nominal = motion.road[rows], motion.lane[rows], motion.s[rows], motion.offset[rows]
-        before = network.lane_to_world(road, lane, s, nominal)
-        after = network.lane_to_world(road, lane, s, nominal + along_lane * deviation[rows])
+        poses = network.lane_to_world(road, lane, s, np.stack((nominal, nominal + along_lane * deviation[rows])))
         # the nominal pose is kept to the bit and only the difference added, so that a zero deviation changes nothing
-        x[rows] += after.x - before.x
-        y[rows] += after.y - before.y
-        z[rows] += after.z - before.z
+        for axis, (before, after) in ((x, poses.x), (y, poses.y), (z, poses.z)):
+            axis[rows] += after - before
     if moved.any():
         heading = heading + _direction_change(motion, x, y)
     return WorldTrajectory(motion.time, x, y, z, heading, motion.pitch, motion.roll, _speed(motion, x, y))
