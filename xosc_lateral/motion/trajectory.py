@@ -96,13 +96,15 @@ def displace(motion: EntityMotion, network: RoadNetwork, deviation: FloatArray) 
         # a vehicle that meets its lane's traffic head-on has its left on the lane's right
         along_lane = np.where(np.cos(motion.heading_relative[rows]) >= 0.0, 1.0, -1.0)
         road, lane, s, nominal = motion.road[rows], motion.lane[rows], motion.s[rows], motion.offset[rows]
-        poses = network.lane_to_world(road, lane, s, np.stack((nominal, nominal + along_lane * deviation[rows])))
+        poses = network.lane_points(road, lane, s, nominal, nominal + along_lane * deviation[rows])
         # the nominal pose is kept to the bit and only the difference added, so that a zero deviation changes nothing
-        for axis, (before, after) in ((x, poses.x), (y, poses.y), (z, poses.z)):
+        for axis, before, after in zip((x, y, z), *poses, strict=True):
             axis[rows] += after - before
+    speed = motion.speed
     if moved.any():
-        heading = heading + _direction_change(motion, x, y)
-    return WorldTrajectory(motion.time, x, y, z, heading, motion.pitch, motion.roll, _speed(motion, x, y))
+        change, ratio = _turned_and_longer(motion, x, y)
+        heading, speed = heading + change, speed * ratio
+    return WorldTrajectory(motion.time, x, y, z, heading, motion.pitch, motion.roll, speed)
 
 
 def _pieces(motion: EntityMotion) -> list[slice]:
@@ -120,35 +122,30 @@ def _overlapping(piece: slice) -> Iterator[tuple[slice, slice, slice]]:
         yield slice(begin - piece.start, end - piece.start), slice(first, last), slice(begin - first, end - first)
 
 
-def _direction_change(motion: EntityMotion, x: FloatArray, y: FloatArray) -> FloatArray:
-    """Direction of the shifted path against the nominal one's, held where the vehicle stands. [rad]"""
-    change = np.zeros(len(x))
+def _turned_and_longer(motion: EntityMotion, x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Direction of the shifted path against the nominal one's, held where the vehicle stands, and ratio of lengths.
+
+    Nominal speed times that ratio stays right at a speed step. Shape (n,) each. [rad], [-]
+    """
+    change, ratio = np.zeros(len(x)), np.ones(len(x))
     for piece in _pieces(motion):
         if piece.stop - piece.start < 2:
             continue
         turn, moving = np.empty(piece.stop - piece.start), np.empty(piece.stop - piece.start, dtype=bool)
         for part, around, inside in _overlapping(piece):
-            nominal = np.gradient(motion.x[around]) + 1j * np.gradient(motion.y[around])
-            shifted = np.gradient(x[around]) + 1j * np.gradient(y[around])
-            moving[part] = (np.minimum(np.abs(nominal), np.abs(shifted)) > _STANDSTILL)[inside]
-            turn[part] = np.angle(shifted * np.conj(nominal))[inside]
+            nominal = (np.gradient(motion.x[around]) + 1j * np.gradient(motion.y[around]))[inside]
+            shifted = (np.gradient(x[around]) + 1j * np.gradient(y[around]))[inside]
+            moving[part] = np.minimum(np.abs(nominal), np.abs(shifted)) > _STANDSTILL
+            turn[part] = np.angle(shifted * np.conj(nominal))
+            np.divide(
+                np.hypot(shifted.real, shifted.imag),
+                length := np.hypot(nominal.real, nominal.imag),
+                out=ratio[piece][part],
+                where=length > _STANDSTILL,
+            )
         if not moving.any():
             continue
         last = np.maximum.accumulate(np.where(moving, np.arange(len(moving)), -1))
         last[last < 0] = int(np.argmax(moving))
         change[piece] = turn[last]
-    return change
-
-
-def _speed(motion: EntityMotion, x: FloatArray, y: FloatArray) -> FloatArray:
-    """Nominal speed times the ratio of path lengths, which stays right at a speed step. [m/s]"""
-    speed = motion.speed.copy()
-    for piece in _pieces(motion):
-        if piece.stop - piece.start < 2:
-            continue
-        for part, around, inside in _overlapping(piece):
-            nominal = np.hypot(np.gradient(motion.x[around]), np.gradient(motion.y[around]))[inside]
-            shifted = np.hypot(np.gradient(x[around]), np.gradient(y[around]))[inside]
-            moving = nominal > _STANDSTILL
-            speed[piece][part][moving] *= (shifted / np.where(moving, nominal, 1.0))[moving]
-    return speed
+    return change, ratio

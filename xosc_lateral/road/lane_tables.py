@@ -200,13 +200,12 @@ class LaneTables:
         outputs: int,
         road: ArrayLike,
         s: ArrayLike,
-        *,
+        *across: ArrayLike,
         lane: ArrayLike | None = None,
-        offset: ArrayLike | None = None,
     ) -> tuple[FloatArray, ...]:
         """Broadcast, cut into chunks, evaluate, put together; a road or lane that is one for all stays a plain int."""
         extra = [] if lane is None else [np.asarray(lane)]
-        numbers = [np.asarray(s, dtype=np.float64)] + ([] if offset is None else [np.asarray(offset, dtype=np.float64)])
+        numbers = [np.asarray(a, dtype=np.float64) for a in (s, *across)]
         shape = np.broadcast_shapes(np.shape(road), *(a.shape for a in (*extra, *numbers)))
         flat = [np.broadcast_to(a, shape).ravel() for a in numbers]
         road_ = _one_or_many(road, shape)

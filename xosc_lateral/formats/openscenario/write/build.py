@@ -35,8 +35,8 @@ def decimals(values: NDArray[np.float64], digits: Sequence[int]) -> tuple[str, .
     if not values.size:
         return ()
     text = "".join(f'"%.{count}f' for count in digits) * len(values) % tuple(values.ravel().tolist()) + '"'
-    while '0"' in text:  # as often as numbers have decimals; a pattern takes three times as long
-        text = text.replace('0"', '"')
+    for zeros in ('0000"', '00"', '0"'):  # up to seven of them; a pattern takes three times as long
+        text = text.replace(zeros, '"')
     return tuple(text.replace('."', '"').replace('"-0"', '"0"')[1:-1].split('"'))
 
 
