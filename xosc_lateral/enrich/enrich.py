@@ -323,8 +323,8 @@ def _draw(
     beyond: list[FloatArray] = []
     for span, knots, seen, side, responses in met.stretches:
         wanted = side * sampler.sample(seen, responses=responses)
-        later = _going_on(seen, max(least - len(knots), 0))
-        beyond.append(side * sampler.copy().sample(later) if later.time.size > later.before else np.empty(0))
+        more = least - len(knots)
+        beyond.append(side * sampler.copy().sample(_going_on(seen, more)) if more > 0 else np.empty(0))
         inside = seen.inside
         who = f"profile {driver.name} for {entity.name!r}"
         check_offsets(wanted, seen.lane_width[inside], who, seen.time[inside])

@@ -13,6 +13,9 @@ IntArray = NDArray[np.int64]
 BLOCK = 64
 """Rows that one box around a vehicle's path covers: 1.3 s at 50 Hz, 40 m on a motorway. [-]"""
 
+BOXES = 4096
+"""Boxes that are swept together: few vehicles over all of a run, or many over a block of rows. [-]"""
+
 
 def pairs_within(x: Sequence[FloatArray], y: Sequence[FloatArray], reach: float) -> list[tuple[int, int]]:
     """Pairs of points that may come within `reach` of each other at some row; none that do is missing.
@@ -34,14 +37,16 @@ def pairs_within(x: Sequence[FloatArray], y: Sequence[FloatArray], reach: float)
     """
     if len(x) < 2 or not len(x[0]):
         return []
-    lows, highs = zip(*(_bounds(np.stack(axis)) for axis in (x, y)), strict=True)
+    (low_x, high_x), (low_y, high_y) = (_bounds(np.stack(axis)) for axis in (x, y))
+    low, high = np.stack([low_x, low_y]), np.stack([high_x, high_y])
     found: set[tuple[int, int]] = set()
-    for block in range(lows[0].shape[1]):
-        low = np.stack([lows[0][:, block], lows[1][:, block]])
-        high = np.stack([highs[0][:, block], highs[1][:, block]])
-        there = np.flatnonzero(np.isfinite(low).all(axis=0))
+    together = max(1, BOXES // len(x))
+    for begin in range(0, low.shape[2], together):
+        part = slice(begin, begin + together)
+        block, there = np.nonzero(np.isfinite(low[..., part]).all(axis=0).T)
         if len(there) > 1:
-            first, second = _overlapping(low[:, there], high[:, there], there, reach)
+            boxes = (low[..., part][:, there, block], high[..., part][:, there, block])
+            first, second = _overlapping(*boxes, there, reach, block)
             found.update(zip(first.tolist(), second.tolist(), strict=True))
     return sorted(found)
 
@@ -63,16 +68,25 @@ def _bounds(values: FloatArray) -> tuple[FloatArray, FloatArray]:
     return np.asarray(low), np.asarray(high)
 
 
-def _overlapping(low: FloatArray, high: FloatArray, names: IntArray, reach: float) -> tuple[IntArray, IntArray]:
-    """Pairs of boxes that are within reach of each other, the smaller name first, shape (pairs,) each."""
+def _overlapping(
+    low: FloatArray, high: FloatArray, names: IntArray, reach: float, block: IntArray | None = None
+) -> tuple[IntArray, IntArray]:
+    """Pairs of boxes that are within reach of each other, the smaller name first, shape (pairs,) each.
+
+    Boxes of other blocks are none: they lie far away on the axis that is swept, shape (n,).
+    """
     axis = int(np.argmax(high.max(axis=1) - low.min(axis=1)))
-    order = np.argsort(low[axis], kind="stable")
-    low, high, names = low[:, order], high[:, order], names[order]
-    ends = np.searchsorted(low[axis], high[axis] + reach, side="right")
+    begin, end = low[axis], high[axis] + reach
+    if block is not None:
+        apart = block * (float(end.max()) - float(begin.min()) + 1.0)
+        begin, end = begin + apart, end + apart
+    order = np.argsort(begin, kind="stable")
+    ends = np.searchsorted(begin[order], end[order], side="right")
     counts = np.maximum(ends - np.arange(len(order)) - 1, 0)
     first = np.repeat(np.arange(len(order)), counts)
     second = first + 1 + np.arange(len(first)) - np.repeat(np.cumsum(counts) - counts, counts)
+    one, two = order[first], order[second]
     other = 1 - axis
-    near = (low[other, second] <= high[other, first] + reach) & (low[other, first] <= high[other, second] + reach)
-    one, two = names[first[near]], names[second[near]]
+    near = (low[other, two] <= high[other, one] + reach) & (low[other, one] <= high[other, two] + reach)
+    one, two = names[one[near]], names[two[near]]
     return np.minimum(one, two), np.maximum(one, two)
