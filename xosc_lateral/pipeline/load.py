@@ -67,10 +67,34 @@ def play_scenario(
     FormatError, PlaybackError
         With file, line and element.
     """
-    scenario = read_scenario(path, parameters or {}, allowed=allowed, roads=roads, strict=strict)
-    network = RoadNetwork(()) if scenario.road_file is None else road_network(scenario.road_file)
     values = tuple(sorted((parameters or {}).items()))
+    scenario = _read(path, values, tuple(allowed), roads, strict)
+    network = RoadNetwork(()) if scenario.road_file is None else road_network(scenario.road_file)
     return _played(_Playable(input_hashes(scenario, network), values, step, time_limit, scenario, network))
+
+
+def _read(
+    path: Path, parameters: tuple[tuple[str, str], ...], allowed: tuple[Path, ...], roads: RoadSearch, strict: bool
+) -> Scenario:
+    """Read a scenario, once for all its variants if that depends on its own file and on the place of its road alone."""
+    state = check_regular(path)
+    guard_input(path)
+    before = _read_before(
+        path, parameters, allowed, roads, strict, state.st_ino, state.st_ctime_ns, state.st_mtime_ns, state.st_size
+    )
+    for scenario in before:
+        if scenario.road_file is None or scenario.road_file.is_file():
+            return scenario
+    scenario = read_scenario(path, dict(parameters), allowed=allowed, roads=roads, strict=strict)
+    if not scenario.catalog_locations and not scenario.remarks:
+        before[:] = [scenario]
+    return scenario
+
+
+@lru_cache(maxsize=2)
+def _read_before(*_key: object) -> list[Scenario]:
+    """The scenario that was read from a file in this state, if it was kept."""
+    return []
 
 
 @lru_cache(maxsize=2)  # as `_played`, whose result is the same object for all variants
