@@ -10,7 +10,7 @@ from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.enrich.enrich import Drivers
 from xosc_lateral.errors import FormatError
 from xosc_lateral.formats.profiles import SHIPPED, find_profile, read_profile
-from xosc_lateral.formats.source import check_regular, guard_input
+from xosc_lateral.formats.source import check_regular, guard_input, state_key
 from xosc_lateral.pipeline.settings import AUTO, ConvertSettings
 from xosc_lateral.scenario import Entity, Scenario
 from xosc_lateral.scenario.enums import VehicleCategory
@@ -92,9 +92,9 @@ def load_profile(name_or_path: str, libraries: tuple[Path, ...]) -> DriverProfil
     path = find_profile(name_or_path, libraries)
     state = check_regular(path)
     guard_input(path)
-    return _load_profile(path, state.st_ino, state.st_ctime_ns, state.st_mtime_ns, state.st_size)
+    return _load_profile(path, state_key(state))
 
 
 @lru_cache(maxsize=128)
-def _load_profile(path: Path, *_state: int) -> DriverProfile:
+def _load_profile(path: Path, _state: tuple[int, ...]) -> DriverProfile:
     return read_profile(path)

@@ -11,6 +11,7 @@ from pathlib import Path
 
 from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.errors import FormatError, XoscLateralError
+from xosc_lateral.formats.atomic import real_path
 from xosc_lateral.formats.hashes import file_hash
 from xosc_lateral.formats.openscenario.catalogs import require_folders
 from xosc_lateral.formats.profiles import find_profile, profile_hash
@@ -240,15 +241,16 @@ def _jobs(request: Request, kind: DocumentKind, base: Path, root: Path, fingerpr
     stem = request.name.removesuffix(relative.suffix) or f"{relative.stem}{request.label}"
     for one in concrete(request, kind):
         source, settings, error = one.source, one.settings, one.error
+        named = relative.with_name(f"{stem}{one.suffix}{relative.suffix}")
+        scenario = printable(Path(os.path.relpath(source, base)).as_posix())
         for variant in range(request.variants):
-            named = relative.with_name(f"{stem}{one.suffix}{relative.suffix}")
             output = numbered(named, variant, request.variants)
             name = printable(output.as_posix())
             if name != output.as_posix():
                 error = error or f"{printable(str(source))}: the file's name is not valid UTF-8; rename it"
             yield Job(
                 name=name,
-                scenario=printable(Path(os.path.relpath(source, base)).as_posix()),
+                scenario=scenario,
                 source=source,
                 output=root / output,
                 base=base,
@@ -261,9 +263,10 @@ def _jobs(request: Request, kind: DocumentKind, base: Path, root: Path, fingerpr
 
 def _refuse_overwriting(jobs: Iterable[Job]) -> None:
     jobs = list(jobs)
-    sources = {os.path.realpath(job.source) for job in jobs}
+    sources = set(map(os.path.realpath, {job.source for job in jobs}))
+    folders: dict[Path, str] = {}
     for job in jobs:
-        if os.path.realpath(job.output) in sources:
+        if real_path(job.output, folders) in sources:
             raise FormatError("is an input: choose another output folder", path=job.output)
 
 
@@ -277,15 +280,23 @@ class _Fingerprints:
     """Hashes of settings; files that settings name count by their bytes, not by their place."""
 
     _profiles: dict[tuple[str, tuple[Path, ...]], str] = field(default_factory=dict)
+    _last: tuple[ConvertSettings, dict[str, str]] | None = None
 
     def of(self, settings: ConvertSettings, variant: int) -> str:
+        if self._last is None or self._last[0] is not settings:  # variants come one after another
+            self._last = settings, self._texts(settings)
+        texts = self._last[1] | {"variant": str(variant)}
+        text = ", ".join(f'"{name}": {texts[name]}' for name in sorted(texts))
+        return hashlib.sha256(f"{{{text}}}".encode()).hexdigest()
+
+    def _texts(self, settings: ConvertSettings) -> dict[str, str]:
+        """JSON of each setting."""
         values = settings.record(Path()) | {"strict": settings.strict}
         values["profile"] = self._profile(settings.profile, settings.library)
         values["entity"] = {name: self._profile(one, settings.library) for name, one in settings.entity.items()}
         for name, path in (("context", settings.context), ("road", settings.road)):
             values[name] = None if path is None else _hash_or_missing(path)
-        values["variant"] = variant
-        return hashlib.sha256(json.dumps(values, sort_keys=True).encode()).hexdigest()
+        return {name: json.dumps(value, sort_keys=True) for name, value in values.items()}
 
     def _profile(self, name: str | DriverProfile, libraries: tuple[Path, ...]) -> str:
         if isinstance(name, DriverProfile):

@@ -11,7 +11,7 @@ from msgspec import structs
 
 from xosc_lateral.formats.opendrive import read_opendrive
 from xosc_lateral.formats.openscenario.read import NO_ROADS, RoadSearch, read_scenario
-from xosc_lateral.formats.source import check_regular, guard_input
+from xosc_lateral.formats.source import check_regular, guard_input, state_key
 from xosc_lateral.motion.nominal import NominalMotion
 from xosc_lateral.pipeline.settings import STEP
 from xosc_lateral.playback.player import play
@@ -79,9 +79,7 @@ def _read(
     """Read a scenario, once for all its variants if that depends on its own file and on the place of its road alone."""
     state = check_regular(path)
     guard_input(path)
-    before = _read_before(
-        path, parameters, allowed, roads, strict, state.st_ino, state.st_ctime_ns, state.st_mtime_ns, state.st_size
-    )
+    before = _read_before(path, parameters, allowed, roads, strict, state_key(state))
     for scenario in before:
         if scenario.road_file is None or scenario.road_file.is_file():
             return scenario
@@ -134,9 +132,9 @@ def road_network(path: Path) -> RoadNetwork:
     """Read a road, once per process for as long as the file stays the same."""
     state = check_regular(path)
     guard_input(path)
-    return _road_network(path, state.st_ino, state.st_ctime_ns, state.st_mtime_ns, state.st_size)
+    return _road_network(path, state_key(state))
 
 
 @lru_cache(maxsize=32)
-def _road_network(path: Path, *_state: int) -> RoadNetwork:
+def _road_network(path: Path, _state: tuple[int, ...]) -> RoadNetwork:
     return read_opendrive(path)

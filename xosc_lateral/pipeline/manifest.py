@@ -13,7 +13,7 @@ from dataclasses import dataclass, field, fields, replace
 from io import BytesIO
 from itertools import islice
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from xosc_lateral.errors import FormatError
 from xosc_lateral.formats.atomic import write_atomically
@@ -154,10 +154,8 @@ class ManifestRow:
     def to_dict(self) -> dict[str, Any]:
         """Plain JSON values."""
         values = {name: getattr(self, name) for name in self.__slots__}
-        return {
-            name: dict(value) if isinstance(value, Mapping) else list(value) if isinstance(value, tuple) else value
-            for name, value in values.items()
-        }
+        values |= {name: dict(values[name]) for name in _MAPPINGS}
+        return {name: list(value) if isinstance(value, tuple) else value for name, value in values.items()}
 
     @classmethod
     def from_dict(cls, values: Mapping[str, Any]) -> ManifestRow:
@@ -241,16 +239,30 @@ def read_manifest(path: Path) -> Iterator[ManifestRow]:
             raise FormatError(f"not a manifest of this package: {error}", path=path) from error
 
 
-def write_timings(seconds: Iterable[tuple[str, float]], path: Path) -> None:
-    """Write what each output took: columns `output`, `seconds`."""
+class Timing(NamedTuple):
+    """What an output took [s], and its `file_state` as it was written; empty: not known."""
+
+    seconds: float = 0.0
+    state: str = ""
+
+
+def is_of_now(path: Path) -> bool:
+    """Whether a manifest has the columns that would be written now."""
+    import pyarrow.parquet as pq
+
+    return bool(pq.read_schema(path).equals(manifest_schema()))
+
+
+def write_timings(timings: Iterable[tuple[str, Timing]], path: Path) -> None:
+    """Write columns `output`, `seconds`, `state`."""
     import pyarrow as pa
 
-    schema = pa.schema([("output", pa.string()), ("seconds", pa.float64())])
-    _write_table(path, schema, ({"output": output, "seconds": took} for output, took in seconds))
+    schema = pa.schema([("output", pa.string()), ("seconds", pa.float64()), ("state", pa.string())])
+    _write_table(path, schema, ({"output": output, **own._asdict()} for output, own in timings))
 
 
-def read_timings(path: Path) -> dict[str, float]:
-    """Seconds per output; empty if there is no file.
+def read_timings(path: Path) -> dict[str, Timing]:
+    """Timing of each output; empty if there is no file.
 
     Raises
     ------
@@ -258,7 +270,10 @@ def read_timings(path: Path) -> dict[str, float]:
         When it is no such file.
     """
     try:
-        return {str(values["output"]): float(values["seconds"]) for values in _read_table(path)}
+        return {
+            str(values["output"]): Timing(float(values["seconds"]), str(values.get("state", "")))
+            for values in _read_table(path)
+        }
     except (TypeError, ValueError, KeyError) as error:
         raise FormatError(f"not a timings file of this package: {error}", path=path) from error
 
