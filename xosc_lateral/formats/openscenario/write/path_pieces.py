@@ -16,7 +16,7 @@ import numpy as np
 from msgspec import Struct
 from numpy.typing import NDArray
 
-from xosc_lateral.mask import true_slices
+from xosc_lateral.rows import true_slices
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
