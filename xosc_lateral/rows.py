@@ -65,12 +65,13 @@ class _Store:
         if self.memory >= 0 or size == 0:
             return np.empty(shape, kind)
         if self._chunk is None or len(self._chunk) - self._free < size:
-            self._chunk, self._free = self._grown(max(CHUNK, self._size // 8, size)), 0
+            self._chunk, self._free = self.grown(max(CHUNK, self._size // 8, size)), 0
         values = np.frombuffer(self._chunk, kind, size // kind.itemsize, self._free).reshape(shape)
         self._free += -(-size // 64) * 64  # a line of the processor's cache
         return values
 
-    def _grown(self, size: int) -> mmap.mmap:
+    def grown(self, size: int) -> mmap.mmap:
+        """A piece of the file that is gone with what lies in it."""
         size = -(-size // mmap.PAGESIZE) * mmap.PAGESIZE
         try:
             with tempfile.TemporaryFile(dir=self.folder) as file:
@@ -119,6 +120,14 @@ def empty(shape: int | tuple[int, ...], kind: DTypeLike = np.float64) -> NDArray
     shape = (shape,) if isinstance(shape, int) else shape
     store = _store.get()
     return np.empty(shape, kind) if store is None else store.empty(shape, np.dtype(kind))
+
+
+def scratch(n: int) -> NDArray[np.float64]:
+    """A column to be filled that is gone after the work on one vehicle: in memory, unless it is long."""
+    store = _store.get()
+    if store is None or 8 * n <= MAPPED / 10:
+        return np.empty(n)
+    return np.frombuffer(store.grown(8 * n), dtype=np.float64, count=n)
 
 
 def kept(values: NDArray[Any]) -> NDArray[Any]:

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from xosc_lateral.motion.nominal import Activity, EntityMotion
 from xosc_lateral.road.network import RoadNetwork
-from xosc_lateral.rows import blocks, columns, empty, rows_where
+from xosc_lateral.rows import blocks, columns, empty, rows_where, scratch
 
 FloatArray = NDArray[np.float64]
 
@@ -61,7 +61,7 @@ class WorldTrajectory:
 
 def distance_driven(motion: EntityMotion) -> FloatArray:
     """Distance driven on the nominal path up to each row, shape (n,); being placed anew is no driving. [m]"""
-    distance = empty(len(motion.x))
+    distance = scratch(len(motion.x))
     distance[:1] = 0.0
     for rows in blocks(len(distance), 1):
         around = slice(rows.start - 1, rows.stop)
