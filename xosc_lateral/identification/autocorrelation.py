@@ -19,7 +19,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.mask import true_slices
+from xosc_lateral.rows import true_slices
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]

@@ -39,7 +39,7 @@ from xosc_lateral.identification.terms.base import Removal, Term
 from xosc_lateral.identification.terms.cycle import CycleTerm
 from xosc_lateral.identification.terms.time import StepTerm
 from xosc_lateral.identification.timeline import COARSE, Timeline
-from xosc_lateral.mask import true_slices
+from xosc_lateral.rows import true_slices
 
 BoolArray = NDArray[np.bool_]
 FloatArray = NDArray[np.float64]
