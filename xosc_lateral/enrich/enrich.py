@@ -17,9 +17,10 @@ from xosc_lateral.driver.plausibility import check_offsets
 from xosc_lateral.driver.profile import COLUMNS, SIDES, Basis, DriverProfile
 from xosc_lateral.driver.sampled_offsets import known_sensor, sensor_error
 from xosc_lateral.driver.sampling import OffsetSampler, Responses, responses_to
-from xosc_lateral.enrich.consequences import gaps_of, lane_departures
+from xosc_lateral.enrich.consequences import HalfWidths, gaps_of, lane_departures
 from xosc_lateral.enrich.give_way import SampledVehicle, give_way, mirrored, other_side
 from xosc_lateral.enrich.result import Enriched, EntityResult, Neighbours, SampledSegment
+from xosc_lateral.errors import FormatError
 from xosc_lateral.motion.context import entity_context
 from xosc_lateral.motion.deviation import SETTLING_TIME, SampledDeviation, deviation_through
 from xosc_lateral.motion.gaps import Gap
@@ -129,7 +130,9 @@ def enrich(
         entities = tuple(_result(one, network) for one in drawn)
         entities = _with_trailers(entities, network, trailers)
         gaps_after = gaps_of(motion, [entity.trajectory for entity in entities])
-        departures = tuple(found for entity in entities for found in lane_departures(entity, network))
+        departures = tuple(
+            found for entity in entities for found in lane_departures(entity, network, run.half_widths if few else None)
+        )
         result = Enriched(motion, network, entities, run.gaps, gaps_after, departures, seed, variant, attempt)
         if best is None or _trouble(result) < _trouble(best):
             best = result
@@ -261,12 +264,15 @@ class _Run(NamedTuple):
         Those alone whose place is.
     met : dict
         By the number of the entity, its last driver and what he meets.
+    half_widths : dict
+        See `lane_departures`.
     """
 
     spans: tuple[tuple[SegmentSpan, ...], ...]
     gaps: tuple[Gap, ...]
     certain: NominalMotion
     met: dict[int, tuple[DriverProfile, _Met]]
+    half_widths: HalfWidths
 
 
 @lru_cache(maxsize=2)  # variants of one run come one after another
@@ -280,7 +286,7 @@ def _run(
     spans = tuple(cut_segments(entity, network, is_trailer=entity.name in pulled) for entity in motion.entities)
     gaps = gaps_of(motion, [_nominal(entity) for entity in motion.entities])
     certain = tuple(one for one in motion.entities if one.name not in uncertain)
-    return _Run(spans, gaps, replace(motion, entities=certain), {})
+    return _Run(spans, gaps, replace(motion, entities=certain), {}, {})
 
 
 def _meet(
@@ -301,6 +307,7 @@ def _meet(
         knots = kept(np.arange(span.first, span.last + 1, every))
         if not span.is_road_following or len(knots) < 2:
             continue
+        _refuse_no_width(entity, span, network)
         segment = _segment(motion, network, index, knots, every, foreign_context)
         if neighbours is Neighbours.NONE:
             segment = _with_nobody_beside(segment)
@@ -311,6 +318,22 @@ def _meet(
         seen, side = (mirrored(segment), -1.0) if other_hand else (segment, 1.0)
         stretches.append(_Stretch(span, knots, seen, side, responses_to(seen, driver)))
     return _Met(tuple(stretches), tuple(sorted(neutral)), frozenset(responds), frozenset(alone))
+
+
+NO_WIDTH = 0.01
+"""A lane narrower than this is none. [m]"""
+
+
+def _refuse_no_width(entity: EntityMotion, span: SegmentSpan, network: RoadNetwork) -> None:
+    """A lane may begin or end with no width, but nobody follows one that has none all along."""
+    for rows in blocks(span.last + 1, span.first):
+        if network.lane_width(entity.road[rows], entity.lane[rows], entity.s[rows]).max() >= NO_WIDTH:
+            return
+    raise FormatError(
+        f"lane {entity.lane[span.first]} has no width where {entity.name!r} follows it",
+        path=network.path,
+        element=f"road {network.road_ids[entity.road[span.first]]!r}",
+    )
 
 
 def _draw(

@@ -42,8 +42,6 @@ many times the nominal run. A fifth slower takes a quarter longer; a file of tra
 SUPPLY = 10.0
 """For so long at least, where it may last longer in another run, a stretch has movement of its own. What comes after it
 is the same again; some of the slow movement of a driver is seen in that time. [s]"""
-NO_WIDTH = 0.01
-"""A lane narrower than this is none. [m]"""
 
 
 def convert_scenario(
@@ -130,7 +128,6 @@ def _convert(
         )
     except DriverProfileError as error:  # found in the movement: who sampled knows the profile by its name alone
         raise DriverProfileError(f"{source}: {error}") from error
-    _refuse_lanes_without_width(played, enriched)
     names = [entity.name for entity in enriched.entities if entity.is_enriched]
     plan = writing_plan(played.scenario, settings, depends, names, pulled=played.trailers, sampled=sampled)
     making = _Making(played, lasting, settings, variant, inputs, egos, depends, output, save)
@@ -281,24 +278,6 @@ def _provenance(
         modes={name: mode for name, mode in plan.modes().items() if enriched.entity(name).is_enriched},
         content_sha256=PENDING,
     )
-
-
-def _refuse_lanes_without_width(played: Played, enriched: Enriched) -> None:
-    """A lane may begin or end with no width, but nobody follows one that has none all along."""
-    for entity in enriched.entities:
-        motion = entity.motion
-        for segment in entity.segments:
-            first, end = segment.span.first, segment.span.last + 1
-            widths = (
-                played.network.lane_width(motion.road[rows], motion.lane[rows], motion.s[rows])
-                for rows in blocks(end, first)
-            )
-            if all(width.max() < NO_WIDTH for width in widths):
-                raise FormatError(
-                    f"lane {motion.lane[first]} has no width where {entity.name!r} follows it",
-                    path=played.scenario.road_file,
-                    element=f"road {played.network.road_ids[motion.road[first]]!r}",
-                )
 
 
 def _write(
