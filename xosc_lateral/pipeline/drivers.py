@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from functools import lru_cache
 from pathlib import Path
 
 from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.enrich.enrich import Drivers
 from xosc_lateral.errors import FormatError
 from xosc_lateral.formats.profiles import SHIPPED, find_profile, read_profile
-from xosc_lateral.formats.source import check_regular, guard_input, state_key
 from xosc_lateral.pipeline.settings import AUTO, ConvertSettings
 from xosc_lateral.scenario import Entity, Scenario
 from xosc_lateral.scenario.enums import VehicleCategory
@@ -62,7 +60,7 @@ def _driver(entity: Entity, settings: ConvertSettings) -> DriverProfile | str:
         if category in NO_DRIVER:
             return NO_DRIVER[category]
         named = AUTO_PROFILE
-    return named if isinstance(named, DriverProfile) else load_profile(named, settings.library)
+    return named if isinstance(named, DriverProfile) else read_profile(named, settings.library)
 
 
 def auto_profile(libraries: tuple[Path, ...]) -> Path:
@@ -85,16 +83,3 @@ def hidden_by_libraries(libraries: tuple[Path, ...]) -> tuple[str, ...]:
     """A line where "auto" takes one of the user's profiles in place of the shipped one."""
     path = auto_profile(libraries)
     return () if path.parent == SHIPPED else (f"{path} hides the shipped profile {AUTO_PROFILE!r}: auto takes it",)
-
-
-def load_profile(name_or_path: str, libraries: tuple[Path, ...]) -> DriverProfile:
-    """Read a profile, once per process for as long as its file stays the same."""
-    path = find_profile(name_or_path, libraries)
-    state = check_regular(path)
-    guard_input(path)
-    return _load_profile(path, state_key(state))
-
-
-@lru_cache(maxsize=128)
-def _load_profile(path: Path, _state: tuple[int, ...]) -> DriverProfile:
-    return read_profile(path)

@@ -15,11 +15,11 @@ from xosc_lateral.errors import FormatError, XoscLateralError
 from xosc_lateral.formats.hashes import file_hash
 from xosc_lateral.formats.openscenario.provenance import CONTENT, content_hash, facts_in, without_provenance
 from xosc_lateral.formats.output_paths import path_below
-from xosc_lateral.formats.profiles import profile_hash
+from xosc_lateral.formats.profiles import profile_hash, read_profile
 from xosc_lateral.formats.source import check_regular
 from xosc_lateral.pipeline.batch import convert_many
 from xosc_lateral.pipeline.convert import convert_scenario
-from xosc_lateral.pipeline.drivers import AUTO_PROFILE, load_profile
+from xosc_lateral.pipeline.drivers import AUTO_PROFILE
 from xosc_lateral.pipeline.jobs import Batch, Job, fingerprint
 from xosc_lateral.pipeline.manifest import MANIFEST, ManifestRow, read_manifest
 from xosc_lateral.pipeline.settings import AUTO, ConvertSettings
@@ -161,7 +161,7 @@ def _other_profile(settings: ConvertSettings, entity: str, recorded: Any) -> str
     """Why an entity would get another profile today."""
     named = settings.entity.get(entity, settings.profile)
     try:
-        found = load_profile(AUTO_PROFILE if named == AUTO else str(named), settings.library)
+        found = read_profile(AUTO_PROFILE if named == AUTO else str(named), settings.library)
     except (XoscLateralError, OSError) as error:
         return f"profile of {entity!r}: {error}"
     same = isinstance(recorded, list) and recorded[1:] == [profile_hash(found)]
