@@ -170,7 +170,10 @@ class NetworkTables(LaneTables):
         *,
         angles: bool = True,
     ) -> _Lie:
-        """What `Surface.at` answers, by the elevation there and its slope; no pitch and roll without `angles`."""
+        """What `Surface.at` answers, by the elevation there and its slope.
+
+        Without `angles` no more than height, shrinking and lead.
+        """
         nothing = np.zeros(len(s))
         if self._flat:
             return nothing, nothing, nothing, None, None, None
@@ -181,17 +184,17 @@ class NetworkTables(LaneTables):
         shrink, rise = np.cos(angle), np.sin(angle)
         level = 1.0 / np.sqrt(1.0 + grade * grade)
         steep = grade * level
+        lead = -t * rise * steep
+        height = height + t * rise * level
+        lift, lift_along, lean = self._shaped(road, s, t)
+        if not angles:
+            return height + lift, nothing, nothing, shrink, None, lead
         ahead, behind = (self._elevation.at(road, s + ds)[1] for ds in (BEND_STEP, -BEND_STEP))
         bend = (ahead - behind) / (2.0 * BEND_STEP) * level * level
-        lead = -t * rise * steep
         onward = 1.0 - t * (shrink * twist * steep + rise * level * bend)
-        height = height + t * rise * level
         climb = grade + t * (shrink * twist * level - rise * steep * bend)
         drift = -t * rise * twist / onward
-        lift, lift_along, lean = self._shaped(road, s, t)
         height, climb, angle = height + lift, (climb + lift_along) / onward, angle + np.arctan(lean)
-        if not angles:
-            return height, nothing, nothing, shrink, drift, lead
         pitch = -np.arctan(climb / np.sqrt(1.0 + drift * drift))
         leaning = np.clip(np.sin(angle) * np.cos(np.arctan(grade)) / np.cos(pitch), -1.0, 1.0)
         roll = np.where(climb == grade, angle, np.arcsin(leaning))
