@@ -38,7 +38,7 @@ class Cubics:
         """Values and derivatives. Shape as `s`. [m]"""
         piece = self._lookup.find(owner, s)
         ds = s - self._lookup.starts[piece]
-        a, b, c, d = (values[piece] for values in self._table)
+        a, b, c, d = (values.take(piece) for values in self._table)
         return a + ds * (b + ds * (c + ds * d)), b + ds * (2.0 * c + (3.0 * ds) * d)
 
 
@@ -58,7 +58,7 @@ class HeightTable:
         """Height `from_centre` (along t) of lanes of this width and id, linear across the lane. Shape as `s`. [m]"""
         piece = self._lookup.find(row, s)
         ds = np.maximum(s - self._lookup.starts[piece], 0.0)
-        inner, inner_slope, outer, outer_slope = (values[piece] for values in self._table)
+        inner, inner_slope, outer, outer_slope = (values.take(piece) for values in self._table)
         low, high = inner + ds * inner_slope, outer + ds * outer_slope
         # a lane of no width has no inside: its inner edge counts
         narrow = width <= 0.0
