@@ -16,7 +16,7 @@ from xosc_lateral.driver.jit_kernel import worth_compiling
 from xosc_lateral.driver.models.autoregressive.fit import fit_autoregressive
 from xosc_lateral.driver.models.autoregressive.fit_matching import simulate
 from xosc_lateral.driver.models.autoregressive.model import AutoregressiveModel
-from xosc_lateral.driver.models.autoregressive.parameters import FitSettings
+from xosc_lateral.driver.models.autoregressive.settings import FitSettings
 from xosc_lateral.driver.models.autoregressive.volatility import Volatility
 from xosc_lateral.driver.models.base import Start
 from xosc_lateral.driver.records import plain, read_as
