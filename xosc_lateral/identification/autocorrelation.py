@@ -17,32 +17,17 @@ from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
+from xosc_lateral.identification.timeline import BoolArray, FloatArray, IntArray
 from xosc_lateral.mask import true_slices
 
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
-IntArray = NDArray[np.intp]
-
-MAX_REFLECTION = 0.999
-"""Reflection coefficients are kept inside the unit circle: the process is stationary. [-]"""
-
-ENOUGH_ROWS = 0.5
-"""The memory is the longest for which this share of the rows has so much past in its own run. [-]"""
-
-ROWS_PER_COEFFICIENT = 20
-"""Fewer rows than this per coefficient shorten the memory. [-]"""
-
-
-START_ROWS = 10.0
-"""First rows of runs have errors of their own as far as there are more of them than this."""
-
+MAX_REFLECTION = 0.999  # Reflection coefficients are kept inside the unit circle: the process is stationary. [-]
+ENOUGH_ROWS = 0.5  # The memory is the longest for which this share of the rows has so much past in its own run. [-]
+ROWS_PER_COEFFICIENT = 20  # Fewer rows than this per coefficient shorten the memory. [-]
+START_ROWS = 10.0  # First rows of runs have errors of their own as far as there are more of them than this.
+# Simulated tables that tell the bias of short drives: their scatter adds an eighth to the fit's own variance.
 BIAS_DRAWS = 4
-"""Simulated tables that tell the bias of short drives: their scatter adds an eighth to the fit's own variance."""
-
-BIAS_SEED = 0
-"""The same numbers each time: fits with and without a term differ by the term alone."""
+BIAS_SEED = 0  # The same numbers each time: fits with and without a term differ by the term alone.
 
 
 @dataclass(frozen=True, eq=False)

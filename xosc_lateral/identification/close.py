@@ -8,7 +8,6 @@ from functools import partial
 from types import MappingProxyType
 
 import numpy as np
-from numpy.typing import NDArray
 
 from xosc_lateral.driver.effects import Effect
 from xosc_lateral.driver.models.base import ModelKind
@@ -40,8 +39,6 @@ from xosc_lateral.identification.significance import LoopSeed
 from xosc_lateral.identification.terms.base import Term
 from xosc_lateral.identification.terms.between import between_shift
 from xosc_lateral.identification.timeline import join_drives
-
-FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,11 +124,10 @@ def population_finding(population: DriverVariance, scored: HeldOut) -> Finding:
     )  # fmt: skip
 
 
+# The held-out error of a profile with more effects may be so many times the base's: 24 runs leave 2 % of noise. [-]
 NO_WORSE = 1.05
-"""The held-out error of a profile with more effects may be so many times the base's: 24 runs leave 2 % of noise. [-]"""
-
+# Why an effect that does not help is taken back.
 HARMFUL = "significant, but with it held-out blocks are predicted worse by its own quantity, beyond what chance does"
-"""Why an effect that does not help is taken back."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

@@ -25,14 +25,11 @@ from xosc_lateral.identification.terms.spread import SpreadTerm
 from xosc_lateral.identification.terms.time import StepTerm, TimeMeanTerm, TimeSpreadTerm
 from xosc_lateral.identification.timeline import Timeline
 
+# Why a term that loses on held-out rows is rejected.
 VETOED = "significant, but chosen and estimated on other blocks it predicts the held-out ones worse than nothing"
-"""Why a term that loses on held-out rows is rejected."""
-
+# Why a column that goes one way is not tested.
 CLOCK = "a clock: what changes with it changes with time, which is tested as such"
-"""Why a column that goes one way is not tested."""
-
-Progress = Callable[[float, str], None]
-"""Gets the share that is done and what is being done."""
+Progress = Callable[[float, str], None]  # Gets the share that is done and what is being done.
 
 
 @dataclass(frozen=True, eq=False)

@@ -18,7 +18,6 @@ from typing import Protocol
 
 import numpy as np
 from msgspec import structs
-from numpy.typing import NDArray
 
 from xosc_lateral.driver.effects import Acts, ColumnEffect
 from xosc_lateral.identification.autocorrelation import Whitener, fit_autoregression, start_factors, unbiased
@@ -32,26 +31,26 @@ from xosc_lateral.identification.innovations import (
     own_levels,
     scoring_step,
 )
-from xosc_lateral.identification.timeline import Timeline, coarse_all, coarse_mean, coarse_middle, means_by_drive
+from xosc_lateral.identification.timeline import (
+    BoolArray,
+    FloatArray,
+    IntArray,
+    Timeline,
+    coarse_all,
+    coarse_mean,
+    coarse_middle,
+    means_by_drive,
+)
 
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
-IntArray = NDArray[np.intp]
-
+# White noise that the model of a drive has beside what it shows: no table knows the lane better (in the motorway
+# recording the standard error of a lane's centre is 0.03 m; docs/real_data.md). Providers smooth their tracks,
+# responses and all; without a floor an effect is sized where the smoothing left nothing of it. [m]
 FLOOR = 0.03
-"""White noise that the model of a drive has beside what it shows: no table knows the lane better (in the motorway
-recording the standard error of a lane's centre is 0.03 m; docs/real_data.md). Providers smooth their tracks, responses
-and all; without a floor an effect is sized where the smoothing left nothing of it. [m]"""
-
+# Stretches of a drive that count as independent in the errors of sizes: far beyond what whitening leaves of the memory,
+# and the whole of a passing vehicle. [s]
 CLUSTER_S = 60
-"""Stretches of a drive that count as independent in the errors of sizes: far beyond what whitening leaves of the
-memory, and the whole of a passing vehicle. [s]"""
-
-ROUNDS = 4
-"""Turns of sizes, autoregression and scale; they settle in three."""
-
-MIN_DRIFT_S = 600.0
-"""A shorter drive tells nothing about drift or a trend of the variance. [s]"""
+ROUNDS = 4  # Turns of sizes, autoregression and scale; they settle in three.
+MIN_DRIFT_S = 600.0  # A shorter drive tells nothing about drift or a trend of the variance. [s]
 
 
 @dataclass(frozen=True, eq=False)

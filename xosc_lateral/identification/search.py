@@ -7,7 +7,6 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from xosc_lateral.identification.candidates import candidates_of
 from xosc_lateral.identification.columns import Column
@@ -19,16 +18,13 @@ from xosc_lateral.identification.dictionary import (
 )
 from xosc_lateral.identification.regression import Coarse
 from xosc_lateral.identification.significance import Budget
+from xosc_lateral.identification.timeline import FloatArray
 
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
-
+# Products are tried among so many columns at most, those whose role is known first: sixty more columns must not cost
+# twenty times as much.
 MAX_PRODUCT_COLUMNS = 24
-"""Products are tried among so many columns at most, those whose role is known first: sixty more columns must not cost
-twenty times as much."""
-
+# Scored dictionaries that are kept, each of tens of megabytes: of the mean and of the spread beside the same fit.
 KEPT = 2
-"""Scored dictionaries that are kept, each of tens of megabytes: of the mean and of the spread beside the same fit."""
 
 
 @dataclass(frozen=True, eq=False)

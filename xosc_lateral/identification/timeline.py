@@ -27,21 +27,14 @@ FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
 IntArray = NDArray[np.intp]
 
+# Samples of the 0.2 s grid per sample of the coarse one: effects take seconds, so they are tested at 1 Hz. [-]
 COARSE = 5
-"""Samples of the 0.2 s grid per sample of the coarse one: effects take seconds, so they are tested at 1 Hz. [-]"""
-
-PAD = 75
-"""Samples before and after each drive in which the context holds its outermost value: 15 s. [-]"""
-
+PAD = 75  # Samples before and after each drive in which the context holds its outermost value: 15 s. [-]
+# What is cut for tracing: a little more around lane changes than for fitting, or their last second looks like an effect
+# of the lane.
 TRACE_RULES = CutRules(lane_change_margin=6.0)
-"""What is cut for tracing: a little more around lane changes than for fitting, or their last second looks like an
-effect of the lane."""
-
-LOCAL_S = 20.0
-"""Movement slower than this counts as mean, faster as spread. [s]"""
-
-MIN_VALID_S = 120.0
-"""Road-following time below which nothing can be said. [s]"""
+LOCAL_S = 20.0  # Movement slower than this counts as mean, faster as spread. [s]
+MIN_VALID_S = 120.0  # Road-following time below which nothing can be said. [s]
 
 
 @dataclass(frozen=True, eq=False, slots=True)

@@ -8,16 +8,13 @@ from enum import IntEnum
 from typing import TYPE_CHECKING, ClassVar, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from xosc_lateral.driver.effects import Effect
 from xosc_lateral.identification.regression import Coarse, Fitted
-from xosc_lateral.identification.timeline import on_fine_grid
+from xosc_lateral.identification.timeline import FloatArray, on_fine_grid
 
 if TYPE_CHECKING:
     from xosc_lateral.identification.search import Search
-
-FloatArray = NDArray[np.float64]
 
 
 class Stage(IntEnum):
@@ -114,21 +111,16 @@ class Outcome:
 class Term(ABC):
     """One term. Frozen and small; sizes are in the fit, not in the term."""
 
-    component: ClassVar[str]
-    """Key of its share of the error budget."""
-    kind: ClassVar[str]
-    """As in the report's schema."""
-    stages: ClassVar[tuple[Stage, ...]] = ()
-    """At which it is tested; none: with another term, which it competes with."""
+    component: ClassVar[str]  # Key of its share of the error budget.
+    kind: ClassVar[str]  # As in the report's schema.
+    stages: ClassVar[tuple[Stage, ...]] = ()  # At which it is tested; none: with another term, which it competes with.
+    # Among those of a stage: smaller ones are asked first, and first where two are equally sure; then by name. [-]
     place: ClassVar[int] = 0
-    """Among those of a stage: smaller ones are asked first, and first where two are equally sure; then by name. [-]"""
-    weight: ClassVar[float]
-    """Of its component in the error budget; one for each kind of hidden effect. [-]"""
-    least_drives: ClassVar[int] = 1
-    """In a table in which it is tested."""
+    weight: ClassVar[float]  # Of its component in the error budget; one for each kind of hidden effect. [-]
+    least_drives: ClassVar[int] = 1  # In a table in which it is tested.
+    # Whether the mean or the innovations' scale follow terms of this class on held-out rows: not the latent path of a
+    # cycle, nor what changes the slow movement alone.
     seen_held_out: ClassVar[bool] = True
-    """Whether the mean or the innovations' scale follow terms of this class on held-out rows: not the latent path of a
-    cycle, nor what changes the slow movement alone."""
 
     @property
     def columns(self) -> tuple[str, ...]:

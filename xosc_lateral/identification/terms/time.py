@@ -15,7 +15,6 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from xosc_lateral.driver.effects import Effect, Step, TimeSmooth
 from xosc_lateral.identification.low_frequencies import (
@@ -40,20 +39,14 @@ from xosc_lateral.identification.squares import SLOW_S, fine_squares, log_sizes,
 from xosc_lateral.identification.terms.base import Description, Outcome, Removal, Stage, Term, centred
 from xosc_lateral.identification.terms.cycle import latent_path
 from xosc_lateral.identification.terms.spread import what_a_column_may_do, what_columns_do
+from xosc_lateral.identification.timeline import FloatArray
 
 if TYPE_CHECKING:
     from xosc_lateral.identification.search import Search
 from xosc_lateral.identification.timeline import on_fine_grid
 
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
-
-
-STEP_PARAMETERS = 2
-"""Of a step: its height and its moment."""
-
-SURER = 0.01
-"""Where it is surer than the best column by this factor, what that column may do is left to time. [-]"""
+STEP_PARAMETERS = 2  # Of a step: its height and its moment.
+SURER = 0.01  # Where it is surer than the best column by this factor, what that column may do is left to time. [-]
 
 
 @dataclass(frozen=True, eq=False)
