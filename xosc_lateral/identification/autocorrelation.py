@@ -32,18 +32,11 @@ BIAS_SEED = 0  # The same numbers each time: fits with and without a term differ
 
 @dataclass(frozen=True, eq=False)
 class MovementProcess:
-    """x_t = sum_k a_k x_{t-k} + sd * white.
+    """x_t = sum_k a_k x_{t-k} + sd * white."""
 
-    Parameters
-    ----------
-    lags : tuple of array
-        Coefficients of the best predictors from 0, 1, ... p past values; the last one is the process itself.
-    deviations : array, shape (p + 1,)
-        Standard deviation of each predictor's error.
-    """
-
+    # Coefficients of the best predictors from 0, 1, ... p past values; the last one is the process itself.
     lags: tuple[FloatArray, ...]
-    deviations: FloatArray
+    deviations: FloatArray  # shape (p + 1,): Standard deviation of each predictor's error.
 
     @property
     def order(self) -> int:
@@ -232,26 +225,13 @@ def unbiased(
 
 @dataclass(frozen=True, eq=False)
 class Whitener:
-    """Turns series on the grid into independent rows of variance 1, the drives' own levels taken out.
+    """Turns series on the grid into independent rows of variance 1, the drives' own levels taken out."""
 
-    Parameters
-    ----------
-    process : MovementProcess
-        Of the movement divided by `scale`.
-    valid : bool array, shape (n,)
-    drive : int array, shape (n,)
-        Which level a row has; increasing.
-    scale : array, shape (n,)
-        Factor on the movement at each row.
-    runs : tuple of slice, optional
-        Rows of each run, where they stand side by side without anything invalid in between.
-    """
-
-    process: MovementProcess
-    valid: BoolArray
-    drive: IntArray
-    scale: FloatArray
-    runs: tuple[slice, ...] = ()
+    process: MovementProcess  # Of the movement divided by `scale`.
+    valid: BoolArray  # shape (n,)
+    drive: IntArray  # shape (n,): Which level a row has; increasing.
+    scale: FloatArray  # shape (n,): Factor on the movement at each row.
+    runs: tuple[slice, ...] = ()  # Rows of each run, where they stand side by side without anything invalid in between.
 
     @cached_property
     def compact(self) -> Whitener:

@@ -61,23 +61,12 @@ class Family(StrEnum):
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Candidate:
-    """A quantity with one degree of freedom, not yet sized.
+    """A quantity with one degree of freedom, not yet sized."""
 
-    Parameters
-    ----------
-    effect : ColumnEffect
-        Without coefficients.
-    family : Family
-    cost : float
-        What its family's size takes from its score. [squared score]
-    contrast : tuple of float
-        Weights of the effect's components, where it has several.
-    """
-
-    effect: ColumnEffect
+    effect: ColumnEffect  # Without coefficients.
     family: Family
-    cost: float
-    contrast: tuple[float, ...] = (1.0,)
+    cost: float  # What its family's size takes from its score. [squared score]
+    contrast: tuple[float, ...] = (1.0,)  # Weights of the effect's components, where it has several.
 
     @property
     def columns(self) -> tuple[str, ...]:
@@ -114,19 +103,11 @@ def candidates_of(columns: Sequence[Column], context: Mapping[str, FloatArray], 
 
 @dataclass(frozen=True, slots=True)
 class Shapes:
-    """Shapes of one column for refinement.
+    """Shapes of one column for refinement."""
 
-    Parameters
-    ----------
-    plain, bent : list of ColumnEffect
-        Bent ones with a fine choice of limits and scales.
-    finer : float
-        How many times as many bent ones as the dictionary has. [-]
-    """
-
-    plain: list[ColumnEffect]
-    bent: list[ColumnEffect]
-    finer: float
+    plain: list[ColumnEffect]  # Bent ones with a fine choice of limits and scales.
+    bent: list[ColumnEffect]  # Bent ones with a fine choice of limits and scales.
+    finer: float  # How many times as many bent ones as the dictionary has. [-]
 
 
 def shapes_of(column: Column, values: FloatArray, *, curves: bool) -> Shapes:

@@ -149,27 +149,13 @@ class Values(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Column:
-    """One context column that varies.
-
-    Parameters
-    ----------
-    name : str
-    values : Values
-        How it can act.
-    gaps : bool
-        NaN ("there is none") occurs often enough to tell.
-    levels : tuple of float
-        Values, for a switch or levels; those that are rare left out.
-    period : float
-        Full circle of an angle, else 0.
-    role : Role
-    """
+    """One context column that varies."""
 
     name: str
-    values: Values
-    gaps: bool
-    levels: tuple[float, ...] = ()
-    period: float = 0.0
+    values: Values  # How it can act.
+    gaps: bool  # NaN ("there is none") occurs often enough to tell.
+    levels: tuple[float, ...] = ()  # Values, for a switch or levels; those that are rare left out.
+    period: float = 0.0  # Full circle of an angle, else 0.
     role: Role = Role.UNKNOWN
 
 

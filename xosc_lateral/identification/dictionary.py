@@ -83,22 +83,12 @@ class Quantities:
 
 @dataclass(frozen=True, eq=False)
 class Dictionary:
-    """Whitened candidates at every lag and response.
+    """Whitened candidates at every lag and response."""
 
-    Parameters
-    ----------
-    candidates : list of Candidate
-        One per entry.
-    lag, response : array, shape (entries,)
-        [s]
-    rows : array, shape (entries, seconds)
-        Length one each; valid seconds only.
-    """
-
-    candidates: list[Candidate]
-    lag: FloatArray
-    response: FloatArray
-    rows: SingleArray
+    candidates: list[Candidate]  # One per entry.
+    lag: FloatArray  # shape (entries,): [s]
+    response: FloatArray  # shape (entries,): [s]
+    rows: SingleArray  # shape (entries, seconds): Length one each; valid seconds only.
     costs: FloatArray = field(init=False)
 
     def __post_init__(self) -> None:
@@ -179,17 +169,10 @@ def _unit_rows(rows: FloatArray, before: FloatArray) -> tuple[FloatArray, FloatA
 
 @dataclass(frozen=True, eq=False)
 class Scores:
-    """Scores of all entries, and the largest ones that the null gives.
+    """Scores of all entries, and the largest ones that the null gives."""
 
-    Parameters
-    ----------
-    scores : array, shape (entries,)
-        Squared score less cost; -inf: barred.
-    maxima : array, shape (NULL_DRAWS,)
-    """
-
-    scores: FloatArray
-    maxima: FloatArray
+    scores: FloatArray  # shape (entries,): Squared score less cost; -inf: barred.
+    maxima: FloatArray  # shape (NULL_DRAWS,)
 
     @property
     def best(self) -> int:

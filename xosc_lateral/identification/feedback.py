@@ -65,32 +65,15 @@ MIN_SEGMENTS = 12  # Fewer segments of one length than this say little: the next
 
 @dataclass(frozen=True, slots=True)
 class Feedback:
-    """A column that the movement itself brings about.
-
-    Parameters
-    ----------
-    column : str
-    coherence : float
-        Squared, above 0.2 Hz, with what it follows most. [-]
-    predicted_share : float
-        Share of its innovations that the movement predicts. [-]
-    function : float
-        Squared coherence, in the same band, with its own mean given the present movement. [-]
-    of : str
-        What it follows: "offset", "size of the offset", ...
-    doubtful : bool
-        No mark is clear.
-    source : str
-        "declared" or "name": it is said to be the car's own movement; empty: its values show it.
-    """
+    """A column that the movement itself brings about."""
 
     column: str
-    coherence: float
-    predicted_share: float
-    function: float
-    of: str
-    doubtful: bool
-    source: str = ""
+    coherence: float  # Squared, above 0.2 Hz, with what it follows most. [-]
+    predicted_share: float  # Share of its innovations that the movement predicts. [-]
+    function: float  # Squared coherence, in the same band, with its own mean given the present movement. [-]
+    of: str  # What it follows: "offset", "size of the offset", ...
+    doubtful: bool  # No mark is clear.
+    source: str = ""  # "declared" or "name": it is said to be the car's own movement; empty: its values show it.
 
 
 def find_feedback(

@@ -119,26 +119,15 @@ class Setting:
 
 @dataclass(frozen=True, eq=False)
 class HeldOut:
-    """Summary statistics on held-out blocks, measured and expected of both profiles.
-
-    Parameters
-    ----------
-    statistics : SummaryStatistics
-    real, before, after : mapping of str to array
-        By group. [m]
-    runs_before, runs_after : array, shape (runs, n)
-        Of the profiles. [m]
-    halves : list of mapping of str to array
-        See `residual.half_samples`. [m]
-    """
+    """Summary statistics on held-out blocks, measured and expected of both profiles."""
 
     statistics: SummaryStatistics
-    real: dict[str, FloatArray]
-    before: dict[str, FloatArray]
-    after: dict[str, FloatArray]
-    runs_before: FloatArray
-    runs_after: FloatArray
-    halves: list[dict[str, FloatArray]]
+    real: dict[str, FloatArray]  # By group. [m]
+    before: dict[str, FloatArray]  # By group. [m]
+    after: dict[str, FloatArray]  # By group. [m]
+    runs_before: FloatArray  # shape (runs, n): Of the profiles. [m]
+    runs_after: FloatArray  # shape (runs, n): Of the profiles. [m]
+    halves: list[dict[str, FloatArray]]  # See `residual.half_samples`. [m]
 
     @property
     def errors(self) -> tuple[float, float]:

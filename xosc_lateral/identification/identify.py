@@ -44,26 +44,13 @@ class Usable:
 
 @dataclass(frozen=True, eq=False)
 class Identified:
-    """What a table of drives calls for.
-
-    Parameters
-    ----------
-    usable : Usable
-    selection : Selection
-        Terms that are kept, each with its held-out gain, and everything rejected.
-    nested : Nested or None
-        Selections of all folds; None: nothing was found.
-    total : Gain or None
-        Of all kept terms together.
-    returned_base : str
-        Why nothing is kept although something was found; empty otherwise.
-    """
+    """What a table of drives calls for."""
 
     usable: Usable
-    selection: Selection
-    nested: Nested | None = None
-    total: Gain | None = None
-    returned_base: str = ""
+    selection: Selection  # Terms that are kept, each with its held-out gain, and everything rejected.
+    nested: Nested | None = None  # Selections of all folds; None: nothing was found.
+    total: Gain | None = None  # Of all kept terms together.
+    returned_base: str = ""  # Why nothing is kept although something was found; empty otherwise.
 
     @property
     def taken_back(self) -> tuple[Rejected, ...]:

@@ -67,40 +67,21 @@ LAG_LIMIT = 5.0  # Longest lag either way. [s]
 
 @dataclass(frozen=True, eq=False)
 class Refined:
-    """One effect, refined.
+    """One effect, refined."""
 
-    Parameters
-    ----------
-    effect : ColumnEffect
-        Without coefficients.
-    score : float
-        Squared score of all its coefficients, less log n for each beyond the first (Schwarz) and less its price.
-    price : float
-        Of its family, and of a finer choice within it than the dictionary has.
-    """
-
-    effect: ColumnEffect
+    effect: ColumnEffect  # Without coefficients.
+    # Squared score of all its coefficients, less log n for each beyond the first (Schwarz) and less its price.
     score: float
-    price: float
+    price: float  # Of its family, and of a finer choice within it than the dictionary has.
 
 
 @dataclass(frozen=True, eq=False)
 class Problem:
-    """One linear regression, whitened: an ordinary one [2]_.
+    """One linear regression, whitened: an ordinary one [2]_."""
 
-    Parameters
-    ----------
-    whitener : Whitener
-        For series and columns.
-    series : array, shape (n,)
-        With what the model has of this component still in.
-    columns : array, shape (n, k)
-        What the model has already.
-    """
-
-    whitener: Whitener
-    series: FloatArray
-    columns: FloatArray
+    whitener: Whitener  # For series and columns.
+    series: FloatArray  # shape (n,): With what the model has of this component still in.
+    columns: FloatArray  # shape (n, k): What the model has already.
 
     @property
     def valid(self) -> BoolArray:

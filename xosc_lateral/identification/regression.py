@@ -55,27 +55,15 @@ MIN_DRIFT_S = 600.0  # A shorter drive tells nothing about drift or a trend of t
 
 @dataclass(frozen=True, eq=False)
 class Coarse:
-    """The timeline at 1 Hz, and every column effect's response on it.
-
-    Parameters
-    ----------
-    timeline : Timeline
-    offset : array, shape (n,)
-        Mean of each second. [m]
-    valid : bool array, shape (n,)
-    drive : int array, shape (n,)
-    time : array, shape (n,)
-        [s]
-    context : mapping of str to array
-        Columns on the fine grid, lane width included, clipped to what occurs while road-following: a traffic jam that
-        is cut out must not stretch a column's range.
-    """
+    """The timeline at 1 Hz, and every column effect's response on it."""
 
     timeline: Timeline
-    offset: FloatArray
-    valid: BoolArray
-    drive: IntArray
-    time: FloatArray
+    offset: FloatArray  # shape (n,): Mean of each second. [m]
+    valid: BoolArray  # shape (n,)
+    drive: IntArray  # shape (n,)
+    time: FloatArray  # shape (n,): [s]
+    # Columns on the fine grid, lane width included, clipped to what occurs while road-following: a traffic jam that is
+    # cut out must not stretch a column's range.
     context: Mapping[str, FloatArray]
     _responses: dict[ColumnEffect, FloatArray] = field(default_factory=dict, repr=False)
 
@@ -165,47 +153,22 @@ class ModelTerm(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class Fitted:
-    """Terms with sizes, and what is left.
-
-    Parameters
-    ----------
-    coarse : Coarse
-    terms : tuple of ModelTerm
-    whitener : Whitener
-    columns : array, shape (n, k)
-        Of the mean, term by term.
-    sizes, covariance : array, shape (k,), (k, k)
-        [m] per unit.
-    levels : array, shape (drives,)
-        Mean offset of every drive where all mean terms are at their mean. [m]
-    scales : array, shape (n, j)
-        Columns of the log scale, term by term.
-    log_sizes, log_covariance : array, shape (j,), (j, j)
-        Natural logarithm per unit.
-    rows : array, shape (n,)
-        Whitened residual, variance 1, 0 where invalid.
-    movement : array, shape (n,)
-        Offset less level and mean terms, over the scale; 0 where invalid. [m]
-    starts : array, shape (order + 1,)
-        Factor on the errors of the first rows of runs, for the likelihood.
-    log_likelihood : float
-        Gaussian, of the valid rows.
-    """
+    """Terms with sizes, and what is left."""
 
     coarse: Coarse
     terms: tuple[ModelTerm, ...]
     whitener: Whitener
-    columns: FloatArray
-    sizes: FloatArray
-    covariance: FloatArray
-    levels: FloatArray
-    scales: FloatArray
-    log_sizes: FloatArray
-    log_covariance: FloatArray
-    rows: FloatArray
-    movement: FloatArray
-    starts: FloatArray
-    log_likelihood: float
+    columns: FloatArray  # shape (n, k): Of the mean, term by term.
+    sizes: FloatArray  # shape (k,): [m] per unit.
+    covariance: FloatArray  # shape (k, k): [m] per unit.
+    levels: FloatArray  # shape (drives,): Mean offset of every drive where all mean terms are at their mean. [m]
+    scales: FloatArray  # shape (n, j): Columns of the log scale, term by term.
+    log_sizes: FloatArray  # shape (j,): Natural logarithm per unit.
+    log_covariance: FloatArray  # shape (j, j): Natural logarithm per unit.
+    rows: FloatArray  # shape (n,): Whitened residual, variance 1, 0 where invalid.
+    movement: FloatArray  # shape (n,): Offset less level and mean terms, over the scale; 0 where invalid. [m]
+    starts: FloatArray  # shape (order + 1,): Factor on the errors of the first rows of runs, for the likelihood.
+    log_likelihood: float  # Gaussian, of the valid rows.
 
     @property
     def scale(self) -> FloatArray:

@@ -47,23 +47,12 @@ SPARE_ROWS = 75  # A bin with fewer rows (15 s) than this is left out. [-]
 
 @dataclass(frozen=True, eq=False)
 class SummaryStatistics:
-    """What is compared, once for measured and sampled offsets alike.
-
-    Parameters
-    ----------
-    timeline : Timeline
-    labels : mapping of str to int array, shape (n,)
-        Bin of every row by group (a column's name, "time", ...), -1: none.
-    middles : mapping of str to array
-        Mean of the quantity per bin, for curves.
-    oscillation : float, optional
-        Frequency of a weave that was found. [1/s]
-    """
+    """What is compared, once for measured and sampled offsets alike."""
 
     timeline: Timeline
-    labels: Mapping[str, IntArray]
-    middles: Mapping[str, FloatArray]
-    oscillation: float | None = None
+    labels: Mapping[str, IntArray]  # shape (n,): Bin of every row by group (a column's name, "time", ...), -1: none.
+    middles: Mapping[str, FloatArray]  # Mean of the quantity per bin, for curves.
+    oscillation: float | None = None  # Frequency of a weave that was found. [1/s]
 
     def describe(self, offset: FloatArray, used: BoolArray) -> dict[str, FloatArray]:
         """Statistics of one series of offsets on the grid, shape (n,), by group. [m]"""

@@ -29,30 +29,16 @@ KEPT = 2
 
 @dataclass(frozen=True, eq=False)
 class Search:
-    """What stays the same in all tests.
-
-    Parameters
-    ----------
-    coarse : Coarse
-    columns : mapping of str to Column
-        That may act.
-    quantities : Quantities
-    seed : SeedSequence
-    budget : Budget
-        How surely each component has to be found.
-    progress : callable
-        Gets what is being done, in a few words.
-    wanted : mapping of str to int, optional
-        How many terms a component has in the table that this is a part of: so many are added, best first, whatever
-        their p-values, and components that have none are not tested. None: this is the table.
-    """
+    """What stays the same in all tests."""
 
     coarse: Coarse
-    columns: Mapping[str, Column]
+    columns: Mapping[str, Column]  # That may act.
     quantities: Quantities
     seed: np.random.SeedSequence
-    budget: Budget
-    progress: Callable[[str], None]
+    budget: Budget  # How surely each component has to be found.
+    progress: Callable[[str], None]  # Gets what is being done, in a few words.
+    # How many terms a component has in the table that this is a part of: so many are added, best first, whatever their
+    # p-values, and components that have none are not tested. None: this is the table.
     wanted: Mapping[str, int] | None = None
     _kept: dict[tuple[object, int], tuple[object, Any]] = field(default_factory=dict, init=False, repr=False)
 

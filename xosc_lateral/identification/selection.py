@@ -38,19 +38,11 @@ MAX_TERMS = 8  # Terms of one table, at most.
 
 @dataclass(frozen=True, slots=True)
 class Gain:
-    """Gain in log-likelihood on rows that nothing was chosen or fitted on.
+    """Gain in log-likelihood on rows that nothing was chosen or fitted on."""
 
-    Parameters
-    ----------
-    mean, error : float
-        Over blocks, per block, with the standard error of the mean. [nat]
-    folds : int
-        In how many folds the term was chosen again.
-    """
-
-    mean: float
-    error: float
-    folds: int
+    mean: float  # Over blocks, per block, with the standard error of the mean. [nat]
+    error: float  # Over blocks, per block, with the standard error of the mean. [nat]
+    folds: int  # In how many folds the term was chosen again.
 
     @property
     def interval(self) -> tuple[float, float]:

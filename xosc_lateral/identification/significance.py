@@ -42,19 +42,12 @@ MANY_DRIVES = 20
 
 @dataclass(frozen=True, slots=True)
 class Budget:
-    """How the error budget is shared among the components that are tested.
+    """How the error budget is shared among the components that are tested."""
 
-    Parameters
-    ----------
-    weights : mapping of str to float
-        Of each component. As shipped: as much for the mean within drives as between them; a quarter for what changes
-        the movement's size or its strength; the rest for hidden effects, which are few to choose among. [-]
-    least_drives : mapping of str to int
-        Drives from which a component is asked at all, where that is more than one.
-    """
-
+    # Of each component. As shipped: as much for the mean within drives as between them; a quarter for what changes the
+    # movement's size or its strength; the rest for hidden effects, which are few to choose among. [-]
     weights: Mapping[str, float]
-    least_drives: Mapping[str, int]
+    least_drives: Mapping[str, int]  # Drives from which a component is asked at all, where that is more than one.
 
     def level_of(self, component: str, drives: int) -> float:
         """Family-wise level that a component may spend.

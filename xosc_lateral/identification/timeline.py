@@ -39,41 +39,18 @@ MIN_VALID_S = 120.0  # Road-following time below which nothing can be said. [s]
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Timeline:
-    """All drives on the 0.2 s grid.
+    """All drives on the 0.2 s grid."""
 
-    Parameters
-    ----------
-    names : tuple of str
-        Drives.
-    drive : int array, shape (n,)
-        Index into `names`.
-    time : array, shape (n,)
-        The drive's own clock. [s]
-    offset : array, shape (n,)
-        0 outside `valid`. [m]
-    valid : bool array, shape (n,)
-        Road-following, not cut out.
-    lane_width : array, shape (n,)
-        [m]
-    context : mapping of str to array, shape (n,)
-        NaN: there is none.
-    levels : frozenset of str
-        Columns of whole numbers.
-    periods : mapping of str to float
-        Full circle of the columns that wrap around.
-    of_one_camera : frozenset of str
-        Columns measured by the camera that measured the offset, and misjudged markings: their errors are the offset's.
-    """
-
-    names: tuple[str, ...]
-    drive: IntArray
-    time: FloatArray
-    offset: FloatArray
-    valid: BoolArray
-    lane_width: FloatArray
-    context: Mapping[str, FloatArray]
-    levels: frozenset[str]
-    periods: Mapping[str, float] = field(default_factory=dict)
+    names: tuple[str, ...]  # Drives.
+    drive: IntArray  # shape (n,): Index into `names`.
+    time: FloatArray  # shape (n,): The drive's own clock. [s]
+    offset: FloatArray  # shape (n,): 0 outside `valid`. [m]
+    valid: BoolArray  # shape (n,): Road-following, not cut out.
+    lane_width: FloatArray  # shape (n,): [m]
+    context: Mapping[str, FloatArray]  # shape (n,): NaN: there is none.
+    levels: frozenset[str]  # Columns of whole numbers.
+    periods: Mapping[str, float] = field(default_factory=dict)  # Full circle of the columns that wrap around.
+    # Columns measured by the camera that measured the offset, and misjudged markings: their errors are the offset's.
     of_one_camera: frozenset[str] = frozenset()
 
     def __len__(self) -> int:

@@ -35,49 +35,25 @@ class Stage(IntEnum):
 
 @dataclass(frozen=True, slots=True)
 class Description:
-    """A term in numbers that a report can put into words.
+    """A term in numbers that a report can put into words."""
 
-    Parameters
-    ----------
-    name : str
-        Short name of the effect.
-    shape : str
-    size : float
-        [m], or a factor.
-    error : float
-        Standard error of the size.
-    statistic : str
-        Group of summary statistics that shows it best.
-    measure : str
-        What the errors before and after compare.
-    lag_s, response_s : float or None
-    """
-
-    name: str
+    name: str  # Short name of the effect.
     shape: str
-    size: float
-    error: float
-    statistic: str
-    measure: str
+    size: float  # [m], or a factor.
+    error: float  # Standard error of the size.
+    statistic: str  # Group of summary statistics that shows it best.
+    measure: str  # What the errors before and after compare.
     lag_s: float | None = None
     response_s: float | None = None
 
 
 @dataclass(eq=False)
 class Removal:
-    """What all terms together did to the measured offsets, on the 0.2 s grid, shape (n,) each.
+    """What all terms together did to the measured offsets, on the 0.2 s grid, shape (n,) each."""
 
-    Parameters
-    ----------
-    location : array
-        [m]
-    spread, fine : array
-        Natural logarithm of a factor.
-    """
-
-    location: FloatArray
-    spread: FloatArray = field(init=False)
-    fine: FloatArray = field(init=False)
+    location: FloatArray  # [m]
+    spread: FloatArray = field(init=False)  # Natural logarithm of a factor.
+    fine: FloatArray = field(init=False)  # Natural logarithm of a factor.
 
     def __post_init__(self) -> None:
         """Nothing but the location so far."""
@@ -86,26 +62,13 @@ class Removal:
 
 @dataclass(frozen=True, eq=False)
 class Outcome:
-    """What a test says.
+    """What a test says."""
 
-    Parameters
-    ----------
-    term : Term or None
-        To be added, or None: nothing that could be.
-    columns : tuple of str
-    p_value : float
-        Family-wise over everything that the test tried.
-    after : Fitted, optional
-        Fit with the term, where the test has made it.
-    together : tuple of Term
-        Found with it, as one finding.
-    """
-
-    term: Term | None
+    term: Term | None  # To be added, or None: nothing that could be.
     columns: tuple[str, ...]
-    p_value: float
-    after: Fitted | None = None
-    together: tuple[Term, ...] = ()
+    p_value: float  # Family-wise over everything that the test tried.
+    after: Fitted | None = None  # Fit with the term, where the test has made it.
+    together: tuple[Term, ...] = ()  # Found with it, as one finding.
 
 
 class Term(ABC):

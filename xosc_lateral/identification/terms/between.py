@@ -121,21 +121,12 @@ def between_shift(fitted: Fitted) -> FloatArray:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class _Places:
-    """Places that drives keep.
+    """Places that drives keep."""
 
-    Parameters
-    ----------
-    place : array, shape (drives,)
-        Levels. [m]
-    weight : array, shape (drives,)
-        One over the variance of a place about what is known; 0: the drive is too short. [1/m^2]
-    known : array, shape (drives, k)
-        A one and the effects between drives that are in the model.
-    """
-
-    place: FloatArray
+    place: FloatArray  # shape (drives,): Levels. [m]
+    # shape (drives,): One over the variance of a place about what is known; 0: the drive is too short. [1/m^2]
     weight: FloatArray
-    known: FloatArray
+    known: FloatArray  # shape (drives, k): A one and the effects between drives that are in the model.
 
     @classmethod
     def of(cls, fitted: Fitted) -> _Places:
@@ -185,18 +176,10 @@ LEAST_APART = 0.1
 
 @dataclass(frozen=True, slots=True)
 class Best:
-    """What explains most.
+    """What explains most."""
 
-    Parameters
-    ----------
-    members : tuple of int
-        One candidate, or two.
-    p_value : float
-        Family-wise over all candidates and pairs.
-    """
-
-    members: tuple[int, ...]
-    p_value: float
+    members: tuple[int, ...]  # One candidate, or two.
+    p_value: float  # Family-wise over all candidates and pairs.
 
 
 def best_of_drives(
@@ -239,18 +222,11 @@ def best_of_drives(
 
 @dataclass(frozen=True, eq=False, slots=True)
 class _Pairs:
-    """Pairs of candidates that are two quantities.
+    """Pairs of candidates that are two quantities."""
 
-    Parameters
-    ----------
-    first, second : int array, shape (pairs,)
-    product : array, shape (pairs,)
-        Cosine of the angle between the two.
-    """
-
-    first: NDArray[np.intp]
-    second: NDArray[np.intp]
-    product: FloatArray
+    first: NDArray[np.intp]  # shape (pairs,)
+    second: NDArray[np.intp]  # shape (pairs,)
+    product: FloatArray  # shape (pairs,): Cosine of the angle between the two.
 
     @classmethod
     def of(cls, quantities: FloatArray, columns: Sequence[str]) -> _Pairs:

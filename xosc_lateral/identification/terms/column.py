@@ -21,21 +21,13 @@ FACTOR_QUANTILES = (0.05, 0.95)
 
 @dataclass(frozen=True, eq=False)
 class ColumnTerm(Term):
-    """An effect of one or two columns.
-
-    Parameters
-    ----------
-    effect : ColumnEffect
-        Without coefficients.
-    alike : tuple of tuple of str
-        Columns of each other effect that explains as much.
-    """
+    """An effect of one or two columns."""
 
     acts: ClassVar[Acts]
     what: ClassVar[str]  # What it acts on, in words.
     group: ClassVar[str] = "spread"  # Mean or spread: which summary statistics show it.
-    effect: ColumnEffect
-    alike: Alternatives = ()
+    effect: ColumnEffect  # Without coefficients.
+    alike: Alternatives = ()  # Columns of each other effect that explains as much.
 
     @property
     def columns(self) -> tuple[str, ...]:

@@ -32,23 +32,15 @@ STATISTIC = "movement at the weave's period"
 
 @dataclass(frozen=True, eq=False)
 class CycleTerm(Term):
-    """Sines and cosines of neighbouring frequencies.
-
-    Parameters
-    ----------
-    frequency : float
-        [1/s]
-    width : int
-        Number of neighbouring frequencies: its phase drifts.
-    """
+    """Sines and cosines of neighbouring frequencies."""
 
     component: ClassVar[str] = "cycle"
     kind: ClassVar[str] = "periodic"
     stages: ClassVar[tuple[Stage, ...]] = (Stage.LOW_FREQUENCY,)
     weight: ClassVar[float] = 1.0
     seen_held_out: ClassVar[bool] = False
-    frequency: float
-    width: int = 1
+    frequency: float  # [1/s]
+    width: int = 1  # Number of neighbouring frequencies: its phase drifts.
 
     def mean_columns(self, coarse: Coarse) -> FloatArray:
         """Cosines and sines for each drive, shape (n, 2 * width * drives)."""

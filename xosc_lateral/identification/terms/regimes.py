@@ -76,26 +76,13 @@ STARTS = ((1.6, 15.0), (2.2, 40.0))
 
 @dataclass(frozen=True, eq=False, slots=True)
 class RegimeFit:
-    """Two regimes of a movement.
+    """Two regimes of a movement."""
 
-    Parameters
-    ----------
-    factor : float
-        Spread in the loud regime over the quiet one. [-]
-    on_s, off_s : float
-        Mean length of either. [s]
-    on : array, shape (n,)
-        Probability that the loud regime is on, given the whole drive.
-    quiet : float
-        Standard deviation of the innovations in the quiet regime. [-]
-    log_likelihood : float
-    """
-
-    factor: float
-    on_s: float
-    off_s: float
-    on: FloatArray
-    quiet: float
+    factor: float  # Spread in the loud regime over the quiet one. [-]
+    on_s: float  # Mean length of either. [s]
+    off_s: float  # Mean length of either. [s]
+    on: FloatArray  # shape (n,): Probability that the loud regime is on, given the whole drive.
+    quiet: float  # Standard deviation of the innovations in the quiet regime. [-]
     log_likelihood: float
 
 
@@ -137,12 +124,7 @@ DRAWS = 2000  # Orders of the blocks that are the null.
 
 @dataclass(frozen=True, eq=False)
 class RegimesTerm(Term):
-    """Two-state Markov chain in the log scale.
-
-    Parameters
-    ----------
-    fit : RegimeFit
-    """
+    """Two-state Markov chain in the log scale."""
 
     component: ClassVar[str] = "regimes"
     kind: ClassVar[str] = "regime"
