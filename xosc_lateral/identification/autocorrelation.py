@@ -19,7 +19,7 @@ from itertools import pairwise
 import numpy as np
 
 from xosc_lateral.identification.timeline import BoolArray, FloatArray, IntArray
-from xosc_lateral.mask import true_slices
+from xosc_lateral.rows import true_slices
 
 MAX_REFLECTION = 0.999  # Reflection coefficients are kept inside the unit circle: the process is stationary. [-]
 ENOUGH_ROWS = 0.5  # The memory is the longest for which this share of the rows has so much past in its own run. [-]

@@ -38,7 +38,7 @@ from xosc_lateral.identification.terms.base import Removal, Term
 from xosc_lateral.identification.terms.cycle import CycleTerm
 from xosc_lateral.identification.terms.time import StepTerm
 from xosc_lateral.identification.timeline import COARSE, BoolArray, FloatArray, IntArray, Timeline
-from xosc_lateral.mask import true_slices
+from xosc_lateral.rows import true_slices
 
 FINE_S = 1.0  # Movement within this time counts as fine when a spread is taken out. [s]
 # By key ("mean 0", "step 0"): a term and what the profile gets for it.
