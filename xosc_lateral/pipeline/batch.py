@@ -53,15 +53,8 @@ class JobState(StrEnum):
 class JobOutcome:
     """What became of a job.
 
-    Parameters
-    ----------
-    state : JobState
-    row : ManifestRow
-        As in the manifest.
-    seconds : float
-        The conversion took. [s]
-    why : str
-        Why an output that was there is made anew, or would be; empty: there was none.
+    `row`: as in the manifest; `seconds`: the conversion took. [s]; `why`: why an output that was there is made anew, or
+    would be; empty: there was none.
     """
 
     state: JobState

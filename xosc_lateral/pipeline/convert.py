@@ -55,26 +55,15 @@ def convert_scenario(
 ) -> ConvertedScenario:
     """Convert one scenario and write it.
 
-    Parameters
-    ----------
-    source : Path
-        Maneuver-based scenario.
-    output : Path
-        Where the converted one goes; its folder has to exist.
-    settings : ConvertSettings
-    variant : int
-        Number of the variant: another one, other offsets.
-    report : Path or None
-        Where the caller will write a report: refused like the output if it can't be meant, before anything is written.
-    save : bool
-        Write the output; else the result holds its bytes, with file references as seen from `output`'s folder.
+    - `source`: maneuver-based scenario
+    - `output`: where the converted one goes; its folder has to exist
+    - `variant`: number of the variant: another one, other offsets
+    - `report`: where the caller will write a report: refused like the output if it can't be meant, before anything is
+      written
+    - `save`: write the output; else the result holds its bytes, with file references as seen from `output`'s folder
 
-    Raises
-    ------
-    XoscLateralError
-        When the input is at fault; nothing is written then.
-    OSError
-        When the output can't be written; nothing is left half-written.
+    Raises `XoscLateralError`: when the input is at fault; nothing is written then; `OSError`: when the output can't be
+    written; nothing is left half-written.
     """
     with guarding_inputs(), beside(output.parent if save else None):
         return _convert(source, output, settings, variant, report, save)

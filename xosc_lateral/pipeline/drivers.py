@@ -29,12 +29,8 @@ NO_DRIVER = {
 def choose_drivers(scenario: Scenario, settings: ConvertSettings, egos: Mapping[str, str] | None = None) -> Drivers:
     """Per entity its profile, or why it gets none; `egos` are the vehicles under test, and why each is one.
 
-    Raises
-    ------
-    FormatError
-        If the settings name an entity that the scenario doesn't have.
-    DriverProfileError
-        If a profile is not known.
+    Raises `FormatError`: if the settings name an entity that the scenario doesn't have; `DriverProfileError`: if a
+    profile is not known.
     """
     known = {entity.name for entity in scenario.entities}
     asked = (("--entity", settings.entity), ("--only", settings.only or ()), ("--ego", settings.ego or ()))
@@ -66,10 +62,7 @@ def _driver(entity: Entity, settings: ConvertSettings) -> DriverProfile | str:
 def auto_profile(libraries: tuple[Path, ...]) -> Path:
     """File of what "auto" chooses: one in one of the folders comes before the shipped one.
 
-    Raises
-    ------
-    FormatError
-        If a folder isn't there.
+    Raises `FormatError`: if a folder isn't there.
     """
     return find_profile(AUTO_PROFILE, libraries)
 

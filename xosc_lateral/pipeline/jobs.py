@@ -29,26 +29,14 @@ from xosc_lateral.version import BEHAVIOUR, __version__
 class Job:
     """One output to make; plain values, so that it can be sent to another process.
 
-    Parameters
-    ----------
-    name : str
-        Path of the output below the output folder, with forward slashes: names its row in the manifest.
-    scenario : str
-        Path of the input below `base`, with forward slashes.
-    source, output : Path
-        Absolute.
-    base : Path
-        Folder that the output tree mirrors. Absolute.
-    settings : ConvertSettings
-    variant : int
-    fingerprint : str
-        SHA-256 over everything but the input files and the program that decides on the output's bytes.
-    error : str
-        Why it can't even be tried (a distribution that can't be read); empty normally.
-    page : Path or None
-        Where a report page about it is written, and its thumbnail beside that. Absolute.
-    package_version : str
-        Of the process that planned it: a worker with another one refuses.
+    - `name`: path of the output below the output folder, with forward slashes: names its row in the manifest
+    - `scenario`: path of the input below `base`, with forward slashes
+    - `source`, `output`: absolute
+    - `base`: folder that the output tree mirrors. Absolute
+    - `fingerprint`: SHA-256 over everything but the input files and the program that decides on the output's bytes
+    - `error`: why it can't even be tried (a distribution that can't be read); empty normally
+    - `page`: where a report page about it is written, and its thumbnail beside that. Absolute
+    - `package_version`: of the process that planned it: a worker with another one refuses
     """
 
     name: str
@@ -97,18 +85,11 @@ class Job:
 class Batch:
     """What `convert_many` does.
 
-    Parameters
-    ----------
-    folder : Path
-        Output tree. Absolute.
-    base : Path
-        Folder that it mirrors. Absolute.
-    jobs : tuple of Job
-        By name.
-    left_out : tuple of (Path, DocumentKind)
-        Files found in folders that are not to be converted: catalogs, outputs of former conversions.
-    notes : tuple of str
-        What a user has to know before it begins, a line each.
+    - `folder`: output tree. Absolute
+    - `base`: folder that it mirrors. Absolute
+    - `jobs`: by name
+    - `left_out`: files found in folders that are not to be converted: catalogs, outputs of former conversions
+    - `notes`: what a user has to know before it begins, a line each
     """
 
     folder: Path
@@ -131,32 +112,17 @@ def plan_batch(
 ) -> Batch:
     """Plan a batch; nothing is converted or written yet.
 
-    Parameters
-    ----------
-    inputs : sequence of str, Path or Request
-        Files, folders, globs, tables (see `find_requests`), or requests with settings of their own.
-    folder : str or Path
-        Output tree. It mirrors the inputs below their common folder: ``db/a/x.xosc`` of the input ``db`` becomes
-        ``folder/a/x.xosc``, its variants ``folder/a/x_01.xosc`` and so on, the scenarios that a parameter value
-        distribution stands for ``folder/a/x_p00000.xosc`` and so on. A row of a table
-        with settings of its own becomes ``folder/a/x_PROFILE_HASH.xosc``: its profile, and a hash of what else it says.
-    settings : ConvertSettings, optional
-        For every input that has none of its own.
-    variants : int
-        Outputs per scenario.
-    report : str or Path, optional
-        Folder for a report page per output, in a tree like that of the outputs.
+    - `inputs`: files, folders, globs, tables (see `find_requests`), or requests with settings of their own
+    - `folder`: output tree. It mirrors the inputs below their common folder: ``db/a/x.xosc`` of the input ``db``
+      becomes ``folder/a/x.xosc``, its variants ``folder/a/x_01.xosc`` and so on, the scenarios that a parameter value
+      distribution stands for ``folder/a/x_p00000.xosc`` and so on. A row of a table with settings of its own becomes
+      ``folder/a/x_PROFILE_HASH.xosc``: its profile, and a hash of what else it says
+    - `settings`: for every input that has none of its own
+    - `variants`: outputs per scenario
+    - `report`: folder for a report page per output, in a tree like that of the outputs
 
-    Returns
-    -------
-    Batch
-
-    Raises
-    ------
-    FormatError
-        An input or allowed folder that isn't there, two inputs with the same output, an output on top of an input.
-    DriverProfileError
-        A profile that is unknown.
+    Raises `FormatError`: an input or allowed folder that isn't there, two inputs with the same output, an output on top
+    of an input; `DriverProfileError`: a profile that is unknown.
     """
     settings = settings or ConvertSettings()
     require_folders(settings.allow)

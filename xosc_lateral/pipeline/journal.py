@@ -39,12 +39,7 @@ def folder_lock(path: Path) -> Iterator[None]:
     The operating system's lock counts, not the file: it goes with the process, however that ends, so a file that a
     killed run has left is no obstacle. What the file says (process and host) is for the message.
 
-    Raises
-    ------
-    FolderInUseError
-        When another process holds it.
-    OSError
-        When the folder can't be written.
+    Raises `FolderInUseError`: when another process holds it; `OSError`: when the folder can't be written.
     """
     file = _open_locked(path)
     try:
@@ -119,17 +114,11 @@ def _known(timing: Timing, now: int) -> Timing:
 class Journal:
     """Rows of an output folder, the newest of each output.
 
-    A file of JSON lines; a line that a kill cut short is dropped. Rows stay on disk: in memory is only where each
-    one begins, so that ten thousand of them cost a megabyte.
+    A file of JSON lines; a line that a kill cut short is dropped. Rows stay on disk: in memory is only where each one
+    begins, so that ten thousand of them cost a megabyte.
 
-    Parameters
-    ----------
-    folder : Path
-        Output folder; rows of its manifest count until the journal has newer ones.
-    path : Path
-        The journal.
-    notify : callable
-        Gets a line if manifest or timings can't be read: they are put aside, and the run goes on without.
+    `folder`: output folder; rows of its manifest count until the journal has newer ones; `path`: the journal; `notify`:
+    gets a line if manifest or timings can't be read: they are put aside, and the run goes on without.
     """
 
     def __init__(self, folder: Path, path: Path, notify: Callable[[str], None]) -> None:
@@ -173,10 +162,7 @@ class Journal:
     def add(self, row: ManifestRow, timing: Timing) -> None:
         """Append a row. From the return on it survives the death of this process.
 
-        Raises
-        ------
-        OSError
-            When the disk is full; rows added before are still there.
+        Raises `OSError`: when the disk is full; rows added before are still there.
         """
         self._changed = True
         self._append(row, timing)

@@ -46,26 +46,14 @@ def play_scenario(
 ) -> Played:
     """Read and play.
 
-    Parameters
-    ----------
-    path : Path
-        The ``.xosc`` file.
-    parameters : mapping of str to str, optional
-        Values that replace those declared.
-    step : float
-    time_limit : float or None
-        [s]
-    allowed : iterable of Path
-        Folders, besides those around the scenario, that its road and catalogs may lie in.
-    roads : RoadSearch
-        Where else its road may lie.
-    strict : bool
-        Refuse a missing vehicle catalog, instead of playing a usual car.
+    - `path`: the ``.xosc`` file
+    - `parameters`: values that replace those declared
+    - `time_limit`: [s]
+    - `allowed`: folders, besides those around the scenario, that its road and catalogs may lie in
+    - `roads`: where else its road may lie
+    - `strict`: refuse a missing vehicle catalog, instead of playing a usual car
 
-    Raises
-    ------
-    FormatError, PlaybackError
-        With file, line and element.
+    Raises `FormatError, PlaybackError`: with file, line and element.
     """
     values = tuple(sorted((parameters or {}).items()))
     scenario = _read(path, values, tuple(allowed), roads, strict)
