@@ -19,14 +19,7 @@ from xosc_lateral.scenario.distribution import ParameterSet
 class Concrete:
     """One scenario to convert.
 
-    Parameters
-    ----------
-    source : Path
-    suffix : str
-        Of the output's name.
-    settings : ConvertSettings
-    error : str
-        Why it can't be; empty normally.
+    `suffix`: of the output's name; `error`: why it can't be; empty normally.
     """
 
     source: Path

@@ -37,29 +37,16 @@ AROUND = 100.0
 class ReconstructSettings:
     """What is reconstructed, and how.
 
-    Parameters
-    ----------
-    begin, end : float or None
-        Of the part of the recording. [s]
-    vehicles : collection of str or None
-        These alone, by their recorded names.
-    around : str or None
-        A vehicle, and those within `AROUND`, for `window` seconds in the middle of its passage.
-    window : float
-        [s]
-    host : str or None
-        Recorded name of the vehicle under test.
-    error : float
-        Bound of positions along the road. [m]
-    version : (int, int)
-    relative : bool
-        Lane changes and braking begin by distances, where the recording bears it out.
-    exact : bool
-        Recorded paths as trajectories, instead of maneuvers.
-    fit : bool
-        A profile of its own for every vehicle that drove long enough.
-    libraries : tuple of Path
-        Folders with further profiles.
+    - `begin`, `end`: of the part of the recording. [s]
+    - `vehicles`: these alone, by their recorded names
+    - `around`: a vehicle, and those within `AROUND`, for `window` seconds in the middle of its passage
+    - `window`: [s]
+    - `host`: recorded name of the vehicle under test
+    - `error`: bound of positions along the road. [m]
+    - `relative`: lane changes and braking begin by distances, where the recording bears it out
+    - `exact`: recorded paths as trajectories, instead of maneuvers
+    - `fit`: a profile of its own for every vehicle that drove long enough
+    - `libraries`: folders with further profiles
     """
 
     begin: float | None = None
@@ -80,22 +67,8 @@ class ReconstructSettings:
 class Reconstructed:
     """A scenario as text, how it was made, and how far it is from the recording.
 
-    Parameters
-    ----------
-    traffic : RecordedTraffic
-    recording : Recording
-    plans : tuple of VehiclePlan
-    scenario : str
-    residuals : tuple of Residuals
-        In the order of `plans`.
-    encounters : tuple of Encounter
-    relative : mapping
-        Entity -> triggers that are distances.
-    drivers : tuple of ChosenDriver
-        In the order of `plans`.
-    fitted : mapping of str to DriverProfile
-        Profiles of single vehicles, by name.
-    settings : ReconstructSettings
+    `residuals`: in the order of `plans`; `relative`: entity -> triggers that are distances; `drivers`: in the order of
+    `plans`; `fitted`: profiles of single vehicles, by name.
     """
 
     traffic: RecordedTraffic
@@ -124,12 +97,8 @@ class Reconstructed:
 def reconstruct_recording(traffic: RecordedTraffic, settings: ReconstructSettings) -> Reconstructed:
     """Choose vehicles, plan their maneuvers, write the scenario in memory and play it.
 
-    Raises
-    ------
-    FormatError
-        A vehicle that is not in the recording, a window without time.
-    NotEnoughDataError
-        If no vehicle is left.
+    Raises `FormatError`: a vehicle that is not in the recording, a window without time; `NotEnoughDataError`: if no
+    vehicle is left.
     """
     tracks, begin, end = chosen(traffic, settings)
     recording = place_tracks(tracks, traffic.network, begin, end)
@@ -221,10 +190,7 @@ def version_named(text: str) -> Version:
 def chosen(traffic: RecordedTraffic, settings: ReconstructSettings) -> tuple[list[Track], float, float]:
     """Tracks and window of time [s] that the settings ask for.
 
-    Raises
-    ------
-    FormatError
-        A vehicle that is not in the recording, a window without time.
+    Raises `FormatError`: a vehicle that is not in the recording, a window without time.
     """
     by_name = {track.name: track for track in traffic.tracks}
     source = traffic.sources[0]

@@ -118,17 +118,9 @@ class ConvertOptions(TypedDict, total=False):
 class ConvertSettings:
     """Settings of one conversion: `ConvertOptions` as plain values that a batch can send and hash.
 
-    Parameters
-    ----------
-    names_may_lack : bool
-        `entity`, `only` and `ego` apply where an entity of that name exists: one of many scenarios.
-    step : float
-        Of playback. [s]
-
-    Raises
-    ------
-    ValueError
-        A version of the standard that can't be written, or that the player does not read.
+    `names_may_lack`: `entity`, `only` and `ego` apply where an entity of that name exists: one of many scenarios;
+    `step`: of playback. [s] Raises `ValueError`: a version of the standard that can't be written, or that the player
+    does not read.
     """
 
     # What is said of one option stays together.
@@ -201,14 +193,8 @@ class ConvertSettings:
     def of(cls, **options: Unpack[ConvertOptions]) -> ConvertSettings:
         """Settings from what a user says, else as configured; None: nothing is said.
 
-        Raises
-        ------
-        TypeError
-            There is no such option.
-        ValueError
-            It can't have that value.
-        FormatError
-            It is the configuration that says so; there is no such road, or folder of roads.
+        Raises `TypeError`: there is no such option; `ValueError`: it can't have that value; `FormatError`: it is the
+        configuration that says so; there is no such road, or folder of roads.
         """
         unknown = options.keys() - OPTIONS.keys()
         if unknown:
@@ -246,10 +232,7 @@ class ConvertSettings:
     def of_record(cls, values: Mapping[str, Any], folder: Path) -> ConvertSettings:
         """Settings from what `record` gave.
 
-        Raises
-        ------
-        ValueError
-            A value that can't be.
+        Raises `ValueError`: a value that can't be.
         """
         found: dict[str, Any] = {"step": float(values.get("step", STEP)), "names_may_lack": True}
         for name, said in values.items():

@@ -46,10 +46,7 @@ class WorkerDiedError(XoscLateralError):
 class Pool(AbstractContextManager["Pool"], Protocol):
     """Workers; use as a context.
 
-    Attributes
-    ----------
-    tries_alone : int
-        How often a task that may have killed its worker is tried by itself.
+    `tries_alone`: how often a task that may have killed its worker is tried by itself.
     """
 
     tries_alone: int
@@ -83,12 +80,7 @@ def run_tasks(
     When a worker dies, whatever had been handed out is tried again, one by one: what kills its worker then as well is
     the culprit and gives a `WorkerDiedError`; the rest is fine.
 
-    Raises
-    ------
-    ClusterError
-        When the cluster is gone.
-    Exception
-        What `work` raises.
+    Raises `ClusterError`: when the cluster is gone; `Exception`: what `work` raises.
     """
     waiting = iter(tasks)
     running: dict[Future[Result], Task] = {}

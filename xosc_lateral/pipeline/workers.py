@@ -27,10 +27,7 @@ PR_SET_PDEATHSIG = 1
 class LocalProcesses:
     """Worker processes of joblib's executor (loky).
 
-    Parameters
-    ----------
-    count : int
-        How many.
+    `count`: how many.
     """
 
     tries_alone = TRIES_ALONE
@@ -112,15 +109,8 @@ class Cluster:
     itself gives a dead worker's tasks to another. Whoever can talk to the scheduler can run code on the workers and
     here: it has to be trusted.
 
-    Parameters
-    ----------
-    address : str
-        Of the scheduler, as in ``tcp://10.0.0.1:8786``.
-
-    Raises
-    ------
-    ClusterError
-        The extra ``cluster`` is not installed, nobody answers, or a worker has another version of this package.
+    `address`: of the scheduler, as in ``tcp://10.0.0.1:8786``. Raises `ClusterError`: the extra ``cluster`` is not
+    installed, nobody answers, or a worker has another version of this package.
     """
 
     tries_alone = 1
@@ -240,12 +230,7 @@ class ThisProcess:
 def open_pool(workers: int, cluster: str | None) -> Pool:
     """Pool for so many processes on this machine (-1: one per core; 0: this process), or for a cluster.
 
-    Raises
-    ------
-    ClusterError
-        The cluster can't be reached.
-    ValueError
-        Fewer than none.
+    Raises `ClusterError`: the cluster can't be reached; `ValueError`: fewer than none.
     """
     if cluster is not None:
         from xosc_lateral.pipeline.workers import Cluster
