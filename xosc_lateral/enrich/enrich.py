@@ -246,9 +246,9 @@ def _draw(
         alone |= sides_known(driver, {Basis.MEASURED, Basis.DECLARED}, other_hand=other_hand)
         seen, side = (mirrored(segment), -1.0) if other_hand else (segment, 1.0)
         wanted = side * sampler.sample(seen)
-        later = _going_on(seen, max(least - len(knots), 0))
         give_back()
-        beyond.append(side * sampler.copy().sample(later) if later.time.size > later.before else np.empty(0))
+        onward = least - len(knots)
+        beyond.append(side * sampler.copy().sample(_going_on(seen, onward)) if onward > 0 else np.empty(0))
         inside = segment.inside
         who = f"profile {driver.name} for {entity.name!r}"
         check_offsets(wanted, segment.lane_width[inside], who, segment.time[inside])

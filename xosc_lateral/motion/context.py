@@ -407,7 +407,9 @@ def _in_sight(motion: NominalMotion) -> list[tuple[slice, list[IntArray]]]:
         for one in motion.entities:
             yield np.where((one.activity & Activity.ACTIVE) != 0, getattr(one, axis), np.nan)
 
-    found = []
+    found: list[tuple[slice, list[IntArray]]] = []
+    if len(motion.entities) < 2:
+        return found
     for rows, pairs in stretches_within(where_active("x"), where_active("y"), IN_SIGHT, blocks=64):
         both = np.array([*pairs, *(pair[::-1] for pair in pairs)], dtype=np.int64)
         both = both[np.lexsort((both[:, 1], both[:, 0]))]
