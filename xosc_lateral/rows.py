@@ -27,8 +27,8 @@ from numpy.typing import DTypeLike, NDArray
 BLOCK = 65_536
 """Rows that are worked on at a time where all of a long run would take much memory: half a megabyte each. [-]"""
 
-IN_MEMORY = 100e6
-"""Columns of one run that are in memory before others go to the file: 2.5 h of one car, as of 100 for 90 s. [byte]"""
+IN_MEMORY = 64e6
+"""Columns of one run that are in memory before others go to the file: 2 h of one car, as of 100 for 70 s. [byte]"""
 
 MAPPED = 50e6
 """Pages of the file that may be in memory after a block: what two or three passes over a block touch. [byte]"""
@@ -158,16 +158,15 @@ def columns(n: int, parts: Iterable[Sequence[NDArray[Any]]]) -> list[NDArray[Any
     begin = 0
     for part in parts:
         end = begin + len(part[0])
-        if end - begin == n:
-            return [kept(values) for values in part]
-        found = found or [values[:1].copy() for values in part]
-        for k, values in enumerate(part):
+        found = found or [kept(values) if end == n else values[:1].copy() for values in part]
+        for k, values in enumerate(part if end - begin < n else ()):
             if len(found[k]) == 1 and not _is_all(values, found[k]):
                 column = empty(n, values.dtype)
                 column[:begin], found[k] = found[k], column
             if len(found[k]) == n:
                 found[k][begin:end] = values
         begin = end
+        give_back()
     return [values if len(values) == n else np.broadcast_to(values, n) for values in found]
 
 
@@ -181,8 +180,8 @@ def _is_all(values: NDArray[Any], first: NDArray[Any]) -> bool:
 def blocks(n: int, begin: int = 0) -> Iterator[slice]:
     """Rows from `begin` to n, at most `BLOCK` at a time."""
     for first in range(begin, n, BLOCK):
+        give_back()  # what came before; here, since not everybody goes on to the end
         yield slice(first, min(first + BLOCK, n))
-        give_back()
 
 
 def rows_where(n: int, holds: Callable[[slice], NDArray[np.bool_]], begin: int = 0) -> NDArray[np.intp]:
