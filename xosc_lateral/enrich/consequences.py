@@ -68,5 +68,5 @@ def gaps_of(motion: NominalMotion, trajectories: Sequence[WorldTrajectory]) -> t
         x = np.where(absent, np.nan, path.x[::every])
         x, y, heading = (kept(values) for values in (x, path.y[::every], path.heading[::every]))
         paths.append(BoxPath(entity.name, x, y, heading, box.length, box.width, box.center_x))
-        give_back()
+        give_back(len(entity.time))
     return smallest_gaps(motion.entities[0].time[::every], paths)

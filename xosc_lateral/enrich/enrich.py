@@ -246,7 +246,7 @@ def _draw(
         alone |= sides_known(driver, {Basis.MEASURED, Basis.DECLARED}, other_hand=other_hand)
         seen, side = (mirrored(segment), -1.0) if other_hand else (segment, 1.0)
         wanted = side * sampler.sample(seen)
-        give_back()
+        give_back(len(entity.time))
         onward = least - len(knots)
         beyond.append(side * sampler.copy().sample(_going_on(seen, onward)) if onward > 0 else np.empty(0))
         inside = segment.inside
@@ -310,7 +310,7 @@ def _sampled(one: _Drawn, rows: IntArray) -> SampledVehicle:
         deviation = one.deviation(rows)
         for span, _, _ in one.segments:
             can_move[(rows >= span.first) & (rows <= span.last)] = True
-    give_back()
+    give_back(len(one.motion.time))
     return SampledVehicle(one.motion, kept(deviation), kept(can_move), one.responds, one.alone)
 
 

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from xosc_lateral.motion.nominal import Activity, EntityMotion
 from xosc_lateral.road.network import RoadNetwork
-from xosc_lateral.rows import blocks, columns, empty, rows_where, scratch
+from xosc_lateral.rows import blocks, columns, empty, put, rows_where, scratch
 
 FloatArray = NDArray[np.float64]
 
@@ -153,7 +153,7 @@ def _turned(motion: EntityMotion, x: FloatArray, y: FloatArray) -> FloatArray:
     heading = empty(len(x))
     for piece in _pieces(motion):
         if piece.stop - piece.start < 2:
-            heading[piece] = motion.heading[piece] + 0.0
+            put(heading, piece, motion.heading[piece] + 0.0)
             continue
         held, waiting = 0.0, piece.start  # rows from `waiting` on stand at the piece's start: as where it moves first
         for rows, around, inside in _overlapping(piece):
@@ -165,9 +165,9 @@ def _turned(motion: EntityMotion, x: FloatArray, y: FloatArray) -> FloatArray:
             if waiting >= 0 and moving.any():
                 held = float(turn[int(np.argmax(moving))])
                 for earlier in blocks(rows.start, waiting):
-                    heading[earlier] = motion.heading[earlier] + held
+                    put(heading, earlier, motion.heading[earlier] + held)
                 waiting = -1
-            heading[rows] = motion.heading[rows] + np.where(last < 0, held, turn[last])
+            put(heading, rows, motion.heading[rows] + np.where(last < 0, held, turn[last]))
             held = held if last[-1] < 0 else float(turn[last[-1]])
     return heading
 
@@ -177,7 +177,7 @@ def _speed(motion: EntityMotion, x: FloatArray, y: FloatArray) -> FloatArray:
     speed = empty(len(x))
     for piece in _pieces(motion):
         if piece.stop - piece.start < 2:
-            speed[piece] = motion.speed[piece]
+            put(speed, piece, motion.speed[piece])
             continue
         for rows, around, inside in _overlapping(piece):
             nominal = np.hypot(np.gradient(motion.x[around]), np.gradient(motion.y[around]))[inside]
@@ -185,5 +185,5 @@ def _speed(motion: EntityMotion, x: FloatArray, y: FloatArray) -> FloatArray:
             moving = nominal > _STANDSTILL
             part = motion.speed[rows].copy()
             part[moving] *= (shifted / np.where(moving, nominal, 1.0))[moving]
-            speed[rows] = part
+            put(speed, rows, part)
     return speed
