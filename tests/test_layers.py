@@ -26,7 +26,6 @@ LAYERS = {
     "drives": 2,
     "driver": 3,
     "playback": 3,
-    "datasets": 3,
     "enrich": 4,
     "evaluation": 4,
     "identification": 5,
