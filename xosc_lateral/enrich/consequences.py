@@ -73,16 +73,15 @@ def _lateral_within_a_lane(motion: EntityMotion) -> list[tuple[int, int]]:
 def gaps_of(motion: NominalMotion, trajectories: Sequence[WorldTrajectory]) -> tuple[Gap, ...]:
     """Smallest gap of each pair of vehicles that meet; `trajectories`: one per entity."""
     every = max(1, round(GAP_STEP / motion.step))
+    vehicles = [both for both in zip(motion.entities, trajectories, strict=True) if both[0].entity.is_vehicle]
+    if len(vehicles) < 2:
+        return ()
     paths = []
-    for entity, path in zip(motion.entities, trajectories, strict=True):
-        if not entity.entity.is_vehicle:
-            continue
+    for entity, path in vehicles:
         box = entity.entity.bounding_box
         absent = (entity.activity[::every] & Activity.ACTIVE) == 0
         x = np.where(absent, np.nan, path.x[::every])
         x, y, heading = (kept(values) for values in (x, path.y[::every], path.heading[::every]))
         paths.append(BoxPath(entity.name, x, y, heading, box.length, box.width, box.center_x))
-        give_back()
-    if not paths:
-        return ()
+        give_back(len(entity.time))
     return smallest_gaps(motion.entities[0].time[::every], paths)

@@ -355,7 +355,7 @@ def _draw(
     for span, knots, seen, side, responses in met.stretches:
         wanted = side * sampler.sample(seen, responses=responses)
         more = least - len(knots)
-        give_back()
+        give_back(len(seen.time))
         beyond.append(side * sampler.copy().sample(_going_on(seen, more)) if more > 0 else np.empty(0))
         inside = seen.inside
         who = f"profile {driver.name} for {entity.name!r}"
@@ -414,7 +414,7 @@ def _sampled(one: _Drawn, rows: IntArray) -> SampledVehicle:
         deviation = one.deviation(rows)
         for span, _, _ in one.segments:
             can_move[(rows >= span.first) & (rows <= span.last)] = True
-    give_back()
+    give_back(len(one.motion.time))
     return SampledVehicle(one.motion, kept(deviation), kept(can_move), one.responds, one.alone)
 
 

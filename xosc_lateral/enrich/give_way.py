@@ -29,7 +29,7 @@ from xosc_lateral.motion.context import CELLS, STEERING, smooth_step
 from xosc_lateral.motion.nearby import stretches_within
 from xosc_lateral.motion.nominal import Activity, EntityMotion, NominalMotion
 from xosc_lateral.road.network import RoadNetwork
-from xosc_lateral.rows import empty, give_back, kept
+from xosc_lateral.rows import empty, give_back, kept, put
 from xosc_lateral.segment import Segment
 
 FloatArray = NDArray[np.float64]
@@ -137,14 +137,13 @@ def give_way(
         Rows that are looked at, evenly spaced.
     """
     count, n = len(sampled), len(rows)
-    left, right = empty((2, count, n))
+    left, right, none = empty((count, n)), empty((count, n)), np.zeros(n)
     names = ("x", "y", "heading", "deviation", "can_move", "present")
     tables = [empty((count, n), bool if name in names[4:] else np.float64) for name in names]
     for k, one in enumerate(sampled):
-        left[k] = right[k] = 0.0
-        for table, values in zip(tables, Frame.of(one, rows)[: len(names)], strict=True):
-            table[k] = values
-        give_back()
+        for table, values in zip((left, right, *tables), (none, none, *Frame.of(one, rows)[: len(names)]), strict=True):
+            put(table, slice(k, k + 1), np.asarray(values))
+        give_back(len(one.motion.time))
     left_hand = np.array(_left_hand(network, sampled, rows), dtype=bool)
     x, y = (
         (np.where(there, row, np.nan) for row, there in zip(table, tables[-1], strict=True)) for table in tables[:2]

@@ -21,7 +21,7 @@ from numpy.typing import ArrayLike, NDArray
 from xosc_lateral.motion.nearby import stretches_within
 from xosc_lateral.motion.nominal import Activity, EntityMotion, NominalMotion
 from xosc_lateral.road.network import RoadNetwork
-from xosc_lateral.rows import empty, give_back
+from xosc_lateral.rows import empty, give_back, put
 from xosc_lateral.scenario import BoundingBox
 from xosc_lateral.scenario.enums import VehicleCategory
 from xosc_lateral.scenario.environment import Environment, Weather
@@ -218,7 +218,7 @@ def _neighbours(
                 who, rows = others[k // len(members)], members[k % len(members)]
                 gap = free_space(seen, box, Extent(*(values[who] for values in extent)))
                 around.add(rows, seen, gap, width[rows], traffic.width[who], traffic.is_truck[who])
-            give_back()
+            give_back(len(grid))
     return around.columns(lanes)
 
 
@@ -260,7 +260,7 @@ def _traffic(motion: NominalMotion, network: RoadNetwork, first: int, every: int
         direction[present] = network.travel_directions(road[present], lane[present])
         direction = np.where(np.cos(heading) < 0.0, -direction, direction)
         for table, values in zip(tables, (road, s, t, direction), strict=True):
-            table[begin : begin + together] = values.reshape(-1, n)
+            put(table, slice(begin, begin + together), values.reshape(-1, n))
         give_back()
     boxes = [one.entity.bounding_box for one in motion.entities]
     length, centre, width = (np.array([getattr(b, name) for b in boxes]) for name in ("length", "center_x", "width"))
@@ -407,7 +407,9 @@ def _in_sight(motion: NominalMotion) -> list[tuple[slice, list[IntArray]]]:
         for one in motion.entities:
             yield np.where((one.activity & Activity.ACTIVE) != 0, getattr(one, axis), np.nan)
 
-    found = []
+    found: list[tuple[slice, list[IntArray]]] = []
+    if len(motion.entities) < 2:
+        return found
     for rows, pairs in stretches_within(where_active("x"), where_active("y"), IN_SIGHT, blocks=64):
         both = np.array([*pairs, *(pair[::-1] for pair in pairs)], dtype=np.int64)
         both = both[np.lexsort((both[:, 1], both[:, 0]))]

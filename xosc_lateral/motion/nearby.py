@@ -74,7 +74,7 @@ def _bounds(x: Iterable[FloatArray], y: Iterable[FloatArray]) -> tuple[FloatArra
         starts = np.arange(0, len(point[0]), BLOCK)
         for found, ufunc in ((lows, np.fmin), (highs, np.fmax)):  # they pass over NaN
             found.append(np.stack([ufunc.reduceat(values, starts) for values in point]))
-        give_back()
+        give_back(len(point[0]))
     low, high = (np.stack(found[1:] or found, axis=-1) for found in (lows, highs))
     return low, high
 

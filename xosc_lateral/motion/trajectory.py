@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from xosc_lateral.motion.nominal import Activity, EntityMotion
 from xosc_lateral.road.network import RoadNetwork
-from xosc_lateral.rows import blocks, columns, empty, rows_where, scratch
+from xosc_lateral.rows import blocks, columns, empty, put, rows_where, scratch
 
 FloatArray = NDArray[np.float64]
 
@@ -156,7 +156,8 @@ def _turned_and_longer(motion: EntityMotion, x: FloatArray, y: FloatArray) -> tu
     heading, speed = empty(len(x)), empty(len(x))
     for piece in _pieces(motion):
         if piece.stop - piece.start < 2:
-            heading[piece], speed[piece] = motion.heading[piece] + 0.0, motion.speed[piece]
+            put(heading, piece, motion.heading[piece] + 0.0)
+            put(speed, piece, motion.speed[piece])
             continue
         held, waiting = 0.0, piece.start  # rows from `waiting` on stand at the piece's start: as where it moves first
         for rows, around, inside in _overlapping(piece):
@@ -166,13 +167,13 @@ def _turned_and_longer(motion: EntityMotion, x: FloatArray, y: FloatArray) -> tu
             turn = np.angle(shifted * np.conj(nominal))
             length, longer = (np.hypot(step.real, step.imag) for step in (nominal, shifted))
             driven = length > _STANDSTILL
-            speed[rows] = motion.speed[rows] * np.where(driven, longer / np.where(driven, length, 1.0), 1.0)
+            put(speed, rows, motion.speed[rows] * np.where(driven, longer / np.where(driven, length, 1.0), 1.0))
             last = np.maximum.accumulate(np.where(moving, np.arange(len(moving)), -1))
             if waiting >= 0 and moving.any():
                 held = float(turn[int(np.argmax(moving))])
                 for earlier in blocks(rows.start, waiting):
-                    heading[earlier] = motion.heading[earlier] + held
+                    put(heading, earlier, motion.heading[earlier] + held)
                 waiting = -1
-            heading[rows] = motion.heading[rows] + np.where(last < 0, held, turn[last])
+            put(heading, rows, motion.heading[rows] + np.where(last < 0, held, turn[last]))
             held = held if last[-1] < 0 else float(turn[last[-1]])
     return heading, speed

@@ -15,7 +15,7 @@ from xosc_lateral.motion.nominal import Activity, EntityMotion, FloatArray, IntA
 from xosc_lateral.playback.state import NOWHERE, EntityState
 from xosc_lateral.road import RoadNetwork
 from xosc_lateral.road.tables import turned_in_surface
-from xosc_lateral.rows import BLOCK, columns, give_back, kept
+from xosc_lateral.rows import BLOCK, columns, kept
 
 NO_LANE = "none"
 """Lane type of what is beside the road, though the road describes it."""
@@ -159,7 +159,6 @@ class Rows:
             relative = (to_lane + pi) % (2.0 * pi) - pi
             yield (*pose[:, :3].T, heading, *pose[:, 4:].T, speed, road, lane, s, offset, relative, activity)
             begin += n
-            give_back()
         self._put_away.clear()
         self._free_put_away.clear()
 

@@ -23,7 +23,7 @@ from xosc_lateral.formats.openscenario.write.path_pieces import (
 from xosc_lateral.formats.openscenario.write.vertices import TimedVertices, Vertices
 from xosc_lateral.motion.nominal import Activity, EntityMotion, NominalMotion
 from xosc_lateral.motion.trajectory import WorldTrajectory
-from xosc_lateral.rows import blocks, columns, kept
+from xosc_lateral.rows import blocks, columns, give_back, kept
 from xosc_lateral.scenario.enums import Priority
 
 FloatArray = NDArray[np.float64]
@@ -55,6 +55,7 @@ class Moving:
 
     def pose(self, row: int) -> Pose:
         """Pose in one row."""
+        give_back()
         path = self.path
         heading = wrapped(path.heading[row])
         x, y, z, h, p, r = map(float, (path.x[row], path.y[row], path.z[row], heading, path.pitch[row], path.roll[row]))
