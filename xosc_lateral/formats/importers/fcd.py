@@ -75,9 +75,7 @@ def import_fcd(source: Path, *, net: str | Path | None = None, lane_width: float
         instant, number, np.array(pos) - 0.5 * length, length, truck,
         lane_on_left=number + 1 < table["lane_count"].to_numpy(), lane_on_right=number > 0,
     )  # fmt: skip
-    for column in ("lead", "left", "right"):
-        table[f"{column}_distance"] = getattr(around, f"{column}_distance")
-        table[f"{column}_is_truck"] = getattr(around, f"{column}_is_truck")
+    table = table.assign(**around)
     return table.sort_values(["drive", "time"], kind="stable").reset_index(drop=True)
 
 

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,14 +21,38 @@ SMOOTHED = 20.0
 """Way over which a lane's turning is averaged into a curvature: bounds are polygons. [m]"""
 
 
-class LaneShape(Protocol):
-    """A lane of some form."""
+class LaneShape(ABC):
+    """A lane between two boundaries, in coordinates along and across its centre line.
+
+    Parameters
+    ----------
+    centre : array, shape (n, 2) or (n, 3)
+        In the direction of travel. [m]
+    boundaries : sequence of array
+        Lines about it. [m]
+    beyond : float
+        So far out of their box a point may lie in the lane. [m]
+    """
+
+    def __init__(self, centre: FloatArray, boundaries: Sequence[FloatArray], beyond: float = 0.0) -> None:
+        self.centre = centre
+        self.step = np.diff(centre[:, :2], axis=0)
+        self.size = np.hypot(*self.step.T)
+        self.start = np.concatenate([[0.0], np.cumsum(self.size)])
+        self.length = float(self.start[-1])
+        self.direction = np.unwrap(np.arctan2(self.step[:, 1], self.step[:, 0]))
+        both = np.concatenate(boundaries)[:, :2]
+        self.low, self.high = both.min(axis=0) - beyond, both.max(axis=0) + beyond
 
     def may_hold(self, x: FloatArray, y: FloatArray) -> NDArray[np.bool_]:
-        """Points that may lie in it, quickly; shape as the arguments."""
+        """Points in the box about it, shape as the arguments."""
+        return np.asarray((x >= self.low[0]) & (x <= self.high[0]) & (y >= self.low[1]) & (y <= self.high[1]))
 
+    @abstractmethod
     def place(self, x: FloatArray, y: FloatArray) -> tuple[FloatArray, ...]:
-        """Way along it (NaN beyond its ends), offset, width, direction and curvature there; shape as the arguments."""
+        """Way along the centre line (NaN beyond its ends), offset from the middle of the boundaries, width, direction
+        and curvature there; shape as the arguments. [m], [m], [m], [rad], [1/m]
+        """
 
 
 def place_in_shapes(tracks: Tracks, shapes: Sequence[LaneShape], left: IntArray) -> PlacedTracks:

@@ -72,7 +72,6 @@ def import_osi(
             keep_cut=True,
             format="osi",
             sources=files,
-            version="unknown",
             licence=LICENCE,
             only=only,
             notes=recorded.notes,

@@ -6,16 +6,15 @@ from collections import Counter, deque
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.drives.cleaning import RUN
-from xosc_lateral.errors import NotEnoughDataError
 from xosc_lateral.formats.importers.cuts import CutSettings, lane_changes, name_states, number_runs
 from xosc_lateral.formats.importers.neighbours import find_neighbours
-from xosc_lateral.formats.importers.table import Imported, drop_cut, hash_files, make_provenance
+from xosc_lateral.formats.importers.table import Imported, finished, hash_files, without_cut
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -145,35 +144,17 @@ def import_placed(
     graph: LaneGraph,
     settings: CutSettings,
     *,
-    keep_cut: bool,
-    format: str,  # noqa: A002 (the record's own word)
-    sources: Sequence[Path],
-    version: str,
-    licence: str,
     only: Collection[str] | None = None,
-    notes: Sequence[str] = (),
+    **about: Any,
 ) -> Imported:
     """Neighbours, cuts and the record of the import; of the vehicles in `only` alone, if it is given.
 
-    Raises `NotEnoughDataError` if nothing is left.
+    Raises `NotEnoughDataError` if nothing is left; further parameters are those of `table.finished`.
     """
     table = placed_table(tracks, graph, settings)
     if only is not None:
         table = table[table["drive"].isin(only)].reset_index(drop=True)
-    record = make_provenance(
-        table,
-        format=format,
-        sources=sources,
-        version=version,
-        licence=licence,
-        settings=asdict(settings),
-        step=tracks.step,
-        notes=notes,
-    )
-    kept = drop_cut(table, keep_cut)
-    if kept.empty:
-        raise NotEnoughDataError(f"{sources[0]}: nothing is left of {len(table)} rows ({dict(record.rows)})")
-    return Imported(kept, record)
+    return finished(table, settings=asdict(settings), step=tracks.step, **about)
 
 
 def import_each(sources: Path | Sequence[Path], read: Callable[[Path], Imported], *, keep_cut: bool) -> Imported:
@@ -200,10 +181,7 @@ def import_each(sources: Path | Sequence[Path], read: Callable[[Path], Imported]
             notes=tuple(note for part in parts for note in part.provenance.notes),
         )
     table = pd.concat([part.table for part in parts], ignore_index=True)
-    kept = drop_cut(table, keep_cut)
-    if kept.empty:
-        raise NotEnoughDataError(f"{files[0]}: nothing is left of {len(table)} rows ({dict(record.rows)})")
-    return Imported(kept, record)
+    return without_cut(table, record, keep_cut, files[0])
 
 
 def placed_table(tracks: PlacedTracks, graph: LaneGraph, settings: CutSettings) -> pd.DataFrame:
@@ -242,7 +220,7 @@ def placed_table(tracks: PlacedTracks, graph: LaneGraph, settings: CutSettings) 
             "speed": tracks.speed,
             "acceleration": _rate(tracks.speed, tracks.vehicle, tracks.step, 1.0),
             **tracks.road,
-            **asdict(near),
+            **near,
             "vehicle_class": tracks.kind,
             "is_truck": is_truck.astype(np.float64),
             RUN: number_runs(state, lane, tracks.vehicle, instant),

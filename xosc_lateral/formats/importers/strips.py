@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from xosc_lateral.formats.importers.lane_shapes import curvature_along
+from xosc_lateral.formats.importers.lane_shapes import LaneShape, curvature_along
 
 FloatArray = NDArray[np.float64]
 
@@ -18,7 +18,7 @@ BEYOND = 1e-3
 """A foot that lies farther than this before the start or past the end is outside. [m]"""
 
 
-class Strip:
+class Strip(LaneShape):
     """A lane in coordinates along and across its centre line.
 
     Parameters
@@ -30,16 +30,9 @@ class Strip:
     def __init__(self, centre: FloatArray, left: FloatArray, right: FloatArray) -> None:
         from scipy.spatial import cKDTree
 
-        self.centre = _dense(centre)
-        self.step = np.diff(self.centre[:, :2], axis=0)
-        self.size = np.hypot(*self.step.T)
-        self.start = np.concatenate([[0.0], np.cumsum(self.size)])
-        self.length = float(self.start[-1])
-        self.direction = np.unwrap(np.arctan2(self.step[:, 1], self.step[:, 0]))
+        super().__init__(_dense(centre), [left, right], BEYOND)
         self._tree = cKDTree(self.centre[:, :2])
         self._left, self._right = self._edge(left), self._edge(right)
-        both = np.concatenate([left, right])[:, :2]
-        self.low, self.high = both.min(axis=0) - BEYOND, both.max(axis=0) + BEYOND
 
     def _edge(self, line: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         """A boundary as way along, offset from the centre line and height, in order of the way."""
@@ -48,14 +41,8 @@ class Strip:
         order = np.argsort(way, kind="stable")
         return way[order], aside[order], dense[order, 2]
 
-    def may_hold(self, x: FloatArray, y: FloatArray) -> NDArray[np.bool_]:
-        """Points in the box about it, shape as the arguments."""
-        return np.asarray((x >= self.low[0]) & (x <= self.high[0]) & (y >= self.low[1]) & (y <= self.high[1]))
-
     def place(self, x: FloatArray, y: FloatArray) -> tuple[FloatArray, ...]:
-        """Way along the centre line (NaN beyond its ends), offset from the middle of the boundaries, width, direction
-        and curvature there; shape as the arguments. [m], [m], [m], [rad], [1/m]
-        """
+        """See `LaneShape`."""
         way, aside, k, beyond = self._foot(x, y)
         left, right = (np.interp(way, edge[0], edge[1]) for edge in (self._left, self._right))
         high, low = (np.interp(way, edge[0], edge[2]) for edge in (self._left, self._right))

@@ -81,7 +81,6 @@ def import_tracks(
         keep_cut=keep_cut,
         format="tracks",
         sources=[source, Path(road)],
-        version="unknown",
         licence=LICENCE,
     )
 
