@@ -15,9 +15,8 @@ from xosc_lateral.driver.plausibility import check_offsets
 from xosc_lateral.driver.profile import COLUMNS, SIDES, Basis, DriverProfile
 from xosc_lateral.driver.sampled_offsets import known_sensor, sensor_error
 from xosc_lateral.driver.sampling import OffsetSampler
-from xosc_lateral.enrich.consequences import gaps_of, lane_departures
 from xosc_lateral.enrich.give_way import SampledVehicle, give_way, mirrored, other_side
-from xosc_lateral.enrich.result import Enriched, EntityResult, Neighbours, SampledSegment
+from xosc_lateral.enrich.result import Enriched, EntityResult, Neighbours, SampledSegment, gaps_of, lane_departures
 from xosc_lateral.motion.context import entity_context
 from xosc_lateral.motion.deviation import SETTLING_TIME, SampledDeviation, deviation_through
 from xosc_lateral.motion.nominal import Activity, EntityMotion, NominalMotion

@@ -5,11 +5,10 @@ from __future__ import annotations
 import contextlib
 import os
 import tempfile
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from xosc_lateral.errors import FormatError
 from xosc_lateral.formats.source import refuse_guarded
 
 
@@ -52,35 +51,6 @@ def replace_atomically(path: Path | str, write: Callable[[Path], object]) -> Pat
     return path
 
 
-def refuse_outputs(outputs: Iterable[Path | None], inputs: Iterable[Path] = ()) -> None:
-    """Refuse outputs that can't be meant, before any work is done and anything is written.
-
-    Raises `FormatError` if an output is a folder, an input (links resolved), or named twice, or its folder can't be
-    made or written to.
-
-    Parameters
-    ----------
-    outputs : iterable of Path or None
-        Files to be written; None: not wanted.
-    inputs : iterable of Path
-        Files that are read.
-    """
-    taken = {path.resolve(): "is an input; choose another output" for path in inputs}
-    for output in outputs:
-        if output is None:
-            continue
-        if output.is_dir():
-            raise FormatError("is a folder, not a file to write to", path=output)
-        if (why := taken.get(output.resolve())) is not None:
-            raise FormatError(why, path=output)
-        taken[output.resolve()] = "is named for two outputs"
-        parent = next(folder for folder in output.absolute().parents if folder.exists())
-        if not parent.is_dir():
-            raise FormatError(f"can't be written: {parent} is a file, not a folder", path=output)
-        if not os.access(parent, os.W_OK | os.X_OK):
-            raise FormatError(f"can't be written: no permission to write to {parent}", path=output)
-
-
 @contextmanager
 def _temporary_beside(path: Path) -> Iterator[Path]:
     # The suffix stays: some writers (Parquet, CSV.gz) choose the format by it.
@@ -88,15 +58,11 @@ def _temporary_beside(path: Path) -> Iterator[Path]:
     descriptor, name = tempfile.mkstemp(prefix=f".{path.stem[:40]}.", suffix=f".tmp{path.suffix}", dir=path.parent)
     os.close(descriptor)
     temporary = Path(name)
+    mask = os.umask(0)
+    os.umask(mask)
     try:
-        temporary.chmod(0o666 & ~_umask())  # mkstemp makes it private; outputs are for everybody
+        temporary.chmod(0o666 & ~mask)  # mkstemp makes it private; outputs are for everybody
         yield temporary
     finally:
         with contextlib.suppress(FileNotFoundError):
             temporary.unlink()
-
-
-def _umask() -> int:
-    mask = os.umask(0)
-    os.umask(mask)
-    return mask

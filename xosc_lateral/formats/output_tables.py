@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 
 from xosc_lateral.formats.atomic import write_atomically
 from xosc_lateral.formats.json_text import canonical_json
-from xosc_lateral.formats.own_files import SIDECAR_SUFFIX
+from xosc_lateral.formats.output_paths import SIDECAR_SUFFIX
 from xosc_lateral.version import __version__
 
 if TYPE_CHECKING:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from xosc_lateral.formats.importers.road_from_tracks import ReferenceLine
 from xosc_lateral.formats.openscenario.write.build import decimal, sub
-from xosc_lateral.formats.own_files import template_mark
+from xosc_lateral.formats.output_paths import template_mark
 
 FloatArray = NDArray[np.float64]
 
