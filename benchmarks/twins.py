@@ -27,8 +27,9 @@ from benchmarks.r157.study.encounters import Target
 from benchmarks.r157.study.verdicts import GAPS, MODELS, limits, verdicts_of
 from benchmarks.reconstruction import WINDOW, write
 from xosc_lateral.drives.drive import Run
+from xosc_lateral.enrich.consequences import Gap, gaps_of
 from xosc_lateral.enrich.enrich import enrich
-from xosc_lateral.enrich.result import Enriched, Gap, gaps_of
+from xosc_lateral.enrich.result import Enriched
 from xosc_lateral.evaluation.filters import below_half_hertz
 from xosc_lateral.evaluation.snippets import Snippets, snippets_of
 from xosc_lateral.formats.profiles import read_profile

@@ -9,7 +9,8 @@ import pytest
 from msgspec import structs
 
 from tests.motion.made_motion import LANE_WIDTH, drive, entity, together, two_roads
-from xosc_lateral.enrich.result import EntityResult, SampledSegment, gaps_of, lane_departures
+from xosc_lateral.enrich.consequences import gaps_of, lane_departures
+from xosc_lateral.enrich.result import EntityResult, SampledSegment
 from xosc_lateral.motion.nominal import Activity, EntityMotion
 from xosc_lateral.motion.segments import cut_segments
 from xosc_lateral.motion.trajectory import displace

@@ -1,11 +1,8 @@
-"""What enriching and converting a scenario give, as data, and what lifelike motion brings about: lane departures, gaps.
-
-The writer, the report and the manifest read it.
-"""
+"""What enriching and converting a scenario give, as data: the writer, the report and the manifest read it."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
 from pathlib import Path
@@ -16,9 +13,8 @@ from numpy.typing import NDArray
 
 from xosc_lateral.driver.drivability import Bound
 from xosc_lateral.driver.profile import DriverProfile
-from xosc_lateral.mask import true_slices
-from xosc_lateral.motion.gaps import BoxPath, Gap, smallest_gaps
-from xosc_lateral.motion.nominal import Activity, EntityMotion, NominalMotion
+from xosc_lateral.motion.gaps import Gap
+from xosc_lateral.motion.nominal import EntityMotion, NominalMotion
 from xosc_lateral.motion.segments import SegmentSpan
 from xosc_lateral.motion.trajectory import WorldTrajectory, leaps
 from xosc_lateral.road.network import RoadNetwork
@@ -209,56 +205,6 @@ def _jumps(entity: EntityResult) -> list[str]:
         "ends, or its road has a gap; a lane change before it would avoid that"
         for time, length in leaps(entity.motion)
     ]
-
-
-GAP_STEP = 0.1
-"""Rows that gaps are looked for on. [s]"""
-
-
-def lane_departures(entity: EntityResult, network: RoadNetwork) -> list[LaneDeparture]:
-    """Where the enriched reference point is outside the nominal lane although the nominal one is inside: worst row."""
-    found = []
-    motion = entity.motion
-    spans = [(segment.span.first, segment.span.last) for segment in entity.segments]
-    for first, last in spans + _lateral_within_a_lane(motion):
-        rows = slice(first, last + 1)
-        half = 0.5 * network.lane_width(motion.road[rows], motion.lane[rows], motion.s[rows])
-        along_lane = np.where(np.cos(motion.heading_relative[rows]) >= 0.0, 1.0, -1.0)
-        beyond = np.abs(motion.offset[rows] + along_lane * entity.deviation[rows]) - half
-        left = (beyond > 0.0) & (np.abs(motion.offset[rows]) <= half)
-        if left.any():
-            worst = int(np.argmax(np.where(left, beyond, -np.inf)))
-            found.append(LaneDeparture(entity.name, float(motion.time[rows][worst]), float(beyond[worst])))
-    return found
-
-
-def _lateral_within_a_lane(motion: EntityMotion) -> list[tuple[int, int]]:
-    """First and last row of lateral actions that keep to one lane: distances kept beside others, offsets in the lane.
-
-    Lane changes cross markings anyway.
-    """
-    lateral = (
-        ((motion.activity & Activity.LATERAL) != 0) & ((motion.activity & Activity.ACTIVE) != 0) & (motion.road >= 0)
-    )
-    return [(part.start, part.stop - 1) for part in true_slices(lateral) if len(set(motion.lane[part].tolist())) == 1]
-
-
-def gaps_of(motion: NominalMotion, trajectories: Sequence[WorldTrajectory]) -> tuple[Gap, ...]:
-    """Smallest gap of each pair of vehicles that meet; `trajectories`: one per entity."""
-    every = max(1, round(GAP_STEP / motion.step))
-    paths = []
-    for entity, path in zip(motion.entities, trajectories, strict=True):
-        if not entity.entity.is_vehicle:
-            continue
-        box = entity.entity.bounding_box
-        absent = ((entity.activity & Activity.ACTIVE) == 0)[::every]
-        x = np.where(absent, np.nan, path.x[::every])
-        paths.append(
-            BoxPath(entity.name, x, path.y[::every], path.heading[::every], box.length, box.width, box.center_x)
-        )
-    if not paths:
-        return ()
-    return smallest_gaps(motion.entities[0].time[::every], paths)
 
 
 @dataclass(frozen=True, slots=True)
