@@ -23,17 +23,10 @@ FloatArray = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False, slots=True)
 class ContextTable(Mapping[str, tuple[FloatArray, FloatArray]]):
-    """Context over time: name -> (time, values), shape (n,) each.
-
-    Parameters
-    ----------
-    columns : mapping of str to (array, array)
-    sha256 : str
-        Of the file's bytes.
-    """
+    """Context over time: name -> (time, values), shape (n,) each."""
 
     columns: Mapping[str, tuple[FloatArray, FloatArray]]
-    sha256: str
+    sha256: str  # of the file's bytes
 
     def __getitem__(self, name: str) -> tuple[FloatArray, FloatArray]:
         return self.columns[name]

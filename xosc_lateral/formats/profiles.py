@@ -201,23 +201,12 @@ FIELDS = tuple(name for name in Metadata.__struct_fields__ if name != "tags")
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Entry:
-    """One file of the library.
-
-    Parameters
-    ----------
-    path : Path
-    profile : DriverProfile or None
-        None: it can't be read.
-    problem : str
-        What is wrong with it, in a line; empty if nothing is.
-    hidden_by : Path or None
-        File of the same name in a folder that is looked through before.
-    """
+    """One file of the library."""
 
     path: Path
-    profile: DriverProfile | None
-    problem: str = ""
-    hidden_by: Path | None = None
+    profile: DriverProfile | None  # None: it can't be read
+    problem: str = ""  # what is wrong with it, in a line; empty if nothing is
+    hidden_by: Path | None = None  # file of the same name in a folder that is looked through before
 
     @property
     def name(self) -> str:

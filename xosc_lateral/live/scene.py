@@ -37,23 +37,12 @@ SEEN = ("x", "y", "z", "heading", "pitch", "roll", "speed", "s", "offset")
 
 @dataclass(frozen=True, slots=True)
 class Scene:
-    """Who was there, and where.
-
-    Parameters
-    ----------
-    entities : sequence of Entity
-    network : callable
-        Reads the road.
-    ego : sequence of str
-        Vehicles under test.
-    is_road : bool
-        Rows have road and lane by the ids of the network; else they are found from positions.
-    """
+    """Who was there, and where."""
 
     entities: Sequence[Entity]
-    network: Callable[[], RoadNetwork]
-    ego: Sequence[str] = ()
-    is_road: bool = True
+    network: Callable[[], RoadNetwork]  # reads the road
+    ego: Sequence[str] = ()  # vehicles under test
+    is_road: bool = True  # rows have road and lane by the ids of the network; else they are found from positions
 
 
 def motion_of(rows: pd.DataFrame, scene: Scene, network: RoadNetwork) -> NominalMotion:

@@ -53,24 +53,12 @@ STAYS_AWAY = 1.0
 
 @dataclass(frozen=True, eq=False)
 class Channel:
-    """A mapped channel.
+    """A mapped channel."""
 
-    Parameters
-    ----------
-    time : array, shape (n,)
-        Stamps. [s]
-    values : array, shape (n,)
-        Numbers in the unit of the standard table, or words.
-    unit : str
-        That they were read in; empty where neither map nor file names one.
-    is_stepwise : bool
-        Whether the nearest sample counts.
-    """
-
-    time: FloatArray
-    values: NDArray[Any]
-    unit: str
-    is_stepwise: bool
+    time: FloatArray  # stamps, shape (n,) [s]
+    values: NDArray[Any]  # numbers in the unit of the standard table, or words, shape (n,)
+    unit: str  # that they were read in; empty where neither map nor file names one
+    is_stepwise: bool  # whether the nearest sample counts
 
     def at(self, time: FloatArray) -> NDArray[Any]:
         """Values at these times. [s]"""

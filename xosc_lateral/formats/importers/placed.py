@@ -27,21 +27,11 @@ IntArray = NDArray[np.int64]
 
 @dataclass(frozen=True, eq=False)
 class LaneGraph:
-    """Pieces of lanes and how they hang together.
+    """Pieces of lanes and how they hang together."""
 
-    Parameters
-    ----------
-    length : array, shape (n,)
-        Of each piece, along the road. [m]
-    left : array of int, shape (n,)
-        Piece beside it on the left that is driven the same way; -1: none.
-    following : sequence of sequences of int
-        Pieces that it leads to.
-    """
-
-    length: FloatArray
-    left: IntArray
-    following: Sequence[Sequence[int]]
+    length: FloatArray  # of each piece, along the road, shape (n,) [m]
+    left: IntArray  # piece beside it on the left that is driven the same way; -1: none, shape (n,)
+    following: Sequence[Sequence[int]]  # pieces that it leads to
 
     def layout(self) -> tuple[IntArray, FloatArray, IntArray]:
         """Part of the network, way along it to the piece's start [m], and rank (growing to the left) of each piece.
@@ -97,45 +87,20 @@ SPEED_WINDOW = 0.4
 
 @dataclass(frozen=True, eq=False)
 class PlacedTracks:
-    """Rows of all vehicles, sorted by vehicle and time.
+    """Rows of all vehicles, sorted by vehicle and time."""
 
-    Parameters
-    ----------
-    names : sequence of str
-        Of the vehicles.
-    vehicle : array of int, shape (n,)
-        Index into `names`.
-    time : array, shape (n,)
-        [s]
-    step : float
-        Between two rows. [s]
-    piece : array of int, shape (n,)
-        Of the lane graph; -1: in no lane.
-    along : array, shape (n,)
-        Way from the piece's start, in the direction of travel. [m]
-    offset, lane_width : array, shape (n,)
-        NaN in no lane. [m]
-    speed : array, shape (n,)
-        [m/s]
-    length : array, shape (n,)
-        Of the vehicle. [m]
-    kind : array of str, shape (n,)
-        Class of the vehicle in lower case; empty where not known.
-    road : mapping of str to array, shape (n,)
-        What the road is like there: curvature, lane_index ...
-    """
-
-    names: Sequence[str]
-    vehicle: IntArray
-    time: FloatArray
-    step: float
-    piece: IntArray
-    along: FloatArray
-    offset: FloatArray
+    names: Sequence[str]  # of the vehicles
+    vehicle: IntArray  # index into `names`, shape (n,)
+    time: FloatArray  # shape (n,) [s]
+    step: float  # between two rows [s]
+    piece: IntArray  # of the lane graph; -1: in no lane, shape (n,)
+    along: FloatArray  # way from the piece's start, in the direction of travel, shape (n,) [m]
+    offset: FloatArray  # offset, lane_width: NaN in no lane, shape (n,) [m]
     lane_width: FloatArray
-    speed: FloatArray
-    length: FloatArray
-    kind: NDArray[np.str_]
+    speed: FloatArray  # shape (n,) [m/s]
+    length: FloatArray  # of the vehicle, shape (n,) [m]
+    kind: NDArray[np.str_]  # class of the vehicle in lower case; empty where not known, shape (n,)
+    # road: what the road is like there: curvature, lane_index ..., shape (n,)
     road: Mapping[str, FloatArray] = field(default_factory=dict)
 
 
