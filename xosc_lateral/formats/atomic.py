@@ -17,13 +17,8 @@ def write_atomically(path: Path | str, data: bytes | str, *, durable: bool = Fal
 
     Raises `OSError`: Disk full, no permission: the output is as it was, and no temporary file stays behind.
 
-    Parameters
-    ----------
-    path : path
-    data : bytes or str
-    durable : bool
-        Return only when the disk has it, so that not even a power cut takes it back. On a busy disk that is a tenth of
-        a second: for what ten thousand others depend on, not for each of the ten thousand.
+    `durable`: return only when the disk has it, so that not even a power cut takes it back. On a busy disk that is a
+    tenth of a second: for what ten thousand others depend on, not for each of the ten thousand.
     """
     content = data.encode() if isinstance(data, str) else data
 

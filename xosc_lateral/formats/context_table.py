@@ -44,10 +44,7 @@ def read_context(path: Path) -> ContextTable:
     Raises `FormatError`: No `time` column, time that does not increase, a value that is infinite, no number or none
     that a road has (`limits`), or no context column.
 
-    Returns
-    -------
-    ContextTable
-        NaN values are left out row by row: between what is stated, values are interpolated.
+    NaN values are left out row by row: between what is stated, values are interpolated.
     """
     table, sha256 = read_table(path)
     time = _time_of(table, path)

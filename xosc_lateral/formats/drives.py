@@ -33,18 +33,10 @@ def read_drives(paths: str | Path | Sequence[str | Path], mapping: MappingLike |
     Raises `FormatError` when a file can't be read, a column is missing, or its values can't be in the unit meant;
     `NotEnoughDataError` when a file holds no drive with two rows of time, offset and lane width.
 
-    Parameters
-    ----------
-    paths : path or sequence of paths
-        Tables; the suffix gives the format.
-    mapping : TableMapping, mapping of str to str, or path, optional
-        What columns are called, and how tables are written; see `formats.mapping`.
-
-    Returns
-    -------
-    list of Drive
-        In the order of the files and of first appearance; a drive without a name is called after its file. Rows are
-        sorted by time, repeated times dropped, rows with a missing value left out (a gap).
+    `paths`: tables; the suffix gives the format. `mapping`: what columns are called, and how tables are written; see
+    `formats.mapping`. Returns list of Drive: in the order of the files and of first appearance; a drive without a name
+    is called after its file. Rows are sorted by time, repeated times dropped, rows with a missing value left out (a
+    gap).
     """
     known = as_mapping(mapping)
     files = [Path(path) for path in ([paths] if isinstance(paths, str | Path) else paths)]

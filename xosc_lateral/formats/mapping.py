@@ -160,10 +160,7 @@ class TableMapping:
     def numbers(self, name: str, column: pd.Series, path: Path) -> pd.Series:
         """The column `name`, its texts as the numbers that they stand for.
 
-        Raises
-        ------
-        FormatError
-            For a text that stands for none.
+        Raises `FormatError`: for a text that stands for none.
         """
         import pandas as pd
 
@@ -207,10 +204,7 @@ def _as_word(cell: object) -> str:
 def parse_map(words: Iterable[str]) -> dict[str, ColumnSource]:
     """Read ``NAME=COLUMN`` or ``NAME=COLUMN:UNIT`` (``speed=v_kmh:km/h``, ``offset=lat:-cm``).
 
-    Raises
-    ------
-    FormatError
-        When a word has no ``=`` or its unit does not fit the column.
+    Raises `FormatError`: when a word has no ``=`` or its unit does not fit the column.
     """
     mapping: dict[str, ColumnSource] = {}
     for word in words:
@@ -232,10 +226,7 @@ def _source(name: str, words: str) -> ColumnSource:
 def read_mapping(path: Path) -> TableMapping:
     """Read a mapping's file.
 
-    Raises
-    ------
-    FormatError
-        It is no TOML, or holds what no mapping has; names the entry.
+    Raises `FormatError`: it is no TOML, or holds what no mapping has; names the entry.
     """
     import tomllib
 

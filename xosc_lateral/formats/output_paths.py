@@ -28,16 +28,8 @@ LONGEST_NAME = 255
 def file_name(name: str, what: str) -> str:
     """A name that others gave, as the name of a file: the one gate to paths.
 
-    Parameters
-    ----------
-    name : str
-    what : str
-        Whose name it is, for the message.
-
-    Raises
-    ------
-    FormatError
-        It could lead to another folder, or no file can have it.
+    `what`: whose name it is, for the message. Raises `FormatError`: it could lead to another folder, or no file can
+    have it.
     """
     wrong = name in ("", ".", "..") or any(sign in "/\\" or sign < " " for sign in name)
     if wrong or len(name.encode(errors="replace")) > LONGEST_NAME:
@@ -48,10 +40,7 @@ def file_name(name: str, what: str) -> str:
 def path_below(folder: Path, name: str, what: str) -> Path:
     """A path below a folder from names that others gave, with forward slashes.
 
-    Raises
-    ------
-    FormatError
-        It leads elsewhere.
+    Raises `FormatError`: it leads elsewhere.
     """
     return folder.joinpath(*(file_name(part, what) for part in name.split("/")))
 
@@ -61,14 +50,8 @@ def output_file(output: str | Path, usual_name: str, suffixes: Sequence[str]) ->
 
     Raises `FormatError` for another suffix.
 
-    Parameters
-    ----------
-    output : str or Path
-        As the user gave it. Ends in a slash, or is a folder: `usual_name` in that folder.
-    usual_name : str
-        File name in a folder.
-    suffixes : sequence of str
-        Formats that can be written, lower case with their dot.
+    `output`: as the user gave it. Ends in a slash, or is a folder: `usual_name` in that folder. `usual_name`: file name
+    in a folder. `suffixes`: formats that can be written, lower case with their dot.
     """
     path = output_folder(output) / file_name(usual_name, "name") if is_folder(output) else Path(output)
     if not path.name.lower().endswith(tuple(suffixes)):
@@ -99,14 +82,8 @@ def claim(outputs: Iterable[Path | None], inputs: Iterable[Path] = (), *, force:
 
     Raises `FormatError`: see `refuse_outputs`; or a file is there that this package did not write.
 
-    Parameters
-    ----------
-    outputs : iterable of Path or None
-        Files to be written; None: not wanted.
-    inputs : iterable of Path
-        Files that are read.
-    force : bool
-        Replace whatever is there, apart from inputs.
+    `outputs`: files to be written; None: not wanted. `inputs`: files that are read. `force`: replace whatever is there,
+    apart from inputs.
     """
     wanted = [output for output in outputs if output is not None]
     refuse_outputs(wanted, inputs)
@@ -121,12 +98,7 @@ def refuse_outputs(outputs: Iterable[Path | None], inputs: Iterable[Path] = ()) 
     Raises `FormatError` if an output is a folder, an input (links resolved), or named twice, or its folder can't be
     made or written to.
 
-    Parameters
-    ----------
-    outputs : iterable of Path or None
-        Files to be written; None: not wanted.
-    inputs : iterable of Path
-        Files that are read.
+    `outputs`: files to be written; None: not wanted. `inputs`: files that are read.
     """
     taken = {path.resolve(): "is an input; choose another output" for path in inputs}
     for output in outputs:

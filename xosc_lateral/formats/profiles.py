@@ -114,12 +114,7 @@ def read_profile(name_or_path: str | Path, folders: Iterable[str | Path] = ()) -
     Raises `DriverProfileError` if no profile of that name is known; lists those that are; `FormatError` if the file is
     not there or no valid profile, or a folder isn't one.
 
-    Parameters
-    ----------
-    name_or_path : str or Path
-        ``motorway`` or ``somewhere/mine.json``.
-    folders : iterable of path
-        Looked through first, in this order.
+    `name_or_path`: ``motorway`` or ``somewhere/mine.json``. `folders`: looked through first, in this order.
     """
     path = find_profile(name_or_path, folders)
     values = parse_json(read_source(path, PROFILE_SIZE).data, path)

@@ -64,19 +64,8 @@ def read_recording(
 ) -> RecordedTraffic:
     """Read a recording.
 
-    Parameters
-    ----------
-    source : path
-    kind : str, optional
-        Its format, one of `READERS`; without it, told from the name.
-    road : path, optional
-        OpenDRIVE file, for formats that come without one.
-    columns : TableMapping, mapping of str to str, or path, optional
-        Name -> ``COLUMN[:UNIT]``, of tables.
-
-    Raises
-    ------
-    FormatError, NotEnoughDataError
+    `kind`: its format, one of `READERS`; without it, told from the name. `road`: OpenDRIVE file, for formats that come
+    without one. `columns`: name -> ``COLUMN[:UNIT]``, of tables. Raises `FormatError`, `NotEnoughDataError`.
     """
     kind = kind or format_of(source)
     if kind not in READERS:

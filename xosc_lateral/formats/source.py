@@ -132,10 +132,7 @@ def check_unpacked(unpacked: int, packed: int, path: Path) -> None:
 
     Raises `FormatError`: Above `limits.UNPACKED_SIZE`, or above `limits.UNPACKED_UNASKED` and `limits.PACKING_RATIO`.
 
-    Parameters
-    ----------
-    unpacked, packed : int
-        [byte]
+    `unpacked`, `packed`: [byte]
     """
     if unpacked > UNPACKED_SIZE.bytes:
         raise FormatError(UNPACKED_SIZE.refusal(unpacked / 1e6), path=path)

@@ -133,10 +133,7 @@ def read_table(path: Path, mapping: TableMapping | None = None) -> tuple[pd.Data
 
     Raises `FormatError` when it isn't one, or is beyond the limits.
 
-    Returns
-    -------
-    DataFrame, str
-        The table, and the SHA-256 of the bytes that it was parsed from.
+    Returns DataFrame, str: the table, and the SHA-256 of the bytes that it was parsed from.
     """
     import pandas as pd
 
@@ -240,10 +237,7 @@ def _encoding(text: IO[bytes]) -> str:
 def _in_utf8(text: IO[bytes], path: Path, encoding: str | None = None) -> IO[bytes]:
     """The text in UTF-8.
 
-    Raises
-    ------
-    FormatError
-        It is not in the encoding that is given or found.
+    Raises `FormatError`: it is not in the encoding that is given or found.
     """
     given = encoding or _encoding(text)
     if given.lower().replace("_", "-") in ("utf-8", "utf8", "utf-8-sig"):

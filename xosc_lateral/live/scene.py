@@ -84,10 +84,7 @@ def sumo_entity(vehicles: Any, name: str) -> Entity:
 def sumo_network(net: str) -> RoadNetwork:
     """The road of a SUMO network, by SUMO's own ``netconvert``.
 
-    Raises
-    ------
-    SimulationError
-        If that is not there, or can't.
+    Raises `SimulationError`: if that is not there, or can't.
     """
     try:
         from sumo import SUMO_HOME

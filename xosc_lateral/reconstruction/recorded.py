@@ -106,10 +106,7 @@ class Track:
 def place_tracks(tracks: Sequence[Track], network: RoadNetwork, start: float, end: float) -> Recording:
     """Each vehicle's longest passage in driving lanes within a window of time.
 
-    Raises
-    ------
-    NotEnoughDataError
-        If no vehicle is left.
+    Raises `NotEnoughDataError`: if no vehicle is left.
     """
     vehicles, left_out = list[RecordedVehicle](), list[str]()
     for track in tracks:

@@ -120,11 +120,7 @@ class Settings:
 
     Raises `XoscLateralError` for an unknown name or a value out of range.
 
-    Parameters
-    ----------
-    parameters : iterable of Parameter
-    chosen : mapping of str to str
-        What the user set, as text.
+    `chosen`: what the user set, as text.
     """
 
     __slots__ = ("_values",)

@@ -68,10 +68,7 @@ class Template:
 
         Raises `XoscLateralError` for an unknown parameter or a value out of range.
 
-        Parameters
-        ----------
-        chosen : mapping of str to str, optional
-            Parameters that differ from their defaults, as text.
+        `chosen`: parameters that differ from their defaults, as text.
         """
         settings = Settings(self.parameters, chosen or {})
         plot = self.plot(settings)

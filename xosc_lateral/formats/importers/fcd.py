@@ -31,6 +31,9 @@ _TRUCKS = ("truck", "trailer", "bus", "coach", "lkw")
 def import_fcd(source: Path, *, net: str | Path | None = None, lane_width: float = WIDTH) -> pd.DataFrame:
     """A drive for every vehicle.
 
+    A vehicle is a truck when its type's name says so. Raises `FormatError`, `NotEnoughDataError`: not such a file; one
+    without `posLat`; one without vehicles.
+
     Parameters
     ----------
     source : Path
@@ -39,16 +42,6 @@ def import_fcd(source: Path, *, net: str | Path | None = None, lane_width: float
         The road network, ``.net.xml``, for widths and counts of lanes.
     lane_width : float
         Where there is no net. [m]
-
-    Returns
-    -------
-    DataFrame
-        A drive table. A vehicle is a truck when its type's name says so.
-
-    Raises
-    ------
-    FormatError, NotEnoughDataError
-        Not such a file; one without `posLat`; one without vehicles.
     """
     import pandas as pd
 

@@ -82,16 +82,9 @@ def import_mf4(
     Raises `FormatError` if the map lacks the position, asammdf is not installed, a log can't be read, a channel is not
     in it, or the unit in the file measures something else.
 
-    Parameters
-    ----------
-    sources : path or sequence of paths
-        Each log is a drive of its own, called after its file.
-    channels : sequence of str
-        Words ``NAME=CHANNEL[:UNIT]``.
-    mapping : TableMapping, mapping of str to str, or path, optional
-        More of them, saved.
-    step : float
-        Of the table. Messages that stay away for longer than a second leave a gap. [s]
+    `sources`: each log is a drive of its own, called after its file. `channels`: words ``NAME=CHANNEL[:UNIT]``.
+    `mapping`: more of them, saved. `step`: of the table [s]. Messages that stay away for longer than a second leave
+    a gap.
     """
     import pandas as pd
 

@@ -83,18 +83,9 @@ class Tracks:
 def read_tracks(path: Path, columns: Sequence[str] = (), mapping: MappingLike | None = None) -> Tracks:
     """Read a table of tracks.
 
-    Parameters
-    ----------
-    mapping : TableMapping, mapping of str to str, or path, optional
-    columns : sequence of str
-        ``NAME=COLUMN[:UNIT]`` for headers that aren't understood, and for units other than m, s, rad, m/s.
-
-    Raises
-    ------
-    FormatError
-        A missing column, no number where one is needed.
-    NotEnoughDataError
-        No vehicle with two rows.
+    `columns`: ``NAME=COLUMN[:UNIT]`` for headers that aren't understood, and for units other than m, s, rad, m/s.
+    Raises `FormatError`: a missing column, no number where one is needed. Raises `NotEnoughDataError`: no vehicle with
+    two rows.
     """
     saved = as_mapping(mapping)
     table = read_esmini_log(path) if is_esmini_log(path) else read_table(path, saved)[0]
@@ -234,10 +225,7 @@ def is_esmini_log(path: Path) -> bool:
 def read_esmini_log(path: Path) -> pd.DataFrame:
     """Rows of all vehicles, one below the other: the columns of `_LOGGED`, and `time`.
 
-    Raises
-    ------
-    FormatError
-        A column is missing, or the table is damaged.
+    Raises `FormatError`: a column is missing, or the table is damaged.
     """
     import pandas as pd
 

@@ -32,10 +32,7 @@ class _Lane:
 def lanes_of(recorded: Recorded) -> tuple[list[Strip], LaneGraph] | None:
     """Driving lanes with a boundary on both sides: logical lanes where there are any, else physical ones.
 
-    Returns
-    -------
-    (list of Strip, LaneGraph) or None
-        None: the trace has no such lane.
+    None: the trace has no such lane.
     """
     lanes = list(_logical(recorded)) or list(_physical(recorded))
     if not lanes:
