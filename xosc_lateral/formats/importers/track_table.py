@@ -16,7 +16,7 @@ from xosc_lateral.formats.importers.placed import PlacedTracks, ground_speed, tr
 from xosc_lateral.formats.mapping import MappingLike, TableMapping, as_mapping, parse_map
 from xosc_lateral.formats.source import open_source
 from xosc_lateral.formats.states import COLUMNS
-from xosc_lateral.formats.tables import comma_numbers, foreign_errors, read_table, seconds_of_text, unpacked_text
+from xosc_lateral.formats.tables import foreign_errors, numbers_of, read_table, unpacked_text
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -162,35 +162,10 @@ def _columns(table: pd.DataFrame, path: Path, saved: TableMapping, words: Sequen
         if name in ("vehicle", "vehicle_class"):
             found[name] = column
         else:
-            found[name] = _numbers(column, name, path) * (1.0 if source is None else source.factor)
+            by = 1.0 if source is None else source.factor
+            found[name] = pd.Series(numbers_of(column, path, name) * by, index=column.index)
     made = pd.DataFrame(found).replace([np.inf, -np.inf], np.nan)
     return made.dropna(subset=["vehicle", "time", "x", "y"])
-
-
-def _numbers(column: pd.Series, name: str, path: Path) -> pd.Series:
-    import pandas as pd
-    from pandas.api import types
-
-    if types.is_numeric_dtype(column):
-        return column.astype(np.float64)
-    if name == "time":
-        seconds = seconds_of_text(column.astype(str))
-        if seconds is not None:
-            return pd.Series(seconds, index=column.index)
-    numbers = comma_numbers(column)
-    if numbers is None:
-        numbers = pd.to_numeric(column, errors="coerce")
-    _refuse_words(numbers, column, path)
-    return numbers
-
-
-def _refuse_words(numbers: pd.Series, column: pd.Series, path: Path) -> None:
-    strange = numbers.isna() & column.notna()
-    if strange.any():
-        row = int(np.flatnonzero(strange)[0])
-        raise FormatError(
-            f"{column.iloc[row]!r} is not a number", path=path, line=row + 2, element=f"column {column.name!r}"
-        )
 
 
 FIRST = b"esmini "

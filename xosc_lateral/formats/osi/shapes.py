@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from xosc_lateral.formats.importers.lane_shapes import Strip, middle
 from xosc_lateral.formats.importers.placed import LaneGraph
-from xosc_lateral.formats.importers.strips import Strip, middle
 from xosc_lateral.formats.osi.extra import osi
 from xosc_lateral.formats.osi.read import Recorded
 
