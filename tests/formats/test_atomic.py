@@ -6,7 +6,8 @@ from pathlib import Path
 import pytest
 
 from xosc_lateral.errors import FormatError
-from xosc_lateral.formats.atomic import refuse_outputs, replace_atomically, write_atomically
+from xosc_lateral.formats.atomic import replace_atomically, write_atomically
+from xosc_lateral.formats.output_paths import refuse_outputs
 
 
 def test_text_and_bytes_arrive(tmp_path: Path) -> None:

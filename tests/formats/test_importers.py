@@ -48,7 +48,7 @@ def test_neighbours_agree_with_a_search_over_all_pairs():
                 and (step != 0 or s[j] > s[k])
             ]
             nearest = min(others, key=lambda j: abs(s[j] - s[k]), default=None)
-            found = getattr(near, f"{name}_distance")[k]
+            found = near[f"{name}_distance"][k]
             free = np.inf if nearest is None else max(abs(s[nearest] - s[k]) - (length[k] + length[nearest]) / 2, 0.0)
             # with the nearest centre on the other side, a longer vehicle may still be nearer bumper to bumper
             if not there[name][k]:
@@ -57,7 +57,7 @@ def test_neighbours_agree_with_a_search_over_all_pairs():
                 assert (found == np.inf and free > REACH) or found <= min(free, REACH)
             if step == 0 and free <= REACH:
                 assert found == pytest.approx(free)
-                assert near.lead_is_truck[k] == truck[nearest]
+                assert near["lead_is_truck"][k] == truck[nearest]
 
 
 def test_a_lane_change_is_cut_from_setting_off_to_settling():

@@ -12,8 +12,7 @@ import pytest
 import xosc_lateral as xl
 from xosc_lateral.errors import FormatError
 from xosc_lateral.formats.hashes import file_hash
-from xosc_lateral.formats.output_paths import claim, is_folder, output_file, output_folder
-from xosc_lateral.formats.own_files import is_own, template_mark
+from xosc_lateral.formats.output_paths import claim, is_folder, is_own, output_file, output_folder, template_mark
 
 SUFFIXES = (".csv", ".csv.gz", ".parquet")
 

@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from xosc_lateral.formats.output_paths import claim
+from xosc_lateral.formats.output_paths import SIDECAR_SUFFIX, claim, is_own
 from xosc_lateral.formats.output_tables import (
     ENCODERS,
     METADATA_KEY,
@@ -20,7 +20,6 @@ from xosc_lateral.formats.output_tables import (
     write_frame,
     write_table,
 )
-from xosc_lateral.formats.own_files import SIDECAR_SUFFIX, is_own
 from xosc_lateral.version import __version__
 
 FRAME = pd.DataFrame({"time": [0.0, 0.2], "offset": [0.1234567, -1.0 / 3.0], "name": ["ego", "=cmd()"], "n": [1, 2]})

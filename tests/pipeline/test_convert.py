@@ -11,7 +11,7 @@ import pytest
 
 from tests.profiles import simulated_profile
 from xosc_lateral.cli import main
-from xosc_lateral.enrich.conversion import ConvertedScenario
+from xosc_lateral.enrich.result import ConvertedScenario
 from xosc_lateral.errors import FormatError
 from xosc_lateral.formats.profiles import write_profile
 from xosc_lateral.motion.nominal import Activity

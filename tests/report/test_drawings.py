@@ -13,7 +13,7 @@ from lxml import etree
 
 from tests.report.made_enriched import made_enriched
 from tests.road.places import hand_written
-from xosc_lateral.enrich.conversion import ConversionProvenance, ConvertedScenario
+from xosc_lateral.enrich.result import ConversionProvenance, ConvertedScenario
 from xosc_lateral.motion.nominal import Activity
 from xosc_lateral.pipeline.settings import ConvertSettings
 from xosc_lateral.report.batch import BORDER, HEIGHT, WIDTH, thumbnail

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from tests.report.made_enriched import made_enriched
-from xosc_lateral.enrich.conversion import ConversionProvenance, ConvertedScenario
+from xosc_lateral.enrich.result import ConversionProvenance, ConvertedScenario
 from xosc_lateral.motion.gaps import Gap
 from xosc_lateral.motion.nominal import Activity, Note
 from xosc_lateral.pipeline.settings import ConvertSettings

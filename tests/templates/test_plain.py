@@ -9,7 +9,7 @@ import pytest
 
 import xosc_lateral as xl
 from xosc_lateral.errors import XoscLateralError
-from xosc_lateral.formats.own_files import template_mark
+from xosc_lateral.formats.output_paths import template_mark
 from xosc_lateral.shipped import shipped_folder
 from xosc_lateral.templates import TEMPLATES
 from xosc_lateral.templates.plain import PlainTemplate, plain_templates

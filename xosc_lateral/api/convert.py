@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import Figure
 
-    from xosc_lateral.enrich.conversion import ConvertedScenario
+    from xosc_lateral.enrich.result import ConvertedScenario
 
 SCENARIO_SUFFIXES = (".xosc",)
 REPORT_SUFFIXES = (".html", ".htm")

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from xosc_lateral.api.result import PathLike, Paths, ProfileLike, Result, given_profile
 from xosc_lateral.enrich.result import Neighbours
 from xosc_lateral.errors import SimulationError
+from xosc_lateral.formats.output_paths import claim, output_file
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -18,10 +19,10 @@ if TYPE_CHECKING:
     from xosc_lateral.scenario.entity import Entity
 
 STATES = ("time", "name", "x", "y", "h", "speed", "road", "lane", "s", "offset", "driver", "steered")
-"""Columns of a run: where vehicles are; offset from the lane's centre, positive left; the driver's; if it counts. A
-row goes on with z, pitch and roll, which only a trace has."""
+"""Columns of a run: where vehicles are; offset from the lane's centre, positive left; the driver's; if it counts."""
 
-_STEERED = STATES.index("steered")
+ROW = (*STATES, "z", "pitch", "roll")
+"""The same with what only a trace has."""
 
 
 def live_esmini(
@@ -84,10 +85,10 @@ def live_esmini(
         for k in range(round(duration / step) + 1):
             time = player.SE_GetSimulationTime()
             for name, state in traffic.states().items():
-                wanted, steered = traffic.moves.get(name, (float("nan"), False))
+                move = traffic.moves.get(name, (float("nan"), False))
                 place = (state.road, state.lane, state.s, traffic.offset_of(state))
-                pose = (state.z, state.p, state.r)
-                rows.append((time, name, state.x, state.y, state.h, state.speed, *place, wanted, steered, *pose))
+                pose = (state.x, state.y, state.h, state.speed)
+                rows.append((time, name, *pose, *place, *move, state.z, state.p, state.r))
             if player.SE_GetQuitFlag() == 1 or k == round(duration / step):
                 break
             traffic.steer(step)
@@ -150,10 +151,8 @@ def live_sumo(
             connection, chosen, ego=ego, seed=seed, profiles=others, neighbours=Neighbours(neighbours)
         )
         end = float(connection.simulation.getTime()) + duration
-        if (
-            configured := float(connection.simulation.getEndTime())
-        ) > 0.0:  # of which SUMO makes nothing by itself here
-            end = min(end, configured)
+        configured = float(connection.simulation.getEndTime())  # of which SUMO makes nothing by itself here
+        end = min(end, configured) if configured > 0.0 else end
         while connection.simulation.getMinExpectedNumber() > 0 and connection.simulation.getTime() < end - 1e-9:
             traffic.steer()
             connection.simulationStep()
@@ -161,10 +160,10 @@ def live_sumo(
             collisions += len(connection.simulation.getCollisions())
             teleports += connection.simulation.getStartingTeleportNumber()
             for name, x, y, h, speed, lane, s, offset in traffic.states():
-                wanted, steered = traffic.moves.get(name, (float("nan"), False))
+                move = traffic.moves.get(name, (float("nan"), False))
                 edge, _, index = lane.rpartition("_")
                 z = float(connection.vehicle.getPosition3D(name)[2])
-                rows.append((time, name, x, y, h, speed, edge, int(index), s, offset, wanted, steered, z, 0.0, 0.0))
+                rows.append((time, name, x, y, h, speed, edge, int(index), s, offset, *move, z, 0.0, 0.0))
                 if name not in entities:
                     entities[name] = sumo_entity(connection.vehicle, name)
     finally:
@@ -189,7 +188,10 @@ class LiveRun(Result):
         events: Sequence[tuple[float, str, int]] = (),
         scene: Scene | None = None,
     ) -> None:
-        self._rows, self._settings, self._scene = rows, dict(settings), scene
+        import pandas as pd
+
+        self._rows = pd.DataFrame(rows, columns=list(ROW))
+        self._settings, self._scene = dict(settings), scene
         self.warnings = tuple(warnings)
         """What a user has to know, a line each."""
         self.events = tuple(events)
@@ -197,20 +199,18 @@ class LiveRun(Result):
 
     def headline(self) -> str:
         """One line."""
-        names = {row[1] for row in self._rows}
-        steered = {row[1] for row in self._rows if row[_STEERED]}
-        time = self._rows[-1][0] if self._rows else 0.0
+        rows = self._rows
+        names, steered = rows["name"].nunique(), rows["name"][rows["steered"].astype(bool)].nunique()
+        time = rows["time"].iloc[-1] if len(rows) else 0.0
         source, profile, seed = (self._settings[key] for key in ("scenario", "profile", "seed"))
-        return f"{source}: {time:g} s, {len(steered)} of {len(names)} vehicles driven by {profile}, seed {seed}"
+        return f"{source}: {time:g} s, {steered} of {names} vehicles driven by {profile}, seed {seed}"
 
     def __str__(self) -> str:
         return "\n".join([self.headline(), *(f"  warning: {warning}" for warning in self.warnings)])
 
     def to_frame(self) -> pd.DataFrame:
         """One row per vehicle and step, see `STATES`; SI units, offsets positive left of travel."""
-        import pandas as pd
-
-        return pd.DataFrame([row[: len(STATES)] for row in self._rows], columns=list(STATES))
+        return self._rows[list(STATES)]
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values, as ``--json`` prints them: what ran, without its rows."""
@@ -218,7 +218,6 @@ class LiveRun(Result):
 
     def write(self, path: PathLike, *, force: bool = False) -> Path:
         """Write the table: ``.csv``, ``.csv.gz`` or ``.parquet``, with its provenance."""
-        from xosc_lateral.formats.output_paths import claim, output_file
         from xosc_lateral.formats.output_tables import output_suffixes, write_frame
 
         output = output_file(path, "states.csv", output_suffixes())
@@ -236,7 +235,6 @@ class LiveRun(Result):
         """
         from xosc_lateral.formats.osi.extra import SUFFIXES
         from xosc_lateral.formats.osi.write import host_of, write_osi
-        from xosc_lateral.formats.output_paths import claim, output_file
         from xosc_lateral.live.scene import motion_of
 
         if self._scene is None:

@@ -142,11 +142,17 @@ class Offsets(Result):
 
     def to_frame(self) -> pd.DataFrame:
         """Columns `drive`, `time` [s], `offset` [m]; of snippets also `snippet` and `offset_real` [m]."""
+        import numpy as np
         import pandas as pd
 
-        from xosc_lateral.formats.offsets import offset_columns
-
-        return pd.DataFrame(offset_columns(self._made, snippets="snippet_s" in self._settings))
+        is_snippet = "snippet_s" in self._settings
+        names = ["drive", "snippet", "time", "offset", "offset_real"] if is_snippet else ["drive", "time", "offset"]
+        lengths = [len(one.time) for one in self._made]
+        columns = {}
+        for name in names:
+            values = [getattr(one, name) for one in self._made]
+            columns[name] = np.repeat(values, lengths) if name in ("drive", "snippet") else np.concatenate(values)
+        return pd.DataFrame(columns)
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values, as ``--json`` prints them: what was sampled, without the offsets themselves."""

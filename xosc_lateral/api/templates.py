@@ -5,8 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from xosc_lateral.api.result import PathLike, Result
-from xosc_lateral.formats.output_paths import claim, output_folder
-from xosc_lateral.formats.own_files import template_mark
+from xosc_lateral.formats.output_paths import claim, output_folder, template_mark
 
 if TYPE_CHECKING:
     from pathlib import Path

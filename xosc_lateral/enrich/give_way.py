@@ -98,27 +98,16 @@ ENTERING = 0.5
 
 @dataclass(frozen=True, eq=False)
 class SampledVehicle:
-    """A vehicle and its sampled path.
+    """A vehicle and its sampled path."""
 
-    Parameters
-    ----------
-    motion : EntityMotion
-        Nominal.
-    deviation : array, shape (n,)
-        From it on the rows that are looked at, positive left. [m]
-    can_move : array of bool, shape (n,)
-        On which of them its path is sampled and may be moved.
-    responds : frozenset of str
-        Sides, "left" and "right", on which its profile responds to neighbours by itself: there, gaps are widened by
-        what that leaves to be widened.
-    alone : frozenset of str
-        Sides on which its answer to neighbours is known to be what its profile says: there the law moves it nowhere.
-    """
-
-    motion: EntityMotion
-    deviation: FloatArray
-    can_move: NDArray[np.bool_]
+    motion: EntityMotion  # nominal
+    deviation: FloatArray  # from it on the rows that are looked at, positive left, shape (n,) [m]
+    can_move: NDArray[np.bool_]  # on which of them its path is sampled and may be moved, shape (n,)
+    # responds: sides, "left" and "right", on which its profile responds to neighbours by itself: there, gaps are
+    # widened by what that leaves to be widened
     responds: frozenset[str] = frozenset()
+    # alone: sides on which its answer to neighbours is known to be what its profile says: there the law moves it
+    # nowhere
     alone: frozenset[str] = frozenset()
 
 

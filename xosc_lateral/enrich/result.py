@@ -1,10 +1,12 @@
-"""What enriching a scenario gives, as data: the writer, the report and the manifest read it."""
+"""What enriching and converting a scenario give, as data: the writer, the report and the manifest read it."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,23 +33,12 @@ FloatArray = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False, slots=True)
 class SampledSegment:
-    """Offsets sampled on one road-following segment.
+    """Offsets sampled on one road-following segment."""
 
-    Parameters
-    ----------
-    span : SegmentSpan
-        The segment.
-    time : array, shape (n,)
-        Every 0.2 s from the segment's start. [s]
-    offset : array, shape (n,)
-        Added to the nominal offset, positive left. [m]
-    beyond : array, shape (k,)
-        How it would go on after the segment's end, should that come later. [m]
-    """
-
-    span: SegmentSpan
-    time: FloatArray
-    offset: FloatArray
+    span: SegmentSpan  # the segment
+    time: FloatArray  # every 0.2 s from the segment's start, shape (n,) [s]
+    offset: FloatArray  # added to the nominal offset, positive left, shape (n,) [m]
+    # beyond: how it would go on after the segment's end, should that come later, shape (k,) [m]
     beyond: FloatArray = field(default_factory=lambda: np.empty(0))
 
     def later(self) -> tuple[FloatArray, FloatArray]:
@@ -58,37 +49,18 @@ class SampledSegment:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class EntityResult:
-    """One entity, nominal and enriched.
+    """One entity, nominal and enriched."""
 
-    Parameters
-    ----------
-    motion : EntityMotion
-        Nominal.
-    spans : tuple of SegmentSpan
-        All of its motion, road-following or not.
-    profile : DriverProfile or None
-        None: not enriched, `why` says the reason.
-    why : str
-        Why it was not enriched; empty if it was.
-    segments : tuple of SampledSegment
-    deviation : array, shape (rows,)
-        Of the enriched path from the nominal one, positive left. [m]
-    trajectory : WorldTrajectory
-        The enriched path (the nominal one if not enriched).
-    neutral : tuple of str
-        Context columns that the profile's effects ask for and that were not known: without effect.
-    bound : Bound or None
-        That sampled movement was smoothed since nobody could have driven it: the worst segment's.
-    """
-
-    motion: EntityMotion
-    spans: tuple[SegmentSpan, ...]
-    profile: DriverProfile | None
-    why: str
+    motion: EntityMotion  # nominal
+    spans: tuple[SegmentSpan, ...]  # all of its motion, road-following or not
+    profile: DriverProfile | None  # None: not enriched, `why` says the reason
+    why: str  # why it was not enriched; empty if it was
     segments: tuple[SampledSegment, ...]
-    deviation: FloatArray
-    trajectory: WorldTrajectory
+    deviation: FloatArray  # of the enriched path from the nominal one, positive left, shape (rows,) [m]
+    trajectory: WorldTrajectory  # the enriched path (the nominal one if not enriched)
+    # neutral: context columns that the profile's effects ask for and that were not known: without effect
     neutral: tuple[str, ...] = ()
+    # bound: that sampled movement was smoothed since nobody could have driven it: the worst segment's
     bound: Bound | None = None
 
     @property
@@ -136,28 +108,16 @@ class LaneDeparture:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Enriched:
-    """A played scenario with lifelike lateral movement.
-
-    Parameters
-    ----------
-    motion : NominalMotion
-    network : RoadNetwork
-    entities : tuple of EntityResult
-        In the scenario's order, all of them.
-    gaps_before, gaps_after : tuple of Gap
-        Smallest gaps of the pairs that come near each other, nominal and enriched.
-    departures : tuple of LaneDeparture
-    seed, variant, attempt : int
-        What the samples were drawn with; `attempt` counts resamplings on request.
-    """
+    """A played scenario with lifelike lateral movement."""
 
     motion: NominalMotion
     network: RoadNetwork
-    entities: tuple[EntityResult, ...]
+    entities: tuple[EntityResult, ...]  # in the scenario's order, all of them
+    # gaps_before, gaps_after: smallest gaps of the pairs that come near each other, nominal and enriched
     gaps_before: tuple[Gap, ...]
     gaps_after: tuple[Gap, ...]
     departures: tuple[LaneDeparture, ...]
-    seed: int
+    seed: int  # seed, variant, attempt: what the samples were drawn with; `attempt` counts resamplings on request
     variant: int
     attempt: int
 
@@ -203,3 +163,42 @@ def _jumps(entity: EntityResult) -> list[str]:
         "ends, or its road has a gap; a lane change before it would avoid that"
         for time, length in leaps(entity.motion)
     ]
+
+
+@dataclass(frozen=True, slots=True)
+class ConversionProvenance:
+    """What went into an output: enough to make the same bytes again."""
+
+    package_version: str
+    behaviour: int  # `version.BEHAVIOUR` of the program
+    scenario: str  # where the scenario lies, as seen from the output
+    # inputs: file name, as seen from the scenario -> SHA-256 of every file that was read (scenario, road,
+    # catalogs, context)
+    inputs: Mapping[str, str]
+    profiles: Mapping[str, tuple[str, str]]  # enriched entity -> name and SHA-256 of its profile
+    options: Mapping[str, Any]  # what was asked for: `ConvertSettings.record`
+    variant: int  # from 1, as in file names
+    version: str  # of the standard that was written
+    ego: tuple[str, ...]  # vehicles under test: left as they are. Empty: there is none, and everything is replayed
+    modes: Mapping[str, str]  # vehicle that was enriched -> "trajectory" or "lane-offset"
+    content_sha256: str  # of the output without its provenance
+
+    @property
+    def mode(self) -> str:
+        """Of all vehicles that were enriched: "trajectory", "lane-offset", "mixed"; empty: nobody was."""
+        found = sorted(set(self.modes.values()))
+        return "mixed" if len(found) > 1 else "".join(found)
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class ConvertedScenario:
+    """One converted scenario."""
+
+    source: Path
+    output: Path
+    output_sha256: str  # SHA-256 of the output's bytes
+    enriched: Enriched  # nominal and enriched motion, segments, gaps
+    provenance: ConversionProvenance
+    warnings: tuple[str, ...]  # what a user has to know, a line each
+    data: bytes = b""  # the converted scenario, if it was not to be written
+    is_replay: bool = True  # everything happens by the clock of the nominal run, whoever drives

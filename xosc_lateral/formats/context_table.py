@@ -23,17 +23,10 @@ FloatArray = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False, slots=True)
 class ContextTable(Mapping[str, tuple[FloatArray, FloatArray]]):
-    """Context over time: name -> (time, values), shape (n,) each.
-
-    Parameters
-    ----------
-    columns : mapping of str to (array, array)
-    sha256 : str
-        Of the file's bytes.
-    """
+    """Context over time: name -> (time, values), shape (n,) each."""
 
     columns: Mapping[str, tuple[FloatArray, FloatArray]]
-    sha256: str
+    sha256: str  # of the file's bytes
 
     def __getitem__(self, name: str) -> tuple[FloatArray, FloatArray]:
         return self.columns[name]
@@ -51,10 +44,7 @@ def read_context(path: Path) -> ContextTable:
     Raises `FormatError`: No `time` column, time that does not increase, a value that is infinite, no number or none
     that a road has (`limits`), or no context column.
 
-    Returns
-    -------
-    ContextTable
-        NaN values are left out row by row: between what is stated, values are interpolated.
+    NaN values are left out row by row: between what is stated, values are interpolated.
     """
     table, sha256 = read_table(path)
     time = _time_of(table, path)

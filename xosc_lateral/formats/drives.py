@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -15,7 +16,7 @@ from xosc_lateral.drives.cuts import MIN_RUN
 from xosc_lateral.drives.drive import Drive
 from xosc_lateral.errors import FormatError, NotEnoughDataError
 from xosc_lateral.formats.mapping import MappingLike, TableMapping, as_mapping
-from xosc_lateral.formats.tables import comma_numbers, indicators, plain_cells, read_table, seconds_of_text
+from xosc_lateral.formats.tables import comma_numbers, indicators, numbers_of, plain_cells, read_table
 from xosc_lateral.segment import CONTEXT_UNITS
 
 if TYPE_CHECKING:
@@ -33,18 +34,10 @@ def read_drives(paths: str | Path | Sequence[str | Path], mapping: MappingLike |
     Raises `FormatError` when a file can't be read, a column is missing, or its values can't be in the unit meant;
     `NotEnoughDataError` when a file holds no drive with two rows of time, offset and lane width.
 
-    Parameters
-    ----------
-    paths : path or sequence of paths
-        Tables; the suffix gives the format.
-    mapping : TableMapping, mapping of str to str, or path, optional
-        What columns are called, and how tables are written; see `formats.mapping`.
-
-    Returns
-    -------
-    list of Drive
-        In the order of the files and of first appearance; a drive without a name is called after its file. Rows are
-        sorted by time, repeated times dropped, rows with a missing value left out (a gap).
+    `paths`: tables; the suffix gives the format. `mapping`: what columns are called, and how tables are written; see
+    `formats.mapping`. Returns list of Drive: in the order of the files and of first appearance; a drive without a name
+    is called after its file. Rows are sorted by time, repeated times dropped, rows with a missing value left out (a
+    gap).
     """
     known = as_mapping(mapping)
     files = [Path(path) for path in ([paths] if isinstance(paths, str | Path) else paths)]
@@ -58,7 +51,10 @@ def read_drives(paths: str | Path | Sequence[str | Path], mapping: MappingLike |
 def with_distinct_names(drives: Sequence[Drive]) -> list[Drive]:
     """Drives of several tables; those of one name are called by their table as well."""
     names = [drive.name for drive in drives]
-    return [drive if names.count(drive.name) == 1 else _named_by_source(drive) for drive in drives]
+    return [
+        drive if names.count(drive.name) == 1 else replace(drive, name=f"{drive.source}:{drive.name}")
+        for drive in drives
+    ]
 
 
 def drives_of_table(table: pd.DataFrame, mapping: MappingLike, path: Path | str = "DataFrame") -> list[Drive]:
@@ -75,10 +71,6 @@ def drives_of_table(table: pd.DataFrame, mapping: MappingLike, path: Path | str 
         clean_drive(name, {key: values[rows] for key, values in columns.items()}, levels, path)
         for name, rows in zip(names, every, strict=True)
     ]
-    return _with_rows(drives, path)
-
-
-def _with_rows(drives: Iterable[Drive | None], path: Path) -> list[Drive]:
     found = [drive for drive in drives if drive is not None]
     if not found:
         raise NotEnoughDataError(
@@ -105,14 +97,10 @@ def translated(table: pd.DataFrame, mapping: TableMapping, path: Path) -> pd.Dat
     kept = {name: mapping.numbers(name, plain_cells(table[name]), path) for name in own}
     for name, source in mapping.columns.items():
         column = mapping.numbers(name, plain_cells(table[source.column]), path)
-        kept[name] = column if name == "drive" or source.factor == 1.0 else _scaled(column, source.factor, path, name)
+        if name != "drive" and source.factor != 1.0:
+            column = pd.Series(numbers_of(column, path, name) * source.factor, index=column.index)
+        kept[name] = column
     return pd.DataFrame(kept)
-
-
-def _scaled(column: pd.Series, by: float, path: Path, name: str) -> pd.Series:
-    import pandas as pd
-
-    return pd.Series(_as_numbers(column, path, name) * by, index=column.index)
 
 
 def _numeric_columns(table: pd.DataFrame, path: Path) -> dict[str, FloatArray]:
@@ -137,7 +125,7 @@ def _numeric_columns(table: pd.DataFrame, path: Path) -> dict[str, FloatArray]:
 
 def _cleaned(table: pd.DataFrame, name: str, path: Path) -> FloatArray:
     """A column of numbers without what is none."""
-    values = _as_numbers(table[name], path, name)
+    values = numbers_of(table[name], path, name)
     values[np.isinf(values) & ~nobody(name, values)] = np.nan
     if name not in OWN:
         _leave_out_nonsense(values, name, path)
@@ -154,25 +142,6 @@ def _leave_out_nonsense(values: FloatArray, name: str, path: Path) -> None:
         what = f"{implausible(name, float(values[row]))}, and {100 * wrong.mean():.0f} % of the rows are not"
         raise FormatError(f"{what}; name the unit with --map", path=path, line=row + 2, element=f"column {name!r}")
     values[wrong] = np.nan
-
-
-def _as_numbers(column: pd.Series, path: Path, name: str) -> FloatArray:
-    import pandas as pd
-    from pandas.api import types
-
-    if types.is_datetime64_any_dtype(column):
-        return np.array((column - column.min()).dt.total_seconds(), dtype=np.float64)
-    if not types.is_numeric_dtype(column) and name == "time" and (seconds := seconds_of_text(column)) is not None:
-        return seconds
-    numbers = pd.to_numeric(column, errors="coerce")
-    if numbers.isna().any() and not types.is_numeric_dtype(column):
-        commas = comma_numbers(column)
-        numbers = numbers if commas is None else commas
-    strange = numbers.isna() & column.notna()
-    if strange.any():
-        row = int(np.flatnonzero(strange)[0])
-        raise FormatError(f"{column.iloc[row]!r} is not a number", path=path, line=row + 2, element=f"column {name!r}")
-    return np.array(numbers.to_numpy(dtype=np.float64, na_value=np.nan))
 
 
 def _may_hold_levels(name: str) -> bool:
@@ -209,12 +178,6 @@ def _drive_names(table: pd.DataFrame, path: Path) -> tuple[list[str], list[NDArr
     order = np.argsort(codes, kind="stable")
     bounds = np.searchsorted(codes[order], np.arange(1, len(names)))
     return [str(name) for name in names], list(np.split(order, bounds))
-
-
-def _named_by_source(drive: Drive) -> Drive:
-    from dataclasses import replace
-
-    return replace(drive, name=f"{drive.source}:{drive.name}")
 
 
 def _listed(columns: Iterable[object]) -> str:

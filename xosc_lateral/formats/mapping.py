@@ -22,41 +22,24 @@ if TYPE_CHECKING:
     import pandas as pd
 
 
-# unit -> (what it measures, factor to SI). Degrees stay apart from radians only by their factor.
+# Factors to SI. Degrees stay apart from radians only by their factor.
+_BY_QUANTITY = {
+    "length": {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "km": 1e3, "ft": 0.3048, "in": 0.0254},
+    "speed": {"m/s": 1.0, "km/h": 1 / 3.6, "kph": 1 / 3.6, "mph": 0.44704, "kn": 1852 / 3600},
+    "time": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0, "h": 3600.0},
+    "angle": {"rad": 1.0, "deg": pi / 180},
+    "angular speed": {"rad/s": 1.0, "deg/s": pi / 180},
+    "acceleration": {"m/s2": 1.0, "g": 9.80665},
+    "curvature": {"1/m": 1.0, "1/km": 1e-3},
+    "number": {"-": 1.0, "%": 1e-2},
+    "rain": {"mm/h": 1.0},
+    "illuminance": {"lx": 1.0, "klx": 1e3},
+}
+
 UNITS: Mapping[str, tuple[str, float]] = MappingProxyType(
-    {
-        "m": ("length", 1.0),
-        "cm": ("length", 1e-2),
-        "mm": ("length", 1e-3),
-        "km": ("length", 1e3),
-        "ft": ("length", 0.3048),
-        "in": ("length", 0.0254),
-        "m/s": ("speed", 1.0),
-        "km/h": ("speed", 1 / 3.6),
-        "kph": ("speed", 1 / 3.6),
-        "mph": ("speed", 0.44704),
-        "kn": ("speed", 1852 / 3600),
-        "s": ("time", 1.0),
-        "ms": ("time", 1e-3),
-        "us": ("time", 1e-6),
-        "ns": ("time", 1e-9),
-        "min": ("time", 60.0),
-        "h": ("time", 3600.0),
-        "rad": ("angle", 1.0),
-        "deg": ("angle", pi / 180),
-        "rad/s": ("angular speed", 1.0),
-        "deg/s": ("angular speed", pi / 180),
-        "m/s2": ("acceleration", 1.0),
-        "g": ("acceleration", 9.80665),
-        "1/m": ("curvature", 1.0),
-        "1/km": ("curvature", 1e-3),
-        "-": ("number", 1.0),
-        "%": ("number", 1e-2),
-        "mm/h": ("rain", 1.0),
-        "lx": ("illuminance", 1.0),
-        "klx": ("illuminance", 1e3),
-    }
+    {unit: (quantity, by) for quantity, units in _BY_QUANTITY.items() for unit, by in units.items()}
 )
+"""Unit -> what it measures, and the factor to SI."""
 
 # Other spellings, as bus logs have them; in lower case and without spaces.
 _SPELLINGS = MappingProxyType(
@@ -160,10 +143,7 @@ class TableMapping:
     def numbers(self, name: str, column: pd.Series, path: Path) -> pd.Series:
         """The column `name`, its texts as the numbers that they stand for.
 
-        Raises
-        ------
-        FormatError
-            For a text that stands for none.
+        Raises `FormatError`: for a text that stands for none.
         """
         import pandas as pd
 
@@ -207,10 +187,7 @@ def _as_word(cell: object) -> str:
 def parse_map(words: Iterable[str]) -> dict[str, ColumnSource]:
     """Read ``NAME=COLUMN`` or ``NAME=COLUMN:UNIT`` (``speed=v_kmh:km/h``, ``offset=lat:-cm``).
 
-    Raises
-    ------
-    FormatError
-        When a word has no ``=`` or its unit does not fit the column.
+    Raises `FormatError`: when a word has no ``=`` or its unit does not fit the column.
     """
     mapping: dict[str, ColumnSource] = {}
     for word in words:
@@ -232,10 +209,7 @@ def _source(name: str, words: str) -> ColumnSource:
 def read_mapping(path: Path) -> TableMapping:
     """Read a mapping's file.
 
-    Raises
-    ------
-    FormatError
-        It is no TOML, or holds what no mapping has; names the entry.
+    Raises `FormatError`: it is no TOML, or holds what no mapping has; names the entry.
     """
     import tomllib
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 
 from xosc_lateral.formats.atomic import write_atomically
 from xosc_lateral.formats.json_text import canonical_json
-from xosc_lateral.formats.own_files import SIDECAR_SUFFIX
+from xosc_lateral.formats.output_paths import SIDECAR_SUFFIX
 from xosc_lateral.version import __version__
 
 if TYPE_CHECKING:
@@ -54,14 +54,8 @@ def write_frame(
 ) -> None:
     """Write a table; the same frame and provenance give the same bytes.
 
-    Parameters
-    ----------
-    path : Path
-        Its suffix, one of `output_suffixes`, decides the format.
-    provenance : mapping
-        JSON values; the package's version is added.
-    decimals : int or mapping of str to int
-        Of the numbers in a CSV, per column or of all; Parquet keeps every bit.
+    `path`: its suffix, one of `output_suffixes`, decides the format. `provenance`: JSON values; the package's version
+    is added. `decimals`: of the numbers in a CSV, per column or of all; Parquet keeps every bit.
     """
     write_table(path, provenance, frame=lambda: frame, text=lambda: csv_text(frame, decimals))
 
@@ -71,10 +65,7 @@ def write_table(
 ) -> None:
     """As `write_frame`, for tables that have a CSV of their own; whole or not at all.
 
-    Parameters
-    ----------
-    frame, text : callable
-        Give the table, and its CSV, when they are wanted.
+    `frame`, `text`: give the table, and its CSV, when they are wanted.
     """
     name = path.name.lower()
     if name.endswith(PARQUET):

@@ -116,12 +116,7 @@ def read_profile(name_or_path: str | Path, folders: Iterable[str | Path] = ()) -
     Raises `DriverProfileError` if no profile of that name is known; lists those that are; `FormatError` if the file is
     not there or no valid profile, or a folder isn't one.
 
-    Parameters
-    ----------
-    name_or_path : str or Path
-        ``motorway`` or ``somewhere/mine.json``.
-    folders : iterable of path
-        Looked through first, in this order.
+    `name_or_path`: ``motorway`` or ``somewhere/mine.json``. `folders`: looked through first, in this order.
     """
     path = find_profile(name_or_path, folders)
     state = check_regular(path)
@@ -210,23 +205,12 @@ FIELDS = tuple(name for name in Metadata.__struct_fields__ if name != "tags")
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Entry:
-    """One file of the library.
-
-    Parameters
-    ----------
-    path : Path
-    profile : DriverProfile or None
-        None: it can't be read.
-    problem : str
-        What is wrong with it, in a line; empty if nothing is.
-    hidden_by : Path or None
-        File of the same name in a folder that is looked through before.
-    """
+    """One file of the library."""
 
     path: Path
-    profile: DriverProfile | None
-    problem: str = ""
-    hidden_by: Path | None = None
+    profile: DriverProfile | None  # None: it can't be read
+    problem: str = ""  # what is wrong with it, in a line; empty if nothing is
+    hidden_by: Path | None = None  # file of the same name in a folder that is looked through before
 
     @property
     def name(self) -> str:

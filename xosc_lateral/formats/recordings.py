@@ -39,29 +39,14 @@ USUAL_HEIGHT = {"truck": 3.6, "bus": 3.2, "trailer": 3.6, "van": 2.3}
 
 @dataclass(frozen=True, eq=False, slots=True)
 class RecordedTraffic:
-    """Tracks in the coordinates of a road.
+    """Tracks in the coordinates of a road."""
 
-    Parameters
-    ----------
-    name : str
-        Of what is made from it.
-    tracks : tuple of Track
-    network : RoadNetwork
-    road : bytes
-        The road's file.
-    road_name : str
-        Of the file.
-    sources : tuple of Path
-        What was read.
-    notes : tuple of str
-    """
-
-    name: str
+    name: str  # of what is made from it
     tracks: tuple[Track, ...]
     network: RoadNetwork
-    road: bytes
-    road_name: str
-    sources: tuple[Path, ...]
+    road: bytes  # the road's file
+    road_name: str  # of the file
+    sources: tuple[Path, ...]  # what was read
     notes: tuple[str, ...] = field(default=())
 
     @property
@@ -79,19 +64,8 @@ def read_recording(
 ) -> RecordedTraffic:
     """Read a recording.
 
-    Parameters
-    ----------
-    source : path
-    kind : str, optional
-        Its format, one of `READERS`; without it, told from the name.
-    road : path, optional
-        OpenDRIVE file, for formats that come without one.
-    columns : TableMapping, mapping of str to str, or path, optional
-        Name -> ``COLUMN[:UNIT]``, of tables.
-
-    Raises
-    ------
-    FormatError, NotEnoughDataError
+    `kind`: its format, one of `READERS`; without it, told from the name. `road`: OpenDRIVE file, for formats that come
+    without one. `columns`: name -> ``COLUMN[:UNIT]``, of tables. Raises `FormatError`, `NotEnoughDataError`.
     """
     kind = kind or format_of(source)
     if kind not in READERS:

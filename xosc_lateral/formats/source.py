@@ -45,20 +45,11 @@ _GUARDED: ContextVar[set[tuple[int, int]] | None] = ContextVar("inputs", default
 
 @dataclass(eq=False, slots=True)
 class Source:
-    """An input file that is open.
-
-    Parameters
-    ----------
-    path : Path
-    file : binary file
-        At its beginning; readers may seek.
-    size : int
-        [byte]
-    """
+    """An input file that is open."""
 
     path: Path
-    file: IO[bytes]
-    size: int
+    file: IO[bytes]  # at its beginning; readers may seek
+    size: int  # [byte]
 
     def unpacked(self, size: int) -> None:
         """Refuse what unpacks to more than its size can hold.
@@ -146,10 +137,7 @@ def check_unpacked(unpacked: int, packed: int, path: Path) -> None:
 
     Raises `FormatError`: Above `limits.UNPACKED_SIZE`, or above `limits.UNPACKED_UNASKED` and `limits.PACKING_RATIO`.
 
-    Parameters
-    ----------
-    unpacked, packed : int
-        [byte]
+    `unpacked`, `packed`: [byte]
     """
     if unpacked > UNPACKED_SIZE.bytes:
         raise FormatError(UNPACKED_SIZE.refusal(unpacked / 1e6), path=path)

@@ -24,13 +24,7 @@ _NUMBERS = "%.3f,%s,%.4f,%.4f,%.4f,%.6f,%.4f,%s,%d,%.4f,%.4f"
 def states_csv(motion: NominalMotion, network: RoadNetwork) -> str:
     """Rows of all entities that exist at a time, ordered by time and then as in the scenario, as CSV.
 
-    Poses are inertial: the offset of the road's header counts.
-
-    Parameters
-    ----------
-    motion : NominalMotion
-    network : RoadNetwork
-        That it was played on.
+    Poses are inertial: the offset of the road's header counts. `network`: that it was played on.
     """
     columns = [list(_rows(entity, network)) for entity in motion.entities]
     lines = [",".join(COLUMNS)]

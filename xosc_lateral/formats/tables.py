@@ -98,6 +98,29 @@ def _stamps(text: pd.Series) -> pd.Series | None:
     return None
 
 
+def numbers_of(column: pd.Series, path: Path, name: str) -> FloatArray:
+    """Numbers, also with decimal commas, and of `time` seconds, shape (n,); NaN where a cell is empty.
+
+    Raises `FormatError` for a cell that is no number.
+    """
+    import pandas as pd
+    from pandas.api import types
+
+    if types.is_datetime64_any_dtype(column):
+        return np.array((column - column.min()).dt.total_seconds(), dtype=np.float64)
+    if not types.is_numeric_dtype(column) and name == "time" and (seconds := seconds_of_text(column)) is not None:
+        return seconds
+    numbers = pd.to_numeric(column, errors="coerce")
+    if numbers.isna().any() and not types.is_numeric_dtype(column):
+        commas = comma_numbers(column)
+        numbers = numbers if commas is None else commas
+    strange = numbers.isna() & column.notna()
+    if strange.any():
+        row = int(np.flatnonzero(strange)[0])
+        raise FormatError(f"{column.iloc[row]!r} is not a number", path=path, line=row + 2, element=f"column {name!r}")
+    return np.array(numbers.to_numpy(dtype=np.float64, na_value=np.nan))
+
+
 def indicators(name: str, column: pd.Series, drives: pd.Series | None, most: int) -> dict[str, FloatArray]:
     """A text column as one column ``name=value`` of 0 and 1 per value.
 
@@ -133,10 +156,7 @@ def read_table(path: Path, mapping: TableMapping | None = None) -> tuple[pd.Data
 
     Raises `FormatError` when it isn't one, or is beyond the limits.
 
-    Returns
-    -------
-    DataFrame, str
-        The table, and the SHA-256 of the bytes that it was parsed from.
+    Returns DataFrame, str: the table, and the SHA-256 of the bytes that it was parsed from.
     """
     import pandas as pd
 
@@ -240,10 +260,7 @@ def _encoding(text: IO[bytes]) -> str:
 def _in_utf8(text: IO[bytes], path: Path, encoding: str | None = None) -> IO[bytes]:
     """The text in UTF-8.
 
-    Raises
-    ------
-    FormatError
-        It is not in the encoding that is given or found.
+    Raises `FormatError`: it is not in the encoding that is given or found.
     """
     given = encoding or _encoding(text)
     if given.lower().replace("_", "-") in ("utf-8", "utf8", "utf-8-sig"):

@@ -87,14 +87,7 @@ OPTIONAL = {"SE_SetLogFilePath": (None, c.c_char_p), "SE_LogToConsole": (None, c
 class Player:
     """An esmini library, its functions by name; the types that a user has declared on them stay as they are.
 
-    Parameters
-    ----------
-    library : path, ctypes.CDLL, or object with the same functions
-
-    Raises
-    ------
-    SimulationError
-        If it can't be loaded, or lacks a function.
+    Raises `SimulationError`: if it can't be loaded, or lacks a function.
     """
 
     def __init__(self, library: Any) -> None:
@@ -120,10 +113,7 @@ class Player:
     def state(self, number: int) -> ObjectState | None:
         """Of an object; None if there is none of that number.
 
-        Raises
-        ------
-        SimulationError
-            If the library's structure is another than ours.
+        Raises `SimulationError`: if the library's structure is another than ours.
         """
         state = ObjectState()
         if not self._is_known:
@@ -417,10 +407,7 @@ def lateral_actions(scenario: Scenario) -> dict[str, set[str]]:
 def open_player(library: Any, scenario: str | Path, *, window: bool = False) -> Player:
     """A library that has opened a scenario; quiet, without a log file.
 
-    Raises
-    ------
-    SimulationError
-        If it is none, or can't open the scenario.
+    Raises `SimulationError`: if it is none, or can't open the scenario.
     """
     player = Player(library)
     if hasattr(player, "SE_SetLogFilePath"):

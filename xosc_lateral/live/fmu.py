@@ -71,18 +71,7 @@ class _OneDriver(Traffic):
 def export_fmu(profile: DriverProfile, path: str | Path, *, fmi: str = "2.0") -> None:
     """Write a unit.
 
-    Parameters
-    ----------
-    profile : DriverProfile
-    path : Path
-        ``.fmu``, which is replaced.
-    fmi : str
-        ``2.0`` or ``3.0``.
-
-    Raises
-    ------
-    SimulationError
-        Without the extra `fmu`.
+    `path`: ``.fmu``, which is replaced. `fmi`: ``2.0`` or ``3.0``. Raises `SimulationError`: without the extra `fmu`.
     """
     try:
         package = "pythonfmu3" if fmi == "3.0" else "pythonfmu"

@@ -8,7 +8,7 @@ import tempfile
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -20,6 +20,9 @@ from xosc_lateral.scenario.entity import BoundingBox, Entity
 from xosc_lateral.scenario.enums import EntityCategory, VehicleCategory
 from xosc_lateral.scenario.place import Place
 
+if TYPE_CHECKING:
+    import pandas as pd
+
 KINDS = {
     "bicycle": VehicleCategory.BICYCLE, "bus": VehicleCategory.BUS, "coach": VehicleCategory.BUS,
     "delivery": VehicleCategory.VAN, "motorcycle": VehicleCategory.MOTORBIKE, "moped": VehicleCategory.MOTORBIKE,
@@ -28,54 +31,42 @@ KINDS = {
 """Vehicle class of SUMO -> category of OpenSCENARIO; a car for the rest. SUMO's ``trailer`` is a truck with one."""
 
 
+SEEN = ("x", "y", "z", "heading", "pitch", "roll", "speed", "s", "offset")
+"""Of `EntityMotion`, what the rows of a run say."""
+
+
 @dataclass(frozen=True, slots=True)
 class Scene:
-    """Who was there, and where.
-
-    Parameters
-    ----------
-    entities : sequence of Entity
-    network : callable
-        Reads the road.
-    ego : sequence of str
-        Vehicles under test.
-    is_road : bool
-        Rows have road and lane by the ids of the network; else they are found from positions.
-    """
+    """Who was there, and where."""
 
     entities: Sequence[Entity]
-    network: Callable[[], RoadNetwork]
-    ego: Sequence[str] = ()
-    is_road: bool = True
+    network: Callable[[], RoadNetwork]  # reads the road
+    ego: Sequence[str] = ()  # vehicles under test
+    is_road: bool = True  # rows have road and lane by the ids of the network; else they are found from positions
 
 
-def motion_of(rows: Sequence[tuple[Any, ...]], scene: Scene, network: RoadNetwork) -> NominalMotion:
+def motion_of(rows: pd.DataFrame, scene: Scene, network: RoadNetwork) -> NominalMotion:
     """The rows of a `LiveRun` by vehicle and time; a vehicle is active where there is a row of it."""
-    times = np.unique([row[0] for row in rows])
-    of: dict[str, list[tuple[Any, ...]]] = {entity.name: [] for entity in scene.entities}
-    for row in rows:
-        if row[1] in of:
-            of[row[1]].append(row)
+    times = np.unique(rows["time"])
     index = {name: k for k, name in enumerate(network.road_ids)}
     found = []
     for entity in scene.entities:
-        own = of[entity.name]
-        at = np.searchsorted(times, [row[0] for row in own])
-        poses = np.array([[row[k] for k in (2, 3, 12, 4, 13, 14, 5, 8, 9)] for row in own]).reshape(-1, 9)
-        places = np.array([(index.get(str(row[6]), -1), row[7]) for row in own], dtype=np.int32).reshape(-1, 2)
-        if own and not scene.is_road:
-            there = network.world_to_lane(*poses[:, :4].T)
-            places, poses[:, 7] = np.stack([there.road, there.lane], axis=1), there.s
-        columns, lanes = np.zeros((9, len(times))), np.zeros((2, len(times)), dtype=np.int32)
-        columns[:, at], lanes[:, at] = poses.T, places.T
-        is_there = np.zeros(len(times), dtype=np.uint8)
-        is_there[at] = int(Activity.ACTIVE)
-        x, y, z, heading, pitch, roll, speed, s, offset = columns
-        road, lane = lanes
-        found.append(
-            EntityMotion(entity, times, x, y, z, heading, pitch, roll, speed, road, lane, s, offset,
-                         np.zeros(len(times)), is_there)
-        )  # fmt: skip
+        own = rows[rows["name"] == entity.name].rename(columns={"h": "heading"})
+        seen: dict[str, Any] = {name: own[name].to_numpy(dtype=np.float64) for name in SEEN}
+        seen |= {
+            "road": [index.get(str(road), -1) for road in own["road"]],
+            "lane": own["lane"].to_numpy(dtype=np.int32),
+        }
+        if len(own) and not scene.is_road:
+            there = network.world_to_lane(*(seen[name] for name in ("x", "y", "z", "heading")))
+            seen |= {"road": there.road, "lane": there.lane, "s": there.s}
+        columns: dict[str, Any] = {name: np.zeros(len(times)) for name in (*SEEN, "heading_relative")}
+        columns |= {name: np.zeros(len(times), dtype=np.int32) for name in ("road", "lane")}
+        columns["activity"] = np.zeros(len(times), dtype=np.uint8)
+        at = np.searchsorted(times, own["time"])
+        for name, values in {**seen, "activity": int(Activity.ACTIVE)}.items():
+            columns[name][at] = values
+        found.append(EntityMotion(entity=entity, time=times, **columns))
     step = float(times[1] - times[0]) if len(times) > 1 else 0.0
     return NominalMotion(step, tuple(found), (), float(times[-1]) if len(times) else 0.0, "simulation", ())
 
@@ -93,10 +84,7 @@ def sumo_entity(vehicles: Any, name: str) -> Entity:
 def sumo_network(net: str) -> RoadNetwork:
     """The road of a SUMO network, by SUMO's own ``netconvert``.
 
-    Raises
-    ------
-    SimulationError
-        If that is not there, or can't.
+    Raises `SimulationError`: if that is not there, or can't.
     """
     try:
         from sumo import SUMO_HOME

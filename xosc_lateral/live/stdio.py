@@ -25,12 +25,7 @@ _PLACE = ("road", "lane", "s")
 class Pipe:
     """Answers line by line.
 
-    Parameters
-    ----------
-    profile : DriverProfile
-    seed : int
-    road : path, optional
-        OpenDRIVE file: vehicles may then say `road`, `lane` and `s`, and see each other there.
+    `road`: OpenDRIVE file: vehicles may then say `road`, `lane` and `s`, and see each other there.
     """
 
     def __init__(self, profile: DriverProfile, *, seed: int = 0, road: str | Path | None = None) -> None:
@@ -52,10 +47,7 @@ class Pipe:
     def answer(self, line: str) -> dict[str, Any]:
         """To one line.
 
-        Raises
-        ------
-        SimulationError
-            If it can't be used; nothing has changed then.
+        Raises `SimulationError`: if it can't be used; nothing has changed then.
         """
         try:
             given = json.loads(line)

@@ -53,10 +53,7 @@ _BEND = 20.0
 def start(words: Iterable[str]) -> Any:
     """Libsumo with a loaded simulation; the words of SUMO's command line.
 
-    Raises
-    ------
-    SimulationError
-        If it is not installed, or can't load that.
+    Raises `SimulationError`: if it is not installed, or can't load that.
     """
     try:
         import libsumo

@@ -10,11 +10,9 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from xosc_lateral.enrich.conversion import ConversionProvenance, ConvertedScenario
 from xosc_lateral.enrich.enrich import enrich, with_offsets
-from xosc_lateral.enrich.result import Enriched
+from xosc_lateral.enrich.result import ConversionProvenance, ConvertedScenario, Enriched
 from xosc_lateral.errors import DriverProfileError, FormatError
-from xosc_lateral.formats.atomic import refuse_outputs
 from xosc_lateral.formats.context_table import read_context
 from xosc_lateral.formats.openscenario.provenance import PENDING
 from xosc_lateral.formats.openscenario.write.build import named
@@ -22,6 +20,7 @@ from xosc_lateral.formats.openscenario.write.result import WrittenScenario
 from xosc_lateral.formats.openscenario.write.sampled import motion_unknown_to
 from xosc_lateral.formats.openscenario.write.target import Player
 from xosc_lateral.formats.openscenario.write.trajectory_scenario import write_trajectory_scenario
+from xosc_lateral.formats.output_paths import refuse_outputs
 from xosc_lateral.formats.profiles import profile_hash
 from xosc_lateral.formats.source import edit_in_place, guarding_inputs
 from xosc_lateral.motion.nominal import Activity

@@ -11,8 +11,7 @@ from urllib.parse import quote
 
 import numpy as np
 
-from xosc_lateral.enrich.conversion import ConvertedScenario
-from xosc_lateral.enrich.result import Enriched
+from xosc_lateral.enrich.result import ConvertedScenario, Enriched
 from xosc_lateral.errors import FormatError
 from xosc_lateral.formats.atomic import write_atomically
 from xosc_lateral.motion.gaps import Gap

@@ -11,9 +11,9 @@ from pathlib import Path
 
 from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.errors import FormatError, XoscLateralError
-from xosc_lateral.formats.atomic import real_path
 from xosc_lateral.formats.hashes import file_hash
 from xosc_lateral.formats.openscenario.catalogs import require_folders
+from xosc_lateral.formats.output_paths import real_path
 from xosc_lateral.formats.profiles import find_profile, profile_hash
 from xosc_lateral.limits import BATCH_JOBS, VARIANTS
 from xosc_lateral.pipeline.concrete import concrete

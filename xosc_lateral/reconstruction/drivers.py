@@ -37,22 +37,11 @@ LEAST_SPREAD = 1e-4
 
 @dataclass(frozen=True, slots=True)
 class ChosenDriver:
-    """Who drives an entity in a twin.
+    """Who drives an entity in a twin."""
 
-    Parameters
-    ----------
-    profile : str
-        Name of the profile; empty: too little was seen, or nobody drove it: no profile of its own.
-    seconds : float
-        Of road-following that this rests on. [s]
-    gain : float
-        Log likelihood beyond the population's. [nat]
-    why : str
-    """
-
-    profile: str
-    seconds: float
-    gain: float
+    profile: str  # name of the profile; empty: too little was seen, or nobody drove it: no profile of its own
+    seconds: float  # of road-following that this rests on [s]
+    gain: float  # log likelihood beyond the population's [nat]
     why: str
 
 
@@ -90,17 +79,10 @@ def choose_driver(stretches: Sequence[FloatArray], models: Mapping[str, WindowMo
 
 @dataclass(frozen=True, eq=False, slots=True)
 class WindowModel:
-    """How window summaries of a profile scatter.
+    """How window summaries of a profile scatter."""
 
-    Parameters
-    ----------
-    mean : array, shape (3,)
-        Mean offset [m], log spread [log m], log lateral speed [log m/s].
-    between, within : array, shape (3, 3)
-        Covariance of drivers' means, and of windows about their driver's mean.
-    """
-
-    mean: FloatArray
+    mean: FloatArray  # mean offset [m], log spread [log m], log lateral speed [log m/s], shape (3,)
+    # between, within: covariance of drivers' means, and of windows about their driver's mean, shape (3, 3)
     between: FloatArray
     within: FloatArray
 

@@ -37,48 +37,24 @@ class Beside:
 
 @dataclass(frozen=True, slots=True)
 class Encounter:
-    """A lane change or a braking, with who was ahead and behind in the lane that it is in then.
+    """A lane change or a braking, with who was ahead and behind in the lane that it is in then."""
 
-    Parameters
-    ----------
-    kind : str
-        "lane change" or "braking".
-    vehicle : str
-    time : float
-        When it begins; of a lane change, when the vehicle is half way. [s]
-    side : str
-        "left", "right"; empty of a braking.
-    ahead, behind : Beside or None
-    """
-
-    kind: str
+    kind: str  # "lane change" or "braking"
     vehicle: str
-    time: float
-    side: str
+    time: float  # when it begins; of a lane change, when the vehicle is half way [s]
+    side: str  # "left", "right"; empty of a braking
     ahead: Beside | None
     behind: Beside | None
 
 
 @dataclass(frozen=True, slots=True)
 class RelativeTrigger:
-    """A maneuver begins when the distance to another vehicle passes a value, but not before a time.
+    """A maneuver begins when the distance to another vehicle passes a value, but not before a time."""
 
-    Parameters
-    ----------
-    other : str
-        The other entity.
-    distance : float
-        Between the reference points, along the road. [m]
-    grows : bool
-        It passes the value from below.
-    not_before : float
-        [s]
-    """
-
-    other: str
-    distance: float
-    grows: bool
-    not_before: float
+    other: str  # the other entity
+    distance: float  # between the reference points, along the road [m]
+    grows: bool  # it passes the value from below
+    not_before: float  # [s]
 
 
 def brakings(plan: VehiclePlan) -> list[int]:

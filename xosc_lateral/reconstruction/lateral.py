@@ -34,21 +34,11 @@ RATE_WINDOW = 0.5
 
 @dataclass(frozen=True, eq=False, slots=True)
 class LateralPlan:
-    """Lateral maneuvers of a vehicle.
+    """Lateral maneuvers of a vehicle."""
 
-    Parameters
-    ----------
-    start : float
-        Level at the first row. [m]
-    transitions : tuple of Transition
-        In order; none begins before the one before it is over.
-    is_played : bool
-        The track stands still sideways for most of the time: no person drove it.
-    """
-
-    start: float
-    transitions: tuple[Transition, ...]
-    is_played: bool
+    start: float  # level at the first row [m]
+    transitions: tuple[Transition, ...]  # in order; none begins before the one before it is over
+    is_played: bool  # the track stands still sideways for most of the time: no person drove it
 
     def at(self, time: FloatArray) -> FloatArray:
         """Level at some times, shape as the argument. [m]"""

@@ -34,40 +34,23 @@ or a sensor's. [-]"""
 
 @dataclass(frozen=True, eq=False, slots=True)
 class VehiclePlan:
-    """One vehicle's part in the scenario.
+    """One vehicle's part in the scenario."""
 
-    Parameters
-    ----------
-    name : str
-        Of the entity.
-    vehicle : RecordedVehicle
-    lateral : LateralPlan
-    way : array, shape (n,)
-        Along the lateral maneuvers' path, at the recorded rows. [m]
-    speed : SpeedProfile
-        From where it appears to where it leaves.
-    appears, leaves : float or None
-        None: it is there from the beginning, to the end. [s]
-    road, lane, s, direction, offset
-        Where it starts: index of the road, OpenDRIVE lane, [m], +1 along s or -1 against it, and [m] from the lane's
-        centre, positive to the left of its travel.
-    targets : tuple of int
-        OpenDRIVE lane that each transition leads to.
-    """
-
-    name: str
+    name: str  # of the entity
     vehicle: RecordedVehicle
     lateral: LateralPlan
-    way: FloatArray
-    speed: SpeedProfile
-    appears: float | None
+    way: FloatArray  # along the lateral maneuvers' path, at the recorded rows, shape (n,) [m]
+    speed: SpeedProfile  # from where it appears to where it leaves
+    appears: float | None  # appears, leaves: None: it is there from the beginning, to the end [s]
     leaves: float | None
+    # road, lane, s, direction, offset: where it starts: index of the road, OpenDRIVE lane, [m], +1 along s or -1
+    # against it, and [m] from the lane's centre, positive to the left of its travel
     road: int
     lane: int
     s: float
     direction: int
     offset: float
-    targets: tuple[int, ...]
+    targets: tuple[int, ...]  # OpenDRIVE lane that each transition leads to
 
     @property
     def present(self) -> tuple[float, float]:
@@ -183,22 +166,12 @@ def _target(vehicle: RecordedVehicle, network: RoadNetwork, one: Transition) -> 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Residuals:
-    """Recorded less planned, at the recorded rows.
+    """Recorded less planned, at the recorded rows."""
 
-    Parameters
-    ----------
-    time : array, shape (n,)
-        [s]
-    along, across : array, shape (n,)
-        Ahead, and to the left, of the planned place. [m]
-    in_lane : bool array, shape (n,)
-        Outside of all transitions: what is across is the driver's.
-    """
-
-    time: FloatArray
-    along: FloatArray
+    time: FloatArray  # shape (n,) [s]
+    along: FloatArray  # along, across: ahead, and to the left, of the planned place, shape (n,) [m]
     across: FloatArray
-    in_lane: NDArray[np.bool_]
+    in_lane: NDArray[np.bool_]  # outside of all transitions: what is across is the driver's, shape (n,)
 
 
 def residuals_of(plan: VehiclePlan) -> Residuals:

@@ -38,42 +38,24 @@ SLOW = 0.5
 
 @dataclass(frozen=True, eq=False, slots=True)
 class RecordedVehicle:
-    """One passage of one vehicle; arrays of shape (n,), rows in order of time.
+    """One passage of one vehicle; arrays of shape (n,), rows in order of time."""
 
-    Parameters
-    ----------
-    name, kind : str
-        As recorded; the class in lower case, empty where not known.
-    length, width, height : float
-        [m]
-    centre : float
-        Middle of the vehicle ahead of its reference point, the rear axle. [m]
-    time : array
-        [s]
-    x, y : array
-        Of the reference point, in the coordinates of the road. [m]
-    road, lane : array of int
-        Index of the road in the network, OpenDRIVE lane.
-    s, offset, lane_width : array
-        Offset from the lane's centre, positive to the LEFT of the vehicle's travel. [m]
-    way : array of int
-        +1: it drives as its lane is driven, -1: against it, as who overtakes on a road with one lane each way.
-    """
-
-    name: str
+    name: str  # name, kind: as recorded; the class in lower case, empty where not known
     kind: str
-    length: float
+    length: float  # length, width, height: [m]
     width: float
     height: float
-    centre: float
-    time: FloatArray
-    x: FloatArray
+    centre: float  # middle of the vehicle ahead of its reference point, the rear axle [m]
+    time: FloatArray  # [s]
+    x: FloatArray  # x, y: of the reference point, in the coordinates of the road [m]
     y: FloatArray
-    road: IntArray
+    road: IntArray  # road, lane: index of the road in the network, OpenDRIVE lane
     lane: IntArray
+    # s, offset, lane_width: offset from the lane's centre, positive to the LEFT of the vehicle's travel [m]
     s: FloatArray
     offset: FloatArray
     lane_width: FloatArray
+    # way: +1: it drives as its lane is driven, -1: against it, as who overtakes on a road with one lane each way
     way: IntArray
 
     def poses(self, network: RoadNetwork, offset: FloatArray) -> Poses:
@@ -96,47 +78,26 @@ class RecordedVehicle:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Recording:
-    """Vehicles on a road, and what was left out, a line each.
-
-    Parameters
-    ----------
-    vehicles : tuple of RecordedVehicle
-    left_out : tuple of str
-    start, end : float
-        Of the window. [s]
-    """
+    """Vehicles on a road, and what was left out, a line each."""
 
     vehicles: tuple[RecordedVehicle, ...]
     left_out: tuple[str, ...]
-    start: float
+    start: float  # start, end: of the window [s]
     end: float
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Track:
-    """One vehicle as recorded, in the coordinates of the road; arrays of shape (n,).
-
-    Parameters
-    ----------
-    name, kind : str
-    length, width, height : float
-        [m]
-    ahead : float
-        The recorded point ahead of the reference point. [m]
-    middle : float
-        The vehicle's middle ahead of it. [m]
-    time, x, y, heading : array
-        Of the recorded point. [s], [m], [rad]
-    """
+    """One vehicle as recorded, in the coordinates of the road; arrays of shape (n,)."""
 
     name: str
     kind: str
-    length: float
+    length: float  # length, width, height: [m]
     width: float
     height: float
-    ahead: float
-    middle: float
-    time: FloatArray
+    ahead: float  # the recorded point ahead of the reference point [m]
+    middle: float  # the vehicle's middle ahead of it [m]
+    time: FloatArray  # time, x, y, heading: of the recorded point [s], [m], [rad]
     x: FloatArray
     y: FloatArray
     heading: FloatArray
@@ -145,10 +106,7 @@ class Track:
 def place_tracks(tracks: Sequence[Track], network: RoadNetwork, start: float, end: float) -> Recording:
     """Each vehicle's longest passage in driving lanes within a window of time.
 
-    Raises
-    ------
-    NotEnoughDataError
-        If no vehicle is left.
+    Raises `NotEnoughDataError`: if no vehicle is left.
     """
     vehicles, left_out = list[RecordedVehicle](), list[str]()
     for track in tracks:

@@ -27,19 +27,11 @@ ROUNDS = 12
 
 @dataclass(frozen=True, eq=False, slots=True)
 class SpeedProfile:
-    """Speed of straight pieces.
+    """Speed of straight pieces."""
 
-    Parameters
-    ----------
-    time, speed : array, shape (k,), k >= 2
-        Both ends and the corners between. [s], [m/s]
-    start : float
-        Way at the first time. [m]
-    """
-
-    time: FloatArray
+    time: FloatArray  # time, speed: both ends and the corners between, shape (k,) [s], [m/s]
     speed: FloatArray
-    start: float
+    start: float  # way at the first time [m]
 
     def way(self, time: FloatArray) -> FloatArray:
         """Way at times within the profile, shape as the argument. [m]"""

@@ -26,39 +26,18 @@ SHAPES = {
 
 @dataclass(frozen=True, slots=True)
 class Transition:
-    """From one lateral level to another.
+    """From one lateral level to another."""
 
-    Parameters
-    ----------
-    start, duration : float
-        [s]
-    shape : DynamicsShape
-    lanes : int
-        Lanes to the left (negative: to the right); 0: within the lane.
-    offset : float
-        Where it ends, from the centre of the lane that it leads to, positive left. [m]
-    level : float
-        The same from the centre of the first row's lane. [m]
-    aborted : bool
-        One half of a lane change that was not carried through.
-    cut : bool
-        The recording begins or ends within it.
-    change : float
-        Of the level, positive left. [m]
-    residual : float
-        Root mean square of the recorded path from the fitted one. [m]
-    """
-
-    start: float
+    start: float  # start, duration: [s]
     duration: float
     shape: DynamicsShape
-    lanes: int
-    offset: float
-    level: float
-    aborted: bool = False
-    cut: bool = False
-    change: float = 0.0
-    residual: float = 0.0
+    lanes: int  # lanes to the left (negative: to the right); 0: within the lane
+    offset: float  # where it ends, from the centre of the lane that it leads to, positive left [m]
+    level: float  # the same from the centre of the first row's lane [m]
+    aborted: bool = False  # one half of a lane change that was not carried through
+    cut: bool = False  # the recording begins or ends within it
+    change: float = 0.0  # of the level, positive left [m]
+    residual: float = 0.0  # root mean square of the recorded path from the fitted one [m]
 
     @property
     def end(self) -> float:

@@ -11,8 +11,7 @@ import numpy as np
 
 from xosc_lateral.driver.answers import basis_of, beside_line, borrows
 from xosc_lateral.driver.profile import SIDES, DriverProfile
-from xosc_lateral.enrich.conversion import ConversionProvenance, ConvertedScenario
-from xosc_lateral.enrich.result import Enriched, EntityResult, Neighbours
+from xosc_lateral.enrich.result import ConversionProvenance, ConvertedScenario, Enriched, EntityResult, Neighbours
 from xosc_lateral.motion.gaps import REACH, Gap
 from xosc_lateral.motion.nominal import Note
 from xosc_lateral.report import scenario_figures as figures

@@ -33,31 +33,17 @@ CROSSFALL = 0.025  # least crossfall for drainage, towards the outer edge [-]; R
 
 @dataclass(frozen=True, slots=True)
 class Straight:
-    """A straight.
+    """A straight."""
 
-    Parameters
-    ----------
-    length : float
-        [m]
-    """
-
-    length: float
+    length: float  # [m]
 
 
 @dataclass(frozen=True, slots=True)
 class Bend:
-    """An arc between two clothoids of equal length.
+    """An arc between two clothoids of equal length."""
 
-    Parameters
-    ----------
-    radius : float
-        Of the reference line; positive: a left bend. [m]
-    arc, clothoid : float
-        Lengths. [m]
-    """
-
-    radius: float
-    arc: float
+    radius: float  # of the reference line; positive: a left bend [m]
+    arc: float  # arc, clothoid: lengths [m]
     clothoid: float
 
     @property
@@ -68,27 +54,13 @@ class Bend:
 
 @dataclass(frozen=True, slots=True)
 class Motorway:
-    """One carriageway.
+    """One carriageway."""
 
-    Parameters
-    ----------
-    alignment : tuple of Straight and Bend
-        From s = 0.
-    lanes : int
-        Driving lanes.
-    lane_width : float
-        [m]
-    left_hand : bool
-        Left-hand traffic.
-    grade : float
-        Rise over run, the same everywhere. [-]
-    """
-
-    alignment: tuple[Straight | Bend, ...]
-    lanes: int
-    lane_width: float
-    left_hand: bool = False
-    grade: float = 0.0
+    alignment: tuple[Straight | Bend, ...]  # from s = 0
+    lanes: int  # driving lanes
+    lane_width: float  # [m]
+    left_hand: bool = False  # left-hand traffic
+    grade: float = 0.0  # rise over run, the same everywhere [-]
 
     @property
     def length(self) -> float:

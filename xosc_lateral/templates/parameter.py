@@ -12,28 +12,15 @@ from xosc_lateral.errors import XoscLateralError
 
 @dataclass(frozen=True, slots=True)
 class Number:
-    """A number within a range.
-
-    Parameters
-    ----------
-    name : str
-    default, low, high : float
-        The range includes its borders. [unit]
-    unit : str
-        ``-`` for none.
-    what : str
-        One line for the user.
-    whole : bool
-        Whole numbers only.
-    """
+    """A number within a range."""
 
     name: str
-    default: float
+    default: float  # default, low, high: the range includes its borders [unit]
     low: float
     high: float
-    unit: str
-    what: str
-    whole: bool = False
+    unit: str  # ``-`` for none
+    what: str  # one line for the user
+    whole: bool = False  # whole numbers only
 
     def read(self, text: str) -> float:
         """Value of ``--set NAME=text``; `XoscLateralError` when it is not a number or out of range."""
@@ -61,21 +48,12 @@ class Number:
 
 @dataclass(frozen=True, slots=True)
 class Choice:
-    """One of a few words.
-
-    Parameters
-    ----------
-    name : str
-    default : str
-    options : tuple of str
-    what : str
-        One line for the user.
-    """
+    """One of a few words."""
 
     name: str
     default: str
     options: tuple[str, ...]
-    what: str
+    what: str  # one line for the user
     unit: str = "-"
 
     def read(self, text: str) -> str:
@@ -97,18 +75,11 @@ class Choice:
 
 @dataclass(frozen=True, slots=True)
 class Declared:
-    """A parameter that a plain scenario declares.
-
-    Parameters
-    ----------
-    name, default : str
-    kind : str
-        OpenSCENARIO's parameter type.
-    """
+    """A parameter that a plain scenario declares."""
 
     name: str
     default: str
-    kind: str
+    kind: str  # OpenSCENARIO's parameter type
     what: str = "Parameter of the scenario."
     unit: str = "-"
 
@@ -149,11 +120,7 @@ class Settings:
 
     Raises `XoscLateralError` for an unknown name or a value out of range.
 
-    Parameters
-    ----------
-    parameters : iterable of Parameter
-    chosen : mapping of str to str
-        What the user set, as text.
+    `chosen`: what the user set, as text.
     """
 
     __slots__ = ("_values",)

@@ -18,15 +18,9 @@ SCENARIO, ROAD = ".xosc", ".xodr"
 
 @dataclass(frozen=True)
 class PlainTemplate:
-    """A scenario file and the road beside it.
+    """A scenario file and the road beside it."""
 
-    Parameters
-    ----------
-    path : Path
-        The scenario; the road has the same name.
-    """
-
-    path: Path
+    path: Path  # the scenario; the road has the same name
 
     @property
     def name(self) -> str:

@@ -40,48 +40,23 @@ def motorway(settings: Settings, *alignment: Straight | Bend, reach: float, lane
 
 @dataclass(frozen=True, slots=True)
 class Plot:
-    """What settings make of a template, by the names of its vehicles and events.
-
-    Parameters
-    ----------
-    motorway : Motorway
-    starts : mapping of str to float
-        Vehicle -> s at the start. [m]
-    speeds : mapping of str to float
-        Vehicle or event -> target speed. [m/s]
-    times : mapping of str to float
-        Event -> time before which it does not begin. [s]
-    distances : mapping of str to float
-        Event -> distance below which it begins. [m]
-    """
+    """What settings make of a template, by the names of its vehicles and events."""
 
     motorway: Motorway
-    starts: Mapping[str, float] = field(default_factory=dict)
-    speeds: Mapping[str, float] = field(default_factory=dict)
-    times: Mapping[str, float] = field(default_factory=dict)
-    distances: Mapping[str, float] = field(default_factory=dict)
+    starts: Mapping[str, float] = field(default_factory=dict)  # vehicle -> s at the start [m]
+    speeds: Mapping[str, float] = field(default_factory=dict)  # vehicle or event -> target speed [m/s]
+    times: Mapping[str, float] = field(default_factory=dict)  # event -> time before which it does not begin [s]
+    distances: Mapping[str, float] = field(default_factory=dict)  # event -> distance below which it begins [m]
 
 
 @dataclass(frozen=True, slots=True)
 class Template:
-    """A maneuver-based scenario with its road, parameterised.
+    """A maneuver-based scenario with its road, parameterised."""
 
-    Parameters
-    ----------
-    name : str
-        As on the command line, and of the files.
-    summary : str
-        One line.
-    own_parameters : tuple of Parameter
-        Beside the common ones.
-    plot : callable
-        Settings to a `Plot`.
-    """
-
-    name: str
-    summary: str
-    own_parameters: tuple[Parameter, ...]
-    plot: Callable[[Settings], Plot]
+    name: str  # as on the command line, and of the files
+    summary: str  # one line
+    own_parameters: tuple[Parameter, ...]  # beside the common ones
+    plot: Callable[[Settings], Plot]  # settings to a `Plot`
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
@@ -93,10 +68,7 @@ class Template:
 
         Raises `XoscLateralError` for an unknown parameter or a value out of range.
 
-        Parameters
-        ----------
-        chosen : mapping of str to str, optional
-            Parameters that differ from their defaults, as text.
+        `chosen`: parameters that differ from their defaults, as text.
         """
         settings = Settings(self.parameters, chosen or {})
         plot = self.plot(settings)

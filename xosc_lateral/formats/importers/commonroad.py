@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from xosc_lateral.errors import FormatError, NotEnoughDataError
 from xosc_lateral.formats.importers.cuts import DEFAULT_CUTS, CutSettings
-from xosc_lateral.formats.importers.lane_shapes import curvature_along, place_in_shapes
+from xosc_lateral.formats.importers.lane_shapes import LaneShape, curvature_along, place_in_shapes
 from xosc_lateral.formats.importers.placed import (
     LaneGraph,
     ground_speed,
@@ -65,11 +65,11 @@ def _read(path: Path, settings: CutSettings) -> Imported:
     )
 
 
-def _graph(scenario: Any) -> tuple[LaneGraph, list[_Shape]]:
+def _graph(scenario: Any) -> tuple[LaneGraph, list[_Lanelet]]:
     """How its lanelets hang together, and their shapes."""
     lanelets = {lanelet.lanelet_id: lanelet for lanelet in scenario.lanelet_network.lanelets}
     numbers = {name: k for k, name in enumerate(lanelets)}
-    shapes = [_Shape(lanelet) for lanelet in lanelets.values()]
+    shapes = [_Lanelet(lanelet) for lanelet in lanelets.values()]
     left = np.array(
         [numbers.get(one.adj_left, -1) if one.adj_left_same_direction else -1 for one in lanelets.values()], dtype=int
     )
@@ -101,9 +101,7 @@ def _opened(path: Path) -> Any:
 def read_obstacles(path: Path) -> Tracks:
     """All obstacles that move along a recorded trajectory.
 
-    Raises
-    ------
-    FormatError, NotEnoughDataError
+    Raises `FormatError`, `NotEnoughDataError`.
     """
     return _tracks(_opened(path), path)
 
@@ -139,27 +137,16 @@ def _tracks(scenario: Any, path: Path) -> Tracks:
     return Tracks(tuple(names), vehicle, time, step, x, y, heading, np.abs(speed), length, kind)
 
 
-class _Shape:
-    """A lanelet's bounds, and where a point lies between them."""
+class _Lanelet(LaneShape):
+    """A lane whose bounds have as many points each, which face each other."""
 
     def __init__(self, lanelet: Any) -> None:
         self.left = np.asarray(lanelet.left_vertices, dtype=np.float64)[:, :2]
         self.right = np.asarray(lanelet.right_vertices, dtype=np.float64)[:, :2]
-        centre = 0.5 * (self.left + self.right)
-        self.centre, self.step = centre, np.diff(centre, axis=0)
-        self.size = np.hypot(*self.step.T)
-        self.start = np.concatenate([[0.0], np.cumsum(self.size)])
-        self.length = float(self.start[-1])
-        self.direction = np.unwrap(np.arctan2(self.step[:, 1], self.step[:, 0]))
-        both = np.concatenate([self.left, self.right])
-        self.low, self.high = both.min(axis=0), both.max(axis=0)
-
-    def may_hold(self, x: FloatArray, y: FloatArray) -> NDArray[np.bool_]:
-        """Points in the box about it."""
-        return np.asarray((x >= self.low[0]) & (x <= self.high[0]) & (y >= self.low[1]) & (y <= self.high[1]))
+        super().__init__(0.5 * (self.left + self.right), [self.left, self.right])
 
     def place(self, x: FloatArray, y: FloatArray) -> tuple[FloatArray, ...]:
-        """Way along the middle (NaN beyond its ends), offset and width across it, its direction and curvature there."""
+        """See `LaneShape`."""
         about = np.stack([x, y], axis=1)[:, None] - self.centre[None, :-1]
         size2 = np.maximum(self.size**2, 1e-12)
         share = np.clip((about * self.step).sum(axis=2) / size2, 0.0, 1.0)

@@ -17,35 +17,19 @@ KEPT = "kept"
 
 @dataclass(frozen=True)
 class CutSettings:
-    """How tracks are cut.
+    """How tracks are cut."""
 
-    Parameters
-    ----------
-    max_gap : float
-        Longest stretch of rows that the provider made up (between two cameras) that is kept. [s]
-    calm_rate : float
-        A lane change reaches back and forth to where the lateral speed falls below this. [m/s]
-    longest_change : float
-        But not farther than this from the crossing. [s]
-    margin : float
-        Cut in addition before and after each lane change. [s]
-    edge : float
-        Cut at both ends of what is left: vehicles still settle there, or are about to set off, and trackers have less
-        to go by. [s]
-    shortest : float
-        Stretches below this are dropped. [s]
-    open_offset, open_rate : float
-        A track that begins or ends farther from the lane centre than this, or faster sideways, is taken to do so in
-        a lane change whose rest was not seen; and nobody has settled in a lane who is farther from its centre: a car of
-        1.8 m touches a marking at 0.95 m. [m], [m/s]
-    """
-
-    max_gap: float = 1.0
-    calm_rate: float = 0.1
-    longest_change: float = 8.0
-    margin: float = 1.0
+    max_gap: float = 1.0  # longest stretch of rows that the provider made up (between two cameras) that is kept [s]
+    calm_rate: float = 0.1  # a lane change reaches back and forth to where the lateral speed falls below this [m/s]
+    longest_change: float = 8.0  # but not farther than this from the crossing [s]
+    margin: float = 1.0  # cut in addition before and after each lane change [s]
+    # edge: cut at both ends of what is left: vehicles still settle there, or are about to set off, and trackers
+    # have less to go by [s]
     edge: float = 2.0
-    shortest: float = 5.0
+    shortest: float = 5.0  # stretches below this are dropped [s]
+    # open_offset, open_rate: a track that begins or ends farther from the lane centre than this, or faster
+    # sideways, is taken to do so in a lane change whose rest was not seen; and nobody has settled in a lane who
+    # is farther from its centre: a car of 1.8 m touches a marking at 0.95 m [m], [m/s]
     open_offset: float = 0.7
     open_rate: float = 0.3
 

@@ -40,7 +40,7 @@ from xosc_lateral.formats.importers.cuts import (
 from xosc_lateral.formats.importers.lanes_from_tracks import LaneCentreLine, fit_lane_centre
 from xosc_lateral.formats.importers.neighbours import find_neighbours
 from xosc_lateral.formats.importers.road_from_tracks import ReferenceLine, fit_reference_line
-from xosc_lateral.formats.importers.table import Imported, drop_cut, guarded, make_provenance
+from xosc_lateral.formats.importers.table import Imported, finished, guarded
 from xosc_lateral.formats.source import Source, open_source
 
 if TYPE_CHECKING:
@@ -74,11 +74,8 @@ LICENCE = (
 def import_dlr_ht(source: Path, settings: CutSettings = DEFAULT_CUTS, *, keep_cut: bool = False) -> Imported:
     """Read the trajectory CSV, the data set's zip or the wheel of `tasi` that holds it.
 
-    Returns
-    -------
-    Imported
-        Table with columns drive, time, offset, lane_width, speed, context, vehicle_class, and (with `keep_cut`) `state`
-        naming why a row would have been cut.
+    Returns Imported: table with columns drive, time, offset, lane_width, speed, context, vehicle_class, and (with
+    `keep_cut`) `state` naming why a row would have been cut.
     """
     tracks = read_tracks(source)
     found = find_lanes(tracks, settings)
@@ -93,8 +90,9 @@ def import_dlr_ht(source: Path, settings: CutSettings = DEFAULT_CUTS, *, keep_cu
     vehicle, frame = tracks["vehicle"].to_numpy(), np.round(tracks["time"].to_numpy() / STEP).astype(np.int64)
     table["state"] = name_states(reasons, placed.lane, vehicle, frame, STEP, settings)
     table[RUN] = number_runs(table["state"].to_numpy(), placed.lane, vehicle, frame)
-    record = make_provenance(
+    return finished(
         table,
+        keep_cut=keep_cut,
         format="dlr-ht",
         sources=[source],
         version=_version(source),
@@ -103,7 +101,6 @@ def import_dlr_ht(source: Path, settings: CutSettings = DEFAULT_CUTS, *, keep_cu
         step=STEP,
         lanes=[_describe(name, k, lane) for name, both in lanes.items() for k, lane in enumerate(both)],
     )
-    return Imported(drop_cut(table, keep_cut), record)
 
 
 def read_tracks(source: Path) -> pd.DataFrame:
@@ -338,7 +335,7 @@ def _context(tracks: pd.DataFrame, placed: _Placed, s: FloatArray, forward: NDAr
             "acceleration": tracks["acceleration_signed"].to_numpy(),
             "lane_index": placed.lane,
             "lane_count": LANES,
-            **asdict(near),
+            **near,
             "vehicle_class": kind,
             "is_truck": (kind == "truck").astype(np.float64),
         }

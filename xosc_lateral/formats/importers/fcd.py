@@ -31,6 +31,9 @@ _TRUCKS = ("truck", "trailer", "bus", "coach", "lkw")
 def import_fcd(source: Path, *, net: str | Path | None = None, lane_width: float = WIDTH) -> pd.DataFrame:
     """A drive for every vehicle.
 
+    A vehicle is a truck when its type's name says so. Raises `FormatError`, `NotEnoughDataError`: not such a file; one
+    without `posLat`; one without vehicles.
+
     Parameters
     ----------
     source : Path
@@ -39,16 +42,6 @@ def import_fcd(source: Path, *, net: str | Path | None = None, lane_width: float
         The road network, ``.net.xml``, for widths and counts of lanes.
     lane_width : float
         Where there is no net. [m]
-
-    Returns
-    -------
-    DataFrame
-        A drive table. A vehicle is a truck when its type's name says so.
-
-    Raises
-    ------
-    FormatError, NotEnoughDataError
-        Not such a file; one without `posLat`; one without vehicles.
     """
     import pandas as pd
 
@@ -75,9 +68,7 @@ def import_fcd(source: Path, *, net: str | Path | None = None, lane_width: float
         instant, number, np.array(pos) - 0.5 * length, length, truck,
         lane_on_left=number + 1 < table["lane_count"].to_numpy(), lane_on_right=number > 0,
     )  # fmt: skip
-    for column in ("lead", "left", "right"):
-        table[f"{column}_distance"] = getattr(around, f"{column}_distance")
-        table[f"{column}_is_truck"] = getattr(around, f"{column}_is_truck")
+    table = table.assign(**around)
     return table.sort_values(["drive", "time"], kind="stable").reset_index(drop=True)
 
 

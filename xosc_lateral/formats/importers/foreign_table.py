@@ -59,16 +59,8 @@ SIGNS = {"offset": "positive to the LEFT of travel, else :-m", "curvature": "pos
 def import_table(sources: Path | Sequence[Path], *, mapping: MappingLike | None = None) -> pd.DataFrame:
     """Tables under standard names, in standard units; a table without `drive` is a drive called after its file.
 
-    Parameters
-    ----------
-    sources : path or sequence of paths
-    mapping : TableMapping, mapping of str to str, or path, optional
-        Without it, headers are taken to be standard names.
-
-    Raises
-    ------
-    FormatError, NotEnoughDataError
-        As `formats.drives.read_drives`: what is written here can be read.
+    `mapping`: without it, headers are taken to be standard names. Raises `FormatError`, `NotEnoughDataError`: as
+    `formats.drives.read_drives`: what is written here can be read.
     """
     import pandas as pd
 
@@ -86,10 +78,7 @@ def import_table(sources: Path | Sequence[Path], *, mapping: MappingLike | None 
 def propose_mapping(files: Sequence[Path]) -> str:
     """TOML of a mapping of these tables, with what each line was guessed from.
 
-    Raises
-    ------
-    FormatError
-        If they can't be read, or have no column in common.
+    Raises `FormatError`: if they can't be read, or have no column in common.
     """
     tables = [read_table(path)[0].rename(columns=lambda name: str(name).strip()) for path in files]
     shared = [name for name in tables[0].columns if all(name in table.columns for table in tables)]

@@ -43,34 +43,18 @@ MIN_PASSAGES = 10  # per 100 m of road, below which the lane ends
 
 @dataclass(frozen=True, eq=False)
 class LaneCentreLine:
-    """Lateral position of a lane's centre along a reference line, as used by its traffic.
+    """Lateral position of a lane's centre along a reference line, as used by its traffic."""
 
-    Parameters
-    ----------
-    start, end : float
-        Range of `s` with enough vehicles. [m]
-    knots : array, shape (n + 4,)
-        Of the cubic spline. [m]
-    coefficients : array, shape (n,)
-        [m]
-    tilt : array, shape (n,)
-        Coefficients of the displacement per metre of height above the mean, about its own mean along the road. [-]
-    height : float
-        Mean height of the vehicles in this lane. [m]
-    covariance : array, shape (n, n)
-        Of `coefficients`. [m²]
-    vehicles : int
-        How many the estimate rests on.
-    """
-
-    start: float
+    start: float  # start, end: range of `s` with enough vehicles [m]
     end: float
-    knots: FloatArray
-    coefficients: FloatArray
+    knots: FloatArray  # of the cubic spline, shape (n + 4,) [m]
+    coefficients: FloatArray  # shape (n,) [m]
+    # tilt: coefficients of the displacement per metre of height above the mean, about its own mean along the
+    # road, shape (n,) [-]
     tilt: FloatArray
-    height: float
-    covariance: FloatArray
-    passages: int
+    height: float  # mean height of the vehicles in this lane [m]
+    covariance: FloatArray  # of `coefficients`, shape (n, n) [m²]
+    passages: int  # how many the estimate rests on
 
     def at(self, s: FloatArray, height: FloatArray) -> FloatArray:
         """Lateral position of the centre as seen on a vehicle of that height [m]; NaN outside of start..end."""

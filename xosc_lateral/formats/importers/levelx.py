@@ -30,7 +30,7 @@ from xosc_lateral.drives.cleaning import RUN
 from xosc_lateral.errors import FormatError, NotEnoughDataError
 from xosc_lateral.formats.importers.cuts import DEFAULT_CUTS, CutSettings, lane_changes, name_states, number_runs
 from xosc_lateral.formats.importers.neighbours import REACH, find_neighbours
-from xosc_lateral.formats.importers.table import Imported, drop_cut, guarded, make_provenance
+from xosc_lateral.formats.importers.table import Imported, finished, guarded
 from xosc_lateral.formats.tables import read_table
 
 if TYPE_CHECKING:
@@ -68,19 +68,15 @@ def import_levelx(source: Path, settings: CutSettings = DEFAULT_CUTS, *, keep_cu
     if len(set(layouts)) > 1 or len(set(steps)) > 1:
         raise FormatError("recordings of different layouts or frame rates: import them one by one", path=source)
     table = pd.concat(parts, ignore_index=True)
-    record = make_provenance(
+    return finished(
         table,
+        keep_cut=keep_cut,
         format=f"levelx {layouts[0]}",
         sources=tracks_files,
-        version="unknown",
         licence=LICENCE,
         settings=asdict(settings),
         step=steps[0],
     )
-    kept = drop_cut(table, keep_cut)
-    if kept.empty:
-        raise NotEnoughDataError(f"{source}: nothing is left of {len(table)} rows ({dict(record.rows)})")
-    return Imported(kept, record)
 
 
 def _read_recording(path: Path, settings: CutSettings) -> tuple[pd.DataFrame, str, float]:
@@ -185,7 +181,7 @@ def _from_highd(
             "acceleration": way * tracks["xAcceleration"].to_numpy(),
             "lane_index": lane_number,
             "lane_count": count.astype(np.int64),
-            **asdict(near),
+            **near,
             "vehicle_class": kind,
             "is_truck": np.isin(kind, TRUCKS).astype(np.float64),
             RUN: number_runs(state, lane_number, vehicle, frame),

@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 
 from xosc_lateral.errors import FormatError
 from xosc_lateral.formats.importers.cuts import KEPT
-from xosc_lateral.formats.importers.table import Imported, drop_cut, guarded, make_provenance
+from xosc_lateral.formats.importers.table import Imported, finished, guarded
 from xosc_lateral.formats.mapping import ColumnSource, MappingLike, as_mapping, factor, is_measured, parse_map, spelled
 from xosc_lateral.formats.source import open_source
 from xosc_lateral.formats.tables import LONGEST_MESSAGE, foreign_errors
@@ -53,24 +53,12 @@ STAYS_AWAY = 1.0
 
 @dataclass(frozen=True, eq=False)
 class Channel:
-    """A mapped channel.
+    """A mapped channel."""
 
-    Parameters
-    ----------
-    time : array, shape (n,)
-        Stamps. [s]
-    values : array, shape (n,)
-        Numbers in the unit of the standard table, or words.
-    unit : str
-        That they were read in; empty where neither map nor file names one.
-    is_stepwise : bool
-        Whether the nearest sample counts.
-    """
-
-    time: FloatArray
-    values: NDArray[Any]
-    unit: str
-    is_stepwise: bool
+    time: FloatArray  # stamps, shape (n,) [s]
+    values: NDArray[Any]  # numbers in the unit of the standard table, or words, shape (n,)
+    unit: str  # that they were read in; empty where neither map nor file names one
+    is_stepwise: bool  # whether the nearest sample counts
 
     def at(self, time: FloatArray) -> NDArray[Any]:
         """Values at these times. [s]"""
@@ -94,16 +82,9 @@ def import_mf4(
     Raises `FormatError` if the map lacks the position, asammdf is not installed, a log can't be read, a channel is not
     in it, or the unit in the file measures something else.
 
-    Parameters
-    ----------
-    sources : path or sequence of paths
-        Each log is a drive of its own, called after its file.
-    channels : sequence of str
-        Words ``NAME=CHANNEL[:UNIT]``.
-    mapping : TableMapping, mapping of str to str, or path, optional
-        More of them, saved.
-    step : float
-        Of the table. Messages that stay away for longer than a second leave a gap. [s]
+    `sources`: each log is a drive of its own, called after its file. `channels`: words ``NAME=CHANNEL[:UNIT]``.
+    `mapping`: more of them, saved. `step`: of the table [s]. Messages that stay away for longer than a second leave
+    a gap.
     """
     import pandas as pd
 
@@ -111,22 +92,24 @@ def import_mf4(
     sources_of = {**as_mapping(mapping).columns, **parse_map(channels)}
     if not any(set(pair) <= sources_of.keys() for pair in POSITIONS):
         raise FormatError(f"{channels_wanted(files[0])}; mapped: {', '.join(sources_of) or 'nothing'}", path=files[0])
-    read = {file: _read_channels(file, sources_of) for file in files}
+    read = {}
+    for file in files:
+        with _opened(file) as log:
+            read[file] = {name: _read_channel(log, name, wanted, file) for name, wanted in sources_of.items()}
     tables = [
         _table(signals, file, name, step)
         for (file, signals), name in zip(read.items(), _drive_names(files), strict=True)
     ]
     table = pd.concat(tables, ignore_index=True)
-    record = make_provenance(
+    return finished(
         table,
+        keep_cut=False,
         format="mf4",
         sources=files,
-        version="unknown",
         licence=LICENCE,
         settings={"step": step, "channels": list(channels), "units": _units(read)},
         step=step,
     )
-    return Imported(drop_cut(table, keep_cut=False), record)
 
 
 def channels_wanted(source: Path) -> str:
@@ -165,11 +148,6 @@ def _units(read: dict[Path, dict[str, Channel]]) -> dict[str, str]:
     return {name: " | ".join(sorted({signals[name].unit for signals in read.values()})) for name in columns}
 
 
-def _read_channels(source: Path, mapping: dict[str, ColumnSource]) -> dict[str, Channel]:
-    with _opened(source) as log:
-        return {name: _read_channel(log, name, wanted, source) for name, wanted in mapping.items()}
-
-
 @contextmanager
 def _opened(source: Path) -> Iterator[Any]:
     """The log; `FormatError` when asammdf is not there or can't read it."""
@@ -203,56 +181,39 @@ def _said(error: Exception) -> str:
 
 
 def _read_channel(log: Any, name: str, wanted: ColumnSource, source: Path) -> Channel:
-    signal = _signal(log, name, wanted, source)
-    kind = signal.samples.dtype.kind
-    if kind in "SU":
-        return _words(signal, name, wanted, source)
-    if kind not in "fiub" or signal.samples.ndim != 1:
-        raise FormatError(
-            f"channel {wanted.column} holds {signal.samples.dtype}, neither numbers nor words",
-            path=source,
-            element=name,
-        )
-    unit, by = _unit(signal, name, wanted, source)
-    values = np.asarray(signal.samples, dtype=np.float64) * by
-    stamps = _stamps(signal, len(values), name, wanted, source)
-    finite = np.isfinite(values) & np.isfinite(stamps)
-    _require_two(int(finite.sum()), name, wanted, source)
-    stepwise = kind in "iub" and not _is_quantity(name, unit)
-    return Channel(stamps[finite], values[finite], unit, stepwise)
+    def wrong(what: str) -> FormatError:
+        return FormatError(f"channel {wanted.column}{what}", path=source, element=name)
 
-
-def _signal(log: Any, name: str, wanted: ColumnSource, source: Path) -> Any:
     places = log.channels_db.get(wanted.column)
     if not places:
         raise FormatError(f"no channel {wanted.column}{_alike(log, wanted.column)}", path=source, element=name)
     # The same channel may lie in several groups (one per bus): the one with the most samples counts.
     signals = [log.get(group=group, index=index) for group, index in places]
     signal = max(signals, key=lambda one: len(one.samples))
-    return signal
-
-
-def _stamps(signal: Any, count: int, name: str, wanted: ColumnSource, source: Path) -> FloatArray:
-    """Times of a channel's samples, shape (count,). [s]"""
-    stamps = np.asarray(signal.timestamps, dtype=np.float64)
-    if len(stamps) != count or np.abs(stamps).max(initial=0.0) > TIME.value or (np.diff(stamps) < 0).any():
-        raise FormatError(
-            f"channel {wanted.column}: times that do not increase, or are beyond {TIME}",
-            path=source,
-            element=name,
-        )
-    return stamps
-
-
-def _words(signal: Any, name: str, wanted: ColumnSource, source: Path) -> Channel:
-    if _is_quantity(name, ""):
-        raise FormatError(f"channel {wanted.column} holds words, not numbers", path=source, element=name)
-    _require_two(len(signal.samples), name, wanted, source)
-    words = [
-        (word.decode("utf-8", "replace") if isinstance(word, bytes) else str(word)).strip("\x00 ")
-        for word in signal.samples.tolist()
-    ]
-    return Channel(np.asarray(signal.timestamps, dtype=np.float64), np.array(words, dtype=object), "", True)
+    samples, stamps = signal.samples, np.asarray(signal.timestamps, dtype=np.float64)
+    kind = samples.dtype.kind
+    if kind in "SU":
+        if _is_quantity(name, ""):
+            raise wrong(" holds words, not numbers")
+        words = [word.decode("utf-8", "replace") if isinstance(word, bytes) else str(word) for word in samples.tolist()]
+        found = Channel(stamps, np.array([word.strip("\x00 ") for word in words], dtype=object), "", True)
+    elif kind not in "fiub" or samples.ndim != 1:
+        raise wrong(f" holds {samples.dtype}, neither numbers nor words")
+    else:
+        try:
+            unit, by = _unit(str(signal.unit or ""), name, wanted)
+        except ValueError as error:
+            more = f"name the unit with --map {name}={wanted.column}:UNIT"
+            raise wrong(f" is in {str(signal.unit or '')!r}: {error}; {more}") from error
+        values = np.asarray(samples, dtype=np.float64) * by
+        if len(stamps) != len(values) or np.abs(stamps).max(initial=0.0) > TIME.value or (np.diff(stamps) < 0).any():
+            raise wrong(f": times that do not increase, or are beyond {TIME}")
+        finite = np.isfinite(values) & np.isfinite(stamps)
+        stepwise = kind in "iub" and not _is_quantity(name, unit)
+        found = Channel(stamps[finite], values[finite], unit, stepwise)
+    if len(found.values) < 2:
+        raise wrong(f" has {len(found.values)} values; two are needed")
+    return found
 
 
 def _alike(log: Any, wanted: str) -> str:
@@ -264,33 +225,20 @@ def _alike(log: Any, wanted: str) -> str:
     return f"; like it are {', '.join(close[:8])}" if close else f"; the log has {len(names)} others, none alike"
 
 
-def _unit(signal: Any, name: str, wanted: ColumnSource, source: Path) -> tuple[str, float]:
-    """Unit that counts, and the factor from it to the standard table's."""
+def _unit(given: str, name: str, wanted: ColumnSource) -> tuple[str, float]:
+    """Unit that counts, and the factor from it to the standard table's; `ValueError`: it measures something else."""
     if wanted.unit:
         return wanted.unit, wanted.factor
-    given = str(signal.unit or "")
     unit = spelled(given)
     if unit == "" or (unit is None and not _is_quantity(name, "")):
         return given, 1.0
-    try:
-        return given, factor(name, given if unit is None else unit)
-    except ValueError as error:
-        raise FormatError(
-            f"channel {wanted.column} is in {given!r}: {error}; name the unit with --map {name}={wanted.column}:UNIT",
-            path=source,
-            element=name,
-        ) from error
+    return given, factor(name, given if unit is None else unit)
 
 
 def _is_quantity(name: str, unit: str) -> bool:
     """Whether a column holds a physical quantity: by the standard table, or by its unit."""
     known = (*POSITIONS[0], *POSITIONS[1], "time")
     return name in known or CONTEXT_UNITS.get(name, "-") != "-" or is_measured(spelled(unit.lstrip("-")) or "")
-
-
-def _require_two(count: int, name: str, wanted: ColumnSource, source: Path) -> None:
-    if count < 2:
-        raise FormatError(f"channel {wanted.column} has {count} values; two are needed", path=source, element=name)
 
 
 def _table(signals: dict[str, Channel], source: Path, drive: str, step: float) -> pd.DataFrame:
@@ -305,12 +253,10 @@ def _table(signals: dict[str, Channel], source: Path, drive: str, step: float) -
         raise FormatError(CLOCK_ROWS.refusal(rows), path=source)
     time = np.asarray(start + step * np.arange(int((end - start) / step) + 1), dtype=np.float64)
     columns = {name: channel.at(time) for name, channel in signals.items()}
-    missing = np.any([_stays_away(time, signals[name].time) for name in position], axis=0)
+    missing = np.zeros(len(time), dtype=np.bool_)  # instants between two messages that are too far apart
+    for name in position:
+        stamps = signals[name].time
+        after = np.clip(np.searchsorted(stamps, time), 1, len(stamps) - 1)
+        missing |= stamps[after] - stamps[after - 1] > STAYS_AWAY
     state = np.where(missing, "gap", KEPT)
     return pd.DataFrame({"drive": drive, "time": np.round(time - start, 6), **columns, "state": state})
-
-
-def _stays_away(time: FloatArray, stamps: FloatArray) -> NDArray[np.bool_]:
-    """Instants between two messages that are too far apart."""
-    after = np.clip(np.searchsorted(stamps, time), 1, len(stamps) - 1)
-    return np.asarray(stamps[after] - stamps[after - 1] > STAYS_AWAY)

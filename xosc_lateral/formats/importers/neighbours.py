@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -15,22 +13,6 @@ REACH = 200.0  # [m]; who is farther away is none, as in `motion.context`
 LONGEST = 30.0  # [m]; no vehicle is longer (German road traffic regulations: 25.25 m)
 
 
-@dataclass(frozen=True, eq=False)
-class Neighbours:
-    """Context of every row, under the names of the drive table.
-
-    Distances are free space, bumper to bumper along the road, 0 while side by side; infinite where that lane has nobody
-    within `REACH`, NaN where there is no such lane [m]. `*_is_truck` is 1 or 0, and 0 where there is nobody.
-    """
-
-    lead_distance: FloatArray
-    lead_is_truck: FloatArray
-    left_distance: FloatArray
-    left_is_truck: FloatArray
-    right_distance: FloatArray
-    right_is_truck: FloatArray
-
-
 def find_neighbours(
     frame: IntArray,
     lane: IntArray,
@@ -40,8 +22,11 @@ def find_neighbours(
     *,
     lane_on_left: BoolArray,
     lane_on_right: BoolArray,
-) -> Neighbours:
-    """Leader in the same lane and nearest vehicle in the lanes beside.
+) -> dict[str, FloatArray]:
+    """Leader in the same lane and nearest vehicle in the lanes beside: columns of the drive table, shape (n,) each.
+
+    Distances are free space, bumper to bumper along the road, 0 while side by side; infinite where that lane has nobody
+    within `REACH`, NaN where there is no such lane [m]. `*_is_truck` is 1 or 0, and 0 where there is nobody.
 
     Parameters
     ----------
@@ -78,7 +63,13 @@ def find_neighbours(
             best, truck = np.where(closer, gap, best), np.where(closer, is_truck[who], truck)
         return np.where(there & known | np.isfinite(best), best, np.nan), truck
 
-    lead, lead_truck = nearest(group, known, ahead_only=True)
-    left, left_truck = nearest(np.where(known, group + 1, -2), lane_on_left)
-    right, right_truck = nearest(np.where(known & (lane > 0), group - 1, -2), lane_on_right)
-    return Neighbours(lead, lead_truck, left, left_truck, right, right_truck)
+    found = {
+        "lead": nearest(group, known, ahead_only=True),
+        "left": nearest(np.where(known, group + 1, -2), lane_on_left),
+        "right": nearest(np.where(known & (lane > 0), group - 1, -2), lane_on_right),
+    }
+    return {
+        f"{who}_{what}": values
+        for who, both in found.items()
+        for what, values in zip(("distance", "is_truck"), both, strict=True)
+    }

@@ -46,14 +46,8 @@ def import_osi(
     Raises `FormatError`: The extra is missing; no trace; no lanes; no such vehicle; `NotEnoughDataError` if nothing is
     left once lane changes are cut.
 
-    Parameters
-    ----------
-    host : str, optional
-        Keep this vehicle alone: its identifier or name in the trace; "host": the trace's host vehicle.
-    road : path, optional
-        OpenDRIVE file to take lanes from.
-    channel : str, optional
-        Topic of an MCAP file with several.
+    `host`: keep this vehicle alone: its identifier or name in the trace; "host": the trace's host vehicle. `road`:
+    OpenDRIVE file to take lanes from. `channel`: topic of an MCAP file with several.
     """
     several = not isinstance(sources, Path) and len(sources) > 1
 
@@ -72,7 +66,6 @@ def import_osi(
             keep_cut=True,
             format="osi",
             sources=files,
-            version="unknown",
             licence=LICENCE,
             only=only,
             notes=recorded.notes,

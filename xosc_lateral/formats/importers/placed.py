@@ -6,16 +6,15 @@ from collections import Counter, deque
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.drives.cleaning import RUN
-from xosc_lateral.errors import NotEnoughDataError
 from xosc_lateral.formats.importers.cuts import CutSettings, lane_changes, name_states, number_runs
 from xosc_lateral.formats.importers.neighbours import find_neighbours
-from xosc_lateral.formats.importers.table import Imported, drop_cut, hash_files, make_provenance
+from xosc_lateral.formats.importers.table import Imported, finished, hash_files, without_cut
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -28,21 +27,11 @@ IntArray = NDArray[np.int64]
 
 @dataclass(frozen=True, eq=False)
 class LaneGraph:
-    """Pieces of lanes and how they hang together.
+    """Pieces of lanes and how they hang together."""
 
-    Parameters
-    ----------
-    length : array, shape (n,)
-        Of each piece, along the road. [m]
-    left : array of int, shape (n,)
-        Piece beside it on the left that is driven the same way; -1: none.
-    following : sequence of sequences of int
-        Pieces that it leads to.
-    """
-
-    length: FloatArray
-    left: IntArray
-    following: Sequence[Sequence[int]]
+    length: FloatArray  # of each piece, along the road, shape (n,) [m]
+    left: IntArray  # piece beside it on the left that is driven the same way; -1: none, shape (n,)
+    following: Sequence[Sequence[int]]  # pieces that it leads to
 
     def layout(self) -> tuple[IntArray, FloatArray, IntArray]:
         """Part of the network, way along it to the piece's start [m], and rank (growing to the left) of each piece.
@@ -98,45 +87,20 @@ SPEED_WINDOW = 0.4
 
 @dataclass(frozen=True, eq=False)
 class PlacedTracks:
-    """Rows of all vehicles, sorted by vehicle and time.
+    """Rows of all vehicles, sorted by vehicle and time."""
 
-    Parameters
-    ----------
-    names : sequence of str
-        Of the vehicles.
-    vehicle : array of int, shape (n,)
-        Index into `names`.
-    time : array, shape (n,)
-        [s]
-    step : float
-        Between two rows. [s]
-    piece : array of int, shape (n,)
-        Of the lane graph; -1: in no lane.
-    along : array, shape (n,)
-        Way from the piece's start, in the direction of travel. [m]
-    offset, lane_width : array, shape (n,)
-        NaN in no lane. [m]
-    speed : array, shape (n,)
-        [m/s]
-    length : array, shape (n,)
-        Of the vehicle. [m]
-    kind : array of str, shape (n,)
-        Class of the vehicle in lower case; empty where not known.
-    road : mapping of str to array, shape (n,)
-        What the road is like there: curvature, lane_index ...
-    """
-
-    names: Sequence[str]
-    vehicle: IntArray
-    time: FloatArray
-    step: float
-    piece: IntArray
-    along: FloatArray
-    offset: FloatArray
+    names: Sequence[str]  # of the vehicles
+    vehicle: IntArray  # index into `names`, shape (n,)
+    time: FloatArray  # shape (n,) [s]
+    step: float  # between two rows [s]
+    piece: IntArray  # of the lane graph; -1: in no lane, shape (n,)
+    along: FloatArray  # way from the piece's start, in the direction of travel, shape (n,) [m]
+    offset: FloatArray  # offset, lane_width: NaN in no lane, shape (n,) [m]
     lane_width: FloatArray
-    speed: FloatArray
-    length: FloatArray
-    kind: NDArray[np.str_]
+    speed: FloatArray  # shape (n,) [m/s]
+    length: FloatArray  # of the vehicle, shape (n,) [m]
+    kind: NDArray[np.str_]  # class of the vehicle in lower case; empty where not known, shape (n,)
+    # road: what the road is like there: curvature, lane_index ..., shape (n,)
     road: Mapping[str, FloatArray] = field(default_factory=dict)
 
 
@@ -145,35 +109,17 @@ def import_placed(
     graph: LaneGraph,
     settings: CutSettings,
     *,
-    keep_cut: bool,
-    format: str,  # noqa: A002 (the record's own word)
-    sources: Sequence[Path],
-    version: str,
-    licence: str,
     only: Collection[str] | None = None,
-    notes: Sequence[str] = (),
+    **about: Any,
 ) -> Imported:
     """Neighbours, cuts and the record of the import; of the vehicles in `only` alone, if it is given.
 
-    Raises `NotEnoughDataError` if nothing is left.
+    Raises `NotEnoughDataError` if nothing is left; further parameters are those of `table.finished`.
     """
     table = placed_table(tracks, graph, settings)
     if only is not None:
         table = table[table["drive"].isin(only)].reset_index(drop=True)
-    record = make_provenance(
-        table,
-        format=format,
-        sources=sources,
-        version=version,
-        licence=licence,
-        settings=asdict(settings),
-        step=tracks.step,
-        notes=notes,
-    )
-    kept = drop_cut(table, keep_cut)
-    if kept.empty:
-        raise NotEnoughDataError(f"{sources[0]}: nothing is left of {len(table)} rows ({dict(record.rows)})")
-    return Imported(kept, record)
+    return finished(table, settings=asdict(settings), step=tracks.step, **about)
 
 
 def import_each(sources: Path | Sequence[Path], read: Callable[[Path], Imported], *, keep_cut: bool) -> Imported:
@@ -200,10 +146,7 @@ def import_each(sources: Path | Sequence[Path], read: Callable[[Path], Imported]
             notes=tuple(note for part in parts for note in part.provenance.notes),
         )
     table = pd.concat([part.table for part in parts], ignore_index=True)
-    kept = drop_cut(table, keep_cut)
-    if kept.empty:
-        raise NotEnoughDataError(f"{files[0]}: nothing is left of {len(table)} rows ({dict(record.rows)})")
-    return Imported(kept, record)
+    return without_cut(table, record, keep_cut, files[0])
 
 
 def placed_table(tracks: PlacedTracks, graph: LaneGraph, settings: CutSettings) -> pd.DataFrame:
@@ -242,7 +185,7 @@ def placed_table(tracks: PlacedTracks, graph: LaneGraph, settings: CutSettings) 
             "speed": tracks.speed,
             "acceleration": _rate(tracks.speed, tracks.vehicle, tracks.step, 1.0),
             **tracks.road,
-            **asdict(near),
+            **near,
             "vehicle_class": tracks.kind,
             "is_truck": is_truck.astype(np.float64),
             RUN: number_runs(state, lane, tracks.vehicle, instant),

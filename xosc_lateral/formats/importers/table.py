@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar, cast
 
 import numpy as np
-from numpy.typing import NDArray
 
 from xosc_lateral.driver.plausibility import implausible_rows
 from xosc_lateral.drives.cleaning import LANE_WIDTHS, MAX_OUTSIDE
@@ -57,10 +56,10 @@ def make_provenance(
     *,
     format: str,  # noqa: A002 (the record's own word)
     sources: Sequence[Path],
-    version: str,
     licence: str,
     settings: Mapping[str, object],
     step: float,
+    version: str = "unknown",
     lanes: Sequence[Mapping[str, object]] = (),
     notes: Sequence[str] = (),
 ) -> ImportRecord:
@@ -78,6 +77,26 @@ def make_provenance(
         lanes=lanes,
         notes=notes,
     )
+
+
+def finished(table: pd.DataFrame, *, keep_cut: bool, sources: Sequence[Path], **about: Any) -> Imported:
+    """A table with its column `state` and its record, see `make_provenance`; without the rows that are cut.
+
+    Raises `NotEnoughDataError` if nothing is left.
+    """
+    record = make_provenance(table, sources=sources, **about)
+    return without_cut(table, record, keep_cut, sources[0])
+
+
+def without_cut(table: pd.DataFrame, record: ImportRecord, keep_cut: bool, source: Path) -> Imported:
+    """The table without the rows that are cut and without `state`, unless they are wanted.
+
+    Raises `NotEnoughDataError` if nothing is left.
+    """
+    kept = table if keep_cut else table[table["state"] == KEPT].drop(columns="state")
+    if kept.empty:
+        raise NotEnoughDataError(f"{source}: nothing is left of {len(table)} rows ({dict(record.rows)})")
+    return Imported(kept.reset_index(drop=True), record)
 
 
 Importer = TypeVar("Importer", bound=Callable[..., Imported])
@@ -121,28 +140,11 @@ def _refuse_nonsense(table: pd.DataFrame, path: Path) -> None:
             wrong |= kept & np.isnan(values)
         allowed = 0.0 if name == "time" else MAX_OUTSIDE
         if wrong.sum() > allowed * kept.sum():
-            raise _refusal(name, values, wrong, believed, kept, path)
+            value, share = values[int(np.argmax(wrong))], 100 * wrong.sum() / kept.sum()
+            what = f"{value:.6g} is not within [{believed.low:g}, {believed.high:g}] ({believed.reason})"
+            raise FormatError(f"{what}, {share:.0f} % of the rows", path=path, element=f"column {name!r}")
         if wrong.any():
             table[name] = np.where(wrong, np.nan, values)
-    _check_lane_width(table, kept, path)
-
-
-def _refusal(
-    name: str,
-    values: NDArray[np.float64],
-    wrong: NDArray[np.bool_],
-    believed: Range,
-    kept: NDArray[np.bool_],
-    path: Path,
-) -> FormatError:
-    """Which value, and how many like it."""
-    row = int(np.argmax(wrong))
-    what = f"{values[row]:.6g} is not within [{believed.low:g}, {believed.high:g}] ({believed.reason})"
-    share = f"{100 * wrong.sum() / kept.sum():.0f} % of the rows"
-    return FormatError(f"{what}, {share}", path=path, element=f"column {name!r}")
-
-
-def _check_lane_width(table: pd.DataFrame, kept: NDArray[np.bool_], path: Path) -> None:
     if "lane_width" in table:
         median = float(np.nanmedian(table["lane_width"].to_numpy(dtype=np.float64)[kept]))
         if not LANE_WIDTHS[0] <= median <= LANE_WIDTHS[1]:
@@ -168,19 +170,11 @@ def as_imported(
         table.assign(state=KEPT),
         format=format,
         sources=[source for source in sources if source.is_file()],
-        version="unknown",
         licence=str(options.get("licence", "your own recording")),
         settings=options,
         step=float(table.groupby("drive", sort=False)["time"].diff().median()),
     )
     return Imported(table, record)
-
-
-def drop_cut(table: pd.DataFrame, keep_cut: bool) -> pd.DataFrame:
-    """Without the rows that are cut and without `state`, unless they are wanted."""
-    if keep_cut:
-        return table.reset_index(drop=True)
-    return table[table["state"] == KEPT].drop(columns="state").reset_index(drop=True)
 
 
 def write_imported(imported: Imported, path: Path) -> None:

@@ -16,7 +16,7 @@ from xosc_lateral.formats.importers.placed import PlacedTracks, ground_speed, tr
 from xosc_lateral.formats.mapping import MappingLike, TableMapping, as_mapping, parse_map
 from xosc_lateral.formats.source import open_source
 from xosc_lateral.formats.states import COLUMNS
-from xosc_lateral.formats.tables import comma_numbers, foreign_errors, read_table, seconds_of_text, unpacked_text
+from xosc_lateral.formats.tables import foreign_errors, numbers_of, read_table, unpacked_text
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -83,18 +83,9 @@ class Tracks:
 def read_tracks(path: Path, columns: Sequence[str] = (), mapping: MappingLike | None = None) -> Tracks:
     """Read a table of tracks.
 
-    Parameters
-    ----------
-    mapping : TableMapping, mapping of str to str, or path, optional
-    columns : sequence of str
-        ``NAME=COLUMN[:UNIT]`` for headers that aren't understood, and for units other than m, s, rad, m/s.
-
-    Raises
-    ------
-    FormatError
-        A missing column, no number where one is needed.
-    NotEnoughDataError
-        No vehicle with two rows.
+    `columns`: ``NAME=COLUMN[:UNIT]`` for headers that aren't understood, and for units other than m, s, rad, m/s.
+    Raises `FormatError`: a missing column, no number where one is needed. Raises `NotEnoughDataError`: no vehicle with
+    two rows.
     """
     saved = as_mapping(mapping)
     table = read_esmini_log(path) if is_esmini_log(path) else read_table(path, saved)[0]
@@ -171,35 +162,10 @@ def _columns(table: pd.DataFrame, path: Path, saved: TableMapping, words: Sequen
         if name in ("vehicle", "vehicle_class"):
             found[name] = column
         else:
-            found[name] = _numbers(column, name, path) * (1.0 if source is None else source.factor)
+            by = 1.0 if source is None else source.factor
+            found[name] = pd.Series(numbers_of(column, path, name) * by, index=column.index)
     made = pd.DataFrame(found).replace([np.inf, -np.inf], np.nan)
     return made.dropna(subset=["vehicle", "time", "x", "y"])
-
-
-def _numbers(column: pd.Series, name: str, path: Path) -> pd.Series:
-    import pandas as pd
-    from pandas.api import types
-
-    if types.is_numeric_dtype(column):
-        return column.astype(np.float64)
-    if name == "time":
-        seconds = seconds_of_text(column.astype(str))
-        if seconds is not None:
-            return pd.Series(seconds, index=column.index)
-    numbers = comma_numbers(column)
-    if numbers is None:
-        numbers = pd.to_numeric(column, errors="coerce")
-    _refuse_words(numbers, column, path)
-    return numbers
-
-
-def _refuse_words(numbers: pd.Series, column: pd.Series, path: Path) -> None:
-    strange = numbers.isna() & column.notna()
-    if strange.any():
-        row = int(np.flatnonzero(strange)[0])
-        raise FormatError(
-            f"{column.iloc[row]!r} is not a number", path=path, line=row + 2, element=f"column {column.name!r}"
-        )
 
 
 FIRST = b"esmini "
@@ -234,10 +200,7 @@ def is_esmini_log(path: Path) -> bool:
 def read_esmini_log(path: Path) -> pd.DataFrame:
     """Rows of all vehicles, one below the other: the columns of `_LOGGED`, and `time`.
 
-    Raises
-    ------
-    FormatError
-        A column is missing, or the table is damaged.
+    Raises `FormatError`: a column is missing, or the table is damaged.
     """
     import pandas as pd
 

@@ -48,18 +48,10 @@ def import_tracks(
     Raises `FormatError`: A missing column, or tracks that lie beside the road; `NotEnoughDataError` if nothing is left
     once lane changes are cut.
 
-    Parameters
-    ----------
-    source : path
-        CSV or Parquet table, one row per vehicle and instant; x and y are the vehicle's middle (or lie `rear` behind
-        it, where there is that column), in the road's coordinates. Or a log that esmini wrote (``--csv_logger``).
-    road : path
-        OpenDRIVE file.
-    columns : sequence of str
-        ``NAME=COLUMN[:UNIT]`` for `vehicle`, `time`, `x`, `y`, `heading`, `speed`, `length`,
-        `rear`, `vehicle_class`.
-    mapping : TableMapping, mapping of str to str, or path, optional
-        More of them, saved.
+    `source`: CSV or Parquet table, one row per vehicle and instant; x and y are the vehicle's middle (or lie `rear`
+    behind it, where there is that column), in the road's coordinates. Or a log that esmini wrote (``--csv_logger``).
+    `road`: OpenDRIVE file. `columns`: ``NAME=COLUMN[:UNIT]`` for `vehicle`, `time`, `x`, `y`, `heading`, `speed`,
+    `length`, `rear`, `vehicle_class`. `mapping`: more of them, saved.
     """
     network = read_opendrive(road)
     tracks = read_tracks(source, columns, mapping)
@@ -81,7 +73,6 @@ def import_tracks(
         keep_cut=keep_cut,
         format="tracks",
         sources=[source, Path(road)],
-        version="unknown",
         licence=LICENCE,
     )
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from xosc_lateral.formats.importers.road_from_tracks import ReferenceLine
 from xosc_lateral.formats.openscenario.write.build import decimal, sub
-from xosc_lateral.formats.own_files import template_mark
+from xosc_lateral.formats.output_paths import template_mark
 
 FloatArray = NDArray[np.float64]
 
@@ -29,18 +29,10 @@ SHOULDER = 3.0
 
 @dataclass(frozen=True, eq=False, slots=True)
 class WrittenLane:
-    """A lane: its type and width.
+    """A lane: its type and width."""
 
-    Parameters
-    ----------
-    kind : str
-        OpenDRIVE lane type.
-    width : array, shape (n, 5)
-        Start s [m] and the polynomial's a, b, c, d of each piece.
-    """
-
-    kind: str
-    width: FloatArray
+    kind: str  # OpenDRIVE lane type
+    width: FloatArray  # start s [m] and the polynomial's a, b, c, d of each piece, shape (n, 5)
 
     @classmethod
     def even(cls, kind: str, width: float) -> WrittenLane:
@@ -58,23 +50,15 @@ class WrittenLane:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class WrittenRoad:
-    """One road; lanes from the reference line outwards, the right ones driven along it.
-
-    Parameters
-    ----------
-    name : str
-    plan : array, shape (n, 5) or (n, 10)
-        Pieces: s, x, y [m], heading [rad], length [m]; and, of curves, aV .. dV behind bU .. dU: bU, cU, dU, cV, dV.
-    left, right : sequence of WrittenLane
-    origin : (float, float)
-        Of its coordinates in the recording's. [m]
-    """
+    """One road; lanes from the reference line outwards, the right ones driven along it."""
 
     name: str
+    # plan: pieces: s, x, y [m], heading [rad], length [m]; and, of curves, aV .. dV behind bU .. dU: bU, cU, dU,
+    # cV, dV, shape (n, 5) or (n, 10)
     plan: FloatArray
     left: Sequence[WrittenLane]
     right: Sequence[WrittenLane]
-    origin: tuple[float, float] = (0.0, 0.0)
+    origin: tuple[float, float] = (0.0, 0.0)  # of its coordinates in the recording's [m]
 
     def to_xml(self) -> str:
         """The document, the same bytes each time."""

@@ -54,17 +54,10 @@ COLOURS: Mapping[str, str] = {"standard": "WHITE"} | {
 
 @dataclass
 class RoadIds:
-    """Identifiers, unique in a trace: those of moving objects first, then lanes, then boundaries.
-
-    Parameters
-    ----------
-    network : RoadNetwork
-    first : int
-        The lowest that is free.
-    """
+    """Identifiers, unique in a trace: those of moving objects first, then lanes, then boundaries."""
 
     network: RoadNetwork
-    first: int
+    first: int  # the lowest that is free
     lanes: dict[Piece, int] = field(init=False)
     free: int = field(init=False)
 

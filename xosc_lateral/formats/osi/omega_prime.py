@@ -36,19 +36,7 @@ COLUMNS = ("total_nanos", "idx", *KINDS, *(name for names in PLACES.values() for
 class OmegaPrimeReader:
     """Its messages one by one, as the readers of traces give them.
 
-    Parameters
-    ----------
-    path : path
-
-    Attributes
-    ----------
-    opendrive : bytes or None
-        The road, where the file has it in this form.
-
-    Raises
-    ------
-    FormatError
-        Not such a file.
+    `opendrive`: the road, where the file has it in this form. Raises `FormatError`: not such a file.
     """
 
     def __init__(self, path: Path) -> None:

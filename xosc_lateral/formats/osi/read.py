@@ -36,27 +36,17 @@ COLUMNS = 12
 
 @dataclass
 class Recorded:
-    """A trace's vehicles, lanes and what a reader has to know.
+    """A trace's vehicles, lanes and what a reader has to know."""
 
-    Parameters
-    ----------
-    tracks : Tracks
-        x and y are those of the ground below the rear axle where the trace says where that is, else below the middle.
-    lanes, boundaries, logical_lanes, logical_boundaries : dict
-        Messages by identifier, as first said.
-    hosts : tuple of str
-        Names of all host vehicles.
-    numbers : dict of str to str
-        Name -> identifier.
-    """
-
+    # tracks: x and y are those of the ground below the rear axle where the trace says where that is, else below
+    # the middle
     tracks: Tracks
-    lanes: dict[int, Any]
+    lanes: dict[int, Any]  # lanes, boundaries, logical_lanes, logical_boundaries: messages by identifier, as first said
     boundaries: dict[int, Any]
     logical_lanes: dict[int, Any]
     logical_boundaries: dict[int, Any]
-    hosts: tuple[str, ...]
-    numbers: dict[str, str]
+    hosts: tuple[str, ...]  # names of all host vehicles
+    numbers: dict[str, str]  # name -> identifier
     notes: list[str]
     opendrive: bytes | None = None
 

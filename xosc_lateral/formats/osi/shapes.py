@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from xosc_lateral.formats.importers.lane_shapes import Strip, middle
 from xosc_lateral.formats.importers.placed import LaneGraph
-from xosc_lateral.formats.importers.strips import Strip, middle
 from xosc_lateral.formats.osi.extra import osi
 from xosc_lateral.formats.osi.read import Recorded
 
@@ -32,10 +32,7 @@ class _Lane:
 def lanes_of(recorded: Recorded) -> tuple[list[Strip], LaneGraph] | None:
     """Driving lanes with a boundary on both sides: logical lanes where there are any, else physical ones.
 
-    Returns
-    -------
-    (list of Strip, LaneGraph) or None
-        None: the trace has no such lane.
+    None: the trace has no such lane.
     """
     lanes = list(_logical(recorded)) or list(_physical(recorded))
     if not lanes:

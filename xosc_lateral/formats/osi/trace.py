@@ -20,18 +20,8 @@ class Trace:
 
     Raises `FormatError`: No trace, or none of ground truth; `XoscLateralError`: The extra `osi` is not installed.
 
-    Parameters
-    ----------
-    path : path
-    channel : str, optional
-        Topic of an MCAP file; without it the one that holds ground truth, else a sensor view.
-
-    Attributes
-    ----------
-    notes : list of str
-        Channels that are not read.
-    opendrive : bytes or None
-        The road, where the file has it as OpenDRIVE.
+    `channel`: topic of an MCAP file; without it the one that holds ground truth, else a sensor view. `notes`: channels
+    that are not read. `opendrive`: the road, where the file has it as OpenDRIVE.
     """
 
     def __init__(self, path: Path, channel: str | None = None) -> None:

@@ -11,7 +11,7 @@ from lxml import etree
 
 from xosc_lateral.formats.openscenario.write import build
 from xosc_lateral.formats.openscenario.write.build import Version, decimal, sub
-from xosc_lateral.formats.own_files import template_mark
+from xosc_lateral.formats.output_paths import template_mark
 from xosc_lateral.reconstruction.encounters import RelativeTrigger
 from xosc_lateral.reconstruction.plan import VehiclePlan
 from xosc_lateral.reconstruction.transitions import Transition, peak_acceleration
