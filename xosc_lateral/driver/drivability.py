@@ -83,7 +83,6 @@ class Bound:
     width: float
 
     def __str__(self) -> str:
-        """For a remark."""
         return (
             f"sampled movement could not be driven (lateral acceleration above {self.before.seldom:.2f} m/s2 for 0.1 % "
             f"of the time, at most {self.before.largest:.2f} m/s2, jerk at most {self.before.jerk:.1f} m/s3): smoothed "

@@ -47,7 +47,6 @@ class ShapedNoise(Record, frozen=True, eq=False, dict=True):
     taper: float = 0.0
 
     def __post_init__(self) -> None:
-        """Check, copy and freeze."""
         damping = frozen_array(self.damping)
         if damping.ndim != 1 or len(damping) < 2 or not np.isfinite(damping).all() or damping.min() < 0:
             raise DriverProfileError(f"fine noise: damping {damping.tolist()}, expected two or more values >= 0")

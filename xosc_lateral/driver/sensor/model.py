@@ -62,7 +62,6 @@ class SensorModel(Record, frozen=True):
     second_view: float = 0.0
 
     def __post_init__(self) -> None:
-        """Check."""
         levels = (self.white, self.coloured, self.rounding, self.second_view)
         parts = (*levels, self.driver_variance, self.sensor_variance)
         if not all(map(isfinite, parts)) or min(parts) < 0 or self.order < 0 or not self.corner > 0:

@@ -159,7 +159,6 @@ class Autoregression(Record, frozen=True, eq=False):
     scale: float
 
     def __post_init__(self) -> None:
-        """Check, copy and freeze."""
         coefficients = frozen_array(self.coefficients)
         if coefficients.ndim != 1 or not np.isfinite(coefficients).all() or not 0 <= self.scale < np.inf:
             raise DriverProfileError(f"autoregression: {coefficients.tolist()}, scale {self.scale}")

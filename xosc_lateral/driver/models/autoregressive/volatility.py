@@ -48,7 +48,6 @@ class Volatility(Record, frozen=True):
     slow: float = 0.0
 
     def __post_init__(self) -> None:
-        """Check."""
         numbers = (self.between, self.within, self.correlation_time, self.slow)
         if (
             not all(map(isfinite, numbers))
