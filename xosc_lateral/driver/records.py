@@ -12,6 +12,7 @@ from typing import Any, Self, TypeVar, get_args, get_origin
 import msgspec
 import numpy as np
 from msgspec import structs
+from numpy.typing import NDArray
 
 from xosc_lateral.errors import DriverProfileError
 
@@ -62,7 +63,7 @@ def set_once(record: msgspec.Struct, **values: object) -> None:
         structs.force_setattr(record, name, value)
 
 
-def frozen_array(values: object, dtype: type[np.generic] = np.float64) -> Any:
+def frozen_array(values: object, dtype: type[np.generic] = np.float64) -> NDArray[Any]:
     """A copy that nobody can write to, shape and unit [any] of the values."""
     array = np.array(values, dtype=dtype)
     array.flags.writeable = False
