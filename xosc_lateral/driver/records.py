@@ -40,16 +40,7 @@ def read_as(kind: type[T], values: object, where: str = "") -> T:
     """Back from `plain`.
 
     Raises `DriverProfileError` if a field is missing, unknown, of the wrong kind or out of its range; the message names
-    it and its path.
-
-    Parameters
-    ----------
-    kind : type
-        A struct, or a union or a tuple of structs.
-    values : object
-        Plain JSON values.
-    where : str
-        Path of the values in their file, for messages.
+    it and its path from `where` on. `kind` is a struct, or a union or a tuple of structs.
     """
     try:
         return msgspec.convert(values, kind, dec_hook=_decoded)

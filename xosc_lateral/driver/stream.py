@@ -90,7 +90,7 @@ class OffsetStream:
     """One driver on one drive, step by step.
 
     The offsets are those that `OffsetSampler.sample` gives for the same profile, seed and context, and, at a higher
-    rate, those that `upsample` makes of them. A driver with preview, and a curve between samples, need to know what
+    rate, the curve of `upsampling` between them. A driver with preview, and a curve between samples, need to know what
     comes: `step` is therefore given the context `preview` seconds ahead of the offset that it returns, and `look`
     the context before that. A bench that doesn't know the future gives `step` the present context without a `look`:
     then the driver responds to it `preview` seconds later; what is random is the same.
