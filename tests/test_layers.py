@@ -17,7 +17,7 @@ LAYERS = {
     "segment": 0,
     "limits": 0,
     "jit": 0,
-    "mask": 0,
+    "rows": 0,
     "normal": 0,
     "digits": 0,
     "road": 1,
