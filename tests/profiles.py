@@ -7,9 +7,17 @@ from functools import lru_cache
 import numpy as np
 
 from examples.driver_simulator.simulator import simulate_drive
+from xosc_lateral.driver.effects import Effect, any_effect
 from xosc_lateral.driver.fitting import fit_profile
 from xosc_lateral.driver.profile import DriverProfile
+from xosc_lateral.driver.records import read_as
 from xosc_lateral.drives.drive import Drive
+
+
+def effect_from_dict(values: dict[str, object]) -> Effect:
+    """One effect as a profile file holds it."""
+    effect: Effect = read_as(any_effect((str(values.get("kind")),)), values)
+    return effect
 
 
 def as_drive(table: object, name: str = "simulated") -> Drive:

@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from xosc_lateral.driver.effects import Product, effect_from_dict
+from tests.profiles import effect_from_dict
+from xosc_lateral.driver.effects import Product
 from xosc_lateral.driver.records import Record, kebab, plain, read_as
 from xosc_lateral.errors import DriverProfileError
 

@@ -11,8 +11,7 @@ from tests.driver.effects.made_effects import STEP, made
 from xosc_lateral.driver.effects import ColumnEffect, Linear, Product
 from xosc_lateral.driver.effects.product import Factor
 from xosc_lateral.driver.records import plain, read_as
-from xosc_lateral.driver.stream import ResponseStream
-from xosc_lateral.driver.stream_state import ResponseStreamState
+from xosc_lateral.driver.stream import ResponseStream, ResponseStreamState
 
 N = 120
 

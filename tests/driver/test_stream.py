@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from msgspec.structs import replace
 
+from tests.driver.upsampled import upsample
 from xosc_lateral.driver.effects import (
     EFFECTS,
     Acts,
@@ -30,7 +31,6 @@ from xosc_lateral.driver.models.two_level.fit import fit_two_level
 from xosc_lateral.driver.profile import DriverProfile
 from xosc_lateral.driver.sampling import sample_offsets
 from xosc_lateral.driver.stream import OffsetStream
-from xosc_lateral.driver.upsampling import upsample
 from xosc_lateral.errors import DriverProfileError
 from xosc_lateral.formats.profiles import read_profile
 from xosc_lateral.segment import Segment

@@ -11,8 +11,7 @@ from msgspec.structs import replace
 from tests.driver.models.made_models import POPULATION
 from xosc_lateral.driver.effects import Drift
 from xosc_lateral.driver.profile import DriverProfile
-from xosc_lateral.driver.stream import OffsetStream
-from xosc_lateral.driver.stream_state import FORMAT, VERSION, sealed, unsealed
+from xosc_lateral.driver.stream import FORMAT, VERSION, OffsetStream, sealed, unsealed
 from xosc_lateral.errors import DriverProfileError
 
 PROFILE = DriverProfile(name="own", model=POPULATION, effects=(Drift(size=0.1),))

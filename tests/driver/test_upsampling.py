@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from numpy.polynomial import Polynomial
 
-from xosc_lateral.driver.upsampling import extrapolate, piece, upsample
+from tests.driver.upsampled import upsample
+from xosc_lateral.driver.upsampling import extrapolate, piece
 
 SAMPLES = np.random.default_rng(1).normal(size=12)
 

@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 from tests.motion.made_motion import LANE_WIDTH, RADIUS, drive, entity, together, two_roads
-from xosc_lateral.driver.effects import ColumnEffect, effect_from_dict
+from tests.profiles import effect_from_dict
+from xosc_lateral.driver.effects import ColumnEffect
 from xosc_lateral.motion.context import NEAR, STEERING, entity_context
 from xosc_lateral.motion.nominal import EntityMotion, PlayedAction
 from xosc_lateral.road.network import RoadNetwork

@@ -56,22 +56,16 @@ FREE_RUN = 1200.0
 
 @dataclass(frozen=True, slots=True)
 class Strain:
-    """How hard a path is to drive.
-
-    Parameters
-    ----------
-    seldom : float
-        Lateral acceleration exceeded in 0.1 % of the time. [m/s2]
-    largest, jerk : float
-        Largest acceleration [m/s2] and jerk over half a second [m/s3].
-    excess : float
-        Largest of these over their bounds: above 1 it could not be driven. [-]
-    """
+    """How hard a path is to drive."""
 
     seldom: float
+    """Lateral acceleration exceeded in 0.1 % of the time. [m/s2]"""
     largest: float
+    """Largest acceleration. [m/s2]"""
     jerk: float
+    """Largest over half a second. [m/s3]"""
     excess: float
+    """Largest of these over their bounds: above 1 it could not be driven. [-]"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,7 +77,6 @@ class Bound:
     width: float
 
     def __str__(self) -> str:
-        """For a remark."""
         return (
             f"sampled movement could not be driven (lateral acceleration above {self.before.seldom:.2f} m/s2 for 0.1 % "
             f"of the time, at most {self.before.largest:.2f} m/s2, jerk at most {self.before.jerk:.1f} m/s3): smoothed "
@@ -104,33 +97,20 @@ def strain(offset: FloatArray, step: float, speed: FloatArray) -> Strain:
     """
     if len(offset) < 4:
         return Strain(0.0, 0.0, 0.0, 0.0)
-    acceleration = np.abs(np.diff(offset, 2)) / step**2
-    hardest = _hardest_jerk(offset, step)
+    signed = np.diff(offset, 2) / step**2
+    acceleration, span = np.abs(signed), max(1, round(JERK_WINDOW / step))
+    jerk = np.abs(signed[span:] - signed[:-span]) / (span * step) if len(signed) > span else np.zeros(1)
+    hardest = float(jerk.max())
     bound = comfort(speed)[1:-1]
     largest = float(acceleration.max())
     seldom, uncomfortable = np.quantile([acceleration, acceleration / bound], 1.0 - SELDOM, axis=1).tolist()
     return Strain(seldom, largest, hardest, max(uncomfortable, largest / LIMIT, hardest / JERK_LIMIT))
 
 
-def _hardest_jerk(offset: FloatArray, step: float) -> float:
-    """Largest change of the lateral acceleration over the window, per time. [m/s3]"""
-    span = max(1, round(JERK_WINDOW / step))
-    signed = np.diff(offset, 2) / step**2
-    jerk = np.abs(signed[span:] - signed[:-span]) / (span * step) if len(signed) > span else np.zeros(1)
-    return float(jerk.max())
-
-
 def drivable(offset: FloatArray, step: float, speed: FloatArray) -> tuple[FloatArray, Bound | None]:
     """The path, smoothed as little as it takes to be drivable; with the reason where it had to be.
 
-    Parameters
-    ----------
-    offset : array, shape (n,)
-        Positive left. [m]
-    step : float
-        [s]
-    speed : array, shape (n,)
-        [m/s]
+    `offset` [m] and `speed` [m/s] of shape (n,); `step` in [s].
     """
     before = strain(offset, step, speed)
     if before.excess <= 1.0:
@@ -144,14 +124,7 @@ def drivable(offset: FloatArray, step: float, speed: FloatArray) -> tuple[FloatA
 
 
 def fit_warnings(profile: DriverProfile, sensor_noise: float | None = None) -> list[str]:
-    """What to know about a profile's sensor and drivability, in lines.
-
-    Parameters
-    ----------
-    profile : DriverProfile
-    sensor_noise : float, optional
-        Standard deviation of the sensor's error that it was fitted with. [m]
-    """
+    """What to know about a profile's sensor (and its error, as far as it was given, [m]) and drivability, in lines."""
     return [*_beside_given(profile, sensor_noise), *_coarse_steps(profile), *_strained(profile)]
 
 

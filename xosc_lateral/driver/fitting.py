@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 import numpy as np
 from msgspec.structs import replace
@@ -46,12 +45,6 @@ def fit_profile(
 
     Parameters
     ----------
-    drives : sequence of Drive
-    name : str
-        Of the profile.
-    model : ModelKind or str
-    rules : CutRules
-        What is cut out.
     provenance : Provenance, optional
         What is known about the drives; hours, counts and fit settings are filled in.
     sensor_noise : float, optional
@@ -95,14 +88,7 @@ def fit_population(
 ) -> DriverProfile:
     """Fit a profile to the driver's part of runs: what class, lane, speed and neighbours do first, then the drivers.
 
-    Parameters
-    ----------
-    runs : sequence of Run
-        Without the sensor's part, see `driver_runs`.
-    sensor : SensorModel, optional
-        What was taken out; the profile keeps it.
-    neighbours : bool, optional
-        Whether also what vehicles beside them do; None: where they are known (`fit_place`).
+    Runs come without the sensor's part (`driver_runs`), which the profile keeps. For `neighbours` see `fit_profile`.
     """
     few = len({run.drive for run in runs}) < LEAST_DRIVES
     beside = measure_beside(runs)
@@ -140,7 +126,7 @@ def _fitted_on(runs: Sequence[Run], core: CoreModel, known: Provenance) -> Prove
         hours=round(seconds / 3600.0, 4),
         drives=len({run.drive for run in runs}),
         runs=len(runs),
-        fit={**known.fit, **_fit_notes(core)},
+        fit={**known.fit, "model": core.kind, "step_s": core.step},
         package_version=__version__,
     )
 
@@ -148,18 +134,8 @@ def _fitted_on(runs: Sequence[Run], core: CoreModel, known: Provenance) -> Prove
 def fit_core(
     rel_offsets: Sequence[FloatArray], drives: Sequence[str], *, model: ModelKind | str = ModelKind.AUTOREGRESSIVE
 ) -> CoreModel:
-    """Fit a core model to relative offsets, which may be what is left once effects were taken out.
+    """Fit a core model to relative offsets [-], one array of shape (n_i,) per run, evenly at 5 Hz, finite.
 
-    Parameters
-    ----------
-    rel_offsets : sequence of array, shape (n_i,)
-        One array per run, evenly at 5 Hz, finite. [-]
-    drives : sequence of str
-        For each run the drive that it comes from: runs of a drive are of one driver.
-    model : ModelKind or str
+    They may be what is left once effects were taken out. Runs of one of the `drives` are of one driver.
     """
     return model_named(model).fit(rel_offsets, drives)
-
-
-def _fit_notes(core: CoreModel) -> Mapping[str, Any]:
-    return {"model": core.kind, "step_s": core.step}

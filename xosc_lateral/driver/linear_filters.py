@@ -43,17 +43,8 @@ def recur(past: FloatArray, noise: FloatArray, coefficients: FloatArray) -> Floa
 
     (What `scipy.signal.lfilter` does too; importing that takes longer than a scenario.)
 
-    Parameters
-    ----------
-    past : array, shape (order,) or (order, paths)
-        Last values, oldest first.
-    noise : array, shape (n,) or (n, paths)
-    coefficients : array, shape (order,)
-
-    Returns
-    -------
-    array, shape (order + n,) or (order + n, paths)
-        The past and the new values.
+    From the past, shape (order,) or (order, paths), oldest first, and noise, shape (n,) or (n, paths), come both the
+    past and the new values, shape (order + n,) or (order + n, paths). [any unit]
     """
     order, paths = len(coefficients), noise.shape[1] if noise.ndim == 2 else 1
     if paths >= WORTH_VECTORISING and not worth_compiling(noise.size):
@@ -110,18 +101,8 @@ _convolve_compiled = JitKernel(_convolve_body).compiled
 def convolve(values: FloatArray, kernel: FloatArray) -> FloatArray:
     """Values seen through a symmetric kernel of odd length.
 
-    Every result is the same sum in the same order, however the values are cut into pieces.
-
-    Parameters
-    ----------
-    values : array, shape (n,) or (n, k)
-        [any unit]
-    kernel : array, shape (taps,)
-        [-]
-
-    Returns
-    -------
-    array, shape (n - taps + 1,) or (n - taps + 1, k)
+    Every result is the same sum in the same order, however the values are cut into pieces. Of shape (n,) or (n, k),
+    through `taps` of them they are of shape (n - taps + 1,) or (n - taps + 1, k). [any unit]
     """
     n = len(values) - len(kernel) + 1
     if values.size == len(values) and worth_compiling(n):

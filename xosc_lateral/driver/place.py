@@ -46,23 +46,15 @@ DIGITS = 6
 
 @dataclass(frozen=True, eq=False)
 class _Pieces:
-    """Snippets of all runs: one observation each.
-
-    Parameters
-    ----------
-    mean : array, shape (n,)
-        Of the offset. [m]
-    spread, fine : array, shape (n,)
-        Logarithms of the standard deviations of the slow and of the fast part. [-]
-    quantities : array, shape (n, k)
-        Mean of each quantity.
-    drive : array of int, shape (n,)
-    """
+    """Snippets of all runs: one observation each, shape (n,)."""
 
     mean: FloatArray
+    """Of the offset. [m]"""
     spread: FloatArray
+    """Logarithms of the standard deviations of the slow part and, `fine`, of the fast one. [-]"""
     fine: FloatArray
     quantities: FloatArray
+    """Mean of each quantity, shape (n, k)."""
     drive: NDArray[np.int64]
 
 
@@ -73,14 +65,9 @@ def fit_place(runs: Sequence[Run], *, neighbours: bool | None = None) -> tuple[C
     share [1]_. The slopes of all columns are shrunk together, by the share of their size that chance would not make
     (`_shrunk`): dropping the uncertain ones predicts other vehicles worse. Nothing is left where chance makes all.
 
-    Raises `NotEnoughDataError`: Neighbours are asked for (True), and there are too few drives, or too few that had any.
-
-    Parameters
-    ----------
-    runs : sequence of Run
-    neighbours : bool, optional
-        Whether also of the distances to vehicles in the neighbouring lanes, on the level (`neighbours`). None: of each
-        side on which `LEAST_DRIVES` drives had somebody; with fewer, chance would pass for an effect.
+    With `neighbours` also of the distances to vehicles in the neighbouring lanes, on the level. None: of each side on
+    which `LEAST_DRIVES` drives had somebody; with fewer, chance would pass for an effect. True raises
+    `NotEnoughDataError` where there are too few drives, or too few that had any.
 
     References
     ----------
@@ -93,9 +80,7 @@ def fit_place(runs: Sequence[Run], *, neighbours: bool | None = None) -> tuple[C
     beside = [] if neighbours is False else neighbour_shapes(runs, LEAST_DRIVES)
     if neighbours and not beside:
         raise NotEnoughDataError(_why_no_neighbours(runs, drives))
-    if drives < LEAST_DRIVES:
-        return ()
-    if not (shapes or beside):
+    if drives < LEAST_DRIVES or not (shapes or beside):
         return ()
     pieces = _pieces(runs, [*shapes, *beside])
     found = _effects([*shapes, *beside], Acts.LOCATION, pieces.mean, pieces)
@@ -117,9 +102,7 @@ def _why_no_neighbours(runs: Sequence[Run], drives: int) -> str:
 
 def without_place(runs: Sequence[Run], effects: Sequence[ColumnEffect]) -> list[Run]:
     """Runs as they would be with every column at its reference."""
-    if not effects:
-        return list(runs)
-    return [_at_reference(run, effects) for run in runs]
+    return [_at_reference(run, effects) for run in runs] if effects else list(runs)
 
 
 def _at_reference(run: Run, effects: Sequence[ColumnEffect]) -> Run:
@@ -159,19 +142,15 @@ def _quantity(effect: ColumnEffect, run: Run) -> FloatArray:
     return values[:, 1] - values[:, 2] if isinstance(effect, Piecewise) else values[:, 0]
 
 
-def _quantities(effects: Sequence[ColumnEffect], run: Run) -> FloatArray:
-    """Of all effects, shape (n, effects)."""
-    return np.stack([_quantity(effect, run) for effect in effects], axis=1) if effects else np.empty((len(run), 0))
-
-
 def _pieces(runs: Sequence[Run], shapes: Sequence[ColumnEffect]) -> _Pieces:
     size = round(PIECE / STEP)
     number = {name: k for k, name in enumerate(dict.fromkeys(run.drive for run in runs))}
     mean, spread, fine, rows, drive = [], [], [], [], []
     for run in runs:
         slow, fast = split_bands(run.offset, STEP)
-        quantities = _quantities(shapes, run)
-        for piece in _successive(len(run), size):
+        quantities = np.stack([_quantity(shape, run) for shape in shapes], axis=1)
+        for first in range(0, len(run) - size + 1, size):
+            piece = slice(first, first + size)
             mean.append(run.offset[piece].mean())
             spread.append(np.log(slow[piece].std() + 1e-6))
             fine.append(np.log(fast[piece].std() + 1e-6))
@@ -179,11 +158,6 @@ def _pieces(runs: Sequence[Run], shapes: Sequence[ColumnEffect]) -> _Pieces:
             drive.append(number[run.drive])
     quantities = np.array(rows).reshape(len(rows), len(shapes))
     return _Pieces(np.array(mean), np.array(spread), np.array(fine), quantities, np.array(drive, dtype=np.int64))
-
-
-def _successive(n: int, size: int) -> list[slice]:
-    """Whole pieces of so many rows, one after the other."""
-    return [slice(first, first + size) for first in range(0, n - size + 1, size)]
 
 
 def _effects(shapes: Sequence[ColumnEffect], acts: Acts, response: FloatArray, pieces: _Pieces) -> list[ColumnEffect]:

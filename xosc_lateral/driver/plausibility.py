@@ -28,20 +28,9 @@ TRIAL_SPEED = 30.0
 
 
 def check_offsets(offset: FloatArray, lane_width: FloatArray | float, who: str, time: FloatArray | None = None) -> None:
-    """Refuse offsets that leave lane and neighbouring lane, or are no numbers.
+    """Refuse offsets [m], shape (n,), that leave lane and neighbouring lane, or are no numbers.
 
-    Raises `DriverProfileError` with the first such offset.
-
-    Parameters
-    ----------
-    offset : array, shape (n,)
-        [m]
-    lane_width : array, shape (n,), or float
-        [m]
-    who : str
-        Begins the message: whose offsets these are.
-    time : array, shape (n,), optional
-        For the message. [s]
+    Raises `DriverProfileError` with the first such offset: `who` says whose it is, `time` [s] of shape (n,) when.
     """
     reach = OFFSET_LANES.value * np.maximum(lane_width, NARROW)
     far = np.flatnonzero(~(np.abs(offset) <= reach))  # also NaN

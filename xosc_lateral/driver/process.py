@@ -23,39 +23,25 @@ FloatArray = NDArray[np.float64]
 
 
 class DriveState(msgspec.Struct, kw_only=True):
-    """Where a drive is.
-
-    Parameters
-    ----------
-    begun_at : float, optional
-        Time of row 0 in the drive's clock; None before it is known. [s]
-    core : CoreModel.State, optional
-        None before the first offset.
-    hidden : list of HiddenEffect.State
-    terms : list of array or None
-        What the hidden effects do together at rows that were drawn and may still be asked for: the parts of
-        `EffectTerms`.
-    first, drawn : int
-        Rows of the drive that `terms` begins and ends at.
-    coarse, fine : array, shape (k,)
-        Core movement drawn ahead. [lane widths]
-    """
+    """Where a drive is."""
 
     begun_at: float | None = None
+    """Time of row 0 in the drive's clock; None before it is known. [s]"""
     core: Any = None
+    """`CoreModel.State`; None before the first offset."""
     hidden: list[Any]
+    """`HiddenEffect.State` of each."""
     terms: list[FloatArray | None] = msgspec.field(default_factory=lambda: [None] * len(EffectTerms().parts))
+    """`EffectTerms.parts` of all hidden effects at rows `first` to `drawn`, which may still be asked for."""
     first: int = 0
     drawn: int = 0
     coarse: FloatArray
+    """Core movement drawn ahead, as is `fine`, shape (k,). [lane widths]"""
     fine: FloatArray
 
 
 class Movement(NamedTuple):
-    """What is random of offsets at some rows, before effects act on it. [lane widths]
-
-    The mean that the coarse part moves about, coarse and fine part.
-    """
+    """What is random of offsets, before effects act: the mean that the coarse part moves about, both parts. [-]"""
 
     mean: FloatArray | float
     coarse: FloatArray
@@ -72,21 +58,15 @@ def offsets_of(movement: Movement, terms: EffectTerms, width: FloatArray) -> Flo
 
 
 class DriveProcess:
-    """One drive.
-
-    Parameters
-    ----------
-    profile : DriverProfile
-    seed : numpy.random.SeedSequence
-    ahead : int
-        Rows that what is random is drawn ahead by, to be quick with blocks of a single row; 0: none.
-    """
+    """One drive; what is random is drawn `ahead` by so many rows, to be quick with blocks of a single row."""
 
     def __init__(self, profile: DriverProfile, seed: np.random.SeedSequence, *, ahead: int = 0) -> None:
         self._model, self._seed = profile.model, seed
         self._ahead = self._core_ahead = ahead
-        _refuse_strangers(profile)
-        self._hidden = tuple(effect for effect in profile.effects if isinstance(effect, HiddenEffect))
+        for effect in profile.effects:
+            if not isinstance(effect, HiddenEffect | ColumnEffect):
+                raise TypeError(f"effect {effect!r} is made neither from HiddenEffect nor from ColumnEffect")
+        self.hidden = tuple(effect for effect in profile.effects if isinstance(effect, HiddenEffect))
         columned = [effect for effect in profile.effects if isinstance(effect, ColumnEffect)]
         self.columned = tuple(
             effect.of_one_driver(generator(seed, DriveSeed.SLOPES, index)) if any(effect.between_drivers) else effect
@@ -96,7 +76,7 @@ class DriveProcess:
         self.state = DriveState(
             hidden=[
                 effect.begin(generator(seed, DriveSeed.HIDDEN, index), profile.model.step)
-                for index, effect in enumerate(self._hidden)
+                for index, effect in enumerate(self.hidden)
             ],
             coarse=np.empty(0),
             fine=np.empty(0),
@@ -107,11 +87,6 @@ class DriveProcess:
     def has_begun(self) -> bool:
         """Whether offsets were taken."""
         return self._core is not None
-
-    @property
-    def hidden(self) -> tuple[HiddenEffect, ...]:
-        """The hidden effects."""
-        return self._hidden
 
     def begin_at(self, time: float) -> None:
         """Time of row 0 in the drive's clock; once. [s]"""
@@ -125,12 +100,9 @@ class DriveProcess:
     def hidden_terms(self, time: FloatArray) -> EffectTerms:
         """What the hidden effects do together at times of the drive, which begins at the first one ever asked for.
 
-        Parameters
-        ----------
-        time : array, shape (n,), n >= 1
-            At about the model's step, none earlier than the last one of an earlier call. [s]
+        `time` [s] of shape (n,), n >= 1, at about the model's step, none earlier than the last of an earlier call.
         """
-        if not self._hidden:
+        if not self.hidden:
             return EffectTerms()
         self.begin_at(float(time[0]))
         rows = np.round((time - (self.state.begun_at or 0.0)) / self._model.step).astype(np.int64)
@@ -138,7 +110,7 @@ class DriveProcess:
 
     def hidden_terms_at(self, rows: NDArray[np.int64]) -> EffectTerms:
         """The same at rows, counted in model steps from the drive's start; shape (n,), n >= 1."""
-        if not self._hidden:
+        if not self.hidden:
             return EffectTerms()
         state, low, high = self.state, int(rows[0]), int(rows[-1]) + 1
         if low < state.first:
@@ -160,7 +132,7 @@ class DriveProcess:
         state, step = self.state, self._model.step
         assert state.begun_at is not None
         time = state.begun_at + step * np.arange(state.drawn, until, dtype=np.float64)
-        new = combine([effect.advance(own, time, step) for effect, own in zip(self._hidden, state.hidden, strict=True)])
+        new = combine([effect.advance(own, time, step) for effect, own in zip(self.hidden, state.hidden, strict=True)])
         state.terms = [
             more if kept is None or more is None else np.concatenate([kept, more])
             for kept, more in zip(state.terms, new.parts, strict=True)
@@ -168,26 +140,9 @@ class DriveProcess:
         state.drawn = until
 
     def take(self, terms: EffectTerms, width: FloatArray, start: float | None = None) -> FloatArray:
-        """Next offsets.
+        """Next offsets, shape (n,), by what all effects do together there and the lane's width, shape (n,). [m]
 
-        Parameters
-        ----------
-        terms : EffectTerms
-            What all effects do together at these rows.
-        width : array, shape (n,)
-            Of the lane. [m]
-        start : float, optional
-            First offset [m]; of a drive that begins only.
-
-        Returns
-        -------
-        array, shape (n,)
-            [m]
-
-        Raises
-        ------
-        ValueError
-            If `start` is given in the middle of a drive.
+        Raises `ValueError` if the first offset `start` [m] is given in the middle of a drive.
         """
         if self._core is None:
             self._core = self._model.stream(child(self._seed, DriveSeed.CORE), _start(start, width, terms))
@@ -222,27 +177,17 @@ class DriveProcess:
     def restore(self, values: Any, where: str) -> None:
         """Go on from a state as plain JSON values.
 
-        Raises
-        ------
-        DriverProfileError
-            If it is none, or of a profile with other effects.
+        Raises `DriverProfileError` if it is none, or of a profile with other effects.
         """
         state = read_as(DriveState, values, where)
         state.hidden = [
             read_as(effect.State, own, f"{where}.hidden[{index}]")
-            for index, (effect, own) in enumerate(zip(self._hidden, state.hidden, strict=True))
+            for index, (effect, own) in enumerate(zip(self.hidden, state.hidden, strict=True))
         ]
         if state.core is not None:
             self._core = self._model.resume(read_as(self._model.State, state.core, f"{where}.core"))
             state.core = self._core.state
         self.state = state
-
-
-def _refuse_strangers(profile: DriverProfile) -> None:
-    """Only effects that can go on block by block."""
-    for effect in profile.effects:
-        if not isinstance(effect, HiddenEffect | ColumnEffect):
-            raise TypeError(f"effect {effect!r} is made neither from HiddenEffect nor from ColumnEffect")
 
 
 def combine(terms: Sequence[EffectTerms]) -> EffectTerms:

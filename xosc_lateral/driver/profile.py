@@ -37,14 +37,8 @@ class Basis(StrEnum):
 class Beside(Record, frozen=True):
     """What is known of a driver's answer to vehicles on one side.
 
-    Parameters
-    ----------
-    basis : Basis
-        `population`: measured on many drivers, pair by pair: `convert` spreads their gaps as that recording has them.
-    seconds : float
-        Driving with somebody within `SCALE` on that side. [s]
-    shift, error : float
-        Mean shift with somebody alongside, positive left, and its standard error. [m]
+    Of the basis `population` it was measured on many drivers, pair by pair: `convert` spreads their gaps as that
+    recording has them.
     """
 
     basis: Basis
@@ -58,28 +52,7 @@ POPULATION = {side: Beside(Basis.POPULATION) for side in SIDES}
 
 
 class Provenance(Record, frozen=True):
-    """Where a profile comes from.
-
-    Parameters
-    ----------
-    source : str
-        The drives in words.
-    licence : str
-        Of the drives, and what it asks of who passes the profile on.
-    hours : float
-        Driving that was fitted, after cutting. [h]
-    drives, runs : int
-        How many.
-    inputs : mapping of str to str
-        File name -> SHA-256 of every table.
-    fit : mapping
-        Model and settings of the fit.
-    evaluation : mapping
-        Results on held-out drives, if there are any.
-    package_version : str
-        That wrote it.
-    notes : str
-    """
+    """Where a profile comes from."""
 
     source: Annotated[str, Meta(description="The drives in words.")] = ""
     licence: Annotated[str, Meta(description="Of the drives.")] = ""
@@ -101,30 +74,20 @@ class Provenance(Record, frozen=True):
 
 
 class Metadata(Record, frozen=True):
-    """What a profile is of, to be searched by; all of it is optional.
-
-    Parameters
-    ----------
-    version : str
-        Of the profile itself, as its owners count: "2", "1.3".
-    driver, vehicle, road : str
-        Whom and what was measured, and where: "professional", "truck", "motorway".
-    country : str
-        ISO 3166-1 alpha-2: "DE".
-    date : str
-        When the drives were recorded, ISO 8601: "2026-05", "2026-05-03/2026-06-01".
-    licence : str
-        Of the profile.
-    tags : tuple of str
-    """
+    """What a profile is of, to be searched by; all of it is optional."""
 
     version: str = ""
+    """Of the profile itself, as its owners count: "2", "1.3"."""
     driver: str = ""
     vehicle: str = ""
     road: str = ""
+    """Whom and what was measured, and where: "professional", "truck", "motorway"."""
     country: str = ""
+    """ISO 3166-1 alpha-2: "DE"."""
     date: str = ""
+    """When the drives were recorded, ISO 8601: "2026-05", "2026-05-03/2026-06-01"."""
     licence: str = ""
+    """Of the profile."""
     tags: tuple[str, ...] = ()
 
 
@@ -138,7 +101,7 @@ MAX_LANE_WIDTH = 10.0
 
 
 class DriverProfile(Record, frozen=True):
-    """What it takes to sample offsets.
+    """What it takes to sample offsets. Raises `DriverProfileError` if it has no name or its lane width is no width.
 
     Parameters
     ----------
@@ -159,11 +122,6 @@ class DriverProfile(Record, frozen=True):
         Fitted on left-hand traffic. On a road of the other hand it is sampled as in a mirror.
     beside : mapping of str to Beside
         By side, "left" and "right": whether its answer to neighbours there is known, and how.
-
-    Raises
-    ------
-    DriverProfileError
-        If it has no name or its lane width is no width.
     """
 
     name: str = field(name="id")
@@ -177,7 +135,6 @@ class DriverProfile(Record, frozen=True):
     beside: Mapping[str, Beside] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        """Check."""
         if not self.name:
             raise DriverProfileError("a profile needs a name")
         if not 0 < self.lane_width <= MAX_LANE_WIDTH:
@@ -217,10 +174,8 @@ class DriverProfile(Record, frozen=True):
     def from_dict(cls, values: Mapping[str, Any]) -> DriverProfile:
         """Back from `to_dict`.
 
-        Raises
-        ------
-        DriverProfileError
-            If it is no profile, of another version, or contradicts itself; names the field and where it stands.
+        Raises `DriverProfileError` if it is no profile, of another version, or contradicts itself; names the field and
+        where it stands.
         """
         present = _checked(values)
         effects = present.get("effects")
@@ -248,11 +203,7 @@ def _checked(values: object) -> dict[str, Any]:
 def file_type(model: str, effects: frozenset[str]) -> type[DriverProfile]:
     """A profile's type with all models and effects spelt out, for reading and for the JSON Schema.
 
-    Parameters
-    ----------
-    model : str
-    effects : frozenset of str
-        Kinds in the file; plug-ins are searched when one is not of this package.
+    By their kinds in the file; plug-ins are searched when one is not of this package.
     """
     known: Any = tuple[any_effect(effects), ...]  # type: ignore[misc]  # known only now
     fields: list[Any] = [("model", any_model(model)), ("effects", known, ())]

@@ -12,6 +12,7 @@ from typing import Any, Self, TypeVar, get_args, get_origin
 import msgspec
 import numpy as np
 from msgspec import structs
+from numpy.typing import NDArray
 
 from xosc_lateral.errors import DriverProfileError
 
@@ -39,16 +40,7 @@ def read_as(kind: type[T], values: object, where: str = "") -> T:
     """Back from `plain`.
 
     Raises `DriverProfileError` if a field is missing, unknown, of the wrong kind or out of its range; the message names
-    it and its path.
-
-    Parameters
-    ----------
-    kind : type
-        A struct, or a union or a tuple of structs.
-    values : object
-        Plain JSON values.
-    where : str
-        Path of the values in their file, for messages.
+    it and its path from `where` on. `kind` is a struct, or a union or a tuple of structs.
     """
     try:
         return msgspec.convert(values, kind, dec_hook=_decoded)
@@ -62,7 +54,7 @@ def set_once(record: msgspec.Struct, **values: object) -> None:
         structs.force_setattr(record, name, value)
 
 
-def frozen_array(values: object, dtype: type[np.generic] = np.float64) -> Any:
+def frozen_array(values: object, dtype: type[np.generic] = np.float64) -> NDArray[Any]:
     """A copy that nobody can write to, shape and unit [any] of the values."""
     array = np.array(values, dtype=dtype)
     array.flags.writeable = False

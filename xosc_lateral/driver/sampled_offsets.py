@@ -99,27 +99,18 @@ def sample_free(
     lane_width: float | None = None,
     with_sensor: bool = False,
 ) -> Iterator[SampledOffsets]:
-    """One free run in even traffic: constant speed, no other context.
+    """One free run in even traffic: constant speed [m/s] for a duration [s], no other context.
 
-    Parameters
-    ----------
-    duration : float
-        [s]
-    speed : float
-        [m/s]
-    lane_width : float, optional
-        The profile's own where not given. [m]
+    In a lane of `lane_width`, or of the profile's own. [m]
     """
     if not 0 < duration < MAX_DURATION:
         raise ValueError(f"a free run of {duration} s, expected more than 0 and less than {MAX_DURATION:g} s")
-    n = round(duration / profile.model.step) + 1
-    time: FloatArray = profile.model.step * np.arange(n, dtype=np.float64)
     width = profile.lane_width if lane_width is None else lane_width
-    segment = Segment(time=time, lane_width=np.full(n, width), speed=np.full(n, speed))
+    segment = Segment.even(duration, profile.model.step, width, speed)
     own = child(np.random.SeedSequence(seed), 0)
     offset = sample_offsets(profile, segment, own)
     offset = offset + sensor_error(known_sensor(profile) if with_sensor else None, offset, STEP, own)
-    yield SampledOffsets(profile.name, 0, time, offset, None)
+    yield SampledOffsets(profile.name, 0, segment.time, offset, None)
 
 
 def known_sensor(profile: DriverProfile) -> SensorModel:

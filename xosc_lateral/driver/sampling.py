@@ -45,7 +45,7 @@ class OffsetSampler:
         self._process = DriveProcess(profile, own)
 
     def sample(self, segment: Segment, *, start: float | None = None, responses: Responses | None = None) -> FloatArray:
-        """Next offsets, one per row inside the segment.
+        """Next offsets from the lane centre, positive to the LEFT of travel, one per row inside the segment. [m]
 
         Raises `ValueError` if the segment has another step or lies before the last one, or `start` is given in the
         middle of a drive.
@@ -58,11 +58,6 @@ class OffsetSampler:
             Offset at the first row [m]; at the start of a drive only. Without it the drive starts as chance has it.
         responses : sequence of array or None, optional
             What `responses_to` gave for this profile and segment, where that was asked before.
-
-        Returns
-        -------
-        array, shape (n,)
-            From the lane centre, positive to the LEFT of travel. [m]
         """
         _check_step(segment, self.profile.model.step)
         width = segment.lane_width[segment.inside]

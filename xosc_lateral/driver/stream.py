@@ -6,19 +6,22 @@ the model (5 Hz), on that moment's context; a bench that runs faster gets the cu
 
 from __future__ import annotations
 
+import hashlib
+import json
 from collections import deque
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, Self
 
+import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
 from xosc_lateral.driver.effects import Acts, ColumnEffect, EffectTerms
+from xosc_lateral.driver.effects.response import ResponseState
 from xosc_lateral.driver.plausibility import check_context
 from xosc_lateral.driver.process import DriveProcess, combine
 from xosc_lateral.driver.profile import DriverProfile, sampling_hash
-from xosc_lateral.driver.records import plain, read_as
-from xosc_lateral.driver.stream_state import ResponseStreamState, SeedState, StreamState, sealed, unsealed
+from xosc_lateral.driver.records import Record, plain, read_as
 from xosc_lateral.driver.upsampling import extrapolate, piece
 from xosc_lateral.errors import DriverProfileError
 
@@ -31,11 +34,63 @@ _NEIGHBOURS = 2
 """Samples ahead that the curve between two samples needs. [-]"""
 
 
+FORMAT = "xosc-lateral offset stream"
+
+VERSION = 2
+"""Of the state's format."""
+
+
+class SeedState(Record, frozen=True):
+    """A seed sequence."""
+
+    entropy: int | Sequence[int] | None
+    spawn_key: tuple[int, ...]
+
+
+class ResponseStreamState(Record, frozen=True):
+    """The response to one effect's columns: where it is, rows that are ready, and how many of these are dropped."""
+
+    response: ResponseState
+    ready: tuple[tuple[float, ...], ...]
+    drop: int
+
+
+class StreamState(Record, frozen=True, kw_only=True):
+    """Where an `OffsetStream` is; `sampling_hash` says of which profile."""
+
+    profile: str
+    seed: SeedState
+    factor: int
+    """Steps per model step."""
+    start: float | None
+    time: float
+    known: tuple[str, ...] | None
+    """Context columns that count; None before the first context."""
+    widths: tuple[float, ...]
+    """Lane widths of rows ahead. [m]"""
+    recalled: int
+    """Rows before the drive."""
+    looked: int
+    """Steps looked ahead."""
+    row: int
+    """Next model step."""
+    phase: int
+    """Step within it."""
+    samples: tuple[float, ...]
+    """Model samples about the present piece. [m]"""
+    curve: tuple[float, ...]
+    """Its coefficients. [m]"""
+    responses: tuple[ResponseStreamState, ...] = msgspec.field(name="answers")
+    """Of the effects whose columns are known."""
+    process: Any
+    """`DriveState` as plain values."""
+
+
 class OffsetStream:
     """One driver on one drive, step by step.
 
     The offsets are those that `OffsetSampler.sample` gives for the same profile, seed and context, and, at a higher
-    rate, those that `upsample` makes of them. A driver with preview, and a curve between samples, need to know what
+    rate, the curve of `upsampling` between them. A driver with preview, and a curve between samples, need to know what
     comes: `step` is therefore given the context `preview` seconds ahead of the offset that it returns, and `look`
     the context before that. A bench that doesn't know the future gives `step` the present context without a `look`:
     then the driver responds to it `preview` seconds later; what is random is the same.
@@ -51,10 +106,7 @@ class OffsetStream:
     time : float
         Of the first offset in the drive's clock, for effects that depend on time. [s]
 
-    Raises
-    ------
-    ValueError
-        If the rate is no whole multiple of the model's.
+    Raises `ValueError` if the rate is no whole multiple of the model's.
 
     Examples
     --------
@@ -123,25 +175,17 @@ class OffsetStream:
         self._looked += 1
 
     def step(self, context: Mapping[str, float] | None = None) -> float:
-        """Next offset.
+        """Next offset from the lane centre, positive to the LEFT of travel. [m]
+
+        Raises `ValueError` if a name that the first context had is missing, a value is none that a road has (`limits`),
+        or `look` was called too few times. The stream is as it was then, and goes on with the next good context.
 
         Parameters
         ----------
         context : mapping of str to float, optional
-            Under DESIGN's names, among them `lane_width` [m] (the profile's where absent) and `speed` [m/s]; NaN:
-            there is none (no vehicle ahead). The names of the first call are those that count; a driver whose column
-            is not among them does not respond to it. Read once per model step.
-
-        Returns
-        -------
-        float
-            From the lane centre, positive to the LEFT of travel. [m]
-
-        Raises
-        ------
-        ValueError
-            If a name that the first context had is missing, a value is none that a road has (`limits`), or `look` was
-            called too few times. The stream is as it was then, and goes on with the next good context.
+            Among its names `lane_width` [m] (the profile's where absent) and `speed` [m/s]; NaN: there is none (no
+            vehicle ahead). The names of the first call are those that count; a driver whose column is not among them
+            does not respond to it. Read once per model step.
         """
         phase = self._phase
         if phase == 0:
@@ -221,11 +265,7 @@ class OffsetStream:
 
     def to_dict(self) -> dict[str, Any]:
         """The state as plain JSON values; `from_dict` goes on from it with the same profile."""
-        values: dict[str, Any] = plain(self._state())
-        return sealed(values)
-
-    def _state(self) -> StreamState:
-        return StreamState(
+        state = StreamState(
             profile=sampling_hash(self.profile),
             seed=SeedState(self._seed.entropy, tuple(self._seed.spawn_key)),
             factor=self._factor,
@@ -242,21 +282,13 @@ class OffsetStream:
             responses=tuple(response.state() for response in self._responses),
             process=self._process.state,
         )
+        return sealed(plain(state))
 
     @classmethod
     def from_dict(cls, profile: DriverProfile, state: Mapping[str, Any]) -> Self:
-        """A stream that goes on where the one that gave `state` was.
+        """A stream that goes on where the one that gave `state` by `to_dict` was.
 
-        Parameters
-        ----------
-        profile : DriverProfile
-        state : mapping
-            Of `to_dict`.
-
-        Raises
-        ------
-        DriverProfileError
-            If the state is none, damaged, of another version, or of another profile.
+        Raises `DriverProfileError` if the state is none, damaged, of another version, or of another profile.
         """
         try:
             return cls._restored(profile, state)
@@ -286,6 +318,36 @@ class OffsetStream:
         return stream
 
 
+def sealed(values: Mapping[str, Any]) -> dict[str, Any]:
+    """A state's plain values with format, version and the hash of all of it."""
+    state = {"format": FORMAT, "version": VERSION, **values}
+    return {**state, "sha256": _hash(state)}
+
+
+def _hash(state: Mapping[str, Any]) -> str:
+    """SHA-256 of a state, whatever the order and the layout of its JSON."""
+    return hashlib.sha256(json.dumps(state, sort_keys=True).encode()).hexdigest()
+
+
+def unsealed(state: Mapping[str, Any]) -> dict[str, Any]:
+    """A state's values without format and version.
+
+    Raises `DriverProfileError` if it is no state of a stream, of another version, or not what was written: nobody edits
+    a generator's state.
+    """
+    if not isinstance(state, Mapping) or state.get("format") != FORMAT:
+        raise DriverProfileError(f'not a state of an offset stream: "format" is not "{FORMAT}"')
+    if state.get("version") != VERSION:
+        raise DriverProfileError(
+            f"a state written by another version of xosc-lateral (format {state.get('version')!r}; this one reads "
+            f"{VERSION})"
+        )
+    written = {name: value for name, value in state.items() if name != "sha256"}
+    if state.get("sha256") != _hash(written):
+        raise DriverProfileError("the state of an offset stream is damaged: its sha256 is another")
+    return {name: value for name, value in written.items() if name not in ("format", "version")}
+
+
 def _steps_per_model_step(rate: float | None, step: float) -> int:
     factor = 1 if rate is None else round(rate * step)
     if rate is not None and (factor < 1 or abs(rate * step - factor) > 1e-9 * factor):
@@ -294,18 +356,14 @@ def _steps_per_model_step(rate: float | None, step: float) -> int:
 
 
 class ResponseStream:
-    """A driver's response to one effect's columns, row by row."""
+    """A driver's response to one effect's columns, row by row; `ahead` are the rows of its preview."""
 
     def __init__(self, effect: ColumnEffect, step: float) -> None:
         self.effect = effect
         self._response = effect.response_in_blocks(step)
+        self.ahead = self._response.ahead
         self._ready: deque[FloatArray] = deque()
         self._drop = 0
-
-    @property
-    def ahead(self) -> int:
-        """Rows of preview."""
-        return self._response.ahead
 
     def take(self, row: Mapping[str, FloatArray], *, before: bool) -> None:
         """One more row of context, each column of shape (1,); what responds to a row before the drive is not given."""

@@ -80,7 +80,6 @@ class Drive:
             raise ValueError(f"drive {self.name}: time does not increase")
 
     def __len__(self) -> int:
-        """Count of rows."""
         return len(self.time)
 
     @property
@@ -136,7 +135,6 @@ class Run:
         )
 
     def __len__(self) -> int:
-        """Count of rows."""
         return len(self.time)
 
     @property

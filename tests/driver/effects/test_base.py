@@ -7,7 +7,8 @@ import json
 import numpy as np
 import pytest
 
-from xosc_lateral.driver.effects import EFFECTS, Drift, Effect, EffectTerms, Step, effect_from_dict
+from tests.profiles import effect_from_dict
+from xosc_lateral.driver.effects import EFFECTS, Drift, Effect, EffectTerms, Step
 from xosc_lateral.driver.effects.base import step_of
 
 

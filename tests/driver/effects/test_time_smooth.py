@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from xosc_lateral.driver.effects import TimeSmooth, effect_from_dict
+from tests.profiles import effect_from_dict
+from xosc_lateral.driver.effects import TimeSmooth
 from xosc_lateral.errors import DriverProfileError
 
 RNG = np.random.default_rng(0)

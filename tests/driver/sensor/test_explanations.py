@@ -19,7 +19,7 @@ def best_of(data: Periodogram):  # type: ignore[no-untyped-def]
 def test_a_low_passed_sensor_needs_no_white_noise_and_its_corner_is_found(order: int, corner: float) -> None:
     frequency = np.geomspace(0.02, 1.5, 90)
     density = driver_density(frequency) + 0.02 * Colour(order, corner).shape(frequency)
-    found = best_of(Periodogram(frequency, density, np.full(90, 2000.0), 51.2))
+    found = best_of(Periodogram(frequency, density, np.full(90, 2000.0)))
     assert found.colour.order == order
     assert found.colour.alone
     assert found.colour.corner == pytest.approx(corner, rel=0.05)

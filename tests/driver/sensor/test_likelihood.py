@@ -26,7 +26,7 @@ def measured(colour: Colour | None = None, weight: float = 200.0) -> Periodogram
     density = driver_density(frequency) + WHITE
     if colour is not None:
         density = density + COLOURED * colour.shape(frequency)
-    return Periodogram(frequency, density, np.full(90, weight), 51.2)
+    return Periodogram(frequency, density, np.full(90, weight))
 
 
 @pytest.mark.parametrize("order", [1, 2, 4])
@@ -87,7 +87,7 @@ def test_how_a_driver_goes_on_below_the_noise_is_told_by_where_his_spectrum_turn
         shape = 1.0 / (at * (1.0 + (at / corner) ** 5) * (1.0 + at**2) ** 1.5)
         return shape * corner * WHITE  # half the noise's at the corner
 
-    data = Periodogram(frequency, true(frequency) + WHITE, np.full(90, 400.0), 51.2)
+    data = Periodogram(frequency, true(frequency) + WHITE, np.full(90, 400.0))
     found = solve(data, Colour(), np.zeros(90))
     fine = np.linspace(0.02, 2.5, 2000)
     accelerations = [float((fine**4 * one).sum()) for one in (density(found.knots, fine), true(fine))]

@@ -20,12 +20,19 @@ from xosc_lateral.driver.sensor.vehicle_bound import (
     STEEPEST_KNOWN,
     density,
     expected_log_density,
-    expected_state,
     interpolation,
     prior,
 )
 
 LOG = np.log(KNOTS)
+
+
+def expected_state() -> np.ndarray:
+    """The likeliest of the prior, up to its level: straight on where slopes are free."""
+    values, log = expected_log_density(KNOTS), np.log(KNOTS)
+    first = int(np.flatnonzero(0.5 * (log[1:] + log[:-1]) > np.log(FREE_BELOW))[0])
+    values[:first] = values[first] + (SLOPES @ values)[first] * (log[:first] - log[first])
+    return np.append(values, 0.0)
 
 
 def power_law(slope: float) -> np.ndarray:

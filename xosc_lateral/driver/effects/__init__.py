@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from functools import cache, reduce
 from operator import or_
 from typing import Any
@@ -23,7 +23,6 @@ from xosc_lateral.driver.effects.shapes import (
     Saturating,
     Threshold,
 )
-from xosc_lateral.driver.records import read_as
 from xosc_lateral.errors import DriverProfileError
 from xosc_lateral.plugins import defined_in, entry_points
 
@@ -38,10 +37,7 @@ ENTRY_POINTS = "xosc_lateral.effects"
 def known_effects() -> tuple[type[Effect], ...]:
     """Every effect that a profile may hold: those here, then those of installed plug-ins.
 
-    Raises
-    ------
-    DriverProfileError
-        If a plug-in offers something else than an effect, or one of a kind that is taken.
+    Raises `DriverProfileError` if a plug-in offers something else than an effect, or one of a kind that is taken.
     """
     found = list(EFFECTS)
     for entry in entry_points(group=ENTRY_POINTS):
@@ -61,23 +57,6 @@ def any_effect(kinds: Iterable[str] | None = None) -> Any:
     """
     here = {effect.kind for effect in EFFECTS}
     return reduce(or_, EFFECTS if kinds is not None and here.issuperset(kinds) else known_effects())
-
-
-def effect_from_dict(values: Mapping[str, Any]) -> Effect:
-    """Read one effect of a profile file.
-
-    Raises
-    ------
-    DriverProfileError
-        If its kind is unknown, a field is missing, unknown or out of range.
-    """
-    effect: Effect = read_as(any_effect((str(values.get("kind")),)), values)
-    return effect
-
-
-def missing_columns(effects: Iterable[Effect], context: Mapping[str, object]) -> tuple[str, ...]:
-    """Columns that the effects read and the context lacks: those effects do nothing."""
-    return tuple(sorted({column for effect in effects for column in effect.columns if column not in context}))
 
 
 __all__ = [
@@ -108,7 +87,5 @@ __all__ = [
     "TimeSmooth",
     "VarianceTrend",
     "any_effect",
-    "effect_from_dict",
     "known_effects",
-    "missing_columns",
 ]

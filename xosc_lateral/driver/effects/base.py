@@ -26,22 +26,13 @@ FloatArray = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False, slots=True)
 class EffectTerms:
-    """What effects do to the base movement, sample by sample. A term that is None changes nothing.
+    """What effects do to the base movement, sample by sample, shape (n,) each. A term that is None changes nothing.
 
     The offset of a profile with effects is, with m the base model's mean and kappa, phi its coarse and fine part [m]::
 
         offset = location + m + spread * (kappa(tau) - m) + fine * phi,    d tau / dt = rate
 
-    Parameters
-    ----------
-    location : array, shape (n,), optional
-        Added to the offset. [m]
-    spread : array, shape (n,), optional
-        Factor on the coarse movement about its mean, > 0. [-]
-    rate : array, shape (n,), optional
-        Rate of the coarse movement's mean reversion, > 0: 2 means that it restores twice as fast. [-]
-    fine : array, shape (n,), optional
-        Factor on the fine movement, > 0. [-]
+    `location` is in [m]; the others are factors > 0 [-]. A `rate` of 2 restores the mean twice as fast.
     """
 
     location: FloatArray | None = None
@@ -60,10 +51,7 @@ class EffectTerms:
 
 
 class Effect(Record, frozen=True, kw_only=True, tag_field="kind", tag=kebab):
-    """One effect, frozen; parameters and their uncertainty are its fields.
-
-    `ColumnEffect` and `HiddenEffect` are what effects are made from.
-    """
+    """One effect, frozen: a `ColumnEffect` or a `HiddenEffect`; parameters and their uncertainty are its fields."""
 
     kind: ClassVar[str]
     """Name in the profile file: the class's, in lower case with hyphens."""
@@ -80,16 +68,9 @@ class Effect(Record, frozen=True, kw_only=True, tag_field="kind", tag=kebab):
 
     @abstractmethod
     def terms(self, time: FloatArray, context: Mapping[str, FloatArray], rng: np.random.Generator) -> EffectTerms:
-        """Evaluate on a whole drive.
+        """Evaluate on a whole drive: even grid [s] and context columns, each in its own unit (NaN: none), shape (n,).
 
-        Parameters
-        ----------
-        time : array, shape (n,)
-            Even grid. [s]
-        context : mapping of str to array, shape (n,)
-            Each column in its own unit; NaN: there is none.
-        rng : numpy.random.Generator
-            For hidden effects only.
+        `rng` is for hidden effects only.
         """
         raise NotImplementedError
 
@@ -107,9 +88,7 @@ def step_of(time: FloatArray) -> float:
 FACTOR_LIMIT = 5.0
 """A factor on spread, rate of mean reversion or fine noise stays within 1/5..5: beyond the fitted range
 of its column a log-linear effect would run away. [-]"""
-
 LOG_LIMIT = float(np.log(FACTOR_LIMIT))
-"""[-]"""
 
 
 class Acts(StrEnum):

@@ -15,7 +15,7 @@ from abc import abstractmethod
 from collections.abc import Iterable, Mapping
 from functools import reduce
 from operator import add
-from typing import Any, Self
+from typing import Any, ClassVar, Self
 
 import msgspec
 import numpy as np
@@ -30,7 +30,6 @@ from xosc_lateral.segment import FADES
 
 FloatArray = NDArray[np.float64]
 
-
 MAX_ORDER = 9
 """More lags in a row are a delay. [-]"""
 
@@ -38,7 +37,9 @@ MAX_ORDER = 9
 class ColumnEffect(Effect, frozen=True, kw_only=True):
     """A dependence on context columns: strength = coefficients . (respond(quantity) - reference).
 
-    A new one names its columns, its `shape` and its `quantity`.
+    A new one names its columns, its `shape` and its `quantity`. A table without one of the columns leaves the movement
+    unchanged. Raises `DriverProfileError` if the lengths disagree, a number is not finite, the response time or a
+    deviation is negative, or the order is not 1 to 9.
 
     Parameters
     ----------
@@ -60,17 +61,10 @@ class ColumnEffect(Effect, frozen=True, kw_only=True):
     response_range : tuple of (float, float)
         Lowest and highest response, per component, that the effect was fitted on; responses beyond are taken as these.
         Empty: no bounds. [unit of the quantity]
-
-    Raises
-    ------
-    DriverProfileError
-        If the lengths disagree, a number is not finite, the response time or a deviation is negative, or the order is
-        not 1 to 9.
-
-    Notes
-    -----
-    A table without one of the columns leaves the movement unchanged; `EffectTerms` is then empty.
     """
+
+    words: ClassVar[str] = ""
+    """For the report, fields of the effect in braces: "linear", "proximity (fades over {0.scale:.3g})" ..."""
 
     acts: Acts
     coefficients: tuple[float, ...] = ()
@@ -83,7 +77,6 @@ class ColumnEffect(Effect, frozen=True, kw_only=True):
     response_order: int = 1
 
     def __post_init__(self) -> None:
-        """Coerce and validate once."""
         tuples = ("coefficients", "errors", "reference", "between_drivers")
         set_once(self, acts=Acts(self.acts), **{name: tuple(map(float, getattr(self, name))) for name in tuples})
         numbers = (*self.coefficients, *self.errors, *self.reference, self.lag_s, self.response_s)
@@ -123,31 +116,20 @@ class ColumnEffect(Effect, frozen=True, kw_only=True):
         return False
 
     @property
-    @abstractmethod
     def shape(self) -> str:
         """Word for the report: linear, threshold, saturating, product, levels, angular ..."""
+        return self.words.format(self)
 
     @abstractmethod
     def quantity(self, context: Mapping[str, FloatArray]) -> FloatArray:
-        """Driving quantity before the response.
+        """Driving quantity before the response, shape (n, k), in the unit that coefficients are per; NaN: no effect.
 
-        Parameters
-        ----------
-        context : mapping of str to array, shape (n,)
-            Each column in its own unit; NaN: there is none. Infinite only where it `levels_off`.
-
-        Returns
-        -------
-        array, shape (n, k)
-            In the unit that the coefficients are per; NaN where "there is none", which has no effect.
+        Context columns of shape (n,) are in their own units; NaN: there is none. Infinite only where it `levels_off`.
         """
 
     @classmethod
     def proposals(cls, column: str, values: FloatArray) -> Iterable[Self]:
-        """Effects without coefficients that `close-loop` tries on a column with these values, shape (n,); none.
-
-        The effects of this package are proposed by the loop itself; those of plug-ins say here what is worth a try.
-        """
+        """Effects of a plug-in without coefficients that `close-loop` tries on a column of these values, shape (n,)."""
         return ()
 
     def seen(self, context: Mapping[str, FloatArray]) -> FloatArray:

@@ -31,10 +31,7 @@ class NoState(msgspec.Struct):
 
 
 class HiddenEffect(Effect, frozen=True, kw_only=True):
-    """An effect of time or of chance alone; its fields are finite numbers.
-
-    A new one says how its state begins and goes on; a plain function of time needs
-    nothing but `advance`.
+    """An effect of time or of chance alone; a plain function of time needs nothing but `advance`.
 
     Raises `DriverProfileError` if a field is not finite, or one in `positive` is not above 0.
     """
@@ -46,7 +43,6 @@ class HiddenEffect(Effect, frozen=True, kw_only=True):
     """Type of the state: a msgspec struct of numbers, arrays and generators."""
 
     def __post_init__(self) -> None:
-        """Validate once."""
         for name in self.__struct_fields__:
             value = float(getattr(self, name))
             set_once(self, **{name: value})
@@ -64,16 +60,9 @@ class HiddenEffect(Effect, frozen=True, kw_only=True):
 
     @abstractmethod
     def advance(self, state: Any, time: FloatArray, step: float) -> EffectTerms:
-        """Terms at the next rows of an even grid, which go on where those of the last call ended.
+        """Terms at the next rows of an even grid, which go on where those of the last call ended; so does `state`.
 
-        Parameters
-        ----------
-        state : State
-            Goes on.
-        time : array, shape (n,), n >= 1
-            In the drive's clock. [s]
-        step : float
-            Of the grid. [s]
+        `time` in the drive's clock, shape (n,), n >= 1, and `step` of the grid in [s].
         """
 
     def terms(self, time: FloatArray, context: Mapping[str, FloatArray], rng: np.random.Generator) -> EffectTerms:
@@ -85,14 +74,9 @@ class HiddenEffect(Effect, frozen=True, kw_only=True):
 
 
 class Adapted(HiddenEffect, frozen=True, kw_only=True):
-    """What makes another driver of a profile's (`driver.derive`).
+    """What makes another driver of a profile's (`pipeline.derive`).
 
-    Parameters
-    ----------
-    shift : float
-        Of the mean offset, positive left. [m]
-    spread, rate, fine : float
-        Factors on the coarse movement, on its rate and on the fine movement, as of `EffectTerms`; 1/5 to 5. [-]
+    `shift` of the mean offset, positive left [m]; factors of `EffectTerms`, 1/5 to 5 [-].
     """
 
     positive: ClassVar[tuple[str, ...]] = ("spread", "rate", "fine")
@@ -102,7 +86,6 @@ class Adapted(HiddenEffect, frozen=True, kw_only=True):
     fine: float = 1.0
 
     def __post_init__(self) -> None:
-        """Check the factors' range."""
         super().__post_init__()
         for name in self.positive:
             if not 1.0 / FACTOR_LIMIT <= getattr(self, name) <= FACTOR_LIMIT:
@@ -126,18 +109,9 @@ class PopulationState(msgspec.Struct):
 
 
 class Population(HiddenEffect, frozen=True, kw_only=True):
-    """A driver is drawn for every run: a shift, normal, and a factor on the spread, log-normal.
+    """A driver is drawn for every run: a shift, normal, and factors on spread and fine noise, log-normal.
 
-    Parameters
-    ----------
-    shift : float
-        Standard deviation of the drivers' mean offsets. [m]
-    shift_error : float
-        Standard error. [m]
-    log_spread : float
-        Standard deviation of the logarithm of the drivers' spreads. [-]
-    log_fine : float
-        The same of the fine noise. [-]
+    Fields are standard deviations: of the drivers' mean offsets, with its standard error [m], and of logarithms [-].
     """
 
     shift: float
@@ -148,7 +122,7 @@ class Population(HiddenEffect, frozen=True, kw_only=True):
     State: ClassVar[type[msgspec.Struct]] = PopulationState
 
     def begin(self, rng: np.random.Generator, step: float) -> PopulationState:
-        """Draw a driver; terms have shape (n,). `step` in [s]."""
+        """Draw a driver. `step` in [s]."""
         shift, spread, fine = rng.normal(size=3) * (self.shift, self.log_spread, self.log_fine)
         return PopulationState(float(shift), float(np.exp(spread)), float(np.exp(fine)))
 
@@ -159,18 +133,9 @@ class Population(HiddenEffect, frozen=True, kw_only=True):
 
 
 class Step(HiddenEffect, frozen=True, kw_only=True):
-    """The mean offset jumps once.
+    """The mean offset jumps once, by `size` (positive: to the left) with a standard error [m], at `at_s` [s].
 
-    Parameters
-    ----------
-    size : float
-        Positive: to the left. [m]
-    size_error : float
-        Standard error. [m]
-    at_s : float
-        When, in the drive's clock. [s]
-    share_before : float
-        Share of the fitted drive before the jump: the mean over the drive stays unchanged. [-]
+    `share_before` of the fitted drive [-] was before the jump: the mean over the drive stays unchanged.
     """
 
     size: float
@@ -187,16 +152,7 @@ class Step(HiddenEffect, frozen=True, kw_only=True):
 class VarianceTrend(HiddenEffect, frozen=True, kw_only=True):
     """Spread and fine noise change steadily with time on the road; outside the fitted time the outermost value holds.
 
-    Parameters
-    ----------
-    factor : float
-        Spread at `to_s` over spread at `from_s`, > 0. [-]
-    factor_error : float
-        Standard error. [-]
-    fine_factor : float
-        The same for the fine noise. [-]
-    from_s, to_s : float
-        Time that it was fitted on, in the drive's clock. [s]
+    By factors > 0 [-] from the beginning to the end of the time that they were fitted on, `from_s` to `to_s` [s].
     """
 
     positive: ClassVar[tuple[str, ...]] = ("factor", "fine_factor")
@@ -235,7 +191,6 @@ class TimeSmooth(HiddenEffect, frozen=True, kw_only=True):
     to_s: float = 3600.0
 
     def __post_init__(self) -> None:
-        """Validate once."""
         names = ("location", "location_errors", "spread", "spread_errors", "fine")
         values = {name: tuple(map(float, getattr(self, name))) for name in names}
         set_once(self, from_s=float(self.from_s), to_s=float(self.to_s), **values)

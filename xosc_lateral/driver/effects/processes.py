@@ -33,17 +33,7 @@ class DriftState(msgspec.Struct):
 
 
 class Drift(HiddenEffect, frozen=True, kw_only=True):
-    """Ornstein-Uhlenbeck process of the mean offset.
-
-    Parameters
-    ----------
-    size : float
-        Standard deviation. [m]
-    size_error : float
-        Its standard error. [m]
-    correlation_s : float
-        Correlation time. [s]
-    """
+    """Ornstein-Uhlenbeck process of the mean offset: standard deviation and its error [m], correlation time [s]."""
 
     positive: ClassVar[tuple[str, ...]] = ("size", "correlation_s")
     size: float
@@ -53,7 +43,7 @@ class Drift(HiddenEffect, frozen=True, kw_only=True):
     State: ClassVar[type[msgspec.Struct]] = DriftState
 
     def begin(self, rng: np.random.Generator, step: float) -> DriftState:
-        """Stationary from the start; terms have shape (n,). `step` in [s]."""
+        """Stationary from the start. `step` in [s]."""
         return DriftState(rng)
 
     def advance(self, state: DriftState, time: FloatArray, step: float) -> EffectTerms:
@@ -79,18 +69,9 @@ class CycleState(msgspec.Struct):
 
 
 class Cycle(HiddenEffect, frozen=True, kw_only=True):
-    """A sine of constant amplitude whose phase starts anywhere and drifts.
+    """A sine of constant amplitude [m] and period [s] whose phase starts anywhere and drifts.
 
-    Parameters
-    ----------
-    amplitude : float
-        [m]
-    amplitude_error : float
-        Standard error. [m]
-    period_s : float
-        [s]
-    coherence_s : float
-        Time after which the phase has drifted by one radian (standard deviation). [s]
+    After `coherence_s` it has drifted by one radian (standard deviation). [s]
     """
 
     positive: ClassVar[tuple[str, ...]] = ("amplitude", "period_s", "coherence_s")
@@ -102,7 +83,7 @@ class Cycle(HiddenEffect, frozen=True, kw_only=True):
     State: ClassVar[type[msgspec.Struct]] = CycleState
 
     def begin(self, rng: np.random.Generator, step: float) -> CycleState:
-        """Any phase; terms have shape (n,). `step` in [s]."""
+        """Any phase. `step` in [s]."""
         return CycleState(rng, float(rng.random()))
 
     def advance(self, state: CycleState, time: FloatArray, step: float) -> EffectTerms:
@@ -126,18 +107,9 @@ class RegimesState(msgspec.Struct):
 
 
 class Regimes(HiddenEffect, frozen=True, kw_only=True):
-    """A two-state Markov process multiplies the spread while it is on.
+    """A two-state Markov process multiplies spread and fine noise while it is on.
 
-    Parameters
-    ----------
-    factor : float
-        Spread in the on regime over spread in the off regime. [-]
-    factor_error : float
-        Standard error. [-]
-    fine_factor : float
-        The same for the fine noise. [-]
-    on_s, off_s : float
-        Mean length of either regime. [s]
+    Factors are those of the on regime over the off regime [-]; `on_s` and `off_s` are the regimes' mean lengths [s].
     """
 
     positive: ClassVar[tuple[str, ...]] = ("factor", "fine_factor", "on_s", "off_s")
@@ -150,7 +122,7 @@ class Regimes(HiddenEffect, frozen=True, kw_only=True):
     State: ClassVar[type[msgspec.Struct]] = RegimesState
 
     def begin(self, rng: np.random.Generator, step: float) -> RegimesState:
-        """The first regime is drawn from the long-run share; terms have shape (n,). `step` in [s]."""
+        """The first regime is drawn from the long-run share. `step` in [s]."""
         on = bool(rng.random() < self.on_s / (self.on_s + self.off_s))
         return RegimesState(rng, on, self._length(rng, on))
 

@@ -33,17 +33,10 @@ class Form(StrEnum):
 
 
 class Factor(Record, frozen=True, kw_only=True):
-    """One of the two.
+    """One of the two: a context column, and how it enters.
 
-    Parameters
-    ----------
-    column : str
-        Context column.
-    form : Form
-        How it enters.
-    at : float
-        Full circle for sine and cosine, the level for equals, the scale for nearness and proximity, the centre (where
-        the other column does nothing) for value; unused otherwise.
+    `at` is the full circle for sine and cosine, the level for equals, the scale for nearness and proximity, the centre
+    (where the other column does nothing) for value; in the column's unit.
     """
 
     column: str

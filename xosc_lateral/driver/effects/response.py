@@ -19,22 +19,16 @@ FloatArray = NDArray[np.float64]
 
 
 class ResponseState(msgspec.Struct):
-    """Where a response is.
-
-    Parameters
-    ----------
-    held : array, shape (m, k), optional
-        Last rows of the quantity, as far back as they are still needed.
-    taken, given : int
-        Rows of the quantity seen, and of the response given.
-    settled : array, shape (order * k,), optional
-        Last response of each first-order lag.
-    """
+    """Where a response is."""
 
     held: FloatArray | None = None
+    """Last rows of the quantity, as far back as they are still needed, shape (m, k)."""
     taken: int = 0
+    """Rows of the quantity seen."""
     given: int = 0
+    """Rows of the response given."""
     settled: FloatArray | None = None
+    """Last response of each first-order lag, shape (order * k,)."""
 
 
 class Response:
@@ -158,21 +152,7 @@ class Response:
 
 
 def respond(values: FloatArray, step: float, lag_s: float, response_s: float, *, order: int = 1) -> FloatArray:
-    """Response to a whole drive; see `Response`.
-
-    Parameters
-    ----------
-    values : array, shape (n,) or (n, k)
-        Finite, on an even time grid. [any unit]
-    step, lag_s, response_s : float
-        [s]
-    order : int
-
-    Returns
-    -------
-    array, shape of `values`
-        In the same unit.
-    """
+    """Response to a whole drive's finite values, even in time, shape (n,) or (n, k), in their unit; see `Response`."""
     values = np.asarray(values, dtype=np.float64)
     if not len(values):
         return values.copy()
@@ -183,11 +163,7 @@ def respond(values: FloatArray, step: float, lag_s: float, response_s: float, *,
 def split_shift(steps: float) -> tuple[int, float]:
     """Row i of a series delayed by `steps` is ``(1 - share) * values[i + whole] + share * values[i + whole + 1]``.
 
-    Returns
-    -------
-    whole : int
-    share : float
-        In [0, 1), the same for every row: rounding does not grow along the drive.
+    Gives `whole`, and `share` in [0, 1), the same for every row: rounding does not grow along the drive.
     """
     whole = math.floor(-steps)
     return whole, -steps - whole

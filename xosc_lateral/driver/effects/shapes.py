@@ -1,4 +1,4 @@
-"""Effects of one context column: how strength follows from its value.
+"""Effects of one context column: how strength follows from its value; NaN ("there is none") changes nothing.
 
 References
 ----------
@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from itertools import pairwise
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,82 +19,67 @@ from xosc_lateral.driver.effects.column import ColumnEffect
 from xosc_lateral.driver.records import set_once
 from xosc_lateral.errors import DriverProfileError
 
+FloatArray = NDArray[np.float64]
+
 
 class SingleColumnEffect(ColumnEffect, frozen=True, kw_only=True):
-    """An effect of one column.
+    """An effect of one column. Raises `DriverProfileError` if a field in `positive` is not above 0."""
 
-    Parameters
-    ----------
-    column : str
-        Its name among the context columns.
-    """
+    positive: ClassVar[tuple[str, ...]] = ()
 
     column: str
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        for name in self.positive:
+            if not getattr(self, name) > 0:
+                raise DriverProfileError(
+                    f"effect {self.kind} of {self.column}: {name} {getattr(self, name)} must be above 0"
+                )
 
     @property
     def columns(self) -> tuple[str, ...]:
         """The one column."""
         return (self.column,)
 
-
-FloatArray = NDArray[np.float64]
+    def values(self, context: Mapping[str, FloatArray]) -> FloatArray:
+        """The column, shape (n,). [its own unit]"""
+        return np.asarray(context[self.column], dtype=np.float64)
 
 
 class Linear(SingleColumnEffect, frozen=True, kw_only=True):
-    """As much as the column says; where it is NaN ("there is none"), nothing changes."""
+    """As much as the column says."""
 
-    @property
-    def shape(self) -> str:
-        """Word for the report."""
-        return "linear"
+    words: ClassVar[str] = "linear"
 
     def quantity(self, context: Mapping[str, FloatArray]) -> FloatArray:
         """The column, shape (n, 1). [its own unit]"""
-        return np.asarray(context[self.column], dtype=np.float64)[:, None]
+        return self.values(context)[:, None]
 
 
 class Magnitude(SingleColumnEffect, frozen=True, kw_only=True):
-    """|column|: to the left as to the right; where it is NaN ("there is none"), nothing changes."""
+    """|column|: to the left as to the right."""
 
-    @property
-    def shape(self) -> str:
-        """Word for the report."""
-        return "linear in its size, to either side alike"
+    words: ClassVar[str] = "linear in its size, to either side alike"
 
     def quantity(self, context: Mapping[str, FloatArray]) -> FloatArray:
         """Size of the column, shape (n, 1), >= 0. [its own unit]"""
-        return np.abs(np.asarray(context[self.column], dtype=np.float64))[:, None]
+        return np.abs(self.values(context))[:, None]
 
 
 class Saturating(SingleColumnEffect, frozen=True, kw_only=True):
-    """tanh((column - middle) / scale).
+    """tanh((column - middle) / scale), scale > 0 [both in the column's unit]; infinity is the far end of the curve."""
 
-    Parameters
-    ----------
-    column : str
-        Where it is NaN ("there is none"), nothing changes; infinity is the far end of the curve.
-    middle, scale : float
-        scale > 0. [unit of the column]
-    """
+    words: ClassVar[str] = "saturating (beyond {0.middle:.4g} +- {0.scale:.3g})"
+    positive: ClassVar[tuple[str, ...]] = ("scale",)
 
     middle: float
     scale: float
-
-    def __post_init__(self) -> None:
-        """Refuse a scale that is not positive."""
-        super().__post_init__()
-        if not self.scale > 0:
-            raise DriverProfileError(f"effect saturating of {self.column}: scale {self.scale} must be above 0")
 
     @property
     def levels_off(self) -> bool:
         """At both ends."""
         return True
-
-    @property
-    def shape(self) -> str:
-        """Word for the report."""
-        return f"saturating (beyond {self.middle:.4g} +- {self.scale:.3g})"
 
     def quantity(self, context: Mapping[str, FloatArray]) -> FloatArray:
         """Between -1 and 1, shape (n, 1). [-]"""
@@ -101,12 +87,10 @@ class Saturating(SingleColumnEffect, frozen=True, kw_only=True):
 
 
 class Threshold(SingleColumnEffect, frozen=True, kw_only=True):
-    """Acts beyond a limit only.
+    """Acts beyond a limit only; NaN counts as on the side that does not act.
 
     Parameters
     ----------
-    column : str
-        Where it is NaN ("there is none"), it counts as on the side that does not act.
     at : float
         The limit. [unit of the column]
     above : bool
@@ -137,20 +121,14 @@ class Threshold(SingleColumnEffect, frozen=True, kw_only=True):
 
 
 class Piecewise(SingleColumnEffect, frozen=True, kw_only=True):
-    """The first coefficient is the slope up to the first knot, each further one the change of slope at a knot.
+    """A polygon over the column, straight on beyond the outermost of its increasing knots [unit of the column].
 
-    Parameters
-    ----------
-    column : str
-        Where it is NaN ("there is none"), nothing changes.
-    knots : tuple of float
-        Increasing. [unit of the column]
+    The first coefficient is the slope up to the first knot, each further one the change of slope at a knot.
     """
 
     knots: tuple[float, ...]
 
     def __post_init__(self) -> None:
-        """Refuse knots that don't increase."""
         super().__post_init__()
         set_once(self, knots=tuple(float(knot) for knot in self.knots))
         if not self.knots or not all(low < high for low, high in pairwise(self.knots)):
@@ -163,26 +141,17 @@ class Piecewise(SingleColumnEffect, frozen=True, kw_only=True):
 
     def quantity(self, context: Mapping[str, FloatArray]) -> FloatArray:
         """The column, and how far it is beyond each knot, shape (n, number of knots + 1). [the column's unit]"""
-        values = np.asarray(context[self.column], dtype=np.float64)
+        values = self.values(context)
         return np.stack(
             [values, *(np.where(values > knot, values - knot, 0.0 * values) for knot in self.knots)], axis=1
         )
 
 
 class Levels(SingleColumnEffect, frozen=True, kw_only=True):
-    """One coefficient for each named level; every other level is the base. Between levels, as near as it is.
+    """One coefficient for each of some levels of a column of whole numbers; every other level is the base.
 
-    Parameters
-    ----------
-    column : str
-        Column of whole numbers, or between them while it changes.
-    levels : tuple of float
-        Those that differ from the rest. [unit of the column]
-
-    Raises
-    ------
-    DriverProfileError
-        No level, or not a coefficient for each.
+    Between levels, while the column changes, as near as it is. Raises `DriverProfileError` without a level, or without
+    a coefficient for each.
     """
 
     levels: tuple[float, ...]
@@ -201,27 +170,14 @@ class Levels(SingleColumnEffect, frozen=True, kw_only=True):
 
     def quantity(self, context: Mapping[str, FloatArray]) -> FloatArray:
         """1 where the column is at the level, 0 from 1 away on, shape (n, number of levels). [-]"""
-        values = np.asarray(context[self.column], dtype=np.float64)
+        values = self.values(context)
         return np.stack([level_share(values, level) for level in self.levels], axis=1)
 
 
-def level_share(values: FloatArray, level: float) -> FloatArray:
-    """How far whole numbers are at a level, shape (n,): between two, as a scenario's lanes come and go. [-]"""
-    return np.nan_to_num(np.clip(1.0 - np.abs(values - level), 0.0, 1.0), nan=0.0)
-
-
 class Nearness(SingleColumnEffect, frozen=True, kw_only=True):
-    """scale / max(|distance|, scale): 1 from touching up to `scale`, fading beyond, 0 where there is none (NaN).
+    """scale / max(|distance|, scale): 1 from touching up to `scale` [unit of the column], fading beyond.
 
-    Parameters
-    ----------
-    column : str
-        A distance; NaN: there is none.
-    scale : float
-        In the column's unit. Infinite is not allowed; a very large one makes it "there is one" (see `presence`).
-        [unit of the column]
-    presence : bool
-        True: 1 wherever there is one, at whatever distance.
+    With `presence` 1 wherever there is one, at whatever distance; 0 where there is none (NaN).
     """
 
     scale: float = 1.0
@@ -243,53 +199,31 @@ class Nearness(SingleColumnEffect, frozen=True, kw_only=True):
 
 
 class Proximity(SingleColumnEffect, frozen=True, kw_only=True):
-    """exp(-|distance| / scale): 1 alongside, 0 far away and where there is none (NaN).
+    """exp(-|distance| / scale): 1 alongside, 37 % at `scale` > 0 [unit of the column], 0 where there is none (NaN)."""
 
-    Parameters
-    ----------
-    column : str
-        A distance, of either sign; NaN: there is none.
-    scale : float
-        Distance over which the influence falls to 37 %; > 0. [unit of the column]
-    """
+    words: ClassVar[str] = "proximity (fades over {0.scale:.3g})"
+    positive: ClassVar[tuple[str, ...]] = ("scale",)
 
     scale: float
 
-    def __post_init__(self) -> None:
-        """Refuse a scale that is not positive."""
-        super().__post_init__()
-        if not self.scale > 0:
-            raise DriverProfileError(f"effect proximity of {self.column}: scale {self.scale} must be above 0")
-
-    @property
-    def shape(self) -> str:
-        """Word for the report."""
-        return f"proximity (fades over {self.scale:.3g})"
-
     def quantity(self, context: Mapping[str, FloatArray]) -> FloatArray:
-        """From 0 (none) to 1 (alongside), shape (n, 1)."""
+        """From 0 (none) to 1 (alongside), shape (n, 1). [-]"""
         return np.nan_to_num(np.exp(-np.abs(np.asarray(context[self.column])) / self.scale), nan=0.0)[:, None]
 
 
 class Angular(SingleColumnEffect, frozen=True, kw_only=True):
-    """Sine and cosine of an angle, a coefficient each.
+    """Sine and cosine of an angle, a coefficient each; full circle 360 deg or 2 pi rad, in the column's unit."""
 
-    Parameters
-    ----------
-    column : str
-        Where it is NaN ("there is none"), nothing changes.
-    period : float
-        Full circle in the column's unit: 360 deg or 2 pi rad.
-    """
+    words: ClassVar[str] = "angular"
 
     period: float = 360.0
-
-    @property
-    def shape(self) -> str:
-        """Word for the report."""
-        return "angular"
 
     def quantity(self, context: Mapping[str, FloatArray]) -> FloatArray:
         """Sine and cosine, shape (n, 2), within -1..1. [-]"""
         angle = 2.0 * np.pi / self.period * context[self.column]
         return np.stack([np.sin(angle), np.cos(angle)], axis=1)
+
+
+def level_share(values: FloatArray, level: float) -> FloatArray:
+    """How far whole numbers are at a level, shape (n,): between two, as a scenario's lanes come and go. [-]"""
+    return np.nan_to_num(np.clip(1.0 - np.abs(values - level), 0.0, 1.0), nan=0.0)

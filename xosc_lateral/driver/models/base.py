@@ -23,14 +23,9 @@ FloatArray = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True)
 class Start:
-    """Where sampled drives begin.
+    """Where sampled drives begin: ``mean + spread * (coarse - mean) + fine * fine part`` is `rel_offset` at first.
 
-    Parameters
-    ----------
-    rel_offset : float or array, shape (drivers,)
-        First value of ``mean + spread * (coarse - mean) + fine * fine part``, in lane widths, positive left. [-]
-    spread, fine : float
-        The effects' factors on both parts at that moment. [-]
+    In lane widths, positive left, one for all or of shape (drivers,); factors are the effects' at that moment. [-]
     """
 
     rel_offset: float | FloatArray
@@ -53,19 +48,9 @@ class CoreStream(Protocol):
         ...
 
     def take(self, n: int, rate: FloatArray | None = None) -> tuple[FloatArray, FloatArray]:
-        """Next n values of the coarse and of the fine part.
+        """Next n values of the coarse and of the fine part, shape (n, drivers), or (n,) for a single driver.
 
-        Parameters
-        ----------
-        n : int
-            Steps to take.
-        rate : array, shape (n,), optional
-            Rate of mean reversion of the coarse part at each step, > 0; 1 where absent. [-]
-
-        Returns
-        -------
-        coarse, fine : array, shape (n, drivers), or (n,) for a single driver
-            In lane widths, positive left. [-]
+        In lane widths, positive left. `rate` of the coarse part's mean reversion at each step, shape (n,), > 0 [-].
         """
         ...
 
@@ -99,13 +84,8 @@ class CoreModel(Record, frozen=True, tag_field="kind", tag=kebab, eq=False):
     ) -> CoreStream:
         """Begin a drive; without `start` as chance has it.
 
-        Parameters
-        ----------
-        seed : numpy.random.SeedSequence
-        start : Start, optional
-        drivers : int, optional
-            So many drives of as many drivers at once: arrays then have an axis of drivers. One driver gives the
-            numbers that a drive by itself gives; of several, each has others, from the same sources of chance.
+        Or so many drives of as many `drivers` at once: arrays then have an axis of drivers. One driver gives the
+        numbers that a drive by itself gives; of several, each has others, from the same sources of chance.
         """
 
     @abstractmethod

@@ -20,21 +20,14 @@ FloatArray = NDArray[np.float64]
 
 
 class ClockState(msgspec.Struct):
-    """Where a changed time is.
-
-    Parameters
-    ----------
-    time : float
-        Own time of the next value, in steps. [-]
-    held : array, shape (k, drivers)
-        Values of the source that are still needed.
-    first : int
-        Index in the source of the first of them.
-    """
+    """Where a changed time is."""
 
     time: float = 0.0
+    """Own time of the next value, in steps. [-]"""
     held: FloatArray | None = None
+    """Values of the source that are still needed, shape (k, drivers)."""
     first: int = 0
+    """Index in the source of the first of them."""
 
 
 def take_at_rate(state: ClockState, source: Callable[[int], FloatArray], n: int, rate: FloatArray | None) -> FloatArray:
@@ -43,16 +36,8 @@ def take_at_rate(state: ClockState, source: Callable[[int], FloatArray], n: int,
     Between the source's values they lie on Catmull-Rom cubics: through the values, with a continuous slope. At rate 1
     from the start on the source's values are handed through, bit by bit.
 
-    Raises `ValueError` if a rate is not above 0 or not finite.
-
-    Parameters
-    ----------
-    state : ClockState
-        Goes on.
-    source : callable
-        ``source(n)`` gives the next n values, shape (n, drivers).
-    rate : array, shape (n,), optional
-        Steps of own time per step, > 0. [-]
+    Raises `ValueError` if a rate, steps of own time per step, shape (n,), is not above 0 or not finite. ``source(n)``
+    gives the next n values, shape (n, drivers); `state` goes on.
     """
     if rate is None and state.time == 0.0:
         return source(n)

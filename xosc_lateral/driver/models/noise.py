@@ -31,23 +31,16 @@ class ShapedNoise(Record, frozen=True, eq=False, dict=True):
     """Noise with a damping function.
 
     Raises `DriverProfileError` if a damping is negative or not finite, or the kernel's length even.
-
-    Parameters
-    ----------
-    damping : array, shape (n_knots,)
-        Damping at frequencies evenly spaced from 0 to half the sampling rate; >= 0. [lane widths]
-    n_taps : int
-        Length of the kernel, odd.
-    taper : float
-        Shape of the Kaiser window that the kernel is faded out by; 0: cut off, as in the paper. [-]
     """
 
     damping: FloatArray
+    """At frequencies evenly spaced from 0 to half the sampling rate, shape (n_knots,); >= 0. [lane widths]"""
     n_taps: int = KERNEL_TAPS
+    """Length of the kernel, odd."""
     taper: float = 0.0
+    """Shape of the Kaiser window that the kernel is faded out by; 0: cut off, as in the paper. [-]"""
 
     def __post_init__(self) -> None:
-        """Check, copy and freeze."""
         damping = frozen_array(self.damping)
         if damping.ndim != 1 or len(damping) < 2 or not np.isfinite(damping).all() or damping.min() < 0:
             raise DriverProfileError(f"fine noise: damping {damping.tolist()}, expected two or more values >= 0")
@@ -73,8 +66,6 @@ def fit_shaped_noise(
 ) -> ShapedNoise:
     """Fit the damping function to measured fine parts [lane widths], one array of shape (n_i,) per run.
 
-    Reference: arXiv:2405.17080, section III.
-
     Raises `NotEnoughDataError` when no run holds a window of 5 s.
     """
     lengths = [len(part) for part in fine_parts]
@@ -89,12 +80,9 @@ def fit_shaped_noise(
 
 
 def mean_power(parts: Sequence[FloatArray], window: int) -> FloatArray:
-    """Mean power per frequency over half-overlapping Hann windows; white noise of variance 1 gives 1 everywhere.
+    """Mean power per frequency over half-overlapping Hann windows, shape (window // 2 + 1,). [square of the unit]
 
-    Returns
-    -------
-    array, shape (window // 2 + 1,)
-        [square of the parts' unit]
+    White noise of variance 1 gives 1 everywhere.
     """
     total, count = np.zeros(window // 2 + 1), 0
     for part in parts:

@@ -30,12 +30,8 @@ ALIASES = {"best": "autoregressive"}
 class KnownModel:
     """A core model and its fit.
 
-    Parameters
-    ----------
-    model : type of CoreModel
-    fit : callable
-        ``fit(rel_offsets, drives)``: relative offsets [-], one array per run at the model's step, and for each run the
-        name of its drive; gives a `model`, or raises `NotEnoughDataError`.
+    ``fit(rel_offsets, drives)`` gets relative offsets [-], one array per run at the model's step, and for each run the
+    name of its drive; it gives a `model`, or raises `NotEnoughDataError`.
     """
 
     model: type[CoreModel]

@@ -38,15 +38,7 @@ CLIMB = 10
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Explanation:
-    """A colour, and what is most likely with it.
-
-    Parameters
-    ----------
-    solution : Solution
-    colour : Colour
-    criterion : float
-        Bayesian information criterion: the lower, the better. [-]
-    """
+    """A colour, what is most likely with it, and the Bayesian information criterion: the lower, the better. [-]"""
 
     solution: Solution
     colour: Colour
@@ -61,10 +53,7 @@ def explanations(
     *,
     only_view: bool = False,
 ) -> list[Explanation]:
-    """All that were tried; of a second view, also or only what it shows.
-
-    Other arguments as for `solve`.
-    """
+    """All that were tried; of a second view, also or only what it shows. Other arguments as for `solve`."""
     seen = [] if view is None else [Colour(alone=alone, view=view) for alone in (False, True)]
     found = [_explanation(data, colour, base, known) for colour in seen]
     if found and only_view:

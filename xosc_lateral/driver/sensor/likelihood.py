@@ -34,18 +34,9 @@ KNOWN_SD = 0.05
 
 @dataclass(frozen=True, slots=True)
 class Colour:
-    """Coloured part of the sensor: a Butterworth shape of some order, or what a second view shows; else there is none.
+    """Coloured part of the sensor: a Butterworth shape of some order and corner [Hz], or what a second view shows.
 
-    Parameters
-    ----------
-    order : int
-        0: no Butterworth shape.
-    corner : float
-        [Hz]
-    alone : bool
-        Whether there is no white noise beside it.
-    view : SecondView, optional
-        The level is then over its density.
+    Of order 0 and without a view there is none. `alone`: there is no white noise beside it.
     """
 
     order: int = 0
@@ -74,41 +65,27 @@ class Colour:
 
 @dataclass(frozen=True, slots=True)
 class Known:
-    """A sensor whose error is known.
-
-    Parameters
-    ----------
-    deviation : float
-        Standard deviation on the table's rows. [m]
-    rate : float
-        Rows per second. [Hz]
-    rounding : float
-        What rounding has of its square, which is known from the rows. [m2]
-    """
+    """A sensor whose error is known."""
 
     deviation: float
+    """Standard deviation on the table's rows. [m]"""
     rate: float
+    """Rows per second. [Hz]"""
     rounding: float = 0.0
+    """What rounding has of its square, which is known from the rows. [m2]"""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Solution:
-    """The maximum.
-
-    Parameters
-    ----------
-    state : array, shape (N_STATE,)
-        The driver: log density at the knots, and the corner of his corrections, see `vehicle_bound`.
-    white, colour : float
-        Log densities of the sensor's two parts, of `colour` over its shape; -inf where there is none.
-    loss : float
-        Minus log posterior.
-    """
+    """The maximum."""
 
     state: FloatArray
+    """The driver, shape (N_STATE,): log density at the knots, and the corner of corrections, see `vehicle_bound`."""
     white: float
+    """Log densities of the sensor's two parts, of `colour` over its shape; -inf where there is none."""
     colour: float
     loss: float
+    """Minus log posterior."""
 
     @property
     def knots(self) -> FloatArray:
@@ -208,17 +185,9 @@ def solve(
     known: Known | None = None,
     start: Solution | None = None,
 ) -> Solution:
-    """Most likely driver and sensor for a given colour of the sensor.
+    """Most likely driver and sensor for a given colour of the sensor, climbed to from one of the same colour.
 
-    Parameters
-    ----------
-    data : Periodogram
-    colour : Colour
-    base : array, shape (n,)
-        Sensor density that is known already, at the data's frequencies. [m2/Hz]
-    known : Known, optional
-    start : Solution, optional
-        To climb from, of the same colour.
+    `base`, shape (n,), is a density of the sensor's that is known already, at the data's frequencies. [m2/Hz]
     """
     problem = _Problem(data, colour, base, known)
     point = problem.start() if start is None else np.array([*start.state, start.white, start.colour])[: problem.size]

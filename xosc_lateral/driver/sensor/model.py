@@ -26,43 +26,27 @@ HIGHEST = 1.5
 
 
 class SensorModel(Record, frozen=True):
-    """The sensor's part of what was measured.
-
-    Raises `DriverProfileError` if a number is negative or no number.
-
-    Parameters
-    ----------
-    white : float
-        One-sided power density of the white part. [m2/Hz]
-    coloured : float
-        That of the low-passed part at frequency 0. [m2/Hz]
-    corner : float
-        Of the low-passed part. [Hz]
-    order : int
-        Of its Butterworth shape; 0 where there is none.
-    rounding : float
-        Step that values come in; 0 where none was found. [m]
-    driver_variance, sensor_variance : float
-        Of the measured rows, whose sum is the measured variance. [m2]
-    driver_share : tuple of float
-        Share of the driver: 95 % interval. [-]
-    second_view : float
-        Power of the error over that of half the lane width, beside the white part, where it was estimated so
-        (`second_view`); else 0. [-]
-    """
+    """The sensor's part of what was measured. Raises `DriverProfileError` if a number is negative or no number."""
 
     white: float
+    """One-sided power density of the white part. [m2/Hz]"""
     coloured: float = 0.0
+    """That of the low-passed part at frequency 0. [m2/Hz]"""
     corner: float = 1.0
+    """Of the low-passed part. [Hz]"""
     order: int = 0
+    """Of its Butterworth shape; 0 where there is none."""
     rounding: float = 0.0
+    """Step that values come in; 0 where none was found. [m]"""
     driver_variance: float = 0.0
+    """Of the measured rows, as `sensor_variance`; their sum is the measured variance. [m2]"""
     sensor_variance: float = 0.0
     driver_share: tuple[float, float] = (0.0, 1.0)
+    """Share of the driver: 95 % interval. [-]"""
     second_view: float = 0.0
+    """Power of the error over that of half the lane width, where it was estimated so (`second_view`); else 0. [-]"""
 
     def __post_init__(self) -> None:
-        """Check."""
         levels = (self.white, self.coloured, self.rounding, self.second_view)
         parts = (*levels, self.driver_variance, self.sensor_variance)
         if not all(map(isfinite, parts)) or min(parts) < 0 or self.order < 0 or not self.corner > 0:

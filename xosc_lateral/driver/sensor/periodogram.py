@@ -41,24 +41,14 @@ BINS_FROM, BIN = 0.12, 0.05
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Periodogram:
-    """Mean power density and its weight.
-
-    Parameters
-    ----------
-    frequency : array, shape (n,)
-        Mean of each bin. [Hz]
-    density : array, shape (n,)
-        One-sided: integrates to the variance. [m2/Hz]
-    weight : array, shape (n,)
-        Independent ordinates in each bin. [-]
-    window : float
-        Length. [s]
-    """
+    """Mean power density and its weight, shape (n,) each."""
 
     frequency: FloatArray
+    """Mean of each bin. [Hz]"""
     density: FloatArray
+    """One-sided: integrates to the variance. [m2/Hz]"""
     weight: FloatArray
-    window: float
+    """Independent ordinates in each bin. [-]"""
 
     @property
     def count(self) -> float:
@@ -101,13 +91,11 @@ def periodogram(frequency: FloatArray, windows: FloatArray) -> Periodogram:
         np.add.reduceat(known, edges) / count,
         np.add.reduceat(density, edges) / count,
         (INDEPENDENT * len(windows) + 0.5) * count,
-        1.0 / float(frequency[1]),
     )
 
 
-ROUNDS = 60
-LEAST_GAIN = 1e-3
-LONGEST_STEP = 1.5
+ROUNDS, LEAST_GAIN, LONGEST_STEP = 60, 1e-3, 1.5
+"""Of a climb: at most so many; it ends where one gains less loss than this; each log density moves by no more. [-]"""
 
 
 def climb(

@@ -18,10 +18,7 @@ values come in such, driver and rounding are not separated (docs/design/sensor.m
 
 
 def quantisation_step(values: FloatArray) -> float:
-    """Step of the lattice that all values lie on, 0 if there is none of at least `LEAST_STEP`. [m]
-
-    `values` of shape (n,).
-    """
+    """Step of the lattice that all values, shape (n,), lie on, 0 if there is none of at least `LEAST_STEP`. [m]"""
     levels = np.unique(np.round(values, 7))
     if len(levels) < 2 or len(levels) > 0.2 * len(values):
         return 0.0
@@ -55,7 +52,7 @@ def rounding_density(
     rate: float,
     noise: float = 0.0,
 ) -> Callable[[FloatArray], FloatArray]:
-    """Power density of the rounding error of a Gaussian signal, as its rows have it.
+    """Power density of the error of rounding a Gaussian signal to steps of q, as its rows have it. [m2/Hz]
 
     The error's autocovariance follows from the signal's structure function D(tau) = E[(x(t + tau) - x(t))^2] [1]_:
     ``q^2 / (2 pi^2) sum_k exp(-2 pi^2 k^2 D(tau) / q^2) / k^2``. Noise that is new in every row adds twice its variance
@@ -65,10 +62,8 @@ def rounding_density(
     ----------
     step : float
         q. [m]
-    driver : callable
-        Density of what is rounded, at frequencies. [m2/Hz]
-    variance : float
-        Of what is rounded less the noise, which the density is scaled to. [m2]
+    driver, variance : callable, float
+        Density of what is rounded, at frequencies [m2/Hz], and what it is scaled to: the variance less the noise [m2].
     rate : float
         Rows per second. [Hz]
     noise : float

@@ -20,21 +20,10 @@ FloatArray = NDArray[np.float64]
 def driver_runs(
     runs: Sequence[Run], drives: Sequence[Drive] = (), *, sensor_noise: float | None = None
 ) -> tuple[list[Run], SensorModel | None]:
-    """Runs with the sensor's part taken out, and what it was.
+    """Runs with the sensor's part taken out, and what it was; as they are, and None, where all are too short.
 
-    Parameters
-    ----------
-    runs : sequence of Run
-    drives : sequence of Drive, optional
-        That they were cut from: variances are then those of the rows as recorded, of which the runs are a low-passed
-        version.
-    sensor_noise : float, optional
-        See `separate`.
-
-    Returns
-    -------
-    list of Run, SensorModel or None
-        The runs as they are, and None, where the longest is too short for a spectrum.
+    With the drives that they were cut from, variances are those of the rows as recorded, of which the runs are a
+    low-passed version. For `sensor_noise` see `separate`.
     """
     if max(map(len, runs), default=0) * STEP < WINDOWS[-1]:
         return list(runs), None

@@ -46,16 +46,9 @@ FINE = 1000
 
 @dataclass(frozen=True, slots=True)
 class SecondView:
-    """Power density of half the lane width: logarithms, straight over log frequency, constant outside.
+    """Power density of half the lane width: logarithms (of m2/Hz) at frequencies [Hz], straight over log frequency.
 
-    Parameters
-    ----------
-    frequencies : tuple of float
-        [Hz]
-    knots : tuple of float
-        Logarithms of the density there, in m2/Hz.
-    slowest : float
-        Below, the density is as it is there. [Hz]
+    Constant outside, and below `slowest` [Hz].
     """
 
     frequencies: tuple[float, ...]
@@ -68,7 +61,7 @@ class SecondView:
         return np.asarray(np.exp(np.interp(log, np.log(self.frequencies), self.knots)))
 
     def scaled(self, factor: float) -> SecondView:
-        """With so many times the density."""
+        """The same times a factor."""
         return replace(self, knots=tuple(knot + float(np.log(factor)) for knot in self.knots))
 
     def variance(self, highest: float) -> float:
@@ -82,12 +75,7 @@ class SecondView:
 def second_view(half_widths: Sequence[FloatArray], step: float) -> SecondView | None:
     """Fitted to the mean periodogram of runs, by Whittle's likelihood [1]_; None of a width that stands still.
 
-    Parameters
-    ----------
-    half_widths : sequence of array, shape (n_i,)
-        Half the lane width, at an even step. [m]
-    step : float
-        [s]
+    From half the lane width of each run [m], shape (n_i,), at an even step [s].
     """
     if np.ptp(np.concatenate(half_widths)) == 0.0:
         return None

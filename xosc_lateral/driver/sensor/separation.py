@@ -46,20 +46,13 @@ MOST_NOISE = 0.9
 
 @dataclass(frozen=True, eq=False)
 class Separation:
-    """Densities of driver and sensor.
-
-    Parameters
-    ----------
-    knots : array
-        Of the driver's density, see `vehicle_bound`.
-    sensor : SensorModel
-    beside : callable
-        Density of what the sensor's numbers don't hold: of rounding, and of errors seen in a second view. [m2/Hz]
-    """
+    """Densities of driver and sensor."""
 
     knots: FloatArray
+    """Of the driver's density, see `vehicle_bound`."""
     sensor: SensorModel
     beside: Callable[[FloatArray], FloatArray]
+    """Density of what the sensor's numbers don't hold: of rounding, and of errors seen in a second view. [m2/Hz]"""
 
     def driver_part(self, offset: FloatArray, step: float) -> FloatArray:
         """The offset with every frequency scaled down to the driver's share of the power, about its own mean.
@@ -74,15 +67,11 @@ class Separation:
         about = offset - mean
         extended = np.concatenate([2.0 * about[0] - about[:0:-1], about, 2.0 * about[-1] - about[-2::-1]])
         frequency: FloatArray = np.asarray(np.fft.rfftfreq(len(extended), step), dtype=np.float64)
-        filtered = scale_frequencies(extended, np.sqrt(self.driver_share_of(frequency)))
-        return np.asarray(mean + filtered[n - 1 : 2 * n - 1])
-
-    def driver_share_of(self, frequency: FloatArray) -> FloatArray:
-        """Driver's share of the power at each frequency from 0 on, shape (m,). [-]"""
         driver = density(self.knots, frequency)
         share = driver / (driver + self.sensor.density(frequency) + self.beside(frequency))
         share[0] = 1.0
-        return share
+        filtered = scale_frequencies(extended, np.sqrt(share))
+        return np.asarray(mean + filtered[n - 1 : 2 * n - 1])
 
 
 def separate(
@@ -103,23 +92,18 @@ def separate(
 
     Parameters
     ----------
-    runs : sequence of array
-        Offsets at an even step. [m]
-    step : float
-        [s]
-    rows : sequence of array, optional
-        The offsets of the same runs as recorded; variances are counted, and rounding is detected, in these. [m]
-    durations : sequence of array, optional
-        How long each row stands for, where rows are not even in time. [s]
+    runs, step : sequence of array, float
+        Offsets [m] at an even step [s].
+    rows, durations : sequence of array, optional
+        The offsets of the same runs as recorded: variances are counted, and rounding is detected, in these [m]; and how
+        long each row stands for, where rows are not even in time [s].
     rate : float, optional
         Rows per second; without, as many as there are in the time of the runs. [Hz]
     sensor_noise : float, optional
         Standard deviation of the sensor's error on the rows, rounding included, where it is known. [m]
-    half_widths : sequence of array, optional
-        Half the lane width in the same runs, where a camera measured it: a second view of its errors. [m]
-    one_camera : bool
-        Whether that is known to be the camera that measured the offset; else what the width shows is taken where it is
-        plausible.
+    half_widths, one_camera : sequence of array, bool, optional
+        Half the lane width in the same runs, where a camera measured it: a second view of its errors [m]; and whether
+        that is known to be the camera that measured the offset: else what the width shows is taken where plausible.
     """
     measured = list(rows) if rows is not None else list(runs)
     variance = _variance(measured, durations)
@@ -200,17 +184,12 @@ def _sensor(
     level = float(np.exp(found.colour))
     coloured, seen = (level, 0.0) if colour.view is None else (0.0, level)
     numbers = (np.exp(found.white), coloured, colour.corner, driver, rest, *interval, seen)
-    white, coloured, corner, driver, rest, low, high, seen = rounded(numbers)
+    white, coloured, corner, driver, rest, low, high, seen = all_significant(numbers, DIGITS)
     return SensorModel(white, coloured, corner, colour.order, grain, driver, rest, (low, high), second_view=seen)
 
 
 DIGITS = 7
 """Significant digits kept of a sensor's numbers: what differs beyond is the processor's rounding. [-]"""
-
-
-def rounded(values: Sequence[float]) -> tuple[float, ...]:
-    """Numbers as a profile keeps them: the same on any machine."""
-    return all_significant(values, DIGITS)
 
 
 def _no_density(frequency: FloatArray) -> FloatArray:

@@ -133,15 +133,6 @@ def prior(state: FloatArray, *, is_corner_free: bool = True) -> tuple[FloatArray
     return np.append(residuals, own / deviation), jacobian
 
 
-def expected_state() -> FloatArray:
-    """The likeliest of the prior, up to its level: straight on where slopes are free. Shape (N_STATE,). [-]"""
-    values = expected_log_density(KNOTS)
-    first = _BOUND[0]
-    slope = (SLOPES @ values)[first]
-    values[:first] = values[first] + slope * (_LOG[:first] - _LOG[first])
-    return np.append(values, 0.0)
-
-
 def interpolation(frequency: FloatArray) -> FloatArray:
     """From knot values to log densities at these frequencies, constant outside the knots, shape (len(frequency), n)."""
     log = np.clip(np.log(np.maximum(frequency, 1e-9)), _LOG[0], _LOG[-1])

@@ -45,17 +45,17 @@ TICKS = 4
 def measuring_low_pass(step: float) -> FloatArray:
     """Symmetric kernel of gain 1, shape (2 * half + 1,) [-], that keeps what is slower than `BORDER`; `step` in [s]."""
     half = round(HALF_LENGTH / step)
-    return _frozen(low_pass(half, 2.0 * BORDER * step, MEASURING_WINDOW))
+    return frozen_array(low_pass(half, 2.0 * BORDER * step, MEASURING_WINDOW))
 
 
 @lru_cache(maxsize=1)
 def building_low_pass() -> FloatArray:
-    """Kernel that makes `COARSE_EVERY` samples of one coarse value; images of slow movement are 75 dB down.
+    """Symmetric kernel that makes `COARSE_EVERY` samples of one coarse value, each sample's weights summing to about 1.
 
-    Symmetric, shape (2 * COARSE_EVERY * (TICKS + 1) - 1,) [-], gain COARSE_EVERY: each sample's weights sum to about 1.
+    Shape (2 * COARSE_EVERY * (TICKS + 1) - 1,). [-]
     """
     half = COARSE_EVERY * (TICKS + 1) - 1
-    return _frozen(low_pass(half, 1.0 / COARSE_EVERY, BUILDING_WINDOW) * COARSE_EVERY)
+    return frozen_array(low_pass(half, 1.0 / COARSE_EVERY, BUILDING_WINDOW) * COARSE_EVERY)
 
 
 @lru_cache(maxsize=1)
@@ -72,7 +72,7 @@ def phases() -> FloatArray:
             at = half + p - COARSE_EVERY * (k - TICKS)
             if 0 <= at < len(kernel):
                 table[k, p] = kernel[at]
-    return _frozen(table / table.sum(axis=0))  # a level stays a level in every phase
+    return frozen_array(table / table.sum(axis=0))  # a level stays a level in every phase
 
 
 def split_bands(values: FloatArray, step: float) -> tuple[FloatArray, FloatArray]:
@@ -86,18 +86,7 @@ def split_bands(values: FloatArray, step: float) -> tuple[FloatArray, FloatArray
 
 
 def interpolate(steps: FloatArray) -> FloatArray:
-    """Coarse steps at 1 Hz as 5 Hz values.
-
-    Parameters
-    ----------
-    steps : array, shape (n + 2 TICKS + 1, k)
-        [any unit]
-
-    Returns
-    -------
-    array, shape (n * COARSE_EVERY, k)
-        In the same unit.
-    """
+    """Coarse steps at 1 Hz, shape (n + 2 TICKS + 1, k), as 5 Hz values, shape (n * COARSE_EVERY, k). [any unit]"""
     table, paths = phases(), steps.shape[1]
     n = len(steps) - len(table) + 1
     if paths == 1 and worth_compiling(n):
@@ -132,12 +121,6 @@ def _interpolate_body(steps, table, result):  # type: ignore[no-untyped-def]
 _interpolate_compiled = JitKernel(_interpolate_body).compiled
 
 
-def _frozen(values: FloatArray) -> FloatArray:
-    array = np.ascontiguousarray(values)
-    array.flags.writeable = False
-    return array
-
-
 MAX_ROOT = 0.995
 """Largest modulus of a root: at one step a second a memory of 200 s. [-]"""
 
@@ -159,7 +142,6 @@ class Autoregression(Record, frozen=True, eq=False):
     scale: float
 
     def __post_init__(self) -> None:
-        """Check, copy and freeze."""
         coefficients = frozen_array(self.coefficients)
         if coefficients.ndim != 1 or not np.isfinite(coefficients).all() or not 0 <= self.scale < np.inf:
             raise DriverProfileError(f"autoregression: {coefficients.tolist()}, scale {self.scale}")

@@ -46,16 +46,14 @@ MOST_DIGITS = 17
 
 def rounded(model: AutoregressiveModel) -> AutoregressiveModel:
     """The same with every number rounded to what is kept of it."""
-    return AutoregressiveModel(
-        mean=_tidy(model.mean),
-        between_drivers=_tidy(model.between_drivers),
+    return replace(
+        model,
+        **{name: significant(getattr(model, name), DIGITS) for name in ("mean", "between_drivers", "correlation")},
         coarse=_tidy_coarse(model.coarse),
         fine=replace(model.fine, damping=np.array(all_significant(model.fine.damping, DIGITS))),
         coarse_volatility=_tidy_volatility(model.coarse_volatility),
         fine_volatility=_tidy_volatility(model.fine_volatility),
-        correlation=_tidy(model.correlation),
-        limits=(_tidy(model.limits[0]), _tidy(model.limits[1])),
-        step=model.step,
+        limits=all_significant(model.limits, DIGITS),
     )
 
 
@@ -72,12 +70,8 @@ def _tidy_coarse(coarse: Autoregression) -> Autoregression:
     return coarse
 
 
-def _tidy(value: float) -> float:
-    return significant(value, DIGITS)
-
-
 def _tidy_volatility(part: Volatility) -> Volatility:
-    return Volatility(_tidy(part.between), _tidy(part.within), _tidy(part.correlation_time), _tidy(part.slow))
+    return Volatility(*all_significant((part.between, part.within, part.correlation_time, part.slow), DIGITS))
 
 
 def fit_autoregressive(

@@ -52,8 +52,8 @@ def fit_autoregression(
 ) -> Autoregression:
     """Fit by least squares, all moments alike but those of wild drivers, who are measured by their own size.
 
-    Weights by how calm a moment is would drop the return of whoever drifts calmly and corrects briskly, and the rest is
-    an endless drift.
+    The scale is the geometric mean of the drivers' residuals. Weights by how calm a moment is would drop the return of
+    whoever drifts calmly and corrects briskly, and the rest is an endless drift.
 
     Drivers' own means are a random effect of variance `between`: it is taken out of the normal equations, where it adds
     the same to every product. Taking each driver's estimated mean out of his runs instead would take slow movement with
@@ -61,21 +61,12 @@ def fit_autoregression(
 
     Parameters
     ----------
-    runs : sequence of array, shape (n_i,)
-        Series with the mean of all taken out. [any unit]
-    order : int
-        >= 1.
-    every : int
-        One step of the model in samples of the runs.
-    drivers : sequence of str
-        Whose each run is.
+    runs, drivers : sequence of array, shape (n_i,), and of str
+        Series with the mean of all taken out [any unit], and whose each is.
+    order, every : int
+        Of the model, >= 1; one step of it in samples of the runs.
     between : float
         Variance of the drivers' own means.
-
-    Returns
-    -------
-    Autoregression
-        Its scale is the geometric mean of the drivers' residuals.
     """
     long = [(run, driver) for run, driver in zip(runs, drivers, strict=True) if len(run) > every * order + every]
     pasts = [np.stack([run[every * (order - 1 - k) : len(run) - every * (k + 1)] for k in range(order)], axis=1)
@@ -117,20 +108,9 @@ HALF_GAIN = 0.5
 def fit_coarse(
     slow: Sequence[FloatArray], drives: Sequence[str], settings: FitSettings
 ) -> tuple[Autoregression, float]:
-    """Autoregression at one step a second, and the variance between drivers.
+    """Autoregression at one step a second [lane widths], and the variance between drivers [lane widths squared].
 
-    Parameters
-    ----------
-    slow : sequence of array, shape (n_i,)
-        Low-passed runs at 5 Hz, the mean of all taken out. [lane widths]
-    drives : sequence of str
-        Whose each is.
-    settings : FitSettings
-
-    Returns
-    -------
-    Autoregression, float
-        [lane widths], [lane widths squared]
+    From low-passed runs at 5 Hz, shape (n_i,), the mean of all taken out [lane widths], and whose drive each is of.
     """
     longest = max(map(len, slow)) * settings.step
     order = max(2, min(settings.order, int(0.4 * longest)))
@@ -261,14 +241,10 @@ def _shaped(wanted: FloatArray, settings: FitSettings) -> ShapedNoise:
 
 
 def _typical_power(runs: Sequence[FloatArray], settings: FitSettings) -> tuple[FloatArray, FloatArray]:
-    """Power spectrum of steady movement: geometric means over windows, so that volatile ones don't outweigh the others.
+    """Frequencies [cycles per sample] and power of steady movement; white noise of variance 1 has 1 everywhere.
 
-    (A periodogram's logarithm lies on average Euler's constant below that of the power.)
-
-    Returns
-    -------
-    frequency, power : array
-        In cycles per sample, and with white noise of variance 1 at 1 everywhere.
+    Geometric means over windows, so that volatile ones don't outweigh the others. (A periodogram's logarithm lies on
+    average Euler's constant below that of the power.)
     """
     size = min(window_of(runs, settings.spectrum_windows, settings), max(map(len, runs)))
     power = np.concatenate([periodograms(run, size, detrend=Detrend.ENDS) for run in runs])

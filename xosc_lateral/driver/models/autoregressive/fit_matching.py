@@ -84,20 +84,7 @@ def with_volatility(
 def simulate(
     model: AutoregressiveModel, n: int, seed: int, *, drivers: int, starts: FloatArray | None = None
 ) -> FloatArray:
-    """Drives of the model, for comparing.
-
-    Parameters
-    ----------
-    n : int
-        Samples per drive.
-    starts : array, shape (drivers,), optional
-        First values. [-]
-
-    Returns
-    -------
-    array, shape (drivers, n)
-        Relative offsets. [-]
-    """
+    """Relative offsets of drives of the model, shape (drivers, n), with given first values, shape (drivers,). [-]"""
     start = None if starts is None else Start(starts)
     coarse, fine = model.stream(np.random.SeedSequence(seed), start, drivers=drivers).take(n)
     return np.ascontiguousarray((coarse + fine).T)
@@ -116,9 +103,9 @@ def _fine_of(pair: tuple[FloatArray, FloatArray]) -> FloatArray:
 def matched(model: AutoregressiveModel, runs: Sequence[FloatArray], settings: FitSettings) -> AutoregressiveModel:
     """Correct scales, volatilities and spectrum until simulated snippets vary as the measured ones do.
 
-    From runs of shape (n_i,) [lane widths]; indirect inference: C. Gourieroux, A. Monfort, E. Renault, Journal of
-    Applied Econometrics 8 (1993), S85-S118. Simulated snippets are cut from free runs, as the measured ones are:
-    those that begin where the measured ones do are drawn otherwise, which would be taken for a lack.
+    From runs of shape (n_i,) [lane widths], by indirect inference [1]_. Simulated snippets are cut from free runs, as
+    the measured ones are: those that begin where the measured ones do are drawn otherwise, which would be taken for a
+    lack.
     """
     length = round(settings.snippet / settings.step) + 1
     real = np.concatenate(
@@ -258,14 +245,8 @@ def autocovariance(series: Sequence[FloatArray], n_lags: int) -> tuple[FloatArra
 def fit_volatility(excess: FloatArray, counts: FloatArray, seconds: float, *, population: bool) -> Volatility:
     """Fit to the excess covariance of log power over what steady Gaussian movement would show.
 
-    Parameters
-    ----------
-    excess, counts : array, shape (n_lags,)
-        Excess at lags of 0, 1, 2 ... windows, and its weights.
-    seconds : float
-        Length of a window. [s]
-    population : bool
-        Whether there are several drivers: what lasts is then a difference between them, else slow variation.
+    `excess` and its weights, shape (n_lags,), at lags of 0, 1, 2 ... windows of so many seconds [s]. In a population of
+    several drivers what lasts is a difference between them, else slow variation.
     """
     best, least = Volatility(), np.inf
     weights = np.sqrt(counts / max(counts.max(), 1.0))

@@ -56,31 +56,19 @@ HEADROOM = 0.02
 
 
 class AutoregressiveState(msgspec.Struct):
-    """Where drives are.
-
-    Parameters
-    ----------
-    driver : DriverState
-    factors : FactorState
-        Volatility drawn ahead.
-    coarse : CoarseState
-    fine : FineState
-    knees, limits : array, shape (2, drivers)
-        Where bending begins and where it ends, on the lower and on the upper side. [lane widths]
-    clock : ClockState
-        Of the coarse part.
-    single : bool
-        One driver, arrays without an axis of drivers.
-    """
+    """Where drives are."""
 
     driver: DriverState
     factors: FactorState
     coarse: CoarseState
     fine: FineState
     knees: FloatArray
+    """Where bending begins (and, in `limits`, ends), on the lower and on the upper side, shape (2, drivers). [-]"""
     limits: FloatArray
     clock: ClockState
+    """Of the coarse part."""
     single: bool = True
+    """One driver, arrays without an axis of drivers."""
 
 
 START_LAGS = 300

@@ -39,15 +39,7 @@ class PairState(msgspec.Struct):
 
 
 class FactorState(msgspec.Struct):
-    """Both logarithms' varying parts, and the factors drawn ahead of one part while the other was asked for.
-
-    Parameters
-    ----------
-    quick, slow : PairState
-        What varies within seconds, and within minutes.
-    coarse, fine : array, shape (k, drivers)
-        Factors that are drawn and not yet taken. [-]
-    """
+    """What varies within seconds and within minutes, and factors drawn and not yet taken, shape (k, drivers). [-]"""
 
     quick: PairState
     slow: PairState
@@ -127,21 +119,13 @@ def _correlated(rng: np.random.Generator, n: int, drivers: int, correlation: flo
 
 
 class QueueState(msgspec.Struct):
-    """Values at 5 Hz that were made and not yet taken.
-
-    Parameters
-    ----------
-    made : array, shape (k, drivers)
-        [lane widths]
-    skip : array of int, shape (drivers,)
-        Rows of it that each driver leaves out before his next.
-    bridge : array, shape (k, drivers)
-        What is still added to meet a start, step by step. [lane widths]
-    """
+    """Values at 5 Hz that were made and not yet taken, shape (k, drivers). [lane widths]"""
 
     made: FloatArray
     skip: IntArray
+    """Rows of it that each driver leaves out before his next, shape (drivers,)."""
     bridge: FloatArray
+    """What is still added to meet a start, step by step, shape (k, drivers). [lane widths]"""
 
 
 class CoarseState(QueueState):
@@ -261,15 +245,7 @@ CANDIDATES = 64
 
 
 class DriverState(msgspec.Struct):
-    """What drivers keep for a whole drive, each of shape (drivers,).
-
-    Parameters
-    ----------
-    mean : array
-        What the coarse movement is about. [lane widths]
-    coarse, fine : array
-        Factors on the coarse and on the fine movement. [-]
-    """
+    """What drivers keep for a whole drive, shape (drivers,): the mean [lane widths], factors on both parts [-]."""
 
     mean: FloatArray
     coarse: FloatArray

@@ -26,29 +26,18 @@ SLOW_CORRELATION_TIME = 300.0
 
 
 class Volatility(Record, frozen=True):
-    """Parameters of the factor.
+    """Variances of the factor's logarithm: between drivers, and of what varies within seconds and within minutes. [-]
 
     Raises `DriverProfileError` if a variance is negative or the correlation time not above 0.
-
-    Parameters
-    ----------
-    between : float
-        Variance of the logarithm between drivers. [-]
-    within : float
-        Variance of the part that varies within seconds. [-]
-    correlation_time : float
-        Of the part that varies within seconds; `memory` in files. [s]
-    slow : float
-        Variance of the part that varies with the correlation time `SLOW_CORRELATION_TIME`. [-]
     """
 
     between: float = 0.0
     within: float = 0.0
     correlation_time: float = msgspec.field(name="memory", default=10.0)
+    """Of the part that varies within seconds; of the slow one it is `SLOW_CORRELATION_TIME`. [s]"""
     slow: float = 0.0
 
     def __post_init__(self) -> None:
-        """Check."""
         numbers = (self.between, self.within, self.correlation_time, self.slow)
         if (
             not all(map(isfinite, numbers))

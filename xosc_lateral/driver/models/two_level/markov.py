@@ -74,12 +74,8 @@ N_BINS = 20
 class MarkovChain:
     """Coarse lateral position as a chain over bins of the relative offset.
 
-    Raises `DriverProfileError` if it isn't square, a count is negative, or there is no transition at all.
-
-    Parameters
-    ----------
-    counts : array of int, shape (n_bins, n_bins)
-        Observed transitions: row i, column j: from bin i to bin j in one step.
+    By observed transitions, shape (n_bins, n_bins): row i, column j: from bin i to bin j in one step. Raises
+    `DriverProfileError` if it isn't square, a count is negative, or there is no transition at all.
     """
 
     counts: IntArray

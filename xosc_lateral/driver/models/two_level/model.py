@@ -88,34 +88,22 @@ PAPER_SETTINGS = TwoLevelSettings()
 
 
 class TwoLevelState(msgspec.Struct):
-    """Where drives are.
-
-    Parameters
-    ----------
-    chain, noise : numpy.random.Generator
-        Of the coarse and of the fine part; each draws one number per step and driver.
-    bins : array of int, shape (drivers,)
-        Last bin.
-    levels : array, shape (smoothing taps - 1, drivers)
-        Last levels of the chain, before smoothing. [-]
-    white : array, shape (kernel taps - 1, drivers)
-        Last values of the fine part's noise, before shaping. [-]
-    fade : array, shape (k, drivers)
-        What is still added to meet a start, step by step. [-]
-    clock : ClockState
-        Of the coarse part.
-    single : bool
-        One driver, arrays without an axis of drivers.
-    """
+    """Where drives are. The generators, of the coarse and of the fine part, draw one number per step and driver."""
 
     chain: np.random.Generator
     noise: np.random.Generator
     bins: IntArray
+    """Last bin, shape (drivers,)."""
     levels: FloatArray
+    """Last levels of the chain, before smoothing, shape (smoothing taps - 1, drivers). [-]"""
     white: FloatArray
+    """Last values of the fine part's noise, before shaping, shape (kernel taps - 1, drivers). [-]"""
     fade: FloatArray
+    """What is still added to meet a start, step by step, shape (k, drivers). [-]"""
     clock: ClockState
+    """Of the coarse part."""
     single: bool = True
+    """One driver, arrays without an axis of drivers."""
 
 
 class TwoLevelModel(CoreModel, frozen=True, eq=False, dict=True):
