@@ -16,8 +16,8 @@ from xosc_lateral.identification.held_out import _frequency, _quantities, estima
 from xosc_lateral.identification.regression import Coarse, fit_model
 from xosc_lateral.identification.selection import Accepted, Gain, Selection
 from xosc_lateral.identification.terms.base import Term
+from xosc_lateral.identification.terms.column import MeanTerm
 from xosc_lateral.identification.terms.cycle import CycleTerm
-from xosc_lateral.identification.terms.mean import MeanTerm
 from xosc_lateral.identification.terms.time import StepTerm
 
 SECONDS = 900.0
@@ -52,7 +52,7 @@ def nested(coarse: Coarse) -> Nested:
     folds = [blocks % 3 == fold for fold in range(3)]
     picked = ((X,), (X, IDLE), (X,))
     selections = tuple(chosen(coarse.only(~held), *terms) for held, terms in zip(folds, picked, strict=True))
-    return Nested(selections, tuple((held, coarse) for held in folds), blocks)
+    return Nested(selections, coarse, blocks)
 
 
 def test_what_acts_gains_on_rows_that_it_was_not_fitted_on(nested: Nested) -> None:
@@ -79,7 +79,7 @@ def test_terms_together_gain_what_the_start_lacks(nested: Nested) -> None:
 def test_a_gain_is_the_mean_over_blocks_with_its_standard_error(coarse: Coarse) -> None:
     blocks = np.arange(len(coarse)) // 60
     rows = np.random.default_rng(1).normal(size=len(coarse))
-    found = _over_blocks(rows, blocks, [(coarse.valid, coarse)], 2)
+    found = _over_blocks(rows, blocks, coarse.valid, 2)
     sums = np.array([rows[blocks == block].sum() for block in np.unique(blocks[coarse.valid])])
     assert found.mean == pytest.approx(sums.mean())
     assert found.error == pytest.approx(sums.std(ddof=1) / np.sqrt(len(sums)))
@@ -99,7 +99,7 @@ def test_only_a_loss_by_a_standard_error_vetoes_a_term_and_being_found_in_no_fol
 
 def test_a_fold_is_scored_with_its_own_version_of_what_was_kept(coarse: Coarse) -> None:
     fold = chosen(coarse, X, IDLE)
-    nested = Nested((fold,), ((coarse.valid, coarse),), np.zeros(len(coarse), dtype=np.intp))
+    nested = Nested((fold,), coarse, np.zeros(len(coarse), dtype=np.intp))
     assert nested.only((mean_term("x"), mean_term("idle"))).selections[0].final is fold.final
     assert nested.only((mean_term("x"),)).selections[0].final.terms == (X,)
     assert nested.only(()).selections[0].final.terms == ()

@@ -20,8 +20,7 @@ from xosc_lateral.formats.profiles import read_profile, write_profile
 from xosc_lateral.identification import selection, terms
 from xosc_lateral.identification.held_out import estimate_all, removal_of
 from xosc_lateral.identification.regression import Coarse
-from xosc_lateral.identification.search import Search
-from xosc_lateral.identification.selection import STAGES, TERMS, in_stages, shared_among
+from xosc_lateral.identification.selection import STAGES, TERMS, Search, in_stages, shared_among
 from xosc_lateral.identification.significance import BUDGET, MANY_DRIVES
 from xosc_lateral.identification.terms.base import Stage, Term
 from xosc_lateral.plugins import defined_in

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from functools import partial
 from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 
@@ -36,62 +37,56 @@ from xosc_lateral.identification.regression import Coarse, Fitted, fit_model
 from xosc_lateral.identification.residual import LackOfFit, lack_of_fit_of, size_of
 from xosc_lateral.identification.selection import Accepted, Gain, Selection
 from xosc_lateral.identification.significance import LoopSeed
-from xosc_lateral.identification.terms.base import Term
+from xosc_lateral.identification.terms.base import Description, Term
 from xosc_lateral.identification.terms.between import between_shift
 from xosc_lateral.identification.timeline import join_drives
 
 
-@dataclass(frozen=True, eq=False)
-class Finding:
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Finding(Description):
     """One effect that the base lacked."""
 
-    effect: str  # Short name.
     kind: str  # As in the report's schema.
-    columns: tuple[str, ...]  # That cause it; two when it is a product.
-    alike: Alternatives  # Columns of each other effect that the data can't tell from it.
-    lag_s: float | None
-    response_s: float | None
-    shape: str
-    size_m: float  # Change of the mean between the 5 % and 95 % quantile, or amplitude [m]; factor for scale.
-    size_error: float  # Standard error of it.
     p_value: float  # Family-wise over everything that its component tried.
     error_before: float  # On held-out blocks, by the effect's own quantity. [m]
     error_after: float  # On held-out blocks, by the effect's own quantity. [m]
-    measure: str  # What that error compares.
-    effects: tuple[Effect, ...]  # What the profile got.
-    statistic: str  # Group of summary statistics that shows it best.
+    columns: tuple[str, ...] = ()  # That cause it; two when it is a product.
+    alike: Alternatives = ()  # Columns of each other effect that the data can't tell from it.
+    effects: tuple[Effect, ...] = ()  # What the profile got.
     gain: Gain | None = None  # Held-out gain, nested; None where its path can't be predicted.
+
+
+def _finding(size: Description, scored: HeldOut, **about: Any) -> Finding:
+    """Put errors on held-out blocks to what was described."""
+    before, after = scored.error_of(size.statistic)
+    described = asdict(size) | {"measure": size.measure or size.statistic}
+    return Finding(error_before=before, error_after=after, **described, **about)
 
 
 def describe_finding(one: Accepted, key: str, fitted: Fitted, effects: tuple[Effect, ...], scored: HeldOut) -> Finding:
     """Put sizes and errors to what was accepted."""
-    size = one.term.describe(fitted, effects, key)
-    return Finding(
-        size.name, one.term.kind, one.term.columns, one.alike, size.lag_s, size.response_s, size.shape, size.size,
-        size.error, one.p_value, *scored.error_of(size.statistic), size.measure, effects, size.statistic, one.gain,
-    )  # fmt: skip
+    term = one.term
+    about = {"kind": term.kind, "columns": term.columns, "alike": one.alike, "p_value": one.p_value, "gain": one.gain}
+    return _finding(term.describe(fitted, effects, key), scored, effects=effects, **about)
 
 
 def spectrum_finding(spectrum: SpectrumShape, scored: HeldOut) -> Finding:
     """The core model is replaced: the first-order chain forgets too fast."""
     worst = int(np.argmax(np.abs(np.log(spectrum.ratio))))
-    statistic, ratio = "movement by band", float(spectrum.ratio[worst])
-    return Finding(
-        "memory beyond one step", "memory", (), (), None, None,
-        f"movement within {spectrum.bands_s[worst]:g} s is {ratio:.2f} times the measured", ratio, 0.0,
-        spectrum.p_value, *scored.error_of(statistic), "size of the movement by frequency band", (), statistic,
-    )  # fmt: skip
+    ratio = float(spectrum.ratio[worst])
+    shape = f"movement within {spectrum.bands_s[worst]:g} s is {ratio:.2f} times the measured"
+    measure = "size of the movement by frequency band"
+    size = Description("memory beyond one step", shape, ratio, 0.0, "movement by band", measure)
+    return _finding(size, scored, kind="memory", p_value=spectrum.p_value)
 
 
 def population_finding(population: DriverVariance, scored: HeldOut) -> Finding:
     """The core model is replaced: one pooled driver can't be many."""
-    statistic, scatter = "quantiles of local spread", float(np.exp(population.log_spread))
-    return Finding(
-        "drivers that differ", "population", (), (), None, None,
-        f"{population.drives} drives; their spreads scatter by a factor of {scatter:.2f}", population.shift,
-        population.shift / float(np.sqrt(2.0 * population.drives)), population.p_value, *scored.error_of(statistic),
-        statistic, (), statistic,
-    )  # fmt: skip
+    drives, shift = population.drives, population.shift
+    shape = f"{drives} drives; their spreads scatter by a factor of {np.exp(population.log_spread):.2f}"
+    error = shift / float(np.sqrt(2.0 * drives))
+    size = Description("drivers that differ", shape, shift, error, "quantiles of local spread")
+    return _finding(size, scored, kind="population", p_value=population.p_value)
 
 
 # The held-out error of a profile with more effects may be so many times the base's: 24 runs leave 2 % of noise. [-]

@@ -16,12 +16,10 @@ from xosc_lateral.identification.columns import Assigned, Column, Role, known_co
 from xosc_lateral.identification.cross_validation import Nested, hold_out_blocks, nest
 from xosc_lateral.identification.feedback import Feedback, find_feedback
 from xosc_lateral.identification.regression import Coarse
-from xosc_lateral.identification.search import Search
-from xosc_lateral.identification.selection import ERROR_BUDGET, Gain, Rejected, Selection, select
+from xosc_lateral.identification.selection import ERROR_BUDGET, Gain, Rejected, Search, Selection, select
 from xosc_lateral.identification.terms.base import Term
 from xosc_lateral.identification.terms.between import BetweenTerm, is_between
-from xosc_lateral.identification.terms.mean import MeanTerm
-from xosc_lateral.identification.terms.spread import SpreadTerm
+from xosc_lateral.identification.terms.column import MeanTerm, SpreadTerm
 from xosc_lateral.identification.terms.time import StepTerm, TimeMeanTerm, TimeSpreadTerm
 from xosc_lateral.identification.timeline import Timeline
 

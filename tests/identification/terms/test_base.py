@@ -9,10 +9,8 @@ from tests.identification.made_coarse import coarse_of, movement, wander
 from xosc_lateral.driver.effects import Acts, Linear
 from xosc_lateral.identification.held_out import estimate_all, removal_of
 from xosc_lateral.identification.regression import Coarse, fit_model
-from xosc_lateral.identification.terms.base import Removal, centred
-from xosc_lateral.identification.terms.column import columns_on_size, of_kind, shrunk
-from xosc_lateral.identification.terms.mean import MeanTerm
-from xosc_lateral.identification.terms.spread import SpreadTerm
+from xosc_lateral.identification.terms.base import Removal
+from xosc_lateral.identification.terms.column import MeanTerm, SpreadTerm, columns_on_size, of_kind, shrunk
 from xosc_lateral.identification.terms.time import StepTerm, TimeSpreadTerm
 
 SECONDS = 900.0
@@ -56,13 +54,6 @@ def test_a_term_matches_one_of_its_kind_and_columns(coarse: Coarse) -> None:
     assert not term().matches(term(SpreadTerm))
     assert StepTerm(at=100).matches(StepTerm(at=150))
     assert not StepTerm(at=100).matches(StepTerm(at=400))
-
-
-def test_what_is_centred_has_no_mean_where_it_counts(coarse: Coarse) -> None:
-    values = np.arange(float(len(coarse)))
-    assert centred(values, coarse)[coarse.valid].mean() == pytest.approx(0.0, abs=1e-9)
-    nothing = coarse.only(np.zeros(len(coarse), dtype=bool))
-    np.testing.assert_array_equal(centred(values, nothing), values)
 
 
 def test_nothing_is_removed_before_a_term_says_so() -> None:

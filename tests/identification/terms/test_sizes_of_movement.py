@@ -10,10 +10,10 @@ from tests.identification.made_coarse import SPREAD, coarse_of, movement, wander
 from xosc_lateral.driver.effects import Acts, ColumnEffect, Linear
 from xosc_lateral.identification import regression
 from xosc_lateral.identification.regression import Fitted, fit_model
-from xosc_lateral.identification.terms.column import ColumnTerm
-from xosc_lateral.identification.terms.mean import MeanTerm
-from xosc_lateral.identification.terms.spread import (
+from xosc_lateral.identification.terms.column import (
+    ColumnTerm,
     FineNoiseTerm,
+    MeanTerm,
     SlowSpreadTerm,
     SpreadTerm,
     fine_twin,
