@@ -61,7 +61,7 @@ def test_drives_that_are_too_short_are_not_dealt() -> None:
     values = np.where(counted, rng.normal(size=DRIVES), 0.0)
     values = (values / np.linalg.norm(values))[:, None]
     left = np.where(counted, rng.normal(size=DRIVES), 0.0) + 7.0 * values[:, 0]
-    assert best_of_drives(left, counted, values, np.zeros(1), ["speed"], rng).p_value < 1e-3
+    assert best_of_drives(left, counted, values, np.zeros(1), ["speed"], rng)[1] < 1e-3
 
 
 @pytest.mark.parametrize("chi_square", [0.5, 4.0, 30.0, 200.0])

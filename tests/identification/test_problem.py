@@ -22,7 +22,8 @@ def coarse() -> Coarse:
 def test_rows_of_valid_seconds_are_those_of_the_whole_grid(coarse: Coarse) -> None:
     """Put side by side without what is cut out, they whiten to the same numbers."""
     problem = MeanTerm.problem(fit_model(coarse, ()))
-    np.testing.assert_allclose(problem.observed, problem.whitener.rows(problem.series)[problem.valid], atol=1e-10)
+    white = problem.whitener.rows(problem.series)[problem.whitener.valid]
+    np.testing.assert_allclose(problem.observed, white, atol=1e-10)
     assert problem.known.shape == (int(coarse.valid.sum()), 0)
 
 

@@ -113,7 +113,7 @@ def test_the_unit_of_the_offset_scales_the_sizes_and_nothing_else(
     monkeypatch.setattr(regression, "FLOOR", abs(factor) * regression.FLOOR)
     other = fit_model(planted(5, scale=factor), (mean_term(),))
     np.testing.assert_allclose(other.sizes, factor * one.sizes, rtol=1e-6)
-    np.testing.assert_allclose(other.rows, np.sign(factor) * one.rows, atol=1e-6)
+    np.testing.assert_allclose(other.innovations, np.sign(factor) * one.innovations, atol=1e-6)
 
 
 def test_the_order_of_terms_does_not_matter() -> None:

@@ -21,6 +21,7 @@ from xosc_lateral.identification.selection import Gain, Search, Selection, selec
 from xosc_lateral.identification.terms.base import Term
 from xosc_lateral.identification.timeline import BoolArray, FloatArray, IntArray, Timeline, coarse_middle
 
+Progress = Callable[[float, str], None]  # Gets the share that is done and what is being done.
 FOLDS = 4  # Every part of the drives is held out once, and predicted from the other three.
 # Length of the blocks of a drive that are held out; drives shorter than three blocks are held out whole. [s]
 BLOCK_S = 150.0

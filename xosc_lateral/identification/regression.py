@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from msgspec import structs
 
-from xosc_lateral.driver.effects import Acts, ColumnEffect
+from xosc_lateral.driver.effects import Acts, ColumnEffect, Effect
 from xosc_lateral.identification.autocorrelation import Whitener, fit_autoregression, start_factors, unbiased
 from xosc_lateral.identification.innovations import (
     LONGEST,
@@ -171,6 +171,15 @@ class Fitted:
         timeline = self.coarse.timeline
         columns = joined([term.fine_mean_columns(self.coarse) for term in self.terms], len(timeline))
         return columns @ self.sizes + self.levels[timeline.drive]
+
+    @cached_property
+    def estimates(self) -> Mapping[str, tuple[Term, tuple[Effect, ...]]]:
+        """Every term and what the profile gets for it, by component and number ("mean 0", "step 0")."""
+        found: dict[str, tuple[Term, tuple[Effect, ...]]] = {}
+        for term in self.terms:
+            number = sum(1 for key in found if key.rpartition(" ")[0] == term.kind_key)
+            found[f"{term.kind_key} {number}"] = (term, term.estimate(self))
+        return found
 
     def mean_part(self, term: Term) -> slice:
         """Where a term's coefficients of the mean are."""

@@ -7,7 +7,7 @@ import pytest
 
 from tests.identification.made_coarse import coarse_of, movement, wander
 from xosc_lateral.driver.effects import Acts, Linear
-from xosc_lateral.identification.held_out import estimate_all, removal_of
+from xosc_lateral.identification.held_out import removal_of
 from xosc_lateral.identification.regression import Coarse, fit_model
 from xosc_lateral.identification.terms.base import Removal
 from xosc_lateral.identification.terms.column import MeanTerm, SpreadTerm, columns_on_size, of_kind, shrunk
@@ -114,9 +114,9 @@ def test_lists_of_terms_by_what_they_act_on(coarse: Coarse) -> None:
 
 def test_terms_of_one_component_are_numbered_and_what_they_did_adds_up(coarse: Coarse) -> None:
     fitted = fit_model(coarse, (term(), term(column="rare"), term(SpreadTerm)))
-    estimates = estimate_all(fitted)
+    estimates = fitted.estimates
     assert list(estimates) == ["mean 0", "mean 1", "spread 0"]
-    removal = removal_of(fitted, estimates)
+    removal = removal_of(fitted)
     parts = [effects[0].strength(0.2, coarse.context) for key, (_, effects) in estimates.items() if "mean" in key]
     np.testing.assert_allclose(removal.location, parts[0] + parts[1], atol=1e-15)  # type: ignore[operator]
     np.testing.assert_array_equal(removal.spread, estimates["spread 0"][1][0].strength(0.2, coarse.context))
